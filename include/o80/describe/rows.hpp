@@ -1,0 +1,164 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <string_view>
+#include <type_traits>
+
+#include "o80/base/error.hpp"
+
+namespace o80 {
+
+/// What one number of a described struct is.
+enum class Kind : std::uint8_t {
+  boolean,
+  int8,
+  int16,
+  int32,
+  int64,
+  uint8,
+  uint16,
+  uint32,
+  uint64,
+  float32,
+  float64,
+  enumeration,  // an integer of 1, 2, 4 or 8 bytes with labels
+  structure,    // a nested described struct
+  text,         // a string: in options only, never in shared memory
+};
+
+/// What an actuator without commands does.
+enum class WhenIdle : std::uint8_t { hold, follow };
+
+/// A short text of fixed size, filled with zeros, that can stand in shared memory.
+template <std::size_t Size>
+struct FixedText {
+  std::array<char, Size> chars{};
+
+  FixedText() = default;
+  explicit FixedText(std::string_view text) {
+    if (text.size() >= Size) {
+      throw InvalidArgument("'" + std::string(text) + "' is too long: at most " +
+                            std::to_string(Size - 1) + " bytes are kept");
+    }
+    std::memcpy(chars.data(), text.data(), text.size());
+  }
+
+  std::string_view view() const {
+    return {chars.data(), strnlen(chars.data(), Size)};
+  }
+  std::string str() const { return std::string(view()); }
+  bool operator==(const FixedText&) const = default;
+};
+
+using NameText = FixedText<48>;
+using UnitText = FixedText<24>;
+using HelpText = FixedText<120>;
+
+inline constexpr std::uint32_t kNoType = 0xFFFFFFFF;
+
+/// One field of a described struct.
+struct FieldRow {
+  NameText name;
+  UnitText unit;
+  HelpText help;
+  std::uint32_t type = kNoType;       // of a nested struct
+  std::uint32_t offset = 0;           // from the start of the struct [bytes]
+  std::uint32_t size = 0;             // of one element [bytes]
+  std::uint32_t rows = 0;             // shape of an array field: 0 x 0 is a plain field,
+  std::uint32_t columns = 0;          // n x 0 a vector, n x m a matrix
+  std::uint32_t first_label = 0;      // of an enumeration
+  std::uint32_t labels = 0;
+  Kind kind = Kind::float64;
+  std::uint8_t is_signed = 0;         // of an enumeration
+  std::array<std::uint8_t, 2> reserved{};
+
+  std::uint32_t count() const {
+    return (rows == 0 ? 1 : rows) * (columns == 0 ? 1 : columns);
+  }
+  bool operator==(const FieldRow&) const = default;
+};
+
+/// One described struct. A type of a single nameless field is a plain number.
+struct TypeRow {
+  NameText name;
+  std::uint32_t size = 0;
+  std::uint32_t alignment = 1;
+  std::uint32_t first_field = 0;
+  std::uint32_t fields = 0;
+  bool operator==(const TypeRow&) const = default;
+};
+
+/// One value of an enumeration.
+struct LabelRow {
+  NameText name;
+  std::int64_t value = 0;
+  bool operator==(const LabelRow&) const = default;
+};
+
+/// Limits of one number of an actuator's state, in the unit of its field.
+struct LimitRow {
+  double minimum;
+  double maximum;
+  double speed;  // [1/s]
+  bool operator==(const LimitRow&) const = default;
+};
+
+/// One thing that can be commanded.
+struct ActuatorRow {
+  NameText name;
+  std::uint32_t type = 0;
+  std::uint32_t offset = 0;       // in the desired and in the observed block [bytes]
+  std::uint32_t first_limit = 0;  // one limit for each number of the state
+  std::uint32_t limits = 0;
+  std::uint32_t group = 0;
+  WhenIdle when_idle = WhenIdle::hold;
+  std::array<std::uint8_t, 3> reserved{};
+  bool operator==(const ActuatorRow&) const = default;
+};
+
+/// Neighbouring actuators of one type that a robot names together ("joints"); an array or a single.
+struct GroupRow {
+  NameText name;  // empty: the robot is one array of actuators
+  std::uint32_t type = 0;
+  std::uint32_t offset = 0;
+  std::uint32_t first_actuator = 0;
+  std::uint32_t count = 0;
+  std::uint32_t is_array = 0;
+  bool operator==(const GroupRow&) const = default;
+};
+
+/// One message a driver understands.
+struct RequestRow {
+  NameText name;
+  HelpText help;
+  std::uint32_t type = kNoType;
+  std::uint32_t reserved = 0;
+  bool operator==(const RequestRow&) const = default;
+};
+
+/// Which clock the times of a history come from.
+enum class Clock : std::uint8_t { monotonic, simulated };
+
+/// What holds for a whole robot.
+struct SchemaHead {
+  NameText robot;
+  std::int64_t period = 0;           // [ns]
+  std::uint32_t extended = kNoType;  // type of the sensor values
+  std::uint32_t block = 0;           // size of the desired and of the observed block [bytes]
+  Clock clock = Clock::monotonic;
+  std::uint8_t bursting = 0;
+  std::array<std::uint8_t, 6> reserved{};
+  bool operator==(const SchemaHead&) const = default;
+};
+
+static_assert(std::is_trivially_copyable_v<FieldRow> && std::is_standard_layout_v<FieldRow>);
+static_assert(std::is_trivially_copyable_v<TypeRow> && std::is_trivially_copyable_v<LabelRow>);
+static_assert(std::is_trivially_copyable_v<LimitRow> && std::is_trivially_copyable_v<ActuatorRow>);
+static_assert(std::is_trivially_copyable_v<GroupRow> && std::is_trivially_copyable_v<RequestRow>);
+static_assert(std::is_trivially_copyable_v<SchemaHead>);
+
+}  // namespace o80

@@ -1,0 +1,299 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "o80/describe/hooks.hpp"
+#include "o80/describe/rows.hpp"
+
+namespace o80 {
+
+/// Limits of one number of a state, as a driver gives them; what is not given is not limited.
+struct Limits {
+  double minimum = -std::numeric_limits<double>::infinity();
+  double maximum = std::numeric_limits<double>::infinity();
+  double speed = std::numeric_limits<double>::infinity();  // [1/s]
+};
+
+class Schema;
+
+/// One actuator while a driver describes it: `schema.actuator("elbow").limits({.maximum = 1.0})`.
+class ActuatorDescription {
+ public:
+  ActuatorDescription(Schema& schema, std::uint32_t index) : schema_(schema), index_(index) {}
+
+  ActuatorDescription& name(std::string_view name);
+  ActuatorDescription& when_idle(WhenIdle when_idle);
+  /// Limits of the first number of the state.
+  ActuatorDescription& limits(const Limits& limits);
+  /// Limits of a named field of the state (of every element of an array field).
+  ActuatorDescription& limits(std::string_view field, const Limits& limits);
+
+ private:
+  Schema& schema_;
+  std::uint32_t index_;
+};
+
+/// What a robot is made of, as a table of fixed-size rows that can stand in shared memory.
+///
+/// Header-only: a robot library describes itself without linking o80.
+class Schema {
+ public:
+  SchemaHead head;
+  std::vector<TypeRow> types;
+  std::vector<FieldRow> fields;
+  std::vector<LabelRow> labels;
+  std::vector<GroupRow> groups;
+  std::vector<ActuatorRow> actuators;
+  std::vector<LimitRow> limits;
+  std::vector<RequestRow> requests;
+  std::vector<TypeHooks> hooks;  // one for each type; stays in the backend's process
+
+  // a driver's describe()
+  ActuatorDescription actuator(std::uint32_t index);
+  ActuatorDescription actuator(std::string_view name);
+
+  // layouts known only at run time; see also the typed description in describe.hpp
+  /// Adds a type from its fields (offsets and sizes are computed), gives its index.
+  std::uint32_t add_type(std::string_view name, std::vector<FieldRow> members);
+  /// Adds an array of actuators, or a single one, behind those there are; gives the group's index.
+  std::uint32_t add_actuators(std::string_view group, std::uint32_t type, std::uint32_t count,
+                              bool is_array = true);
+  std::uint32_t add_request(std::string_view name, std::uint32_t type, std::string_view help);
+
+  /// Calls `visit(offset, const FieldRow&)` for every number of a type, nested ones included.
+  template <class Visit>
+  void each_scalar(std::uint32_t type, Visit&& visit, std::uint32_t base = 0) const;
+  std::uint32_t scalar_count(std::uint32_t type) const;
+
+  bool operator==(const Schema& other) const {
+    return head == other.head && types == other.types && fields == other.fields &&
+           labels == other.labels && groups == other.groups && actuators == other.actuators &&
+           limits == other.limits && requests == other.requests;
+  }
+
+  /// The place of an actuator that is described already; used by the typed description.
+  void place_group(std::string_view group, std::uint32_t type, std::uint32_t offset,
+                   std::uint32_t count, bool is_array);
+};
+
+/// Size in shared memory of a number of this kind [bytes].
+constexpr std::uint32_t size_of(Kind kind) {
+  switch (kind) {
+    case Kind::boolean:
+    case Kind::int8:
+    case Kind::uint8:
+      return 1;
+    case Kind::int16:
+    case Kind::uint16:
+      return 2;
+    case Kind::int32:
+    case Kind::uint32:
+    case Kind::float32:
+      return 4;
+    case Kind::int64:
+    case Kind::uint64:
+    case Kind::float64:
+      return 8;
+    default:
+      return 0;
+  }
+}
+
+/// A plain field for `Schema::add_type`: `scalar_field("position", Kind::float64, "[rad]")`.
+FieldRow scalar_field(std::string_view name, Kind kind, std::string_view text = "",
+                      std::uint32_t rows = 0, std::uint32_t columns = 0);
+
+/// Splits "of the loop [Nm/rad]" into unit and help.
+void set_text(FieldRow& field, std::string_view text);
+
+inline constexpr std::uint32_t round_up(std::uint32_t value, std::uint32_t step) {
+  return (value + step - 1) / step * step;
+}
+
+// ---------------------------------------------------------------------------------------------
+
+inline void set_text(FieldRow& field, std::string_view text) {
+  const auto open = text.rfind('[');
+  const auto close = text.rfind(']');
+  if (open == std::string_view::npos || close == std::string_view::npos || close < open) {
+    field.help = HelpText(text);
+    return;
+  }
+  field.unit = UnitText(text.substr(open + 1, close - open - 1));
+  auto help = text.substr(0, open);
+  while (!help.empty() && help.back() == ' ') help.remove_suffix(1);
+  field.help = HelpText(help);
+}
+
+inline FieldRow scalar_field(std::string_view name, Kind kind, std::string_view text,
+                             std::uint32_t rows, std::uint32_t columns) {
+  FieldRow field;
+  field.name = NameText(name);
+  field.kind = kind;
+  field.size = size_of(kind);
+  field.rows = rows;
+  field.columns = columns;
+  set_text(field, text);
+  return field;
+}
+
+inline std::uint32_t Schema::add_type(std::string_view name, std::vector<FieldRow> members) {
+  TypeRow type;
+  type.name = NameText(name);
+  type.first_field = static_cast<std::uint32_t>(fields.size());
+  type.fields = static_cast<std::uint32_t>(members.size());
+  std::uint32_t end = 0;
+  for (FieldRow& field : members) {
+    const bool nested = field.kind == Kind::structure;
+    const std::uint32_t alignment = nested ? types.at(field.type).alignment : field.size;
+    if (alignment == 0) {
+      throw InvalidArgument("field '" + field.name.str() + "' of '" + std::string(name) +
+                            "' has no size: give its kind (or, for an enumeration, its size)");
+    }
+    if (nested) field.size = types.at(field.type).size;
+    field.offset = round_up(end, alignment);
+    end = field.offset + field.size * field.count();
+    type.alignment = alignment > type.alignment ? alignment : type.alignment;
+    fields.push_back(field);
+  }
+  type.size = round_up(end, type.alignment);
+  types.push_back(type);
+  hooks.emplace_back();
+  return static_cast<std::uint32_t>(types.size() - 1);
+}
+
+template <class Visit>
+void Schema::each_scalar(std::uint32_t type, Visit&& visit, std::uint32_t base) const {
+  const TypeRow& row = types.at(type);
+  for (std::uint32_t i = 0; i < row.fields; ++i) {
+    const FieldRow& field = fields.at(row.first_field + i);
+    for (std::uint32_t element = 0; element < field.count(); ++element) {
+      const std::uint32_t offset = base + field.offset + element * field.size;
+      if (field.kind == Kind::structure) {
+        each_scalar(field.type, visit, offset);
+      } else {
+        visit(offset, field);
+      }
+    }
+  }
+}
+
+inline std::uint32_t Schema::scalar_count(std::uint32_t type) const {
+  std::uint32_t count = 0;
+  each_scalar(type, [&](std::uint32_t, const FieldRow&) { ++count; });
+  return count;
+}
+
+inline void Schema::place_group(std::string_view group, std::uint32_t type, std::uint32_t offset,
+                                std::uint32_t count, bool is_array) {
+  GroupRow row;
+  row.name = NameText(group);
+  row.type = type;
+  row.offset = offset;
+  row.first_actuator = static_cast<std::uint32_t>(actuators.size());
+  row.count = count;
+  row.is_array = is_array ? 1 : 0;
+  const std::uint32_t scalars = scalar_count(type);
+  const std::uint32_t stride = types.at(type).size;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    ActuatorRow actuator;
+    const std::string prefix(group);
+    actuator.name = NameText(is_array ? (prefix.empty() ? "actuator_" : prefix + "_") +
+                                            std::to_string(i)
+                                      : prefix);
+    actuator.type = type;
+    actuator.offset = offset + i * stride;
+    actuator.group = static_cast<std::uint32_t>(groups.size());
+    actuator.first_limit = static_cast<std::uint32_t>(limits.size());
+    actuator.limits = scalars;
+    actuators.push_back(actuator);
+    const Limits none;
+    limits.insert(limits.end(), scalars, LimitRow{none.minimum, none.maximum, none.speed});
+  }
+  groups.push_back(row);
+}
+
+inline std::uint32_t Schema::add_actuators(std::string_view group, std::uint32_t type,
+                                           std::uint32_t count, bool is_array) {
+  const std::uint32_t offset = round_up(head.block, types.at(type).alignment);
+  place_group(group, type, offset, count, is_array);
+  head.block = offset + count * types.at(type).size;
+  return static_cast<std::uint32_t>(groups.size() - 1);
+}
+
+inline std::uint32_t Schema::add_request(std::string_view name, std::uint32_t type,
+                                         std::string_view help) {
+  RequestRow row;
+  row.name = NameText(name);
+  row.help = HelpText(help);
+  row.type = type;
+  requests.push_back(row);
+  return static_cast<std::uint32_t>(requests.size() - 1);
+}
+
+inline ActuatorDescription Schema::actuator(std::uint32_t index) {
+  if (index >= actuators.size()) {
+    throw InvalidArgument("there is no actuator " + std::to_string(index) + ": '" +
+                          head.robot.str() + "' has " + std::to_string(actuators.size()));
+  }
+  return {*this, index};
+}
+
+inline ActuatorDescription Schema::actuator(std::string_view name) {
+  std::string there;
+  for (std::uint32_t i = 0; i < actuators.size(); ++i) {
+    if (actuators[i].name.view() == name) return {*this, i};
+    there += (i == 0 ? "" : ", ") + actuators[i].name.str();
+  }
+  throw InvalidArgument("there is no actuator '" + std::string(name) + "'; there are: " + there);
+}
+
+inline ActuatorDescription& ActuatorDescription::name(std::string_view name) {
+  schema_.actuators[index_].name = NameText(name);
+  return *this;
+}
+
+inline ActuatorDescription& ActuatorDescription::when_idle(WhenIdle when_idle) {
+  schema_.actuators[index_].when_idle = when_idle;
+  return *this;
+}
+
+inline ActuatorDescription& ActuatorDescription::limits(const Limits& limits) {
+  const ActuatorRow& row = schema_.actuators[index_];
+  if (row.limits > 0) {
+    schema_.limits[row.first_limit] = {limits.minimum, limits.maximum, limits.speed};
+  }
+  return *this;
+}
+
+inline ActuatorDescription& ActuatorDescription::limits(std::string_view field,
+                                                        const Limits& limits) {
+  const ActuatorRow& row = schema_.actuators[index_];
+  const TypeRow& type = schema_.types.at(row.type);
+  std::uint32_t scalar = row.first_limit;
+  std::string there;
+  for (std::uint32_t i = 0; i < type.fields; ++i) {
+    const FieldRow& member = schema_.fields.at(type.first_field + i);
+    const std::uint32_t inside =
+        member.kind == Kind::structure ? schema_.scalar_count(member.type) : 1;
+    const std::uint32_t numbers = inside * member.count();
+    if (member.name.view() == field) {
+      for (std::uint32_t n = 0; n < numbers; ++n) {
+        schema_.limits[scalar + n] = {limits.minimum, limits.maximum, limits.speed};
+      }
+      return *this;
+    }
+    there += (i == 0 ? "" : ", ") + member.name.str();
+    scalar += numbers;
+  }
+  throw InvalidArgument("'" + type.name.str() + "' has no field '" + std::string(field) +
+                        "'; there are: " + there);
+}
+
+}  // namespace o80

@@ -1,0 +1,34 @@
+#include "o80/base/time.hpp"
+
+#include <time.h>
+
+#include <algorithm>
+#include <limits>
+
+namespace o80 {
+
+namespace {
+constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
+}
+
+std::int64_t monotonic_now() noexcept {
+  timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return static_cast<std::int64_t>(now.tv_sec) * 1'000'000'000 + now.tv_nsec;
+}
+
+Deadline::Deadline(Timeout timeout) noexcept : end_(kNever) {
+  if (!timeout) return;
+  const std::int64_t now = monotonic_now();
+  const std::int64_t wait = std::max<std::int64_t>(timeout->count(), 0);
+  end_ = wait > kNever - now ? kNever : now + wait;
+}
+
+bool Deadline::over() const noexcept { return end_ != kNever && monotonic_now() >= end_; }
+
+std::int64_t Deadline::left(std::int64_t cap) const noexcept {
+  if (end_ == kNever) return cap;
+  return std::clamp<std::int64_t>(end_ - monotonic_now(), 0, cap);
+}
+
+}  // namespace o80
