@@ -1,0 +1,1 @@
+"""Table tennis with a pneumatic arm: real robot, simulated ball."""

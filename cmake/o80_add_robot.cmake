@@ -1,0 +1,22 @@
+# o80_add_robot(name source...)
+#
+# Builds the robot library <name>.so from sources of which one contains O80_ROBOT(name, Driver).
+# The target is called <name>: link to it what the hardware needs. The library uses o80's headers
+# only; the program that loads it brings the compiled loop.
+function(o80_add_robot name)
+  add_library(${name} MODULE ${ARGN})
+  target_compile_features(${name} PRIVATE cxx_std_20)
+  target_link_libraries(${name} PRIVATE o80::headers)
+  # a symbol that nobody defines is an error here, not when the robot is started
+  target_link_options(${name} PRIVATE -Wl,--no-undefined)
+  set_target_properties(
+    ${name}
+    PROPERTIES PREFIX ""
+               SUFFIX ".so"
+               CXX_VISIBILITY_PRESET hidden
+               VISIBILITY_INLINES_HIDDEN ON
+  )
+  if(DEFINED O80_ROBOT_BUILD_DIR)
+    set_target_properties(${name} PROPERTIES LIBRARY_OUTPUT_DIRECTORY ${O80_ROBOT_BUILD_DIR})
+  endif()
+endfunction()

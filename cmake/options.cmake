@@ -1,0 +1,38 @@
+# What to build. A user who only wants the library needs none of these.
+if(DEFINED SKBUILD)
+  set(building_wheel ON)
+else()
+  set(building_wheel OFF)
+endif()
+
+option(O80_BUILD_PYTHON "Build the Python module o80._core" ${building_wheel})
+option(O80_BUILD_TESTS "Build the C++ tests (needs GoogleTest)" OFF)
+option(O80_BUILD_EXAMPLES "Build the C++ examples" OFF)
+option(O80_BUILD_BENCHMARKS "Build the benchmarks (needs google-benchmark)" OFF)
+option(O80_WERROR "Treat warnings as errors" OFF)
+option(O80_CCACHE "Compile through ccache where it is installed" OFF)
+set(O80_BUILD_MUJOCO "AUTO" CACHE STRING "Build the MuJoCo simulator: AUTO (if MuJoCo is found), ON or OFF")
+set_property(CACHE O80_BUILD_MUJOCO PROPERTY STRINGS AUTO ON OFF)
+set(O80_SANITIZE "" CACHE STRING "Sanitizers for everything built, as for -fsanitize=")
+
+if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "Kind of build" FORCE)
+endif()
+
+if(O80_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+  find_program(O80_CCACHE_PROGRAM ccache)
+  if(O80_CCACHE_PROGRAM)
+    set(CMAKE_CXX_COMPILER_LAUNCHER ${O80_CCACHE_PROGRAM})
+  endif()
+endif()
+
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+
+if(O80_SANITIZE)
+  add_compile_options(-fsanitize=${O80_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  add_link_options(-fsanitize=${O80_SANITIZE})
+endif()

@@ -1,0 +1,10 @@
+# Every file of src/programs is a program of its own.
+file(GLOB o80_program_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/programs/*.cpp)
+set(o80_programs)
+foreach(source IN LISTS o80_program_sources)
+  cmake_path(GET source STEM program)
+  add_executable(${program} ${source})
+  target_link_libraries(${program} PRIVATE o80 o80_warnings)
+  set_target_properties(${program} PROPERTIES INSTALL_RPATH "$ORIGIN/../${CMAKE_INSTALL_LIBDIR}")
+  list(APPEND o80_programs ${program})
+endforeach()
