@@ -33,3 +33,12 @@ foreach(folder IN LISTS test_folders)
     ${target} DISCOVERY_MODE PRE_TEST TEST_PREFIX "${folder}." PROPERTIES TIMEOUT 120
   )
 endforeach()
+
+# each C++ file of tests/processes is a program that the process tests start: bin/<stem>
+file(GLOB process_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tests/processes/*.cpp)
+foreach(source IN LISTS process_sources)
+  cmake_path(GET source STEM program)
+  add_executable(${program} ${source})
+  target_include_directories(${program} PRIVATE ${PROJECT_SOURCE_DIR})
+  target_link_libraries(${program} PRIVATE o80 o80_warnings)
+endforeach()

@@ -1,0 +1,80 @@
+"""What every test session promises: it leaves no process and no shared memory behind."""
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TypeVar
+
+import pytest
+
+os.environ.setdefault("HYPOTHESIS_STORAGE_DIRECTORY", "build/hypothesis")
+
+ROOT = Path(__file__).resolve().parent.parent
+SHARED_MEMORY = Path("/dev/shm")
+GRACE = 5.0  # [s] for the last to die
+
+Found = TypeVar("Found", int, Path)
+
+
+def segment_files() -> set[Path]:
+    """Files of o80 in shared memory."""
+    return {*SHARED_MEMORY.glob("o80-*"), *SHARED_MEMORY.glob(".o80-*")}
+
+
+def abandoned_files() -> set[Path]:
+    """Those that no living process has mapped: others may run beside these tests."""
+    abandoned = segment_files()
+    for maps in Path("/proc").glob("[0-9]*/maps") if abandoned else ():
+        try:
+            text = maps.read_text()
+        except OSError:
+            continue
+        abandoned = {file for file in abandoned if str(file) not in text}
+    return abandoned
+
+
+def command_line(process: int) -> str:
+    """The words a process was started with; empty once it is dead."""
+    try:
+        return Path(f"/proc/{process}/cmdline").read_text().replace("\0", " ")
+    except OSError:
+        return ""
+
+
+def children() -> set[int]:
+    """Living child processes of all threads of this one."""
+    found = {
+        int(child)
+        for task in Path("/proc/self/task").iterdir()
+        for child in (task / "children").read_text().split()
+    }
+    own = {child for child in found if "multiprocessing.resource_tracker" in command_line(child)}
+    return {child for child in found - own if command_line(child)}
+
+
+def left_over(found: Callable[[], set[Found]], before: set[Found]) -> list[Found]:
+    """What was found beyond what was there before, once the dying have died."""
+    end = time.monotonic() + GRACE
+    while (rest := found() - before) and time.monotonic() < end:
+        time.sleep(0.05)
+    return sorted(rest)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def nothing_left_behind() -> Iterator[None]:
+    processes, files = children(), segment_files()
+    yield
+    living = [command_line(child) for child in left_over(children, processes)]
+    assert not living, f"the tests left processes behind: {living}"
+    abandoned = left_over(abandoned_files, files)
+    assert not abandoned, f"the tests left shared memory behind: {abandoned}"
+
+
+@pytest.fixture(scope="session")
+def build_prefix() -> Path:
+    """The build folder of the preset dev, laid out like an installation (bin, lib)."""
+    prefix = ROOT / "build" / "dev"
+    if not (prefix / "lib" / "libo80.so").exists():
+        pytest.fail("the C++ side is not built: make test ARGS=dev")
+    return prefix

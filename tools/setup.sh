@@ -1,0 +1,84 @@
+#!/usr/bin/env bash
+# Sets up what a make target needs: tools/setup.sh demo|test|bench
+# Nothing is done twice; stamps of what was done lie in .venv/stamps.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+purpose=${1:?demo, test or bench}
+
+mkdir -p build
+exec 9> build/setup.lock
+flock 9
+
+say() { printf '== %s\n' "$*" >&2; }
+
+# Debian packages that are missing: asked for as root, named otherwise
+need_packages() {
+  local missing=()
+  for package in "$@"; do
+    [ "$(dpkg-query -W -f '${Status}' "$package" 2> /dev/null)" = "install ok installed" ] ||
+      missing+=("$package")
+  done
+  [ ${#missing[@]} -eq 0 ] && return
+  if ! command -v apt-get > /dev/null || [ "$(id -u)" -ne 0 ]; then
+    say "missing, please install: apt-get install ${missing[*]}"
+    return 1
+  fi
+  say "installing ${missing[*]}"
+  export DEBIAN_FRONTEND=noninteractive
+  apt-get install -y -qq --no-install-recommends "${missing[@]}" > build/apt.log 2>&1 ||
+    { apt-get update -qq && apt-get install -y -qq --no-install-recommends "${missing[@]}"; } \
+      > build/apt.log 2>&1 || { tail -n 20 build/apt.log >&2; return 1; }
+}
+
+# runs the command only if what it depends on has changed since it last succeeded
+once() {
+  local stamp=.venv/stamps/$1 state=$2
+  shift 2
+  [ "$(cat "$stamp" 2> /dev/null)" = "$state" ] && return
+  "$@"
+  mkdir -p .venv/stamps
+  echo "$state" > "$stamp"
+}
+
+state_of() { find "$@" -type f ! -name '*.pyc' -print0 | sort -z | xargs -0 sha256sum | sha256sum; }
+
+pip() { .venv/bin/python -m pip -q --disable-pip-version-check "$@"; }
+
+make_environment() {
+  local python
+  for python in python3 python3.11 python3.12 python3.13; do
+    "$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2> /dev/null && break
+    python=
+  done
+  [ -n "$python" ] || { say "Python 3.11 or later is needed"; return 1; }
+  "$python" -c 'import ensurepip' 2> /dev/null || need_packages python3-venv python3-dev
+  say "making .venv"
+  "$python" -m venv --clear .venv
+}
+
+install_tools() {
+  say "installing what building ${1:+and testing }needs"
+  pip install 'pip>=25.1'
+  .venv/bin/python tools/build_requirements.py > build/requirements.txt
+  pip install -r build/requirements.txt --group build ${1:+--group "$1"}
+}
+
+install_o80() {
+  say "building and installing o80"
+  pip install --no-build-isolation -Cbuild-dir=build/pip '.[rendering]'
+}
+
+case $purpose in
+  demo) ;;
+  test) need_packages g++ libgtest-dev libgmock-dev strace ;;
+  bench) need_packages g++ libbenchmark-dev rt-tests ;;
+  *) say "unknown purpose '$purpose'"; exit 2 ;;
+esac
+# pictures without a screen; without it the demo goes on and says so
+need_packages libosmesa6 || true
+
+.venv/bin/python -c '' 2> /dev/null || make_environment
+group=$([ "$purpose" = test ] && echo test || true)
+once "tools-${group:-build}" "$(state_of pyproject.toml)" install_tools "$group"
+once o80 "$(state_of pyproject.toml CMakeLists.txt README.md LICENSE cmake include src python \
+  $(ls -d robots simulators apps 2> /dev/null))" install_o80

@@ -1,0 +1,27 @@
+"""Which files of the tree are ours to format and to check."""
+
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+FOLDERS = (
+    "include",
+    "src",
+    "python",
+    "robots",
+    "simulators",
+    "apps",
+    "examples",
+    "benchmarks",
+    "tests",
+    "tools",
+)
+
+
+def cpp_files() -> list[str]:
+    """All C++ files, relative to the root."""
+    return sorted(
+        str(file.relative_to(ROOT))
+        for folder in FOLDERS
+        for suffix in ("hpp", "cpp")
+        for file in (ROOT / folder).rglob(f"*.{suffix}")
+    )

@@ -1,0 +1,96 @@
+"""Runs all tests, or the steps named on the command line, and stops at the first that fails.
+
+What a step prints goes to build/test/<step>.log; its closing lines are shown, and all of it when
+it fails.
+"""
+
+import argparse
+import os
+import subprocess
+import sys
+import time
+from collections import deque
+from pathlib import Path
+
+from sources import ROOT
+
+JOBS = str(len(os.sched_getaffinity(0)))
+LOGS = ROOT / "build" / "test"
+
+
+def typed_folders() -> list[str]:
+    """Folders outside the package whose Python is type-checked too."""
+    folders = ("tools", "benchmarks", "examples")
+    return [folder for folder in folders if any((ROOT / folder).rglob("*.py"))]
+
+
+def cpp(preset: str) -> list[list[str]]:
+    """Commands that build a preset and run its tests."""
+    # a thread sanitizer of this age cannot stand the widest address randomisation
+    random_bits = int(Path("/proc/sys/vm/mmap_rnd_bits").read_text())
+    fixed_addresses = ["setarch", "-R"] if preset == "tsan" and random_bits > 28 else []
+    return [
+        ["cmake", "--preset", preset],
+        ["cmake", "--build", "--preset", preset, "-j", JOBS],
+        [*fixed_addresses, "ctest", "--preset", preset, "-j", JOBS],
+    ]
+
+
+PYTHON = [sys.executable, "-m"]
+STEPS: dict[str, list[list[str]]] = {
+    "format": [[sys.executable, "tools/format.py", "--check"]],
+    "ruff": [["ruff", "check", "."]],
+    "mypy": [
+        [*PYTHON, "mypy", "-p", "o80", "-p", "o80_table_tennis"],
+        *([*PYTHON, "mypy", folder] for folder in typed_folders()),
+    ],
+    "dev": cpp("dev"),
+    "tidy": [[sys.executable, "tools/tidy.py"]],
+    "asan": cpp("asan"),
+    "tsan": cpp("tsan"),
+    "pytest": [[*PYTHON, "pytest"]],
+}
+CLOSING_LINES = {"dev": 3, "asan": 3, "tsan": 3}
+
+
+def run(name: str) -> bool:
+    """Runs one step; says how it went."""
+    log = LOGS / f"{name}.log"
+    print(f"== {name}", flush=True)
+    begin = time.monotonic()
+    with log.open("w") as output:
+        for command in STEPS[name]:
+            result = subprocess.run(command, cwd=ROOT, stdout=output, stderr=subprocess.STDOUT)
+            if result.returncode != 0:
+                break
+    passed = result.returncode == 0
+    with log.open(errors="replace") as text:
+        print(*deque(text, CLOSING_LINES.get(name, 1) if passed else 400), sep="", end="")
+    seconds = time.monotonic() - begin
+    print(f"== {name}: {'passed' if passed else 'FAILED'} in {seconds:.0f} s", flush=True)
+    return passed
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("steps", nargs="*", help=f"of {', '.join(STEPS)}; all by default")
+    parser.add_argument("--keep-going", action="store_true", help="run the steps after a failure")
+    arguments = parser.parse_args()
+    unknown = set(arguments.steps) - set(STEPS)
+    if unknown:
+        parser.error(f"no step {', '.join(sorted(unknown))}; there are {', '.join(STEPS)}")
+
+    os.environ.setdefault("CCACHE_DIR", str(ROOT / "build" / "ccache"))
+    LOGS.mkdir(parents=True, exist_ok=True)
+    failed = []
+    for name in arguments.steps or STEPS:
+        if not run(name):
+            failed.append(name)
+            if not arguments.keep_going:
+                break
+    print(f"failed: {', '.join(failed)} (build/test)" if failed else "all steps passed")
+    return int(bool(failed))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
