@@ -2,6 +2,8 @@
 
 namespace o80 {
 
-std::string_view version() noexcept { return O80_VERSION; }
+std::string_view version() noexcept {
+  return O80_VERSION;
+}
 
 }  // namespace o80

@@ -2,4 +2,6 @@
 
 #include "o80/base/version.hpp"
 
-int main() { std::cout << o80::version() << '\n'; }
+int main() {
+  std::cout << o80::version() << '\n';
+}
