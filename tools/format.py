@@ -19,7 +19,7 @@ def check_cpp() -> bool:
     )
     unformatted = sorted(set(re.findall(r"^(\S+?):\d+:\d+: ", result.stderr, re.MULTILINE)))
     for file in unformatted:
-        print(f"not formatted: {file} (make format)")
+        print(f"not formatted: {file} (make format)", flush=True)
     return result.returncode == 0 and not unformatted
 
 
