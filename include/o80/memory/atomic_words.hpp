@@ -1,0 +1,39 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <string_view>
+
+namespace o80 {
+
+// Shared memory that another process may be writing is copied in relaxed atomic words of 8 bytes.
+// `shared` is aligned to 8, `bytes` is a multiple of 8, the private side needs no alignment.
+
+inline void store_words(std::byte* shared, const std::byte* from, std::size_t bytes) noexcept {
+  auto* words = reinterpret_cast<std::uint64_t*>(shared);
+  for (std::size_t i = 0; i < bytes / 8; ++i) {
+    std::uint64_t word;
+    std::memcpy(&word, from + 8 * i, 8);
+    std::atomic_ref(words[i]).store(word, std::memory_order_relaxed);
+  }
+}
+
+inline void load_words(std::byte* to, const std::byte* shared, std::size_t bytes) noexcept {
+  auto* words = reinterpret_cast<std::uint64_t*>(const_cast<std::byte*>(shared));
+  for (std::size_t i = 0; i < bytes / 8; ++i) {
+    const std::uint64_t word = std::atomic_ref(words[i]).load(std::memory_order_relaxed);
+    std::memcpy(to + 8 * i, &word, 8);
+  }
+}
+
+/// Writes a text, cut to what fits, with at least one zero behind it. Release: see `load_text`.
+void store_text(std::atomic<std::uint64_t>* words, std::size_t count,
+                std::string_view text) noexcept;
+
+/// Reads a text up to its zero; may be of mixed age, never out of bounds.
+std::string load_text(const std::atomic<std::uint64_t>* words, std::size_t count);
+
+}  // namespace o80

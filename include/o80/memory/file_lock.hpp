@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "o80/memory/fork.hpp"
+
+namespace o80 {
+
+inline constexpr std::uint64_t kBackendByte = 0;
+inline constexpr std::uint64_t kFirstLaneByte = 16;
+
+/// True if anybody, this process included, holds that byte through another descriptor.
+bool is_byte_locked(int descriptor, std::uint64_t byte) noexcept;
+
+/// Move-only: an open file that is never mapped and bears open-file-description locks.
+///
+/// A forked child closes its copy at once, without unlocking: the lock dies with this process
+/// and with nothing else.
+class LockFile {
+ public:
+  LockFile() noexcept = default;
+  /// Takes over an open, close-on-exec descriptor.
+  explicit LockFile(int descriptor);
+  LockFile(LockFile&& other) noexcept;
+  LockFile& operator=(LockFile&& other) noexcept;
+  ~LockFile();
+
+  bool is_open() const noexcept { return descriptor_ >= 0; }
+  int descriptor() const noexcept { return descriptor_; }
+  /// True if the byte is now held through this file.
+  bool try_lock(std::uint64_t byte) noexcept;
+  void unlock(std::uint64_t byte) noexcept;
+  void close() noexcept;
+
+ private:
+  int descriptor_ = -1;
+  ForkGuard guard_;
+};
+
+}  // namespace o80

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+#include <mutex>
+#include <string_view>
+
+namespace o80 {
+
+/// How many forks lie between the first process and this one.
+std::uint64_t process_generation() noexcept;
+
+/// Locked around every fork: registries of the process are whole in the child.
+std::mutex& fork_mutex() noexcept;
+
+/// Remembers the process an object was made in.
+class ForkGuard {
+ public:
+  ForkGuard() noexcept;
+  bool forked() const noexcept { return generation_ != process_generation(); }
+  /// Throws UsedAfterFork; `what` is for example "segment 'pam'".
+  void check(std::string_view what) const;
+
+ private:
+  std::uint64_t generation_;
+};
+
+}  // namespace o80

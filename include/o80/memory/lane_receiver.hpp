@@ -1,0 +1,106 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string_view>
+
+#include "o80/memory/segment_layout.hpp"
+#include "o80/memory/status_word.hpp"
+
+namespace o80 {
+
+/// The backend's end of one lane.
+///
+/// Trusts nothing that the frontend can write: its cursor is private, blocks are copied out in
+/// whole before anybody looks at them, impossible counters reset the lane.
+///
+/// Writer:   the backend's thread.
+/// Readers:  LaneSender.
+/// Realtime: yes; flush() makes one system call if somebody sleeps.
+class LaneReceiver {
+ public:
+  LaneReceiver(const SegmentView& view, std::uint32_t lane) noexcept;
+
+  /// Committed blocks not taken yet; resets the lane and answers 0 if that is impossible.
+  std::uint32_t available() noexcept;
+  /// Copies the next block (64 bytes) and moves on; false if none is committed.
+  bool take(std::byte* block) noexcept;
+  /// 8 bytes at `offset` of the next block, to be asked only if one is available.
+  std::uint64_t peek_word(std::size_t offset) const noexcept;
+  /// Forgets what is committed and not taken: after garbage. What was taken stays in flight.
+  void reset() noexcept;
+  /// How often that happened.
+  std::uint64_t resets() const noexcept { return resets_; }
+
+  /// Gives back blocks that were taken; the sender sees it at the next flush.
+  void free(std::uint32_t blocks) noexcept;
+  /// Blocks taken and not given back.
+  std::uint64_t in_flight() const noexcept { return cursor_ - freed_; }
+
+  /// Visible at once; wakes nobody until flag() and flush().
+  void set_status(std::uint64_t id, StatusWord word) noexcept;
+  /// A text for an id, cut to 247 bytes; to be written before the status that it explains.
+  void set_message(std::uint64_t id, std::string_view text) noexcept;
+  void set_staged(std::uint64_t id) noexcept;
+  /// Both flag.
+  void set_ended(std::uint64_t id) noexcept;
+  void set_burst_done(std::uint64_t id, Iteration row) noexcept;
+  /// Asks for the lane's waiters to be woken at the next flush.
+  void flag() noexcept { flagged_ = true; }
+  /// Publishes what was freed and wakes, both only if there is cause; once an iteration.
+  void flush() noexcept;
+
+  /// Owner of the lane as its page has it: a count, 0 if never taken; and the last that closed.
+  std::uint64_t incarnation() const noexcept;
+  std::uint64_t closed() const noexcept;
+
+ private:
+  LaneSenderPage* page_;
+  LaneFeedback* feedback_;
+  StatusSlot* statuses_;
+  std::byte* transport_;
+  std::uint64_t mask_;
+  std::uint64_t cursor_ = 0;
+  std::uint64_t freed_ = 0;
+  std::uint64_t freed_published_ = 0;
+  std::uint64_t bursts_ = 0;
+  std::uint64_t messages_ = 0;
+  std::uint64_t resets_ = 0;
+  bool flagged_ = false;
+};
+
+/// All lanes, and the order of their batches.
+///
+/// Writer / Readers / Realtime: as LaneReceiver.
+class LaneReceivers {
+ public:
+  /// `ticket_offset`: where in its first block a batch bears its ticket.
+  LaneReceivers(const SegmentView& view, std::size_t ticket_offset);
+
+  std::uint32_t size() const noexcept { return static_cast<std::uint32_t>(lanes_.size()); }
+  LaneReceiver& operator[](std::uint32_t lane) noexcept { return lanes_[lane]; }
+
+  /// Begins to look for batches: remembers bell and tickets. False if nothing can be there.
+  bool look() noexcept;
+  /// The lane whose next batch is the next of all below the remembered ticket; it is to be taken
+  /// whole (or the lane reset) before the next call. Empty when there is no more.
+  std::optional<std::uint32_t> next() noexcept;
+  /// Makes the next look() look whatever the bell says (a lane's owner died).
+  void look_again() noexcept { pending_ = true; }
+  /// The bell as look() found it, for BellWaiter::wait.
+  std::uint32_t bell_seen() const noexcept { return bell_seen_; }
+  /// flush() on every lane.
+  void flush_events() noexcept;
+
+ private:
+  SegmentView view_;
+  std::size_t ticket_offset_;
+  std::deque<LaneReceiver> lanes_;
+  std::uint32_t bell_seen_ = 0;
+  std::uint64_t below_ = 0;
+  bool pending_ = true;
+};
+
+}  // namespace o80

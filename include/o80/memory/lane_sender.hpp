@@ -1,0 +1,101 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+
+#include "o80/memory/segment.hpp"
+#include "o80/memory/signal.hpp"
+#include "o80/memory/status_word.hpp"
+
+namespace o80 {
+
+/// Move-only: a lane taken by a frontend; given back by the destructor, or by the kernel.
+///
+/// Ids and positions go on where former owners left them.
+///
+/// Writer:   its owner, which guards the sending calls (next_ids, free_blocks, send) if it has
+///           several threads.
+/// Readers:  the backend; statuses, bursts, messages and waits may be asked from any thread.
+/// Realtime: send and the questions, yes; taking and waiting, no.
+class LaneSender {
+ public:
+  enum class Known { not_yet, yes, forgotten };
+  struct StatusAnswer {
+    Known known;
+    StatusWord word;  // if known == yes
+  };
+  struct BurstAnswer {
+    Known known;
+    Iteration row;  // of its last iteration, if known == yes
+  };
+
+  /// Takes the first free lane of a segment attached with Access::read_write, which must outlive
+  /// it. Throws NoLane (naming the holders), ReadOnly, UsedAfterFork.
+  explicit LaneSender(const AttachedSegment& segment);
+  LaneSender(LaneSender&& other) noexcept;
+  LaneSender& operator=(LaneSender&&) = delete;
+  ~LaneSender();
+
+  std::uint32_t lane() const noexcept { return lane_; }
+  std::uint64_t incarnation() const noexcept { return incarnation_; }
+  /// All blocks of the lane: the largest batch there can be.
+  std::uint32_t blocks() const noexcept { return view_.shape.lane_blocks; }
+  /// Blocks that may be sent now.
+  std::uint32_t free_blocks() const noexcept;
+  /// The first of n ids in a row, from 1.
+  std::uint64_t next_ids(std::uint64_t n) noexcept;
+  /// Copies a whole batch of blocks, draws its ticket, writes it at `ticket_offset` (multiple of 8)
+  /// of the first block, commits all with one store, rings. Returns the ticket.
+  /// Throws LaneFull with nothing sent, InvalidArgument, UsedAfterFork.
+  std::uint64_t send(std::span<const std::byte> batch, std::size_t ticket_offset);
+
+  StatusAnswer status(std::uint64_t id) const noexcept;
+  /// The text that came with a status, if it is still there.
+  std::optional<std::string> message(std::uint64_t id) const;
+  /// Whether the burst of the batch `id` is done.
+  BurstAnswer burst(std::uint64_t id) const noexcept;
+  /// The last batch staged whole; the last batch ended.
+  std::uint64_t staged() const noexcept;
+  std::uint64_t ended() const noexcept;
+
+  /// Until `done()`, which is asked again whenever the backend has flagged the lane.
+  /// Throws BackendGone (any of it) and Cancelled.
+  template <class Done>
+  Waited wait_until(Done&& done, const Deadline& deadline, const Check& check = {}) {
+    while (true) {
+      const std::uint32_t seen = events();
+      if (done()) return Waited::ready;
+      if (spinner_.spin([&] { return events() != seen; })) continue;
+      if (deadline.over()) return done() ? Waited::ready : Waited::timed_out;
+      if (sleep(seen, deadline, check)) continue;
+      if (done()) return Waited::ready;
+      segment_->throw_if_gone();
+    }
+  }
+
+ private:
+  std::uint32_t events() const noexcept {
+    return feedback_->events.load(std::memory_order_acquire);  // sync events
+  }
+  /// One slice; true if the events moved on. Throws Cancelled.
+  bool sleep(std::uint32_t seen, const Deadline& deadline, const Check& check);
+
+  const AttachedSegment* segment_;
+  SegmentView view_;
+  LockFile lock_;
+  std::uint32_t lane_ = 0;
+  LaneSenderPage* page_ = nullptr;
+  const LaneFeedback* feedback_ = nullptr;
+  const StatusSlot* statuses_ = nullptr;
+  std::byte* transport_ = nullptr;
+  std::uint64_t incarnation_ = 0;
+  std::uint64_t sent_ = 0;
+  Spinner spinner_;
+  ForkGuard guard_;
+};
+
+}  // namespace o80

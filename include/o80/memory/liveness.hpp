@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "o80/memory/segment.hpp"
+
+namespace o80 {
+
+enum class LaneState : std::uint8_t { free, alive, died, closed };
+
+struct LaneLife {
+  LaneState state = LaneState::free;
+  std::uint64_t incarnation = 0;
+  friend bool operator==(const LaneLife&, const LaneLife&) = default;
+};
+
+/// Move-only: knows for each lane of a segment whether its owner lives.
+///
+/// One helper thread a process asks the kernel for all segments every 20 ms, in ordinary
+/// scheduling, off the processors that `avoid_processors` names.
+///
+/// Writer:   the helper thread.
+/// Readers:  the backend's thread.
+/// Realtime: changes() and lane(), one load each.
+class LaneLiveness {
+ public:
+  explicit LaneLiveness(const OwnedSegment& segment);
+  LaneLiveness(LaneLiveness&&) noexcept;
+  LaneLiveness& operator=(LaneLiveness&&) = delete;
+  ~LaneLiveness();
+
+  /// Counts changes: nothing to look at while it stands still.
+  std::uint32_t changes() const noexcept;
+  LaneLife lane(std::uint32_t i) const noexcept;
+  /// Asks now, in the calling thread. Not for the loop.
+  void refresh() noexcept;
+
+  /// Takes the helper off these processors, if others remain.
+  static void avoid_processors(const std::vector<int>& processors);
+
+ private:
+  friend class LivenessThread;
+  struct Watched;
+  std::unique_ptr<Watched> watched_;
+};
+
+}  // namespace o80
