@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "o80/control/record.hpp"
+
+namespace o80 {
+
+/// A batch while a frontend fills it, as the blocks that will cross its lane.
+///
+/// Each verb returns the place of its record in the batch; once the batch has its id, the record's
+/// is `record_id(batch, place)`.
+class BatchBuilder {
+ public:
+  BatchBuilder();
+
+  /// Adds a command. `head` says actuator, mode, pace, profile, start and amount; the rest is set
+  /// here. `mask` is empty or one bit a number of the state, `times` empty or one end a row [ns],
+  /// `states` holds `rows` states.
+  std::uint32_t command(const RecordHead& head, std::span<const std::uint64_t> mask,
+                        std::span<const std::int64_t> times, std::uint32_t rows,
+                        std::span<const std::byte> states);
+  std::uint32_t command(const RecordHead& head, std::span<const std::byte> state) {
+    return command(head, {}, {}, 1, state);
+  }
+  std::uint32_t purge(std::uint16_t actuator_or_every);
+  /// Drops only what this lane sent.
+  std::uint32_t purge_own(std::uint16_t actuator_or_every);
+  std::uint32_t request(std::uint16_t index, std::span<const std::byte> payload);
+  std::uint32_t take_control();
+  std::uint32_t release_control();
+
+  /// Completes the batch: `batch` says id, ticket, at, late_now, burst and flags.
+  std::span<const Block> seal(const BatchRecord& batch);
+  /// Sets the ticket of a sealed batch, drawn just before its commit.
+  void set_ticket(std::uint64_t ticket) noexcept;
+
+  void clear();
+  bool empty() const noexcept { return records_ == 0; }
+  std::uint32_t records() const noexcept { return records_; }
+  /// Blocks that the batch takes in its lane.
+  std::uint64_t blocks() const noexcept { return blocks_.size(); }
+
+ private:
+  std::byte* open(const RecordHead& head, std::uint64_t payload_bytes);
+
+  std::vector<Block> blocks_;  // the batch's own block first
+  std::uint32_t records_ = 0;
+};
+
+}  // namespace o80

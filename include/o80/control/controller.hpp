@@ -1,0 +1,84 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+
+#include "o80/control/batch_handler.hpp"
+#include "o80/control/pool.hpp"
+#include "o80/control/record.hpp"
+#include "o80/control/status.hpp"
+#include "o80/describe/schema.hpp"
+
+namespace o80 {
+
+/// Turns the commands of all lanes into desired states, one iteration after the other.
+///
+/// Its order in an iteration: `take` what is due, `step`, then `finish_pending` once the row is
+/// out. Every record ends with exactly one end status (`queued` is not told: a record of a batch
+/// that is active and has no status yet is queued). The schema's rows are copied.
+///
+/// Writer:   one thread.
+/// Realtime: everything but construction; nothing allocates, locks or throws.
+class Controller {
+ public:
+  /// Statuses of dropped or late commands told in one iteration, at most.
+  static constexpr std::uint32_t kStatusesPerIteration = 1024;
+
+  Controller(const Schema& schema, BlockPool& pool, StatusSink& sink, std::uint32_t lanes = 8);
+  Controller(const Controller&) = delete;
+  Controller& operator=(const Controller&) = delete;
+  ~Controller();
+
+  /// Begins, or begins afresh: desired becomes `desired`, or `observed` where that is null, and all
+  /// that was queued ends purged (fresh_start) at iteration `row`.
+  void restart(const std::byte* observed, const std::byte* desired, Iteration row) noexcept;
+
+  /// Checks the records of a batch that is complete in the pool but not yet due, about `budget`
+  /// blocks a call (it finishes the record it is in); true when all are. Batches of one lane are
+  /// checked and taken in their order. `take` does what is left of it.
+  bool check(std::uint32_t lane, BlockIndex batch, std::uint32_t budget) noexcept;
+  /// Takes a whole batch at `handler.iteration()`. The batch record in the pool is the
+  /// controller's from here on: copy `burst` and `flags` before.
+  void take(std::uint32_t lane, BlockIndex batch, BatchHandler& handler) noexcept;
+  /// Ends a whole batch, never taken, as rejected; its records follow in `finish_pending`.
+  void reject(std::uint32_t lane, BlockIndex batch, Reason reason, std::uint8_t aux,
+              Iteration iteration) noexcept;
+
+  /// Commands => desired. `observed` is the last row's.
+  void step(Iteration iteration, const std::byte* observed) noexcept;
+
+  /// Drops what an actuator (or kEveryActuator) runs and queues; O(1) an actuator.
+  void purge(std::uint32_t actuator, Iteration iteration, Reason reason = Reason::none) noexcept;
+  /// Drops what one lane sent; walks the queues that it shares with others.
+  void purge_lane(std::uint32_t lane, std::uint32_t actuator, Iteration iteration,
+                  Reason reason = Reason::none) noexcept;
+  /// Ends what an actuator runs and queues as interrupted.
+  void interrupt(std::uint32_t actuator, Iteration iteration) noexcept;
+
+  /// Tells the statuses of what was dropped, at most kStatusesPerIteration a call (less what the
+  /// last step spent on late commands); false when some are left.
+  bool finish_pending() noexcept;
+
+  /// The desired block, as the schema lays it out.
+  const std::byte* desired() const noexcept;
+  /// One bit an actuator, in whole words: a command gave the desired state of the last step.
+  const std::uint64_t* active_mask() const noexcept;
+  /// One bit an actuator, in whole words: the last step clamped it.
+  const std::uint64_t* clamped_mask() const noexcept;
+  /// Words of a mask.
+  std::uint32_t words() const noexcept;
+
+  /// Something runs or is queued.
+  bool active() const noexcept;
+  /// Something dropped is still to be told.
+  bool pending() const noexcept;
+  /// Blocks of a lane given back to the pool since construction, those of ended batches included.
+  std::uint64_t freed(std::uint32_t lane) const noexcept;
+
+ private:
+  class Body;
+  std::unique_ptr<Body> body_;
+};
+
+}  // namespace o80

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "o80/describe/schema.hpp"
+
+namespace o80 {
+
+/// Refuses a command that a robot cannot follow, when it is added and not later.
+///
+/// Each throws InvalidArgument, whose text names the actuator, the field, the value and what is
+/// allowed. The schema must outlive it. `mask` is empty (the whole state) or a bit for each number.
+class CommandCheck {
+ public:
+  explicit CommandCheck(const Schema& schema) : schema_(schema) {}
+
+  /// Index of an actuator by its name.
+  std::uint32_t actuator(std::string_view name) const;
+  /// The index itself, if there is such an actuator.
+  std::uint32_t actuator(std::int64_t index) const;
+  /// Targets, one state after the other.
+  void targets(std::uint32_t actuator, std::span<const std::byte> states,
+               std::span<const std::uint64_t> mask = {}) const;
+  /// A pace of so much of the first number of the state [1/s].
+  void speed(std::uint32_t actuator, double speed) const;
+  /// A request's struct: its booleans and enumerations are ones.
+  void request(std::uint32_t index, std::span<const std::byte> payload) const;
+
+ private:
+  const Schema& schema_;
+};
+
+}  // namespace o80
