@@ -52,7 +52,8 @@ class Schema {
   std::vector<ActuatorRow> actuators;
   std::vector<LimitRow> limits;
   std::vector<RequestRow> requests;
-  std::vector<TypeHooks> hooks;  // one for each type; stays in the backend's process
+  std::vector<TypeHooks> hooks;    // one for each type; stays in the backend's process
+  std::vector<const void*> keys;   // one for each type: of which C++ type it came, or null
 
   // a driver's describe()
   ActuatorDescription actuator(std::uint32_t index);
@@ -64,6 +65,8 @@ class Schema {
   /// Adds an array of actuators, or a single one, behind those there are; gives the group's index.
   std::uint32_t add_actuators(std::string_view group, std::uint32_t type, std::uint32_t count,
                               bool is_array = true);
+  /// Adds a sensor value to the extended type; gives its offset in the extended block [bytes].
+  std::uint32_t add_sensor(FieldRow sensor);
   std::uint32_t add_request(std::string_view name, std::uint32_t type, std::string_view help);
 
   /// Calls `visit(offset, const FieldRow&)` for every number of a type, nested ones included.
@@ -165,6 +168,7 @@ inline std::uint32_t Schema::add_type(std::string_view name, std::vector<FieldRo
   type.size = round_up(end, type.alignment);
   types.push_back(type);
   hooks.emplace_back();
+  keys.push_back(nullptr);
   return static_cast<std::uint32_t>(types.size() - 1);
 }
 
@@ -225,6 +229,35 @@ inline std::uint32_t Schema::add_actuators(std::string_view group, std::uint32_t
   place_group(group, type, offset, count, is_array);
   head.block = offset + count * types.at(type).size;
   return static_cast<std::uint32_t>(groups.size() - 1);
+}
+
+inline std::uint32_t Schema::add_sensor(FieldRow sensor) {
+  // the fields of the extended type must be neighbours: its type is built anew with one more
+  std::vector<FieldRow> members;
+  if (head.extended != kNoType) {
+    const TypeRow& old = types.at(head.extended);
+    members.assign(fields.begin() + old.first_field,
+                   fields.begin() + old.first_field + old.fields);
+  }
+  for (const FieldRow& member : members) {
+    if (member.name == sensor.name) {
+      throw InvalidArgument("there is already a sensor '" + sensor.name.str() + "'");
+    }
+  }
+  members.push_back(sensor);
+  if (head.extended == kNoType) {
+    head.extended = add_type("Extended", members);
+    return fields.back().offset;
+  }
+  TypeRow& old = types[head.extended];
+  const bool last = old.first_field + old.fields == fields.size();
+  if (last) fields.resize(old.first_field);
+  const std::uint32_t index = add_type("Extended", members);
+  types[head.extended] = types[index];
+  types.resize(index);
+  hooks.resize(index);
+  keys.resize(index);
+  return fields.back().offset;
 }
 
 inline std::uint32_t Schema::add_request(std::string_view name, std::uint32_t type,

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "o80/describe/schema.hpp"
+
+namespace o80 {
+
+/// What begins every row of a history.
+struct RowHead {
+  std::int64_t iteration = 0;
+  std::int64_t time = 0;      // [ns], of the clock that the schema names
+  std::int64_t lateness = 0;  // how long after its due moment the iteration began [ns]
+  std::uint32_t overruns = 0;  // iterations so far that were not done in time
+  std::uint32_t skipped = 0;   // periods so far that were left out to catch up
+  std::uint32_t fresh = 0;     // 1: the robot started afresh in this row
+  std::uint32_t reserved = 0;
+};
+static_assert(sizeof(RowHead) == 40 && std::is_trivially_copyable_v<RowHead>);
+
+/// Where the parts of a row lie: offsets from its start [bytes].
+struct RowLayout {
+  std::uint32_t desired = 0;
+  std::uint32_t observed = 0;
+  std::uint32_t extended = 0;
+  std::uint32_t active = 0;   // one bit an actuator, whole 8-byte words
+  std::uint32_t clamped = 0;  // likewise
+  std::uint32_t size = 0;
+  std::uint32_t mask_words = 0;
+  std::uint32_t block = 0;
+  std::uint32_t extended_size = 0;
+};
+
+inline RowLayout row_layout(const Schema& schema) {
+  RowLayout layout;
+  layout.block = round_up(schema.head.block, 8);
+  layout.extended_size =
+      schema.head.extended == kNoType ? 0 : round_up(schema.types.at(schema.head.extended).size, 8);
+  layout.mask_words = static_cast<std::uint32_t>((schema.actuators.size() + 63) / 64);
+  layout.desired = sizeof(RowHead);
+  layout.observed = layout.desired + layout.block;
+  layout.extended = layout.observed + layout.block;
+  layout.active = layout.extended + layout.extended_size;
+  layout.clamped = layout.active + layout.mask_words * 8;
+  layout.size = layout.clamped + layout.mask_words * 8;
+  return layout;
+}
+
+}  // namespace o80
