@@ -1,0 +1,259 @@
+#include "o80/describe/table.hpp"
+
+#include <cmath>
+#include <set>
+#include <type_traits>
+
+namespace o80 {
+
+namespace {
+
+constexpr std::uint64_t kMagic = 0x616D656863533038;  // "80Schema"
+constexpr std::uint32_t kMostRows = 1U << 16;
+constexpr std::uint32_t kMostBytes = 1U << 28;
+
+struct TableHead {
+  std::uint64_t magic = kMagic;
+  std::uint32_t counts[7] = {};
+  std::uint32_t sizes[7] = {};
+};
+
+/// Calls `visit` for every table of rows of a schema, in the order of the bytes.
+template <class SchemaLike, class Visit>
+void each_table(SchemaLike& schema, Visit&& visit) {
+  visit(0, schema.types);
+  visit(1, schema.fields);
+  visit(2, schema.labels);
+  visit(3, schema.groups);
+  visit(4, schema.actuators);
+  visit(5, schema.limits);
+  visit(6, schema.requests);
+}
+
+[[noreturn]] void refuse(const std::string& why) {
+  throw InvalidArgument("the description cannot be used: " + why);
+}
+
+template <class Row>
+void check_text(const Row& text, const char* what) {
+  for (const char c : text.view()) {
+    if (static_cast<unsigned char>(c) < 32 || c == 127) {
+      refuse(std::string(what) + " holds a control character");
+    }
+  }
+  if (text.chars.back() != 0) refuse(std::string(what) + " has no end");
+}
+
+void check_field(const Schema& schema, std::uint32_t type_index, const FieldRow& field) {
+  const TypeRow& type = schema.types[type_index];
+  const std::string name = "field '" + field.name.str() + "' of '" + type.name.str() + "' ";
+  check_text(field.name, "a field's name");
+  check_text(field.unit, "a unit");
+  check_text(field.help, "a help");
+  const std::uint64_t end =
+      field.offset + std::uint64_t{field.size} * (field.rows == 0 ? 1 : field.rows) *
+                         (field.columns == 0 ? 1 : field.columns);
+  if (end > type.size) refuse(name + "lies outside its struct");
+  if (field.rows == 0 && field.columns != 0) refuse(name + "has columns but no rows");
+  switch (field.kind) {
+    case Kind::structure:
+      // a nested type stands before its owner, so there is no circle
+      if (field.type >= type_index) refuse(name + "nests a type that is not described before");
+      if (field.size != schema.types[field.type].size) refuse(name + "has not its type's size");
+      break;
+    case Kind::enumeration:
+      if (field.size != 1 && field.size != 2 && field.size != 4 && field.size != 8) {
+        refuse(name + "has the size of no enumeration");
+      }
+      if (std::uint64_t{field.first_label} + field.labels > schema.labels.size()) {
+        refuse(name + "has labels that are not there");
+      }
+      break;
+    default:
+      if (static_cast<int>(field.kind) > static_cast<int>(Kind::float64)) {
+        refuse(name + "is of a kind that cannot be shared");
+      }
+      if (field.size != size_of(field.kind)) refuse(name + "has not its kind's size");
+  }
+}
+
+void check_types(const Schema& schema) {
+  std::vector<std::uint64_t> numbers;
+  for (std::uint32_t i = 0; i < schema.types.size(); ++i) {
+    const TypeRow& type = schema.types[i];
+    check_text(type.name, "a type's name");
+    if (type.size > kMostBytes) refuse("type '" + type.name.str() + "' is too large");
+    if (type.alignment == 0 || type.alignment > 64 ||
+        (type.alignment & (type.alignment - 1)) != 0) {
+      refuse("type '" + type.name.str() + "' has no alignment");
+    }
+    if (std::uint64_t{type.first_field} + type.fields > schema.fields.size()) {
+      refuse("type '" + type.name.str() + "' has fields that are not there");
+    }
+    std::set<std::string_view> names;
+    std::uint64_t count = 0;
+    for (std::uint32_t f = 0; f < type.fields; ++f) {
+      const FieldRow& field = schema.fields[type.first_field + f];
+      check_field(schema, i, field);
+      if (!names.insert(field.name.view()).second) {
+        refuse("type '" + type.name.str() + "' has two fields '" + field.name.str() + "'");
+      }
+      count += std::uint64_t{field.count()} *
+               (field.kind == Kind::structure ? numbers[field.type] : 1);
+    }
+    if (count > kMostBytes) refuse("type '" + type.name.str() + "' has too many numbers");
+    numbers.push_back(count);
+  }
+}
+
+void check_limit(const ActuatorRow& actuator, const LimitRow& limit) {
+  if (std::isnan(limit.minimum) || std::isnan(limit.maximum) || !(limit.speed > 0) ||
+      limit.minimum > limit.maximum) {
+    refuse("the limits of actuator '" + actuator.name.str() + "' are from " +
+           std::to_string(limit.minimum) + " to " + std::to_string(limit.maximum) + " at " +
+           std::to_string(limit.speed) + "/s: minimum <= maximum and speed > 0 are needed");
+  }
+}
+
+void check_actuators(const Schema& schema) {
+  std::set<std::string_view> names;
+  for (const ActuatorRow& actuator : schema.actuators) {
+    const std::string name = "actuator '" + actuator.name.str() + "' ";
+    check_text(actuator.name, "an actuator's name");
+    if (actuator.name.view().empty()) refuse("an actuator has no name");
+    if (!names.insert(actuator.name.view()).second) refuse("there are two " + name);
+    if (actuator.type >= schema.types.size()) refuse(name + "has no type");
+    const TypeRow& type = schema.types[actuator.type];
+    if (std::uint64_t{actuator.offset} + type.size > schema.head.block) {
+      refuse(name + "lies outside the row");
+    }
+    if (type.alignment > 1 && actuator.offset % type.alignment != 0) {
+      refuse(name + "is not aligned");
+    }
+    if (actuator.group >= schema.groups.size()) refuse(name + "has no group");
+    if (static_cast<int>(actuator.when_idle) > static_cast<int>(WhenIdle::follow)) {
+      refuse(name + "has no when_idle");
+    }
+    if (std::uint64_t{actuator.first_limit} + actuator.limits > schema.limits.size() ||
+        actuator.limits != schema.scalar_count(actuator.type)) {
+      refuse(name + "has not one limit for each number");
+    }
+    for (std::uint32_t i = 0; i < actuator.limits; ++i) {
+      check_limit(actuator, schema.limits[actuator.first_limit + i]);
+    }
+  }
+}
+
+void check_groups(const Schema& schema) {
+  std::uint64_t next = 0;
+  for (const GroupRow& group : schema.groups) {
+    check_text(group.name, "a group's name");
+    if (group.first_actuator != next || next + group.count > schema.actuators.size()) {
+      refuse("group '" + group.name.str() + "' has actuators that are not there");
+    }
+    if (group.is_array == 0 && group.count != 1) refuse("a group of one has not one actuator");
+    next += group.count;
+    for (std::uint32_t i = 0; i < group.count; ++i) {
+      const ActuatorRow& actuator = schema.actuators[group.first_actuator + i];
+      if (actuator.type != group.type ||
+          actuator.offset != group.offset + std::uint64_t{i} * schema.types[group.type].size) {
+        refuse("the actuators of group '" + group.name.str() + "' are no array");
+      }
+    }
+  }
+  if (next != schema.actuators.size()) refuse("an actuator stands in no group");
+}
+
+}  // namespace
+
+void check(const Schema& schema) {
+  check_text(schema.head.robot, "the robot's name");
+  if (schema.head.period < 0) refuse("the period is negative");
+  if (schema.head.block > kMostBytes) refuse("the row is too large");
+  if (static_cast<int>(schema.head.clock) > static_cast<int>(Clock::simulated)) {
+    refuse("the clock is unknown");
+  }
+  check_types(schema);
+  if (schema.head.extended != kNoType && schema.head.extended >= schema.types.size()) {
+    refuse("the extended type is not there");
+  }
+  for (const LabelRow& label : schema.labels) check_text(label.name, "a label");
+  check_actuators(schema);
+  check_groups(schema);
+  std::set<std::string_view> names;
+  for (const RequestRow& request : schema.requests) {
+    check_text(request.name, "a request's name");
+    check_text(request.help, "a help");
+    if (request.type >= schema.types.size()) {
+      refuse("request '" + request.name.str() + "' has no type");
+    }
+    if (!names.insert(request.name.view()).second) {
+      refuse("there are two requests '" + request.name.str() + "'");
+    }
+  }
+}
+
+std::vector<std::byte> to_bytes(const Schema& schema) {
+  TableHead head;
+  std::size_t size = sizeof head + sizeof schema.head;
+  each_table(schema, [&]<class Row>(int i, const std::vector<Row>& rows) {
+    head.counts[i] = static_cast<std::uint32_t>(rows.size());
+    head.sizes[i] = sizeof(Row);
+    size += rows.size() * sizeof(Row);
+  });
+  std::vector<std::byte> bytes(size);
+  std::byte* out = bytes.data();
+  const auto put = [&](const void* from, std::size_t count) {
+    if (count > 0) std::memcpy(out, from, count);
+    out += count;
+  };
+  put(&head, sizeof head);
+  put(&schema.head, sizeof schema.head);
+  each_table(schema, [&]<class Row>(int, const std::vector<Row>& rows) {
+    put(rows.data(), rows.size() * sizeof(Row));
+  });
+  return bytes;
+}
+
+Schema schema_from_bytes(std::span<const std::byte> bytes) {
+  const auto foreign = [](const std::string& why) {
+    return SegmentError("the segment's schema cannot be read (" + why +
+                        "): the file is damaged or comes from another version of o80; remove it "
+                        "with `o80 clean` or start its backend again");
+  };
+  TableHead head;
+  Schema schema;
+  if (bytes.size() < sizeof head + sizeof schema.head) throw foreign("too short");
+  std::memcpy(&head, bytes.data(), sizeof head);
+  if (head.magic != kMagic) throw foreign("no schema");
+  std::memcpy(&schema.head, bytes.data() + sizeof head, sizeof schema.head);
+  std::size_t at = sizeof head + sizeof schema.head;
+  each_table(schema, [&]<class Row>(int i, std::vector<Row>& rows) {
+    if (head.sizes[i] != sizeof(Row)) throw foreign("rows of another size");
+    if (head.counts[i] > kMostRows * 16) throw foreign("too many rows");
+    const std::size_t count = head.counts[i] * sizeof(Row);
+    if (count > bytes.size() - at) throw foreign("too short");
+    rows.resize(head.counts[i]);
+    if (count > 0) std::memcpy(rows.data(), bytes.data() + at, count);
+    at += count;
+  });
+  schema.hooks.resize(schema.types.size());
+  schema.keys.resize(schema.types.size());
+  try {
+    check(schema);
+  } catch (const InvalidArgument& error) {
+    throw foreign(error.what());
+  }
+  return schema;
+}
+
+std::uint64_t hash(const Schema& schema) {
+  // FNV-1a, 64 bits
+  std::uint64_t value = 0xCBF29CE484222325;
+  for (const std::byte byte : to_bytes(schema)) {
+    value = (value ^ static_cast<std::uint64_t>(byte)) * 0x100000001B3;
+  }
+  return value;
+}
+
+}  // namespace o80
