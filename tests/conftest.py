@@ -35,22 +35,31 @@ def abandoned_files() -> set[Path]:
 
 
 def command_line(process: int) -> str:
-    """The words a process was started with; empty once it is dead."""
+    """The words a process was started with."""
     try:
         return Path(f"/proc/{process}/cmdline").read_text().replace("\0", " ")
     except OSError:
         return ""
 
 
+def lives(process: int) -> bool:
+    """Whether the process still runs: a zombie does not."""
+    try:
+        state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return False
+    return state not in "ZX"
+
+
 def children() -> set[int]:
-    """Living child processes of all threads of this one."""
+    """Living child processes of all threads of this one, but for Python's own."""
     found = {
         int(child)
         for task in Path("/proc/self/task").iterdir()
         for child in (task / "children").read_text().split()
     }
     own = {child for child in found if "multiprocessing.resource_tracker" in command_line(child)}
-    return {child for child in found - own if command_line(child)}
+    return {child for child in found - own if lives(child)}
 
 
 def left_over(found: Callable[[], set[Found]], before: set[Found]) -> list[Found]:
