@@ -47,7 +47,7 @@ struct SegmentHeader {
   char user[32];
   char program[64];
 };
-static_assert(sizeof(SegmentHeader) == 192);
+static_assert(sizeof(SegmentHeader) == 184);
 
 struct Counters {
   alignas(kLineBytes) std::atomic<std::int64_t> begun;  // row being written, or published
