@@ -80,6 +80,8 @@ def main() -> int:
     if unknown:
         parser.error(f"no step {', '.join(sorted(unknown))}; there are {', '.join(STEPS)}")
 
+    tools = Path(sys.executable).parent
+    os.environ["PATH"] = f"{tools}{os.pathsep}{os.environ['PATH']}"
     os.environ.setdefault("CCACHE_DIR", str(ROOT / "build" / "ccache"))
     LOGS.mkdir(parents=True, exist_ok=True)
     failed = []
