@@ -1,0 +1,159 @@
+"""Time stamps for recordings that have none, from their positions and velocities.
+
+The vision system delivers frames at a fixed rate; a reader took the newest frame about every 10 ms
+and kept no stamp. So rows are whole numbers of frames apart (0: the same frame again, mostly 1 or
+2, more where the ball was lost). A flight fitted to roughly stamped rows is far more exact than
+the stamps were: where on it a row lies tells its frame. The rough stamps are those of the reader's
+rate; where they end in a poor fit, distance over recorded velocity (which lags by some 25 ms).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from .flight_fit import Flight, bounce_rows, fit_segment, meeting
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+FRAME_PERIOD = 1 / 180
+"""Between two frames of the vision system [s]; slope of stamps over frames where both are known."""
+READER_PERIOD = 0.010
+"""About the time between two rows: the rate of the reader [s]."""
+CLOSE = 0.006
+"""Rows this near to a flight, on average, leave no doubt about their frames [m]."""
+MOST_ROUNDS = 8
+NEAR_BOUNCE = 3
+"""Rows next to a bounce whose recorded velocities are not used."""
+LONGEST_GAP = 8
+"""Frames that may lie between the last row before a bounce and the first one after it."""
+
+
+def new_frames(positions: FloatArray) -> NDArray[np.bool_]:
+    """(N,) False where a row repeats the frame of the row before it."""
+    repeated = np.all(np.diff(positions, axis=0) == 0, axis=1)
+    return np.concatenate([[True], ~repeated])
+
+
+def frames_of(
+    positions: FloatArray,
+    velocities: FloatArray,
+    rows: IntArray,
+    *,
+    period: float = FRAME_PERIOD,
+) -> IntArray:
+    """Number of the frame (N,) of each row, from 0; times `period` [s] these are the stamps.
+
+    `positions` (N, 3) [m], `velocities` (N, 3) [m/s] of new frames only, and their number in the
+    file `rows` (N,).
+    """
+    bounces, _ = bounce_rows(positions)
+    edges = [-1, *bounces, len(positions)]
+    frames = np.zeros(len(positions), dtype=np.int64)
+    before: Flight | None = None
+    for first, last in pairwise(edges):
+        segment = slice(first + 1, last)
+        counted = _count(positions[segment], velocities[segment], rows[segment], period)
+        mine, flight = counted.frames, counted.flight
+        if before is not None:
+            # the segment goes on after the one before, the lowest row lies between them
+            start = int(frames[first - 1])
+            ahead, between = _gap(before, flight, start, positions[first], period)
+            frames[first] = start + between
+            mine = mine + start + ahead
+            flight = replace(flight, origin=flight.origin + (start + ahead) * period)
+        frames[segment] = mine
+        before = flight
+    return frames
+
+
+@dataclass(frozen=True, eq=False)
+class _Count:
+    frames: IntArray
+    """(n,), from 0"""
+    flight: Flight
+    """Through the rows at frames * period."""
+    distance: float
+    """Root mean square of the rows' distances from the flight [m]."""
+
+
+def _count(positions: FloatArray, velocities: FloatArray, rows: IntArray, period: float) -> _Count:
+    """Frames of the rows between two bounces; a second first guess where the first fits badly."""
+    by_reader = _settle((rows - rows[0]) * READER_PERIOD, positions, period)
+    if by_reader.distance < CLOSE:
+        return by_reader
+    durations = _durations(positions, velocities)
+    by_speed = _settle(np.cumsum(np.concatenate([[0.0], durations])), positions, period)
+    return min(by_reader, by_speed, key=lambda count: count.distance)
+
+
+def _settle(times: FloatArray, positions: FloatArray, period: float) -> _Count:
+    """Frames near `times` (n,) [s] that agree with the flight fitted to them."""
+    frames = np.zeros(0, dtype=np.int64)
+    for _ in range(MOST_ROUNDS):
+        flight = fit_segment(times, positions)
+        # how much later each row lies on the flight than its stamp says => its frame anew
+        flown, speed = flight.at(times)
+        misses = positions - flown
+        late = np.sum(misses * speed, axis=1) / np.sum(speed**2, axis=1)
+        again = _whole((times + late) / period)
+        if np.array_equal(again, frames):
+            break
+        frames = again
+        times = frames.astype(np.float64) * period
+    return _Count(frames, flight, float(np.sqrt(np.mean(np.sum(misses**2, axis=1)))))
+
+
+def _durations(positions: FloatArray, velocities: FloatArray) -> FloatArray:
+    """Time from each row to the next (n - 1,) [s]: distance over smoothed recorded velocity."""
+    rows = np.arange(len(positions), dtype=np.float64)
+    windows = sliding_window_view(np.pad(velocities, ((2, 2), (0, 0)), mode="edge"), 5, axis=0)
+    calm = np.median(windows, axis=-1)
+    # the velocities of rows next to a bounce are mixed with those of its other side
+    inner = slice(NEAR_BOUNCE, -NEAR_BOUNCE) if len(rows) > 4 * NEAR_BOUNCE else slice(None)
+    polynomial = np.polynomial.polynomial.polyfit(rows[inner], calm[inner], min(2, len(rows) - 1))
+    speed = np.polynomial.polynomial.polyval(rows[1:] - 0.5, polynomial).T
+    distance = np.diff(positions, axis=0)
+    durations: FloatArray = np.sum(distance * speed, axis=1) / np.sum(speed**2, axis=1)
+    return durations
+
+
+def _whole(frames: FloatArray) -> IntArray:
+    """Whole frames from 0, each at least one after the one before, nearest to `frames` (n,).
+
+    What is left over is the same for most rows (when the first frame was taken): it is removed
+    before rounding.
+    """
+    phase = float(np.angle(np.mean(np.exp(2j * np.pi * frames)))) / (2 * np.pi)
+    steps = np.arange(len(frames))
+    apart: IntArray = np.maximum.accumulate(np.rint(frames - phase).astype(np.int64) - steps)
+    whole: IntArray = apart + steps - apart[0]
+    return whole
+
+
+def _gap(
+    before: Flight, after: Flight, frame: int, lowest: FloatArray, period: float
+) -> tuple[int, int]:
+    """Frames from the last row before a bounce, `frame`, to the first row after, and to the lowest.
+
+    Of all gaps, the one with which the two flights meet best, in one point.
+    """
+    best = (np.inf, 2, 1)
+    start = frame * period
+    for ahead in range(2, LONGEST_GAP + 1):
+        shifted = replace(after, origin=start + ahead * period)
+        time, _ = meeting(before, shifted, start, start + ahead * period)
+        at = np.array([time])
+        apart = float(np.linalg.norm(before.at(at)[0] - shifted.at(at)[0]))
+        # the lowest row lies on one of the two flights
+        between = np.arange(1, ahead)
+        times = start + between.astype(np.float64) * period
+        path = np.where((times < time)[:, None], before.at(times)[0], shifted.at(times)[0])
+        off = np.linalg.norm(path - lowest, axis=1)
+        best = min(best, (apart + float(off.min()), ahead, int(between[off.argmin()])))
+    return best[1], best[2]

@@ -1,0 +1,188 @@
+"""Files of recorded balls: JSON of a ball gun, HDF5 of shots with known launch parameters."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .frame_stamps import FRAME_PERIOD, frames_of, new_frames
+from .trajectories import SHORTEST, BallTrajectory
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """How rows of a file lie in the world: turned about z by `yaw`, then shifted by `offset`."""
+
+    offset: tuple[float, float, float]
+    """[m]"""
+    yaw: float = 0.0
+    """[rad]"""
+
+    def point(self, rows: FloatArray) -> FloatArray:
+        """Positions (N, 3) in the world [m]."""
+        shifted: FloatArray = self.direction(rows) + np.array(self.offset)
+        return shifted
+
+    def direction(self, rows: FloatArray) -> FloatArray:
+        """Velocities (N, 3) in the world."""
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        turned: FloatArray = rows @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        return turned
+
+
+BALL_GUN_FRAME = Frame(offset=(-0.4, -0.13, 1.23))
+"""Of the JSON files: measured."""
+LAUNCHER_FRAME = Frame(offset=(0.4, 2.95, 0.033), yaw=-math.pi / 2)
+"""Of the HDF5 files, which begin at the launcher and fly along +x: height fitted to the bounces,
+the rest chosen so that the launcher stands at the far end of the table and shoots at the arm."""
+
+FORMATS = (".json", ".hdf5", ".h5")
+
+
+def recording_files(path: Path) -> list[Path]:
+    """The file itself, or the recordings of a folder in the order of their names."""
+    if path.is_file():
+        return [path]
+    if not path.is_dir():
+        raise FileNotFoundError(
+            f"{path}: no such file or folder; give a recording ({', '.join(FORMATS)}) "
+            "or a folder of them"
+        )
+    files = sorted(file for file in path.iterdir() if file.suffix in FORMATS)
+    if not files:
+        raise FileNotFoundError(
+            f"{path}: no recordings in this folder; expected files ending in {', '.join(FORMATS)}"
+        )
+    return files
+
+
+def read_recording(
+    file: Path,
+    *,
+    frame_offset: Sequence[float] | None = None,
+    frame_yaw: float | None = None,
+) -> list[BallTrajectory]:
+    """The trajectories of one file; what is None of the frame is that of the format."""
+    readers = {".json": _read_ball_gun, ".hdf5": _read_shots, ".h5": _read_shots}
+    if file.suffix not in readers:
+        raise ValueError(f"{file}: unknown format; can read {', '.join(FORMATS)}")
+    usual = BALL_GUN_FRAME if file.suffix == ".json" else LAUNCHER_FRAME
+    offset = usual.offset if frame_offset is None else tuple(float(v) for v in frame_offset)
+    if len(offset) != 3:
+        raise ValueError(f"frame_offset needs three numbers [m], not {frame_offset}")
+    frame = Frame(
+        offset=(offset[0], offset[1], offset[2]),
+        yaw=usual.yaw if frame_yaw is None else frame_yaw,
+    )
+    return readers[file.suffix](file, frame)
+
+
+def _read_ball_gun(file: Path, frame: Frame) -> list[BallTrajectory]:
+    """One shot: {"ob": rows of x, y, z [m], vx, vy, vz [m/s]}, no stamps."""
+    every_row = _ball_gun_rows(file)
+    numbers = np.flatnonzero(new_frames(every_row[:, :3]))
+    rows = every_row[numbers]
+    _require_rows(file, rows)
+    frames = frames_of(rows[:, :3], rows[:, 3:], numbers)
+    trajectory = BallTrajectory(
+        name=str(file),
+        stamps=frames.astype(np.float64) * FRAME_PERIOD,
+        positions=frame.point(rows[:, :3]),
+        velocities=frame.direction(rows[:, 3:]),
+    )
+    return [trajectory.named(file.stem)]
+
+
+def _ball_gun_rows(file: Path) -> FloatArray:
+    try:
+        content = json.loads(file.read_text())
+    except ValueError as error:
+        raise ValueError(f"{file}: not JSON ({error}); record or download it again") from error
+    if not isinstance(content, dict) or "ob" not in content:
+        keys = ", ".join(content) if isinstance(content, dict) else type(content).__name__
+        raise ValueError(
+            f'{file}: no "ob" but {keys}; expected {{"ob": [[x, y, z, vx, vy, vz], ...]}}'
+        )
+    try:
+        rows = np.array(content["ob"], dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ValueError(
+            f'{file}: the rows of "ob" are not all lists of 6 numbers ({error}); '
+            "repair or remove the file"
+        ) from error
+    if rows.ndim != 2 or rows.shape[1] != 6:
+        raise ValueError(
+            f'{file}: "ob" has shape {rows.shape}, not (N, 6): x, y, z [m], vx, vy, vz [m/s]'
+        )
+    return rows
+
+
+def _read_shots(file: Path, frame: Frame) -> list[BallTrajectory]:
+    """Shots originals/<i>/{positions, velocities (N, 3), time_stamps (N)}, in order of i."""
+    import h5py
+
+    try:
+        content = h5py.File(file, "r")
+    except OSError as error:
+        raise ValueError(f"{file}: not HDF5 ({error}); record or download it again") from error
+    with content:
+        if "originals" not in content:
+            raise ValueError(
+                f'{file}: no group "originals" but {", ".join(content) or "nothing"}; '
+                "expected originals/<i>/positions, velocities, time_stamps"
+            )
+        shots = content["originals"]
+        return [_read_shot(file, shots[key], frame) for key in sorted(shots, key=_number)]
+
+
+def _read_shot(file: Path, shot: Any, frame: Frame) -> BallTrajectory:
+    name = f"{file}{shot.name}"
+    missing = [key for key in ("positions", "velocities", "time_stamps") if key not in shot]
+    if missing:
+        raise ValueError(
+            f"{name}: no {', '.join(missing)}; there is {', '.join(shot) or 'nothing'}"
+        )
+    positions, velocities, stamps = (
+        np.asarray(shot[key], dtype=np.float64)
+        for key in ("positions", "velocities", "time_stamps")
+    )
+    for key, rows in (("positions", positions), ("velocities", velocities)):
+        if rows.ndim != 2 or rows.shape[1] != 3:
+            raise ValueError(f"{name}: {key} have shape {rows.shape}, not (N, 3)")
+    trajectory = BallTrajectory(
+        name=name,
+        stamps=stamps,
+        positions=frame.point(positions),
+        velocities=frame.direction(velocities),
+    )
+    return trajectory.named(f"{file.stem}/{shot.name.rsplit('/', 1)[-1]}")
+
+
+def _number(key: str) -> tuple[int, str]:
+    """Orders "2" before "10", and names after numbers."""
+    return (int(key), "") if key.isdigit() else (sys.maxsize, key)
+
+
+def _require_rows(file: Path, rows: FloatArray) -> None:
+    """Enough finite rows to reconstruct stamps from."""
+    broken = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+    if len(broken):
+        raise ValueError(
+            f"{file}: NaN or infinity (first in row {broken[0]}); "
+            "remove the rows in which the ball was not seen"
+        )
+    if len(rows) < SHORTEST:
+        raise ValueError(
+            f"{file}: {len(rows)} different rows are too few to fit a flight, {SHORTEST} are "
+            "needed; leave this file out"
+        )
