@@ -1,0 +1,106 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "o80/describe/layout.hpp"
+#include "o80/describe/schema.hpp"
+#include "o80/memory/segment.hpp"
+#include "o80/runtime/request_server.hpp"
+
+namespace o80 {
+
+/// What happens to the commands of a frontend that dies, or when all fall silent for too long.
+enum class Stale : std::uint8_t {
+  hold,   // they are carried out
+  purge,  // they are dropped
+  stop    // the backend stops
+};
+
+/// Everything about a backend that is not its robot.
+struct BackendOptions {
+  std::string segment;
+  std::int64_t period = 1'000'000;         // [ns]
+  bool bursting = false;                   // stands still until a frontend asks for iterations
+  std::uint64_t history = 0;               // rows kept; 0: as many as 16 MiB hold, 1e5 at most
+  std::uint32_t lanes = 8;                 // frontends that may command at once
+  std::uint32_t lane_blocks = 16384;       // of 64 bytes, that one of them may have in flight
+  mode_t permission = 0600;                // of the segment
+  Stale stale = Stale::hold;
+  std::int64_t silence = 0;                // longest time without a batch [ns]; 0: no limit
+};
+
+/// How the last period went; written by whoever paces the loop.
+struct Timing {
+  std::int64_t lateness = 0;   // [ns]
+  std::uint32_t overruns = 0;  // so far
+  std::uint32_t skipped = 0;   // so far
+};
+
+/// What `step` came back with.
+enum class Step : std::uint8_t {
+  run,       // an iteration is under way: the desired states are to be written
+  standing,  // bursting, and nothing is granted
+  ended      // a stop was asked for, or a request failed
+};
+
+/// The side that iterates, in bytes: `publish` row 0, then `step` and `publish` for ever.
+///
+/// Writer:   one thread, that of the loop; `ask_to_stop` any thread or signal handler.
+/// Readers:  frontends of any process.
+/// Realtime: step, publish and what lies between them; not construction, nor end.
+class UntypedBackend {
+ public:
+  /// Takes the name and publishes the segment as starting. The schema gets period and clock from
+  /// the options. Throws SegmentTaken, SegmentError, InvalidArgument.
+  UntypedBackend(Schema schema, const BackendOptions& options, RequestServer* server = nullptr);
+  UntypedBackend(const UntypedBackend&) = delete;
+  UntypedBackend& operator=(const UntypedBackend&) = delete;
+  /// Ends as stopped, unless it has ended.
+  ~UntypedBackend();
+
+  const Schema& schema() const noexcept;
+  const RowLayout& layout() const noexcept;
+  const std::string& name() const noexcept;
+
+  /// The blocks of the row under way, to be filled before `publish`.
+  std::byte* observed() noexcept;
+  std::byte* extended() noexcept;
+  /// Publishes the row under way; the first one is row 0 and makes the backend running.
+  void publish() noexcept;
+
+  /// Commands => desired. Bursting, `step` waits for a grant, `try_step` does not.
+  Step step() noexcept;
+  Step try_step() noexcept;
+  const std::byte* desired() const noexcept;
+  /// One bit an actuator: a command gave its desired state.
+  const std::uint64_t* active() const noexcept;
+  /// The iteration under way; before the first `step`, 0.
+  Iteration iteration() const noexcept;
+  /// Time of the iteration under way, on the schema's clock [ns].
+  std::int64_t time() const noexcept;
+  void set_timing(const Timing& timing) noexcept;
+
+  /// Ends the commands of an actuator as interrupted, in the iteration under way.
+  void interrupt(std::uint32_t actuator) noexcept;
+
+  /// Makes `step` end. From any thread or signal handler.
+  void ask_to_stop() noexcept;
+  bool stop_asked() const noexcept;
+  /// Why `step` ended on its own: a failed request's text, a stale command's policy.
+  std::string_view failure() const noexcept;
+  /// Tells frontends that no row will follow; `text` is the fault of a failed one.
+  void end(State stopped_or_failed, std::string_view text = {}) noexcept;
+
+ private:
+  class Body;
+  std::unique_ptr<Body> body_;
+};
+
+}  // namespace o80

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "o80/control/pool.hpp"
+
+namespace o80 {
+
+/// A batch that waits in the pool for its iteration.
+struct ScheduledBatch {
+  Iteration at = 0;
+  std::uint64_t ticket = 0;
+  BlockIndex batch = kNoBlock;
+  std::uint32_t lane = 0;
+  bool late_now = false;
+};
+
+/// Batches sent for a later iteration, the next one first.
+///
+/// Writer:   the backend's thread.
+/// Realtime: yes: a heap in memory reserved for as many as the lanes can hold.
+class Schedule {
+ public:
+  explicit Schedule(std::size_t most) { heap_.reserve(most); }
+
+  bool empty() const noexcept { return heap_.empty(); }
+  const ScheduledBatch& next() const noexcept { return heap_.front(); }
+  void add(const ScheduledBatch& batch) noexcept;
+  void drop_next() noexcept;
+
+ private:
+  std::vector<ScheduledBatch> heap_;
+};
+
+}  // namespace o80
