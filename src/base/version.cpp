@@ -2,8 +2,6 @@
 
 namespace o80 {
 
-std::string_view version() noexcept {
-  return O80_VERSION;
-}
+std::string_view version() noexcept { return O80_VERSION; }
 
 }  // namespace o80

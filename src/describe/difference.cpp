@@ -31,20 +31,21 @@ std::map<std::string, std::string> fields_of(const Schema& schema, std::uint32_t
   for (std::uint32_t i = 0; i < row.fields; ++i) {
     const FieldRow& field = schema.fields[row.first_field + i];
     const std::string unit = field.unit.view().empty() ? "" : " [" + field.unit.str() + "]";
-    lines[field.name.str()] = kind_name(schema, field) + shape(field) + unit + " at byte " +
-                              std::to_string(field.offset);
+    lines[field.name.str()] =
+        kind_name(schema, field) + shape(field) + unit + " at byte " + std::to_string(field.offset);
   }
   return lines;
 }
 
 std::string kind_name(const Schema& schema, const FieldRow& field) {
-  static constexpr const char* kNames[] = {"boolean", "int8",   "int16",  "int32",   "int64",
-                                           "uint8",   "uint16", "uint32", "uint64",  "float32",
+  static constexpr const char* kNames[] = {"boolean", "int8",   "int16",  "int32",  "int64",
+                                           "uint8",   "uint16", "uint32", "uint64", "float32",
                                            "float64", "enum",   "struct", "text"};
   std::string name = kNames[static_cast<int>(field.kind)];
   if (field.kind == Kind::structure) {
     name = "{";
-    for (const auto& [inner, line] : fields_of(schema, field.type)) name += inner + ": " + line + "; ";
+    for (const auto& [inner, line] : fields_of(schema, field.type))
+      name += inner + ": " + line + "; ";
     return name + "}";
   }
   if (field.kind == Kind::enumeration) {

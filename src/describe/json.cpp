@@ -75,8 +75,8 @@ class JsonWriter {
   bool after_key_ = false;
 };
 
-constexpr const char* kKinds[] = {"bool",   "int8",   "int16",  "int32",   "int64",
-                                  "uint8",  "uint16", "uint32", "uint64",  "float32",
+constexpr const char* kKinds[] = {"bool",    "int8",   "int16",  "int32",  "int64",
+                                  "uint8",   "uint16", "uint32", "uint64", "float32",
                                   "float64", "enum",   "struct", "text"};
 
 void write_type(JsonWriter& json, const Schema& schema, std::uint32_t index);

@@ -50,9 +50,9 @@ void check_field(const Schema& schema, std::uint32_t type_index, const FieldRow&
   check_text(field.name, "a field's name");
   check_text(field.unit, "a unit");
   check_text(field.help, "a help");
-  const std::uint64_t end =
-      field.offset + std::uint64_t{field.size} * (field.rows == 0 ? 1 : field.rows) *
-                         (field.columns == 0 ? 1 : field.columns);
+  const std::uint64_t end = field.offset + std::uint64_t{field.size} *
+                                               (field.rows == 0 ? 1 : field.rows) *
+                                               (field.columns == 0 ? 1 : field.columns);
   if (end > type.size) refuse(name + "lies outside its struct");
   if (field.rows == 0 && field.columns != 0) refuse(name + "has columns but no rows");
   switch (field.kind) {
@@ -98,8 +98,8 @@ void check_types(const Schema& schema) {
       if (!names.insert(field.name.view()).second) {
         refuse("type '" + type.name.str() + "' has two fields '" + field.name.str() + "'");
       }
-      count += std::uint64_t{field.count()} *
-               (field.kind == Kind::structure ? numbers[field.type] : 1);
+      count +=
+          std::uint64_t{field.count()} * (field.kind == Kind::structure ? numbers[field.type] : 1);
     }
     if (count > kMostBytes) refuse("type '" + type.name.str() + "' has too many numbers");
     numbers.push_back(count);

@@ -81,7 +81,9 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
         payload_(largest_request(), std::byte{0}),
         fresh_desired_(layout.block / 8),
         stale_(options.stale),
-        silence_(options.silence <= 0 ? 0 : std::max<std::int64_t>(1, options.silence / options.period)) {
+        silence_(options.silence <= 0
+                     ? 0
+                     : std::max<std::int64_t>(1, options.silence / options.period)) {
     for (std::uint32_t i = 0; i < lanes.size(); ++i) lives_[i] = liveness.lane(i);
   }
 
@@ -154,7 +156,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   std::vector<std::byte> payload_;
   std::vector<std::uint64_t> fresh_desired_;
   Stale stale_;
-  std::int64_t silence_;             // [iterations], 0: no limit
+  std::int64_t silence_;  // [iterations], 0: no limit
   Iteration last_batch_ = 0;
   std::uint32_t seen_changes_ = 0;
   bool begun_ = false;    // row 0 is out
@@ -163,12 +165,12 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   // the batch being copied from its lane
   bool staging_ = false;
   std::uint32_t staging_lane_ = 0;
-  std::uint32_t staging_left_ = 0;   // blocks
+  std::uint32_t staging_left_ = 0;  // blocks
   BlockChain staging_chain_;
 
-  std::uint32_t holder_ = kNobody;   // lane with exclusive control
+  std::uint32_t holder_ = kNobody;  // lane with exclusive control
 
-  std::int64_t burst_left_ = 0;      // iterations, or kUntilEnded
+  std::int64_t burst_left_ = 0;  // iterations, or kUntilEnded
   std::uint32_t burst_lane_ = kNobody;
   CommandId burst_id_ = 0;
 };
@@ -177,12 +179,13 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
 
 void UntypedBackend::Body::changed(const StatusChange& change) noexcept {
   LaneReceiver& lane = lanes[change.lane];
-  lane.set_status(change.id, {static_cast<std::uint8_t>(change.status),
-                              static_cast<std::uint8_t>(change.reason), change.aux,
-                              change.iteration});
+  lane.set_status(change.id,
+                  {static_cast<std::uint8_t>(change.status),
+                   static_cast<std::uint8_t>(change.reason), change.aux, change.iteration});
   if (is_end(change.status)) lane.flag();
   // a burst that runs until its batch has ended: this iteration is its last, or there is none
-  if (burst_left_ != kUntilEnded || change.lane != burst_lane_ || change.id != burst_id_ + 1) return;
+  if (burst_left_ != kUntilEnded || change.lane != burst_lane_ || change.id != burst_id_ + 1)
+    return;
   burst_left_ = in_step_ ? 1 : 0;
   if (!in_step_) lane.set_burst_done(burst_id_, iteration_ - 1);
 }
@@ -326,8 +329,8 @@ void UntypedBackend::Body::take_due() noexcept {
     const ScheduledBatch due = schedule.next();
     schedule.drop_next();
     if (holder_ != kNobody && holder_ != due.lane) {
-      controller.reject(due.lane, due.batch, Reason::exclusive,
-                        static_cast<std::uint8_t>(holder_), iteration_);
+      controller.reject(due.lane, due.batch, Reason::exclusive, static_cast<std::uint8_t>(holder_),
+                        iteration_);
     } else if (due.at < iteration_ && !due.late_now) {
       controller.reject(due.lane, due.batch, Reason::late, 0, iteration_);
     } else {

@@ -96,8 +96,8 @@ concept Number = std::is_arithmetic_v<T> && !std::is_same_v<T, char> &&
 
 /// What may be the state of an actuator, sensor values or the body of a request.
 template <class T>
-concept Shareable = Number<T> || DescribedEnum<T> ||
-                    (DescribedStruct<T> && std::is_trivially_copyable_v<T>);
+concept Shareable =
+    Number<T> || DescribedEnum<T> || (DescribedStruct<T> && std::is_trivially_copyable_v<T>);
 
 /// A state type with its own way to interpolate: `static T blend(const T&, const T&, double)`.
 template <class T>
@@ -120,8 +120,8 @@ constexpr Kind kind_of() {
     return sizeof(T) == 4 ? Kind::float32 : Kind::float64;
   } else {
     constexpr int kWidth = sizeof(T) == 1 ? 0 : sizeof(T) == 2 ? 1 : sizeof(T) == 4 ? 2 : 3;
-    return static_cast<Kind>(
-        static_cast<int>(std::is_signed_v<T> ? Kind::int8 : Kind::uint8) + kWidth);
+    return static_cast<Kind>(static_cast<int>(std::is_signed_v<T> ? Kind::int8 : Kind::uint8) +
+                             kWidth);
   }
 }
 
@@ -140,7 +140,8 @@ FieldRow field_row(Schema& schema, std::string_view name, std::size_t offset,
     using Element = typename ArrayOf<T>::Element;
     row = field_row<Element>(schema, name, offset, text);
     if (row.columns != 0) {
-      throw InvalidArgument("field '" + std::string(name) + "': an array has two dimensions at most");
+      throw InvalidArgument("field '" + std::string(name) +
+                            "': an array has two dimensions at most");
     }
     row.columns = row.rows;
     row.rows = static_cast<std::uint32_t>(ArrayOf<T>::kCount);
@@ -161,8 +162,9 @@ FieldRow field_row(Schema& schema, std::string_view name, std::size_t offset,
     } else if constexpr (Number<T>) {
       row.kind = kind_of<T>();
     } else {
-      static_assert(Shareable<T>,
-                    "a field must be a number, a described enum or struct, or a std::array of them");
+      static_assert(
+          Shareable<T>,
+          "a field must be a number, a described enum or struct, or a std::array of them");
       row.kind = Kind::structure;
       row.type = type_of<T>(schema);
     }
@@ -247,8 +249,9 @@ void pack(const T& value, std::byte* out) {
       out += sizeof(element);
     }
   } else {
-    o80_describe(Tag<T>{}, [&]<class Field>(std::string_view, Field T::*member, std::size_t offset,
-                                            std::string_view) { pack(value.*member, out + offset); });
+    o80_describe(Tag<T>{},
+                 [&]<class Field>(std::string_view, Field T::* member, std::size_t offset,
+                                  std::string_view) { pack(value.*member, out + offset); });
   }
 }
 

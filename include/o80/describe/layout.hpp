@@ -10,8 +10,8 @@ namespace o80 {
 /// What begins every row of a history.
 struct RowHead {
   std::int64_t iteration = 0;
-  std::int64_t time = 0;      // [ns], of the clock that the schema names
-  std::int64_t lateness = 0;  // how long after its due moment the iteration began [ns]
+  std::int64_t time = 0;       // [ns], of the clock that the schema names
+  std::int64_t lateness = 0;   // how long after its due moment the iteration began [ns]
   std::uint32_t overruns = 0;  // iterations so far that were not done in time
   std::uint32_t skipped = 0;   // periods so far that were left out to catch up
   std::uint32_t fresh = 0;     // 1: the robot started afresh in this row

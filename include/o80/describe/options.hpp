@@ -109,7 +109,7 @@ template <class Config>
 std::vector<Option> options_of() {
   std::vector<Option> options;
   const Config defaults{};
-  o80_describe(Tag<Config>{}, [&]<class Field>(std::string_view name, Field Config::*member,
+  o80_describe(Tag<Config>{}, [&]<class Field>(std::string_view name, Field Config::* member,
                                                std::size_t, std::string_view text) {
     FieldRow row;
     set_text(row, text);
@@ -124,7 +124,7 @@ template <class Config>
 void set_option(Config& config, std::string_view name, std::string_view text) {
   bool known = false;
   std::string there;
-  o80_describe(Tag<Config>{}, [&]<class Field>(std::string_view field, Field Config::*member,
+  o80_describe(Tag<Config>{}, [&]<class Field>(std::string_view field, Field Config::* member,
                                                std::size_t, std::string_view) {
     there += (there.empty() ? "" : ", ") + std::string(field);
     if (field != name) return;

@@ -47,9 +47,7 @@ struct FixedText {
     std::memcpy(chars.data(), text.data(), text.size());
   }
 
-  std::string_view view() const {
-    return {chars.data(), strnlen(chars.data(), Size)};
-  }
+  std::string_view view() const { return {chars.data(), strnlen(chars.data(), Size)}; }
   std::string str() const { return std::string(view()); }
   bool operator==(const FixedText&) const = default;
 };
@@ -65,20 +63,18 @@ struct FieldRow {
   NameText name;
   UnitText unit;
   HelpText help;
-  std::uint32_t type = kNoType;       // of a nested struct
-  std::uint32_t offset = 0;           // from the start of the struct [bytes]
-  std::uint32_t size = 0;             // of one element [bytes]
-  std::uint32_t rows = 0;             // shape of an array field: 0 x 0 is a plain field,
-  std::uint32_t columns = 0;          // n x 0 a vector, n x m a matrix
-  std::uint32_t first_label = 0;      // of an enumeration
+  std::uint32_t type = kNoType;   // of a nested struct
+  std::uint32_t offset = 0;       // from the start of the struct [bytes]
+  std::uint32_t size = 0;         // of one element [bytes]
+  std::uint32_t rows = 0;         // shape of an array field: 0 x 0 is a plain field,
+  std::uint32_t columns = 0;      // n x 0 a vector, n x m a matrix
+  std::uint32_t first_label = 0;  // of an enumeration
   std::uint32_t labels = 0;
   Kind kind = Kind::float64;
-  std::uint8_t is_signed = 0;         // of an enumeration
+  std::uint8_t is_signed = 0;  // of an enumeration
   std::array<std::uint8_t, 2> reserved{};
 
-  std::uint32_t count() const {
-    return (rows == 0 ? 1 : rows) * (columns == 0 ? 1 : columns);
-  }
+  std::uint32_t count() const { return (rows == 0 ? 1 : rows) * (columns == 0 ? 1 : columns); }
   bool operator==(const FieldRow&) const = default;
 };
 

@@ -52,8 +52,8 @@ class Schema {
   std::vector<ActuatorRow> actuators;
   std::vector<LimitRow> limits;
   std::vector<RequestRow> requests;
-  std::vector<TypeHooks> hooks;    // one for each type; stays in the backend's process
-  std::vector<const void*> keys;   // one for each type: of which C++ type it came, or null
+  std::vector<TypeHooks> hooks;   // one for each type; stays in the backend's process
+  std::vector<const void*> keys;  // one for each type: of which C++ type it came, or null
 
   // a driver's describe()
   ActuatorDescription actuator(std::uint32_t index);
@@ -208,9 +208,8 @@ inline void Schema::place_group(std::string_view group, std::uint32_t type, std:
   for (std::uint32_t i = 0; i < count; ++i) {
     ActuatorRow actuator;
     const std::string prefix(group);
-    actuator.name = NameText(is_array ? (prefix.empty() ? "actuator_" : prefix + "_") +
-                                            std::to_string(i)
-                                      : prefix);
+    actuator.name = NameText(
+        is_array ? (prefix.empty() ? "actuator_" : prefix + "_") + std::to_string(i) : prefix);
     actuator.type = type;
     actuator.offset = offset + i * stride;
     actuator.group = static_cast<std::uint32_t>(groups.size());
@@ -236,8 +235,7 @@ inline std::uint32_t Schema::add_sensor(FieldRow sensor) {
   std::vector<FieldRow> members;
   if (head.extended != kNoType) {
     const TypeRow& old = types.at(head.extended);
-    members.assign(fields.begin() + old.first_field,
-                   fields.begin() + old.first_field + old.fields);
+    members.assign(fields.begin() + old.first_field, fields.begin() + old.first_field + old.fields);
   }
   for (const FieldRow& member : members) {
     if (member.name == sensor.name) {

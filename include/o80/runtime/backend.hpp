@@ -26,14 +26,14 @@ enum class Stale : std::uint8_t {
 /// Everything about a backend that is not its robot.
 struct BackendOptions {
   std::string segment;
-  std::int64_t period = 1'000'000;         // [ns]
-  bool bursting = false;                   // stands still until a frontend asks for iterations
-  std::uint64_t history = 0;               // rows kept; 0: as many as 16 MiB hold, 1e5 at most
-  std::uint32_t lanes = 8;                 // frontends that may command at once
-  std::uint32_t lane_blocks = 16384;       // of 64 bytes, that one of them may have in flight
-  mode_t permission = 0600;                // of the segment
+  std::int64_t period = 1'000'000;    // [ns]
+  bool bursting = false;              // stands still until a frontend asks for iterations
+  std::uint64_t history = 0;          // rows kept; 0: as many as 16 MiB hold, 1e5 at most
+  std::uint32_t lanes = 8;            // frontends that may command at once
+  std::uint32_t lane_blocks = 16384;  // of 64 bytes, that one of them may have in flight
+  mode_t permission = 0600;           // of the segment
   Stale stale = Stale::hold;
-  std::int64_t silence = 0;                // longest time without a batch [ns]; 0: no limit
+  std::int64_t silence = 0;  // longest time without a batch [ns]; 0: no limit
 };
 
 /// How the last period went; written by whoever paces the loop.

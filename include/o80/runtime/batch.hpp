@@ -1,0 +1,79 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "o80/control/record.hpp"
+#include "o80/memory/segment.hpp"
+#include "o80/runtime/link.hpp"
+
+namespace o80 {
+
+/// What became of one command or request.
+struct Handle {
+  CommandId id = 0;
+  Status status = Status::none;
+  Reason reason = Reason::none;
+  Iteration iteration = -1;  // at which the status changed; -1 while it is queued
+  std::string text;          // of a rejection: why, in words
+};
+
+/// What one pulse sent: to be waited for, and asked what became of it.
+///
+/// Copies mean the same batch. Statuses once seen as ended are kept.
+class Batch {
+ public:
+  Batch() = default;
+  Batch(std::shared_ptr<Link> link, std::shared_ptr<LaneSender> lane, CommandId id,
+        std::uint32_t records);
+
+  CommandId id() const { return id_; }
+  std::size_t size() const { return records_; }
+  bool empty() const { return records_ == 0; }
+  /// What became of the record at this place (in the order in which they were added).
+  Handle handle(std::size_t place) const;
+  std::vector<Handle> handles() const;
+  /// Every record has an end status.
+  bool ended() const;
+  /// The iteration at which the batch was taken; -1 if it was not yet.
+  Iteration first_iteration() const;
+  /// The iteration at which the last of its commands ended; -1 if it has not yet.
+  Iteration last_iteration() const;
+  /// Waits until every record has an end status and the row of that iteration is there.
+  /// Throws TimeoutError, BackendGone, Cancelled.
+  void wait(Timeout timeout, const Check& check = {}) const;
+
+ private:
+  struct Kept;
+  Handle ask(CommandId id) const;
+
+  std::shared_ptr<Link> link_;
+  std::shared_ptr<LaneSender> lane_;
+  CommandId id_ = 0;
+  std::uint32_t records_ = 0;
+  std::shared_ptr<Kept> kept_;
+};
+
+/// A burst under way.
+class Burst {
+ public:
+  Burst() = default;
+  Burst(std::shared_ptr<Link> link, std::shared_ptr<LaneSender> lane, Batch batch);
+
+  const Batch& batch() const { return batch_; }
+  bool done() const;
+  /// Waits for the last iteration of the burst and returns its row.
+  /// Throws TimeoutError, BackendGone, Cancelled, Error if the batch was rejected.
+  UntypedObservation wait(Timeout timeout, const Check& check = {}) const;
+
+ private:
+  std::shared_ptr<Link> link_;
+  std::shared_ptr<LaneSender> lane_;
+  Batch batch_;
+};
+
+}  // namespace o80

@@ -1,0 +1,126 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "o80/control/limits.hpp"
+#include "o80/runtime/batch.hpp"
+#include "o80/runtime/command.hpp"
+#include "o80/runtime/link.hpp"
+#include "o80/runtime/observation.hpp"
+
+namespace o80 {
+
+struct FrontendOptions {
+  Timeout timeout = std::chrono::seconds(5);  // to wait for the backend
+  Access access = Access::read_write;
+  bool dead = false;  // attach also to a backend that is gone, to read its history
+  Check check = {};   // asked in every wait; false ends it
+};
+
+/// The side that commands and reads, in bytes.
+///
+/// Move-only. Takes a lane with its first pulse; a pure reader takes none.
+///
+/// Writer / Readers: any threads of one process.
+class UntypedFrontend {
+ public:
+  /// Waits for the backend, up to the timeout. Throws TimeoutError, SegmentError, BackendFailed.
+  explicit UntypedFrontend(const std::string& segment, const FrontendOptions& options = {});
+  /// A frontend whose bursts run in its own thread.
+  UntypedFrontend(const std::string& segment, std::shared_ptr<InlineRunner> runner);
+  UntypedFrontend(UntypedFrontend&&) noexcept;
+  UntypedFrontend& operator=(UntypedFrontend&&) noexcept;
+  ~UntypedFrontend();
+
+  const std::string& segment() const;
+  const Schema& schema() const;
+  const RowLayout& layout() const;
+  std::shared_ptr<const Description> description() const;
+  std::uint64_t epoch() const;
+  bool bursting() const;
+  /// [ns]
+  std::int64_t period() const;
+  Life life() const;
+  std::uint32_t actuator(std::string_view name) const;
+  std::uint32_t request_index(std::string_view name) const;
+
+  // what the next pulse sends; each returns its place in the batch
+  /// Adds a command. `mask` has a bit for each number of the state that is given; empty: all.
+  std::uint32_t add_command(std::uint32_t actuator, std::span<const std::byte> state,
+                            const CommandOptions& options = {},
+                            std::span<const std::uint64_t> mask = {});
+  /// One command through `rows` states. With `times` (ends of the rows since its start [ns]),
+  /// which needs no pace, or at options.pace for each row.
+  std::uint32_t add_trajectory(std::uint32_t actuator, std::uint32_t rows,
+                               std::span<const std::byte> states,
+                               const CommandOptions& options = {.pace = iterations(1)},
+                               std::span<const std::int64_t> times = {});
+  std::uint32_t add_purge(std::uint32_t actuator = kEveryActuator);
+  /// Drops only what this frontend sent.
+  std::uint32_t add_purge_own();
+  std::uint32_t add_request(std::uint32_t request, std::span<const std::byte> payload);
+  std::uint32_t add_take_control();
+  std::uint32_t add_release_control();
+  /// Records added and not pulsed.
+  std::size_t added() const;
+  void forget_added();
+
+  /// Sends what was added as one batch. Throws LaneFull (nothing is sent, all stays added), NoLane,
+  /// ReadOnly, BackendGone.
+  Batch pulse(const PulseOptions& options = {});
+  /// Sends and waits until every command has ended; bursting, lets the backend run as long as
+  /// that takes. Returns the row of the last iteration.
+  UntypedObservation pulse_and_wait(Timeout timeout, const PulseOptions& options = {},
+                                    const Check& check = {});
+  /// Sends what was added and lets a bursting backend run n iterations.
+  Burst start_burst(std::int64_t iterations);
+  UntypedObservation burst(std::int64_t iterations, Timeout timeout, const Check& check = {});
+
+  // observations
+  /// Iteration of the newest row.
+  Iteration published() const;
+  Iteration oldest() const;
+  UntypedObservation latest() const;
+  /// Fills a row of this frontend's size; throws as latest().
+  void latest(std::byte* row) const;
+  /// Row k, as soon as it is there. Throws RowOverwritten, TimeoutError, BackendGone.
+  UntypedObservation wait_for(Iteration k, Timeout timeout, const Check& check = {}) const;
+  void wait_for(Iteration k, std::byte* row, Timeout timeout, const Check& check = {}) const;
+  /// As many of the rows first..last as there are.
+  Rows history(Iteration first, Iteration last) const;
+  /// The last n.
+  Rows history(std::size_t n) const;
+  /// The next row in sequence for a position of the caller's own: waits for row `position`; if it
+  /// is overwritten, jumps to the oldest one there. Returns how many were missed.
+  std::int64_t wait_for_next(Iteration& position, std::byte* row, Timeout timeout,
+                             const Check& check = {}) const;
+
+  /// Gives the lane back; every further use throws Closed. Sent motion goes on.
+  void close();
+  bool closed() const;
+  std::shared_ptr<Link> link() const { return link_; }
+
+ private:
+  Batch send(const BatchRecord& record);
+  [[noreturn]] void missing(Iteration k) const;
+
+  std::shared_ptr<Link> link_;
+  std::unique_ptr<CommandCheck> check_;
+  BatchBuilder builder_;  // guarded by link_->sending
+};
+
+/// Bursts several backends at once: grants to all, then waits for all.
+std::vector<UntypedObservation> burst(
+    std::span<const std::pair<UntypedFrontend*, std::int64_t>> frontends, Timeout timeout,
+    const Check& check = {});
+
+}  // namespace o80

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "o80/control/batch_builder.hpp"
+#include "o80/memory/history.hpp"
+#include "o80/memory/lane_sender.hpp"
+#include "o80/memory/segment.hpp"
+#include "o80/memory/signal.hpp"
+#include "o80/runtime/observation.hpp"
+
+namespace o80 {
+
+/// Runs the iterations that a frontend asks for in the frontend's own thread (an inline robot).
+class InlineRunner {
+ public:
+  virtual ~InlineRunner() = default;
+  /// Runs until the backend stands still. Throws DriverError.
+  virtual void run() = 0;
+};
+
+/// What a frontend, its batches and its bursts share: the attached segment and the lane.
+///
+/// Writer / Readers: any threads; `sending` guards what is sent.
+struct Link {
+  Link(AttachedSegment attached, std::shared_ptr<InlineRunner> inline_runner);
+
+  /// The lane, taken at the first call. Throws NoLane, ReadOnly, Closed.
+  std::shared_ptr<LaneSender> lane();
+  /// The same if it was taken, else null.
+  std::shared_ptr<LaneSender> lane_if_taken() const;
+  /// Throws Closed or UsedAfterFork.
+  void check_usable() const;
+  /// The caller's check, which also ends waits on a closed frontend.
+  Check guarded(const Check& check) const;
+
+  AttachedSegment segment;
+  std::shared_ptr<const Description> description;
+  HistoryReader history;
+  RowWaiter rows;
+  std::shared_ptr<InlineRunner> runner;
+  mutable std::mutex sending;
+  std::atomic<bool> closed{false};
+
+ private:
+  friend class UntypedFrontend;
+  std::shared_ptr<LaneSender> lane_;
+};
+
+}  // namespace o80

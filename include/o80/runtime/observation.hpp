@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "o80/describe/describe.hpp"
+#include "o80/describe/layout.hpp"
+#include "o80/describe/schema.hpp"
+
+namespace o80 {
+
+/// A robot as its segment describes it: shared by all observations of a frontend.
+struct Description {
+  Schema schema;
+  RowLayout layout;
+};
+
+/// One row of a history, in bytes: what was asked in an iteration and what came of it.
+class UntypedObservation {
+ public:
+  explicit UntypedObservation(std::shared_ptr<const Description> description)
+      : description_(std::move(description)), row_(description_->layout.size / 8) {}
+
+  const Schema& schema() const { return description_->schema; }
+  const RowLayout& layout() const { return description_->layout; }
+  const std::byte* bytes() const { return reinterpret_cast<const std::byte*>(row_.data()); }
+  std::byte* bytes() { return reinterpret_cast<std::byte*>(row_.data()); }
+  std::size_t size() const { return row_.size() * 8; }
+
+  RowHead head() const { return unpack<RowHead>(bytes()); }
+  Iteration iteration() const { return head().iteration; }
+  /// On the schema's clock [ns].
+  std::int64_t time() const { return head().time; }
+  const std::byte* desired() const { return bytes() + layout().desired; }
+  const std::byte* observed() const { return bytes() + layout().observed; }
+  const std::byte* extended() const { return bytes() + layout().extended; }
+  /// A command gave the desired state of this actuator.
+  bool active(std::uint32_t actuator) const { return bit(layout().active, actuator); }
+  /// The limits changed it.
+  bool clamped(std::uint32_t actuator) const { return bit(layout().clamped, actuator); }
+
+ private:
+  bool bit(std::uint32_t mask, std::uint32_t actuator) const {
+    return (unpack<std::uint64_t>(bytes() + mask + actuator / 64 * 8) >> (actuator % 64) & 1) != 0;
+  }
+
+  std::shared_ptr<const Description> description_;
+  std::vector<std::uint64_t> row_;
+};
+
+/// Neighbouring rows of a history, packed.
+struct Rows {
+  Iteration first = 0;
+  std::size_t count = 0;
+  std::size_t row_bytes = 0;
+  std::vector<std::byte> bytes;
+
+  std::span<const std::byte> row(std::size_t i) const {
+    return std::span(bytes).subspan(i * row_bytes, row_bytes);
+  }
+};
+
+}  // namespace o80

@@ -1,0 +1,155 @@
+#include "o80/runtime/batch.hpp"
+
+#include <unordered_map>
+
+#include "o80/base/error.hpp"
+
+namespace o80 {
+
+/// End statuses that were seen, so that they outlive the segment's memory of them.
+struct Batch::Kept {
+  std::mutex mutex;
+  std::unordered_map<CommandId, Handle> ended;
+};
+
+Batch::Batch(std::shared_ptr<Link> link, std::shared_ptr<LaneSender> lane, CommandId id,
+             std::uint32_t records)
+    : link_(std::move(link)),
+      lane_(std::move(lane)),
+      id_(id),
+      records_(records),
+      kept_(std::make_shared<Kept>()) {}
+
+namespace {
+
+std::string words_for(const Handle& handle, std::uint8_t aux) {
+  switch (handle.reason) {
+    case Reason::late:
+      return "it came after the iteration it was meant for";
+    case Reason::exclusive:
+      return "the frontend of lane " + std::to_string(aux) + " has exclusive control";
+    case Reason::invalid:
+      return "the backend could not read it";
+    case Reason::limits:
+      return "it lies outside the limits";
+    case Reason::fresh_start:
+      return "the robot started afresh";
+    case Reason::dead_frontend:
+      return "its frontend died";
+    case Reason::silence:
+      return "no frontend sent anything for too long";
+    case Reason::stopped:
+      return "the backend stopped";
+    default:
+      return "";
+  }
+}
+
+}  // namespace
+
+Handle Batch::ask(CommandId id) const {
+  {
+    const std::scoped_lock lock(kept_->mutex);
+    const auto known = kept_->ended.find(id);
+    if (known != kept_->ended.end()) return known->second;
+  }
+  Handle handle;
+  handle.id = id;
+  const LaneSender::StatusAnswer answer = lane_->status(id);
+  if (answer.known == LaneSender::Known::not_yet) {
+    handle.status = Status::queued;
+    return handle;
+  }
+  if (answer.known == LaneSender::Known::forgotten) {
+    handle.status = Status::forgotten;
+    return handle;
+  }
+  handle.status = static_cast<Status>(answer.word.status);
+  handle.reason = static_cast<Reason>(answer.word.reason);
+  handle.iteration = answer.word.iteration;
+  if (!is_end(handle.status)) return handle;
+  handle.text = handle.reason == Reason::driver ? lane_->message(id).value_or("")
+                                                : words_for(handle, answer.word.aux);
+  const std::scoped_lock lock(kept_->mutex);
+  kept_->ended.emplace(id, handle);
+  return handle;
+}
+
+Handle Batch::handle(std::size_t place) const {
+  if (place >= records_) {
+    throw InvalidArgument("the batch has " + std::to_string(records_) + " records, there is no " +
+                          std::to_string(place));
+  }
+  return ask(record_id(id_, place));
+}
+
+std::vector<Handle> Batch::handles() const {
+  std::vector<Handle> all;
+  all.reserve(records_);
+  for (std::size_t i = 0; i < records_; ++i) all.push_back(handle(i));
+  return all;
+}
+
+bool Batch::ended() const { return records_ == 0 || is_end(ask(id_ + 1).status); }
+
+Iteration Batch::first_iteration() const {
+  if (id_ == 0) return -1;
+  return ask(id_).iteration;
+}
+
+Iteration Batch::last_iteration() const {
+  if (id_ == 0) return -1;
+  const Handle handle = ask(id_ + 1);
+  return is_end(handle.status) ? handle.iteration : -1;
+}
+
+void Batch::wait(Timeout timeout, const Check& check) const {
+  if (empty() && id_ == 0) return;
+  const Deadline deadline(timeout);
+  const Check guarded = link_->guarded(check);
+  const auto ended = [&] { return is_end(ask(id_ + 1).status); };
+  if (lane_->wait_until(ended, deadline, guarded) == Waited::timed_out) {
+    throw TimeoutError("the batch sent to '" + link_->segment.name() +
+                       "' has not ended in time: give more time, purge, or ask its handles");
+  }
+  const Iteration last = last_iteration();
+  if (last >= 0 && ask(id_ + 1).status != Status::rejected) {
+    link_->rows.wait_for_row(last, deadline, guarded);
+  }
+}
+
+Burst::Burst(std::shared_ptr<Link> link, std::shared_ptr<LaneSender> lane, Batch batch)
+    : link_(std::move(link)), lane_(std::move(lane)), batch_(std::move(batch)) {}
+
+bool Burst::done() const { return lane_->burst(batch_.id()).known != LaneSender::Known::not_yet; }
+
+UntypedObservation Burst::wait(Timeout timeout, const Check& check) const {
+  const Deadline deadline(timeout);
+  const CommandId id = batch_.id();
+  LaneSender::BurstAnswer answer = lane_->burst(id);
+  const auto over = [&] {
+    answer = lane_->burst(id);
+    if (answer.known != LaneSender::Known::not_yet) return true;
+    const LaneSender::StatusAnswer status = lane_->status(id);
+    return status.known == LaneSender::Known::yes &&
+           static_cast<Status>(status.word.status) == Status::rejected;
+  };
+  if (answer.known == LaneSender::Known::not_yet &&
+      lane_->wait_until(over, deadline, link_->guarded(check)) == Waited::timed_out) {
+    throw TimeoutError("the burst of '" + link_->segment.name() +
+                       "' was not done in time: give more time, or see whether another "
+                       "frontend's burst comes before it");
+  }
+  if (answer.known == LaneSender::Known::not_yet) {
+    throw Error("the burst of '" + link_->segment.name() + "' was rejected");
+  }
+  UntypedObservation observation(link_->description);
+  const bool known = answer.known == LaneSender::Known::yes;
+  if (!known || !link_->history.read(answer.row, observation.bytes())) {
+    throw RowOverwritten("the last row of this burst of '" + link_->segment.name() +
+                         "' is no longer there: wait for a burst before sending many more");
+  }
+  return observation;
+}
+
+}  // namespace o80

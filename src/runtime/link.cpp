@@ -1,0 +1,59 @@
+#include "o80/runtime/link.hpp"
+
+#include "o80/describe/table.hpp"
+
+namespace o80 {
+
+namespace {
+std::shared_ptr<const Description> describe(const AttachedSegment& segment) {
+  auto description = std::make_shared<Description>();
+  description->schema = schema_from_bytes(segment.schema());
+  description->layout = row_layout(description->schema);
+  if (description->layout.size != segment.header().shape.row_bytes) {
+    throw SegmentError("segment '" + segment.name() + "' has rows of " +
+                       std::to_string(segment.header().shape.row_bytes) +
+                       " bytes, its schema says " + std::to_string(description->layout.size) +
+                       ": the file is damaged; start its backend again");
+  }
+  return description;
+}
+}  // namespace
+
+Link::Link(AttachedSegment attached, std::shared_ptr<InlineRunner> inline_runner)
+    : segment(std::move(attached)),
+      description(describe(segment)),
+      history(segment.view()),
+      rows(segment),
+      runner(std::move(inline_runner)) {}
+
+std::shared_ptr<LaneSender> Link::lane() {
+  check_usable();
+  if (!lane_) {
+    segment.throw_if_gone();
+    lane_ = std::make_shared<LaneSender>(segment);
+  }
+  return lane_;
+}
+
+std::shared_ptr<LaneSender> Link::lane_if_taken() const {
+  const std::scoped_lock lock(sending);
+  return lane_;
+}
+
+void Link::check_usable() const {
+  segment.check_process();
+  if (closed.load(std::memory_order_relaxed)) {
+    throw Closed("the frontend of '" + segment.name() + "' was closed: open a new one");
+  }
+}
+
+Check Link::guarded(const Check& check) const {
+  return [this, &check] {
+    if (closed.load(std::memory_order_relaxed)) {
+      throw Closed("the frontend of '" + segment.name() + "' was closed while it waited");
+    }
+    return !check || check();
+  };
+}
+
+}  // namespace o80
