@@ -1,5 +1,7 @@
 #pragma once
 
+#include <sys/types.h>
+
 #include <cstdint>
 #include <string>
 
@@ -20,8 +22,8 @@ bool is_byte_locked(int descriptor, std::uint64_t byte) noexcept;
 class LockFile {
  public:
   LockFile() noexcept = default;
-  /// Takes over an open, close-on-exec descriptor.
-  explicit LockFile(int descriptor);
+  /// Opens close-on-exec; not open, with errno set, if that fails.
+  static LockFile open(const std::string& path, int flags, mode_t permission = 0);
   LockFile(LockFile&& other) noexcept;
   LockFile& operator=(LockFile&& other) noexcept;
   ~LockFile();

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <sys/types.h>
+
 #include <cstdint>
 #include <mutex>
 #include <string_view>
@@ -11,6 +13,11 @@ std::uint64_t process_generation() noexcept;
 
 /// Locked around every fork: registries of the process are whole in the child.
 std::mutex& fork_mutex() noexcept;
+
+/// open(2) of a file that the child of every fork closes at once; no fork falls in between.
+int open_for_this_process(const char* path, int flags, mode_t permission);
+/// Closes it here.
+void close_in_this_process(int descriptor) noexcept;
 
 /// Remembers the process an object was made in.
 class ForkGuard {

@@ -58,6 +58,8 @@ class HistoryReader {
 
  private:
   const std::byte* slot(Iteration k) const noexcept;
+  /// Of what was copied before this call, rows from here on are whole.
+  Iteration first_true() const noexcept;
 
   const Counters* counters_;
   const std::byte* slots_begin_;

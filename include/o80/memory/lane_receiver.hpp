@@ -63,6 +63,7 @@ class LaneReceiver {
   std::byte* transport_;
   std::uint64_t mask_;
   std::uint64_t cursor_ = 0;
+  std::uint64_t committed_ = 0;  // as last read
   std::uint64_t freed_ = 0;
   std::uint64_t freed_published_ = 0;
   std::uint64_t bursts_ = 0;

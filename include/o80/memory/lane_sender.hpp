@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "o80/memory/segment.hpp"
+#include "o80/memory/attached_segment.hpp"
 #include "o80/memory/signal.hpp"
 #include "o80/memory/status_word.hpp"
 
@@ -66,14 +66,20 @@ class LaneSender {
   /// Throws BackendGone (any of it) and Cancelled.
   template <class Done>
   Waited wait_until(Done&& done, const Deadline& deadline, const Check& check = {}) {
+    std::int64_t look_at = 0;
     while (true) {
       const std::uint32_t seen = events();
       if (done()) return Waited::ready;
-      if (spinner_.spin([&] { return events() != seen; })) continue;
+      if (spinner_.spin([&] { return events() != seen; }) && done()) return Waited::ready;
       if (deadline.over()) return done() ? Waited::ready : Waited::timed_out;
-      if (sleep(seen, deadline, check)) continue;
+      if (look_at == 0) look_at = monotonic_now() + kSlice;
+      sleep(seen, deadline);
+      if (monotonic_now() < look_at) continue;
+      look_at += kSlice;
+      // what is done is done, whatever became of the backend
+      const bool gone = look_around(check);
       if (done()) return Waited::ready;
-      segment_->throw_if_gone();
+      if (gone) segment_->throw_if_gone();
     }
   }
 
@@ -81,8 +87,10 @@ class LaneSender {
   std::uint32_t events() const noexcept {
     return feedback_->events.load(std::memory_order_acquire);  // sync events
   }
-  /// One slice; true if the events moved on. Throws Cancelled.
-  bool sleep(std::uint32_t seen, const Deadline& deadline, const Check& check);
+  /// One slice at most.
+  void sleep(std::uint32_t seen, const Deadline& deadline);
+  /// True if the backend is gone. Throws Cancelled.
+  bool look_around(const Check& check) const;
 
   const AttachedSegment* segment_;
   SegmentView view_;

@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "o80/memory/segment.hpp"
+#include "o80/memory/owned_segment.hpp"
 
 namespace o80 {
 

@@ -63,6 +63,7 @@ struct Bell {
   alignas(kLineBytes) std::atomic<std::uint32_t> rung;     // futex; changes after each commit
   alignas(kLineBytes) std::atomic<std::uint64_t> tickets;  // next to be drawn
   alignas(kLineBytes) std::atomic<std::int64_t> wanted;    // lowest row anybody waits for
+  std::atomic<std::uint32_t> passed_on;                    // last row_wake told to the rest
 };
 static_assert(sizeof(Bell) == 3 * kLineBytes);
 

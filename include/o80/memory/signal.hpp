@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include "o80/base/time.hpp"
-#include "o80/memory/segment.hpp"
+#include "o80/memory/attached_segment.hpp"
 #include "o80/memory/spinner.hpp"
 
 namespace o80 {
@@ -29,7 +29,8 @@ class RowWaiter {
   Waited wait_for_row(Iteration k, const Deadline& deadline, const Check& check = {});
 
  private:
-  bool sleep(Iteration k, std::int64_t at_most) noexcept;
+  void sleep(Iteration k, std::int64_t at_most) noexcept;
+  void poll(Iteration k, std::int64_t at_most) noexcept;
 
   const AttachedSegment* segment_;
   SegmentView view_;

@@ -31,7 +31,7 @@ class Spinner {
 
   Spinner() noexcept;
   /// With a given number of processors, for tests.
-  explicit Spinner(int processors) noexcept : processors_(processors) {}
+  explicit Spinner(int processors) noexcept : fixed_(processors) {}
 
   /// Whether this wait should spin.
   bool worth() noexcept;
@@ -57,7 +57,8 @@ class Spinner {
   }
 
  private:
-  std::atomic<int> processors_;
+  int fixed_;                       // 0: ask the machine
+  std::atomic<int> processors_{0};  // as last asked, 0: never
   std::atomic<std::uint32_t> failures_{0};
   std::atomic<std::uint32_t> refused_{0};
 };

@@ -1,0 +1,90 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "o80/base/time.hpp"
+#include "o80/memory/file_lock.hpp"
+#include "o80/memory/fork.hpp"
+#include "o80/memory/life.hpp"
+#include "o80/memory/mapping.hpp"
+#include "o80/memory/segment_layout.hpp"
+
+namespace o80 {
+
+/// Asked now and then in every wait; false ends the wait with Cancelled. Empty: never asked.
+using Check = std::function<bool()>;
+
+enum class Access { read_only, read_write };
+
+struct AttachOptions {
+  enum class Dead { wait, accept };
+  Dead dead = Dead::wait;          // accept: also a stopped, failed or killed one, to read it
+  std::uint64_t ignore_epoch = 0;  // a segment of this epoch counts as not there
+  Check check;
+};
+
+/// Move-only: the segment of some backend, seen from a frontend.
+///
+/// Mapped read-only but for the bell (with Access::read_write) and the lane that a LaneSender
+/// takes. Copies its header first: what the file says later moves no bound.
+///
+/// Writer / Readers: const calls from any thread.
+/// Realtime: view() only.
+class AttachedSegment {
+ public:
+  /// Waits until a segment of that name is running. Throws TimeoutError (listing what there is),
+  /// SegmentError, BackendFailed, Cancelled, InvalidArgument.
+  static AttachedSegment attach(std::string_view name, Access access, const Deadline& deadline,
+                                const AttachOptions& options = {});
+
+  AttachedSegment(AttachedSegment&& other) noexcept;
+  AttachedSegment& operator=(AttachedSegment&& other) noexcept;
+
+  const std::string& name() const noexcept { return name_; }
+  std::uint64_t epoch() const noexcept { return header_.epoch; }
+  const SegmentHeader& header() const noexcept { return header_; }
+  Access access() const noexcept { return access_; }
+  /// The schema, from the mapping.
+  std::span<const std::byte> schema() const noexcept;
+  const SegmentView& view() const noexcept { return view_; }
+  int descriptor() const noexcept { return file_.descriptor(); }
+  /// Asks the kernel: 2 us unless the state word says enough.
+  Life life() const noexcept;
+  /// Neither starting nor running, for good.
+  bool gone() const noexcept;
+  std::string fault() const;
+  /// Throws the fitting BackendGone unless starting or running; UsedAfterFork.
+  void throw_if_gone() const;
+  /// The same, asking the kernel at most every 20 ms: a clock read otherwise.
+  void throw_if_known_gone() const;
+  /// Throws UsedAfterFork.
+  void check_process() const;
+  /// Another open file of the same segment, for the lock of a lane.
+  LockFile open_again() const;
+
+ private:
+  AttachedSegment() = default;
+  friend class SegmentSearch;
+  void throw_gone(Life life) const;
+  /// Nothing if no file bears the name. Throws SegmentError.
+  static std::optional<AttachedSegment> open(std::string_view name, Access access);
+
+  std::string name_;
+  std::string path_;
+  Access access_ = Access::read_only;
+  SegmentHeader header_{};
+  LockFile file_;  // the mapped one, holds nothing
+  Mapping mapping_;
+  SegmentView view_;
+  ForkGuard guard_;
+  mutable std::atomic<std::int64_t> asked_{0};
+};
+
+}  // namespace o80

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "o80/memory/file_lock.hpp"
+#include "o80/memory/fork.hpp"
+#include "o80/memory/life.hpp"
+#include "o80/memory/mapping.hpp"
+#include "o80/memory/segment_layout.hpp"
+
+namespace o80 {
+
+struct SegmentSpec {
+  std::string name;
+  std::span<const std::byte> schema;
+  std::uint32_t row_bytes = 0;        // multiple of 8
+  std::uint64_t rows = 1;             // history promised
+  std::uint32_t lanes = 8;            // commanding frontends at once
+  std::uint32_t lane_blocks = 16384;  // of 64 bytes, rounded up to a power of two
+  mode_t permission = 0600;
+};
+
+/// Move-only: the segment of a living backend.
+///
+/// Writer:   the backend, one thread.
+/// Readers:  every attached process.
+/// Realtime: view() and state only; creation and end are not.
+class OwnedSegment {
+ public:
+  /// Builds the file, holds it, gives it its name; a dead one of that name is taken over.
+  /// Throws SegmentTaken, SegmentError, InvalidArgument.
+  static OwnedSegment create(const SegmentSpec& spec);
+  /// Throws SegmentTaken if a living backend has the name: to ask before hardware is touched.
+  static void refuse_if_taken(std::string_view name);
+
+  OwnedSegment(OwnedSegment&&) noexcept = default;
+  OwnedSegment& operator=(OwnedSegment&& other) noexcept;
+  /// Ends as stopped unless it has ended, and lets go of the name. The file goes too, unless it
+  /// failed: then it stays, so that whoever comes to attach learns why.
+  ~OwnedSegment();
+
+  const std::string& name() const noexcept { return name_; }
+  std::uint64_t epoch() const noexcept { return epoch_; }
+  const SegmentView& view() const noexcept { return view_; }
+  /// A descriptor of the file that bears no locks.
+  int descriptor() const noexcept { return query_.descriptor(); }
+  State state() const noexcept;
+  /// starting => running.
+  void set_state(State state) noexcept;
+  /// Says why and wakes everybody who waits for a row or on a lane.
+  void end(State stopped_or_failed, std::string_view text = {}) noexcept;
+  /// Unlinks the file if the name still leads to it.
+  void remove() noexcept;
+  /// Throws UsedAfterFork.
+  void check_process() const;
+
+ private:
+  OwnedSegment() = default;
+
+  void release() noexcept;
+
+  std::string name_;
+  std::string path_;
+  std::uint64_t epoch_ = 0;
+  LockFile lock_;   // holds byte 0, never mapped
+  LockFile query_;  // the mapped one, holds nothing
+  Mapping mapping_;
+  SegmentView view_;
+  ForkGuard guard_;
+};
+
+}  // namespace o80

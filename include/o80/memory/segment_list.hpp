@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "o80/memory/life.hpp"
+
+namespace o80 {
+
+struct SegmentEntry {
+  std::string name;
+  Life life = Life::killed;
+  bool readable;  // false: not a segment of this version, or not ours to read
+  int pid;
+  std::int64_t started_at;  // [s] since 1970
+  std::string user, program;
+  std::uint64_t epoch;
+  std::uint64_t bytes;
+};
+
+/// All segments of the directory, by name.
+std::vector<SegmentEntry> list_segments();
+
+/// Removes a dead segment; false if there is none. Throws SegmentTaken if it is alive.
+bool clean(std::string_view name);
+
+/// Removes all dead segments and the temporary files nobody holds; the names removed.
+std::vector<std::string> clean_dead();
+
+/// Removes temporary files that no starter holds any more.
+void sweep_drafts() noexcept;
+
+}  // namespace o80

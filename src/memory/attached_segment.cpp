@@ -1,0 +1,214 @@
+#include "o80/memory/attached_segment.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+#include "o80/base/error.hpp"
+#include "o80/memory/atomic_words.hpp"
+#include "o80/memory/segment_file.hpp"
+#include "o80/memory/segment_list.hpp"
+#include "o80/memory/segment_name.hpp"
+
+namespace o80 {
+
+namespace {
+
+constexpr std::int64_t kPoll = 1'000'000;  // while a segment is awaited [ns]
+constexpr int kPollsBetweenChecks = 20;
+constexpr std::int64_t kKnownFor = 20'000'000;  // how long an answer of the kernel counts [ns]
+
+std::string quoted(std::string_view name) { return "segment '" + std::string(name) + "'"; }
+
+std::string what_there_is() {
+  std::string text;
+  for (const SegmentEntry& entry : list_segments())
+    text += (text.empty() ? "" : ", ") + entry.name + " (" + name_of(entry.life) + ")";
+  return text.empty() ? "There is no segment at all." : "There are: " + text + ".";
+}
+
+}  // namespace
+
+std::optional<AttachedSegment> AttachedSegment::open(std::string_view name, Access access) {
+  AttachedSegment segment;
+  segment.name_ = name;
+  segment.path_ = segment_path(name);
+  segment.access_ = access;
+  const int mode = access == Access::read_write ? O_RDWR : O_RDONLY;
+  segment.file_ = LockFile::open(segment.path_, mode | O_NOFOLLOW);
+  if (!segment.file_.is_open()) {
+    if (errno == ENOENT) return std::nullopt;
+    if ((errno == EACCES || errno == EPERM) && access == Access::read_write)
+      throw SegmentError(quoted(name) +
+                         " may not be written by this user: attach read-only, or let its backend "
+                         "be started with group permission");
+    throw SegmentError(quoted(name) + " cannot be opened (" + segment.path_ +
+                       "): " + std::strerror(errno));
+  }
+
+  const std::string wrong =
+      inspect_segment(segment.file_.descriptor(), segment.header_, segment.view_.offsets);
+  if (!wrong.empty())
+    throw SegmentError(quoted(name) + " cannot be attached (" + segment.path_ + "): " + wrong +
+                       ". Start its backend anew with this o80, or remove it with `o80 clean " +
+                       std::string(name) + "`.");
+
+  // all of it to read; to write only where frontends may
+  segment.mapping_ = Mapping(segment.file_.descriptor(), segment.view_.offsets.file_bytes,
+                             Mapping::Protection::read, Mapping::Faults::later);
+  segment.view_.base = segment.mapping_.data();
+  segment.view_.shape = segment.header_.shape;
+  if (access == Access::read_write)
+    Mapping::make_writable(segment.view_.base, segment.file_.descriptor(),
+                           segment.view_.offsets.bell, segment.header_.shape.page_bytes);
+  return segment;
+}
+
+/// The waiting side of attach: looks at what bears the name, again and again.
+class SegmentSearch {
+ public:
+  SegmentSearch(std::string_view name, Access access, const AttachOptions& options)
+      : name_(name), access_(access), options_(options), path_(segment_path(name)) {}
+
+  /// True if `found` may be taken. Throws BackendFailed.
+  bool look() {
+    if (!found_ || !leads_to(path_, found_->descriptor()))
+      found_ = AttachedSegment::open(name_, access_);
+    if (!found_) {
+      reason_ = "there is no such segment";
+      return false;
+    }
+    if (found_->epoch() == options_.ignore_epoch) {
+      reason_ = "its new backend has not come";
+      return false;
+    }
+    const Life life = found_->life();
+    if (life == Life::running) return true;
+    if (life == Life::starting) {
+      reason_ = "its backend is still starting";
+      return false;
+    }
+    if (options_.dead == AttachOptions::Dead::accept) return true;
+    if (life == Life::failed) found_->throw_gone(life);
+    reason_ = std::string("its last backend was ") + name_of(life) + ", and no new one has come";
+    return false;
+  }
+
+  AttachedSegment found() { return std::move(*found_); }
+  const std::string& reason() const noexcept { return reason_; }
+
+ private:
+  std::string_view name_;
+  Access access_;
+  const AttachOptions& options_;
+  std::string path_;
+  std::optional<AttachedSegment> found_;
+  std::string reason_;
+};
+
+AttachedSegment AttachedSegment::attach(std::string_view name, Access access,
+                                        const Deadline& deadline, const AttachOptions& options) {
+  SegmentSearch search(name, access, options);
+  for (int polls = 0;; ++polls) {
+    if (search.look()) return search.found();
+    if (deadline.over())
+      throw TimeoutError(quoted(name) +
+                         " has no running backend within the time given: " + search.reason() +
+                         ". " + what_there_is() + " Start one with `o80 run`, or check the name.");
+    if (polls % kPollsBetweenChecks == 0 && options.check && !options.check())
+      throw Cancelled("the wait for " + quoted(name) + " was cancelled");
+    const timespec pause{.tv_sec = 0, .tv_nsec = std::max<long>(deadline.left(kPoll), 1000)};
+    nanosleep(&pause, nullptr);
+  }
+}
+
+AttachedSegment::AttachedSegment(AttachedSegment&& other) noexcept { *this = std::move(other); }
+
+AttachedSegment& AttachedSegment::operator=(AttachedSegment&& other) noexcept {
+  if (this == &other) return *this;
+  name_ = std::move(other.name_);
+  path_ = std::move(other.path_);
+  access_ = other.access_;
+  header_ = other.header_;
+  file_ = std::move(other.file_);
+  mapping_ = std::move(other.mapping_);
+  view_ = other.view_;
+  guard_ = other.guard_;
+  asked_.store(0, std::memory_order_relaxed);
+  return *this;
+}
+
+std::span<const std::byte> AttachedSegment::schema() const noexcept {
+  return {view_.base + view_.offsets.schema, view_.shape.schema_bytes};
+}
+
+Life AttachedSegment::life() const noexcept {
+  return judge_life(descriptor(), view_.counters().state);
+}
+
+bool AttachedSegment::gone() const noexcept {
+  const Life now = life();
+  return now != Life::starting && now != Life::running;
+}
+
+std::string AttachedSegment::fault() const {
+  return load_text(view_.counters().fault, std::size(view_.counters().fault));
+}
+
+void AttachedSegment::throw_if_gone() const {
+  check_process();
+  throw_gone(life());
+}
+
+void AttachedSegment::throw_gone(Life life) const {
+  const std::string backend =
+      quoted(name_) + ": its backend (pid " + std::to_string(header_.pid) + ") ";
+  const std::string cure = " Its history can still be read; start it again and attach anew.";
+  switch (life) {
+    case Life::starting:
+    case Life::running:
+      return;
+    case Life::stopped:
+      throw BackendStopped(backend + "has stopped." + cure);
+    case Life::failed: {
+      const std::string why = fault();
+      throw BackendFailed(backend + "failed" + (why.empty() ? "." : ": " + why + ".") + cure);
+    }
+    case Life::superseded:
+      throw BackendSuperseded(backend +
+                              "is gone and a new one has its name: attach again. The old history "
+                              "can still be read.");
+    case Life::killed:
+      throw BackendKilled(backend + "was killed." + cure);
+  }
+}
+
+void AttachedSegment::throw_if_known_gone() const {
+  const auto state =
+      static_cast<State>(view_.counters().state.load(std::memory_order_acquire));  // sync state
+  const std::int64_t now = monotonic_now();
+  const bool fresh = now - asked_.load(std::memory_order_relaxed) < kKnownFor;
+  if (fresh && (state == State::running || state == State::starting)) return check_process();
+  throw_if_gone();
+  asked_.store(now, std::memory_order_relaxed);
+}
+
+void AttachedSegment::check_process() const {
+  if (guard_.forked()) guard_.check(quoted(name_));
+}
+
+LockFile AttachedSegment::open_again() const {
+  check_process();
+  // through the descriptor: the name may lead to a successor by now
+  const std::string path = "/proc/self/fd/" + std::to_string(descriptor());
+  LockFile file = LockFile::open(path, O_RDWR);
+  if (!file.is_open())
+    throw SegmentError(quoted(name_) + " cannot be opened again: " + std::strerror(errno));
+  return file;
+}
+
+}  // namespace o80

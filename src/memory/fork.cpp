@@ -1,0 +1,77 @@
+#include "o80/memory/fork.hpp"
+
+#include <fcntl.h>
+#include <pthread.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <string>
+#include <vector>
+
+#include "o80/base/error.hpp"
+#include "o80/memory/file_lock.hpp"
+
+namespace o80 {
+
+namespace {
+
+std::atomic<std::uint64_t> generation{0};
+
+// leaked: objects of static lifetime may still let go of their files at exit
+std::vector<int>& lock_files() {
+  static auto* files = new std::vector<int>;
+  return *files;
+}
+
+void before_fork() { fork_mutex().lock(); }
+void after_fork_in_parent() { fork_mutex().unlock(); }
+
+void after_fork_in_child() {
+  // closing a copy leaves the lock with the parent; unlocking would take it away
+  for (const int file : lock_files()) ::close(file);
+  lock_files().clear();
+  generation.fetch_add(1, std::memory_order_relaxed);
+  fork_mutex().unlock();
+}
+
+void watch_forks() noexcept {
+  static const bool watching =
+      pthread_atfork(before_fork, after_fork_in_parent, after_fork_in_child) == 0;
+  static_cast<void>(watching);
+}
+
+}  // namespace
+
+std::uint64_t process_generation() noexcept { return generation.load(std::memory_order_relaxed); }
+
+std::mutex& fork_mutex() noexcept {
+  static auto* mutex = new std::mutex;
+  return *mutex;
+}
+
+ForkGuard::ForkGuard() noexcept : generation_(process_generation()) { watch_forks(); }
+
+void ForkGuard::check(std::string_view what) const {
+  if (forked())
+    throw UsedAfterFork(std::string(what) +
+                        " was opened before this process was forked: open it again in this "
+                        "process");
+}
+
+int open_for_this_process(const char* path, int flags, mode_t permission) {
+  watch_forks();
+  const std::lock_guard lock(fork_mutex());
+  lock_files().reserve(lock_files().size() + 1);
+  const int descriptor = ::open(path, flags, permission);
+  if (descriptor >= 0) lock_files().push_back(descriptor);
+  return descriptor;
+}
+
+void close_in_this_process(int descriptor) noexcept {
+  const std::lock_guard lock(fork_mutex());
+  std::erase(lock_files(), descriptor);
+  ::close(descriptor);
+}
+
+}  // namespace o80

@@ -1,0 +1,102 @@
+#include "o80/memory/history.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cstring>
+
+#include "o80/base/crash_point.hpp"
+#include "o80/memory/atomic_words.hpp"
+
+// The thread sanitizer does not model fences; every word they order is atomic, so it has nothing
+// to report either.
+#if defined(__SANITIZE_THREAD__) && !defined(__clang__)
+#pragma GCC diagnostic ignored "-Wtsan"
+#endif
+
+namespace o80 {
+
+HistoryWriter::HistoryWriter(const SegmentView& view) noexcept
+    : counters_(&view.counters()),
+      slots_begin_(view.history()),
+      row_bytes_(view.shape.row_bytes),
+      slots_(view.shape.slots) {}
+
+void HistoryWriter::publish(Iteration k, const std::byte* row) noexcept {
+  std::byte* slot = slots_begin_ + static_cast<std::uint64_t>(k) % slots_ * row_bytes_;
+  O80_CRASH_POINT("history.before_begun");
+  counters_->begun.store(k, std::memory_order_relaxed);
+  std::atomic_thread_fence(std::memory_order_release);  // sync row
+  O80_CRASH_POINT("history.before_row");
+  store_words(slot, row, row_bytes_);
+  O80_CRASH_POINT("history.before_published");
+  // sequentially consistent because RowSignal looks for waiters right after it
+  counters_->published.store(k, std::memory_order_seq_cst);  // sync published
+  O80_CRASH_POINT("history.after_published");
+}
+
+HistoryReader::HistoryReader(const SegmentView& view) noexcept
+    : counters_(&view.counters()),
+      slots_begin_(view.history()),
+      row_bytes_(view.shape.row_bytes),
+      slots_(view.shape.slots) {}
+
+Iteration HistoryReader::published() const noexcept {
+  return counters_->published.load(std::memory_order_acquire);  // sync published
+}
+
+Iteration HistoryReader::oldest() const noexcept {
+  return std::max<Iteration>(0, published() - static_cast<Iteration>(rows()) + 1);
+}
+
+const std::byte* HistoryReader::slot(Iteration k) const noexcept {
+  return slots_begin_ + static_cast<std::uint64_t>(k) % slots_ * row_bytes_;
+}
+
+Iteration HistoryReader::first_true() const noexcept {
+  std::atomic_thread_fence(std::memory_order_acquire);  // sync row
+  return counters_->begun.load(std::memory_order_relaxed) - static_cast<Iteration>(slots_) + 1;
+}
+
+bool HistoryReader::read(Iteration k, std::byte* to) const noexcept {
+  if (k < oldest() || k > published()) return false;
+  load_words(to, slot(k), row_bytes_);
+  return k >= first_true();
+}
+
+Iteration HistoryReader::latest(std::byte* to) const noexcept {
+  while (true) {
+    const Iteration k = published();
+    if (k < 0) return -1;
+    load_words(to, slot(k), row_bytes_);
+    if (k >= first_true()) return k;
+  }
+}
+
+HistoryReader::Range HistoryReader::read_range(Iteration first, std::size_t count,
+                                               std::byte* to) const noexcept {
+  const Iteration newest = published();
+  const auto behind = static_cast<std::uint64_t>(std::max<Iteration>(0, -first));
+  if (count <= behind) return {0, 0};
+  const Iteration begin = std::max(first, oldest());
+  if (begin > newest) return {begin, 0};
+  // `count` may be anything: it is compared, not added
+  const auto skipped = static_cast<std::uint64_t>(begin - std::max<Iteration>(first, 0)) + behind;
+  if (count <= skipped) return {begin, 0};
+  const auto there = static_cast<std::uint64_t>(newest - begin) + 1;
+  const std::uint64_t rows = std::min<std::uint64_t>(there, count - skipped);
+
+  // two runs of slots at most
+  const std::uint64_t slot_of_begin = static_cast<std::uint64_t>(begin) % slots_;
+  const std::uint64_t before_end = std::min(rows, slots_ - slot_of_begin);
+  load_words(to, slot(begin), before_end * row_bytes_);
+  load_words(to + before_end * row_bytes_, slots_begin_, (rows - before_end) * row_bytes_);
+
+  // what the writer reached meanwhile is dropped, the rest is true
+  const Iteration kept = std::max(begin, first_true());
+  const auto lost = static_cast<std::uint64_t>(kept - begin);
+  if (lost >= rows) return {kept, 0};
+  if (lost > 0) std::memmove(to, to + lost * row_bytes_, (rows - lost) * row_bytes_);
+  return {kept, rows - lost};
+}
+
+}  // namespace o80

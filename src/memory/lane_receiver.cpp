@@ -1,0 +1,174 @@
+#include "o80/memory/lane_receiver.hpp"
+
+#include <algorithm>
+
+#include "o80/base/crash_point.hpp"
+#include "o80/memory/atomic_words.hpp"
+#include "o80/memory/futex.hpp"
+
+namespace o80 {
+
+LaneReceiver::LaneReceiver(const SegmentView& view, std::uint32_t lane) noexcept
+    : page_(&view.lane(lane)),
+      feedback_(&view.feedback(lane)),
+      statuses_(view.statuses(lane)),
+      transport_(view.transport(lane)),
+      mask_(view.shape.lane_blocks - 1) {}
+
+std::uint32_t LaneReceiver::available() noexcept {
+  committed_ = page_->committed.load(std::memory_order_acquire);  // sync lane
+  const std::uint64_t blocks = mask_ + 1;
+  // an honest owner never has more in flight than the lane, nor takes anything back
+  if (committed_ - freed_ > blocks || committed_ - cursor_ > blocks) {
+    reset();
+    return 0;
+  }
+  return static_cast<std::uint32_t>(committed_ - cursor_);
+}
+
+bool LaneReceiver::take(std::byte* block) noexcept {
+  if (cursor_ == committed_ && available() == 0) return false;
+  load_words(block, transport_ + (cursor_ & mask_) * kBlockSize, kBlockSize);
+  ++cursor_;
+  return true;
+}
+
+std::uint64_t LaneReceiver::peek_word(std::size_t offset) const noexcept {
+  std::uint64_t word;
+  load_words(reinterpret_cast<std::byte*>(&word),
+             transport_ + (cursor_ & mask_) * kBlockSize + offset, 8);
+  return word;
+}
+
+void LaneReceiver::reset() noexcept {
+  const std::uint64_t taken = in_flight();
+  committed_ = page_->committed.load(std::memory_order_acquire);  // sync lane
+  cursor_ = committed_;
+  freed_ = cursor_ - taken;
+  ++resets_;
+  flag();
+}
+
+void LaneReceiver::free(std::uint32_t blocks) noexcept {
+  freed_ += std::min<std::uint64_t>(blocks, in_flight());
+}
+
+void LaneReceiver::set_status(std::uint64_t id, StatusWord word) noexcept {
+  StatusSlot& slot = statuses_[id & (2 * (mask_ + 1) - 1)];
+  if (slot.id.load(std::memory_order_relaxed) != id) {
+    // a reader of the new id sees no old word
+    slot.word.store(0, std::memory_order_relaxed);
+    O80_CRASH_POINT("status.before_id");
+    slot.id.store(id, std::memory_order_release);  // sync status_id
+  }
+  O80_CRASH_POINT("status.before_word");
+  slot.word.store(word.packed(), std::memory_order_release);  // sync status
+  O80_CRASH_POINT("status.after_word");
+}
+
+void LaneReceiver::set_message(std::uint64_t id, std::string_view text) noexcept {
+  MessageSlot& slot = feedback_->messages[messages_++ % kMessages];
+  slot.id.store(0, std::memory_order_relaxed);
+  O80_CRASH_POINT("message.before_text");
+  store_text(slot.text, std::size(slot.text), text);
+  O80_CRASH_POINT("message.before_id");
+  slot.id.store(id, std::memory_order_release);  // sync message
+}
+
+void LaneReceiver::set_staged(std::uint64_t id) noexcept {
+  feedback_->staged.store(id, std::memory_order_release);  // sync staged
+}
+
+void LaneReceiver::set_ended(std::uint64_t id) noexcept {
+  feedback_->ended.store(id, std::memory_order_release);  // sync ended
+  flag();
+}
+
+namespace {
+
+void write_burst(BurstSlot& slot, std::uint64_t id, Iteration row) noexcept {
+  slot.id.store(0, std::memory_order_relaxed);
+  slot.row.store(row, std::memory_order_release);  // sync burst_row
+  slot.id.store(id, std::memory_order_release);    // sync burst
+}
+
+}  // namespace
+
+void LaneReceiver::set_burst_done(std::uint64_t id, Iteration row) noexcept {
+  O80_CRASH_POINT("burst.before");
+  write_burst(feedback_->recent_bursts[bursts_ % kBurstsKept], id, row);
+  O80_CRASH_POINT("burst.before_newest");
+  write_burst(feedback_->burst, id, row);
+  feedback_->bursts.store(++bursts_, std::memory_order_release);  // sync bursts
+  O80_CRASH_POINT("burst.after");
+  flag();
+}
+
+void LaneReceiver::flush() noexcept {
+  if (freed_ != freed_published_) {
+    freed_published_ = freed_;
+    feedback_->freed.store(freed_, std::memory_order_release);  // sync freed
+  }
+  if (!flagged_) return;
+  flagged_ = false;
+
+  // the flag is taken down before the events move: who raises it later has seen them or sees them
+  std::atomic<std::uint32_t>& waiting = page_->waiting;
+  bool sleepers = waiting.load(std::memory_order_seq_cst) != 0;  // sync waiting
+  if (sleepers) waiting.store(0, std::memory_order_seq_cst);     // sync waiting
+  O80_CRASH_POINT("events.before");
+  feedback_->events.fetch_add(1, std::memory_order_seq_cst);  // sync events
+  O80_CRASH_POINT("events.after");
+  sleepers = sleepers || waiting.load(std::memory_order_seq_cst) != 0;  // sync waiting
+  if (sleepers) futex_wake(feedback_->events, kEverybody);
+}
+
+std::uint64_t LaneReceiver::incarnation() const noexcept {
+  return page_->incarnation.load(std::memory_order_acquire);  // sync incarnation
+}
+
+std::uint64_t LaneReceiver::closed() const noexcept {
+  return page_->closed.load(std::memory_order_acquire);  // sync closed
+}
+
+LaneReceivers::LaneReceivers(const SegmentView& view, std::size_t ticket_offset)
+    : view_(view), ticket_offset_(ticket_offset) {
+  for (std::uint32_t i = 0; i < view.shape.lanes; ++i) lanes_.emplace_back(view, i);
+}
+
+bool LaneReceivers::look() noexcept {
+  const std::uint32_t bell = view_.bell().rung.load(std::memory_order_acquire);  // sync bell
+  if (bell == bell_seen_ && !pending_) return false;
+  bell_seen_ = bell;
+  below_ = view_.bell().tickets.load(std::memory_order_seq_cst);  // sync tickets
+  pending_ = true;
+  return true;
+}
+
+std::optional<std::uint32_t> LaneReceivers::next() noexcept {
+  std::optional<std::uint32_t> first;
+  std::uint64_t lowest = below_;
+  bool left_over = false;
+  for (std::uint32_t i = 0; i < size(); ++i) {
+    if (lanes_[i].available() == 0) continue;
+    std::uint64_t ticket = lanes_[i].peek_word(ticket_offset_);
+    if (ticket >= below_) {
+      if (ticket < view_.bell().tickets.load(std::memory_order_seq_cst)) {  // sync tickets
+        left_over = true;
+        continue;
+      }
+      ticket = 0;  // nobody drew it: the order is lost, the batch is not
+    }
+    if (first && ticket >= lowest) continue;
+    first = i;
+    lowest = ticket;
+  }
+  if (!first) pending_ = left_over;
+  return first;
+}
+
+void LaneReceivers::flush_events() noexcept {
+  for (LaneReceiver& lane : lanes_) lane.flush();
+}
+
+}  // namespace o80

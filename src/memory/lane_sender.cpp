@@ -1,0 +1,205 @@
+#include "o80/memory/lane_sender.hpp"
+
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <algorithm>
+
+#include "o80/base/crash_point.hpp"
+#include "o80/base/error.hpp"
+#include "o80/memory/atomic_words.hpp"
+#include "o80/memory/futex.hpp"
+#include "o80/memory/segment_file.hpp"
+
+namespace o80 {
+
+namespace {
+
+constexpr int kTries = 1000;  // of a status that is being written
+
+std::string holders(const SegmentView& view) {
+  std::string text;
+  for (std::uint32_t i = 0; i < view.shape.lanes; ++i) {
+    const LaneSenderPage& page = view.lane(i);
+    text += (i == 0 ? "" : ", ") + load_text(page.owner, std::size(page.owner));
+  }
+  return text;
+}
+
+}  // namespace
+
+LaneSender::LaneSender(const AttachedSegment& segment) : segment_(&segment), view_(segment.view()) {
+  const std::string quoted = "segment '" + segment.name() + "'";
+  if (segment.access() != Access::read_write)
+    throw ReadOnly(quoted + " was attached to read only: attach again without it to command");
+  lock_ = segment.open_again();
+  const std::uint32_t lanes = view_.shape.lanes;
+  while (lane_ < lanes && !lock_.try_lock(kFirstLaneByte + lane_)) ++lane_;
+  if (lane_ == lanes)
+    throw NoLane(quoted + ": all of its " + std::to_string(lanes) + " lanes are taken, by " +
+                 holders(view_) +
+                 ". Close one of these frontends, or start the backend with more lanes.");
+
+  // ours: writable through the descriptor that bears no lock
+  const std::uint64_t offset = view_.offsets.lanes + lane_ * view_.offsets.lane_stride;
+  Mapping::make_writable(view_.base, segment.descriptor(), offset, view_.offsets.lane_stride);
+  page_ = &view_.lane(lane_);
+  feedback_ = &view_.feedback(lane_);
+  statuses_ = view_.statuses(lane_);
+  transport_ = view_.transport(lane_);
+
+  // go on where the last owner left off
+  sent_ = page_->committed.load(std::memory_order_relaxed);
+  if (page_->next_id.load(std::memory_order_relaxed) == 0)
+    page_->next_id.store(1, std::memory_order_relaxed);
+  store_text(page_->owner, std::size(page_->owner),
+             "pid " + std::to_string(getpid()) + " (" + own_program() + ")");
+  O80_CRASH_POINT("lane.before_incarnation");
+  incarnation_ = page_->incarnation.load(std::memory_order_relaxed) + 1;
+  page_->incarnation.store(incarnation_, std::memory_order_release);  // sync incarnation
+  O80_CRASH_POINT("lane.after_incarnation");
+
+  // the last owner may have died between its commit and the bell
+  ring_bell(view_);
+}
+
+LaneSender::LaneSender(LaneSender&& other) noexcept
+    : segment_(other.segment_),
+      view_(other.view_),
+      lock_(std::move(other.lock_)),
+      lane_(other.lane_),
+      page_(other.page_),
+      feedback_(other.feedback_),
+      statuses_(other.statuses_),
+      transport_(other.transport_),
+      incarnation_(other.incarnation_),
+      sent_(other.sent_),
+      guard_(other.guard_) {}
+
+LaneSender::~LaneSender() {
+  if (!lock_.is_open() || guard_.forked()) return;
+  O80_CRASH_POINT("lane.before_close");
+  page_->closed.store(incarnation_, std::memory_order_release);  // sync closed
+  O80_CRASH_POINT("lane.after_close");
+  mprotect(page_, view_.offsets.lane_stride, PROT_READ);
+}
+
+std::uint32_t LaneSender::free_blocks() const noexcept {
+  const std::uint64_t in_flight =
+      sent_ - feedback_->freed.load(std::memory_order_acquire);  // sync freed
+  return in_flight > blocks() ? 0 : blocks() - static_cast<std::uint32_t>(in_flight);
+}
+
+std::uint64_t LaneSender::next_ids(std::uint64_t n) noexcept {
+  const std::uint64_t first = page_->next_id.load(std::memory_order_relaxed);
+  page_->next_id.store(first + n, std::memory_order_relaxed);
+  return first;
+}
+
+std::uint64_t LaneSender::send(std::span<const std::byte> batch, std::size_t ticket_offset) {
+  guard_.check("segment '" + segment_->name() + "'");
+  if (batch.empty() || batch.size() % kBlockSize != 0 || ticket_offset % 8 != 0 ||
+      ticket_offset >= kBlockSize)
+    throw InvalidArgument(
+        "a batch is made of whole blocks of 64 bytes and bears its ticket in "
+        "the first");
+  const std::uint64_t count = batch.size() / kBlockSize;
+  const std::uint32_t free = free_blocks();
+  if (count > free)
+    throw LaneFull("segment '" + segment_->name() + "': the batch takes " + std::to_string(count) +
+                   " blocks, " + std::to_string(free) + " of the lane's " +
+                   std::to_string(blocks()) +
+                   " are free. Nothing was sent: wait until earlier commands have ended, purge, "
+                   "or send less at once.");
+
+  // batch => transport, in two runs at most
+  const std::uint64_t begin = sent_ & (blocks() - 1);
+  const std::uint64_t before_end = std::min<std::uint64_t>(count, blocks() - begin) * kBlockSize;
+  std::byte* first = transport_ + begin * kBlockSize;
+  O80_CRASH_POINT("lane.before_copy");
+  store_words(first, batch.data(), before_end);
+  store_words(transport_, batch.data() + before_end, batch.size() - before_end);
+
+  // what happened before this ticket was drawn is seen by whoever draws a later one
+  O80_CRASH_POINT("lane.before_ticket");
+  const std::uint64_t ticket =
+      view_.bell().tickets.fetch_add(1, std::memory_order_seq_cst);  // sync tickets
+  store_words(first + ticket_offset, reinterpret_cast<const std::byte*>(&ticket), 8);
+
+  sent_ += count;
+  O80_CRASH_POINT("lane.before_commit");
+  page_->committed.store(sent_, std::memory_order_release);  // sync lane
+  O80_CRASH_POINT("lane.after_commit");
+  ring_bell(view_);
+  return ticket;
+}
+
+LaneSender::StatusAnswer LaneSender::status(std::uint64_t id) const noexcept {
+  const StatusSlot& slot = statuses_[id & (2 * std::uint64_t{blocks()} - 1)];
+  for (int i = 0; i < kTries; ++i) {
+    const std::uint64_t word = slot.word.load(std::memory_order_acquire);  // sync status
+    const std::uint64_t owner = slot.id.load(std::memory_order_acquire);   // sync status_id
+    if (owner > id) return {Known::forgotten, {}};
+    if (owner < id) return {Known::not_yet, {}};
+    if (word != 0 && slot.word.load(std::memory_order_relaxed) == word)
+      return {Known::yes, StatusWord::unpack(word)};
+  }
+  return {Known::not_yet, {}};
+}
+
+std::optional<std::string> LaneSender::message(std::uint64_t id) const {
+  for (const MessageSlot& slot : feedback_->messages) {
+    if (slot.id.load(std::memory_order_acquire) != id) continue;  // sync message
+    std::string text = load_text(slot.text, std::size(slot.text));
+    if (slot.id.load(std::memory_order_relaxed) == id) return text;
+  }
+  return std::nullopt;
+}
+
+namespace {
+
+bool read_burst(const BurstSlot& slot, std::uint64_t id, Iteration& row) noexcept {
+  if (slot.id.load(std::memory_order_acquire) != id) return false;  // sync burst
+  row = slot.row.load(std::memory_order_acquire);                   // sync burst_row
+  return slot.id.load(std::memory_order_relaxed) == id;
+}
+
+}  // namespace
+
+LaneSender::BurstAnswer LaneSender::burst(std::uint64_t id) const noexcept {
+  Iteration row = -1;
+  if (read_burst(feedback_->burst, id, row)) return {Known::yes, row};
+
+  // not the newest: look through the recent ones
+  const std::uint64_t done = feedback_->bursts.load(std::memory_order_acquire);  // sync bursts
+  const std::uint64_t kept = std::min<std::uint64_t>(done, kBurstsKept);
+  for (std::uint64_t back = 1; back <= kept; ++back)
+    if (read_burst(feedback_->recent_bursts[(done - back) % kBurstsKept], id, row))
+      return {Known::yes, row};
+  const std::uint64_t oldest = feedback_->recent_bursts[done % kBurstsKept].id.load(
+      std::memory_order_acquire);  // sync burst
+  return {oldest > id ? Known::forgotten : Known::not_yet, -1};
+}
+
+std::uint64_t LaneSender::staged() const noexcept {
+  return feedback_->staged.load(std::memory_order_acquire);  // sync staged
+}
+
+std::uint64_t LaneSender::ended() const noexcept {
+  return feedback_->ended.load(std::memory_order_acquire);  // sync ended
+}
+
+void LaneSender::sleep(std::uint32_t seen, const Deadline& deadline) {
+  if (guard_.forked()) guard_.check("segment '" + segment_->name() + "'");
+  page_->waiting.store(1, std::memory_order_seq_cst);             // sync waiting
+  if (feedback_->events.load(std::memory_order_seq_cst) == seen)  // sync events
+    futex_wait(feedback_->events, seen, deadline.left(kSlice));
+}
+
+bool LaneSender::look_around(const Check& check) const {
+  if (check && !check())
+    throw Cancelled("the wait for segment '" + segment_->name() + "' was cancelled");
+  return segment_->gone();
+}
+
+}  // namespace o80

@@ -1,0 +1,203 @@
+#include "o80/memory/liveness.hpp"
+
+#include <pthread.h>
+#include <sched.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <atomic>
+#include <deque>
+#include <thread>
+#include <utility>
+
+#include "o80/memory/futex.hpp"
+
+namespace o80 {
+
+namespace {
+
+constexpr std::int64_t kPeriod = 20'000'000;  // [ns]
+
+constexpr std::uint64_t pack(LaneLife life) noexcept {
+  return life.incarnation << 2 | static_cast<std::uint64_t>(life.state);
+}
+
+constexpr LaneLife unpack(std::uint64_t word) noexcept {
+  return {.state = static_cast<LaneState>(word & 3), .incarnation = word >> 2};
+}
+
+}  // namespace
+
+/// Writer:   whoever holds fork_mutex().
+/// Readers:  the backend's thread.
+/// Realtime: the words may be read anywhere.
+struct LaneLiveness::Watched {
+  explicit Watched(const OwnedSegment& segment)
+      : descriptor(segment.descriptor()), view(segment.view()) {
+    for (std::uint32_t i = 0; i < view.shape.lanes; ++i) lanes.emplace_back(0);
+  }
+
+  void ask() noexcept {
+    bool changed = false;
+    for (std::uint32_t i = 0; i < view.shape.lanes; ++i) {
+      const std::uint64_t before = lanes[i].load(std::memory_order_relaxed);
+      const std::uint64_t now = pack(ask_lane(i, unpack(before)));
+      if (now == before) continue;
+      lanes[i].store(now, std::memory_order_relaxed);
+      changed = true;
+    }
+    if (changed) changes.fetch_add(1, std::memory_order_release);  // sync changes
+  }
+
+  LaneLife ask_lane(std::uint32_t i, LaneLife last) const noexcept {
+    const LaneSenderPage& page = view.lane(i);
+    // whoever has counted itself has held the lock: if it is not held now, that one is gone
+    const std::uint64_t before =
+        page.incarnation.load(std::memory_order_acquire);  // sync incarnation
+    const bool held = is_byte_locked(descriptor, kFirstLaneByte + i);
+    if (!held) {
+      if (before == 0) return {};
+      const bool in_order = page.closed.load(std::memory_order_acquire) == before;  // sync closed
+      return {in_order ? LaneState::closed : LaneState::died, before};
+    }
+    const std::uint64_t now = page.incarnation.load(std::memory_order_acquire);  // sync incarnation
+    // held, but the new owner has not counted itself yet
+    const bool ended = last.state == LaneState::died || last.state == LaneState::closed;
+    if (now == 0 || (ended && now == last.incarnation)) return last;
+    return {LaneState::alive, now};
+  }
+
+  int descriptor;
+  SegmentView view;
+  std::deque<std::atomic<std::uint64_t>> lanes;
+  std::atomic<std::uint32_t> changes{0};
+};
+
+/// The helper of a process; everything in it is guarded by fork_mutex().
+class LivenessThread {
+ public:
+  static void add(LaneLiveness::Watched* watched) {
+    const std::lock_guard lock(fork_mutex());
+    Registry& all = registry();
+    // a thread does not survive a fork; its handle is left behind
+    if (all.guard.forked()) all = Registry{};
+    watched->ask();
+    if (all.helper == nullptr) all.helper = new LivenessThread;
+    all.watched.push_back(watched);
+  }
+
+  static void remove(LaneLiveness::Watched* watched) noexcept {
+    LivenessThread* idle = nullptr;
+    {
+      const std::lock_guard lock(fork_mutex());
+      Registry& all = registry();
+      if (all.guard.forked()) return;
+      std::erase(all.watched, watched);
+      if (all.watched.empty()) idle = std::exchange(all.helper, nullptr);
+    }
+    delete idle;
+  }
+
+  static void avoid(const std::vector<int>& processors) {
+    const std::lock_guard lock(fork_mutex());
+    Registry& all = registry();
+    all.avoided = processors;
+    if (!all.guard.forked() && all.helper != nullptr) all.helper->settle();
+  }
+
+ private:
+  struct Registry {
+    std::vector<LaneLiveness::Watched*> watched;
+    std::vector<int> avoided;
+    LivenessThread* helper = nullptr;
+    ForkGuard guard;
+  };
+
+  static Registry& registry() {
+    static auto* all = new Registry;
+    return *all;
+  }
+
+  LivenessThread() {
+    if (sched_getaffinity(0, sizeof allowed_, &allowed_) != 0) CPU_ZERO(&allowed_);
+    // signals are for the program's own threads
+    sigset_t every, before;
+    sigfillset(&every);
+    pthread_sigmask(SIG_BLOCK, &every, &before);
+    thread_ = std::thread([this] { run(); });
+    pthread_sigmask(SIG_SETMASK, &before, nullptr);
+    // it may have been started by a real-time thread
+    const sched_param ordinary{};
+    pthread_setschedparam(thread_.native_handle(), SCHED_OTHER, &ordinary);
+    pthread_setname_np(thread_.native_handle(), "o80-liveness");
+    settle();
+  }
+
+  ~LivenessThread() {
+    stop_.store(1, std::memory_order_seq_cst);
+    futex_wake(stop_, kEverybody);
+    thread_.join();
+  }
+
+  /// Off the avoided processors: on what its starter could use, else on any other.
+  void settle() {
+    cpu_set_t any;
+    CPU_ZERO(&any);
+    for (int i = 0; i < CPU_SETSIZE; ++i) CPU_SET(i, &any);
+    cpu_set_t wanted = allowed_;
+    for (const int processor : registry().avoided)
+      if (processor >= 0 && processor < CPU_SETSIZE) {
+        CPU_CLR(processor, &wanted);
+        CPU_CLR(processor, &any);
+      }
+    const pthread_t thread = thread_.native_handle();
+    if (CPU_COUNT(&wanted) > 0 && pthread_setaffinity_np(thread, sizeof wanted, &wanted) == 0)
+      return;
+    if (pthread_setaffinity_np(thread, sizeof any, &any) == 0) return;
+    pthread_setaffinity_np(thread, sizeof allowed_, &allowed_);
+  }
+
+  void run() noexcept {
+    while (stop_.load(std::memory_order_acquire) == 0) {
+      {
+        const std::lock_guard lock(fork_mutex());
+        for (LaneLiveness::Watched* watched : registry().watched) watched->ask();
+      }
+      futex_wait(stop_, 0, kPeriod);
+    }
+  }
+
+  cpu_set_t allowed_;
+  std::atomic<std::uint32_t> stop_{0};
+  std::thread thread_;
+};
+
+LaneLiveness::LaneLiveness(const OwnedSegment& segment)
+    : watched_(std::make_unique<Watched>(segment)) {
+  LivenessThread::add(watched_.get());
+}
+
+LaneLiveness::LaneLiveness(LaneLiveness&&) noexcept = default;
+
+LaneLiveness::~LaneLiveness() {
+  if (watched_) LivenessThread::remove(watched_.get());
+}
+
+std::uint32_t LaneLiveness::changes() const noexcept {
+  return watched_->changes.load(std::memory_order_acquire);  // sync changes
+}
+
+LaneLife LaneLiveness::lane(std::uint32_t i) const noexcept {
+  return unpack(watched_->lanes[i].load(std::memory_order_relaxed));
+}
+
+void LaneLiveness::refresh() noexcept {
+  const std::lock_guard lock(fork_mutex());
+  watched_->ask();
+}
+
+void LaneLiveness::avoid_processors(const std::vector<int>& processors) {
+  LivenessThread::avoid(processors);
+}
+
+}  // namespace o80

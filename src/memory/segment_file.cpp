@@ -1,0 +1,174 @@
+#include "o80/memory/segment_file.hpp"
+
+#include <fcntl.h>
+#include <pwd.h>
+#include <signal.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <vector>
+
+#include "o80/base/crash_point.hpp"
+#include "o80/base/time.hpp"
+#include "o80/memory/file_lock.hpp"
+#include "o80/memory/futex.hpp"
+
+namespace o80 {
+
+namespace {
+
+std::string text_of(const char* chars, std::size_t most) { return {chars, strnlen(chars, most)}; }
+
+bool read_header(int descriptor, SegmentHeader& header) noexcept {
+  return pread(descriptor, &header, sizeof header, 0) == sizeof header;
+}
+
+// how long a lock of a living process, or of one that is being torn down, may last unnoticed
+constexpr std::int64_t kPasser = 20'000'000;    // [ns]
+constexpr std::int64_t kDying = 1'000'000'000;  // [ns]
+
+std::int64_t patience(int descriptor) noexcept {
+  SegmentHeader header;
+  const bool dead = read_header(descriptor, header) && header.pid > 0 && kill(header.pid, 0) != 0 &&
+                    errno == ESRCH;
+  return dead ? kDying : kPasser;
+}
+
+}  // namespace
+
+bool leads_to(const std::string& path, int descriptor) noexcept {
+  struct stat named, open;
+  return lstat(path.c_str(), &named) == 0 && fstat(descriptor, &open) == 0 &&
+         named.st_dev == open.st_dev && named.st_ino == open.st_ino;
+}
+
+bool bears_the_mark(int descriptor) noexcept {
+  std::uint64_t magic = 0;
+  return pread(descriptor, &magic, sizeof magic, 0) == sizeof magic && magic == kSegmentMagic;
+}
+
+bool is_held(int descriptor, const std::string& path) {
+  const std::int64_t end = monotonic_now() + patience(descriptor);
+  while (is_byte_locked(descriptor, kBackendByte)) {
+    if (monotonic_now() >= end) return leads_to(path, descriptor);
+    usleep(1000);
+  }
+  return false;
+}
+
+std::string taken_text(std::string_view name, int descriptor) {
+  SegmentHeader header{};
+  const bool known = read_header(descriptor, header) && header.magic == kSegmentMagic;
+  return "segment '" + std::string(name) + "' already has a backend" +
+         (known ? " (" + describe_owner(header) + ")" : std::string()) +
+         ".\nStop it first with `o80 stop " + std::string(name) +
+         "`, or give this one another name with --segment.";
+}
+
+std::string inspect_segment(int descriptor, SegmentHeader& header, SegmentOffsets& offsets) {
+  struct stat status;
+  if (fstat(descriptor, &status) != 0) return std::strerror(errno);
+  if (!S_ISREG(status.st_mode)) return "it is not a regular file";
+  if (!bears_the_mark(descriptor)) return "it was not made by o80";
+  if (!read_header(descriptor, header)) return "it is truncated";
+  if (header.version != kSegmentVersion || header.header_bytes != sizeof header)
+    return "it is of version " + std::to_string(header.version) + ", this o80 reads version " +
+           std::to_string(kSegmentVersion) + " only";
+  if (header.shape.page_bytes != static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE)) ||
+      !SegmentOffsets::compute(header.shape, offsets) || header.epoch == 0 ||
+      header.file_bytes != offsets.file_bytes)
+    return "its header is corrupted";
+  if (static_cast<std::uint64_t>(status.st_size) < offsets.file_bytes) return "it is truncated";
+  if (static_cast<std::uint64_t>(status.st_size) > offsets.file_bytes)
+    return "it is longer than its header says";
+  return {};
+}
+
+const char* name_of(Life life) noexcept {
+  switch (life) {
+    case Life::starting:
+      return "starting";
+    case Life::running:
+      return "running";
+    case Life::stopped:
+      return "stopped";
+    case Life::failed:
+      return "failed";
+    case Life::superseded:
+      return "superseded";
+    case Life::killed:
+      return "killed";
+  }
+  return "unknown";
+}
+
+Life judge_life(int descriptor, const std::atomic<std::uint32_t>& state) noexcept {
+  // the lock first: an end in order is said before the lock falls
+  const bool held = is_byte_locked(descriptor, kBackendByte);
+  switch (static_cast<State>(state.load(std::memory_order_acquire))) {  // sync state
+    case State::stopped:
+      return Life::stopped;
+    case State::failed:
+      return Life::failed;
+    case State::superseded:
+      return Life::superseded;
+    case State::starting:
+      return held ? Life::starting : Life::killed;
+    case State::running:
+      break;
+  }
+  return held ? Life::running : Life::killed;
+}
+
+void end_segment(const SegmentView& view, State state) noexcept {
+  Counters& counters = view.counters();
+  O80_CRASH_POINT("segment.before_end");
+  counters.state.store(static_cast<std::uint32_t>(state), std::memory_order_seq_cst);  // sync state
+  O80_CRASH_POINT("segment.after_end");
+  counters.row_wake.fetch_add(1, std::memory_order_seq_cst);  // sync row_wake
+  futex_wake(counters.row_wake, kEverybody);
+  for (std::uint32_t i = 0; i < view.shape.lanes; ++i) {
+    LaneFeedback& feedback = view.feedback(i);
+    feedback.events.fetch_add(1, std::memory_order_seq_cst);  // sync events
+    futex_wake(feedback.events, kEverybody);
+  }
+}
+
+std::string describe_owner(const SegmentHeader& header) {
+  const time_t started = header.started_at;
+  const time_t now = time(nullptr);
+  tm then{}, today{};
+  localtime_r(&started, &then);
+  localtime_r(&now, &today);
+  const bool same_day = then.tm_year == today.tm_year && then.tm_yday == today.tm_yday;
+
+  char clock[32] = "";
+  strftime(clock, sizeof clock, same_day ? "%H:%M" : "%Y-%m-%d %H:%M", &then);
+  return "pid " + std::to_string(header.pid) + ", started " + clock + " by " +
+         text_of(header.user, sizeof header.user);
+}
+
+std::string own_user() {
+  std::vector<char> buffer(16384);
+  passwd entry{};
+  passwd* found = nullptr;
+  if (getpwuid_r(geteuid(), &entry, buffer.data(), buffer.size(), &found) == 0 && found != nullptr)
+    return found->pw_name;
+  return "user " + std::to_string(geteuid());
+}
+
+std::string own_program() {
+  char name[64] = "";
+  const int file = open("/proc/self/comm", O_RDONLY | O_CLOEXEC);
+  if (file < 0) return "unknown";
+  const ssize_t length = read(file, name, sizeof name - 1);
+  close(file);
+  std::string program = text_of(name, length > 0 ? static_cast<std::size_t>(length) : 0);
+  while (!program.empty() && program.back() == '\n') program.pop_back();
+  return program;
+}
+
+}  // namespace o80

@@ -1,0 +1,37 @@
+#include "o80/memory/segment_layout.hpp"
+
+#include <bit>
+
+namespace o80 {
+
+namespace {
+constexpr std::uint64_t kMostBytes = 1ULL << 46;
+}
+
+bool SegmentOffsets::compute(const SegmentShape& shape, SegmentOffsets& offsets) noexcept {
+  const std::uint64_t page = shape.page_bytes;
+  if (page < 4096 || page > (1U << 20) || !std::has_single_bit(page)) return false;
+  if (shape.schema_bytes > (1ULL << 32)) return false;
+  if (shape.row_bytes == 0 || shape.row_bytes % 8 != 0 || shape.row_bytes > (1ULL << 32))
+    return false;
+  if (shape.slots < 2 || shape.slots > kMostBytes / shape.row_bytes) return false;
+  if (shape.lanes > kMostLanes) return false;
+  if (!std::has_single_bit(shape.lane_blocks) || shape.lane_blocks > (1U << 24)) return false;
+
+  const auto pages = [page](std::uint64_t bytes) { return (bytes + page - 1) / page * page; };
+  const std::uint64_t blocks = shape.lane_blocks;
+  offsets.schema = pages(sizeof(SegmentHeader));
+  offsets.counters = offsets.schema + pages(shape.schema_bytes);
+  offsets.bell = offsets.counters + pages(sizeof(Counters));
+  offsets.lanes = offsets.bell + pages(sizeof(Bell));
+  offsets.transport = pages(sizeof(LaneSenderPage));
+  offsets.lane_stride = offsets.transport + pages(blocks * kBlockSize);
+  offsets.feedback = offsets.lanes + shape.lanes * offsets.lane_stride;
+  offsets.statuses = pages(sizeof(LaneFeedback));
+  offsets.feedback_stride = offsets.statuses + pages(2 * blocks * sizeof(StatusSlot));
+  offsets.history = offsets.feedback + shape.lanes * offsets.feedback_stride;
+  offsets.file_bytes = offsets.history + pages(shape.slots * shape.row_bytes);
+  return true;
+}
+
+}  // namespace o80

@@ -1,0 +1,121 @@
+#include "o80/memory/signal.hpp"
+
+#include <time.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "o80/base/crash_point.hpp"
+#include "o80/base/error.hpp"
+#include "o80/memory/futex.hpp"
+
+namespace o80 {
+
+namespace {
+constexpr Iteration kNobody = std::numeric_limits<Iteration>::max();
+}
+
+RowWaiter::RowWaiter(const AttachedSegment& segment, std::int64_t poll) noexcept
+    : segment_(&segment), view_(segment.view()), poll_(std::max<std::int64_t>(poll, 1000)) {}
+
+Waited RowWaiter::wait_for_row(Iteration k, const Deadline& deadline, const Check& check) {
+  segment_->check_process();
+  const std::atomic<std::int64_t>& published = view_.counters().published;
+  const auto ready = [&] {
+    return published.load(std::memory_order_acquire) >= k;  // sync published
+  };
+  if (spinner_.spin(ready)) return Waited::ready;
+  std::int64_t look_at = monotonic_now() + kSlice;
+  while (!deadline.over()) {
+    if (segment_->access() == Access::read_write)
+      sleep(k, deadline.left(kSlice));
+    else
+      poll(k, deadline.left(kSlice));
+    if (ready()) return Waited::ready;
+    if (monotonic_now() < look_at) continue;
+    look_at += kSlice;
+    if (check && !check())
+      throw Cancelled("the wait for a row of segment '" + segment_->name() + "' was cancelled");
+    // rows may have come before the end
+    const bool gone = segment_->gone();
+    if (ready()) return Waited::ready;
+    if (gone) segment_->throw_if_gone();
+  }
+  return ready() ? Waited::ready : Waited::timed_out;
+}
+
+void RowWaiter::sleep(Iteration k, std::int64_t at_most) noexcept {
+  Counters& counters = view_.counters();
+  Bell& bell = view_.bell();
+
+  // lower the word, look again, sleep
+  const std::uint32_t seen = counters.row_wake.load(std::memory_order_seq_cst);  // sync row_wake
+  Iteration lowest = bell.wanted.load(std::memory_order_seq_cst);                // sync wanted
+  while (k < lowest &&
+         !bell.wanted.compare_exchange_weak(lowest, k, std::memory_order_seq_cst)) {  // sync wanted
+  }
+  if (counters.published.load(std::memory_order_seq_cst) >= k) return;  // sync published
+  if (!futex_wait(counters.row_wake, seen, at_most)) return;
+
+  // the writer woke one: the first awake after each of its wakes tells the rest
+  const std::uint32_t now = counters.row_wake.load(std::memory_order_seq_cst);  // sync row_wake
+  if (now == seen || bell.passed_on.exchange(now, std::memory_order_relaxed) == now) return;
+  futex_wake(counters.row_wake, kEverybody);
+}
+
+void RowWaiter::poll(Iteration k, std::int64_t at_most) noexcept {
+  // not on the futex: it would take the one wake meant for those who can pass it on
+  const Counters& counters = view_.counters();
+  const std::int64_t end = monotonic_now() + at_most;
+  for (std::int64_t left = at_most; left > 0; left = end - monotonic_now()) {
+    const std::int64_t nap = std::min(left, poll_);
+    const timespec pause{.tv_sec = 0, .tv_nsec = static_cast<long>(nap)};
+    nanosleep(&pause, nullptr);
+    if (counters.published.load(std::memory_order_acquire) >= k) return;  // sync published
+    const auto state =
+        static_cast<State>(counters.state.load(std::memory_order_acquire));  // sync state
+    if (state != State::running && state != State::starting) return;
+  }
+}
+
+void RowSignal::wake_readers(Iteration k) noexcept {
+  Bell& bell = view_.bell();
+  if (bell.wanted.load(std::memory_order_seq_cst) > k) return;  // sync wanted
+  O80_CRASH_POINT("rows.before_reset");
+  bell.wanted.store(kNobody, std::memory_order_seq_cst);  // sync wanted
+  O80_CRASH_POINT("rows.before_wake");
+  // after the reset: who registered before it still has the old value and will not sleep on it
+  std::atomic<std::uint32_t>& wake = view_.counters().row_wake;
+  wake.fetch_add(1, std::memory_order_seq_cst);  // sync row_wake
+  futex_wake(wake, 1);
+  O80_CRASH_POINT("rows.after_wake");
+}
+
+std::uint32_t BellWaiter::value() const noexcept {
+  return view_.bell().rung.load(std::memory_order_acquire);  // sync bell
+}
+
+bool BellWaiter::wait(std::uint32_t seen, std::int64_t at_most) noexcept {
+  const auto rang = [&] { return value() != seen; };
+  if (spinner_.spin(rang)) return true;
+  std::atomic<std::uint32_t>& sleeping = view_.counters().sleeping;
+  sleeping.store(1, std::memory_order_seq_cst);  // sync sleeping
+  const Bell& bell = view_.bell();
+  if (bell.rung.load(std::memory_order_seq_cst) == seen)  // sync bell
+    futex_wait(bell.rung, seen, std::min(at_most, kSlice));
+  sleeping.store(0, std::memory_order_relaxed);
+  return rang();
+}
+
+void BellWaiter::interrupt() noexcept { ring_bell(view_); }
+
+void ring_bell(const SegmentView& view) noexcept {
+  Bell& bell = view.bell();
+  O80_CRASH_POINT("bell.before_ring");
+  bell.rung.fetch_add(1, std::memory_order_seq_cst);  // sync bell
+  O80_CRASH_POINT("bell.after_ring");
+  if (view.counters().sleeping.load(std::memory_order_seq_cst) != 0)  // sync sleeping
+    futex_wake(bell.rung, 1);
+}
+
+}  // namespace o80
