@@ -2,20 +2,24 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string_view>
+#include <vector>
 
+#include "o80/control/record.hpp"
+#include "o80/control/state_layout.hpp"
 #include "o80/describe/schema.hpp"
 
 namespace o80 {
 
 /// Refuses a command that a robot cannot follow, when it is added and not later.
 ///
-/// Each throws InvalidArgument, whose text names the actuator, the field, the value and what is
-/// allowed. The schema must outlive it. `mask` is empty (the whole state) or a bit for each number.
+/// Each verb throws InvalidArgument, whose text names the actuator, the field, the value and what
+/// is allowed. The schema must outlive it. `mask` is empty (the whole state) or a bit a number.
 class CommandCheck {
  public:
-  explicit CommandCheck(const Schema& schema) : schema_(schema) {}
+  explicit CommandCheck(const Schema& schema);
 
   /// Index of an actuator by its name.
   std::uint32_t actuator(std::string_view name) const;
@@ -30,7 +34,19 @@ class CommandCheck {
   void request(std::uint32_t index, std::span<const std::byte> payload) const;
 
  private:
+  struct Range {
+    double lowest;  // finite: what has no limit cannot be infinite either
+    double highest;
+  };
+
+  bool within(std::uint32_t actuator, const std::byte* state,
+              const std::uint64_t* mask) const noexcept;
+  [[noreturn]] void refuse(std::uint32_t actuator, const std::byte* state,
+                           const std::uint64_t* mask) const;
+
   const Schema& schema_;
+  std::vector<std::optional<StateLayout>> layouts_;
+  std::vector<Range> ranges_;  // one for each limit of the schema
 };
 
 }  // namespace o80

@@ -69,9 +69,7 @@ std::string_view to_text(Status status) noexcept;
 std::string_view to_text(Reason reason) noexcept;
 
 /// Whether a command with this status changes no more.
-constexpr bool is_end(Status status) noexcept {
-  return status >= Status::completed;
-}
+constexpr bool is_end(Status status) noexcept { return status >= Status::completed; }
 
 inline constexpr std::uint16_t kEveryActuator = 0xFFFF;
 inline constexpr Iteration kNow = -1;
@@ -133,9 +131,7 @@ constexpr std::uint64_t blocks_of(std::uint64_t payload_bytes) noexcept {
 }
 
 /// Words of a mask with one bit for each of `bits`.
-constexpr std::uint32_t mask_words(std::uint32_t bits) noexcept {
-  return (bits + 63) / 64;
-}
+constexpr std::uint32_t mask_words(std::uint32_t bits) noexcept { return (bits + 63) / 64; }
 
 /// Id of the record at this place of a batch.
 constexpr CommandId record_id(CommandId batch, std::uint64_t place) noexcept {

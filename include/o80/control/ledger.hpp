@@ -1,0 +1,80 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "o80/control/pool.hpp"
+#include "o80/control/record.hpp"
+#include "o80/control/status.hpp"
+
+namespace o80 {
+
+/// What the backend writes into `RecordHead::own` of the records it has taken.
+struct Own {
+  static constexpr std::size_t kNext = 0;   // record in a queue, or among the dropped
+  static constexpr std::size_t kBatch = 1;  // to which it belongs
+  static constexpr std::size_t kLast = 2;   // block of the record
+  static constexpr std::size_t kOther = 3;  // next step of a plan, next group of dropped records
+};
+
+/// Keeps account of taken batches: tells every end exactly once and gives the blocks back.
+///
+/// Realtime: everything but construction. Dropping is O(1); `work` tells the statuses bit by bit.
+class Ledger {
+ public:
+  Ledger(BlockPool& pool, StatusSink& sink, std::uint32_t lanes)
+      : pool_(pool), sink_(sink), freed_(lanes) {}
+
+  /// Enters a batch as taken; it stays open until `close` and until all its records have ended.
+  /// `spare` are its blocks that no record uses.
+  void enter(std::uint32_t lane, BlockIndex batch, const BlockChain& spare,
+             Iteration iteration) noexcept;
+  /// Ends the records from `place` on, which have no blocks, as rejected; told in `work`.
+  void reject_from(BlockIndex batch, std::uint32_t place, Reason reason, std::uint8_t aux,
+                   Iteration iteration) noexcept;
+  /// The batch gets no more records.
+  void close(BlockIndex batch, Iteration iteration) noexcept { ended(batch, iteration); }
+  /// Ends a whole batch that was never taken; its records are told in `work`.
+  void reject(std::uint32_t lane, BlockIndex batch, Reason reason, std::uint8_t aux,
+              Iteration iteration) noexcept;
+
+  /// A command has begun.
+  void activate(BlockIndex record, Iteration iteration) noexcept;
+  /// A record has ended: told at once.
+  void end(BlockIndex record, Status status, Reason reason, std::uint8_t aux,
+           Iteration iteration) noexcept;
+  /// A list of records has ended: told in `work`.
+  void drop(BlockIndex first, Status status, Reason reason, Iteration iteration) noexcept;
+
+  /// Tells at most `budget` ends; false when some are left.
+  bool work(std::uint32_t budget) noexcept;
+  bool pending() const noexcept { return group_.record != kNoBlock || first_ != kNoBlock; }
+
+  std::uint32_t lane_of(BlockIndex record) const noexcept;
+  std::uint64_t freed(std::uint32_t lane) const noexcept { return freed_[lane]; }
+
+ private:
+  struct TakenBatch;
+  struct Group {
+    BlockIndex record = kNoBlock;
+    Status status = Status::none;
+    Reason reason = Reason::none;
+    Iteration iteration = 0;
+  };
+
+  TakenBatch& batch(BlockIndex block) noexcept;
+  void ended(BlockIndex batch, Iteration iteration) noexcept;
+  void append(BlockIndex group) noexcept;
+  BlockIndex& link(BlockIndex group) noexcept;
+  bool tell_rejected(BlockIndex batch, std::uint32_t& budget) noexcept;
+
+  BlockPool& pool_;
+  StatusSink& sink_;
+  std::vector<std::uint64_t> freed_;
+  Group group_;                  // whose ends are being told
+  BlockIndex first_ = kNoBlock;  // of the groups that wait: dropped records, or a batch's missing
+  BlockIndex last_ = kNoBlock;
+};
+
+}  // namespace o80

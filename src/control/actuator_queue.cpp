@@ -1,0 +1,213 @@
+#include "o80/control/actuator_queue.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace o80 {
+
+ActuatorQueue::ActuatorQueue(const Schema& schema, const ActuatorRow& row,
+                             const StateLayout& layout, BlockPool& pool, Ledger& ledger,
+                             std::byte* desired)
+    : layout_(&layout),
+      pool_(&pool),
+      ledger_(&ledger),
+      desired_(desired),
+      motion_(layout),
+      clamp_(schema, row, layout),
+      carry_(schema.head.period),
+      period_(static_cast<double>(schema.head.period) / 1e9),
+      when_idle_(row.when_idle),
+      mask_(mask_words(static_cast<std::uint32_t>(layout.numbers().size()))),
+      scratch_((layout.size() + 7) / 8) {}
+
+void ActuatorQueue::append(BlockIndex first, BlockIndex last, std::uint32_t lane) noexcept {
+  if (head_ == kNoBlock) {
+    head_ = first;
+    lane_ = lane;
+  } else {
+    pool_->head(tail_).own[Own::kNext] = first;
+    if (lane_ != lane) lane_ = kSeveralLanes;
+  }
+  tail_ = last;
+}
+
+void ActuatorQueue::drop(Status status, Reason reason, Iteration iteration) noexcept {
+  if (status != Status::overwritten) {
+    motion_.rest();
+  } else if (running_ && clamped_) {
+    motion_.rest();
+  } else if (running_) {
+    motion_.keep_moving();
+  }
+  carry_.reset();
+  running_ = false;
+  ledger_->drop(head_, status, reason, iteration);
+  head_ = tail_ = kNoBlock;
+}
+
+void ActuatorQueue::halt() noexcept {
+  motion_.rest();
+  carry_.reset();
+  running_ = false;
+}
+
+void ActuatorQueue::drop_lane(std::uint32_t lane, Status status, Reason reason,
+                              Iteration iteration) noexcept {
+  if (lane_ == lane) return drop(status, reason, iteration);
+  if (lane_ != kSeveralLanes) return;
+
+  // part the queue in two: what goes and what stays
+  BlockIndex gone = kNoBlock;
+  BlockIndex last_gone = kNoBlock;
+  BlockIndex next = head_;
+  if (running_ && ledger_->lane_of(head_) == lane) halt();
+  head_ = tail_ = kNoBlock;
+  while (next != kNoBlock) {
+    const BlockIndex record = next;
+    next = pool_->head(record).own[Own::kNext];
+    const bool goes = ledger_->lane_of(record) == lane;
+    BlockIndex& first = goes ? gone : head_;
+    BlockIndex& last = goes ? last_gone : tail_;
+    (first == kNoBlock ? first : pool_->head(last).own[Own::kNext]) = record;
+    last = record;
+    pool_->head(record).own[Own::kNext] = kNoBlock;
+  }
+  ledger_->drop(gone, status, reason, iteration);
+}
+
+ActuatorQueue::Moved ActuatorQueue::step(Iteration iteration, const std::byte* observed,
+                                         std::uint32_t& late_budget) noexcept {
+  if (running_) {
+    if (iteration > motion_.last()) begin_row(iteration, observed);
+  } else if (!begin_next(iteration, observed, late_budget)) {
+    return empty() ? Moved::idle : Moved::waiting;
+  }
+  if (clamp_.any()) {
+    auto* previous = reinterpret_cast<std::byte*>(scratch_.data());
+    layout_->copy(previous, desired_);
+    motion_.state(iteration, desired_);
+    clamped_ = clamp_.apply(desired_, previous);
+  } else {
+    motion_.state(iteration, desired_);
+  }
+  if (iteration >= motion_.last() && rows_left_ == 0) end_running(iteration);
+  return clamped_ ? Moved::clamped : Moved::active;
+}
+
+void ActuatorQueue::end_running(Iteration iteration) noexcept {
+  const BlockIndex record = head_;
+  running_ = false;
+  pop();
+  if (clamped_) {
+    ledger_->end(record, Status::limited, Reason::limits, 0, iteration);
+  } else {
+    ledger_->end(record, Status::completed, Reason::none, 0, iteration);
+  }
+}
+
+void ActuatorQueue::pop() noexcept {
+  head_ = pool_->head(head_).own[Own::kNext];
+  if (head_ == kNoBlock) tail_ = kNoBlock;
+}
+
+bool ActuatorQueue::begin_next(Iteration iteration, const std::byte* observed,
+                               std::uint32_t& late_budget) noexcept {
+  // skip what was to end before now
+  while (head_ != kNoBlock) {
+    const RecordHead& late = pool_->head(head_);
+    if (late.pace != Pace::until || late.amount >= iteration) break;
+    if (late_budget == 0) return false;
+    --late_budget;
+    carry_.reset();
+    const BlockIndex record = head_;
+    pop();
+    ledger_->end(record, Status::rejected, Reason::late, 0, iteration);
+  }
+  if (head_ == kNoBlock) return false;
+
+  // mask, times and rows of the command lie behind its head
+  const RecordHead& head = pool_->head(head_);
+  rows_ = Cursor(*pool_, head_, sizeof(RecordHead), head.payload_bytes);
+  partial_ = head.partial != 0;
+  if (partial_) rows_.read(mask_.data(), mask_.size() * sizeof mask_.front());
+  timed_ = head.pace == Pace::duration && head.rows > 1;
+  time_ = 0;
+  if (timed_) {
+    times_ = rows_;
+    rows_.skip(std::uint64_t{head.rows} * sizeof time_);
+  }
+  rows_left_ = head.rows;
+  first_row_ = true;
+  running_ = true;
+  clamped_ = false;
+  ledger_->activate(head_, iteration);
+  begin_row(iteration, observed);
+  return true;
+}
+
+void ActuatorQueue::begin_row(Iteration iteration, const std::byte* observed) noexcept {
+  const RecordHead& head = pool_->head(head_);
+  const std::uint64_t* mask = partial_ ? mask_.data() : nullptr;
+
+  // desired or observed => from
+  layout_->copy(motion_.from(), desired_);
+  if (first_row_ && head.start == Start::observed) layout_->copy(motion_.from(), observed, mask);
+
+  // the row of the command => to
+  if (partial_) {
+    auto* row = reinterpret_cast<std::byte*>(scratch_.data());
+    rows_.read(row, layout_->size());
+    layout_->copy(motion_.to(), motion_.from());
+    layout_->copy(motion_.to(), row, mask);
+  } else {
+    rows_.read(motion_.to(), layout_->size());
+  }
+  --rows_left_;
+  motion_.begin(iteration, iterations(head, iteration), head.profile, head.pace);
+  first_row_ = false;
+}
+
+std::int64_t ActuatorQueue::iterations(const RecordHead& head, Iteration iteration) noexcept {
+  switch (head.pace) {
+    case Pace::direct:
+      return 1;
+    case Pace::iterations:
+      return std::max<std::int64_t>(1, head.amount);
+    case Pace::until:
+      carry_.reset();
+      return head.amount - iteration + 1;
+    case Pace::speed:
+      return iterations_at(head.speed * period_, head.profile);
+    case Pace::duration: {
+      if (!timed_) return carry_.iterations(head.amount);
+      std::int64_t end = time_;
+      times_.read(&end, sizeof end);
+      return carry_.iterations(end - std::exchange(time_, end));
+    }
+  }
+  return 1;
+}
+
+std::int64_t ActuatorQueue::iterations_at(double speed, Profile profile) noexcept {
+  if (!layout_->numbers().front().moves()) return 1;
+  const double distance = layout_->number(0, motion_.to()) - layout_->number(0, motion_.from());
+  if (std::isnan(distance)) return 1;
+  if (profile == Profile::minimum_jerk) {
+    return minimum_jerk_iterations(distance, motion_.first_moment(), speed);
+  }
+  return distance == 0.0 ? 1 : linear_iterations(distance, speed);
+}
+
+void ActuatorQueue::settle(const std::byte* observed) noexcept {
+  halt();
+  if (follows()) return follow(observed);
+  if (layout_->hooks().hold == nullptr) return;
+  // in an aligned place of its own, so that no padding reaches the row
+  std::byte* held = motion_.to();
+  layout_->copy(held, desired_);
+  layout_->hooks().hold(held);
+  layout_->copy(desired_, held);
+}
+
+}  // namespace o80

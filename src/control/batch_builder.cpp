@@ -1,0 +1,112 @@
+#include "o80/control/batch_builder.hpp"
+
+#include <cassert>
+#include <cstring>
+#include <limits>
+
+#include "o80/base/error.hpp"
+
+namespace o80 {
+namespace {
+
+RecordHead head_of(RecordKind kind, std::uint16_t actuator = 0, std::uint8_t partial = 0) {
+  RecordHead head;
+  head.kind = kind;
+  head.actuator = actuator;
+  head.partial = partial;
+  return head;
+}
+
+}  // namespace
+
+BatchBuilder::BatchBuilder() : blocks_(1) {}
+
+std::byte* BatchBuilder::open(const RecordHead& head, std::uint64_t payload_bytes) {
+  const std::uint64_t all = blocks_.size() + blocks_of(payload_bytes);
+  if (payload_bytes > std::numeric_limits<std::uint32_t>::max() ||
+      all > std::numeric_limits<std::uint32_t>::max()) {
+    throw LaneFull("a batch of " + std::to_string(all) +
+                   " blocks fits no lane: send it in several pulses");
+  }
+  const std::size_t first = blocks_.size();
+  blocks_.resize(all);
+  RecordHead written = head;
+  written.payload_bytes = static_cast<std::uint32_t>(payload_bytes);
+  std::byte* bytes = blocks_[first].bytes.data();
+  std::memcpy(bytes, &written, sizeof written);
+  ++records_;
+  return bytes + sizeof written;
+}
+
+std::uint32_t BatchBuilder::command(const RecordHead& head, std::span<const std::uint64_t> mask,
+                                    std::span<const std::int64_t> times, std::uint32_t rows,
+                                    std::span<const std::byte> states) {
+  assert(times.empty() || (times.size() == rows && head.pace == Pace::duration));
+  RecordHead written = head;
+  written.kind = RecordKind::command;
+  written.partial = mask.empty() ? 0 : 1;
+  written.rows = rows;
+  std::byte* bytes = open(written, mask.size_bytes() + times.size_bytes() + states.size_bytes());
+  for (const auto part : {std::as_bytes(mask), std::as_bytes(times), states}) {
+    if (!part.empty()) std::memcpy(bytes, part.data(), part.size());
+    bytes += part.size();
+  }
+  return records_ - 1;
+}
+
+std::uint32_t BatchBuilder::purge(std::uint16_t actuator_or_every) {
+  open(head_of(RecordKind::purge, actuator_or_every), 0);
+  return records_ - 1;
+}
+
+std::uint32_t BatchBuilder::purge_own(std::uint16_t actuator_or_every) {
+  open(head_of(RecordKind::purge, actuator_or_every, 1), 0);
+  return records_ - 1;
+}
+
+std::uint32_t BatchBuilder::request(std::uint16_t index, std::span<const std::byte> payload) {
+  std::byte* bytes = open(head_of(RecordKind::request, index), payload.size());
+  if (!payload.empty()) std::memcpy(bytes, payload.data(), payload.size());
+  return records_ - 1;
+}
+
+std::uint32_t BatchBuilder::take_control() {
+  open(head_of(RecordKind::take_control), 0);
+  return records_ - 1;
+}
+
+std::uint32_t BatchBuilder::release_control() {
+  open(head_of(RecordKind::release_control), 0);
+  return records_ - 1;
+}
+
+std::span<const Block> BatchBuilder::seal(const BatchRecord& batch) {
+  BatchRecord written = batch;
+  written.kind = RecordKind::batch;
+  written.records = records_;
+  written.blocks = static_cast<std::uint32_t>(blocks_.size());
+  std::memcpy(blocks_.front().bytes.data(), &written, sizeof written);
+
+  // the ids follow the batch's
+  std::size_t block = 1;
+  for (std::uint32_t place = 0; place < records_; ++place) {
+    std::byte* bytes = blocks_[block].bytes.data();
+    RecordHead head;
+    std::memcpy(&head, bytes, sizeof head);
+    head.id = record_id(batch.id, place);
+    std::memcpy(bytes, &head, sizeof head);
+    block += blocks_of(head.payload_bytes);
+  }
+  return blocks_;
+}
+
+void BatchBuilder::set_ticket(std::uint64_t ticket) noexcept {
+  std::memcpy(blocks_.front().bytes.data() + offsetof(BatchRecord, ticket), &ticket, sizeof ticket);
+}
+
+void BatchBuilder::clear() {
+  blocks_.resize(1);
+  records_ = 0;
+}
+
+}  // namespace o80

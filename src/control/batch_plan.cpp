@@ -1,0 +1,146 @@
+#include "o80/control/batch_plan.hpp"
+
+#include <utility>
+
+namespace o80 {
+namespace {
+
+/// What a plan writes into `BatchRecord::own`.
+constexpr std::size_t kSteps = 0;
+constexpr std::size_t kMissingFrom = 1;
+constexpr std::size_t kSpareFirst = 2;
+constexpr std::size_t kSpareLast = 3;
+constexpr std::size_t kSpareBlocks = 4;
+
+BatchRecord& record_of(BlockPool& pool, BlockIndex batch) noexcept {
+  return *reinterpret_cast<BatchRecord*>(pool.bytes(batch));
+}
+
+}  // namespace
+
+BatchPlanner::BatchPlanner(const Schema& schema, RecordCheck::Layouts layouts, BlockPool& pool,
+                           std::uint32_t lanes)
+    : pool_(pool),
+      check_(schema, std::move(layouts)),
+      actuators_(static_cast<std::uint32_t>(schema.actuators.size())),
+      lanes_(lanes),
+      open_(std::size_t{lanes} * actuators_),
+      tails_(pool.size(), kNoBlock),
+      known_(pool.size(), Known::nothing) {}
+
+void BatchPlanner::begin(Lane& lane, BlockIndex batch) noexcept {
+  lane.batch = batch;
+  lane.cursor = pool_.next(batch);
+  lane.last_step = kNoBlock;
+  lane.invalid = kNoBlock;
+  lane.place = 0;
+  lane.blocks = 1;
+  ++lane.epoch;
+  record_of(pool_, batch).own = {kNoBlock, 0, kNoBlock, kNoBlock, 0};
+}
+
+bool BatchPlanner::check(std::uint32_t lane_index, BlockIndex batch,
+                         std::uint32_t budget) noexcept {
+  if (known_[batch] != Known::nothing) return true;
+  Lane& lane = lanes_[lane_index];
+  if (lane.batch != batch) begin(lane, batch);
+  const BatchRecord& record = pool_.batch(batch);
+  if (record.kind != RecordKind::batch || record.records >= record.blocks) {
+    lane.batch = kNoBlock;
+    known_[batch] = Known::garbage;
+    return true;
+  }
+  for (std::uint32_t used = 0; lane.place < record.records && lane.cursor != kNoBlock;) {
+    if (used >= budget) return false;
+    used += check_record(lane_index);
+  }
+  complete(lane);
+  return true;
+}
+
+void BatchPlanner::complete(Lane& lane) noexcept {
+  BatchRecord& record = record_of(pool_, lane.batch);
+  record.own[kMissingFrom] = lane.place;
+  for (BlockIndex spare = lane.cursor; spare != kNoBlock; spare = pool_.next(spare)) {
+    if (record.own[kSpareBlocks]++ == 0) record.own[kSpareFirst] = spare;
+    record.own[kSpareLast] = spare;
+  }
+  const bool whole = lane.blocks + record.own[kSpareBlocks] == record.blocks;
+  known_[lane.batch] = whole ? Known::plan : Known::garbage;
+  lane.batch = kNoBlock;
+}
+
+std::uint32_t BatchPlanner::check_record(std::uint32_t lane_index) noexcept {
+  Lane& lane = lanes_[lane_index];
+  const BlockIndex first = lane.cursor;
+  RecordHead& head = pool_.head(first);
+  const CommandId id = record_id(pool_.batch(lane.batch).id, lane.place);
+
+  // the blocks it says it has, as far as they are there
+  const std::uint64_t claimed = blocks_of(head.payload_bytes);
+  BlockIndex last = first;
+  std::uint32_t blocks = 1;
+  while (blocks < claimed && pool_.next(last) != kNoBlock) {
+    last = pool_.next(last);
+    ++blocks;
+  }
+  if (blocks < claimed || head.id != id || !check_.valid(pool_, first)) {
+    head.kind = kInvalidRecord;
+    head.id = id;
+    head.payload_bytes = static_cast<std::uint32_t>(blocks * kBlockBytes - sizeof(RecordHead));
+  }
+  head.own = {kNoBlock, lane.batch, last, kNoBlock};
+  add(lane_index, first);
+  lane.cursor = pool_.next(last);
+  lane.blocks += blocks;
+  ++lane.place;
+  return blocks;
+}
+
+void BatchPlanner::add(std::uint32_t lane_index, BlockIndex record) noexcept {
+  Lane& lane = lanes_[lane_index];
+  const RecordHead& head = pool_.head(record);
+  if (head.kind == kInvalidRecord) {
+    if (lane.invalid != kNoBlock) return join(lane.invalid, record);
+    lane.invalid = record;
+  } else if (head.kind == RecordKind::command) {
+    OpenList& list = open(lane_index, head.actuator);
+    if (head.mode == Mode::queue && list.epoch == lane.epoch) return join(list.first, record);
+    list = {record, lane.epoch};
+  } else if (head.kind == RecordKind::purge && head.actuator != kEveryActuator) {
+    open(lane_index, head.actuator).epoch = 0;
+  } else {
+    ++lane.epoch;  // nothing that comes later may be taken before it
+  }
+  add_step(lane, record);
+}
+
+void BatchPlanner::add_step(Lane& lane, BlockIndex record) noexcept {
+  tails_[record] = record;
+  if (lane.last_step == kNoBlock) {
+    record_of(pool_, lane.batch).own[kSteps] = record;
+  } else {
+    pool_.head(lane.last_step).own[Own::kOther] = record;
+  }
+  lane.last_step = record;
+}
+
+void BatchPlanner::join(BlockIndex list, BlockIndex record) noexcept {
+  pool_.head(tails_[list]).own[Own::kNext] = record;
+  tails_[list] = record;
+}
+
+std::optional<Plan> BatchPlanner::plan(BlockIndex batch) noexcept {
+  const Known known = std::exchange(known_[batch], Known::nothing);
+  if (known != Known::plan) return std::nullopt;
+  const auto& own = pool_.batch(batch).own;
+  return Plan{
+      own[kSteps], own[kMissingFrom], {own[kSpareFirst], own[kSpareLast], own[kSpareBlocks]}};
+}
+
+void BatchPlanner::forget(std::uint32_t lane, BlockIndex batch) noexcept {
+  known_[batch] = Known::nothing;
+  if (lanes_[lane].batch == batch) lanes_[lane].batch = kNoBlock;
+}
+
+}  // namespace o80

@@ -1,0 +1,316 @@
+#include "o80/control/controller.hpp"
+
+#include <bit>
+#include <cstring>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "o80/base/error.hpp"
+#include "o80/control/actuator_queue.hpp"
+#include "o80/control/batch_plan.hpp"
+#include "o80/control/ledger.hpp"
+#include "o80/control/state_layout.hpp"
+
+namespace o80 {
+namespace {
+
+std::vector<std::optional<StateLayout>> layouts_of(const Schema& schema) {
+  std::vector<std::optional<StateLayout>> layouts(schema.types.size());
+  for (const ActuatorRow& actuator : schema.actuators) {
+    auto& layout = layouts.at(actuator.type);
+    if (!layout) layout.emplace(schema, actuator.type);
+    if (layout->numbers().empty()) {
+      throw InvalidArgument("actuator '" + actuator.name.str() +
+                            "' has a state without numbers: describe at least one field of '" +
+                            schema.types[actuator.type].name.str() + "'");
+    }
+    if (actuator.offset + layout->size() > schema.head.block) {
+      throw InvalidArgument("actuator '" + actuator.name.str() +
+                            "' lies outside the robot's block of " +
+                            std::to_string(schema.head.block) + " bytes");
+    }
+  }
+  for (const RequestRow& request : schema.requests) {
+    if (request.type == kNoType) continue;
+    auto& layout = layouts.at(request.type);
+    if (!layout) layout.emplace(schema, request.type);
+  }
+  return layouts;
+}
+
+RecordCheck::Layouts pointers_to(const std::vector<std::optional<StateLayout>>& layouts) {
+  RecordCheck::Layouts pointers;
+  for (const auto& layout : layouts) pointers.push_back(layout ? &*layout : nullptr);
+  return pointers;
+}
+
+/// Calls `visit(index)` for each bit set.
+template <class Visit>
+void each_bit(std::uint64_t word, std::uint32_t base, Visit&& visit) noexcept {
+  for (; word != 0; word &= word - 1) {
+    visit(base + static_cast<std::uint32_t>(std::countr_zero(word)));
+  }
+}
+
+}  // namespace
+
+class Controller::Body {
+ public:
+  Body(const Schema& schema, BlockPool& pool, StatusSink& sink, std::uint32_t lanes);
+
+  void restart(const std::byte* observed, const std::byte* desired, Iteration row) noexcept;
+  void take(std::uint32_t lane, BlockIndex batch, BatchHandler& handler) noexcept;
+  void step(Iteration iteration, const std::byte* observed) noexcept;
+  bool finish_pending() noexcept;
+  bool active() const noexcept;
+
+  /// Calls `visit(ActuatorQueue&)` for one actuator or every one.
+  template <class Visit>
+  void each(std::uint32_t actuator, Visit&& visit) noexcept {
+    if (actuator < actuators_.size()) return visit(actuators_[actuator]);
+    if (actuator != kEveryActuator) return;
+    for (ActuatorQueue& queue : actuators_) visit(queue);
+  }
+
+  BlockPool& pool;
+  Ledger ledger;
+
+ private:
+  void take_step(std::uint32_t lane, BlockIndex record, BatchHandler& handler) noexcept;
+  void purge(std::uint32_t lane, const RecordHead& head, Iteration iteration) noexcept;
+  const std::byte* of(std::uint32_t actuator, const std::byte* block) const noexcept {
+    return block + offsets_[actuator];
+  }
+
+  std::vector<std::optional<StateLayout>> layouts_;
+
+ public:
+  BatchPlanner planner;
+  std::vector<Block> desired;
+  std::vector<std::uint64_t> active_mask;
+  std::vector<std::uint64_t> clamped_mask;
+
+ private:
+  std::vector<std::uint32_t> offsets_;
+  std::vector<ActuatorQueue> actuators_;
+  std::vector<std::uint64_t> busy_;    // has commands, or has just lost its last
+  std::vector<std::uint64_t> follow_;  // follows when idle
+  std::uint32_t late_told_ = 0;        // in the last step
+};
+
+Controller::Body::Body(const Schema& schema, BlockPool& blocks, StatusSink& sink,
+                       std::uint32_t lanes)
+    : pool(blocks),
+      ledger(blocks, sink, lanes),
+      layouts_(layouts_of(schema)),
+      planner(schema, pointers_to(layouts_), blocks, lanes),
+      desired((schema.head.block + kBlockBytes - 1) / kBlockBytes) {
+  const auto count = static_cast<std::uint32_t>(schema.actuators.size());
+  const std::uint32_t words = mask_words(count);
+  active_mask.resize(words);
+  clamped_mask.resize(words);
+  busy_.resize(words);
+  follow_.resize(words);
+  actuators_.reserve(count);
+  auto* block = reinterpret_cast<std::byte*>(desired.data());
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const ActuatorRow& row = schema.actuators[i];
+    offsets_.push_back(row.offset);
+    actuators_.emplace_back(schema, row, *layouts_[row.type], pool, ledger, block + row.offset);
+    busy_[i / 64] |= std::uint64_t{1} << (i % 64);
+    if (row.when_idle == WhenIdle::follow) follow_[i / 64] |= std::uint64_t{1} << (i % 64);
+  }
+}
+
+void Controller::Body::restart(const std::byte* observed, const std::byte* wanted,
+                               Iteration row) noexcept {
+  const std::byte* source = wanted != nullptr ? wanted : observed;
+  for (std::uint32_t i = 0; i < actuators_.size(); ++i) {
+    actuators_[i].drop(Status::purged, Reason::fresh_start, row);
+    actuators_[i].follow(of(i, source));
+    busy_[i / 64] |= std::uint64_t{1} << (i % 64);
+  }
+  for (std::size_t word = 0; word < busy_.size(); ++word) {
+    active_mask[word] = 0;
+    clamped_mask[word] = 0;
+  }
+}
+
+void Controller::Body::take(std::uint32_t lane, BlockIndex batch, BatchHandler& handler) noexcept {
+  planner.check(lane, batch, std::numeric_limits<std::uint32_t>::max());
+  const std::optional<Plan> plan = planner.plan(batch);
+  if (!plan) return ledger.reject(lane, batch, Reason::invalid, 0, handler.iteration());
+
+  ledger.enter(lane, batch, plan->spare, handler.iteration());
+  ledger.reject_from(batch, plan->missing_from, Reason::invalid, 0, handler.iteration());
+  for (BlockIndex step = plan->steps; step != kNoBlock;) {
+    const BlockIndex record = step;
+    step = pool.head(record).own[Own::kOther];
+    take_step(lane, record, handler);
+  }
+  ledger.close(batch, handler.iteration());
+}
+
+void Controller::Body::take_step(std::uint32_t lane, BlockIndex record,
+                                 BatchHandler& handler) noexcept {
+  const RecordHead& head = pool.head(record);
+  const auto end = [&](const Outcome& outcome) {
+    ledger.end(record, outcome.status, outcome.reason, outcome.aux, handler.iteration());
+  };
+  switch (head.kind) {
+    case RecordKind::command: {
+      ActuatorQueue& queue = actuators_[head.actuator];
+      if (head.mode == Mode::overwrite) {
+        queue.drop(Status::overwritten, Reason::none, handler.iteration());
+      }
+      queue.append(record, planner.tail(record), lane);
+      busy_[head.actuator / 64] |= std::uint64_t{1} << (head.actuator % 64);
+      break;
+    }
+    case RecordKind::purge:
+      purge(lane, head, handler.iteration());
+      end({});
+      break;
+    case RecordKind::request:
+      end(handler.request(lane, head.id, head.actuator,
+                          Cursor(pool, record, sizeof(RecordHead), head.payload_bytes)));
+      break;
+    case RecordKind::take_control:
+      end(handler.take_control(lane));
+      break;
+    case RecordKind::release_control:
+      end(handler.release_control(lane));
+      break;
+    default:
+      ledger.drop(record, Status::rejected, Reason::invalid, handler.iteration());
+  }
+}
+
+void Controller::Body::purge(std::uint32_t lane, const RecordHead& head,
+                             Iteration iteration) noexcept {
+  each(head.actuator, [&](ActuatorQueue& queue) {
+    if (head.partial != 0) {
+      queue.drop_lane(lane, Status::purged, Reason::none, iteration);
+    } else {
+      queue.drop(Status::purged, Reason::none, iteration);
+    }
+  });
+}
+
+void Controller::Body::step(Iteration iteration, const std::byte* observed) noexcept {
+  std::uint32_t late_budget = kStatusesPerIteration;
+  for (std::size_t word = 0; word < busy_.size(); ++word) {
+    const auto base = static_cast<std::uint32_t>(word * 64);
+    std::uint64_t active = 0;
+    std::uint64_t clamped = 0;
+
+    // who had nothing to do before follows on, the others move
+    each_bit(follow_[word] & ~busy_[word], base,
+             [&](std::uint32_t i) { actuators_[i].follow(of(i, observed)); });
+    each_bit(busy_[word], base, [&](std::uint32_t i) {
+      ActuatorQueue& queue = actuators_[i];
+      const std::uint64_t bit = std::uint64_t{1} << (i % 64);
+      switch (queue.step(iteration, of(i, observed), late_budget)) {
+        case ActuatorQueue::Moved::idle:
+          queue.settle(of(i, observed));
+          busy_[word] &= ~bit;
+          break;
+        case ActuatorQueue::Moved::waiting:
+          break;
+        case ActuatorQueue::Moved::clamped:
+          clamped |= bit;
+          [[fallthrough]];
+        case ActuatorQueue::Moved::active:
+          active |= bit;
+      }
+    });
+    active_mask[word] = active;
+    clamped_mask[word] = clamped;
+  }
+  late_told_ = kStatusesPerIteration - late_budget;
+}
+
+bool Controller::Body::finish_pending() noexcept {
+  const std::uint32_t told = std::exchange(late_told_, 0);
+  return ledger.work(kStatusesPerIteration - told);
+}
+
+bool Controller::Body::active() const noexcept {
+  for (const ActuatorQueue& queue : actuators_) {
+    if (!queue.empty()) return true;
+  }
+  return false;
+}
+
+Controller::Controller(const Schema& schema, BlockPool& pool, StatusSink& sink, std::uint32_t lanes)
+    : body_(std::make_unique<Body>(schema, pool, sink, lanes)) {}
+
+Controller::~Controller() = default;
+
+void Controller::restart(const std::byte* observed, const std::byte* desired,
+                         Iteration row) noexcept {
+  body_->restart(observed, desired, row);
+}
+
+bool Controller::check(std::uint32_t lane, BlockIndex batch, std::uint32_t budget) noexcept {
+  return body_->planner.check(lane, batch, budget);
+}
+
+void Controller::take(std::uint32_t lane, BlockIndex batch, BatchHandler& handler) noexcept {
+  body_->take(lane, batch, handler);
+}
+
+void Controller::reject(std::uint32_t lane, BlockIndex batch, Reason reason, std::uint8_t aux,
+                        Iteration iteration) noexcept {
+  body_->planner.forget(lane, batch);
+  body_->ledger.reject(lane, batch, reason, aux, iteration);
+}
+
+void Controller::step(Iteration iteration, const std::byte* observed) noexcept {
+  body_->step(iteration, observed);
+}
+
+void Controller::purge(std::uint32_t actuator, Iteration iteration, Reason reason) noexcept {
+  body_->each(actuator,
+              [&](ActuatorQueue& queue) { queue.drop(Status::purged, reason, iteration); });
+}
+
+void Controller::purge_lane(std::uint32_t lane, std::uint32_t actuator, Iteration iteration,
+                            Reason reason) noexcept {
+  body_->each(actuator, [&](ActuatorQueue& queue) {
+    queue.drop_lane(lane, Status::purged, reason, iteration);
+  });
+}
+
+void Controller::interrupt(std::uint32_t actuator, Iteration iteration) noexcept {
+  body_->each(actuator, [&](ActuatorQueue& queue) {
+    queue.drop(Status::interrupted, Reason::none, iteration);
+  });
+}
+
+bool Controller::finish_pending() noexcept { return body_->finish_pending(); }
+
+const std::byte* Controller::desired() const noexcept {
+  return reinterpret_cast<const std::byte*>(body_->desired.data());
+}
+
+const std::uint64_t* Controller::active_mask() const noexcept { return body_->active_mask.data(); }
+
+const std::uint64_t* Controller::clamped_mask() const noexcept {
+  return body_->clamped_mask.data();
+}
+
+std::uint32_t Controller::words() const noexcept {
+  return static_cast<std::uint32_t>(body_->active_mask.size());
+}
+
+bool Controller::active() const noexcept { return body_->active(); }
+bool Controller::pending() const noexcept { return body_->ledger.pending(); }
+std::uint64_t Controller::freed(std::uint32_t lane) const noexcept {
+  return body_->ledger.freed(lane);
+}
+
+}  // namespace o80

@@ -1,0 +1,179 @@
+#include "o80/control/ledger.hpp"
+
+#include <algorithm>
+#include <new>
+
+namespace o80 {
+
+/// The first block of a batch once it is taken.
+struct Ledger::TakenBatch {
+  RecordKind kind = RecordKind::batch;
+  Status end = Status::completed;  // of the batch
+  Reason reason = Reason::none;    // of the records without blocks
+  std::uint8_t aux = 0;
+  std::uint32_t records = 0;
+  CommandId id = 0;
+  Iteration last_end = 0;
+  Iteration rejected_at = 0;
+  std::uint32_t open = 0;  // records that have not ended, and one until the batch is closed
+  std::uint32_t told = 0;  // place of the next record without blocks
+  BlockIndex next_group = kNoBlock;
+  std::uint32_t lane = 0;
+  BlockChain spare;
+};
+
+Ledger::TakenBatch& Ledger::batch(BlockIndex block) noexcept {
+  static_assert(sizeof(TakenBatch) <= kBlockBytes);
+  return *std::launder(reinterpret_cast<TakenBatch*>(pool_.bytes(block)));
+}
+
+std::uint32_t Ledger::lane_of(BlockIndex record) const noexcept {
+  const BlockIndex block = pool_.head(record).own[Own::kBatch];
+  return std::launder(reinterpret_cast<const TakenBatch*>(pool_.bytes(block)))->lane;
+}
+
+void Ledger::enter(std::uint32_t lane, BlockIndex block, const BlockChain& spare,
+                   Iteration iteration) noexcept {
+  const BatchRecord record = pool_.batch(block);
+  TakenBatch taken;
+  taken.records = record.records;
+  taken.id = record.id;
+  taken.last_end = iteration;
+  taken.open = record.records + 1;
+  taken.told = record.records;
+  taken.lane = lane;
+  taken.spare = spare;
+  new (pool_.bytes(block)) TakenBatch(taken);
+  sink_.changed({lane, taken.id, Status::active, Reason::none, 0, iteration});
+}
+
+void Ledger::reject_from(BlockIndex block, std::uint32_t place, Reason reason, std::uint8_t aux,
+                         Iteration iteration) noexcept {
+  TakenBatch& taken = batch(block);
+  if (place >= taken.records) return;
+  taken.told = place;
+  taken.reason = reason;
+  taken.aux = aux;
+  taken.rejected_at = iteration;
+  append(block);
+}
+
+void Ledger::reject(std::uint32_t lane, BlockIndex block, Reason reason, std::uint8_t aux,
+                    Iteration iteration) noexcept {
+  // how many blocks there really are decides how many records there can be
+  BlockChain spare;
+  for (BlockIndex next = pool_.next(block); next != kNoBlock; next = pool_.next(next)) {
+    if (spare.blocks == 0) spare.first = next;
+    spare.last = next;
+    ++spare.blocks;
+  }
+  const BatchRecord record = pool_.batch(block);
+  TakenBatch taken;
+  taken.end = Status::rejected;
+  taken.reason = reason;
+  taken.aux = aux;
+  taken.records = std::min(record.records, spare.blocks);
+  taken.id = record.id;
+  taken.last_end = iteration;
+  taken.open = taken.records + 1;
+  taken.lane = lane;
+  taken.spare = spare;
+  new (pool_.bytes(block)) TakenBatch(taken);
+  sink_.changed({lane, taken.id, Status::rejected, reason, aux, iteration});
+  reject_from(block, 0, reason, aux, iteration);
+  close(block, iteration);
+}
+
+void Ledger::activate(BlockIndex record, Iteration iteration) noexcept {
+  sink_.changed(
+      {lane_of(record), pool_.head(record).id, Status::active, Reason::none, 0, iteration});
+}
+
+void Ledger::end(BlockIndex record, Status status, Reason reason, std::uint8_t aux,
+                 Iteration iteration) noexcept {
+  const RecordHead& head = pool_.head(record);
+  const BlockIndex block = head.own[Own::kBatch];
+  const auto blocks = static_cast<std::uint32_t>(blocks_of(head.payload_bytes));
+  const std::uint32_t lane = batch(block).lane;
+  sink_.changed({lane, head.id, status, reason, aux, iteration});
+  pool_.release(record, head.own[Own::kLast], blocks);
+  freed_[lane] += blocks;
+  ended(block, iteration);
+}
+
+void Ledger::ended(BlockIndex block, Iteration iteration) noexcept {
+  TakenBatch& taken = batch(block);
+  taken.last_end = std::max(taken.last_end, iteration);
+  if (--taken.open > 0) return;
+
+  const Reason reason = taken.end == Status::rejected ? taken.reason : Reason::none;
+  const std::uint8_t aux = taken.end == Status::rejected ? taken.aux : std::uint8_t{0};
+  sink_.changed({taken.lane, taken.id + 1, taken.end, reason, aux, taken.last_end});
+  freed_[taken.lane] += 1 + taken.spare.blocks;
+  pool_.release(taken.spare);
+  pool_.release(block, block, 1);
+}
+
+BlockIndex& Ledger::link(BlockIndex group) noexcept {
+  const auto kind = static_cast<RecordKind>(*pool_.bytes(group));
+  return kind == RecordKind::batch ? batch(group).next_group : pool_.head(group).own[Own::kOther];
+}
+
+void Ledger::append(BlockIndex group) noexcept {
+  link(group) = kNoBlock;
+  (first_ == kNoBlock ? first_ : link(last_)) = group;
+  last_ = group;
+}
+
+void Ledger::drop(BlockIndex first, Status status, Reason reason, Iteration iteration) noexcept {
+  if (first == kNoBlock) return;
+  // the first of them bears what became of all; what it asked for no longer matters
+  RecordHead& head = pool_.head(first);
+  head.amount = iteration;
+  head.rows = static_cast<std::uint32_t>(status) << 8 | static_cast<std::uint32_t>(reason);
+  append(first);
+}
+
+bool Ledger::tell_rejected(BlockIndex block, std::uint32_t& budget) noexcept {
+  TakenBatch& taken = batch(block);
+  while (taken.told < taken.records && budget > 0) {
+    sink_.changed({taken.lane, record_id(taken.id, taken.told), Status::rejected, taken.reason,
+                   taken.aux, taken.rejected_at});
+    ++taken.told;
+    --taken.open;
+    --budget;
+  }
+  return taken.told == taken.records;
+}
+
+bool Ledger::work(std::uint32_t budget) noexcept {
+  while (true) {
+    // the group at hand
+    while (group_.record != kNoBlock) {
+      if (budget == 0) return false;
+      const BlockIndex record = group_.record;
+      group_.record = pool_.head(record).own[Own::kNext];
+      end(record, group_.status, group_.reason, 0, group_.iteration);
+      --budget;
+    }
+    if (first_ == kNoBlock) return true;
+    if (budget == 0) return false;
+
+    // the next one: records of a batch that have no blocks, or records that were dropped
+    const BlockIndex group = first_;
+    if (static_cast<RecordKind>(*pool_.bytes(group)) == RecordKind::batch) {
+      // the batch stays open while it is told
+      if (!tell_rejected(group, budget)) return false;
+      first_ = link(group);
+      ++batch(group).open;
+      ended(group, batch(group).rejected_at);
+    } else {
+      first_ = link(group);
+      const RecordHead& head = pool_.head(group);
+      group_ = {group, static_cast<Status>(head.rows >> 8), static_cast<Reason>(head.rows & 0xFF),
+                head.amount};
+    }
+  }
+}
+
+}  // namespace o80

@@ -1,0 +1,231 @@
+#include "o80/control/limits.hpp"
+
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <string>
+
+namespace o80 {
+namespace {
+
+std::string text_of(double value) {
+  char text[32];
+  const auto end = std::to_chars(text, text + sizeof text, value).ptr;
+  return std::string(text, end);
+}
+
+/// A number of a state in words: its path of names and its field.
+struct NumberName {
+  std::string path;  // empty for a plain number
+  const FieldRow* field = nullptr;
+};
+
+/// The name of the number at `offset` of a type.
+NumberName name_at(const Schema& schema, std::uint32_t type, std::uint32_t offset) {
+  const TypeRow& row = schema.types.at(type);
+  for (std::uint32_t i = 0; i < row.fields; ++i) {
+    const FieldRow& field = schema.fields.at(row.first_field + i);
+    const std::uint32_t end = field.offset + field.size * field.count();
+    if (offset < field.offset || offset >= end) continue;
+
+    const std::uint32_t element = (offset - field.offset) / field.size;
+    NumberName name{field.name.str(), &field};
+    if (field.columns != 0) {
+      name.path += "[" + std::to_string(element / field.columns) + "][" +
+                   std::to_string(element % field.columns) + "]";
+    } else if (field.rows != 0) {
+      name.path += "[" + std::to_string(element) + "]";
+    }
+    if (field.kind != Kind::structure) return name;
+    const std::uint32_t inside = offset - field.offset - element * field.size;
+    const NumberName inner = name_at(schema, field.type, inside);
+    if (!inner.path.empty()) name.path += (name.path.empty() ? "" : ".") + inner.path;
+    name.field = inner.field;
+    return name;
+  }
+  return {};
+}
+
+std::string with_unit(const std::string& text, const FieldRow* field) {
+  const bool has_unit = field != nullptr && !field->unit.view().empty();
+  return has_unit ? text + " [" + field->unit.str() + "]" : text;
+}
+
+std::string of_actuator(const Schema& schema, std::uint32_t actuator) {
+  return "actuator '" + schema.actuators[actuator].name.str() + "' (" + std::to_string(actuator) +
+         ")";
+}
+
+std::string of_number(const Schema& schema, std::uint32_t actuator, const NumberName& name) {
+  return (name.path.empty() ? "" : "'" + name.path + "' of ") + of_actuator(schema, actuator);
+}
+
+std::string actuators_of(const Schema& schema) {
+  std::string there;
+  for (std::size_t i = 0; i < schema.actuators.size(); ++i) {
+    there += (i == 0 ? "" : ", ") + schema.actuators[i].name.str() + " (" + std::to_string(i) + ")";
+  }
+  return "'" + schema.head.robot.str() + "' has " +
+         (there.empty() ? std::string("no actuators") : there);
+}
+
+std::string labels_of(const Schema& schema, const FieldRow& field) {
+  if (field.kind == Kind::boolean) return "0, 1";
+  std::string there;
+  for (std::uint32_t i = 0; i < field.labels; ++i) {
+    const LabelRow& label = schema.labels.at(field.first_label + i);
+    there += (i == 0 ? "" : ", ") + label.name.str() + " (" + std::to_string(label.value) + ")";
+  }
+  return there;
+}
+
+}  // namespace
+
+CommandCheck::CommandCheck(const Schema& schema) : schema_(schema), layouts_(schema.types.size()) {
+  for (const ActuatorRow& actuator : schema.actuators) {
+    auto& layout = layouts_.at(actuator.type);
+    if (!layout) layout.emplace(schema, actuator.type);
+  }
+  for (const RequestRow& request : schema.requests) {
+    if (request.type == kNoType) continue;
+    auto& layout = layouts_.at(request.type);
+    if (!layout) layout.emplace(schema, request.type);
+  }
+  constexpr double kLargest = std::numeric_limits<double>::max();
+  for (const LimitRow& limit : schema.limits) {
+    ranges_.push_back({std::fmax(limit.minimum, -kLargest), std::fmin(limit.maximum, kLargest)});
+  }
+}
+
+std::uint32_t CommandCheck::actuator(std::string_view name) const {
+  for (std::size_t i = 0; i < schema_.actuators.size(); ++i) {
+    if (schema_.actuators[i].name.view() == name) return static_cast<std::uint32_t>(i);
+  }
+  throw InvalidArgument("there is no actuator '" + std::string(name) +
+                        "': " + actuators_of(schema_));
+}
+
+std::uint32_t CommandCheck::actuator(std::int64_t index) const {
+  if (index >= 0 && static_cast<std::size_t>(index) < schema_.actuators.size()) {
+    return static_cast<std::uint32_t>(index);
+  }
+  throw InvalidArgument("there is no actuator " + std::to_string(index) + ": " +
+                        actuators_of(schema_));
+}
+
+bool CommandCheck::within(std::uint32_t actuator, const std::byte* state,
+                          const std::uint64_t* mask) const noexcept {
+  const ActuatorRow& row = schema_.actuators[actuator];
+  const StateLayout& layout = *layouts_[row.type];
+  const Range* ranges = ranges_.data() + row.first_limit;
+  if (layout.plain() && mask == nullptr) {
+    bool all = true;
+    for (std::uint32_t i = 0; i < row.limits; ++i) {
+      const double value = load<double>(state + i * sizeof(double));
+      all = all && value >= ranges[i].lowest && value <= ranges[i].highest;
+    }
+    return all;
+  }
+  for (std::uint32_t i = 0; i < row.limits; ++i) {
+    if (!masked(mask, i)) continue;
+    if (!layout.proper_number(i, state)) return false;
+    if (!layout.numbers()[i].moves()) continue;
+    const double value = layout.number(i, state);
+    if (!(value >= ranges[i].lowest && value <= ranges[i].highest)) return false;
+  }
+  return true;
+}
+
+void CommandCheck::targets(std::uint32_t index, std::span<const std::byte> states,
+                           std::span<const std::uint64_t> mask) const {
+  const std::uint32_t known = actuator(std::int64_t{index});
+  const StateLayout& layout = *layouts_[schema_.actuators[known].type];
+  if (states.empty() || states.size() % layout.size() != 0) {
+    throw InvalidArgument(
+        "a target of " + of_actuator(schema_, known) + " has " + std::to_string(layout.size()) +
+        " bytes: " + std::to_string(states.size()) + " bytes hold no whole number of them");
+  }
+  const std::size_t words = mask_words(static_cast<std::uint32_t>(layout.numbers().size()));
+  if (!mask.empty() && mask.size() != words) {
+    throw InvalidArgument("a mask for " + of_actuator(schema_, known) + " has " +
+                          std::to_string(words) + " words, not " + std::to_string(mask.size()));
+  }
+  const std::uint64_t* bits = mask.empty() ? nullptr : mask.data();
+  for (std::size_t at = 0; at < states.size(); at += layout.size()) {
+    if (!within(known, states.data() + at, bits)) refuse(known, states.data() + at, bits);
+  }
+}
+
+void CommandCheck::refuse(std::uint32_t actuator, const std::byte* state,
+                          const std::uint64_t* mask) const {
+  const ActuatorRow& row = schema_.actuators[actuator];
+  const StateLayout& layout = *layouts_[row.type];
+  for (std::uint32_t i = 0; i < row.limits; ++i) {
+    if (!masked(mask, i)) continue;
+    const NumberName name = name_at(schema_, row.type, layout.numbers()[i].offset);
+    if (!layout.proper_number(i, state)) {
+      throw InvalidArgument("the target of " + of_number(schema_, actuator, name) +
+                            " is none of its values: " + labels_of(schema_, *name.field));
+    }
+    if (!layout.numbers()[i].moves()) continue;
+    const double value = layout.number(i, state);
+    const LimitRow& limit = schema_.limits[row.first_limit + i];
+    if (!std::isfinite(value)) {
+      throw InvalidArgument("target " + text_of(value) + " for " +
+                            of_number(schema_, actuator, name) + " is not a finite number");
+    }
+    if (value < limit.minimum || value > limit.maximum) {
+      throw InvalidArgument("target " + with_unit(text_of(value), name.field) + " for " +
+                            of_number(schema_, actuator, name) + " is outside its limits: from " +
+                            text_of(limit.minimum) + " to " +
+                            with_unit(text_of(limit.maximum), name.field));
+    }
+  }
+  throw InvalidArgument("the target of " + of_actuator(schema_, actuator) + " cannot be used");
+}
+
+void CommandCheck::speed(std::uint32_t index, double speed) const {
+  const std::uint32_t known = actuator(std::int64_t{index});
+  const ActuatorRow& row = schema_.actuators[known];
+  const StateLayout& layout = *layouts_[row.type];
+  if (row.limits == 0) return;
+  const double highest = schema_.limits[row.first_limit].speed;
+  const bool positive = std::isfinite(speed) && speed > 0.0;
+  if (positive && !(speed > highest)) return;
+
+  const NumberName name = name_at(schema_, row.type, layout.numbers()[0].offset);
+  const std::string of_field = name.field != nullptr ? name.field->unit.str() : "";
+  const std::string unit = " [" + (of_field.empty() ? "1" : of_field) + "/s]";
+  const std::string what =
+      "speed " + text_of(speed) + unit + " for " + of_number(schema_, known, name);
+  if (!positive) throw InvalidArgument(what + " is not a positive, finite number");
+  throw InvalidArgument(what + " is above its maximum: " + text_of(highest) + unit);
+}
+
+void CommandCheck::request(std::uint32_t index, std::span<const std::byte> payload) const {
+  if (index >= schema_.requests.size()) {
+    std::string there;
+    for (const RequestRow& row : schema_.requests) {
+      there += (there.empty() ? "" : ", ") + row.name.str();
+    }
+    throw InvalidArgument("there is no request " + std::to_string(index) + ": '" +
+                          schema_.head.robot.str() + "' has " +
+                          (there.empty() ? std::string("none") : there));
+  }
+  const RequestRow& row = schema_.requests[index];
+  const std::size_t size = row.type == kNoType ? 0 : layouts_[row.type]->size();
+  if (payload.size() != size) {
+    throw InvalidArgument("request '" + row.name.str() + "' has " + std::to_string(size) +
+                          " bytes, not " + std::to_string(payload.size()));
+  }
+  if (size == 0) return;
+  const StateLayout& layout = *layouts_[row.type];
+  for (std::size_t i = 0; i < layout.numbers().size(); ++i) {
+    if (layout.proper_number(i, payload.data())) continue;
+    const NumberName name = name_at(schema_, row.type, layout.numbers()[i].offset);
+    throw InvalidArgument("'" + name.path + "' of request '" + row.name.str() +
+                          "' is none of its values: " + labels_of(schema_, *name.field));
+  }
+}
+
+}  // namespace o80

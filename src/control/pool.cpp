@@ -1,0 +1,81 @@
+#include "o80/control/pool.hpp"
+
+#include <sys/mman.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <string>
+#include <utility>
+
+#include "o80/base/error.hpp"
+
+namespace o80 {
+
+BlockPool::BlockPool(std::uint32_t blocks) : size_(blocks), available_(blocks), next_(blocks) {
+  if (blocks == 0 || blocks == kNoBlock) {
+    throw InvalidArgument("a pool of " + std::to_string(blocks) +
+                          " blocks cannot be: give it 1 to " + std::to_string(kNoBlock - 1));
+  }
+  void* mapped = mmap(nullptr, std::size_t{blocks} * kBlockBytes, PROT_READ | PROT_WRITE,
+                      MAP_PRIVATE | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
+  if (mapped == MAP_FAILED) {
+    throw Error("no memory for " + std::to_string(blocks) + " blocks of queued commands (" +
+                std::strerror(errno) + "): give the segment fewer or smaller lanes");
+  }
+  blocks_ = static_cast<std::byte*>(mapped);
+
+  // touched once, so that the loop meets no page fault; neighbours are handed out in order
+  std::memset(blocks_, 0, std::size_t{blocks} * kBlockBytes);
+  for (BlockIndex block = 0; block < blocks; ++block) next_[block] = block + 1;
+  next_[blocks - 1] = kNoBlock;
+  free_ = 0;
+}
+
+BlockPool::BlockPool(BlockPool&& other) noexcept
+    : blocks_(std::exchange(other.blocks_, nullptr)),
+      size_(std::exchange(other.size_, 0)),
+      available_(std::exchange(other.available_, 0)),
+      free_(std::exchange(other.free_, kNoBlock)),
+      next_(std::move(other.next_)) {}
+
+BlockPool::~BlockPool() {
+  if (blocks_ != nullptr) munmap(blocks_, std::size_t{size_} * kBlockBytes);
+}
+
+bool Cursor::read(void* out, std::size_t bytes) noexcept {
+  auto* to = static_cast<std::byte*>(out);
+  if (bytes > left_) {
+    std::memset(to, 0, bytes);
+    left_ = 0;
+    return false;
+  }
+  left_ -= bytes;
+  while (bytes > 0) {
+    if (offset_ == kBlockBytes) {
+      block_ = pool_->next(block_);
+      offset_ = 0;
+    }
+    const std::size_t here = std::min<std::size_t>(bytes, kBlockBytes - offset_);
+    std::memcpy(to, pool_->bytes(block_) + offset_, here);
+    to += here;
+    bytes -= here;
+    offset_ += static_cast<std::uint32_t>(here);
+  }
+  return true;
+}
+
+void Cursor::skip(std::uint64_t bytes) noexcept {
+  bytes = std::min(bytes, left_);
+  left_ -= bytes;
+  while (bytes > 0) {
+    if (offset_ == kBlockBytes) {
+      block_ = pool_->next(block_);
+      offset_ = 0;
+    }
+    const std::uint64_t here = std::min<std::uint64_t>(bytes, kBlockBytes - offset_);
+    bytes -= here;
+    offset_ += static_cast<std::uint32_t>(here);
+  }
+}
+
+}  // namespace o80

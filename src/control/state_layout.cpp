@@ -1,0 +1,126 @@
+#include "o80/control/state_layout.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace o80 {
+
+StateLayout::StateLayout(const Schema& schema, std::uint32_t type)
+    : hooks_(type < schema.hooks.size() ? schema.hooks[type] : TypeHooks{}),
+      size_(schema.types.at(type).size) {
+  std::uint32_t end = 0;
+  schema.each_scalar(type, [&](std::uint32_t offset, const FieldRow& field) {
+    const std::uint32_t size = field.kind == Kind::enumeration ? field.size : size_of(field.kind);
+    if ((size != 1 && size != 2 && size != 4 && size != 8) || offset + size > size_) {
+      throw InvalidArgument("field '" + field.name.str() + "' of '" +
+                            schema.types[type].name.str() +
+                            "' cannot cross a loop: only numbers, booleans and enumerations can");
+    }
+    NumberPlace place{offset, size, field.kind, field.is_signed != 0, 0, 0};
+    if (field.kind == Kind::enumeration) {
+      place.first_label = static_cast<std::uint32_t>(labels_.size());
+      place.labels = field.labels;
+      for (std::uint32_t i = 0; i < field.labels; ++i) {
+        labels_.push_back(schema.labels.at(field.first_label + i).value);
+      }
+    }
+    plain_ = plain_ && field.kind == Kind::float64 && offset == end;
+    padded_ = padded_ || offset != end;
+    end = offset + size;
+    numbers_.push_back(place);
+  });
+  padded_ = padded_ || end != size_;
+  plain_ = plain_ && end == size_;
+}
+
+void StateLayout::copy_numbers(std::byte* to, const std::byte* from) const noexcept {
+  for (const NumberPlace& place : numbers_) {
+    std::memcpy(to + place.offset, from + place.offset, place.size);
+  }
+}
+
+void StateLayout::copy(std::byte* to, const std::byte* from,
+                       const std::uint64_t* mask) const noexcept {
+  for (std::size_t i = 0; i < numbers_.size(); ++i) {
+    if (!masked(mask, i)) continue;
+    std::memcpy(to + numbers_[i].offset, from + numbers_[i].offset, numbers_[i].size);
+  }
+}
+
+bool StateLayout::proper_number(std::size_t number, const std::byte* state) const noexcept {
+  const NumberPlace& place = numbers_[number];
+  const std::byte* at = state + place.offset;
+  if (place.kind == Kind::boolean) return load<std::uint8_t>(at) <= 1;
+  if (place.kind != Kind::enumeration || place.labels == 0) return true;
+  std::int64_t value = 0;
+  switch (place.size) {
+    case 1:
+      value = place.is_signed ? load<std::int8_t>(at) : std::int64_t{load<std::uint8_t>(at)};
+      break;
+    case 2:
+      value = place.is_signed ? load<std::int16_t>(at) : std::int64_t{load<std::uint16_t>(at)};
+      break;
+    case 4:
+      value = place.is_signed ? load<std::int32_t>(at) : std::int64_t{load<std::uint32_t>(at)};
+      break;
+    default:
+      value = load<std::int64_t>(at);
+  }
+  const auto first = labels_.begin() + place.first_label;
+  return std::find(first, first + place.labels, value) != first + place.labels;
+}
+
+bool StateLayout::proper(const std::byte* state, const std::uint64_t* mask) const noexcept {
+  if (plain_) return true;
+  for (std::size_t i = 0; i < numbers_.size(); ++i) {
+    if (masked(mask, i) && !proper_number(i, state)) return false;
+  }
+  return true;
+}
+
+bool StateLayout::finite(const std::byte* state, const std::uint64_t* mask) const noexcept {
+  for (std::size_t i = 0; i < numbers_.size(); ++i) {
+    if (!masked(mask, i)) continue;
+    const std::byte* at = state + numbers_[i].offset;
+    const Kind kind = numbers_[i].kind;
+    if (kind == Kind::float64) {
+      if (!std::isfinite(load<double>(at))) return false;
+    } else if (kind == Kind::float32) {
+      if (!std::isfinite(load<float>(at))) return false;
+    } else if (!proper_number(i, state)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+double StateLayout::number(std::size_t number, const std::byte* state) const noexcept {
+  const std::byte* at = state + numbers_[number].offset;
+  switch (numbers_[number].kind) {
+    case Kind::float64:
+      return load<double>(at);
+    case Kind::float32:
+      return load<float>(at);
+    case Kind::int8:
+      return load<std::int8_t>(at);
+    case Kind::int16:
+      return load<std::int16_t>(at);
+    case Kind::int32:
+      return load<std::int32_t>(at);
+    case Kind::int64:
+      return static_cast<double>(load<std::int64_t>(at));
+    case Kind::uint8:
+      return load<std::uint8_t>(at);
+    case Kind::uint16:
+      return load<std::uint16_t>(at);
+    case Kind::uint32:
+      return load<std::uint32_t>(at);
+    case Kind::uint64:
+      return static_cast<double>(load<std::uint64_t>(at));
+    default:
+      return load<std::uint8_t>(at);  // of a boolean; an enumeration is never reckoned with
+  }
+}
+
+}  // namespace o80
