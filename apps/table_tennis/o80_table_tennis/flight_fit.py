@@ -46,6 +46,8 @@ CLOSE_ENOUGH = 1e-3
 MOST_ROUNDS = 12
 SCALES = np.array([0.01] * 3 + [0.1] * 3 + [0.1 * AERODYNAMICS.drag] + [0.1] * 3)
 """Typical sizes of the ten unknowns, for differences and damping."""
+BELIEFS = np.array([0.0] * 6 + [1 / (DRAG_BELIEF * AERODYNAMICS.drag)] + [1 / TURN_BELIEF] * 3)
+"""How sure each unknown is known before [1 / its unit]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,16 +205,11 @@ def fit_segment(
     points = np.concatenate([positions, *(point[None] for _, point in anchors)])
     noise = np.full(len(points), POSITION_NOISE)
     noise[len(stamps) :] = ANCHOR_NOISE
-    sure = [0.0] * 6 + [1 / (DRAG_BELIEF * AERODYNAMICS.drag)] + [1 / TURN_BELIEF] * 3
-    belief = np.array(sure)
     centre = np.concatenate([np.zeros(6), [AERODYNAMICS.drag], np.zeros(3)])
 
     for _ in range(MOST_ROUNDS):
-        # one flight as it is and ten with one unknown changed => residuals and their slopes
-        batch = unknowns[:, None] + np.column_stack([np.zeros(10), np.diag(SLOPE_SHARE * SCALES)])
-        flown, _velocities = _fly(batch, times)
-        misses = points - flown[..., 0]
-        slopes = (flown[..., 1:] - flown[..., :1]) / (SLOPE_SHARE * SCALES)
+        flown, slopes = sloped(unknowns, times)
+        misses = points - flown
 
         # far rows count less
         distance = np.linalg.norm(misses, axis=1) / noise
@@ -222,13 +219,21 @@ def fit_segment(
         weight /= noise
 
         # rows and beliefs => the step
-        matrix = np.vstack([(weight[:, None, None] * slopes).reshape(-1, 10), np.diag(belief)])
-        right = np.concatenate([(weight[:, None] * misses).ravel(), belief * (centre - unknowns)])
+        matrix = np.vstack([(weight[:, None, None] * slopes).reshape(-1, 10), np.diag(BELIEFS)])
+        right = np.concatenate([(weight[:, None] * misses).ravel(), BELIEFS * (centre - unknowns)])
         step = np.linalg.lstsq(matrix * SCALES, right, rcond=1e-10)[0]
         unknowns = unknowns + SCALES * step
         if np.abs(step).max() < CLOSE_ENOUGH:
             break
     return Flight(origin=origin, unknowns=unknowns)
+
+
+def sloped(unknowns: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Positions (T, 3) of a flight at `times` (T,), and their slopes (T, 3, 10) in its unknowns."""
+    # one flight as it is and ten with one unknown changed
+    change = SLOPE_SHARE * SCALES
+    flown, _ = _fly(unknowns[:, None] + np.column_stack([np.zeros(10), np.diag(change)]), times)
+    return flown[..., 0], (flown[..., 1:] - flown[..., :1]) / change
 
 
 def _guess(times: FloatArray, positions: FloatArray) -> FloatArray:

@@ -16,7 +16,16 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from .flight_fit import Flight, bounce_rows, fit_segment, meeting
+from .flight_fit import (
+    BELIEFS,
+    POSITION_NOISE,
+    SCALES,
+    Flight,
+    bounce_rows,
+    fit_segment,
+    meeting,
+    sloped,
+)
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -25,9 +34,11 @@ FRAME_PERIOD = 1 / 180
 """Between two frames of the vision system [s]; slope of stamps over frames where both are known."""
 READER_PERIOD = 0.010
 """About the time between two rows: the rate of the reader [s]."""
-CLOSE = 0.006
+CLOSE = 0.0025
 """Rows this near to a flight, on average, leave no doubt about their frames [m]."""
-MOST_ROUNDS = 8
+CLEAR_GAIN = 0.1
+"""A frame is added or taken away if the squared distances fall by more than this share."""
+MOST_ROUNDS = 30
 NEAR_BOUNCE = 3
 """Rows next to a bounce whose recorded velocities are not used."""
 LONGEST_GAP = 8
@@ -95,18 +106,51 @@ def _count(positions: FloatArray, velocities: FloatArray, rows: IntArray, period
 def _settle(times: FloatArray, positions: FloatArray, period: float) -> _Count:
     """Frames near `times` (n,) [s] that agree with the flight fitted to them."""
     frames = np.zeros(0, dtype=np.int64)
+    flight: Flight | None = None
     for _ in range(MOST_ROUNDS):
-        flight = fit_segment(times, positions)
+        flight = fit_segment(times, positions, start=flight)
         # how much later each row lies on the flight than its stamp says => its frame anew
         flown, speed = flight.at(times)
         misses = positions - flown
         late = np.sum(misses * speed, axis=1) / np.sum(speed**2, axis=1)
         again = _whole((times + late) / period)
         if np.array_equal(again, frames):
+            again = again + _missed(flight, frames, misses, speed, period)
+        if np.array_equal(again, frames):
             break
         frames = again
         times = frames.astype(np.float64) * period
+    assert flight is not None
     return _Count(frames, flight, float(np.sqrt(np.mean(np.sum(misses**2, axis=1)))))
+
+
+def _missed(
+    flight: Flight, frames: IntArray, misses: FloatArray, speed: FloatArray, period: float
+) -> IntArray:
+    """Frames (n,) to add where one frame more or less from some row on brings the rows closer.
+
+    A flight gives way to a frame missed in its middle, so that no row looks wrong by itself: each
+    cut is judged by what is left after the best flight for it, to first order.
+    """
+    _, slopes = sloped(flight.unknowns, frames.astype(np.float64) * period)
+    matrix = np.vstack([slopes.reshape(-1, 10) / POSITION_NOISE, np.diag(BELIEFS)])
+    basis = np.linalg.qr(matrix * SCALES)[0][: misses.size]
+    left = misses.ravel() / POSITION_NOISE
+
+    # column c: what it does to the misses when all rows after c come one frame later
+    later = np.tri(len(frames), k=-1)[:, :-1]
+    shifts = (later[:, None, :] * (speed * period)[..., None]).reshape(misses.size, -1)
+    shifts /= POSITION_NOISE
+    shifts -= basis @ (basis.T @ shifts)
+    along, size = left @ shifts, np.sum(shifts**2, axis=0)
+
+    gains = np.stack([2 * along - size, -2 * along - size])
+    gains[1, np.diff(frames) == 1] = -np.inf
+    sign, cut = np.unravel_index(np.argmax(gains), gains.shape)
+    if gains[sign, cut] < CLEAR_GAIN * np.sum(left**2):
+        return np.zeros_like(frames)
+    added: IntArray = np.where(np.arange(len(frames)) > cut, 1 - 2 * sign, 0)
+    return added
 
 
 def _durations(positions: FloatArray, velocities: FloatArray) -> FloatArray:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .frame_stamps import FRAME_PERIOD, frames_of, new_frames
-from .trajectories import SHORTEST, BallTrajectory
+from .trajectories import BallTrajectory, require_enough_rows
 
 FloatArray = NDArray[np.float64]
 
@@ -92,7 +92,8 @@ def _read_ball_gun(file: Path, frame: Frame) -> list[BallTrajectory]:
     every_row = _ball_gun_rows(file)
     numbers = np.flatnonzero(new_frames(every_row[:, :3]))
     rows = every_row[numbers]
-    _require_rows(file, rows)
+    _require_finite(file, rows)
+    require_enough_rows(str(file), len(rows))
     frames = frames_of(rows[:, :3], rows[:, 3:], numbers)
     trajectory = BallTrajectory(
         name=str(file),
@@ -159,6 +160,7 @@ def _read_shot(file: Path, shot: Any, frame: Frame) -> BallTrajectory:
     for key, rows in (("positions", positions), ("velocities", velocities)):
         if rows.ndim != 2 or rows.shape[1] != 3:
             raise ValueError(f"{name}: {key} have shape {rows.shape}, not (N, 3)")
+    require_enough_rows(name, len(positions))
     trajectory = BallTrajectory(
         name=name,
         stamps=stamps,
@@ -173,16 +175,11 @@ def _number(key: str) -> tuple[int, str]:
     return (int(key), "") if key.isdigit() else (sys.maxsize, key)
 
 
-def _require_rows(file: Path, rows: FloatArray) -> None:
-    """Enough finite rows to reconstruct stamps from."""
+def _require_finite(file: Path, rows: FloatArray) -> None:
+    """Time stamps cannot be reconstructed around rows that are not numbers."""
     broken = np.flatnonzero(~np.isfinite(rows).all(axis=1))
     if len(broken):
         raise ValueError(
             f"{file}: NaN or infinity (first in row {broken[0]}); "
             "remove the rows in which the ball was not seen"
-        )
-    if len(rows) < SHORTEST:
-        raise ValueError(
-            f"{file}: {len(rows)} different rows are too few to fit a flight, {SHORTEST} are "
-            "needed; leave this file out"
         )

@@ -18,6 +18,14 @@ SHORTEST = 8
 """Rows below which a trajectory cannot be fitted."""
 
 
+def require_enough_rows(name: str, rows: int) -> None:
+    """Raises ValueError if a flight cannot be fitted to so few rows."""
+    if rows < SHORTEST:
+        raise ValueError(
+            f"{name}: {rows} rows are too few to fit a flight, {SHORTEST} are needed; leave it out"
+        )
+
+
 @dataclass(frozen=True)
 class SampledFlight:
     """A flight in equal steps, ready to be commanded: row i is at i * period after the start."""
@@ -50,7 +58,7 @@ class BallTrajectory:
     """Where a ball was seen, and when.
 
     Raises ValueError, naming the trajectory and the cure, unless the arrays fit each other, all
-    numbers are finite, the stamps rise and there are at least `SHORTEST` rows.
+    numbers are finite and the stamps rise.
     """
 
     name: str
@@ -76,11 +84,6 @@ class BallTrajectory:
                     f"{self.name}: {what} hold NaN or infinity (first in row {row}); "
                     "remove the rows in which the ball was not seen"
                 )
-        if rows < SHORTEST:
-            raise ValueError(
-                f"{self.name}: {rows} rows are too few to fit a flight, {SHORTEST} are needed; "
-                "leave this file out"
-            )
         falling = np.flatnonzero(np.diff(self.stamps) <= 0)
         if len(falling):
             raise ValueError(
@@ -100,6 +103,7 @@ class BallTrajectory:
     @cached_property
     def fit(self) -> FlightFit:
         """The flight, with its bounces, that explains the positions best."""
+        require_enough_rows(self.name, len(self.stamps))
         return fit_flight(self.stamps, self.positions)
 
     def resample(self, period: float = 0.002) -> SampledFlight:
