@@ -1,0 +1,117 @@
+#pragma once
+
+#include <concepts>
+#include <cstdint>
+#include <variant>
+
+namespace o80::pam {
+
+/// What a muscle pulls with now, and how fast its contractile element changes length.
+struct Pull {
+  double force = 0.0;           ///< [N], never pushes
+  double fibre_velocity = 0.0;  ///< [m/s], 0 for a muscle without an inner length
+};
+
+/// A muscle: length and velocity of the whole, its inner (fibre) length and its activation in
+/// [0, 1] => pull. The law is constant; what changes is held by the caller.
+template <class T>
+concept MuscleLaw = requires(const T& law, double x) {
+  { law.pull(x, x, x, x) } noexcept -> std::same_as<Pull>;  // length, velocity, fibre, act.
+  { law.resting_fibre_length(x, x) } noexcept -> std::same_as<double>;  // length, activation
+  { law.resting_force(x, x) } noexcept -> std::same_as<double>;         // length, activation
+};
+
+/// Length of a muscle with its tendon when the joint is at zero [m].
+inline constexpr double kRestLength = 0.68;
+
+/// Pneumatic muscle whose force is linear in the pressure and in the contraction:
+/// F = F_max a (1 - contraction / stroke), slack beyond its stroke.
+struct LinearMuscle {
+  double maximum_force = 1500.0;    ///< [N], full pressure, not contracted
+  double full_force_length = 0.70;  ///< [m], contraction counts from here
+  double stroke = 0.10;             ///< [m], no force when contracted by so much
+
+  Pull pull(double length, double velocity, double fibre_length, double activation) const noexcept;
+  double resting_fibre_length(double length, double activation) const noexcept;
+  double resting_force(double length, double activation) const noexcept;
+};
+
+/// Muscle of Hill type after Haeufle et al. (2014): a contractile and a parallel elastic element,
+/// in series with an elastic and a damping one. Concentric and eccentric force-velocity relation.
+class HillMuscle {
+ public:
+  struct Parameters {
+    double maximum_force = 1500.0;         ///< [N]
+    double optimal_length = 0.2552835868;  ///< [m], of the contractile element
+    double width_descending = 0.469110;    ///< of the force-length bell, beyond the optimum
+    double width_ascending = 0.328754;
+    double exponent_descending = 6.268913;
+    double exponent_ascending = 3.506187;
+    double hill_a = 0.246955;
+    double hill_b = 2.372502;  ///< [1/s]
+    double eccentric_slope = 7.539560;
+    double eccentric_force = 1.185253;
+    double parallel_rest = 0.929294;  ///< share of the optimal length
+    double parallel_exponent = 2.625216;
+    double parallel_force = 17.559679;  ///< share of the maximum force
+    double damping = 0.999776;
+    double damping_at_rest = 0.1;       ///< share of the largest damping
+    double series_rest = 0.458792;      ///< [m]
+    double series_toe = 0.042700;       ///< stretch at the end of the curved part
+    double series_linear = 0.017204;    ///< further stretch for `series_force` again
+    double series_force = 1499.576;     ///< [N], at the end of the curved part
+    double minimum_activation = 0.005;  ///< a living muscle is never quite off
+  };
+
+  HillMuscle() noexcept : HillMuscle(Parameters{}) {}
+  explicit HillMuscle(const Parameters& parameters) noexcept;
+
+  const Parameters& parameters() const noexcept { return p_; }
+
+  /// Share of the maximum force at full activation and no motion, 1 at the optimal length.
+  double isometric(double fibre_length) const noexcept;
+  double parallel_force(double fibre_length) const noexcept;  ///< [N]
+  double series_force(double series_length) const noexcept;   ///< [N]
+  double contractile_force(double fibre_length, double fibre_velocity,
+                           double activation) const noexcept;                               ///< [N]
+  double damping_force(double contractile_and_parallel, double stretching) const noexcept;  ///< [N]
+
+  Pull pull(double length, double velocity, double fibre_length, double activation) const noexcept;
+  double resting_fibre_length(double length, double activation) const noexcept;
+  double resting_force(double length, double activation) const noexcept;
+
+ private:
+  struct Fibre {  // all that follows from its length and activation
+    double isometric, parallel;
+    double drive;           // activation x isometric
+    double hill_a, hill_b;  // of the concentric curve, relative to maximum force and length
+  };
+  struct Curve {  // force over velocity: a hyperbola on either side of rest
+    double a, b;
+  };
+  Fibre fibre(double fibre_length, double activation) const noexcept;
+  Curve eccentric(const Fibre& fibre) const noexcept;
+  double contractile(const Fibre& fibre, double fibre_velocity) const noexcept;
+  double velocity_in_balance(const Fibre& fibre, const Curve& curve, double sign, double velocity,
+                             double series) const noexcept;
+  double fibre_velocity(const Fibre& fibre, double velocity, double series) const noexcept;
+
+  Parameters p_;
+  double parallel_stiffness_;
+  double series_exponent_;
+  double series_stiffness_toe_;
+  double series_stiffness_;
+  double largest_damping_;
+};
+
+static_assert(MuscleLaw<LinearMuscle> && MuscleLaw<HillMuscle>);
+
+/// Which law a plant is built with.
+enum class MuscleModel : std::uint8_t { linear, hill };
+
+/// The law chosen at run time; visited once for all eight muscles.
+using Muscle = std::variant<LinearMuscle, HillMuscle>;
+
+Muscle make_muscle(MuscleModel model) noexcept;
+
+}  // namespace o80::pam

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+namespace o80::pam {
+
+inline constexpr std::size_t kJoints = 4;
+inline constexpr std::size_t kMuscles = 2 * kJoints;
+
+/// One number a joint, from the base to the wrist.
+using Joints = std::array<double, kJoints>;
+
+/// The muscle that turns `joint` towards larger angles.
+constexpr std::size_t agonist(std::size_t joint) noexcept { return 2 * joint; }
+/// The muscle that turns `joint` towards smaller angles.
+constexpr std::size_t antagonist(std::size_t joint) noexcept { return 2 * joint + 1; }
+
+/// Raw pressures of the eight muscles: agonist and antagonist of joint 1, then of joint 2, and on.
+using Pressures = std::array<std::int32_t, kMuscles>;
+
+constexpr Pressures equal_pressures(std::int32_t raw) noexcept {
+  return {raw, raw, raw, raw, raw, raw, raw, raw};
+}
+
+/// Pressure above the atmosphere [bar]; 18000 is 1.81 bar.
+constexpr double to_bar(double raw) noexcept { return 0.0002 * raw - 1.7888; }
+
+/// What a muscle may be asked for, raw; the ends are no and full activation.
+struct PressureRange {
+  std::int32_t minimum = 6000;
+  std::int32_t maximum = 24000;
+
+  constexpr double activation(std::int32_t raw) const noexcept {
+    return static_cast<double>(raw - minimum) / (maximum - minimum);
+  }
+  constexpr double pressure(double activation) const noexcept {
+    return minimum + activation * (maximum - minimum);
+  }
+};
+
+using PressureRanges = std::array<PressureRange, kMuscles>;
+
+/// The ranges of the published simulation: the same for all muscles.
+inline constexpr PressureRanges kSimulatedRanges{};
+
+/// The ranges of the real arm, in the order of `Pressures`.
+inline constexpr PressureRanges kRealRanges{{{15000, 25000},
+                                             {16000, 25000},
+                                             {15000, 21500},
+                                             {16000, 25000},
+                                             {13000, 21000},
+                                             {13000, 21000},
+                                             {13000, 19000},
+                                             {13000, 21900}}};
+
+}  // namespace o80::pam
