@@ -5,6 +5,7 @@ add_library(o80_headers INTERFACE)
 add_library(o80::headers ALIAS o80_headers)
 set_target_properties(o80_headers PROPERTIES EXPORT_NAME headers)
 target_compile_features(o80_headers INTERFACE cxx_std_20)
+target_compile_definitions(o80_headers INTERFACE O80_VERSION="${PROJECT_VERSION}")
 target_include_directories(
   o80_headers INTERFACE $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>
                         $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>
@@ -15,7 +16,6 @@ list(FILTER o80_sources EXCLUDE REGEX "/src/programs/")
 add_library(o80 SHARED ${o80_sources})
 add_library(o80::o80 ALIAS o80)
 target_link_libraries(o80 PUBLIC o80_headers Threads::Threads PRIVATE ${CMAKE_DL_LIBS} o80_warnings)
-target_compile_definitions(o80 PRIVATE O80_VERSION="${PROJECT_VERSION}")
 # no fused multiply-add: machines agree on every desired state, bit for bit
 target_compile_options(o80 PRIVATE -ffp-contract=off)
 target_link_options(o80 PRIVATE -Wl,--no-undefined)

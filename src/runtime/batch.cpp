@@ -104,7 +104,7 @@ Iteration Batch::last_iteration() const {
 }
 
 void Batch::wait(Timeout timeout, const Check& check) const {
-  if (empty() && id_ == 0) return;
+  if (id_ == 0) return;  // an empty batch was never sent
   const Deadline deadline(timeout);
   const Check guarded = link_->guarded(check);
   const auto ended = [&] { return is_end(ask(id_ + 1).status); };
@@ -112,9 +112,9 @@ void Batch::wait(Timeout timeout, const Check& check) const {
     throw TimeoutError("the batch sent to '" + link_->segment.name() +
                        "' has not ended in time: give more time, purge, or ask its handles");
   }
-  const Iteration last = last_iteration();
-  if (last >= 0 && ask(id_ + 1).status != Status::rejected) {
-    link_->rows.wait_for_row(last, deadline, guarded);
+  const Handle last = ask(id_ + 1);
+  if (last.status == Status::completed) {
+    link_->rows.wait_for_row(last.iteration, deadline, guarded);
   }
 }
 

@@ -214,13 +214,14 @@ Batch UntypedFrontend::send(const BatchRecord& wanted) {
   return batch;
 }
 
-Batch UntypedFrontend::pulse(const PulseOptions& options) {
+Batch UntypedFrontend::pulse(const PulseOptions& options, std::uint16_t flags) {
   if (options.at != kNow && options.at < 0) {
     throw InvalidArgument("a batch cannot be taken at iteration " + std::to_string(options.at));
   }
   BatchRecord record;
   record.at = options.at;
   record.late_now = options.late == PulseOptions::Late::now ? 1 : 0;
+  record.flags = flags;
   {
     const std::scoped_lock lock(link_->sending);
     link_->check_usable();
@@ -231,27 +232,13 @@ Batch UntypedFrontend::pulse(const PulseOptions& options) {
 
 UntypedObservation UntypedFrontend::pulse_and_wait(Timeout timeout, const PulseOptions& options,
                                                    const Check& check) {
-  const Deadline deadline(timeout);
-  if (!bursting()) {
-    const Batch batch = pulse(options);
-    batch.wait(timeout, check);
-    const Iteration last = batch.last_iteration();
-    if (last < 0) return latest();
-    return wait_for(
-        last, std::chrono::nanoseconds(deadline.left(std::numeric_limits<std::int64_t>::max())),
-        check);
-  }
-  if (added() == 0) return latest();
-  BatchRecord record;
-  record.at = options.at;
-  record.late_now = options.late == PulseOptions::Late::now ? 1 : 0;
-  record.flags = kBurstUntilEnded;
-  const Batch batch = send(record);
+  // bursting, the backend runs until the batch has ended
+  const Batch batch = pulse(options, bursting() ? kBurstUntilEnded : std::uint16_t{0});
   batch.wait(timeout, check);
-  if (batch.first_iteration() >= 0 && Burst(link_, link_->lane_if_taken(), batch).done()) {
-    return Burst(link_, link_->lane_if_taken(), batch).wait(timeout, check);
-  }
-  return latest();
+  UntypedObservation observation(link_->description);
+  const Iteration last = batch.last_iteration();
+  if (last < 0 || !link_->history.read(last, observation.bytes())) latest(observation.bytes());
+  return observation;
 }
 
 Burst UntypedFrontend::start_burst(std::int64_t iterations) {

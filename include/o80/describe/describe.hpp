@@ -275,8 +275,8 @@ void describe_actuators(Schema& schema) {
   if constexpr (std::is_same_v<Actuators, NoActuators>) {
     return;
   } else if constexpr (describing::ArrayOf<Actuators>::value) {
-    using State = typename describing::ArrayOf<Actuators>::Element;
-    schema.place_group("", describing::type_of<State>(schema), 0,
+    using StateType = typename describing::ArrayOf<Actuators>::Element;
+    schema.place_group("", describing::type_of<StateType>(schema), 0,
                        describing::ArrayOf<Actuators>::kCount, true);
     schema.head.block = round_up(sizeof(Actuators), 8);
   } else {
@@ -286,8 +286,8 @@ void describe_actuators(Schema& schema) {
                                                     std::size_t offset, std::string_view) {
       const auto place = static_cast<std::uint32_t>(offset);
       if constexpr (describing::ArrayOf<Field>::value) {
-        using State = typename describing::ArrayOf<Field>::Element;
-        schema.place_group(name, describing::type_of<State>(schema), place,
+        using StateType = typename describing::ArrayOf<Field>::Element;
+        schema.place_group(name, describing::type_of<StateType>(schema), place,
                            describing::ArrayOf<Field>::kCount, true);
       } else {
         schema.place_group(name, describing::type_of<Field>(schema), place, 1, false);

@@ -76,7 +76,7 @@ class UntypedFrontend {
 
   /// Sends what was added as one batch. Throws LaneFull (nothing is sent, all stays added), NoLane,
   /// ReadOnly, BackendGone.
-  Batch pulse(const PulseOptions& options = {});
+  Batch pulse(const PulseOptions& options = {}) { return pulse(options, 0); }
   /// Sends and waits until every command has ended; bursting, lets the backend run as long as
   /// that takes. Returns the row of the last iteration.
   UntypedObservation pulse_and_wait(Timeout timeout, const PulseOptions& options = {},
@@ -110,6 +110,7 @@ class UntypedFrontend {
   std::shared_ptr<Link> link() const { return link_; }
 
  private:
+  Batch pulse(const PulseOptions& options, std::uint16_t flags);
   Batch send(const BatchRecord& record);
   [[noreturn]] void missing(Iteration k) const;
 

@@ -1,0 +1,148 @@
+#pragma once
+
+#include <array>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+#include <type_traits>
+
+#include "o80/describe/describe.hpp"
+#include "o80/robot/table.hpp"
+#include "o80/runtime/request_server.hpp"
+#include "o80/runtime/robot_types.hpp"
+
+namespace o80 {
+
+/// A value's place in a block whose layout is known at run time only.
+template <class T>
+struct Place {
+  std::uint32_t offset = 0;
+};
+
+/// What a driver is to do: the desired states of an iteration.
+template <class D>
+class Desired {
+ public:
+  explicit Desired(const DesiredView& view) : view_(view) {
+    if constexpr (!kIsRunTime<D>) {
+      states = unpack<ActuatorsOf<D>>(view.states);
+    }
+  }
+
+  ActuatorsOf<D> states;  // all of them, as the driver's own type
+
+  const auto& operator[](std::size_t actuator) const { return states[actuator]; }
+  /// A value of a layout known at run time only.
+  template <class T>
+  T at(Place<T> place) const {
+    return unpack<T>(view_.states + place.offset);
+  }
+  /// A command gave this state; else it is held, or follows the observed one.
+  bool active(std::size_t actuator) const {
+    return (view_.active[actuator / 64] >> (actuator % 64) & 1) != 0;
+  }
+  std::int64_t iteration() const { return view_.iteration; }
+  /// On the backend's clock [ns].
+  std::int64_t time() const { return view_.time; }
+  /// How long an iteration lasts [s].
+  double period() const { return static_cast<double>(view_.period) * 1e-9; }
+
+ private:
+  DesiredView view_;
+};
+
+/// What came of it: a driver fills it in `read`.
+template <class D>
+class Reading {
+ public:
+  explicit Reading(ReadingView& view) : view_(view) {
+    if constexpr (!kIsRunTime<D>) {
+      observed = unpack<ActuatorsOf<D>>(view.observed);
+      if constexpr (!std::is_same_v<ExtendedOf<D>, NoExtended>) {
+        extended = unpack<ExtendedOf<D>>(view.extended);
+      }
+    }
+  }
+
+  ActuatorsOf<D> observed;  // holds the last reading
+  ExtendedOf<D> extended;   // likewise
+
+  /// Values of a layout known at run time only.
+  template <class T>
+  void observe(Place<T> place, const T& value) {
+    pack(value, view_.observed + place.offset);
+  }
+  template <class T>
+  void extend(Place<T> place, const T& value) {
+    pack(value, view_.extended + place.offset);
+  }
+  std::byte* observed_bytes() { return view_.observed; }
+  std::byte* extended_bytes() { return view_.extended; }
+
+  std::int64_t iteration() const { return view_.iteration; }
+  /// On the backend's clock [ns].
+  std::int64_t time() const { return view_.time; }
+
+  /// The robot cannot go on: the loop ends, frontends raise the text.
+  void fault(std::string_view text) {
+    const std::size_t size =
+        text.size() < sizeof fault_.text ? text.size() : sizeof fault_.text - 1;
+    if (size > 0) std::memcpy(fault_.text, text.data(), size);
+    fault_.text[size] = 0;
+    faulty_ = true;
+  }
+  /// The robot is done: the loop ends in order after this row.
+  void finish() { view_.finished = 1; }
+  /// The commands of this actuator end as interrupted, in this iteration.
+  void interrupt(std::size_t actuator) {
+    view_.interrupted[actuator / 64] |= std::uint64_t{1} << (actuator % 64);
+  }
+  /// True in the reading of a fresh start, which may also give the desired states to go on from.
+  bool fresh() const { return view_.desired != nullptr; }
+  template <class Actuators>
+  void go_on_from(const Actuators& desired) {
+    if (!fresh()) return;
+    pack(desired, view_.desired);
+    view_.has_desired = 1;
+  }
+  std::byte* desired_bytes() {
+    view_.has_desired = fresh() ? 1 : 0;
+    return view_.desired;
+  }
+
+  // for the caller of the driver
+  bool faulty() const { return faulty_; }
+  const FaultText& fault_text() const { return fault_; }
+  /// Puts the typed values where the row is made.
+  void store() {
+    if constexpr (!kIsRunTime<D>) {
+      if constexpr (!std::is_same_v<ActuatorsOf<D>, NoActuators>) pack(observed, view_.observed);
+      if constexpr (!std::is_same_v<ExtendedOf<D>, NoExtended>) pack(extended, view_.extended);
+    }
+  }
+
+ private:
+  ReadingView& view_;
+  FaultText fault_;
+  bool faulty_ = false;
+};
+
+/// The class an engineer writes; there is no base class.
+///
+/// Its constructor touches no hardware. Optional: `describe(Schema&) const`, `Extended`,
+/// `Requests` with `on(const Each&)` (returning void or Served), `wait(std::int64_t due)`.
+template <class D>
+concept Driver = requires(D& driver, const Desired<D>& desired, Reading<D>& reading) {
+  typename D::Config;
+  typename D::Actuators;
+  requires DescribedStruct<typename D::Config>;
+  requires std::constructible_from<D, const typename D::Config&>;
+  driver.start();
+  driver.write(desired);
+  driver.read(reading);
+  { driver.stop() } noexcept;
+};
+
+}  // namespace o80

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <memory>
+#include <mutex>
+
+#include "o80/robot/loop.hpp"
+#include "o80/runtime/frontend.hpp"
+
+namespace o80 {
+
+/// A bursting robot inside the caller's process: bursts run in the thread that asks for them.
+///
+/// Others may attach to its segment, watch it and command it; what they send is taken when the
+/// owner next bursts or pulses.
+class InlineRobot final : public InlineRunner {
+ public:
+  /// Starts the robot. Throws as Loop.
+  InlineRobot(std::unique_ptr<Robot> robot, BackendOptions options);
+
+  void run() override;
+  /// Stops the robot; its frontends see a backend that stopped.
+  void stop() noexcept;
+  const std::string& segment() const noexcept { return loop_.backend().name(); }
+
+ private:
+  std::mutex running_;
+  Loop loop_;
+};
+
+/// An unused segment name for a robot inside this process.
+std::string unused_segment_name(const std::string& robot);
+
+}  // namespace o80

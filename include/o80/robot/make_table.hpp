@@ -1,0 +1,182 @@
+#pragma once
+
+#include <exception>
+#include <memory>
+#include <string>
+
+#include "o80/base/version.hpp"
+#include "o80/describe/options.hpp"
+#include "o80/robot/driver.hpp"
+#include "o80/robot/table.hpp"
+
+/// Makes a shared library a robot: O80_ROBOT(arm, Arm), once, at global scope.
+#define O80_ROBOT(robot, DriverType) O80_ROBOT_WITH(robot, DriverType, "")
+
+/// The same, naming what the library was built with besides o80 ("mujoco 4.0.1").
+#define O80_ROBOT_WITH(robot, DriverType, versions)                                             \
+  extern "C" __attribute__((visibility("default"))) const ::o80::RobotTable* o80_robot_table(); \
+  const ::o80::RobotTable* o80_robot_table() {                                                  \
+    return ::o80::robot_table<DriverType>(#robot, versions);                                    \
+  }                                                                                             \
+  static_assert(true)
+
+namespace o80 {
+
+namespace driving {
+
+inline void set_fault(FaultText* fault, const char* text) {
+  const std::size_t size = strnlen(text, sizeof fault->text - 1);
+  std::memcpy(fault->text, text, size);
+  fault->text[size] = 0;
+}
+
+/// Runs a piece of a driver; what it throws becomes a fault and the result `failed`.
+template <class Result, class Call>
+Result guarded(FaultText* fault, Result failed, Call&& call) noexcept {
+  try {
+    return call();
+  } catch (const std::exception& error) {
+    set_fault(fault, error.what());
+  } catch (...) {
+    set_fault(fault, "the driver threw something that is no std::exception");
+  }
+  return failed;
+}
+
+template <Driver D>
+void describe_driver(const D& driver, const char* name, Schema& schema) {
+  schema.head.robot = NameText(name);
+  describe_types<D>(schema);
+  if constexpr (requires { driver.describe(schema); }) driver.describe(schema);
+  schema.head.block = round_up(schema.head.block, 8);
+}
+
+template <Driver D, class Request>
+RequestAnswer serve(D& driver, const std::byte* payload, FaultText* text) {
+  if constexpr (requires {
+                  { driver.on(unpack<Request>(payload)) } -> std::same_as<Served>;
+                }) {
+    const Served served = driver.on(unpack<Request>(payload));
+    set_fault(text, served.text.data());
+    return static_cast<RequestAnswer>(served.kind);
+  } else {
+    driver.on(unpack<Request>(payload));
+    return RequestAnswer::done;
+  }
+}
+static_assert(static_cast<int>(RequestAnswer::rejected) ==
+                  static_cast<int>(Served::Kind::rejected) &&
+              static_cast<int>(RequestAnswer::start_afresh) ==
+                  static_cast<int>(Served::Kind::start_afresh) &&
+              static_cast<int>(RequestAnswer::failed) == static_cast<int>(Served::Kind::failed));
+
+}  // namespace driving
+
+/// The table of functions of a driver class.
+template <Driver D>
+const RobotTable* robot_table(const char* name, const char* versions = "") {
+  static const char* robot_name = name;
+  static const std::string built_with =
+      std::string("o80 ") + O80_VERSION + (*versions == 0 ? "" : std::string("; ") + versions);
+  static const RobotTable table = [] {
+    RobotTable t{};
+    t.version = kRobotTableVersion;
+    t.size = sizeof(RobotTable);
+    t.row_sizes = kSchemaRowSizes;
+    t.name = robot_name;
+    t.built_with = built_with.c_str();
+    t.options = [](void* context, void (*each)(void*, const OptionRow*)) {
+      for (const Option& option : options_of<typename D::Config>()) {
+        const OptionRow row{option.name.c_str(), option.kind.c_str(), option.default_text.c_str(),
+                            option.help.c_str(), option.unit.c_str()};
+        each(context, &row);
+      }
+    };
+    t.create = [](const OptionValue* values, std::uint32_t count, FaultText* fault) -> void* {
+      return driving::guarded<void*>(fault, nullptr, [&]() -> void* {
+        typename D::Config config;
+        for (std::uint32_t i = 0; i < count; ++i) {
+          set_option(config, values[i].name, values[i].text);
+        }
+        return new D(config);
+      });
+    };
+    t.describe = [](void* robot, void* context, void (*rows)(void*, const SchemaRows*),
+                    FaultText* fault) {
+      return driving::guarded<int>(fault, 1, [&] {
+        Schema schema;
+        driving::describe_driver(*static_cast<const D*>(robot), robot_name, schema);
+        const auto count = [](const auto& rows_of) {
+          return static_cast<std::uint32_t>(rows_of.size());
+        };
+        const SchemaRows all{&schema.head,
+                             schema.types.data(),
+                             schema.hooks.data(),
+                             schema.fields.data(),
+                             schema.labels.data(),
+                             schema.groups.data(),
+                             schema.actuators.data(),
+                             schema.limits.data(),
+                             schema.requests.data(),
+                             count(schema.types),
+                             count(schema.fields),
+                             count(schema.labels),
+                             count(schema.groups),
+                             count(schema.actuators),
+                             count(schema.limits),
+                             count(schema.requests)};
+        rows(context, &all);
+        return 0;
+      });
+    };
+    t.start = [](void* robot, FaultText* fault) {
+      return driving::guarded<int>(fault, 1, [&] {
+        static_cast<D*>(robot)->start();
+        return 0;
+      });
+    };
+    if constexpr (requires(D& driver, std::int64_t due) { driver.wait(due); }) {
+      t.paces_itself = 1;
+      t.wait = [](void* robot, std::int64_t due, FaultText* fault) {
+        return driving::guarded<int>(fault, 1, [&] {
+          static_cast<D*>(robot)->wait(due);
+          return 0;
+        });
+      };
+    }
+    t.write = [](void* robot, const DesiredView* view, FaultText* fault) {
+      return driving::guarded<int>(fault, 1, [&] {
+        static_cast<D*>(robot)->write(Desired<D>(*view));
+        return 0;
+      });
+    };
+    t.read = [](void* robot, ReadingView* view, FaultText* fault) {
+      return driving::guarded<int>(fault, 1, [&] {
+        Reading<D> reading(*view);
+        static_cast<D*>(robot)->read(reading);
+        reading.store();
+        if (reading.faulty()) driving::set_fault(fault, reading.fault_text().text);
+        return reading.faulty() ? 1 : 0;
+      });
+    };
+    t.request = [](void* robot, std::uint32_t index, const std::byte* payload, FaultText* text) {
+      return driving::guarded<RequestAnswer>(text, RequestAnswer::failed, [&] {
+        RequestAnswer answer = RequestAnswer::rejected;
+        std::uint32_t i = 0;
+        [&]<class... Each>(Requests<Each...>) {
+          (void)((i++ == index &&
+                  (answer = driving::serve<D, Each>(*static_cast<D*>(robot), payload, text),
+                   true)) ||
+                 ...);
+        }(RequestsOf<D>{});
+        return answer;
+      });
+    };
+    t.stop = [](void* robot) { static_cast<D*>(robot)->stop(); };
+    t.destroy = [](void* robot) { delete static_cast<D*>(robot); };
+    return t;
+  }();
+  return &table;
+}
+
+}  // namespace o80

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "o80/describe/options.hpp"
+#include "o80/describe/schema.hpp"
+#include "o80/robot/table.hpp"
+#include "o80/runtime/request_server.hpp"
+
+namespace o80 {
+
+/// Name and text of each value that a robot is started with.
+using OptionValues = std::vector<std::pair<std::string, std::string>>;
+
+/// The options a robot knows, from its table.
+std::vector<Option> options_of(const RobotTable& table);
+
+/// Throws DriverError if a table was made by another version of o80.
+void check_table(const RobotTable& table, const std::string& where);
+
+/// One living driver behind its table.
+///
+/// Move-only. The driver is stopped and destroyed with it.
+class Robot {
+ public:
+  /// Constructs the driver, which touches no hardware. Throws InvalidArgument, DriverError.
+  Robot(const RobotTable& table, const OptionValues& options);
+  Robot(const Robot&) = delete;
+  Robot& operator=(const Robot&) = delete;
+  ~Robot();
+
+  const RobotTable& table() const { return table_; }
+  /// Throws DriverError.
+  Schema describe() const;
+
+  // the driver's verbs; false: `fault()` says why
+  bool start() noexcept;
+  bool wait(std::int64_t due) noexcept;
+  bool write(const DesiredView& desired) noexcept;
+  bool read(ReadingView& reading) noexcept;
+  Served request(std::uint32_t index, const std::byte* payload) noexcept;
+  /// Once, and only if a start was tried.
+  void stop() noexcept;
+  const char* fault() const noexcept { return fault_.text; }
+
+ private:
+  const RobotTable& table_;
+  void* driver_ = nullptr;
+  FaultText fault_{};
+  bool started_ = false;
+};
+
+}  // namespace o80

@@ -1,0 +1,17 @@
+#pragma once
+
+#include "o80/robot/make_table.hpp"
+
+namespace o80 {
+
+/// Runs a robot as a process: options from the command line, signals, messages.
+/// Returns 0 after an end in order, 1 after a failure, 2 for options that cannot be used.
+int run(const RobotTable& table, int argc, char** argv);
+
+/// One's own main: `int main(int argc, char** argv) { return o80::run<Arm>(argc, argv, "arm"); }`
+template <Driver D>
+int run(int argc, char** argv, const char* name) {
+  return run(*robot_table<D>(name), argc, argv);
+}
+
+}  // namespace o80

@@ -1,0 +1,105 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "o80/describe/hooks.hpp"
+#include "o80/describe/rows.hpp"
+
+// What crosses the border between a robot library and o80: plain structs and functions that
+// neither throw nor know a C++ type of the other side. Both sides compare versions and sizes.
+
+namespace o80 {
+
+inline constexpr std::uint32_t kRobotTableVersion = 1;
+
+/// Why a call failed.
+struct FaultText {
+  char text[512];
+};
+
+/// One value a robot can be started with.
+struct OptionRow {
+  const char* name;
+  const char* kind;
+  const char* default_text;
+  const char* help;
+  const char* unit;
+};
+
+struct OptionValue {
+  const char* name;
+  const char* text;
+};
+
+/// All rows of a schema.
+struct SchemaRows {
+  const SchemaHead* head;
+  const TypeRow* types;
+  const TypeHooks* hooks;  // one for each type
+  const FieldRow* fields;
+  const LabelRow* labels;
+  const GroupRow* groups;
+  const ActuatorRow* actuators;
+  const LimitRow* limits;
+  const RequestRow* requests;
+  std::uint32_t type_count, field_count, label_count, group_count, actuator_count, limit_count,
+      request_count;
+};
+
+/// What a driver is to write.
+struct DesiredView {
+  const std::byte* states;      // the desired block
+  const std::uint64_t* active;  // one bit an actuator
+  std::int64_t iteration;
+  std::int64_t time;    // [ns]
+  std::int64_t period;  // [ns]
+};
+
+/// Where a driver's reading goes; observed and extended hold the last one.
+struct ReadingView {
+  std::byte* observed;
+  std::byte* extended;
+  std::byte* desired;          // in a fresh start; else null
+  std::uint64_t* interrupted;  // one bit an actuator, zero
+  std::int64_t iteration;
+  std::int64_t time;          // [ns]
+  std::uint32_t finished;     // set it to end the loop in order
+  std::uint32_t has_desired;  // set it if `desired` was filled
+};
+
+/// How a request ended.
+enum class RequestAnswer : std::uint32_t { done = 0, rejected = 1, start_afresh = 2, failed = 3 };
+
+/// A robot, as functions. Those that return int give 0, or 1 and fill the fault.
+struct RobotTable {
+  std::uint32_t version;
+  std::uint32_t size;          // of this struct
+  std::uint32_t row_sizes;     // of all schema rows, summed: another layout cannot be read
+  std::uint32_t paces_itself;  // the driver's own `wait` says when an iteration begins
+  const char* name;
+  const char* built_with;  // versions of o80 and of what it links
+
+  void (*options)(void* context, void (*each)(void* context, const OptionRow* row));
+  void* (*create)(const OptionValue* values, std::uint32_t count, FaultText* fault);
+  int (*describe)(void* robot, void* context, void (*rows)(void* context, const SchemaRows* rows),
+                  FaultText* fault);
+  int (*start)(void* robot, FaultText* fault);
+  int (*wait)(void* robot, std::int64_t due, FaultText* fault);
+  int (*write)(void* robot, const DesiredView* desired, FaultText* fault);
+  int (*read)(void* robot, ReadingView* reading, FaultText* fault);
+  RequestAnswer (*request)(void* robot, std::uint32_t index, const std::byte* payload,
+                           FaultText* text);
+  void (*stop)(void* robot);
+  void (*destroy)(void* robot);
+};
+
+inline constexpr std::uint32_t kSchemaRowSizes =
+    sizeof(SchemaHead) + sizeof(TypeRow) + sizeof(FieldRow) + sizeof(LabelRow) + sizeof(GroupRow) +
+    sizeof(ActuatorRow) + sizeof(LimitRow) + sizeof(RequestRow);
+
+/// The one symbol of a robot library.
+inline constexpr const char* kRobotSymbol = "o80_robot_table";
+using RobotTableFunction = const RobotTable* (*)();
+
+}  // namespace o80

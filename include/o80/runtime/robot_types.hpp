@@ -1,0 +1,77 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <type_traits>
+
+#include "o80/describe/describe.hpp"
+
+namespace o80 {
+
+/// The layout is known only at run time: `describe` adds actuators and sensors, and gets places.
+struct RunTimeActuators {};
+
+/// The requests a robot serves.
+template <Shareable... Each>
+struct Requests {};
+
+namespace robot_types {
+
+template <class R>
+struct Extended {
+  using Type = NoExtended;
+};
+template <class R>
+  requires requires { typename R::Extended; }
+struct Extended<R> {
+  using Type = typename R::Extended;
+};
+template <class R>
+struct RequestsIn {
+  using Type = Requests<>;
+};
+template <class R>
+  requires requires { typename R::Requests; }
+struct RequestsIn<R> {
+  using Type = typename R::Requests;
+};
+
+}  // namespace robot_types
+
+/// The types of a robot: of its driver class, or of any struct that names them alike.
+template <class R>
+using ActuatorsOf = typename R::Actuators;
+template <class R>
+using ExtendedOf = typename robot_types::Extended<R>::Type;
+template <class R>
+using RequestsOf = typename robot_types::RequestsIn<R>::Type;
+template <class R>
+inline constexpr bool kIsRunTime = std::is_same_v<ActuatorsOf<R>, RunTimeActuators>;
+
+/// A request's name: that of its struct in snake_case, "Home" => "home", "LaunchBall" =>
+/// "launch_ball".
+template <Shareable Request>
+std::string request_name() {
+  std::string_view type = o80_type_name(Tag<Request>{});
+  const auto colon = type.rfind(':');
+  if (colon != std::string_view::npos) type.remove_prefix(colon + 1);
+  std::string name;
+  for (const char c : type) {
+    const bool upper = c >= 'A' && c <= 'Z';
+    if (upper && !name.empty()) name += '_';
+    name += upper ? static_cast<char>(c - 'A' + 'a') : c;
+  }
+  return name;
+}
+
+/// Describes what the types of a robot say: actuators, sensor values, requests.
+template <class R>
+void describe_types(Schema& schema) {
+  if constexpr (!kIsRunTime<R>) describe_actuators<ActuatorsOf<R>>(schema);
+  describe_extended<ExtendedOf<R>>(schema);
+  [&]<class... Each>(Requests<Each...>) {
+    (schema.add_request(request_name<Each>(), describing::type_of<Each>(schema), ""), ...);
+  }(RequestsOf<R>{});
+}
+
+}  // namespace o80

@@ -1,0 +1,101 @@
+#pragma once
+
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "o80/runtime/backend.hpp"
+#include "o80/runtime/request_server.hpp"
+#include "o80/runtime/robot_types.hpp"
+
+namespace o80 {
+
+/// A backend inside one's own program: `publish` row 0, then `step` and `publish` for ever.
+///
+/// R is any struct that names Actuators and, if there are, Extended and Requests.
+///
+/// Writer:   one thread.
+/// Realtime: step and publish.
+template <class R>
+class Backend : private RequestServer {
+ public:
+  using Actuators = ActuatorsOf<R>;
+  using Extended = ExtendedOf<R>;
+  using Describe = std::function<void(Schema&)>;
+
+  /// Takes the name; `describe` may give names, limits and when_idle.
+  explicit Backend(const BackendOptions& options, const Describe& describe = {})
+      : backend_(schema_of(options, describe), options, this) {}
+
+  /// Serves a request between two iterations.
+  template <Shareable Request>
+  void on(std::function<Served(const Request&)> serve) {
+    const std::string name = request_name<Request>();
+    const auto& rows = backend_.schema().requests;
+    for (std::uint32_t i = 0; i < rows.size(); ++i) {
+      if (rows[i].name.view() != name) continue;
+      servers_[i] = [serve = std::move(serve)](const std::byte* payload) {
+        return serve(unpack<Request>(payload));
+      };
+      return;
+    }
+    throw InvalidArgument("request '" + name + "' is not among the Requests of the robot");
+  }
+  /// Reads the robot anew after a request answered `start_afresh`.
+  void on_fresh_start(std::function<void(Actuators&, Extended&)> read) { read_ = std::move(read); }
+
+  /// Publishes what was observed in the iteration under way; the first call makes row 0.
+  void publish(const Actuators& observed, const Extended& extended = {}) noexcept {
+    if constexpr (!std::is_same_v<Actuators, NoActuators>) pack(observed, backend_.observed());
+    if constexpr (!std::is_same_v<Extended, NoExtended>) pack(extended, backend_.extended());
+    backend_.publish();
+  }
+  /// The desired states of the next iteration; empty when a stop was asked for. Bursting, waits
+  /// for a grant.
+  std::optional<Actuators> step() noexcept {
+    if (backend_.step() != Step::run) return std::nullopt;
+    return unpack<Actuators>(backend_.desired());
+  }
+  UntypedBackend& untyped() { return backend_; }
+
+ private:
+  static Schema schema_of(const BackendOptions& options, const Describe& describe) {
+    Schema schema;
+    schema.head.robot = NameText(options.segment);
+    describe_types<R>(schema);
+    if (describe) describe(schema);
+    return schema;
+  }
+  Served serve(std::uint32_t request, std::span<const std::byte> payload) noexcept override {
+    const auto server = servers_.find(request);
+    if (server == servers_.end()) return Served::rejected("nobody serves this request");
+    try {
+      return server->second(payload.data());
+    } catch (const std::exception& error) {
+      return Served::failed(error.what());
+    } catch (...) {
+      return Served::failed("a request's server threw");
+    }
+  }
+  bool read_fresh(FreshReading& reading) noexcept override {
+    if (!read_) return true;  // what was observed last holds
+    try {
+      Actuators observed = unpack<Actuators>(reading.observed);
+      Extended extended = unpack<Extended>(reading.extended);
+      read_(observed, extended);
+      if constexpr (!std::is_same_v<Actuators, NoActuators>) pack(observed, reading.observed);
+      if constexpr (!std::is_same_v<Extended, NoExtended>) pack(extended, reading.extended);
+      return true;
+    } catch (...) {
+      return false;
+    }
+  }
+
+  std::map<std::uint32_t, std::function<Served(const std::byte*)>> servers_;
+  std::function<void(Actuators&, Extended&)> read_;
+  UntypedBackend backend_;
+};
+
+}  // namespace o80

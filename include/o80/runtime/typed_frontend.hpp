@@ -1,0 +1,81 @@
+#pragma once
+
+#include <array>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "o80/describe/table.hpp"
+#include "o80/runtime/frontend.hpp"
+#include "o80/runtime/typed_observation.hpp"
+
+namespace o80 {
+
+/// Throws SchemaMismatch, showing the difference, unless the types laid out in `expected` are those
+/// of `found`; names, limits and texts are the backend's own affair.
+void check_types(const Schema& expected, const Schema& found, const std::string& segment);
+
+/// A frontend that knows the robot's types; `Frontend<>` knows none.
+template <class R = void>
+class Frontend : public UntypedFrontend {
+ public:
+  explicit Frontend(const std::string& segment, const FrontendOptions& options = {})
+      : UntypedFrontend(segment, options) {
+    if constexpr (!kIsRunTime<R>) {
+      Schema expected;
+      describe_types<R>(expected);
+      check_types(expected, schema(), segment);
+    }
+  }
+
+  using UntypedFrontend::add_command;
+  /// Adds a command by index or by name; the state must be of the actuator's type.
+  template <Shareable State>
+  std::uint32_t add_command(std::uint32_t index, const State& target,
+                            const CommandOptions& options = {}) {
+    std::array<std::byte, sizeof(State)> bytes{};
+    pack(target, bytes.data());
+    return UntypedFrontend::add_command(index, bytes, options);
+  }
+  template <Shareable State>
+  std::uint32_t add_command(std::string_view name, const State& target,
+                            const CommandOptions& options = {}) {
+    return add_command(actuator(name), target, options);
+  }
+  /// One command through all rows, `options.pace` for each.
+  template <Shareable State>
+  std::uint32_t add_trajectory(std::string_view name, std::span<const State> rows,
+                               const CommandOptions& options = {.pace = iterations(1)}) {
+    std::vector<std::byte> bytes(rows.size() * sizeof(State));
+    for (std::size_t i = 0; i < rows.size(); ++i) pack(rows[i], bytes.data() + i * sizeof(State));
+    return UntypedFrontend::add_trajectory(actuator(name), static_cast<std::uint32_t>(rows.size()),
+                                           bytes, options);
+  }
+  template <Shareable Request>
+  std::uint32_t add_request(const Request& request) {
+    std::array<std::byte, sizeof(Request)> bytes{};
+    pack(request, bytes.data());
+    return UntypedFrontend::add_request(request_index(request_name<Request>()), bytes);
+  }
+
+  Observation<R> latest() const { return Observation<R>(UntypedFrontend::latest()); }
+  Observation<R> wait_for(Iteration k, Timeout timeout = std::chrono::seconds(5)) const {
+    return Observation<R>(UntypedFrontend::wait_for(k, timeout));
+  }
+  Observation<R> pulse_and_wait(Timeout timeout = std::nullopt, const PulseOptions& options = {}) {
+    return Observation<R>(UntypedFrontend::pulse_and_wait(timeout, options));
+  }
+  Observation<R> burst(std::int64_t count, Timeout timeout = std::chrono::seconds(5)) {
+    return Observation<R>(UntypedFrontend::burst(count, timeout));
+  }
+};
+
+template <>
+class Frontend<void> : public UntypedFrontend {
+ public:
+  using UntypedFrontend::UntypedFrontend;
+};
+
+}  // namespace o80

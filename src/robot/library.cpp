@@ -1,0 +1,96 @@
+#include "o80/robot/library.hpp"
+
+#include <dlfcn.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <sstream>
+
+#include "o80/base/error.hpp"
+#include "o80/robot/robot.hpp"
+
+namespace o80 {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+/// The folder of the robots that come with o80: beside the library this code stands in.
+fs::path bundled_folder() {
+  Dl_info info{};
+  if (dladdr(reinterpret_cast<void*>(&bundled_folder), &info) == 0) return {};
+  std::error_code ignored;
+  const fs::path library = fs::canonical(info.dli_fname, ignored);
+  return library.parent_path() / "o80" / "robots";
+}
+
+std::string where(const std::string& name_or_path) {
+  if (name_or_path.find('/') != std::string::npos) return fs::absolute(name_or_path).string();
+  std::string there;
+  for (const RobotFile& robot : find_robots()) {
+    if (robot.name == name_or_path) return robot.path;
+    there += (there.empty() ? "" : ", ") + robot.name;
+  }
+  throw DriverError("there is no robot '" + name_or_path + "'; there are: " + there +
+                    ". Give the path of its library, or add its folder to O80_ROBOT_PATH");
+}
+
+}  // namespace
+
+std::vector<std::string> robot_folders() {
+  std::vector<std::string> folders;
+  if (const char* given = std::getenv("O80_ROBOT_PATH"); given != nullptr) {
+    std::istringstream parts(given);
+    for (std::string folder; std::getline(parts, folder, ':');) {
+      if (!folder.empty()) folders.push_back(folder);
+    }
+  }
+  folders.push_back(bundled_folder().string());
+  return folders;
+}
+
+std::vector<RobotFile> find_robots() {
+  std::vector<RobotFile> robots;
+  for (const std::string& folder : robot_folders()) {
+    std::error_code ignored;
+    std::vector<RobotFile> here;
+    for (const auto& entry : fs::directory_iterator(folder, ignored)) {
+      if (entry.path().extension() == ".so") {
+        here.push_back({entry.path().stem().string(), fs::absolute(entry.path()).string()});
+      }
+    }
+    std::ranges::sort(here, {}, &RobotFile::name);
+    for (RobotFile& robot : here) {
+      const bool hidden = std::ranges::any_of(
+          robots, [&](const RobotFile& other) { return other.name == robot.name; });
+      if (!hidden) robots.push_back(std::move(robot));
+    }
+  }
+  return robots;
+}
+
+RobotLibrary RobotLibrary::load(const std::string& name_or_path) {
+  RobotLibrary library;
+  library.path = where(name_or_path);
+  std::error_code ignored;
+  if (!fs::exists(library.path, ignored)) {
+    throw DriverError("there is no robot library '" + library.path + "'");
+  }
+  void* handle = dlopen(library.path.c_str(), RTLD_NOW | RTLD_LOCAL);
+  if (handle == nullptr) {
+    throw DriverError("the robot library '" + library.path + "' cannot be loaded: " + dlerror() +
+                      ". If it names a library in another version, build the robot (or o80) again "
+                      "with the one that is installed");
+  }
+  auto* function = reinterpret_cast<RobotTableFunction>(dlsym(handle, kRobotSymbol));
+  if (function == nullptr) {
+    throw DriverError("'" + library.path +
+                      "' is no robot library: it has no O80_ROBOT(name, Driver)");
+  }
+  library.table = function();
+  check_table(*library.table, library.path);
+  return library;
+}
+
+}  // namespace o80

@@ -1,0 +1,132 @@
+#include "o80/robot/loop.hpp"
+
+#include <bit>
+
+#include "o80/base/error.hpp"
+
+namespace o80 {
+
+Loop::Loop(std::unique_ptr<Robot> robot, const BackendOptions& options)
+    : robot_(std::move(robot)),
+      backend_(robot_->describe(), options, this),
+      pacer_(options.period),
+      paced_(!options.bursting),
+      interrupted_(backend_.layout().mask_words + 1) {
+  fault_.reserve(1024);
+}
+
+Loop::~Loop() { stop(); }
+
+void Loop::start() {
+  if (!robot_->start() || !read()) {
+    if (fault_.empty()) failed("start");
+    const std::string why = fault_;
+    stop();
+    throw DriverError(why);
+  }
+  backend_.publish();
+}
+
+// commands => desired => hardware, wait, hardware => observed, the row is published
+Ended Loop::run() noexcept {
+  pacer_.begin();
+  while (!finished_ && backend_.step() == Step::run) {
+    if (!iterate()) break;
+  }
+  return stop();
+}
+
+bool Loop::run_granted() noexcept {
+  while (!ended_) {
+    const Step step = finished_ ? Step::ended : backend_.try_step();
+    if (step == Step::standing) return true;
+    if (step == Step::ended || !iterate()) stop();
+  }
+  return false;
+}
+
+bool Loop::iterate() noexcept {
+  if (!write() || !pace() || !read()) return false;
+  backend_.publish();
+  return true;
+}
+
+bool Loop::write() noexcept {
+  const DesiredView view{backend_.desired(), backend_.active(), backend_.iteration(),
+                         backend_.time(), backend_.schema().head.period};
+  return robot_->write(view) || failed("write");
+}
+
+/// Real time waits here, for the clock or for the robot's own tick.
+bool Loop::pace() noexcept {
+  if (!paced_) return true;
+  if (robot_->table().paces_itself == 0) {
+    pacer_.sleep();
+  } else if (!robot_->wait(pacer_.due())) {
+    return failed("wait");
+  }
+  backend_.set_timing(pacer_.next());
+  return true;
+}
+
+bool Loop::read() noexcept {
+  std::fill(interrupted_.begin(), interrupted_.end(), 0);
+  ReadingView view{};
+  view.observed = backend_.observed();
+  view.extended = backend_.extended();
+  view.interrupted = interrupted_.data();
+  view.iteration = backend_.iteration();
+  view.time = backend_.time();
+  if (!robot_->read(view)) return failed("read");
+  finished_ = finished_ || view.finished != 0;
+  for (std::uint32_t word = 0; word < interrupted_.size(); ++word) {
+    for (std::uint64_t bits = interrupted_[word]; bits != 0; bits &= bits - 1) {
+      const auto actuator = word * 64 + static_cast<std::uint32_t>(std::countr_zero(bits));
+      if (actuator < backend_.schema().actuators.size()) backend_.interrupt(actuator);
+    }
+  }
+  return true;
+}
+
+bool Loop::failed(const char* verb) noexcept {
+  fault_ = "'";
+  fault_ += robot_->table().name;
+  fault_ += "' failed in ";
+  fault_ += verb;
+  fault_ += ": ";
+  fault_ += robot_->fault();
+  return false;
+}
+
+Served Loop::serve(std::uint32_t request, std::span<const std::byte> payload) noexcept {
+  const Served served = robot_->request(request, payload.data());
+  if (served.kind == Served::Kind::failed) {
+    failed(backend_.schema().requests[request].name.chars.data());
+  }
+  return served;
+}
+
+bool Loop::read_fresh(FreshReading& reading) noexcept {
+  ReadingView view{};
+  view.observed = reading.observed;
+  view.extended = reading.extended;
+  view.desired = reading.desired;
+  view.interrupted = interrupted_.data();
+  view.iteration = backend_.iteration();
+  view.time = backend_.time();
+  if (!robot_->read(view)) return failed("read");
+  reading.has_desired = view.has_desired != 0;
+  return true;
+}
+
+Ended Loop::stop() noexcept {
+  if (!ended_) {
+    ended_ = true;
+    robot_->stop();
+    if (fault_.empty()) fault_ = backend_.failure();
+    backend_.end(fault_.empty() ? State::stopped : State::failed, fault_);
+  }
+  return {fault_.empty(), fault_};
+}
+
+}  // namespace o80

@@ -1,0 +1,75 @@
+#include "o80/robot/real_time.hpp"
+
+#include <alloca.h>
+#include <sched.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+
+#include "o80/memory/liveness.hpp"
+
+namespace o80 {
+
+namespace {
+
+constexpr int kPage = 4096;
+
+/// Touches so much of the stack that the loop never meets a page for the first time.
+__attribute__((noinline)) void touch_stack(std::size_t bytes) {
+  auto* stack = static_cast<volatile char*>(alloca(bytes));
+  for (std::size_t i = 0; i < bytes; i += kPage) stack[i] = 0;
+}
+
+std::string list(const std::vector<int>& processors) {
+  std::string text;
+  for (const int processor : processors) {
+    text += (text.empty() ? "" : ",") + std::to_string(processor);
+  }
+  return text;
+}
+
+void set_policy(const RealTimeOptions& options, std::vector<std::string>& refused) {
+  const int policy = options.policy == RealTimeOptions::Policy::fifo ? SCHED_FIFO : SCHED_RR;
+  sched_param parameter{};
+  parameter.sched_priority = options.priority;
+  if (sched_setscheduler(0, policy, &parameter) == 0) return;
+  refused.push_back("real-time priority " + std::to_string(options.priority) + " was refused (" +
+                    std::strerror(errno) +
+                    "). Allow it with `ulimit -r 99` (limits.conf: rtprio), "
+                    "or `sudo setcap cap_sys_nice+ep` on the program");
+}
+
+void set_processors(const RealTimeOptions& options, std::vector<std::string>& refused) {
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  for (const int processor : options.processors) {
+    if (processor >= 0 && processor < CPU_SETSIZE) CPU_SET(processor, &set);
+  }
+  LaneLiveness::avoid_processors(options.processors);
+  if (sched_setaffinity(0, sizeof set, &set) == 0) return;
+  refused.push_back("processors " + list(options.processors) + " were refused (" +
+                    std::strerror(errno) + "). This machine has " +
+                    std::to_string(sysconf(_SC_NPROCESSORS_ONLN)) +
+                    "; see them with `lscpu`, and what may be used with `taskset -p $$`");
+}
+
+void lock_memory(std::vector<std::string>& refused) {
+  if (mlockall(MCL_CURRENT | MCL_FUTURE) == 0) return;
+  refused.push_back(std::string("locked memory was refused (") + std::strerror(errno) +
+                    "). Allow it with `ulimit -l unlimited` (limits.conf: memlock)");
+}
+
+}  // namespace
+
+std::vector<std::string> set_up_real_time(const RealTimeOptions& options) {
+  std::vector<std::string> refused;
+  if (options.lock_memory) lock_memory(refused);
+  touch_stack(options.stack);
+  if (!options.processors.empty()) set_processors(options, refused);
+  if (options.policy != RealTimeOptions::Policy::other) set_policy(options, refused);
+  return refused;
+}
+
+}  // namespace o80

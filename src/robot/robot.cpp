@@ -1,0 +1,99 @@
+#include "o80/robot/robot.hpp"
+
+#include <algorithm>
+#include <cstdio>
+
+namespace o80 {
+
+std::vector<Option> options_of(const RobotTable& table) {
+  std::vector<Option> options;
+  table.options(&options, [](void* context, const OptionRow* row) {
+    static_cast<std::vector<Option>*>(context)->push_back(
+        {row->name, row->kind, row->default_text, row->help, row->unit});
+  });
+  return options;
+}
+
+void check_table(const RobotTable& table, const std::string& where) {
+  if (table.version != kRobotTableVersion || table.size != sizeof(RobotTable) ||
+      table.row_sizes != kSchemaRowSizes) {
+    throw DriverError(
+        "the robot library '" + where + "' was built for another version of o80" +
+        (table.version == kRobotTableVersion ? " (" + std::string(table.built_with) + ")" : "") +
+        ": build it again with this one (" O80_VERSION ")");
+  }
+}
+
+Robot::Robot(const RobotTable& table, const OptionValues& options) : table_(table) {
+  check_table(table, table.name);
+  std::vector<OptionValue> values;
+  values.reserve(options.size());
+  for (const auto& [name, text] : options) values.push_back({name.c_str(), text.c_str()});
+  driver_ = table.create(values.data(), static_cast<std::uint32_t>(values.size()), &fault_);
+  if (driver_ == nullptr) {
+    throw DriverError("robot '" + std::string(table.name) + "' cannot be made: " + fault_.text);
+  }
+}
+
+Robot::~Robot() {
+  stop();
+  table_.destroy(driver_);
+}
+
+Schema Robot::describe() const {
+  Schema schema;
+  FaultText fault{};
+  const auto copy = [](void* context, const SchemaRows* rows) {
+    auto& out = *static_cast<Schema*>(context);
+    out.head = *rows->head;
+    out.types.assign(rows->types, rows->types + rows->type_count);
+    out.hooks.assign(rows->hooks, rows->hooks + rows->type_count);
+    out.keys.resize(rows->type_count);
+    out.fields.assign(rows->fields, rows->fields + rows->field_count);
+    out.labels.assign(rows->labels, rows->labels + rows->label_count);
+    out.groups.assign(rows->groups, rows->groups + rows->group_count);
+    out.actuators.assign(rows->actuators, rows->actuators + rows->actuator_count);
+    out.limits.assign(rows->limits, rows->limits + rows->limit_count);
+    out.requests.assign(rows->requests, rows->requests + rows->request_count);
+  };
+  if (table_.describe(driver_, &schema, copy, &fault) != 0) {
+    throw DriverError("robot '" + std::string(table_.name) +
+                      "' cannot be described: " + fault.text);
+  }
+  return schema;
+}
+
+bool Robot::start() noexcept {
+  started_ = true;
+  return table_.start(driver_, &fault_) == 0;
+}
+bool Robot::wait(std::int64_t due) noexcept { return table_.wait(driver_, due, &fault_) == 0; }
+bool Robot::write(const DesiredView& desired) noexcept {
+  return table_.write(driver_, &desired, &fault_) == 0;
+}
+bool Robot::read(ReadingView& reading) noexcept {
+  return table_.read(driver_, &reading, &fault_) == 0;
+}
+
+Served Robot::request(std::uint32_t index, const std::byte* payload) noexcept {
+  FaultText text{};
+  switch (table_.request(driver_, index, payload, &text)) {
+    case RequestAnswer::done:
+      return Served::done();
+    case RequestAnswer::rejected:
+      return Served::rejected(text.text);
+    case RequestAnswer::start_afresh:
+      return Served::start_afresh();
+    default:
+      std::copy_n(text.text, sizeof text.text, fault_.text);
+      return Served::failed(text.text);
+  }
+}
+
+void Robot::stop() noexcept {
+  if (!started_) return;
+  started_ = false;
+  table_.stop(driver_);
+}
+
+}  // namespace o80
