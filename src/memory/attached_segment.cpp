@@ -150,6 +150,12 @@ Life AttachedSegment::life() const noexcept {
   return judge_life(descriptor(), view_.counters().state);
 }
 
+bool AttachedSegment::has_ended() const noexcept {
+  const auto state =
+      static_cast<State>(view_.counters().state.load(std::memory_order_acquire));  // sync state
+  return state != State::starting && state != State::running;
+}
+
 bool AttachedSegment::gone() const noexcept {
   const Life now = life();
   return now != Life::starting && now != Life::running;
@@ -188,11 +194,9 @@ void AttachedSegment::throw_gone(Life life) const {
 }
 
 void AttachedSegment::throw_if_known_gone() const {
-  const auto state =
-      static_cast<State>(view_.counters().state.load(std::memory_order_acquire));  // sync state
   const std::int64_t now = monotonic_now();
   const bool fresh = now - asked_.load(std::memory_order_relaxed) < kKnownFor;
-  if (fresh && (state == State::running || state == State::starting)) return check_process();
+  if (fresh && !has_ended()) return check_process();
   throw_if_gone();
   asked_.store(now, std::memory_order_relaxed);
 }

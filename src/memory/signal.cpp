@@ -32,8 +32,8 @@ Waited RowWaiter::wait_for_row(Iteration k, const Deadline& deadline, const Chec
     else
       poll(k, deadline.left(kSlice));
     if (ready()) return Waited::ready;
-    if (monotonic_now() < look_at) continue;
-    look_at += kSlice;
+    if (monotonic_now() < look_at && !segment_->has_ended()) continue;
+    look_at = monotonic_now() + kSlice;
     if (check && !check())
       throw Cancelled("the wait for a row of segment '" + segment_->name() + "' was cancelled");
     // rows may have come before the end
@@ -72,9 +72,7 @@ void RowWaiter::poll(Iteration k, std::int64_t at_most) noexcept {
     const timespec pause{.tv_sec = 0, .tv_nsec = static_cast<long>(nap)};
     nanosleep(&pause, nullptr);
     if (counters.published.load(std::memory_order_acquire) >= k) return;  // sync published
-    const auto state =
-        static_cast<State>(counters.state.load(std::memory_order_acquire));  // sync state
-    if (state != State::running && state != State::starting) return;
+    if (segment_->has_ended()) return;
   }
 }
 

@@ -27,7 +27,7 @@ struct AttachOptions {
   enum class Dead { wait, accept };
   Dead dead = Dead::wait;          // accept: also a stopped, failed or killed one, to read it
   std::uint64_t ignore_epoch = 0;  // a segment of this epoch counts as not there
-  Check check;
+  Check check = {};
 };
 
 /// Move-only: the segment of some backend, seen from a frontend.
@@ -57,6 +57,8 @@ class AttachedSegment {
   int descriptor() const noexcept { return file_.descriptor(); }
   /// Asks the kernel: 2 us unless the state word says enough.
   Life life() const noexcept;
+  /// Whether the backend, or its successor, has said that it is over: one load.
+  bool has_ended() const noexcept;
   /// Neither starting nor running, for good.
   bool gone() const noexcept;
   std::string fault() const;

@@ -74,8 +74,8 @@ class LaneSender {
       if (deadline.over()) return done() ? Waited::ready : Waited::timed_out;
       if (look_at == 0) look_at = monotonic_now() + kSlice;
       sleep(seen, deadline);
-      if (monotonic_now() < look_at) continue;
-      look_at += kSlice;
+      if (monotonic_now() < look_at && !segment_->has_ended()) continue;
+      look_at = monotonic_now() + kSlice;
       // what is done is done, whatever became of the backend
       const bool gone = look_around(check);
       if (done()) return Waited::ready;

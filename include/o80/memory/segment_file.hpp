@@ -15,9 +15,10 @@ bool leads_to(const std::string& path, int descriptor) noexcept;
 /// True if it begins as a segment of any version.
 bool bears_the_mark(int descriptor) noexcept;
 
-/// How often an owner is seen in the lock for a moment only: a cleaner, a starter, a dying process.
+/// True if somebody holds byte 0 and goes on holding it, and `path` still names this file.
 ///
-/// True if somebody holds byte 0 and goes on holding it. The descriptor must bear no lock.
+/// Waits a moment for those who hold it in passing: a cleaner, a starter, a dying process. The
+/// descriptor must bear no lock itself.
 bool is_held(int descriptor, const std::string& path);
 
 /// What refuses a second backend.

@@ -12,12 +12,13 @@ namespace o80 {
 struct SegmentEntry {
   std::string name;
   Life life = Life::killed;
-  bool readable;  // false: not a segment of this version, or not ours to read
-  int pid;
-  std::int64_t started_at;  // [s] since 1970
-  std::string user, program;
-  std::uint64_t epoch;
-  std::uint64_t bytes;
+  bool readable = false;  // false: no segment of this version, or not ours to read
+  int pid = 0;
+  std::int64_t started_at = 0;  // [s] since 1970
+  std::string user{};
+  std::string program{};
+  std::uint64_t epoch = 0;
+  std::uint64_t bytes = 0;
 };
 
 /// All segments of the directory, by name.

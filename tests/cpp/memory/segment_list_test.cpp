@@ -1,0 +1,64 @@
+#include "o80/memory/segment_list.hpp"
+
+#include <gmock/gmock.h>
+
+#include <fstream>
+
+#include "memory/segments.hpp"
+#include "o80/base/error.hpp"
+
+namespace o80 {
+namespace {
+
+using ::testing::ElementsAre;
+using SegmentListTest = SegmentTest;
+
+TEST_F(SegmentListTest, ShowsEverySegmentByNameWithItsLife) {
+  const OwnedSegment starting = OwnedSegment::create(small_spec("b"));
+  const OwnedSegment running = running_segment(small_spec("a"));
+  running_segment(small_spec("c")).end(State::failed);
+  std::ofstream(directory_.file_of("d")) << "foreign";
+  std::ofstream(directory_.path() + "/other") << "no segment at all";
+
+  const std::vector<SegmentEntry> entries = list_segments();
+
+  std::vector<std::string> seen;
+  for (const SegmentEntry& entry : entries) seen.push_back(entry.name + " " + name_of(entry.life));
+  EXPECT_THAT(seen, ElementsAre("a running", "b starting", "c failed", "d killed"));
+  EXPECT_EQ(entries[0].pid, getpid());
+  EXPECT_EQ(entries[0].epoch, running.epoch());
+  EXPECT_TRUE(entries[0].readable);
+  EXPECT_FALSE(entries[3].readable);
+  EXPECT_FALSE(entries[0].user.empty());
+}
+
+TEST_F(SegmentListTest, IsEmptyWhereThereIsNothing) {
+  EXPECT_TRUE(list_segments().empty());
+  setenv("O80_DIRECTORY", "/nowhere", 1);
+  EXPECT_TRUE(list_segments().empty());
+}
+
+TEST_F(SegmentListTest, CleansTheDeadAndRefusesTheLiving) {
+  const OwnedSegment alive = running_segment(small_spec("alive"));
+  running_segment(small_spec("dead")).end(State::failed);
+
+  EXPECT_THROW(clean("alive"), SegmentTaken);
+  EXPECT_TRUE(clean("dead"));
+  EXPECT_FALSE(clean("dead"));
+  EXPECT_EQ(directory_.files(), 1U);
+}
+
+TEST_F(SegmentListTest, CleansAllTheDeadButNothingForeign) {
+  const OwnedSegment alive = running_segment(small_spec("alive"));
+  running_segment(small_spec("x")).end(State::failed);
+  running_segment(small_spec("y")).end(State::failed);
+  std::ofstream(directory_.file_of("foreign")) << "not ours";
+  std::ofstream(directory_.file_of("x.new-0011223344556677")) << "a draft nobody holds";
+
+  EXPECT_THAT(clean_dead(), ElementsAre("x", "y"));
+  EXPECT_EQ(directory_.files(), 2U);
+  EXPECT_EQ(alive.state(), State::running);
+}
+
+}  // namespace
+}  // namespace o80

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include "memory/private_directory.hpp"
+#include "o80/memory/segment.hpp"
+
+namespace o80 {
+
+inline SegmentSpec small_spec(const std::string& name = "arm") {
+  return {.name = name, .schema = {}, .row_bytes = 64, .rows = 16, .lanes = 2, .lane_blocks = 16};
+}
+
+inline OwnedSegment running_segment(const SegmentSpec& spec = small_spec()) {
+  OwnedSegment segment = OwnedSegment::create(spec);
+  segment.set_state(State::running);
+  return segment;
+}
+
+inline Deadline soon() { return Deadline(std::chrono::milliseconds(5)); }
+/// Long enough for any machine; no test waits for it to pass.
+inline Deadline patient() { return Deadline(std::chrono::seconds(60)); }
+
+inline AttachedSegment attach(const std::string& name = "arm", Access access = Access::read_write) {
+  return AttachedSegment::attach(name, access, patient());
+}
+
+/// A test with its own directory of segments.
+class SegmentTest : public ::testing::Test {
+ protected:
+  PrivateDirectory directory_;
+};
+
+/// What an error says, or "" if none is thrown.
+template <class Wanted, class Call>
+std::string message_of(Call&& call) {
+  try {
+    call();
+  } catch (const Wanted& error) {
+    return error.what();
+  }
+  return {};
+}
+
+}  // namespace o80
