@@ -103,6 +103,11 @@ Iteration Batch::last_iteration() const {
   return is_end(handle.status) ? handle.iteration : -1;
 }
 
+std::string Batch::rejection() const {
+  const Handle handle = ask(id_);
+  return handle.status == Status::rejected ? handle.text : "";
+}
+
 void Batch::wait(Timeout timeout, const Check& check) const {
   if (id_ == 0) return;  // an empty batch was never sent
   const Deadline deadline(timeout);
@@ -113,7 +118,7 @@ void Batch::wait(Timeout timeout, const Check& check) const {
                        "' has not ended in time: give more time, purge, or ask its handles");
   }
   const Handle last = ask(id_ + 1);
-  if (last.status == Status::completed) {
+  if (last.status == Status::completed && link_->description->schema.head.bursting == 0) {
     link_->rows.wait_for_row(last.iteration, deadline, guarded);
   }
 }
@@ -123,8 +128,7 @@ Burst::Burst(std::shared_ptr<Link> link, std::shared_ptr<LaneSender> lane, Batch
 
 bool Burst::done() const { return lane_->burst(batch_.id()).known != LaneSender::Known::not_yet; }
 
-UntypedObservation Burst::wait(Timeout timeout, const Check& check) const {
-  const Deadline deadline(timeout);
+Iteration Burst::wait_done(Timeout timeout, const Check& check) const {
   const CommandId id = batch_.id();
   LaneSender::BurstAnswer answer = lane_->burst(id);
   const auto over = [&] {
@@ -134,20 +138,27 @@ UntypedObservation Burst::wait(Timeout timeout, const Check& check) const {
     return status.known == LaneSender::Known::yes &&
            static_cast<Status>(status.word.status) == Status::rejected;
   };
-  if (answer.known == LaneSender::Known::not_yet &&
-      lane_->wait_until(over, deadline, link_->guarded(check)) == Waited::timed_out) {
+  if (lane_->wait_until(over, Deadline(timeout), link_->guarded(check)) == Waited::timed_out) {
     throw TimeoutError("the burst of '" + link_->segment.name() +
                        "' was not done in time: give more time, or see whether another "
                        "frontend's burst comes before it");
   }
-  if (answer.known == LaneSender::Known::not_yet) {
-    throw Error("the burst of '" + link_->segment.name() + "' was rejected");
+  if (answer.known == LaneSender::Known::forgotten) {
+    throw RowOverwritten("this burst of '" + link_->segment.name() +
+                         "' is no longer remembered: wait for a burst before sending many more");
+  }
+  return answer.known == LaneSender::Known::yes ? answer.row : -1;
+}
+
+UntypedObservation Burst::wait(Timeout timeout, const Check& check) const {
+  const Iteration row = wait_done(timeout, check);
+  if (row < 0) {
+    throw Error("the burst of '" + link_->segment.name() + "' was rejected: " + batch_.rejection());
   }
   UntypedObservation observation(link_->description);
-  const bool known = answer.known == LaneSender::Known::yes;
-  if (!known || !link_->history.read(answer.row, observation.bytes())) {
-    throw RowOverwritten("the last row of this burst of '" + link_->segment.name() +
-                         "' is no longer there: wait for a burst before sending many more");
+  if (!link_->history.read(row, observation.bytes())) {
+    throw RowOverwritten("row " + std::to_string(row) + " of '" + link_->segment.name() +
+                         "', the last of this burst, is no longer there");
   }
   return observation;
 }

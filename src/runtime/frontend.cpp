@@ -232,10 +232,18 @@ Batch UntypedFrontend::pulse(const PulseOptions& options, std::uint16_t flags) {
 
 UntypedObservation UntypedFrontend::pulse_and_wait(Timeout timeout, const PulseOptions& options,
                                                    const Check& check) {
-  // bursting, the backend runs until the batch has ended
-  const Batch batch = pulse(options, bursting() ? kBurstUntilEnded : std::uint16_t{0});
-  batch.wait(timeout, check);
   UntypedObservation observation(link_->description);
+  if (bursting()) {
+    // the backend runs until the batch has ended
+    const Batch batch = pulse(options, kBurstUntilEnded);
+    const Iteration row =
+        batch.id() == 0 ? -1
+                        : Burst(link_, link_->lane_if_taken(), batch).wait_done(timeout, check);
+    if (row < 0 || !link_->history.read(row, observation.bytes())) latest(observation.bytes());
+    return observation;
+  }
+  const Batch batch = pulse(options, 0);
+  batch.wait(timeout, check);
   const Iteration last = batch.last_iteration();
   if (last < 0 || !link_->history.read(last, observation.bytes())) latest(observation.bytes());
   return observation;

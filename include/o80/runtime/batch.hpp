@@ -43,7 +43,10 @@ class Batch {
   Iteration first_iteration() const;
   /// The iteration at which the last of its commands ended; -1 if it has not yet.
   Iteration last_iteration() const;
-  /// Waits until every record has an end status and the row of that iteration is there.
+  /// Why the batch as a whole was rejected, in words; empty if it was not.
+  std::string rejection() const;
+  /// Waits until every record has an end status and, in real time, the row of that iteration is
+  /// there (a bursting backend may stand still before it).
   /// Throws TimeoutError, BackendGone, Cancelled.
   void wait(Timeout timeout, const Check& check = {}) const;
 
@@ -66,6 +69,9 @@ class Burst {
 
   const Batch& batch() const { return batch_; }
   bool done() const;
+  /// Waits until the last iteration of the burst is done; its row, or -1 if the batch was rejected.
+  /// Throws TimeoutError, BackendGone, Cancelled.
+  Iteration wait_done(Timeout timeout, const Check& check = {}) const;
   /// Waits for the last iteration of the burst and returns its row.
   /// Throws TimeoutError, BackendGone, Cancelled, Error if the batch was rejected.
   UntypedObservation wait(Timeout timeout, const Check& check = {}) const;
