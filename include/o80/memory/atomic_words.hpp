@@ -23,10 +23,19 @@ inline void store_words(std::byte* shared, const std::byte* from, std::size_t by
 
 inline void load_words(std::byte* to, const std::byte* shared, std::size_t bytes) noexcept {
   auto* words = reinterpret_cast<std::uint64_t*>(const_cast<std::byte*>(shared));
-  for (std::size_t i = 0; i < bytes / 8; ++i) {
+  const auto copy = [&](std::size_t i) {
     const std::uint64_t word = std::atomic_ref(words[i]).load(std::memory_order_relaxed);
     std::memcpy(to + 8 * i, &word, 8);
+  };
+  // compilers do not unroll a loop over atomics, and bulk reads live on it
+  std::size_t i = 0;
+  for (; i + 4 <= bytes / 8; i += 4) {
+    copy(i);
+    copy(i + 1);
+    copy(i + 2);
+    copy(i + 3);
   }
+  for (std::size_t left = bytes / 8 % 4; left > 0; --left) copy(i++);
 }
 
 /// Writes a text, cut to what fits, with at least one zero behind it. Release: see `load_text`.

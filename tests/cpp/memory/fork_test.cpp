@@ -45,6 +45,9 @@ TEST_F(ForkTest, MarksEveryObjectOfTheParentAsUsedAfterFork) {
 }
 
 TEST_F(ForkTest, LetsAChildOpenEverythingAgain) {
+#ifdef __SANITIZE_THREAD__
+  GTEST_SKIP() << "the thread sanitizer cannot start a thread after a fork";
+#endif
   const OwnedSegment owner = running_segment();
   const LaneLiveness liveness(owner);
   const AttachedSegment segment = attach();

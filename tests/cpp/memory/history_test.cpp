@@ -108,7 +108,9 @@ TEST_F(HistoryTest, GivesWhatThereIsOfARangeThatIsNot) {
 TEST_F(HistoryTest, OutlivesItsBackend) {
   publish(0, 12);
   segment_.end(State::failed);
-  { const OwnedSegment gone = std::move(segment_); }
+  {
+    const OwnedSegment gone = std::move(segment_);
+  }
   const OwnedSegment next = running_segment(spec_of(3));
   Row row;
 

@@ -202,7 +202,8 @@ TEST_F(LaneTest, IsResetWhenItsCountersAreImpossible) {
   send(sender, 1, 4);
   EXPECT_THAT(take_all(), ElementsAre(1));
   LaneSenderPage& page = segment_.view().lane(0);
-  for (const std::uint64_t nonsense : {std::uint64_t{0}, std::uint64_t{1} << 60, ~std::uint64_t{0}}) {
+  for (const std::uint64_t nonsense :
+       {std::uint64_t{0}, std::uint64_t{1} << 60, ~std::uint64_t{0}}) {
     page.committed = nonsense;
     EXPECT_EQ(lanes_[0].available(), 0U);
     EXPECT_EQ(lanes_[0].in_flight(), 4U);
