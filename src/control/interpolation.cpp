@@ -61,9 +61,10 @@ std::int64_t minimum_jerk_iterations(double distance, const Moment& start, doubl
   std::int64_t failed = tried - 1;
   std::int64_t gentlest = tried;
   double lowest = peak(tried);
-  for (int tries = 0; tries < kMostTries && !(lowest <= highest); ++tries) {
+  for (int tries = 0; tries < kMostTries && tried < kMostIterations && !(lowest <= highest);
+       ++tries) {
     failed = tried;
-    tried += 1 + tried / 8;
+    tried = std::min(tried + 1 + tried / 8, kMostIterations);
     const double reached = peak(tried);
     if (reached < lowest) {
       lowest = reached;
