@@ -1,0 +1,109 @@
+"""What an experiment is set up with: plain frozen values with the published defaults."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+from .actions import FINE, REAL_RANGE, SIMULATED_RANGE, PressureRange
+from .observations import ObservationBounds
+from .rewards import EndRule, RewardRule
+
+JOINTS = 4
+ITERATIONS = 5
+"""Of the arm and of each twin, in a step of the environment."""
+RANGES = {"simulated": SIMULATED_RANGE, "real": REAL_RANGE}
+"""Of pressures, by name."""
+
+
+class Pacing(Enum):
+    """How arm and twins run."""
+
+    REAL_TIME = "real time"
+    """The arm by its own clock in its own process, each twin bursting in its own process."""
+    PROCESSES = "processes"
+    """Arm and twins all bursting, each in its own process."""
+    INLINE = "inline"
+    """Arm and twins all bursting, in the caller's process."""
+
+    @property
+    def real_time(self) -> bool:
+        """The arm has a clock of its own."""
+        return self is Pacing.REAL_TIME
+
+
+@dataclass(frozen=True)
+class RigSettings:
+    """The arm and its twins. Raises ValueError for settings that make none."""
+
+    pacing: Pacing = Pacing.INLINE
+    arm_segment: str | None = None
+    """Name of the arm's segment; None: an unused one."""
+    attach: bool = False
+    """The arm is there already, in another process, as `arm_segment`: only the twins are started."""
+    twins: int = 1
+    """Simulations that mirror the arm; the first one holds the ball that is played."""
+    extra_balls: int = 0
+    """Balls beside it, spread over the twins."""
+    muscle: str = "linear"
+    """Model of the muscles of the simulated arm: linear or hill."""
+    ranges: str = "simulated"
+    """Whose pressures may be asked for: simulated or real."""
+    frequency: float = 500.0
+    """Of the arm and of the twins [1/s]."""
+    history: int | None = None
+    """Rows that arm and twins keep; None: as many as fit into o80's usual history."""
+
+    def __post_init__(self) -> None:
+        if self.twins < 1:
+            raise ValueError(f"at least one twin is needed, not {self.twins}")
+        if self.extra_balls < 0:
+            raise ValueError(f"extra_balls is a number of balls, not {self.extra_balls}")
+        if self.ranges not in RANGES:
+            raise ValueError(f"unknown ranges '{self.ranges}'; there are: {', '.join(RANGES)}")
+        if self.attach and self.arm_segment is None:
+            raise ValueError("to attach to an arm, give the name of its segment: arm_segment")
+        if self.attach and self.pacing is Pacing.INLINE:
+            raise ValueError("an arm in another process cannot be inline; choose another pacing")
+
+    @property
+    def pressures(self) -> PressureRange:
+        """What each muscle may be asked for."""
+        return RANGES[self.ranges]
+
+    @property
+    def period(self) -> float:
+        """Of an iteration [s]."""
+        return 1.0 / self.frequency
+
+    def balls_of_twin(self, twin: int) -> int:
+        """How many balls twin number `twin` holds; a twin has at least one."""
+        share, more = divmod(self.extra_balls, self.twins)
+        extra = share + (1 if twin >= self.twins - more else 0)
+        return max(1, extra + (1 if twin == 0 else 0))
+
+
+@dataclass(frozen=True)
+class TaskSettings:
+    """What is played, and how it is paid."""
+
+    balls: str | None = None
+    """A recording or a folder of them; None: simulated shots."""
+    ball_seed: int = 0
+    """Of the simulated shots."""
+    factor: float = FINE
+    """Of the actions: 0.05 fine, 1 coarse."""
+    delay: int = 1
+    """Iterations the policy has to think, real time: an action acts from row k + 1 + delay."""
+    bounds: ObservationBounds = field(default_factory=ObservationBounds)
+    end: EndRule = field(default_factory=EndRule)
+    reward: RewardRule = field(default_factory=RewardRule)
+    most_late: int = 20
+    """Rows of lateness above which an episode is given up as stalled, real time."""
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.delay < ITERATIONS:
+            raise ValueError(
+                f"a delay of {self.delay} iterations: an action must act within its step, "
+                f"so it lies between 0 and {ITERATIONS - 1}"
+            )
