@@ -54,8 +54,8 @@ void PamDriver::write(const Desired<PamDriver>& desired) {
     throw DriverError("the arm moves on by " + std::to_string(period_) +
                       " ns an iteration, but the loop's period is " + std::to_string(period) +
                       " ns. Run it at --frequency " +
-                      std::to_string(1e9 / static_cast<double>(period_)) + ", or give it period=" +
-                      std::to_string(static_cast<double>(period) * 1e-9));
+                      std::to_string(1e9 / static_cast<double>(period_)) +
+                      ", or give it period=" + std::to_string(static_cast<double>(period) * 1e-9));
   }
   now_.desired = desired.states;
   Pressures asked{};

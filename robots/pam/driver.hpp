@@ -28,12 +28,10 @@ struct ArmSensors {
   std::array<bool, kMuscles> clipped{};
 };
 O80_DESCRIBE(ArmSensors, (joint_positions, "[rad]"), (joint_velocities, "[rad/s]"),
-             (bars, "in the muscles now [bar]"),
-             (activations, "of the muscles now, 0 to 1"),
+             (bars, "in the muscles now [bar]"), (activations, "of the muscles now, 0 to 1"),
              (racket_position, "centre of the racket in the world [m]"),
              (racket_rotation, "row by row; the blade looks along its second column"),
-             (racket_velocity, "[m/s]"),
-             (racket_angular_velocity, "in the world's axes [rad/s]"),
+             (racket_velocity, "[m/s]"), (racket_angular_velocity, "in the world's axes [rad/s]"),
              (clipped, "a pressure asked for was out of range"));
 
 /// The pneumatic arm as a robot: raw pressures of eight muscles in, joint angles out.
