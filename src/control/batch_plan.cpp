@@ -31,6 +31,7 @@ BatchPlanner::BatchPlanner(const Schema& schema, RecordCheck::Layouts layouts, B
 void BatchPlanner::begin(Lane& lane, BlockIndex batch) noexcept {
   lane.batch = batch;
   lane.cursor = pool_.next(batch);
+  lane.last = kNoBlock;
   lane.last_step = kNoBlock;
   lane.invalid = kNoBlock;
   lane.place = 0;
@@ -50,9 +51,8 @@ bool BatchPlanner::check(std::uint32_t lane_index, BlockIndex batch,
     known_[batch] = Known::garbage;
     return true;
   }
-  for (std::uint32_t used = 0; lane.place < record.records && lane.cursor != kNoBlock;) {
-    if (used >= budget) return false;
-    used += check_record(lane_index);
+  while (lane.place < record.records && lane.cursor != kNoBlock) {
+    if (budget == 0 || !check_record(lane_index, budget)) return false;
   }
   complete(lane);
   return true;
@@ -70,31 +70,47 @@ void BatchPlanner::complete(Lane& lane) noexcept {
   lane.batch = kNoBlock;
 }
 
-std::uint32_t BatchPlanner::check_record(std::uint32_t lane_index) noexcept {
-  Lane& lane = lanes_[lane_index];
-  const BlockIndex first = lane.cursor;
-  RecordHead& head = pool_.head(first);
-  const CommandId id = record_id(pool_.batch(lane.batch).id, lane.place);
-
+RecordCheck::Verdict BatchPlanner::begin_record(Lane& lane) noexcept {
   // the blocks it says it has, as far as they are there
+  const RecordHead& head = pool_.head(lane.cursor);
   const std::uint64_t claimed = blocks_of(head.payload_bytes);
-  BlockIndex last = first;
-  std::uint32_t blocks = 1;
-  while (blocks < claimed && pool_.next(last) != kNoBlock) {
-    last = pool_.next(last);
-    ++blocks;
+  lane.last = lane.cursor;
+  lane.record_blocks = 1;
+  while (lane.record_blocks < claimed && pool_.next(lane.last) != kNoBlock) {
+    lane.last = pool_.next(lane.last);
+    ++lane.record_blocks;
   }
-  if (blocks < claimed || head.id != id || !check_.valid(pool_, first)) {
+  const CommandId id = record_id(pool_.batch(lane.batch).id, lane.place);
+  if (lane.record_blocks < claimed || head.id != id) return RecordCheck::Verdict::invalid;
+  return check_.begin(pool_, lane.cursor, lane.progress);
+}
+
+bool BatchPlanner::check_record(std::uint32_t lane_index, std::uint32_t& budget) noexcept {
+  using Verdict = RecordCheck::Verdict;
+  Lane& lane = lanes_[lane_index];
+  Verdict verdict = Verdict::unfinished;
+  if (lane.last == kNoBlock) {
+    verdict = begin_record(lane);
+    --budget;
+  }
+  if (verdict == Verdict::unfinished) {
+    verdict = check_.go_on(pool_, lane.cursor, lane.progress, budget);
+    if (verdict == Verdict::unfinished) return false;
+  }
+  RecordHead& head = pool_.head(lane.cursor);
+  if (verdict == Verdict::invalid) {
     head.kind = kInvalidRecord;
-    head.id = id;
-    head.payload_bytes = static_cast<std::uint32_t>(blocks * kBlockBytes - sizeof(RecordHead));
+    head.id = record_id(pool_.batch(lane.batch).id, lane.place);
+    head.payload_bytes =
+        static_cast<std::uint32_t>(lane.record_blocks * kBlockBytes - sizeof(RecordHead));
   }
-  head.own = {kNoBlock, lane.batch, last, kNoBlock};
-  add(lane_index, first);
-  lane.cursor = pool_.next(last);
-  lane.blocks += blocks;
+  head.own = {kNoBlock, lane.batch, lane.last, kNoBlock};
+  add(lane_index, lane.cursor);
+  lane.cursor = pool_.next(lane.last);
+  lane.last = kNoBlock;
+  lane.blocks += lane.record_blocks;
   ++lane.place;
-  return blocks;
+  return true;
 }
 
 void BatchPlanner::add(std::uint32_t lane_index, BlockIndex record) noexcept {

@@ -144,34 +144,37 @@ void Controller::Body::take(std::uint32_t lane, BlockIndex batch, BatchHandler& 
   const std::optional<Plan> plan = planner.plan(batch);
   if (!plan) return ledger.reject(lane, batch, Reason::invalid, 0, handler.iteration());
 
-  ledger.enter(lane, batch, plan->spare, handler.iteration());
-  ledger.reject_from(batch, plan->missing_from, Reason::invalid, 0, handler.iteration());
+  const Iteration taken_at = handler.iteration();
+  ledger.enter(lane, batch, plan->spare, taken_at);
+  ledger.reject_from(batch, plan->missing_from, Reason::invalid, 0, taken_at);
   for (BlockIndex step = plan->steps; step != kNoBlock;) {
     const BlockIndex record = step;
     step = pool.head(record).own[Own::kOther];
     take_step(lane, record, handler);
   }
-  ledger.close(batch, handler.iteration());
+  ledger.close(batch, taken_at);
 }
 
 void Controller::Body::take_step(std::uint32_t lane, BlockIndex record,
                                  BatchHandler& handler) noexcept {
   const RecordHead& head = pool.head(record);
+  // a fresh start moves the count on: the request bears the iteration of the fresh row
+  const Iteration now = handler.iteration();
   const auto end = [&](const Outcome& outcome) {
-    ledger.end(record, outcome.status, outcome.reason, outcome.aux, handler.iteration());
+    ledger.end(record, outcome.status, outcome.reason, outcome.aux, now);
   };
   switch (head.kind) {
     case RecordKind::command: {
       ActuatorQueue& queue = actuators_[head.actuator];
       if (head.mode == Mode::overwrite) {
-        queue.drop(Status::overwritten, Reason::none, handler.iteration());
+        queue.drop(Status::overwritten, Reason::none, now);
       }
       queue.append(record, planner.tail(record), lane);
       busy_[head.actuator / 64] |= std::uint64_t{1} << (head.actuator % 64);
       break;
     }
     case RecordKind::purge:
-      purge(lane, head, handler.iteration());
+      purge(lane, head, now);
       end({});
       break;
     case RecordKind::request:
@@ -185,7 +188,7 @@ void Controller::Body::take_step(std::uint32_t lane, BlockIndex record,
       end(handler.release_control(lane));
       break;
     default:
-      ledger.drop(record, Status::rejected, Reason::invalid, handler.iteration());
+      ledger.drop(record, Status::rejected, Reason::invalid, now);
   }
 }
 

@@ -45,29 +45,32 @@ RecordCheck::RecordCheck(const Schema& schema, Layouts layouts) : layouts_(std::
   mask_.resize(mask_words(static_cast<std::uint32_t>(numbers)));
 }
 
-bool RecordCheck::valid(const BlockPool& pool, BlockIndex block) noexcept {
+RecordCheck::Verdict RecordCheck::begin(const BlockPool& pool, BlockIndex block,
+                                        Progress& progress) noexcept {
+  const auto verdict = [](bool valid) { return valid ? Verdict::valid : Verdict::invalid; };
   const RecordHead& head = pool.head(block);
-  const Cursor payload(pool, block, sizeof(RecordHead), head.payload_bytes);
+  progress = {Cursor(pool, block, sizeof(RecordHead), head.payload_bytes)};
   switch (head.kind) {
     case RecordKind::command:
-      return valid_command(head, payload);
+      return begin_command(head, progress);
     case RecordKind::request:
-      return valid_request(head, payload);
+      return check_request(head, progress.payload);
     case RecordKind::purge:
-      return head.payload_bytes == 0 && head.partial <= 1 &&
-             (head.actuator == kEveryActuator || head.actuator < actuator_types_.size());
+      return verdict(head.payload_bytes == 0 && head.partial <= 1 &&
+                     (head.actuator == kEveryActuator || head.actuator < actuator_types_.size()));
     case RecordKind::take_control:
     case RecordKind::release_control:
-      return head.payload_bytes == 0;
+      return verdict(head.payload_bytes == 0);
     default:
-      return false;
+      return Verdict::invalid;
   }
 }
 
-bool RecordCheck::valid_command(const RecordHead& head, Cursor payload) noexcept {
+RecordCheck::Verdict RecordCheck::begin_command(const RecordHead& head,
+                                                Progress& progress) noexcept {
   if (head.actuator >= actuator_types_.size() || head.rows == 0 || !known_enums(head) ||
       !sane_pace(head)) {
-    return false;
+    return Verdict::invalid;
   }
   const StateLayout& layout = *layouts_[actuator_types_[head.actuator]];
   const auto numbers = static_cast<std::uint32_t>(layout.numbers().size());
@@ -75,38 +78,59 @@ bool RecordCheck::valid_command(const RecordHead& head, Cursor payload) noexcept
   const std::uint64_t mask_bytes = head.partial != 0 ? 8 * mask_words(numbers) : 0;
   const std::uint64_t time_bytes = timed ? 8 * std::uint64_t{head.rows} : 0;
   const std::uint64_t row_bytes = std::uint64_t{head.rows} * layout.size();
-  if (head.payload_bytes != mask_bytes + time_bytes + row_bytes) return false;
+  if (head.payload_bytes != mask_bytes + time_bytes + row_bytes) return Verdict::invalid;
 
   // the mask names no number that is not there
   if (head.partial != 0) {
-    payload.read(mask_.data(), mask_bytes);
-    if (numbers % 64 != 0 && mask_[numbers / 64] >> (numbers % 64) != 0) return false;
+    progress.payload.read(mask_.data(), mask_bytes);
+    if (numbers % 64 != 0 && mask_[numbers / 64] >> (numbers % 64) != 0) return Verdict::invalid;
   }
-  // times never run backwards
-  std::int64_t before = 0;
-  for (std::uint32_t row = 0; timed && row < head.rows; ++row) {
-    std::int64_t time = 0;
-    payload.read(&time, sizeof time);
-    if (time < before || time > kLongestDuration) return false;
-    before = time;
-  }
-  auto* state = reinterpret_cast<std::byte*>(state_.data());
-  for (std::uint32_t row = 0; row < head.rows; ++row) {
-    payload.read(state, layout.size());
-    if (!layout.finite(state, head.partial != 0 ? mask_.data() : nullptr)) return false;
-  }
-  return true;
+  progress.times_left = timed ? head.rows : 0;
+  progress.rows_left = head.rows;
+  return Verdict::unfinished;
 }
 
-bool RecordCheck::valid_request(const RecordHead& head, Cursor payload) noexcept {
-  if (head.actuator >= request_types_.size()) return false;
-  const std::uint32_t type = request_types_[head.actuator];
-  if (type == kNoType) return head.payload_bytes == 0;
-  const StateLayout* layout = layouts_[type];
-  if (layout == nullptr || head.payload_bytes != layout->size()) return false;
+RecordCheck::Verdict RecordCheck::go_on(const BlockPool& pool, BlockIndex block, Progress& progress,
+                                        std::uint32_t& budget) noexcept {
+  const RecordHead& head = pool.head(block);
+  const StateLayout& layout = *layouts_[actuator_types_[head.actuator]];
+  const std::uint64_t* mask = nullptr;
+  if (head.partial != 0) {
+    const std::size_t mask_bytes =
+        sizeof(std::uint64_t) * mask_words(static_cast<std::uint32_t>(layout.numbers().size()));
+    Cursor(pool, block, sizeof(RecordHead), head.payload_bytes).read(mask_.data(), mask_bytes);
+    mask = mask_.data();
+  }
+  auto bytes_left = static_cast<std::int64_t>(std::uint64_t{budget} * kBlockBytes);
+
+  // times never run backwards
+  for (; progress.times_left > 0 && bytes_left > 0; --progress.times_left) {
+    std::int64_t time = 0;
+    progress.payload.read(&time, sizeof time);
+    if (time < progress.time || time > kLongestDuration) return Verdict::invalid;
+    progress.time = time;
+    bytes_left -= sizeof time;
+  }
   auto* state = reinterpret_cast<std::byte*>(state_.data());
-  payload.read(state, layout->size());
-  return layout->proper(state);
+  for (; progress.rows_left > 0 && bytes_left > 0; --progress.rows_left) {
+    progress.payload.read(state, layout.size());
+    if (!layout.finite(state, mask)) return Verdict::invalid;
+    bytes_left -= layout.size();
+  }
+  budget = static_cast<std::uint32_t>(std::max<std::int64_t>(bytes_left, 0) / kBlockBytes);
+  return progress.rows_left > 0 ? Verdict::unfinished : Verdict::valid;
+}
+
+RecordCheck::Verdict RecordCheck::check_request(const RecordHead& head, Cursor payload) noexcept {
+  if (head.actuator >= request_types_.size()) return Verdict::invalid;
+  const std::uint32_t type = request_types_[head.actuator];
+  const StateLayout* layout = type == kNoType ? nullptr : layouts_[type];
+  const std::uint32_t size = layout == nullptr ? 0 : layout->size();
+  if (head.payload_bytes != size) return Verdict::invalid;
+  if (layout == nullptr) return Verdict::valid;
+  auto* state = reinterpret_cast<std::byte*>(state_.data());
+  payload.read(state, size);
+  return layout->proper(state) ? Verdict::valid : Verdict::invalid;
 }
 
 }  // namespace o80

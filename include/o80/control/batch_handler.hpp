@@ -19,7 +19,8 @@ class BatchHandler {
  public:
   /// The iteration about to run; a fresh start inside `request` may move it on.
   virtual Iteration iteration() const noexcept = 0;
-  /// Serves a request now; may call `Controller::restart`. `payload` holds the whole struct.
+  /// Serves a request now; may call `Controller::restart`. `payload` holds the whole struct. The
+  /// request ends with the iteration at which it began: that of the fresh row, if it made one.
   virtual Outcome request(std::uint32_t lane, CommandId id, std::uint32_t index,
                           Cursor payload) noexcept = 0;
   virtual Outcome take_control(std::uint32_t lane) noexcept = 0;

@@ -50,17 +50,21 @@ class BatchPlanner {
     std::uint64_t epoch = 0;
   };
   struct Lane {
-    BlockIndex batch = kNoBlock;  // being checked
-    BlockIndex cursor = kNoBlock;
+    BlockIndex batch = kNoBlock;   // being checked
+    BlockIndex cursor = kNoBlock;  // first block of the record being checked
+    BlockIndex last = kNoBlock;    // its last one; none before it has been walked
     BlockIndex last_step = kNoBlock;
     BlockIndex invalid = kNoBlock;
     std::uint32_t place = 0;
+    std::uint32_t record_blocks = 0;
     std::uint32_t blocks = 0;  // seen
     std::uint64_t epoch = 0;
+    RecordCheck::Progress progress;
   };
 
   void begin(Lane& lane, BlockIndex batch) noexcept;
-  std::uint32_t check_record(std::uint32_t lane) noexcept;
+  RecordCheck::Verdict begin_record(Lane& lane) noexcept;
+  bool check_record(std::uint32_t lane, std::uint32_t& budget) noexcept;
   void add(std::uint32_t lane, BlockIndex record) noexcept;
   void add_step(Lane& lane, BlockIndex record) noexcept;
   void join(BlockIndex list, BlockIndex record) noexcept;

@@ -35,8 +35,8 @@ class Controller {
   void restart(const std::byte* observed, const std::byte* desired, Iteration row) noexcept;
 
   /// Checks the records of a batch that is complete in the pool but not yet due, about `budget`
-  /// blocks a call (it finishes the record it is in); true when all are. Batches of one lane are
-  /// checked and taken in their order. `take` does what is left of it.
+  /// blocks a call; true when all are. Batches of one lane are checked one after the other. `take`
+  /// does what is left of it.
   bool check(std::uint32_t lane, BlockIndex batch, std::uint32_t budget) noexcept;
   /// Takes a whole batch at `handler.iteration()`. The batch record in the pool is the
   /// controller's from here on: copy `burst` and `flags` before.

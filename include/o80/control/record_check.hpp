@@ -19,12 +19,24 @@ class RecordCheck {
   using Layouts = std::vector<const StateLayout*>;
   RecordCheck(const Schema& schema, Layouts layouts);
 
-  /// Whether the record starting at `block`, all of whose blocks are there, can be followed.
-  bool valid(const BlockPool& pool, BlockIndex block) noexcept;
+  enum class Verdict : std::uint8_t { unfinished, valid, invalid };
+  /// What is left to look at of one record.
+  struct Progress {
+    Cursor payload;
+    std::uint32_t times_left = 0;
+    std::uint32_t rows_left = 0;
+    std::int64_t time = 0;  // end of the row before [ns]
+  };
+
+  /// Judges all but the times and rows of the record starting at `block`, whose blocks are there.
+  Verdict begin(const BlockPool& pool, BlockIndex block, Progress& progress) noexcept;
+  /// Goes on with times and rows, for about `budget` blocks, which it takes off.
+  Verdict go_on(const BlockPool& pool, BlockIndex block, Progress& progress,
+                std::uint32_t& budget) noexcept;
 
  private:
-  bool valid_command(const RecordHead& head, Cursor payload) noexcept;
-  bool valid_request(const RecordHead& head, Cursor payload) noexcept;
+  Verdict begin_command(const RecordHead& head, Progress& progress) noexcept;
+  Verdict check_request(const RecordHead& head, Cursor payload) noexcept;
 
   Layouts layouts_;
   std::vector<std::uint32_t> actuator_types_;
