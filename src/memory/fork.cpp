@@ -46,8 +46,8 @@ void watch_forks() noexcept {
 std::uint64_t process_generation() noexcept { return generation.load(std::memory_order_relaxed); }
 
 std::mutex& fork_mutex() noexcept {
-  static auto* mutex = new std::mutex;
-  return *mutex;
+  static std::mutex mutex;
+  return mutex;
 }
 
 ForkGuard::ForkGuard() noexcept : generation_(process_generation()) { watch_forks(); }

@@ -55,7 +55,9 @@ void LaneReceiver::free(std::uint32_t blocks) noexcept {
 
 void LaneReceiver::set_status(std::uint64_t id, StatusWord word) noexcept {
   StatusSlot& slot = statuses_[id & (2 * (mask_ + 1) - 1)];
-  if (slot.id.load(std::memory_order_relaxed) != id) {
+  const std::uint64_t owner = slot.id.load(std::memory_order_relaxed);
+  if (owner > id) return;  // a later command has the place: this one is forgotten already
+  if (owner != id) {
     // a reader of the new id sees no old word
     slot.word.store(0, std::memory_order_relaxed);
     O80_CRASH_POINT("status.before_id");

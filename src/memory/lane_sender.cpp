@@ -1,6 +1,5 @@
 #include "o80/memory/lane_sender.hpp"
 
-#include <sys/mman.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -76,12 +75,15 @@ LaneSender::LaneSender(LaneSender&& other) noexcept
       sent_(other.sent_),
       guard_(other.guard_) {}
 
-LaneSender::~LaneSender() {
+LaneSender::~LaneSender() { give_back(); }
+
+void LaneSender::give_back() noexcept {
   if (!lock_.is_open() || guard_.forked()) return;
   O80_CRASH_POINT("lane.before_close");
   page_->closed.store(incarnation_, std::memory_order_release);  // sync closed
   O80_CRASH_POINT("lane.after_close");
-  mprotect(page_, view_.offsets.lane_stride, PROT_READ);
+  // the page stays writable: another thread may still raise the flag of its waiting
+  lock_.close();
 }
 
 std::uint32_t LaneSender::free_blocks() const noexcept {

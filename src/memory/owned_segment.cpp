@@ -7,7 +7,6 @@
 #include <time.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <bit>
 #include <cerrno>
 #include <cinttypes>
@@ -106,9 +105,7 @@ void reserve(const Draft& draft, const std::string& name, std::uint64_t bytes) {
   if (error != 0) fail(name, "its memory cannot be reserved", error);
 }
 
-void copy_text(char* to, std::size_t most, const std::string& text) {
-  std::memcpy(to, text.data(), std::min(text.size(), most - 1));
-}
+void copy_text(char* to, std::size_t most, const std::string& text) { text.copy(to, most - 1); }
 
 void fill(const SegmentView& view, const SegmentSpec& spec, std::uint64_t epoch) {
   SegmentHeader header{};
@@ -134,21 +131,16 @@ void fill(const SegmentView& view, const SegmentSpec& spec, std::uint64_t epoch)
 
 /// Tells those attached to a dead segment that it has a successor; a file that is no segment
 /// has nobody to tell.
-void supersede(const std::string& path) noexcept {
-  try {
-    const LockFile file = LockFile::open(path, kOpen);
-    SegmentHeader header;
-    SegmentView view;
-    if (!file.is_open() || !inspect_segment(file.descriptor(), header, view.offsets).empty())
-      return;
-    const Mapping mapping(file.descriptor(), view.offsets.file_bytes,
-                          Mapping::Protection::read_write, Mapping::Faults::later);
-    view.base = mapping.data();
-    view.shape = header.shape;
-    end_segment(view, State::superseded);
-  } catch (...) {
-    // the name is taken over all the same
-  }
+void supersede(const std::string& path) {
+  const LockFile file = LockFile::open(path, kOpen);
+  SegmentHeader header;
+  SegmentView view;
+  if (!file.is_open() || !inspect_segment(file.descriptor(), header, view.offsets).empty()) return;
+  const Mapping mapping(file.descriptor(), view.offsets.file_bytes, Mapping::Protection::read_write,
+                        Mapping::Faults::later);
+  view.base = mapping.data();
+  view.shape = header.shape;
+  end_segment(view, State::superseded);
 }
 
 /// draft => the file that bears the name

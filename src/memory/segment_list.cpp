@@ -115,13 +115,9 @@ std::vector<std::string> clean_dead() {
   return removed;
 }
 
-void sweep_drafts() noexcept {
-  try {
-    for (const std::string& file : file_names())
-      if (is_draft(file)) remove_dead(segment_directory() + "/" + file, false);
-  } catch (...) {
-    // another starter, or `clean`, sweeps again
-  }
+void sweep_drafts() {
+  for (const std::string& file : file_names())
+    if (is_draft(file)) remove_dead(segment_directory() + "/" + file, false);
 }
 
 }  // namespace o80

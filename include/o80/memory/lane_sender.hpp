@@ -40,6 +40,9 @@ class LaneSender {
   LaneSender& operator=(LaneSender&&) = delete;
   ~LaneSender();
 
+  /// Gives the lane back now; questions may still be asked, nothing may be sent.
+  void give_back() noexcept;
+
   std::uint32_t lane() const noexcept { return lane_; }
   std::uint64_t incarnation() const noexcept { return incarnation_; }
   /// All blocks of the lane: the largest batch there can be.

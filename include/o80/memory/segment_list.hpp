@@ -31,6 +31,6 @@ bool clean(std::string_view name);
 std::vector<std::string> clean_dead();
 
 /// Removes temporary files that no starter holds any more.
-void sweep_drafts() noexcept;
+void sweep_drafts();
 
 }  // namespace o80

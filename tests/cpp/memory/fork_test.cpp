@@ -14,7 +14,6 @@ namespace o80 {
 namespace {
 
 using ForkTest = SegmentTest;
-using ::testing::HasSubstr;
 
 /// Runs `body` in a forked child; its exit code is the number of failed expectations.
 int failures_in_child(const std::function<int()>& body) {

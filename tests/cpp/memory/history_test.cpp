@@ -138,6 +138,7 @@ TEST_F(HistoryTest, IsNeverTornWhenReadersAreOvertaken) {
     }
   };
   std::vector<std::thread> readers;
+  readers.reserve(3);
   for (int i = 0; i < 3; ++i) readers.emplace_back(read_everything);
   while (reading < 3) std::this_thread::yield();
   publish(0, kLast);

@@ -314,6 +314,7 @@ TEST_F(LaneTest, WakesThoseWhoWaitForABurst) {
   LaneSender sender(attached_);
   std::atomic<Iteration> row{-1};
   std::vector<std::thread> waiters;
+  waiters.reserve(3);
   for (int i = 0; i < 3; ++i)
     waiters.emplace_back([&] {
       EXPECT_EQ(sender.wait_until([&] { return sender.burst(2).known == Known::yes; }, patient()),

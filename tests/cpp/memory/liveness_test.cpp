@@ -78,6 +78,7 @@ TEST_F(LivenessTest, LeavesALaneToAnOwnerThatIsOnlyStopped) {
 
 TEST_F(LivenessTest, ServesManyBackendsOfAProcessThatComeAndGo) {
   std::vector<std::thread> threads;
+  threads.reserve(4);
   for (int i = 0; i < 4; ++i)
     threads.emplace_back([i] {
       for (int round = 0; round < 5; ++round) {

@@ -98,6 +98,7 @@ TEST_F(OwnedSegmentTest, IsWonByExactlyOneOfManyStarters) {
     if (round % 2 == 1) running_segment().end(State::failed);
     std::atomic<int> won{0}, refused{0}, decided{0};
     std::vector<std::thread> starters;
+    starters.reserve(4);
     for (int i = 0; i < 4; ++i)
       starters.emplace_back([&] {
         try {

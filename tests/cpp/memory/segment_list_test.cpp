@@ -23,6 +23,7 @@ TEST_F(SegmentListTest, ShowsEverySegmentByNameWithItsLife) {
   const std::vector<SegmentEntry> entries = list_segments();
 
   std::vector<std::string> seen;
+  seen.reserve(entries.size());
   for (const SegmentEntry& entry : entries) seen.push_back(entry.name + " " + name_of(entry.life));
   EXPECT_THAT(seen, ElementsAre("a running", "b starting", "c failed", "d killed"));
   EXPECT_EQ(entries[0].pid, getpid());

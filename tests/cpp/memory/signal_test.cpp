@@ -59,6 +59,7 @@ TEST_F(SignalTest, WakesEveryoneOfManyWaitersForDifferentRows) {
   constexpr Iteration kLast = 200;
   std::atomic<int> done{0};
   std::vector<std::thread> sleepers;
+  sleepers.reserve(kSleepers);
   for (int i = 0; i < kSleepers; ++i)
     sleepers.emplace_back([&, i] {
       RowWaiter waiter(attached_);
