@@ -1,0 +1,196 @@
+"""Where, when and how to meet the ball, so that it flies back to the target.
+
+Three numbers make a strike: when it happens, the angle of the wrist, and the speed of joint 1. The
+first says where the ball is, and so the angles of joints 1 to 3; together they say how the ball
+leaves. Least squares finds those that send it to the target, near to a comfortable strike.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .aerodynamics import Aerodynamics
+from .flight import AERODYNAMICS, BALL_GUN_SPIN, TABLE, predict
+from .kinematics import nearest_in_reach, posture_reaching, racket_pose
+from .racket_impact import RacketImpact, velocity_to_land
+from .table import Table
+
+FloatArray = NDArray[np.float64]
+
+PERIOD = 0.01
+"""Of the rows of a predicted path [s]."""
+LATEST = 1.6
+"""No ball is followed further ahead than this [s]."""
+FIRST_ROUNDS = 4
+"""Of the search for the first strike; later ones begin near to what they look for."""
+
+
+@dataclass(frozen=True)
+class Strike:
+    """A motion of the racket through the ball."""
+
+    time: float
+    """From now [s]."""
+    posture: FloatArray
+    """(4,) [rad]"""
+    speeds: FloatArray
+    """(4,) [rad/s]"""
+
+
+@dataclass(frozen=True)
+class InterceptionSettings:
+    """Which strikes are wanted."""
+
+    target: tuple[float, float] = (0.0, 2.5)
+    """Where on the table the ball shall land [m]."""
+    flight: float = 0.55
+    """How long it shall fly there [s]."""
+    nearest: float = -0.15
+    """y of the nearest place behind which no ball is met [m]."""
+    farthest: float = 0.30
+    """y of the farthest place [m]."""
+    fastest: float = 4.0
+    """Speed of joint 1 [rad/s]."""
+    steepest: float = 1.2
+    """Angle of the wrist, either way [rad]."""
+    comfortable: tuple[float, float, float] = (0.05, 0.3, 1.5)
+    """y [m], wrist [rad], speed of joint 1 [rad/s] that are chosen if all do equally well."""
+    discomfort: tuple[float, float, float] = (0.5, 0.1, 0.05)
+    """What a deviation from them weighs, against an error of the ball's velocity [1/m, 1, s]."""
+    after_bounce: float = 0.02
+    """How long after its bounce a ball may be met at the earliest [s]."""
+    spin: tuple[float, float, float] = BALL_GUN_SPIN
+    """Of the coming ball [rad/s]."""
+    impact: RacketImpact = field(default_factory=RacketImpact)
+    aerodynamics: Aerodynamics = AERODYNAMICS
+    table: Table = TABLE
+
+
+@dataclass(frozen=True)
+class ComingBall:
+    """The part of a predicted path on which the ball can be met."""
+
+    times: FloatArray
+    """(N,) from now [s]"""
+    positions: FloatArray
+    """(N, 3) [m]"""
+    velocities: FloatArray
+    """(N, 3) [m/s]"""
+
+    def later(self, time: float) -> ComingBall:
+        """The same path, seen `time` [s] later."""
+        return ComingBall(self.times - time, self.positions, self.velocities)
+
+    def at(self, time: float) -> tuple[FloatArray, FloatArray]:
+        """Position and velocity (3,) at `time` from now, between the first row and the last."""
+        row = int(np.clip((time - self.times[0]) / PERIOD, 0, len(self.times) - 2))
+        share = (time - self.times[row]) / PERIOD
+        change = self.velocities[row + 1] - self.velocities[row]
+        velocity = self.velocities[row] + share * change
+        mean = self.velocities[row] + 0.5 * share * change
+        return self.positions[row] + share * PERIOD * mean, velocity
+
+    def time_at(self, y: float) -> float:
+        """When it is at `y`, or as near to it as it comes [s]."""
+        return float(np.interp(-y, -self.positions[:, 1], self.times))
+
+
+def coming_ball(
+    position: FloatArray, velocity: FloatArray, settings: InterceptionSettings
+) -> ComingBall | None:
+    """The path of a ball while it can be met, after its bounce; None if it does not come."""
+    if velocity[1] > -0.5 or position[1] < settings.nearest:
+        return None
+    duration = min(LATEST, 1.6 * (position[1] - settings.nearest) / -velocity[1] + 0.1)
+    path = predict(
+        position,
+        velocity,
+        duration,
+        spin=settings.spin,
+        period=PERIOD,
+        aerodynamics=settings.aerodynamics,
+        table=settings.table,
+    )
+    rising = np.flatnonzero(np.diff(path.velocities[:, 2]) > 0.0)
+    first = int(rising[-1]) + 2 if len(rising) else 0
+    y = path.positions[:, 1]
+    near = np.flatnonzero((y <= settings.farthest + 0.03) & (y >= settings.nearest - 0.03))
+    near = near[near >= first]
+    if len(near) < 2:
+        return None
+    rows = slice(int(near[0]), int(near[-1]) + 1)
+    return ComingBall(path.stamps[rows], path.positions[rows], path.velocities[rows])
+
+
+class StrikePlanner:
+    """Finds strikes; each search begins at the strike found before."""
+
+    def __init__(self, settings: InterceptionSettings) -> None:
+        self._settings = settings
+        self.forget()
+
+    def forget(self) -> None:
+        """The next ball is another one."""
+        _, wrist, speed = self._settings.comfortable
+        self._place, self._wrist, self._speed = self._settings.comfortable[0], wrist, speed
+        self._found = False
+
+    def plan(self, ball: ComingBall) -> Strike | None:
+        """The strike that sends the ball best to the target; None if none is within reach."""
+        s = self._settings
+        low = np.array([ball.time_at(s.farthest), -s.steepest, 0.0])
+        high = np.array([ball.time_at(s.nearest), s.steepest, s.fastest])
+        comfort = np.array([ball.time_at(s.comfortable[0]), *s.comfortable[1:]])
+        position, velocity = ball.at(float(comfort[0]))
+        discomfort = np.array(s.discomfort) * [abs(float(velocity[1])), 1.0, 1.0]
+
+        # Gauss-Newton, held within the limits
+        guess = np.clip([ball.time_at(self._place), self._wrist, self._speed], low, high)
+        probe = np.array([0.004, 0.02, 0.05])
+        target = np.array([*s.target, s.table.bounce_height])
+        for _ in range(1 if self._found else FIRST_ROUNDS):
+            position, _ = ball.at(float(guess[0]))
+            wanted = velocity_to_land(position, target, s.flight, aerodynamics=s.aerodynamics)
+            here = self._outcome(ball, guess)
+            if here is None:
+                return None
+            slopes = np.zeros((3, 3))
+            for i in range(3):
+                moved = guess.copy()
+                moved[i] += probe[i]
+                there = self._outcome(ball, moved)
+                if there is None:
+                    return None
+                slopes[:, i] = (there - here) / probe[i]
+            matrix = slopes.T @ slopes + np.diag(discomfort**2)
+            right = slopes.T @ (wanted - here) + discomfort**2 * (comfort - guess)
+            guess = np.clip(guess + np.linalg.solve(matrix, right), low, high)
+        self._found = True
+        return self._strike(ball, guess)
+
+    def _strike(self, ball: ComingBall, guess: FloatArray) -> Strike | None:
+        position, _ = ball.at(float(guess[0]))
+        self._place, self._wrist, self._speed = float(position[1]), float(guess[1]), float(guess[2])
+        posture = _posture(position, self._wrist)
+        if posture is None:
+            return None
+        return Strike(float(guess[0]), posture, np.array([self._speed, 0.0, 0.0, 0.0]))
+
+    def _outcome(self, ball: ComingBall, guess: FloatArray) -> FloatArray | None:
+        """Velocity of the ball after such a strike."""
+        position, velocity = ball.at(float(guess[0]))
+        posture = _posture(position, float(guess[1]))
+        if posture is None:
+            return None
+        speed = float(guess[2])
+        racket = np.array([-speed * position[1], speed * position[0], 0.0])
+        normal = np.array(racket_pose(posture).normal)
+        return self._settings.impact.outgoing(velocity, racket, normal)
+
+
+def _posture(position: FloatArray, wrist: float) -> FloatArray | None:
+    x, y, z = position.tolist()
+    return posture_reaching(nearest_in_reach((x, y, z)), wrist)

@@ -1,0 +1,70 @@
+"""How the joints shall move: smooth from what they do now into the strike, and to rest after it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class JointMotion:
+    """Angles, speeds and accelerations of the joints at one instant, each (4,)."""
+
+    q: FloatArray
+    """[rad]"""
+    dq: FloatArray
+    """[rad/s]"""
+    ddq: FloatArray
+    """[rad/s^2]"""
+
+    @classmethod
+    def at_rest(cls, q: FloatArray) -> JointMotion:
+        """Standing still at `q`."""
+        return cls(q.copy(), np.zeros_like(q), np.zeros_like(q))
+
+
+@dataclass(frozen=True)
+class Swing:
+    """Polynomials of the fifth degree, one a joint, continued with constant speed."""
+
+    coefficients: FloatArray
+    """(6, 4), of the powers of time"""
+    duration: float
+    """[s]"""
+
+    @classmethod
+    def between(cls, start: JointMotion, end: JointMotion, duration: float) -> Swing:
+        """From `start` to `end` in `duration` [s]."""
+        t = duration
+        # what is missing at the end if the start simply went on
+        gap = end.q - (start.q + t * start.dq + 0.5 * t * t * start.ddq)
+        gap_dq = t * (end.dq - start.dq - t * start.ddq)
+        gap_ddq = t * t * (end.ddq - start.ddq)
+        return cls(
+            np.array(
+                [
+                    start.q,
+                    start.dq,
+                    0.5 * start.ddq,
+                    (10.0 * gap - 4.0 * gap_dq + 0.5 * gap_ddq) / t**3,
+                    (-15.0 * gap + 7.0 * gap_dq - gap_ddq) / t**4,
+                    (6.0 * gap - 3.0 * gap_dq + 0.5 * gap_ddq) / t**5,
+                ]
+            ),
+            duration,
+        )
+
+    def at(self, time: float) -> JointMotion:
+        """`time` [s] after its start."""
+        t = min(time, self.duration)
+        c = self.coefficients
+        q = c[0] + t * (c[1] + t * (c[2] + t * (c[3] + t * (c[4] + t * c[5]))))
+        dq = c[1] + t * (2 * c[2] + t * (3 * c[3] + t * (4 * c[4] + t * 5 * c[5])))
+        if time > self.duration:
+            return JointMotion(q + (time - self.duration) * dq, dq, np.zeros_like(q))
+        ddq = 2 * c[2] + t * (6 * c[3] + t * (12 * c[4] + t * 20 * c[5]))
+        return JointMotion(q, dq, ddq)
