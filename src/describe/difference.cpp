@@ -8,6 +8,8 @@ namespace o80 {
 
 namespace {
 
+using Lines = std::map<std::string, std::string>;  // by what they speak of
+
 std::string number(double value) {
   std::ostringstream text;
   text << value;
@@ -23,16 +25,15 @@ std::string shape(const FieldRow& field) {
 
 std::string kind_name(const Schema& schema, const FieldRow& field);
 
-/// "position: float64 at 0" for every field, by name.
-std::map<std::string, std::string> fields_of(const Schema& schema, std::uint32_t type) {
-  std::map<std::string, std::string> lines;
+/// "float64 at byte 0" for every field, by name.
+Lines fields_of(const Schema& schema, std::uint32_t type) {
+  Lines lines;
   if (type == kNoType) return lines;
   const TypeRow& row = schema.types[type];
   for (std::uint32_t i = 0; i < row.fields; ++i) {
     const FieldRow& field = schema.fields[row.first_field + i];
-    const std::string unit = field.unit.view().empty() ? "" : " [" + field.unit.str() + "]";
     lines[field.name.str()] =
-        kind_name(schema, field) + shape(field) + unit + " at byte " + std::to_string(field.offset);
+        kind_name(schema, field) + shape(field) + " at byte " + std::to_string(field.offset);
   }
   return lines;
 }
@@ -59,8 +60,6 @@ std::string kind_name(const Schema& schema, const FieldRow& field) {
   return name;
 }
 
-using Lines = std::map<std::string, std::string>;
-
 std::string limits_of(const Schema& schema, const ActuatorRow& actuator) {
   std::string text;
   for (std::uint32_t i = 0; i < actuator.limits; ++i) {
@@ -71,58 +70,98 @@ std::string limits_of(const Schema& schema, const ActuatorRow& actuator) {
   return text;
 }
 
-/// A schema as lines that can be compared one by one, by what they speak of.
-Lines lines_of(const Schema& schema) {
+constexpr std::string_view kUnit = " unit";  // ends the names of lines that give a unit
+
+void add_fields(Lines& lines, const std::string& of, const Schema& schema, std::uint32_t type) {
+  const auto name = [&](const std::string& field) {
+    return of + "field" + (field.empty() ? "" : " '" + field + "'");
+  };
+  for (const auto& [field, line] : fields_of(schema, type)) lines[name(field)] = line;
+  for (std::uint32_t i = 0; type != kNoType && i < schema.types[type].fields; ++i) {
+    const FieldRow& field = schema.fields[schema.types[type].first_field + i];
+    if (field.unit.view().empty()) continue;
+    lines[name(field.name.str()) + std::string(kUnit)] = "[" + field.unit.str() + "]";
+  }
+}
+
+/// What compiled code relies on.
+Lines layout_lines(const Schema& schema) {
   Lines lines;
+  lines["size of a row's states"] = std::to_string(round_up(schema.head.block, 8));
+  lines["actuators"] = std::to_string(schema.actuators.size());
+  for (std::size_t i = 0; i < schema.actuators.size(); ++i) {
+    const ActuatorRow& actuator = schema.actuators[i];
+    const std::string name = "actuator " + std::to_string(i) + " ";
+    lines[name + "offset"] = std::to_string(actuator.offset);
+    add_fields(lines, name, schema, actuator.type);
+  }
+  add_fields(lines, "extended ", schema, schema.head.extended);
+  for (const RequestRow& request : schema.requests) {
+    const std::string name = "request '" + request.name.str() + "'";
+    lines[name] = "there";
+    add_fields(lines, name + " ", schema, request.type);
+  }
+  return lines;
+}
+
+/// A whole schema, but for its helps.
+Lines lines_of(const Schema& schema) {
+  Lines lines = layout_lines(schema);
   lines["robot"] = schema.head.robot.str();
   lines["period"] = std::to_string(schema.head.period) + " ns";
   lines["clock"] = schema.head.clock == Clock::simulated ? "simulated" : "monotonic";
   lines["bursting"] = schema.head.bursting != 0 ? "yes" : "no";
-  lines["size of a row's states"] = std::to_string(schema.head.block);
-  lines["actuators"] = std::to_string(schema.actuators.size());
   for (std::size_t i = 0; i < schema.actuators.size(); ++i) {
     const ActuatorRow& actuator = schema.actuators[i];
     const std::string name = "actuator " + std::to_string(i) + " ";
     lines[name + "name"] = actuator.name.str();
     lines[name + "when_idle"] = actuator.when_idle == WhenIdle::hold ? "hold" : "follow";
     lines[name + "limits"] = limits_of(schema, actuator);
-    lines[name + "offset"] = std::to_string(actuator.offset);
-    for (const auto& [field, line] : fields_of(schema, actuator.type)) {
-      lines[name + "field '" + field + "'"] = line;
-    }
-  }
-  for (const auto& [field, line] : fields_of(schema, schema.head.extended)) {
-    lines["extended field '" + field + "'"] = line;
-  }
-  for (const RequestRow& request : schema.requests) {
-    const std::string name = "request '" + request.name.str() + "'";
-    lines[name] = "there";
-    for (const auto& [field, line] : fields_of(schema, request.type)) {
-      lines[name + " field '" + field + "'"] = line;
-    }
   }
   return lines;
+}
+
+std::string compare(const Lines& expected, const Lines& found) {
+  std::string text;
+  for (const auto& [what, line] : expected) {
+    const auto other = found.find(what);
+    if (other == found.end()) {
+      text += "  " + what + ": expected " + line + ", found nothing\n";
+    } else if (other->second != line) {
+      text += "  " + what + ": expected " + line + ", found " + other->second + "\n";
+    }
+  }
+  for (const auto& [what, line] : found) {
+    if (!expected.contains(what)) text += "  " + what + ": expected nothing, found " + line + "\n";
+  }
+  return text;
+}
+
+/// Drops the lines that only one side has, where that is no contradiction: units, and requests
+/// that a program does not know.
+void forgive(Lines& expected, Lines& found) {
+  std::erase_if(expected, [&](const auto& line) {
+    return line.first.ends_with(kUnit) && !found.contains(line.first);
+  });
+  std::erase_if(found, [&](const auto& line) {
+    const bool may_miss = line.first.ends_with(kUnit) || line.first.starts_with("request ");
+    return may_miss && !expected.contains(line.first);
+  });
 }
 
 }  // namespace
 
 std::string difference(const Schema& expected, const Schema& found) {
   if (expected == found) return "";
-  const Lines a = lines_of(expected);
-  const Lines b = lines_of(found);
-  std::string text;
-  for (const auto& [what, line] : a) {
-    const auto other = b.find(what);
-    if (other == b.end()) {
-      text += "  " + what + ": expected " + line + ", found nothing\n";
-    } else if (other->second != line) {
-      text += "  " + what + ": expected " + line + ", found " + other->second + "\n";
-    }
-  }
-  for (const auto& [what, line] : b) {
-    if (!a.contains(what)) text += "  " + what + ": expected nothing, found " + line + "\n";
-  }
-  return text.empty() ? "  help texts or groups differ\n" : text;
+  const std::string text = compare(lines_of(expected), lines_of(found));
+  return text.empty() ? "  names of types, helps or groups differ\n" : text;
+}
+
+std::string layout_difference(const Schema& expected, const Schema& found) {
+  Lines wanted = layout_lines(expected);
+  Lines there = layout_lines(found);
+  forgive(wanted, there);
+  return compare(wanted, there);
 }
 
 }  // namespace o80

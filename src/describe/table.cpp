@@ -1,5 +1,6 @@
 #include "o80/describe/table.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 #include <type_traits>
@@ -9,8 +10,10 @@ namespace o80 {
 namespace {
 
 constexpr std::uint64_t kMagic = 0x616D656863533038;  // "80Schema"
-constexpr std::uint32_t kMostRows = 1U << 16;
+constexpr std::uint32_t kMostRows = 1U << 20;
+constexpr std::uint32_t kMostActuators = 0xFFFF;  // a record names one, or all, in 16 bits
 constexpr std::uint32_t kMostBytes = 1U << 28;
+constexpr std::uint32_t kMostNested = 16;
 
 struct TableHead {
   std::uint64_t magic = kMagic;
@@ -50,10 +53,10 @@ void check_field(const Schema& schema, std::uint32_t type_index, const FieldRow&
   check_text(field.name, "a field's name");
   check_text(field.unit, "a unit");
   check_text(field.help, "a help");
-  const std::uint64_t end = field.offset + std::uint64_t{field.size} *
-                                               (field.rows == 0 ? 1 : field.rows) *
-                                               (field.columns == 0 ? 1 : field.columns);
-  if (end > type.size) refuse(name + "lies outside its struct");
+  const std::uint64_t elements = std::uint64_t{field.rows == 0 ? 1 : field.rows} *
+                                 (field.columns == 0 ? 1 : field.columns);
+  if (elements > kMostBytes) refuse(name + "has too many elements");
+  if (field.offset + field.size * elements > type.size) refuse(name + "lies outside its struct");
   if (field.rows == 0 && field.columns != 0) refuse(name + "has columns but no rows");
   switch (field.kind) {
     case Kind::structure:
@@ -77,33 +80,41 @@ void check_field(const Schema& schema, std::uint32_t type_index, const FieldRow&
   }
 }
 
-void check_types(const Schema& schema) {
+/// Numbers of each type, nested ones included.
+std::vector<std::uint64_t> check_types(const Schema& schema) {
   std::vector<std::uint64_t> numbers;
+  std::vector<std::uint32_t> depths;
   for (std::uint32_t i = 0; i < schema.types.size(); ++i) {
     const TypeRow& type = schema.types[i];
     check_text(type.name, "a type's name");
-    if (type.size > kMostBytes) refuse("type '" + type.name.str() + "' is too large");
+    const std::string name = "type '" + type.name.str() + "' ";
+    if (type.size > kMostBytes) refuse(name + "is too large");
     if (type.alignment == 0 || type.alignment > 64 ||
         (type.alignment & (type.alignment - 1)) != 0) {
-      refuse("type '" + type.name.str() + "' has no alignment");
+      refuse(name + "has no alignment");
     }
     if (std::uint64_t{type.first_field} + type.fields > schema.fields.size()) {
-      refuse("type '" + type.name.str() + "' has fields that are not there");
+      refuse(name + "has fields that are not there");
     }
     std::set<std::string_view> names;
     std::uint64_t count = 0;
+    std::uint32_t depth = 0;
     for (std::uint32_t f = 0; f < type.fields; ++f) {
       const FieldRow& field = schema.fields[type.first_field + f];
       check_field(schema, i, field);
       if (!names.insert(field.name.view()).second) {
-        refuse("type '" + type.name.str() + "' has two fields '" + field.name.str() + "'");
+        refuse(name + "has two fields '" + field.name.str() + "'");
       }
-      count +=
-          std::uint64_t{field.count()} * (field.kind == Kind::structure ? numbers[field.type] : 1);
+      const bool nested = field.kind == Kind::structure;
+      count += std::uint64_t{field.count()} * (nested ? numbers[field.type] : 1);
+      if (count > kMostBytes) refuse(name + "has too many numbers");
+      if (nested) depth = std::max(depth, depths[field.type] + 1);
     }
-    if (count > kMostBytes) refuse("type '" + type.name.str() + "' has too many numbers");
+    if (depth > kMostNested) refuse(name + "nests too deep");
     numbers.push_back(count);
+    depths.push_back(depth);
   }
+  return numbers;
 }
 
 void check_limit(const ActuatorRow& actuator, const LimitRow& limit) {
@@ -115,7 +126,8 @@ void check_limit(const ActuatorRow& actuator, const LimitRow& limit) {
   }
 }
 
-void check_actuators(const Schema& schema) {
+void check_actuators(const Schema& schema, const std::vector<std::uint64_t>& numbers) {
+  if (schema.actuators.size() >= kMostActuators) refuse("there are too many actuators");
   std::set<std::string_view> names;
   for (const ActuatorRow& actuator : schema.actuators) {
     const std::string name = "actuator '" + actuator.name.str() + "' ";
@@ -135,7 +147,7 @@ void check_actuators(const Schema& schema) {
       refuse(name + "has no when_idle");
     }
     if (std::uint64_t{actuator.first_limit} + actuator.limits > schema.limits.size() ||
-        actuator.limits != schema.scalar_count(actuator.type)) {
+        actuator.limits != numbers[actuator.type]) {
       refuse(name + "has not one limit for each number");
     }
     for (std::uint32_t i = 0; i < actuator.limits; ++i) {
@@ -148,6 +160,9 @@ void check_groups(const Schema& schema) {
   std::uint64_t next = 0;
   for (const GroupRow& group : schema.groups) {
     check_text(group.name, "a group's name");
+    if (group.type >= schema.types.size()) {
+      refuse("group '" + group.name.str() + "' has no type");
+    }
     if (group.first_actuator != next || next + group.count > schema.actuators.size()) {
       refuse("group '" + group.name.str() + "' has actuators that are not there");
     }
@@ -173,13 +188,14 @@ void check(const Schema& schema) {
   if (static_cast<int>(schema.head.clock) > static_cast<int>(Clock::simulated)) {
     refuse("the clock is unknown");
   }
-  check_types(schema);
+  const std::vector<std::uint64_t> numbers = check_types(schema);
   if (schema.head.extended != kNoType && schema.head.extended >= schema.types.size()) {
     refuse("the extended type is not there");
   }
   for (const LabelRow& label : schema.labels) check_text(label.name, "a label");
-  check_actuators(schema);
+  check_actuators(schema, numbers);
   check_groups(schema);
+  if (schema.requests.size() >= kMostActuators) refuse("there are too many requests");
   std::set<std::string_view> names;
   for (const RequestRow& request : schema.requests) {
     check_text(request.name, "a request's name");
@@ -230,7 +246,7 @@ Schema schema_from_bytes(std::span<const std::byte> bytes) {
   std::size_t at = sizeof head + sizeof schema.head;
   each_table(schema, [&]<class Row>(int i, std::vector<Row>& rows) {
     if (head.sizes[i] != sizeof(Row)) throw foreign("rows of another size");
-    if (head.counts[i] > kMostRows * 16) throw foreign("too many rows");
+    if (head.counts[i] > kMostRows) throw foreign("too many rows");
     const std::size_t count = head.counts[i] * sizeof(Row);
     if (count > bytes.size() - at) throw foreign("too short");
     rows.resize(head.counts[i]);

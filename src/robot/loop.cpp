@@ -3,6 +3,7 @@
 #include <bit>
 
 #include "o80/base/error.hpp"
+#include "o80/base/time.hpp"
 
 namespace o80 {
 
@@ -29,7 +30,7 @@ void Loop::start() {
 
 // commands => desired => hardware, wait, hardware => observed, the row is published
 Ended Loop::run() noexcept {
-  pacer_.begin();
+  pacer_.begin(monotonic_now());
   while (!finished_ && backend_.step() == Step::run) {
     if (!iterate()) break;
   }
@@ -60,12 +61,15 @@ bool Loop::write() noexcept {
 /// Real time waits here, for the clock or for the robot's own tick.
 bool Loop::pace() noexcept {
   if (!paced_) return true;
-  if (robot_->table().paces_itself == 0) {
-    pacer_.sleep();
-  } else if (!robot_->wait(pacer_.due())) {
-    return failed("wait");
+  const bool in_time = pacer_.in_time(monotonic_now());
+  if (robot_->table().paces_itself != 0) {
+    if (!robot_->wait(pacer_.due())) return failed("wait");
+    backend_.set_timing(pacer_.tick(monotonic_now()));
+    return true;
   }
-  backend_.set_timing(pacer_.next());
+  while (in_time && !sleep_until(pacer_.due()) && !backend_.stop_asked()) {
+  }
+  backend_.set_timing(pacer_.next(monotonic_now()));
   return true;
 }
 
@@ -115,6 +119,7 @@ bool Loop::read_fresh(FreshReading& reading) noexcept {
   view.iteration = backend_.iteration();
   view.time = backend_.time();
   if (!robot_->read(view)) return failed("read");
+  finished_ = finished_ || view.finished != 0;
   reading.has_desired = view.has_desired != 0;
   return true;
 }

@@ -2,29 +2,16 @@
 
 #include <time.h>
 
-#include <cerrno>
-
-#include "o80/base/time.hpp"
-
 namespace o80 {
 
-void Pacer::begin() noexcept { due_ = monotonic_now() + period_; }
-
-void Pacer::sleep() noexcept {
-  overrun_ = monotonic_now() > due_;
-  if (overrun_) return;
-  timespec until;
-  until.tv_sec = due_ / 1'000'000'000;
-  until.tv_nsec = due_ % 1'000'000'000;
-  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) == EINTR) {
-  }
+bool Pacer::in_time(std::int64_t now) noexcept {
+  if (now <= due_) return true;
+  ++timing_.overruns;
+  return false;
 }
 
-const Timing& Pacer::next() noexcept {
-  const std::int64_t now = monotonic_now();
+const Timing& Pacer::next(std::int64_t now) noexcept {
   timing_.lateness = now - due_;
-  if (overrun_) ++timing_.overruns;
-  overrun_ = false;
   due_ += period_;
   if (due_ <= now) {
     const std::int64_t missed = (now - due_) / period_ + 1;
@@ -32,6 +19,23 @@ const Timing& Pacer::next() noexcept {
     due_ += missed * period_;
   }
   return timing_;
+}
+
+const Timing& Pacer::tick(std::int64_t now) noexcept {
+  timing_.lateness = now - due_;
+  // the robot's clock is its own: a tick counts as the one that was nearest
+  if (timing_.lateness > 0) {
+    timing_.skipped += static_cast<std::uint32_t>((timing_.lateness + period_ / 2) / period_);
+  }
+  due_ = now + period_;
+  return timing_;
+}
+
+bool sleep_until(std::int64_t due) noexcept {
+  timespec until;
+  until.tv_sec = due / 1'000'000'000;
+  until.tv_nsec = due % 1'000'000'000;
+  return clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) == 0;
 }
 
 }  // namespace o80

@@ -1,11 +1,14 @@
 #include "o80/robot/run.hpp"
 
+#include <pthread.h>
+#include <signal.h>
 #include <unistd.h>
-#include <csignal>
 
 #include <atomic>
+#include <cerrno>
 #include <cstdio>
 #include <memory>
+#include <mutex>
 #include <thread>
 
 #include "o80/base/error.hpp"
@@ -17,28 +20,97 @@ namespace o80 {
 
 namespace {
 
+std::atomic<bool> stop_asked{false};
 std::atomic<Loop*> running_loop{nullptr};
+std::mutex ending;  // held by the input's thread while it speaks to the loop
 
+/// In a signal handler: only what a handler may do.
 void stop_on_signal(int) {
+  stop_asked.store(true);
   if (Loop* loop = running_loop.load()) loop->ask_to_stop();
 }
 
-void set_signals(void (*handler)(int)) {
-  struct sigaction action{};
-  action.sa_handler = handler;
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
-}
+/// SIGINT and SIGTERM stop in order while this lives.
+class StopSignals {
+ public:
+  StopSignals() {
+    stop_asked = false;
+    struct sigaction action{};
+    action.sa_handler = stop_on_signal;
+    sigaction(SIGINT, &action, &interrupt_);
+    sigaction(SIGTERM, &action, &terminate_);
+  }
+  StopSignals(const StopSignals&) = delete;
+  StopSignals& operator=(const StopSignals&) = delete;
+  ~StopSignals() {
+    sigaction(SIGINT, &interrupt_, nullptr);
+    sigaction(SIGTERM, &terminate_, nullptr);
+  }
+
+ private:
+  struct sigaction interrupt_{};
+  struct sigaction terminate_{};
+};
+
+/// The loop that signals stop, as long as this lives.
+class Running {
+ public:
+  explicit Running(Loop& loop) {
+    running_loop = &loop;
+    if (stop_asked) loop.ask_to_stop();
+  }
+  Running(const Running&) = delete;
+  Running& operator=(const Running&) = delete;
+  ~Running() {
+    const std::scoped_lock lock(ending);
+    running_loop = nullptr;
+  }
+};
 
 /// Stops the loop when whoever started the process has gone: its standard input ends.
 void watch_input() {
+  // signals are for the loop's thread
+  sigset_t every;
+  sigset_t before;
+  sigfillset(&every);
+  pthread_sigmask(SIG_BLOCK, &every, &before);
   std::thread([] {
     char byte;
     ssize_t got = 0;
     while ((got = read(STDIN_FILENO, &byte, 1)) > 0 || (got < 0 && errno == EINTR)) {
     }
+    const std::scoped_lock lock(ending);
     stop_on_signal(0);
   }).detach();
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+}
+
+/// A robot that cannot be made leaves its fault where others wait for it to attach.
+void leave_fault(const BackendOptions& options, const char* why) noexcept {
+  try {
+    BackendOptions least;
+    least.segment = options.segment;
+    least.permission = options.permission;
+    least.history = 1;
+    least.lanes = 1;
+    least.lane_blocks = 16;
+    UntypedBackend backend(Schema(), least);
+    backend.end(State::failed, why);
+  } catch (const std::exception&) {
+    // there is no segment to leave it in; the caller says it all the same
+  }
+}
+
+std::unique_ptr<Loop> make_loop(const RobotTable& table, const RunOptions& options) {
+  OwnedSegment::refuse_if_taken(options.backend.segment);
+  try {
+    return std::make_unique<Loop>(std::make_unique<Robot>(table, options.robot), options.backend);
+  } catch (const SegmentTaken&) {
+    throw;
+  } catch (const std::exception& error) {
+    leave_fault(options.backend, error.what());
+    throw;
+  }
 }
 
 void announce(const RobotTable& table, const UntypedBackend& backend) {
@@ -54,19 +126,16 @@ void announce(const RobotTable& table, const UntypedBackend& backend) {
 }
 
 int run_robot(const RobotTable& table, const RunOptions& options) {
-  OwnedSegment::refuse_if_taken(options.backend.segment);
-  Loop loop(std::make_unique<Robot>(table, options.robot), options.backend);
-  running_loop = &loop;
-  set_signals(stop_on_signal);
+  const StopSignals signals;
+  const std::unique_ptr<Loop> loop = make_loop(table, options);
+  const Running running(*loop);
   if (options.until_eof) watch_input();
-  loop.start();
+  loop->start();
   for (const std::string& refused : set_up_real_time(options.real_time)) {
     std::fprintf(stderr, "o80: %s\n", refused.c_str());
   }
-  announce(table, loop.backend());
-  const Ended ended = loop.run();
-  set_signals(SIG_IGN);
-  running_loop = nullptr;
+  announce(table, loop->backend());
+  const Ended ended = loop->run();
   if (!ended.in_order) std::fprintf(stderr, "o80: %s\n", ended.fault.c_str());
   return ended.in_order ? 0 : 1;
 }

@@ -24,7 +24,7 @@ constexpr RunFlag kFlags[] = {
     {"lane-blocks", "N", "blocks of 64 bytes each of them may have in flight (default: 16384)"},
     {"permission", "OCTAL", "of the segment's file (default: 600; 660 lets the group command)"},
     {"stale", "POLICY", "commands of a dead frontend: hold, purge or stop (default: hold)"},
-    {"silence", "SECONDS", "longest time without a command before the stale policy applies"},
+    {"silence", "SECONDS", "longest time without a command before they are purged or all stops"},
     {"policy", "CLASS", "scheduling: other, fifo or rr (default: other)"},
     {"priority", "N", "1 to 99, with fifo and rr (default: 80)"},
     {"cpus", "LIST", "processors of the loop, for example 2,3"},

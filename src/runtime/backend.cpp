@@ -30,6 +30,10 @@ Schema prepared(Schema schema, const BackendOptions& options) {
     throw InvalidArgument("the period is " + std::to_string(options.period) +
                           " ns: it must be above 0");
   }
+  if (options.silence > 0 && options.stale == Stale::hold) {
+    throw InvalidArgument(
+        "a longest silence needs to know what follows it: set the stale policy to purge or stop");
+  }
   schema.head.period = options.period;
   schema.head.bursting = options.bursting ? 1 : 0;
   schema.head.clock = options.bursting ? Clock::simulated : Clock::monotonic;
@@ -136,9 +140,11 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   void begin_staging(std::uint32_t lane) noexcept;
   bool stage(std::uint32_t& budget) noexcept;
   void staged() noexcept;
+  bool admit(const ScheduledBatch& sent) noexcept;
   void grant(std::uint32_t lane, const BatchRecord& batch) noexcept;
   bool granted() const noexcept { return burst_left_ != 0; }
   void count_burst() noexcept;
+  void end_burst(Iteration row) noexcept;
 
   // what the helper thread saw
   void look_at_lives() noexcept;
@@ -159,8 +165,8 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   std::int64_t silence_;  // [iterations], 0: no limit
   Iteration last_batch_ = 0;
   std::uint32_t seen_changes_ = 0;
-  bool begun_ = false;    // row 0 is out
-  bool in_step_ = false;  // the controller moves the actuators on
+  bool begun_ = false;      // row 0 is out
+  bool under_way_ = false;  // from step to publish: what ends now ends in this iteration
 
   // the batch being copied from its lane
   bool staging_ = false;
@@ -169,6 +175,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   BlockChain staging_chain_;
 
   std::uint32_t holder_ = kNobody;  // lane with exclusive control
+  std::uint64_t holder_incarnation_ = 0;
 
   std::int64_t burst_left_ = 0;  // iterations, or kUntilEnded
   std::uint32_t burst_lane_ = kNobody;
@@ -186,8 +193,8 @@ void UntypedBackend::Body::changed(const StatusChange& change) noexcept {
   // a burst that runs until its batch has ended: this iteration is its last, or there is none
   if (burst_left_ != kUntilEnded || change.lane != burst_lane_ || change.id != burst_id_ + 1)
     return;
-  burst_left_ = in_step_ ? 1 : 0;
-  if (!in_step_) lane.set_burst_done(burst_id_, iteration_ - 1);
+  burst_left_ = under_way_ ? 1 : 0;
+  if (!under_way_) end_burst(iteration_ - 1);
 }
 
 void UntypedBackend::Body::give_back() noexcept {
@@ -242,6 +249,7 @@ Outcome UntypedBackend::Body::request(std::uint32_t lane, CommandId id, std::uin
 Outcome UntypedBackend::Body::take_control(std::uint32_t lane) noexcept {
   // a batch of another lane never comes here while somebody has control
   holder_ = lane;
+  holder_incarnation_ = lanes[lane].incarnation();
   return {};
 }
 
@@ -297,22 +305,31 @@ void UntypedBackend::Body::staged() noexcept {
   const BatchRecord batch = pool.batch(first);
   lanes[lane].set_staged(batch.id);
   last_batch_ = iteration_;
-  if (holder_ != kNobody && holder_ != lane) {
-    controller.reject(lane, first, Reason::exclusive, static_cast<std::uint8_t>(holder_),
-                      iteration_);
-    return;
-  }
-  const bool late = batch.at >= 0 && batch.at < iteration_;
-  if (late && batch.late_now == 0) {
-    controller.reject(lane, first, Reason::late, 0, iteration_);
-    return;
-  }
+  const ScheduledBatch sent{batch.at < 0 ? iteration_ : batch.at, batch.ticket, first, lane,
+                            batch.late_now != 0};
+  if (!admit(sent)) return;
   grant(lane, batch);
-  if (batch.at > iteration_) {
-    schedule.add({batch.at, batch.ticket, first, lane, batch.late_now != 0});
+  if (sent.at > iteration_) {
+    schedule.add(sent);
   } else {
     controller.take(lane, first, *this);
   }
+}
+
+/// Whether a batch may be taken, now or later; else it ends as rejected.
+bool UntypedBackend::Body::admit(const ScheduledBatch& sent) noexcept {
+  const auto reject = [&](Reason reason, std::uint32_t aux = 0) {
+    controller.reject(sent.lane, sent.batch, reason, static_cast<std::uint8_t>(aux), iteration_);
+    return false;
+  };
+  watch_holder();
+  if (holder_ != kNobody && holder_ != sent.lane) return reject(Reason::exclusive, holder_);
+  if (sent.at < iteration_ && !sent.late_now) return reject(Reason::late);
+  const LaneLife& life = lives_[sent.lane];
+  const bool dead = life.state == LaneState::died &&
+                    life.incarnation == lanes[sent.lane].incarnation();
+  if (dead && stale_ == Stale::purge) return reject(Reason::dead_frontend);
+  return true;
 }
 
 void UntypedBackend::Body::grant(std::uint32_t lane, const BatchRecord& batch) noexcept {
@@ -328,14 +345,7 @@ void UntypedBackend::Body::take_due() noexcept {
   while (!schedule.empty() && schedule.next().at <= iteration_) {
     const ScheduledBatch due = schedule.next();
     schedule.drop_next();
-    if (holder_ != kNobody && holder_ != due.lane) {
-      controller.reject(due.lane, due.batch, Reason::exclusive, static_cast<std::uint8_t>(holder_),
-                        iteration_);
-    } else if (due.at < iteration_ && !due.late_now) {
-      controller.reject(due.lane, due.batch, Reason::late, 0, iteration_);
-    } else {
-      controller.take(due.lane, due.batch, *this);
-    }
+    if (admit(due)) controller.take(due.lane, due.batch, *this);
   }
 }
 
@@ -386,12 +396,15 @@ void UntypedBackend::Body::look_at_lives() noexcept {
   }
 }
 
-/// Control falls with its holder.
+/// Control falls with its holder: closed, dead, or its lane in other hands.
 void UntypedBackend::Body::watch_holder() noexcept {
   if (holder_ == kNobody) return;
   const LaneLife life = liveness.lane(holder_);
-  const bool gone = life.state == LaneState::died || life.state == LaneState::closed;
-  if (gone && life.incarnation == lanes[holder_].incarnation()) holder_ = kNobody;
+  const bool died = life.state == LaneState::died && life.incarnation == holder_incarnation_;
+  if (died || lanes[holder_].closed() >= holder_incarnation_ ||
+      lanes[holder_].incarnation() != holder_incarnation_) {
+    holder_ = kNobody;
+  }
 }
 
 void UntypedBackend::Body::watch_silence() noexcept {
@@ -405,7 +418,6 @@ void UntypedBackend::Body::watch_silence() noexcept {
 Step UntypedBackend::Body::step(bool may_wait) noexcept {
   while (true) {
     look_at_lives();
-    watch_holder();
     if (stop.load(std::memory_order_relaxed)) return Step::ended;
     if (!granted()) {
       take_due();
@@ -422,18 +434,18 @@ Step UntypedBackend::Body::step(bool may_wait) noexcept {
   }
   if (granted()) take_due();
   watch_silence();
-  in_step_ = true;
+  under_way_ = true;
   controller.step(iteration_, row() + layout.observed);
-  in_step_ = false;
   return Step::run;
 }
 
 void UntypedBackend::Body::count_burst() noexcept {
-  if (burst_left_ > 0) --burst_left_;
-  if (burst_left_ == 0 && burst_lane_ != kNobody) {
-    lanes[burst_lane_].set_burst_done(burst_id_, iteration_);
-    burst_lane_ = kNobody;
-  }
+  if (burst_left_ > 0 && --burst_left_ == 0) end_burst(iteration_);
+}
+
+void UntypedBackend::Body::end_burst(Iteration row) noexcept {
+  lanes[burst_lane_].set_burst_done(burst_id_, row);
+  burst_lane_ = kNobody;
 }
 
 void UntypedBackend::Body::publish(bool fresh) noexcept {
@@ -457,8 +469,9 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
 
   // whoever waits for it
   if (!fresh) {
-    if (begun_) count_burst();
     controller.finish_pending();
+    under_way_ = false;
+    count_burst();
     give_back();
   }
   row_signal.wake_readers(iteration_);
@@ -469,6 +482,11 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
 
 void UntypedBackend::Body::end(State state, std::string_view text) noexcept {
   if (segment.state() != State::starting && segment.state() != State::running) return;
+  // the burst under way has no last row: whoever waits for it learns that the backend is gone
+  burst_left_ = 0;
+  for (; !schedule.empty(); schedule.drop_next()) {
+    controller.reject(schedule.next().lane, schedule.next().batch, Reason::stopped, 0, iteration_);
+  }
   controller.purge(kEveryActuator, iteration_, Reason::stopped);
   while (!controller.finish_pending()) {
   }
@@ -481,7 +499,9 @@ void UntypedBackend::Body::end(State state, std::string_view text) noexcept {
 UntypedBackend::UntypedBackend(Schema schema, const BackendOptions& options, RequestServer* server)
     : body_(std::make_unique<Body>(std::move(schema), options, server)) {}
 
-UntypedBackend::~UntypedBackend() { body_->end(State::stopped, ""); }
+UntypedBackend::~UntypedBackend() {
+  body_->end(failure().empty() ? State::stopped : State::failed, failure());
+}
 
 const Schema& UntypedBackend::schema() const noexcept { return body_->schema; }
 const RowLayout& UntypedBackend::layout() const noexcept { return body_->layout; }

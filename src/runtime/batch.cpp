@@ -1,8 +1,10 @@
 #include "o80/runtime/batch.hpp"
 
+#include <algorithm>
 #include <unordered_map>
 
 #include "o80/base/error.hpp"
+#include "o80/memory/atomic_words.hpp"
 
 namespace o80 {
 
@@ -22,12 +24,20 @@ Batch::Batch(std::shared_ptr<Link> link, std::shared_ptr<LaneSender> lane, Comma
 
 namespace {
 
-std::string words_for(const Handle& handle, std::uint8_t aux) {
+/// Who holds a lane, in words.
+std::string owner_of(const Link& link, std::uint32_t lane) {
+  const SegmentView& view = link.segment.view();
+  if (lane >= view.shape.lanes) return "another frontend";
+  const LaneSenderPage& page = view.lane(lane);
+  return "the frontend of " + load_text(page.owner, std::size(page.owner));
+}
+
+std::string words_for(const Link& link, const Handle& handle, std::uint8_t aux) {
   switch (handle.reason) {
     case Reason::late:
       return "it came after the iteration it was meant for";
     case Reason::exclusive:
-      return "the frontend of lane " + std::to_string(aux) + " has exclusive control";
+      return owner_of(link, aux) + " has exclusive control";
     case Reason::invalid:
       return "the backend could not read it";
     case Reason::limits:
@@ -69,7 +79,7 @@ Handle Batch::ask(CommandId id) const {
   handle.iteration = answer.word.iteration;
   if (!is_end(handle.status)) return handle;
   handle.text = handle.reason == Reason::driver ? lane_->message(id).value_or("")
-                                                : words_for(handle, answer.word.aux);
+                                                : words_for(*link_, handle, answer.word.aux);
   const std::scoped_lock lock(kept_->mutex);
   kept_->ended.emplace(id, handle);
   return handle;
@@ -103,7 +113,14 @@ Iteration Batch::last_iteration() const {
   return is_end(handle.status) ? handle.iteration : -1;
 }
 
+bool Batch::rejected() const noexcept {
+  const LaneSender::StatusAnswer answer = lane_->status(id_);
+  return answer.known == LaneSender::Known::yes &&
+         static_cast<Status>(answer.word.status) == Status::rejected;
+}
+
 std::string Batch::rejection() const {
+  if (id_ == 0) return "";
   const Handle handle = ask(id_);
   return handle.status == Status::rejected ? handle.text : "";
 }
@@ -118,27 +135,28 @@ void Batch::wait(Timeout timeout, const Check& check) const {
                        "' has not ended in time: give more time, purge, or ask its handles");
   }
   const Handle last = ask(id_ + 1);
-  if (last.status == Status::completed && link_->description->schema.head.bursting == 0) {
+  if (last.iteration <= link_->history.published()) return;
+  // a bursting backend may stand still before that row; one that ended never makes it, and says so
+  const auto is_cut = [](const Handle& handle) { return handle.reason == Reason::stopped; };
+  const bool paced = link_->description->schema.head.bursting == 0;
+  if ((last.status == Status::completed && paced) || is_cut(last) ||
+      std::ranges::any_of(handles(), is_cut)) {
     link_->rows.wait_for_row(last.iteration, deadline, guarded);
   }
 }
 
-Burst::Burst(std::shared_ptr<Link> link, std::shared_ptr<LaneSender> lane, Batch batch)
-    : link_(std::move(link)), lane_(std::move(lane)), batch_(std::move(batch)) {}
-
-bool Burst::done() const { return lane_->burst(batch_.id()).known != LaneSender::Known::not_yet; }
+bool Burst::done() const {
+  return lane().burst(batch_.id()).known != LaneSender::Known::not_yet ||
+         batch_.rejected();
+}
 
 Iteration Burst::wait_done(Timeout timeout, const Check& check) const {
-  const CommandId id = batch_.id();
-  LaneSender::BurstAnswer answer = lane_->burst(id);
+  LaneSender::BurstAnswer answer{};
   const auto over = [&] {
-    answer = lane_->burst(id);
-    if (answer.known != LaneSender::Known::not_yet) return true;
-    const LaneSender::StatusAnswer status = lane_->status(id);
-    return status.known == LaneSender::Known::yes &&
-           static_cast<Status>(status.word.status) == Status::rejected;
+    answer = lane().burst(batch_.id());
+    return answer.known != LaneSender::Known::not_yet || batch_.rejected();
   };
-  if (lane_->wait_until(over, Deadline(timeout), link_->guarded(check)) == Waited::timed_out) {
+  if (lane().wait_until(over, Deadline(timeout), link_->guarded(check)) == Waited::timed_out) {
     throw TimeoutError("the burst of '" + link_->segment.name() +
                        "' was not done in time: give more time, or see whether another "
                        "frontend's burst comes before it");

@@ -80,7 +80,13 @@ UntypedFrontend::UntypedFrontend(const std::string& segment, std::shared_ptr<Inl
       check_(std::make_unique<CommandCheck>(link_->description->schema)) {}
 
 UntypedFrontend::UntypedFrontend(UntypedFrontend&&) noexcept = default;
-UntypedFrontend& UntypedFrontend::operator=(UntypedFrontend&&) noexcept = default;
+UntypedFrontend& UntypedFrontend::operator=(UntypedFrontend&& other) noexcept {
+  // what was here closes with `other`
+  std::swap(link_, other.link_);
+  std::swap(check_, other.check_);
+  std::swap(builder_, other.builder_);
+  return *this;
+}
 
 UntypedFrontend::~UntypedFrontend() {
   if (link_) close();
@@ -188,26 +194,36 @@ void UntypedFrontend::forget_added() {
 
 // ------------------------------------------------------------------------------ sending
 
-/// Seals what was added, sends it, and lets an inline robot take it.
-Batch UntypedFrontend::send(const BatchRecord& wanted) {
+/// Before anything is used up: ids that are drawn and never sent would age the statuses of others.
+void UntypedFrontend::refuse_if_full(const BatchBuilder& builder, const LaneSender& lane) const {
+  const std::uint64_t needed = builder.blocks();
+  const std::string takes = "the batch takes " + std::to_string(needed) + " blocks of 64 bytes, ";
+  if (needed > lane.blocks()) {
+    throw LaneFull(takes + "a lane of '" + segment() + "' has " + std::to_string(lane.blocks()) +
+                   ": send it in parts, or start the backend with larger lanes (lane_blocks)");
+  }
+  if (const std::uint32_t free = lane.free_blocks(); needed > free) {
+    throw LaneFull(takes + std::to_string(free) + " of " + std::to_string(lane.blocks()) +
+                   " are free in the lane of '" + segment() +
+                   "'. Nothing was sent, all stays added: pulse again when earlier commands have "
+                   "ended, purge, or start the backend with larger lanes (lane_blocks)");
+  }
+}
+
+/// Seals a batch, sends it, and lets an inline robot take it.
+Batch UntypedFrontend::send(BatchBuilder& builder, const BatchRecord& wanted) {
   std::shared_ptr<LaneSender> lane;
   Batch batch;
   {
     const std::scoped_lock lock(link_->sending);
     lane = link_->lane();
     link_->segment.throw_if_known_gone();
-    if (builder_.blocks() > lane->blocks()) {
-      const std::uint64_t needed = builder_.blocks();
-      throw LaneFull("the batch takes " + std::to_string(needed) +
-                     " blocks of 64 bytes, a lane of '" + segment() + "' has " +
-                     std::to_string(lane->blocks()) +
-                     ": send it in parts, or start the backend with larger lanes (lane_blocks)");
-    }
+    refuse_if_full(builder, *lane);
     BatchRecord record = wanted;
-    const std::uint32_t records = builder_.records();
+    const std::uint32_t records = builder.records();
     record.id = lane->next_ids(std::uint64_t{records} + 2);
-    lane->send(std::as_bytes(builder_.seal(record)), offsetof(BatchRecord, ticket));
-    builder_.clear();
+    lane->send(std::as_bytes(builder.seal(record)), offsetof(BatchRecord, ticket));
+    builder.clear();
     batch = Batch(link_, lane, record.id, records);
   }
   if (link_->runner) link_->runner->run();
@@ -227,26 +243,38 @@ Batch UntypedFrontend::pulse(const PulseOptions& options, std::uint16_t flags) {
     link_->check_usable();
     if (builder_.empty()) return {};
   }
-  return send(record);
+  return send(builder_, record);
+}
+
+Batch UntypedFrontend::pulse(BatchBuilder& batch) {
+  link_->check_usable();
+  return batch.empty() ? Batch() : send(batch, {});
+}
+
+Batch UntypedFrontend::pulse_to_end(const PulseOptions& options) {
+  return pulse(options, bursting() ? kBurstUntilEnded : std::uint16_t{0});
+}
+
+UntypedObservation UntypedFrontend::wait_for_end(const Batch& batch, Timeout timeout,
+                                                 const Check& check) const {
+  UntypedObservation observation(link_->description);
+  Iteration last = -1;
+  if (batch.id() != 0 && bursting()) {
+    last = Burst(link_, batch).wait_done(timeout, check);
+  } else {
+    batch.wait(timeout, check);
+    last = batch.last_iteration();
+  }
+  if (const std::string why = batch.rejection(); !why.empty()) {
+    throw Error("the batch sent to '" + segment() + "' was rejected: " + why);
+  }
+  if (last < 0 || !link_->history.read(last, observation.bytes())) latest(observation.bytes());
+  return observation;
 }
 
 UntypedObservation UntypedFrontend::pulse_and_wait(Timeout timeout, const PulseOptions& options,
                                                    const Check& check) {
-  UntypedObservation observation(link_->description);
-  if (bursting()) {
-    // the backend runs until the batch has ended
-    const Batch batch = pulse(options, kBurstUntilEnded);
-    const Iteration row =
-        batch.id() == 0 ? -1
-                        : Burst(link_, link_->lane_if_taken(), batch).wait_done(timeout, check);
-    if (row < 0 || !link_->history.read(row, observation.bytes())) latest(observation.bytes());
-    return observation;
-  }
-  const Batch batch = pulse(options, 0);
-  batch.wait(timeout, check);
-  const Iteration last = batch.last_iteration();
-  if (last < 0 || !link_->history.read(last, observation.bytes())) latest(observation.bytes());
-  return observation;
+  return wait_for_end(pulse_to_end(options), timeout, check);
 }
 
 Burst UntypedFrontend::start_burst(std::int64_t iterations) {
@@ -260,8 +288,7 @@ Burst UntypedFrontend::start_burst(std::int64_t iterations) {
   }
   BatchRecord record;
   record.burst = iterations;
-  Batch batch = send(record);
-  return {link_, link_->lane_if_taken(), std::move(batch)};
+  return {link_, send(builder_, record)};
 }
 
 UntypedObservation UntypedFrontend::burst(std::int64_t iterations, Timeout timeout,
@@ -390,7 +417,7 @@ std::int64_t UntypedFrontend::wait_for_next(Iteration& position, std::byte* row,
     }
   }
   Iteration next = wanted;
-  while (!link_->history.read(next, row)) next = std::max(next + 1, link_->history.oldest());
+  while (!link_->history.read(next, row)) next = std::max(next, link_->history.oldest());
   position = next + 1;
   return next - wanted;
 }
@@ -398,6 +425,8 @@ std::int64_t UntypedFrontend::wait_for_next(Iteration& position, std::byte* row,
 void UntypedFrontend::close() {
   link_->closed.store(true, std::memory_order_relaxed);
   const std::scoped_lock lock(link_->sending);
+  // batches that are still asked keep their statuses, not the lane
+  if (link_->lane_) link_->lane_->give_back();
   link_->lane_.reset();
 }
 

@@ -239,9 +239,12 @@ constexpr std::size_t payload() {
 }  // namespace describing
 
 /// Copies a value without its padding: those bytes of `out` stay as they are (zero in a row).
+/// A struct without fields has nothing to copy, and `out` may be null.
 template <class T>
 void pack(const T& value, std::byte* out) {
-  if constexpr (describing::payload<T>() == sizeof(T)) {
+  if constexpr (std::is_empty_v<T>) {
+    return;
+  } else if constexpr (describing::payload<T>() == sizeof(T)) {
     std::memcpy(out, &value, sizeof(T));
   } else if constexpr (describing::ArrayOf<T>::value) {
     for (const auto& element : value) {
@@ -258,8 +261,8 @@ void pack(const T& value, std::byte* out) {
 template <class T>
 T unpack(const std::byte* from) {
   static_assert(std::is_trivially_copyable_v<T>);
-  T value;
-  std::memcpy(&value, from, sizeof(T));
+  T value{};
+  if constexpr (!std::is_empty_v<T>) std::memcpy(&value, from, sizeof(T));
   return value;
 }
 

@@ -231,30 +231,25 @@ inline std::uint32_t Schema::add_actuators(std::string_view group, std::uint32_t
 }
 
 inline std::uint32_t Schema::add_sensor(FieldRow sensor) {
-  // the fields of the extended type must be neighbours: its type is built anew with one more
+  // fields of a type are neighbours, and nested types stand before it: it is built anew at the end
   std::vector<FieldRow> members;
   if (head.extended != kNoType) {
-    const TypeRow& old = types.at(head.extended);
+    const TypeRow old = types.at(head.extended);
     members.assign(fields.begin() + old.first_field, fields.begin() + old.first_field + old.fields);
-  }
-  for (const FieldRow& member : members) {
-    if (member.name == sensor.name) {
-      throw InvalidArgument("there is already a sensor '" + sensor.name.str() + "'");
+    for (const FieldRow& member : members) {
+      if (member.name == sensor.name) {
+        throw InvalidArgument("there is already a sensor '" + sensor.name.str() + "'");
+      }
+    }
+    if (head.extended + 1 == types.size() && old.first_field + old.fields == fields.size()) {
+      fields.resize(old.first_field);
+      types.pop_back();
+      hooks.pop_back();
+      keys.pop_back();
     }
   }
   members.push_back(sensor);
-  if (head.extended == kNoType) {
-    head.extended = add_type("Extended", members);
-    return fields.back().offset;
-  }
-  TypeRow& old = types[head.extended];
-  const bool last = old.first_field + old.fields == fields.size();
-  if (last) fields.resize(old.first_field);
-  const std::uint32_t index = add_type("Extended", members);
-  types[head.extended] = types[index];
-  types.resize(index);
-  hooks.resize(index);
-  keys.resize(index);
+  head.extended = add_type("Extended", members);
   return fields.back().offset;
 }
 

@@ -26,6 +26,10 @@ std::uint64_t hash(const Schema& schema);
 /// What differs, a line each, in words; empty if nothing does.
 std::string difference(const Schema& expected, const Schema& found);
 
+/// The same, but only of what a program that was compiled for `expected` relies on: the actuators'
+/// states, the sensor values and the requests it knows, where their numbers lie and what they are.
+std::string layout_difference(const Schema& expected, const Schema& found);
+
 /// For people and foreign tools.
 std::string to_json(const Schema& schema);
 

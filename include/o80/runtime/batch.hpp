@@ -51,8 +51,10 @@ class Batch {
   void wait(Timeout timeout, const Check& check = {}) const;
 
  private:
+  friend class Burst;
   struct Kept;
   Handle ask(CommandId id) const;
+  bool rejected() const noexcept;
 
   std::shared_ptr<Link> link_;
   std::shared_ptr<LaneSender> lane_;
@@ -65,9 +67,10 @@ class Batch {
 class Burst {
  public:
   Burst() = default;
-  Burst(std::shared_ptr<Link> link, std::shared_ptr<LaneSender> lane, Batch batch);
+  Burst(std::shared_ptr<Link> link, Batch batch) : link_(std::move(link)), batch_(std::move(batch)) {}
 
   const Batch& batch() const { return batch_; }
+  /// Its last iteration is done, or its batch was rejected.
   bool done() const;
   /// Waits until the last iteration of the burst is done; its row, or -1 if the batch was rejected.
   /// Throws TimeoutError, BackendGone, Cancelled.
@@ -77,8 +80,9 @@ class Burst {
   UntypedObservation wait(Timeout timeout, const Check& check = {}) const;
 
  private:
+  LaneSender& lane() const { return *batch_.lane_; }
+
   std::shared_ptr<Link> link_;
-  std::shared_ptr<LaneSender> lane_;
   Batch batch_;
 };
 

@@ -52,6 +52,8 @@ class UntypedFrontend {
   Life life() const;
   std::uint32_t actuator(std::string_view name) const;
   std::uint32_t request_index(std::string_view name) const;
+  /// Refuses what the robot cannot follow, as the verbs below do.
+  const CommandCheck& check() const { return *check_; }
 
   // what the next pulse sends; each returns its place in the batch
   /// Adds a command. `mask` has a bit for each number of the state that is given; empty: all.
@@ -77,8 +79,14 @@ class UntypedFrontend {
   /// Sends what was added as one batch. Throws LaneFull (nothing is sent, all stays added), NoLane,
   /// ReadOnly, BackendGone.
   Batch pulse(const PulseOptions& options = {}) { return pulse(options, 0); }
-  /// Sends and waits until every command has ended; bursting, lets the backend run as long as
-  /// that takes. Returns the row of the last iteration.
+  /// Sends a batch of the caller's own making; what was added stays added.
+  Batch pulse(BatchBuilder& batch);
+  /// Sends what was added; bursting, lets the backend run until all of it has ended.
+  Batch pulse_to_end(const PulseOptions& options = {});
+  /// Waits for the end of such a batch and returns the row of its last iteration.
+  UntypedObservation wait_for_end(const Batch& batch, Timeout timeout,
+                                  const Check& check = {}) const;
+  /// Both at once.
   UntypedObservation pulse_and_wait(Timeout timeout, const PulseOptions& options = {},
                                     const Check& check = {});
   /// Sends what was added and lets a bursting backend run n iterations.
@@ -111,7 +119,8 @@ class UntypedFrontend {
 
  private:
   Batch pulse(const PulseOptions& options, std::uint16_t flags);
-  Batch send(const BatchRecord& record);
+  Batch send(BatchBuilder& builder, const BatchRecord& record);
+  void refuse_if_full(const BatchBuilder& builder, const LaneSender& lane) const;
   [[noreturn]] void missing(Iteration k) const;
 
   std::shared_ptr<Link> link_;

@@ -23,11 +23,12 @@ class Frontend : public UntypedFrontend {
  public:
   explicit Frontend(const std::string& segment, const FrontendOptions& options = {})
       : UntypedFrontend(segment, options) {
-    if constexpr (!kIsRunTime<R>) {
-      Schema expected;
-      describe_types<R>(expected);
-      check_types(expected, schema(), segment);
-    }
+    compare();
+  }
+  /// A frontend whose bursts run in its own thread.
+  Frontend(const std::string& segment, std::shared_ptr<InlineRunner> runner)
+      : UntypedFrontend(segment, std::move(runner)) {
+    compare();
   }
 
   using UntypedFrontend::add_command;
@@ -37,6 +38,7 @@ class Frontend : public UntypedFrontend {
                             const CommandOptions& options = {}) {
     std::array<std::byte, sizeof(State)> bytes{};
     pack(target, bytes.data());
+    check_state<State>(index);
     return UntypedFrontend::add_command(index, bytes, options);
   }
   template <Shareable State>
@@ -50,6 +52,7 @@ class Frontend : public UntypedFrontend {
                                const CommandOptions& options = {.pace = iterations(1)}) {
     std::vector<std::byte> bytes(rows.size() * sizeof(State));
     for (std::size_t i = 0; i < rows.size(); ++i) pack(rows[i], bytes.data() + i * sizeof(State));
+    check_state<State>(actuator(name));
     return UntypedFrontend::add_trajectory(actuator(name), static_cast<std::uint32_t>(rows.size()),
                                            bytes, options);
   }
@@ -70,6 +73,25 @@ class Frontend : public UntypedFrontend {
   Observation<R> burst(std::int64_t count, Timeout timeout = std::chrono::seconds(5)) {
     return Observation<R>(UntypedFrontend::burst(count, timeout));
   }
+
+ private:
+  void compare() {
+    if constexpr (!kIsRunTime<R>) {
+      Schema expected;
+      describe_types<R>(expected);
+      check_types(expected, schema(), segment());
+      for (const ActuatorRow& row : expected.actuators) states_.push_back(expected.keys[row.type]);
+    }
+  }
+  /// States of one size may still be of different types.
+  template <class State>
+  void check_state(std::uint32_t index) const {
+    if (index >= states_.size() || states_[index] == &describing::kKey<State>) return;
+    throw InvalidArgument("the target of actuator '" + schema().actuators[index].name.str() +
+                          "' of '" + segment() + "' must be of its own state type");
+  }
+
+  std::vector<const void*> states_;  // of each actuator: which C++ type its state is
 };
 
 template <>
