@@ -1,0 +1,34 @@
+"""A backend inside a Python program that has a loop of its own; anybody may command it."""
+
+import threading
+import time
+
+import numpy as np
+
+import o80
+
+MOTOR = np.dtype([("position", float), ("velocity", float)])
+
+
+def command() -> None:
+    """What another process would do."""
+    with o80.Frontend("gripper") as frontend:
+        frontend.add_command("left", {"position": 0.02, "velocity": 0.0}, iterations=50)
+        frontend.add_command("right", {"position": -0.02}, iterations=50)
+        observation = frontend.pulse_and_wait(timeout=10.0)
+        print("closed to", observation.observed["position"].round(4))
+
+
+with o80.Backend("gripper", MOTOR, actuators=["left", "right"], frequency=200) as backend:
+    fingers = np.zeros(2, MOTOR)
+    backend.publish(fingers)  # row 0
+    commander = threading.Thread(target=command)
+    commander.start()
+    due = time.monotonic()
+    while commander.is_alive():
+        desired = backend.step()
+        fingers[:] = desired  # these fingers go where they are told
+        due += 0.005
+        time.sleep(max(0.0, due - time.monotonic()))
+        backend.publish(fingers)
+    commander.join()

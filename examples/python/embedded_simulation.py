@@ -1,0 +1,37 @@
+"""A bursting backend inside a Python simulation: it stands still until it is asked to step."""
+
+import threading
+
+import numpy as np
+
+import o80
+
+
+def learn() -> None:
+    """What a learner in another process would do."""
+    with o80.Frontend("pendulum") as world:
+        for step in range(3):
+            world.add_command("torque", 0.5 * step)
+            observation = world.burst(100)
+            print(
+                f"iteration {observation.iteration}: angle {observation.extended['angle']:.3f} rad"
+            )
+
+
+SENSORS = np.dtype([("angle", float), ("speed", float)])
+
+with o80.Backend(
+    "pendulum", float, actuators=["torque"], extended=SENSORS, period=0.002, bursting=True
+) as backend:
+    angle, speed = 0.1, 0.0
+    backend.publish([0.0], (angle, speed))
+    learner = threading.Thread(target=learn)
+    learner.start()
+    while learner.is_alive():
+        desired = backend.step(timeout=0.1)  # None: nobody asked in time
+        if desired is None:
+            continue
+        speed += 0.002 * (desired[0] - 9.81 * np.sin(angle))
+        angle += 0.002 * speed
+        backend.publish(desired, (angle, speed))
+    learner.join()
