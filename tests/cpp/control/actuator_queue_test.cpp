@@ -72,6 +72,14 @@ TEST(ActuatorQueue, ACommandStartsFromTheDesiredStateUnlessItAsksForTheObserved)
   EXPECT_THAT(rig.run(8), ElementsAre(3.0, 2.0, 1.0, 0.0, 1.5, 1.0, 0.5, 0.0));
 }
 
+TEST(ActuatorQueue, OnlyTheFirstRowOfATrajectoryStartsFromTheObserved) {
+  Rig rig(plain_robot(1));
+  rig.observe(0, 2.0);
+  rig.add_rows(0, from_observed(over(2)), 2, {4.0, 6.0});
+  rig.pulse();
+  EXPECT_THAT(rig.run(4), ElementsAre(3.0, 4.0, 5.0, 6.0));
+}
+
 TEST(ActuatorQueue, UntilCountsTheIterationsThatAreLeftWhenItStarts) {
   Rig rig(plain_robot(1));
   rig.add(0, over(3), {3.0});
@@ -106,14 +114,19 @@ TEST(ActuatorQueue, APastUntilIsRejectedAsLateAndTheNextStartsInItsPlace) {
 }
 
 TEST(ActuatorQueue, LateCommandsInARowAreToldAThousandAnIteration) {
-  Rig rig(plain_robot(1));
+  Rig rig(plain_robot(2));
   rig.run(5);
   for (int i = 0; i < 2500; ++i) rig.add(0, until(1), {9.0});
   rig.add(0, direct(), {1.0});
   rig.pulse();
+  // what was dropped counts against the same thousand
+  for (int i = 0; i < 10; ++i) rig.add(1, over(9), {1.0});
+  rig.batch.purge(1);
+  rig.pulse();
   const std::size_t before = rig.witness.changes.size();
   rig.step();
   EXPECT_EQ(rig.witness.changes.size() - before, Controller::kStatusesPerIteration);
+  EXPECT_TRUE(rig.controller.pending());
   EXPECT_FALSE(rig.active());
   EXPECT_EQ(rig.desired(), 0.0);
   EXPECT_THAT(rig.run(2), ElementsAre(0.0, 1.0));
@@ -339,9 +352,9 @@ TEST(ActuatorQueue, AnIdleActuatorThatFollowsLetsTheNextCommandStartFromWhereItI
   EXPECT_THAT(rig.run(2), ElementsAre(2.0, 2.0));
   EXPECT_EQ(rig.desired(1), 0.0) << "the other one holds";
   rig.add(0, over(2), {4.0});
+  rig.add(0, over(2), {6.0});
   rig.pulse();
-  rig.observe(0, 2.0);
-  EXPECT_THAT(rig.run(2), ElementsAre(3.0, 4.0));
+  EXPECT_THAT(rig.run(4), ElementsAre(3.0, 4.0, 5.0, 6.0)) << "not while it is commanded";
   rig.observe(0, 3.5);
   EXPECT_THAT(rig.run(1), ElementsAre(3.5)) << "from its first idle iteration on";
   rig.observe(0, 3.0);

@@ -89,13 +89,14 @@ TEST(Clamp, BoundsComeBeforeTheSpeed) {
 TEST(Clamp, ASpeedPaceAtTheMaximumIsNotClampedByRounding) {
   for (const double speed : {0.1, 0.3, 1.0 / 3.0, 0.7, 12.34567}) {
     for (const bool smooth : {false, true}) {
+      constexpr double kFar = 1e6 / 7.0;  // where a number is rounded more than its steps are
       Schema schema = plain_robot(1);
       schema.actuator(0).limits({.speed = speed});
       Rig rig(schema);
-      rig.observe(0, 1000.0 / 7.0);
+      rig.observe(0, kFar);
       rig.controller.restart(rig.observed.data(), nullptr, 0);
       const RecordHead head = at_speed(speed);
-      rig.add(0, smooth ? smoothly(head) : head, {1000.0 / 7.0 + 0.3});
+      rig.add(0, smooth ? smoothly(head) : head, {kFar + 0.3});
       const CommandId batch = rig.pulse();
       while (rig.controller.active()) {
         rig.step();

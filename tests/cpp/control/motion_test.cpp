@@ -102,7 +102,10 @@ double first_step_after(void (*something)(Rig&), const Schema& schema = plain_ro
 TEST(Motion, MinimumJerkStartsAtRestAfterAnythingElse) {
   const double at_rest = minimum_jerk(0.01);
   EXPECT_NEAR(first_step_after([](Rig&) {}), at_rest, 1e-12);
-  EXPECT_NEAR(first_step_after([](Rig& rig) {  // a direct command
+  EXPECT_NEAR(first_step_after([](Rig& rig) {  // a direct command, once there was another one
+                rig.add(0, over(2), {9.0});
+                rig.pulse();
+                rig.run(2);
                 rig.add_rows(0, direct(), 4, {1.0, 2.0, 3.0, 4.0});
                 rig.pulse();
                 rig.run(2);
