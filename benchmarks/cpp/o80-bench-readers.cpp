@@ -117,9 +117,9 @@ void measure(int rounds) {
   for (int round = 0; round < rounds; ++round) {
     waiters.stand_still();
     paced_iteration(backend, 2);
-    sample("paced_writer_alone", "ns", paced_iteration(backend, 50));
+    sample("paced_writer_alone", "us", paced_iteration(backend, 50) * 1e-3);
     waiters.go_on();
-    sample("paced_writer_with_64_waiters", "ns", paced_iteration(backend, 50));
+    sample("paced_writer_with_64_waiters", "us", paced_iteration(backend, 50) * 1e-3);
   }
 }
 

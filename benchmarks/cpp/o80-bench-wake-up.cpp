@@ -28,8 +28,8 @@ struct Futex {
 };
 
 Futex& shared_futex() {
-  void* page = mmap(nullptr, sizeof(Futex), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1,
-                    0);
+  void* page =
+      mmap(nullptr, sizeof(Futex), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   return *new (page) Futex;
 }
 

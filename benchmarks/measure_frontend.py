@@ -1,0 +1,94 @@
+"""The calls of a Python frontend."""
+
+import ctypes
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+
+import o80
+from sampling import built, rounds, sample, seconds, take_priority
+
+ROWS = 10_000
+CALLS = 2000
+COMMANDS = 1000
+
+
+def start_robot() -> None:
+    """From the start of a robot's process to its first row, and another frontend's attachment."""
+    robot = o80.robots.load("two_joints")
+    begin = time.perf_counter()
+    with robot.start(bursting=True) as process, process.frontend() as arm:
+        arm.latest()
+        sample("python_backend_ready", "ms", (time.perf_counter() - begin) * 1e3)
+        begin = time.perf_counter()
+        with o80.Frontend(arm.segment):
+            sample("python_frontend_attached", "ms", (time.perf_counter() - begin) * 1e3)
+
+
+def command(arm: o80.Frontend) -> None:
+    """Commands added, sent, and dropped again by the backend before the next round."""
+
+    def add() -> None:
+        for _ in range(COMMANDS):
+            arm.add_command(0, 0.5, duration=2.0)
+
+    sample("python_add_command", "us", seconds(add) / COMMANDS * 1e6)
+    sample("python_pulse_1000", "us", seconds(arm.pulse) * 1e6)
+    arm.purge().wait(5.0)
+
+
+def read(arm: o80.Frontend) -> None:
+    def latest() -> None:
+        for _ in range(CALLS):
+            arm.latest()
+
+    sample("python_latest", "us", seconds(latest) / CALLS * 1e6)
+
+    # NumPy's array is fresh for each history, memcpy's is not
+    rows = arm.history(ROWS).rows
+    target = np.ones_like(rows)
+    copy = (target.ctypes.data, rows.ctypes.data, rows.nbytes)
+    copied = seconds(lambda: ctypes.memmove(*copy))
+    sample("memcpy_same_bytes", "GB/s", rows.nbytes / copied * 1e-9)
+    got = seconds(lambda: arm.history(ROWS))
+    sample("python_history", "GB/s", rows.nbytes / got * 1e-9)
+
+
+def burst(arm: o80.Frontend) -> None:
+    def once() -> None:
+        for _ in range(CALLS):
+            arm.burst(1)
+
+    sample("python_burst_1", "us", seconds(once) / CALLS * 1e6)
+
+
+def follow_trajectory(arm: o80.Frontend, targets: NDArray[np.float64]) -> None:
+    def send() -> None:
+        arm.add_trajectory(targets, iterations=1)
+        arm.pulse()
+
+    sample("python_trajectory", "ms", seconds(send) * 1e3)
+    arm.purge().wait(5.0)
+
+
+def main() -> None:
+    take_priority()
+    for _ in range(min(rounds(), 7)):
+        start_robot()
+    two = o80.robots.load("two_joints").start(bursting=True)
+    eight = o80.robots.load(str(built() / "lib" / "o80" / "robots" / "eight_empty.so")).start(
+        bursting=True
+    )
+    targets = np.random.default_rng(1).random((ROWS, 8))
+    with two, two.frontend() as arm, eight, eight.frontend() as many:
+        arm.burst(ROWS + 10)
+        for _ in range(rounds()):
+            burst(arm)
+            read(arm)
+            command(arm)
+            follow_trajectory(many, targets)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,68 @@
+"""Measures the budgets of o80, each beside its limit: a table, and build/bench/results.json."""
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from programs import ROOT, NotMeasuredError, Samples, run
+from results import Result, print_table, result_of, write
+from rows import ROWS, Row
+
+ROUNDS = 21
+ROUNDS_QUICK = 3
+
+
+def arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__)
+    names = [row.name for row in ROWS]
+    parser.add_argument("--rows", nargs="+", choices=names, default=names, metavar="ROW",
+                        help="only these: " + ", ".join(names))  # fmt: skip
+    parser.add_argument("--quick", action="store_true", help="few repetitions: rough figures")
+    parser.add_argument("--rounds", type=int, help=f"repetitions of each (default: {ROUNDS})")
+    parser.add_argument("--built", type=Path, default=ROOT / "build" / "release", metavar="FOLDER",
+                        help="where the programs were built (default: build/release)")  # fmt: skip
+    return parser.parse_args()
+
+
+def measure(rows: Sequence[Row], rounds: int, built: Path, console: Console) -> list[Result]:
+    measured: dict[str, dict[str, Samples] | str] = {}
+    for program in dict.fromkeys(row.program for row in rows):
+        with console.status(f"measuring: {program}"):
+            try:
+                measured[program] = run(program, rounds, built)
+            except NotMeasuredError as reason:
+                measured[program] = str(reason)
+    results = []
+    for row in rows:
+        samples = measured[row.program]
+        if isinstance(samples, str):
+            results.append(Result(row=row.row, budget=row.budget, not_measured=samples))
+        else:
+            results.append(result_of(row, samples))
+    return results
+
+
+def main() -> int:
+    asked = arguments()
+    rounds = asked.rounds or (ROUNDS_QUICK if asked.quick else ROUNDS)
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=150)
+    chosen = [row for row in ROWS if row.name in asked.rows]
+    results = measure(chosen, rounds, asked.built.resolve(), console)
+    print_table(results, console)
+    path = ROOT / "build" / "bench" / "results.json"
+    write(results, path)
+    missed = [result.row for result in results if result.met is False]
+    unknown = sum(result.met is None for result in results)
+    console.print(
+        f"{len(results) - len(missed) - unknown} budgets met, {len(missed)} missed, "
+        f"{unknown} not measured; figures in {path.relative_to(ROOT)}"
+    )
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
