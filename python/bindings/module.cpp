@@ -2,11 +2,23 @@
 
 #include <string>
 
+#include "bindings.hpp"
 #include "o80/base/version.hpp"
+
+namespace nb = nanobind;
 
 NB_MODULE(_core, m) {
   m.doc() = "The compiled part of o80.";
+  // a frontend that lives until the interpreter ends is no leak
+  nb::set_leak_warnings(false);
   m.def(
-      "version", [] { return nanobind::str(o80::version().data(), o80::version().size()); },
+      "version", [] { return nb::str(o80::version().data(), o80::version().size()); },
       "The version of the compiled library.");
+  bind_errors(m);
+  bind_segment_list(m);
+  bind_observation(m);
+  bind_batch(m);
+  bind_frontend(m);
+  bind_backend(m);
+  bind_robots(m);
 }

@@ -1,7 +1,87 @@
 """Real-time control, simulators and learning code in step, through shared memory."""
 
-from o80._core import version
+from o80 import robots
+from o80._core import Batch, Burst, Handle, Observation, Stream, version
+from o80.actuator import Actuator, Number
+from o80.errors import (
+    BackendFailed,
+    BackendGone,
+    BackendKilled,
+    BackendStopped,
+    BackendSuperseded,
+    Cancelled,
+    Closed,
+    ControlTaken,
+    DriverError,
+    Error,
+    InvalidArgument,
+    LaneFull,
+    NoLane,
+    NotBursting,
+    ReadOnly,
+    RequestRejected,
+    RowOverwritten,
+    SchemaMismatch,
+    SegmentError,
+    SegmentTaken,
+    TimeoutError,
+    UsedAfterFork,
+)
+from o80.frontend import Frontend, burst
+from o80.frontend_classes import register_frontend
+from o80.history import History
+from o80.installation import prefix
+from o80.record import Record
+from o80.segment_list import Segment, clean, segments
+from o80.words import Mode, Profile, Reason, Start, Status
 
 __version__ = version()
 
-__all__ = ["__version__", "version"]
+__all__ = [
+    "Actuator",
+    "BackendFailed",
+    "BackendGone",
+    "BackendKilled",
+    "BackendStopped",
+    "BackendSuperseded",
+    "Batch",
+    "Burst",
+    "Cancelled",
+    "Closed",
+    "ControlTaken",
+    "DriverError",
+    "Error",
+    "Frontend",
+    "Handle",
+    "History",
+    "InvalidArgument",
+    "LaneFull",
+    "Mode",
+    "NoLane",
+    "NotBursting",
+    "Number",
+    "Observation",
+    "Profile",
+    "ReadOnly",
+    "Reason",
+    "Record",
+    "RequestRejected",
+    "RowOverwritten",
+    "SchemaMismatch",
+    "Segment",
+    "SegmentError",
+    "SegmentTaken",
+    "Start",
+    "Status",
+    "Stream",
+    "TimeoutError",
+    "UsedAfterFork",
+    "__version__",
+    "burst",
+    "clean",
+    "prefix",
+    "register_frontend",
+    "robots",
+    "segments",
+    "version",
+]

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "o80/base/time.hpp"
 #include "o80/describe/describe.hpp"
 #include "o80/describe/layout.hpp"
 #include "o80/describe/schema.hpp"

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+#include <memory>
+
+#include "errors.hpp"
+#include "o80/runtime/batch.hpp"
+#include "observation.hpp"
+
+/// A burst under way and the way to read its row.
+struct PendingBurst {
+  o80::Burst burst;
+  std::shared_ptr<const Decoder> decoder;
+};
+
+/// Waits for (something of) a batch; an o80.TimeoutError carries the batch.
+template <class Wait>
+auto carrying(const o80::Batch& batch, Wait&& wait) {
+  try {
+    return wait();
+  } catch (const o80::TimeoutError& error) {
+    const nanobind::object type = python_error("TimeoutError");
+    const nanobind::object raised = type(error.what(), nanobind::cast(batch));
+    PyErr_SetObject(type.ptr(), raised.ptr());
+    throw nanobind::python_error();
+  }
+}

@@ -1,0 +1,13 @@
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+// What each file of this folder adds to the module.
+
+void bind_errors(nanobind::module_& module);
+void bind_segment_list(nanobind::module_& module);
+void bind_observation(nanobind::module_& module);
+void bind_batch(nanobind::module_& module);
+void bind_frontend(nanobind::module_& module);
+void bind_backend(nanobind::module_& module);
+void bind_robots(nanobind::module_& module);

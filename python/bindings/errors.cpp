@@ -1,0 +1,58 @@
+#include <nanobind/nanobind.h>
+
+#include "bindings.hpp"
+#include "errors.hpp"
+#include "o80/base/error.hpp"
+
+namespace nb = nanobind;
+
+namespace {
+
+/// Raises the class of o80.errors that has the name of the C++ one.
+void translate(const std::exception_ptr& thrown, void*) {
+#define O80_TRANSLATE(Name)                    \
+  catch (const o80::Name& error) {             \
+    set_error(python_error(#Name), error.what()); \
+  }
+  try {
+    std::rethrow_exception(thrown);
+  }
+  O80_TRANSLATE(InvalidArgument)
+  O80_TRANSLATE(TimeoutError)
+  O80_TRANSLATE(SegmentTaken)
+  O80_TRANSLATE(SegmentError)
+  O80_TRANSLATE(SchemaMismatch)
+  O80_TRANSLATE(BackendStopped)
+  O80_TRANSLATE(BackendFailed)
+  O80_TRANSLATE(BackendKilled)
+  O80_TRANSLATE(BackendSuperseded)
+  O80_TRANSLATE(BackendGone)
+  O80_TRANSLATE(RowOverwritten)
+  O80_TRANSLATE(LaneFull)
+  O80_TRANSLATE(NoLane)
+  O80_TRANSLATE(NotBursting)
+  O80_TRANSLATE(ReadOnly)
+  O80_TRANSLATE(UsedAfterFork)
+  O80_TRANSLATE(Closed)
+  O80_TRANSLATE(Cancelled)
+  O80_TRANSLATE(DriverError)
+  O80_TRANSLATE(Error)
+#undef O80_TRANSLATE
+}
+
+}  // namespace
+
+nb::object python_error(const char* name) {
+  return nb::module_::import_("o80.errors").attr(name);
+}
+
+void set_error(const nb::object& type, const char* text) {
+  PyErr_SetString(type.ptr(), text);
+}
+
+void raise_python(const char* name, const std::string& text) {
+  set_error(python_error(name), text.c_str());
+  throw nb::python_error();
+}
+
+void bind_errors(nb::module_&) { nb::register_exception_translator(translate); }

@@ -1,0 +1,138 @@
+#include "observation.hpp"
+
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/string.h>
+
+#include <cstring>
+#include <span>
+
+#include "bindings.hpp"
+#include "o80/base/error.hpp"
+#include "o80/describe/table.hpp"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+
+Decoder::Decoder(std::shared_ptr<const o80::Description> what, nb::object how)
+    : description(std::move(what)),
+      layout(std::move(how)),
+      desired(layout.attr("desired")),
+      observed(layout.attr("observed")),
+      extended(layout.attr("extended")),
+      active(layout.attr("active")),
+      clamped(layout.attr("clamped")),
+      flat(layout.attr("flat")),
+      text(layout.attr("text")) {}
+
+namespace {
+
+int fill_buffer(PyObject* self, Py_buffer* view, int flags) {
+  auto* observation = nb::inst_ptr<Observation>(self);
+  return PyBuffer_FillInfo(view, self, observation->row.bytes(),
+                           static_cast<Py_ssize_t>(observation->row.size()), 0, flags);
+}
+
+PyType_Slot buffer_slots[] = {{Py_bf_getbuffer, reinterpret_cast<void*>(&fill_buffer)},
+                              {0, nullptr}};
+
+/// A row copied out of an array of rows.
+Observation* from_bytes(std::shared_ptr<const Decoder> decoder, nb::handle bytes) {
+  auto observation = std::make_unique<Observation>(std::move(decoder));
+  Py_buffer view;
+  if (PyObject_GetBuffer(bytes.ptr(), &view, PyBUF_SIMPLE) != 0) throw nb::python_error();
+  const bool fits = static_cast<std::size_t>(view.len) == observation->row.size();
+  if (fits) std::memcpy(observation->row.bytes(), view.buf, view.len);
+  PyBuffer_Release(&view);
+  if (!fits) {
+    throw o80::InvalidArgument("a row of this robot has " +
+                               std::to_string(observation->row.size()) + " bytes");
+  }
+  return observation.release();
+}
+
+std::shared_ptr<o80::Description> description_from(nb::bytes schema) {
+  auto description = std::make_shared<o80::Description>();
+  description->schema = o80::schema_from_bytes(
+      std::as_bytes(std::span(schema.c_str(), schema.size())));
+  description->layout = o80::row_layout(description->schema);
+  return description;
+}
+
+}  // namespace
+
+void bind_observation(nb::module_& m) {
+  nb::class_<o80::Description>(m, "Description", "A robot as its segment describes it.")
+      .def(nb::new_(&description_from), "schema"_a)
+      .def("json", [](const o80::Description& self) { return o80::to_json(self.schema); })
+      .def("table",
+           [](const o80::Description& self) {
+             const auto bytes = o80::to_bytes(self.schema);
+             return nb::bytes(bytes.data(), bytes.size());
+           })
+      .def("hash", [](const o80::Description& self) { return o80::hash(self.schema); });
+
+  nb::class_<Decoder>(m, "Decoder", "How rows of one robot become arrays.")
+      .def(nb::new_([](std::shared_ptr<o80::Description> description, nb::object layout) {
+             return std::make_shared<Decoder>(std::move(description), std::move(layout));
+           }),
+           "description"_a, "layout"_a)
+      .def_ro("layout", &Decoder::layout);
+
+  nb::class_<Observation>(m, "Observation", nb::type_slots(buffer_slots),
+                          R"(One row of the history: what was asked in an iteration and what came of it.
+
+The arrays share the memory of this observation, which is its own: nothing that happens later
+changes them.)")
+      .def(nb::new_(&from_bytes), "decoder"_a, "row"_a)
+      .def_prop_ro("iteration", [](const Observation& self) { return self.row.iteration(); },
+                   "The iteration of this row.")
+      .def_prop_ro("time", [](const Observation& self) { return self.row.time(); },
+                   "When it was published [ns]: of the monotonic clock, or simulated in bursting.")
+      .def_prop_ro("lateness", [](const Observation& self) { return self.row.head().lateness; },
+                   "How long after its due moment the iteration began [ns].")
+      .def_prop_ro("overruns", [](const Observation& self) { return self.row.head().overruns; },
+                   "Iterations so far that were not done in time.")
+      .def_prop_ro("skipped", [](const Observation& self) { return self.row.head().skipped; },
+                   "Periods so far that were left out to catch up.")
+      .def_prop_ro("fresh", [](const Observation& self) { return self.row.head().fresh != 0; },
+                   "Whether the robot started afresh in this row.")
+      .def_ro("missed", &Observation::missed,
+              "Rows between this one and the one read before it that were overwritten unread; "
+              "set by wait_for_next and stream.")
+      .def_prop_ro("desired", [](nb::handle self) {
+            return nb::inst_ptr<Observation>(self)->decoder->desired(self);
+          },
+          nb::sig("def desired(self) -> typing.Any"),
+          "The states that were asked: an array (actuators,), or a record of groups.")
+      .def_prop_ro("observed", [](nb::handle self) {
+            return nb::inst_ptr<Observation>(self)->decoder->observed(self);
+          },
+          nb::sig("def observed(self) -> typing.Any"),
+          "The states that were read: an array (actuators,), or a record of groups.")
+      .def_prop_ro("extended", [](nb::handle self) {
+            return nb::inst_ptr<Observation>(self)->decoder->extended(self);
+          },
+          nb::sig("def extended(self) -> typing.Any"),
+          "Further sensor values: a record with a value for each field.")
+      .def_prop_ro("active", [](nb::handle self) {
+            return nb::inst_ptr<Observation>(self)->decoder->active(self);
+          },
+          nb::sig("def active(self) -> typing.Any"),
+          "Whether a command gave the desired state: bool (actuators,).")
+      .def_prop_ro("clamped", [](nb::handle self) {
+            return nb::inst_ptr<Observation>(self)->decoder->clamped(self);
+          },
+          nb::sig("def clamped(self) -> typing.Any"),
+          "Whether the limits changed the desired state: bool (actuators,).")
+      .def("flat",
+          [](nb::handle self, nb::handle dtype) {
+            return nb::inst_ptr<Observation>(self)->decoder->flat(self, dtype);
+          },
+          "dtype"_a = nb::none(),
+          nb::sig("def flat(self, dtype: typing.Any = None) -> typing.Any"),
+          "All observed numbers, then all extended ones, as one vector (default: float32).")
+      .def("__repr__", [](nb::handle self) {
+            return nb::inst_ptr<Observation>(self)->decoder->text(self);
+          },
+          nb::sig("def __repr__(self) -> str"));
+}

@@ -1,0 +1,30 @@
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include "bindings.hpp"
+#include "o80/memory/segment_list.hpp"
+#include "waiting.hpp"
+
+namespace nb = nanobind;
+
+void bind_segment_list(nb::module_& m) {
+  using o80::SegmentEntry;
+  nb::class_<SegmentEntry>(m, "SegmentEntry", "A file in shared memory that bears a segment's name.")
+      .def_ro("name", &SegmentEntry::name)
+      .def_prop_ro(
+          "life", [](const SegmentEntry& entry) { return std::string(name_of(entry.life)); })
+      .def_ro("readable", &SegmentEntry::readable)
+      .def_ro("pid", &SegmentEntry::pid)
+      .def_ro("started_at", &SegmentEntry::started_at, "[s] since 1970")
+      .def_ro("user", &SegmentEntry::user)
+      .def_ro("program", &SegmentEntry::program)
+      .def_ro("epoch", &SegmentEntry::epoch)
+      .def_ro("size", &SegmentEntry::bytes);
+  m.def("list_segments", [] {
+    const Waiting waiting;
+    return o80::list_segments();
+  });
+  m.def("clean", [](const std::string& name) { return o80::clean(name); }, nb::arg("name"));
+  m.def("clean_dead", &o80::clean_dead);
+}

@@ -1,0 +1,308 @@
+#include "states.hpp"
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <string_view>
+#include <type_traits>
+
+#include "o80/base/error.hpp"
+#include "o80/control/record.hpp"
+
+namespace nb = nanobind;
+using o80::FieldRow;
+using o80::InvalidArgument;
+using o80::Kind;
+using o80::Schema;
+
+namespace {
+
+std::string text_of(nb::handle value) { return nb::cast<std::string>(nb::repr(value)); }
+
+[[noreturn]] void refuse(const std::string& what, const std::string& needed, nb::handle value) {
+  PyErr_Clear();
+  throw InvalidArgument(what + " is " + needed + ", not " + text_of(value));
+}
+
+template <class T>
+void store(std::byte* to, T value) {
+  std::memcpy(to, &value, sizeof value);
+}
+
+/// Any Python number that is a whole one.
+nb::object whole_number(nb::handle value) {
+  if (PyFloat_Check(value.ptr())) {
+    const double number = PyFloat_AS_DOUBLE(value.ptr());
+    if (std::isfinite(number) && number == std::floor(number)) {
+      return nb::steal(PyLong_FromDouble(number));
+    }
+    return {};
+  }
+  PyObject* index = PyNumber_Index(value.ptr());
+  if (index == nullptr) PyErr_Clear();
+  return nb::steal(index);
+}
+
+template <class T>
+void write_integer(nb::handle value, std::byte* to, const std::string& what) {
+  const nb::object whole = whole_number(value);
+  if (!whole.is_valid()) refuse(what, "an integer", value);
+  constexpr auto kLeast = std::numeric_limits<T>::min();
+  constexpr auto kMost = std::numeric_limits<T>::max();
+  T number{};
+  if (!nb::try_cast<T>(whole, number)) {
+    PyErr_Clear();
+    throw InvalidArgument(what + " holds " + std::to_string(kLeast) + " to " +
+                          std::to_string(kMost) + ", not " + text_of(value));
+  }
+  store(to, number);
+}
+
+void write_float(Kind kind, nb::handle value, std::byte* to, const std::string& what) {
+  double number = 0;
+  if (PyFloat_CheckExact(value.ptr())) {
+    number = PyFloat_AS_DOUBLE(value.ptr());
+  } else {
+    number = PyFloat_AsDouble(value.ptr());
+    if (number == -1.0 && PyErr_Occurred() != nullptr) refuse(what, "a number", value);
+  }
+  if (kind == Kind::float64) {
+    store(to, number);
+  } else {
+    store(to, static_cast<float>(number));
+  }
+}
+
+void write_boolean(nb::handle value, std::byte* to, const std::string& what) {
+  const nb::object whole = whole_number(value);
+  std::int64_t number = -1;
+  if (whole.is_valid()) {
+    if (!nb::try_cast<std::int64_t>(whole, number)) PyErr_Clear();
+  } else if (nb::hasattr(value, "dtype")) {
+    number = PyObject_IsTrue(value.ptr());  // numpy.bool is no index
+  }
+  if (number != 0 && number != 1) refuse(what, "True or False", value);
+  store(to, static_cast<std::uint8_t>(number));
+}
+
+std::string labels_of(const Schema& schema, const FieldRow& field) {
+  std::string there;
+  for (std::uint32_t i = 0; i < field.labels; ++i) {
+    there += (i == 0 ? "" : ", ") + schema.labels[field.first_label + i].name.str();
+  }
+  return there;
+}
+
+void write_label(const Schema& schema, const FieldRow& field, nb::handle value, std::byte* to,
+                 const std::string& what) {
+  std::int64_t number = 0;
+  bool known = false;
+  if (PyUnicode_Check(value.ptr())) {
+    const auto text = nb::cast<std::string>(value);
+    for (std::uint32_t i = 0; i < field.labels; ++i) {
+      const o80::LabelRow& label = schema.labels[field.first_label + i];
+      if (label.name.view() != text) continue;
+      number = label.value;
+      known = true;
+    }
+  } else {
+    const nb::object whole = whole_number(value);
+    known = whole.is_valid() && nb::try_cast<std::int64_t>(whole, number);
+    if (known) {
+      known = false;
+      for (std::uint32_t i = 0; i < field.labels; ++i) {
+        known = known || schema.labels[field.first_label + i].value == number;
+      }
+    }
+  }
+  if (!known) refuse(what, "one of " + labels_of(schema, field), value);
+  std::memcpy(to, &number, field.size);  // little end first
+}
+
+std::string fields_of(const Schema& schema, std::uint32_t type) {
+  std::string there;
+  const o80::TypeRow& row = schema.types[type];
+  for (std::uint32_t i = 0; i < row.fields; ++i) {
+    there += (i == 0 ? "" : ", ") + schema.fields[row.first_field + i].name.str();
+  }
+  return there.empty() ? "it has no fields" : "its fields are " + there;
+}
+
+/// Fills a struct, number after number.
+class Writer {
+ public:
+  Writer(const Schema& schema, StateBytes& state) : schema_(schema), state_(state) {}
+
+  /// `number` is the place of the struct's first number in the whole state.
+  void write(std::uint32_t type, nb::handle value, std::byte* to, std::uint32_t number,
+             const std::string& what) {
+    if (const FieldRow* alone = plain_number(schema_, type)) {
+      element(*alone, value, to, number, what);
+    } else if (has_names(value)) {
+      by_name(type, value, to, number, what);
+    } else {
+      in_order(type, value, to, number, what);
+    }
+  }
+
+ private:
+  static bool has_names(nb::handle value) {
+    if (PyDict_Check(value.ptr())) return true;
+    if (nb::hasattr(value, "dtype")) return !value.attr("dtype").attr("names").is_none();
+    return nb::hasattr(value, "keys");
+  }
+
+  static nb::object names_of(nb::handle value) {
+    if (nb::hasattr(value, "dtype")) return value.attr("dtype").attr("names");
+    return value.attr("keys")();
+  }
+
+  void by_name(std::uint32_t type, nb::handle value, std::byte* to, std::uint32_t number,
+               const std::string& what) {
+    const o80::TypeRow& row = schema_.types[type];
+    std::uint32_t found = 0;
+    std::uint32_t place = number;
+    const nb::object names = nb::steal(PySequence_List(names_of(value).ptr()));
+    if (!names.is_valid()) throw nb::python_error();
+    for (std::uint32_t i = 0; i < row.fields; ++i) {
+      const FieldRow& member = schema_.fields[row.first_field + i];
+      const nb::str name(member.name.view().data(), member.name.view().size());
+      const int there = PySequence_Contains(names.ptr(), name.ptr());
+      if (there < 0) throw nb::python_error();
+      if (there != 0) {
+        ++found;
+        field(member, value[name], to + member.offset, place,
+              "'" + member.name.str() + "' of " + what);
+      } else {
+        state_.whole = false;
+      }
+      place += numbers_in(member);
+    }
+    if (found == nb::len(names)) return;
+    for (nb::handle name : names) {
+      bool known = false;
+      for (std::uint32_t i = 0; i < row.fields; ++i) {
+        const auto text = schema_.fields[row.first_field + i].name.view();
+        known = known || name.equal(nb::str(text.data(), text.size()));
+      }
+      if (!known) {
+        throw InvalidArgument(what + " has no field " + text_of(name) + ": " +
+                              fields_of(schema_, type));
+      }
+    }
+  }
+
+  void in_order(std::uint32_t type, nb::handle value, std::byte* to, std::uint32_t number,
+                const std::string& what) {
+    const o80::TypeRow& row = schema_.types[type];
+    const bool is_sequence = PySequence_Check(value.ptr()) != 0 && !PyUnicode_Check(value.ptr());
+    if (!is_sequence || PySequence_Size(value.ptr()) != static_cast<Py_ssize_t>(row.fields)) {
+      refuse(what, "a mapping, a record, or all its fields in order (" + fields_of(schema_, type) +
+                       ")",
+             value);
+    }
+    for (std::uint32_t i = 0; i < row.fields; ++i) {
+      const FieldRow& member = schema_.fields[row.first_field + i];
+      field(member, value[i], to + member.offset, number, "'" + member.name.str() + "' of " + what);
+      number += numbers_in(member);
+    }
+  }
+
+  /// A plain, a vector or a matrix field.
+  void field(const FieldRow& member, nb::handle value, std::byte* to, std::uint32_t number,
+             const std::string& what) {
+    if (member.rows == 0) {
+      element(member, value, to, number, what);
+      return;
+    }
+    const std::uint32_t each = numbers_in(member) / member.count();
+    expect_length(value, member.rows, what);
+    for (std::uint32_t i = 0; i < member.rows; ++i) {
+      const std::string where = what + " [" + std::to_string(i) + "]";
+      const nb::object row = value[i];
+      if (member.columns == 0) {
+        element(member, row, to + i * member.size, number + i * each, where);
+        continue;
+      }
+      expect_length(row, member.columns, where);
+      for (std::uint32_t j = 0; j < member.columns; ++j) {
+        const std::uint32_t place = i * member.columns + j;
+        element(member, row[j], to + place * member.size, number + place * each,
+                where + " [" + std::to_string(j) + "]");
+      }
+    }
+  }
+
+  void element(const FieldRow& member, nb::handle value, std::byte* to, std::uint32_t number,
+               const std::string& what) {
+    if (member.kind == Kind::structure) {
+      write(member.type, value, to, number, what);
+      return;
+    }
+    write_number(schema_, member, value, to, what);
+    state_.mask[number / 64] |= std::uint64_t{1} << (number % 64);
+  }
+
+  static void expect_length(nb::handle value, std::uint32_t length, const std::string& what) {
+    const bool is_sequence = PySequence_Check(value.ptr()) != 0 && !PyUnicode_Check(value.ptr());
+    if (!is_sequence || PySequence_Size(value.ptr()) != static_cast<Py_ssize_t>(length)) {
+      refuse(what, "a sequence of " + std::to_string(length), value);
+    }
+  }
+
+  std::uint32_t numbers_in(const FieldRow& member) const {
+    return member.count() *
+           (member.kind == Kind::structure ? schema_.scalar_count(member.type) : 1);
+  }
+
+  const Schema& schema_;
+  StateBytes& state_;
+};
+
+}  // namespace
+
+const FieldRow* plain_number(const Schema& schema, std::uint32_t type) {
+  const o80::TypeRow& row = schema.types[type];
+  if (row.fields != 1) return nullptr;
+  const FieldRow& field = schema.fields[row.first_field];
+  const bool plain =
+      field.name.view().empty() && field.rows == 0 && field.kind != Kind::structure;
+  return plain ? &field : nullptr;
+}
+
+void write_number(const Schema& schema, const FieldRow& field, nb::handle value, std::byte* to,
+                  const std::string& what) {
+  switch (field.kind) {
+    case Kind::float32:
+    case Kind::float64:
+      return write_float(field.kind, value, to, what);
+    case Kind::boolean:
+      return write_boolean(value, to, what);
+    case Kind::int8:
+      return write_integer<std::int8_t>(value, to, what);
+    case Kind::int16:
+      return write_integer<std::int16_t>(value, to, what);
+    case Kind::int32:
+      return write_integer<std::int32_t>(value, to, what);
+    case Kind::int64:
+      return write_integer<std::int64_t>(value, to, what);
+    case Kind::uint8:
+      return write_integer<std::uint8_t>(value, to, what);
+    case Kind::uint16:
+      return write_integer<std::uint16_t>(value, to, what);
+    case Kind::uint32:
+      return write_integer<std::uint32_t>(value, to, what);
+    case Kind::uint64:
+      return write_integer<std::uint64_t>(value, to, what);
+    case Kind::enumeration:
+      return write_label(schema, field, value, to, what);
+    default:
+      throw InvalidArgument(what + " cannot be set from Python");
+  }
+}
+
+StateBytes::StateBytes(const Schema& schema, std::uint32_t type, nb::handle value,
+                       const std::string& owner)
+    : bytes(schema.types[type].size), mask(o80::mask_words(schema.scalar_count(type))) {
+  Writer(schema, *this).write(type, value, bytes.data(), 0, owner);
+}

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "o80/describe/schema.hpp"
+
+/// The index of the number that is alone in a type, or nothing for a type with names.
+const o80::FieldRow* plain_number(const o80::Schema& schema, std::uint32_t type);
+
+/// Writes one number; `what` names it in the error.
+void write_number(const o80::Schema& schema, const o80::FieldRow& field, nanobind::handle value,
+                  std::byte* to, const std::string& what);
+
+/// A described struct from Python: a number, a mapping, a record, or a sequence of all its fields.
+struct StateBytes {
+  std::vector<std::byte> bytes;
+  std::vector<std::uint64_t> mask;  // a bit for each number that was given
+  bool whole = true;
+
+  /// Throws InvalidArgument, naming `owner`, the field and what there is.
+  StateBytes(const o80::Schema& schema, std::uint32_t type, nanobind::handle value,
+             const std::string& owner);
+};

@@ -1,0 +1,66 @@
+#include "words.hpp"
+
+#include <array>
+#include <nanobind/stl/string.h>
+
+#include <string>
+
+#include "o80/base/error.hpp"
+
+namespace nb = nanobind;
+
+namespace {
+
+/// The value whose text is `word`; the error lists what there is.
+template <class Value, std::size_t N>
+Value parse(nb::handle word, const std::array<Value, N>& values, const char* name) {
+  Py_ssize_t size = 0;
+  const char* text =
+      PyUnicode_Check(word.ptr()) ? PyUnicode_AsUTF8AndSize(word.ptr(), &size) : nullptr;
+  std::string there;
+  for (const Value value : values) {
+    const std::string_view known = o80::to_text(value);
+    if (text != nullptr && known == std::string_view(text, static_cast<std::size_t>(size))) {
+      return value;
+    }
+    there += (there.empty() ? "'" : ", '") + std::string(known) + "'";
+  }
+  PyErr_Clear();
+  throw o80::InvalidArgument(std::string(name) + " cannot be " +
+                             nb::cast<std::string>(nb::repr(word)) + ": it is one of " + there);
+}
+
+/// Looked up once and kept for the life of the process.
+template <class Value, std::size_t N>
+nb::object member(Value value, const char* type) {
+  static std::array<PyObject*, N> known{};
+  const auto index = static_cast<std::size_t>(value) < N ? static_cast<std::size_t>(value) : 0;
+  if (known[index] == nullptr) {
+    const std::string_view text = o80::to_text(value);
+    known[index] = nb::module_::import_("o80.words")
+                       .attr(type)(nb::str(text.data(), text.size()))
+                       .release()
+                       .ptr();
+  }
+  return nb::borrow(known[index]);
+}
+
+}  // namespace
+
+o80::Mode mode_of(nb::handle word) {
+  using enum o80::Mode;
+  return parse(word, std::array{queue, overwrite}, "mode");
+}
+
+o80::Profile profile_of(nb::handle word) {
+  using enum o80::Profile;
+  return parse(word, std::array{linear, minimum_jerk}, "profile");
+}
+
+o80::Start start_of(nb::handle word) {
+  using enum o80::Start;
+  return parse(word, std::array{desired, observed}, "start");
+}
+
+nb::object python_word(o80::Status status) { return member<o80::Status, 10>(status, "Status"); }
+nb::object python_word(o80::Reason reason) { return member<o80::Reason, 10>(reason, "Reason"); }

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+#include "o80/control/record.hpp"
+
+// Words of a few letters: enums that are strings in Python (o80.words).
+
+o80::Mode mode_of(nanobind::handle word);
+o80::Profile profile_of(nanobind::handle word);
+o80::Start start_of(nanobind::handle word);
+
+/// Members of o80.Status and o80.Reason.
+nanobind::object python_word(o80::Status status);
+nanobind::object python_word(o80::Reason reason);

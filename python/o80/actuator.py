@@ -1,0 +1,92 @@
+"""The things that can be commanded, as a robot describes them."""
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True, kw_only=True)
+class Number:
+    """One number of an actuator's state."""
+
+    name: str  #: path of fields, empty for a plain number
+    unit: str
+    help: str
+    minimum: float  #: -inf: not limited
+    maximum: float  #: inf: not limited
+    speed: float  #: largest one [unit/s]; inf: not limited
+
+
+@dataclass(frozen=True, kw_only=True)
+class Actuator:
+    """One thing that can be commanded."""
+
+    index: int
+    name: str
+    group: str  #: empty if the robot is one array of actuators
+    when_idle: str  #: "hold" or "follow"
+    numbers: tuple[Number, ...]  #: of its state, in order
+
+    @property
+    def unit(self) -> str:
+        """The unit of the first number."""
+        return self.numbers[0].unit
+
+    @property
+    def minimum(self) -> float:
+        """The least value of the first number."""
+        return self.numbers[0].minimum
+
+    @property
+    def maximum(self) -> float:
+        """The largest value of the first number."""
+        return self.numbers[0].maximum
+
+    @property
+    def speed(self) -> float:
+        """The largest speed of the first number [its unit/s]."""
+        return self.numbers[0].speed
+
+
+def names_of(described: dict[str, Any], path: str = "") -> Iterator[tuple[str, str, str]]:
+    """Path, unit and help of every number of a described type, in order."""
+    for field in described["fields"]:
+        inner = f"{path}.{field['name']}" if path and field["name"] else path or field["name"]
+        for place in itertools.product(*map(range, field["shape"])):
+            here = inner + "".join(f"[{i}]" for i in place)
+            if field["kind"] == "struct":
+                yield from names_of(field["type"], here)
+            else:
+                yield here, field["unit"], field["help"]
+
+
+def actuators_of(schema: dict[str, Any]) -> list[Actuator]:
+    """The actuators of a schema."""
+    actuators = []
+    for index, row in enumerate(schema["actuators"]):
+        group = schema["groups"][row["group"]]
+        numbers = tuple(
+            Number(
+                name=name,
+                unit=unit,
+                help=text,
+                minimum=-math.inf if limit["minimum"] is None else limit["minimum"],
+                maximum=math.inf if limit["maximum"] is None else limit["maximum"],
+                speed=math.inf if limit["speed"] is None else limit["speed"],
+            )
+            for (name, unit, text), limit in zip(
+                names_of(group["type"]), row["limits"], strict=True
+            )
+        )
+        actuators.append(
+            Actuator(
+                index=index,
+                name=row["name"],
+                group=group["name"],
+                when_idle=row["when_idle"],
+                numbers=numbers,
+            )
+        )
+    return actuators

@@ -1,0 +1,351 @@
+"""The side that commands and reads."""
+
+import contextlib
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from enum import IntEnum
+from functools import cached_property
+from types import TracebackType
+from typing import Any, Literal, Self, overload
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from o80 import _core, frontend_classes
+from o80.actuator import Actuator, actuators_of
+from o80.errors import BackendGone, Closed, ControlTaken, Error, InvalidArgument, RequestRejected, SchemaMismatch
+from o80.history import History
+from o80.layout import Layout
+from o80.trajectory import states_of, times_of
+from o80.words import Status
+
+
+class Frontend(_core.Frontend):
+    """A frontend of the backend that owns a segment: sends commands, reads observations.
+
+    segment: its name.
+    timeout: how long to wait for the backend [s]; None is for ever.
+    read_only: asks for no right to command.
+    on_error: what becomes of sent motion if the `with` block ends by an exception or Ctrl-C:
+        "purge" drops what this frontend sent, "continue" leaves it.
+    dead: attaches also to a backend that is gone, to read its history.
+
+    May be used from several threads. Raises TimeoutError, SegmentError, BackendFailed.
+    If the robot's package has a class of its own for it, that one is made.
+    """
+
+    def __new__(
+        cls,
+        segment: str,
+        timeout: float | None = 5.0,
+        *,
+        read_only: bool = False,
+        on_error: Literal["purge", "continue"] = "purge",
+        dead: bool = False,
+    ) -> Self:
+        attachment = _core.attach(segment, timeout, read_only, dead)
+        chosen = frontend_classes.of(attachment.robot) if cls is Frontend else None
+        self = super().__new__(cls if chosen is None else chosen)
+        self._attachment = attachment
+        return self
+
+    def __init__(
+        self,
+        segment: str,
+        timeout: float | None = 5.0,
+        *,
+        read_only: bool = False,
+        on_error: Literal["purge", "continue"] = "purge",
+        dead: bool = False,
+    ) -> None:
+        if on_error not in ("purge", "continue"):
+            raise InvalidArgument(f"on_error cannot be {on_error!r}: it is 'purge' or 'continue'")
+        self._on_error = on_error
+        self._arguments = (segment, timeout, read_only, on_error, dead)
+        self._set_up(self.__dict__.pop("_attachment"))
+
+    @classmethod
+    def _of(cls, attachment: _core.Attachment) -> "Frontend":
+        """The frontend of an inline robot."""
+        chosen = frontend_classes.of(attachment.robot) or cls
+        self = _core.Frontend.__new__(chosen)
+        assert isinstance(self, Frontend)
+        self._on_error = "purge"
+        self._arguments = None
+        self._set_up(attachment)
+        return self
+
+    def _set_up(self, attachment: _core.Attachment) -> None:
+        self._description = attachment.description
+        self._layout = Layout(self._description)
+        self._decoder = _core.Decoder(self._description, self._layout)
+        super().__init__(attachment, self._decoder)
+        self._first = self._read(self.oldest, 1) if self.published >= 0 else None
+
+    # ------------------------------------------------------------------ commanding
+
+    def add_trajectory(
+        self,
+        targets: ArrayLike | Mapping[str, ArrayLike],
+        actuators: int | str | Sequence[int | str] | None = None,
+        *,
+        iterations: int | None = None,
+        times: ArrayLike | None = None,
+        speed: float | None = None,
+        mode: str = "queue",
+        profile: str = "linear",
+        start: str = "desired",
+    ) -> None:
+        """Adds one command through many states for each of several actuators.
+
+        targets: (T, actuators), row after row; (T,) for a single actuator. Numbers for states of
+            one number, else a structured array, or a mapping from each field to an array.
+        actuators: which ones, by index or name (None: all).
+        iterations: of each row (default: 1).
+        times: when each row is reached, since the start [s]: (T,), not falling.
+        speed: at which to go to each row, as in add_command.
+        mode, profile, start: as in add_command.
+
+        All of it is added or, if InvalidArgument is raised, none.
+        """
+        if times is not None and (iterations is not None or speed is not None):
+            raise InvalidArgument(
+                "a trajectory has one pace: give one of iterations, times and speed"
+            )
+        if times is None and speed is None and iterations is None:
+            iterations = 1
+        chosen, single = self._chosen(actuators)
+        states, rows = states_of(targets, chosen, single, self._layout)
+        self._add_trajectories(
+            [actuator for actuator in chosen],
+            rows,
+            states,
+            None if times is None else times_of(times),
+            speed,
+            iterations,
+            mode,
+            profile,
+            start,
+        )
+
+    def _chosen(self, actuators: int | str | Sequence[int | str] | None) -> tuple[list[int], bool]:
+        """Indices, and whether one actuator was named alone."""
+        if actuators is None:
+            return list(range(len(self.actuators))), False
+        if isinstance(actuators, (int, str, np.integer)):
+            return [self._index(actuators)], True
+        return [self._index(actuator) for actuator in actuators], False
+
+    def request(self, name: str, /, *, timeout: float | None = None, **fields: Any) -> None:
+        """Sends a request to the driver at once and waits for its answer.
+
+        name: of the request; `requests` lists them.
+        timeout: for the answer [s].
+        fields: of the request; what is not given is zero.
+
+        It needs no pulse; what was added and not pulsed stays added. Raises RequestRejected with
+        the driver's text, TimeoutError, BackendGone. `add_request` makes one part of a pulse.
+        """
+        batch = self._send_request(name, fields)
+        batch.wait(timeout)
+        handle = batch.handles[0]
+        if handle.status != Status.COMPLETED:
+            raise RequestRejected(f"'{self.segment}' did not serve '{name}': {handle.text}")
+
+    @overload
+    def burst(
+        self, iterations: int = 1, *, timeout: float | None = None, wait: Literal[True] = True
+    ) -> _core.Observation: ...
+    @overload
+    def burst(
+        self, iterations: int = 1, *, timeout: float | None = None, wait: Literal[False]
+    ) -> _core.Burst: ...
+    def burst(
+        self, iterations: int = 1, *, timeout: float | None = None, wait: bool = True
+    ) -> _core.Observation | _core.Burst:
+        """Sends what was added and lets a bursting backend run exactly so many iterations.
+
+        Returns the observation of the last one; with `wait=False` a Burst, to be waited for.
+        Raises NotBursting, TimeoutError after `timeout` [s], BackendGone, LaneFull, InvalidArgument.
+        """
+        return self._burst(iterations, timeout) if wait else self._start_burst(iterations)
+
+    @contextlib.contextmanager
+    def control(self, timeout: float | None = 5.0) -> Iterator[Self]:
+        """Exclusive control within a `with` block: batches of other frontends are rejected.
+
+        Raises ControlTaken, naming the holder, if another frontend has it.
+        """
+        batch = self._take_control()
+        batch.wait(timeout)
+        handle = batch.handles[0]
+        if handle.status != Status.COMPLETED:
+            raise ControlTaken(f"no control of '{self.segment}': {handle.text}")
+        try:
+            yield self
+        finally:
+            with contextlib.suppress(BackendGone, Closed):
+                self._release_control().wait(timeout)
+
+    # ------------------------------------------------------------------ observing
+
+    def history(
+        self, n: int | None = None, *, since: int | None = None, until: int | None = None
+    ) -> History:
+        """The last n observations, or those of the iterations `since` to `until`, both included.
+
+        None of them: all that are still there. What is no longer there is left out.
+        """
+        oldest, last = self.oldest, self.published
+        if n is not None and (since is not None or until is not None):
+            raise InvalidArgument("give either n, or since and until")
+        if n is not None and n < 0:
+            raise InvalidArgument(f"a history of {n} observations: it cannot be negative")
+        if until is not None:
+            last = min(last, until)
+        first = oldest if n is None else max(oldest, last + 1 - n)
+        if since is not None:
+            first = max(first, since)
+        return self._read(first, max(0, last + 1 - first))
+
+    def _read(self, first: int, count: int) -> History:
+        rows = np.empty(count, self._layout.row)
+        begin, found = self._read_rows(first, rows.view(np.uint8)) if count else (first, 0)
+        return History(self._decoder, rows[:found])
+
+    @property
+    def initial_states(self) -> Any:
+        """The observed states of row 0, before anything was asked.
+
+        If that row was overwritten before this frontend attached: of the oldest row it found.
+        """
+        if self._first is None or not len(self._first):
+            raise Error(f"'{self.segment}' had no row yet when this frontend attached")
+        return self._first[0].observed
+
+    # ------------------------------------------------------------------ the robot
+
+    @property
+    def schema(self) -> dict[str, Any]:
+        """All that the backend says of its robot."""
+        return self._layout.schema
+
+    @property
+    def robot(self) -> str:
+        """The name of the robot."""
+        name: str = self.schema["robot"]
+        return name
+
+    @cached_property
+    def actuators(self) -> list[Actuator]:
+        """What can be commanded: index, name, unit, limits."""
+        return actuators_of(self.schema)
+
+    @property
+    def requests(self) -> dict[str, str]:
+        """The requests that the driver serves, each with its help."""
+        return {request["name"]: request["help"] for request in self.schema["requests"]}
+
+    @property
+    def enums(self) -> dict[str, type[IntEnum]]:
+        """An IntEnum for each enumerated field, by its name."""
+        return self._layout.enums
+
+    @property
+    def period(self) -> float:
+        """Of the iterations [s]."""
+        nanoseconds: int = self.schema["period"]
+        return nanoseconds * 1e-9
+
+    @property
+    def frequency(self) -> float:
+        """Iterations a second [1/s]."""
+        nanoseconds: int = self.schema["period"]
+        return 1e9 / nanoseconds
+
+    @property
+    def alive(self) -> bool:
+        """Whether the backend lives."""
+        return self.life in ("starting", "running")
+
+    # ------------------------------------------------------------------ its life
+
+    def close(self) -> None:
+        """Ends it: sent motion goes on, an inline robot stops. Closing twice is allowed."""
+        if self.closed:
+            return
+        if self.added:
+            warnings.warn(
+                f"{self.added} commands were added to '{self.segment}' and never pulsed",
+                ResourceWarning,
+                stacklevel=2,
+            )
+        self._close()
+
+    def reattach(self, timeout: float | None = 5.0) -> None:
+        """Attaches to the backend that now owns the name, after the former one ended.
+
+        Raises TimeoutError, and SchemaMismatch if it is described otherwise.
+        """
+        if self._arguments is None:
+            raise InvalidArgument("an inline robot that ended cannot be attached again: start it")
+        segment, _, read_only, *_ = self._arguments
+        attachment = _core.attach(segment, timeout, read_only, False)
+        difference = _core.difference(self._description, attachment.description)
+        if difference:
+            raise SchemaMismatch(
+                f"'{segment}' is no longer the robot it was; open a new frontend:\n{difference}"
+            )
+        self._reattach(attachment)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if error is not None and not self.closed:
+            self.forget_added()
+            if self._on_error == "purge":
+                with contextlib.suppress(Error):
+                    self._purge_own()
+        self.close()
+
+    def __reduce__(self) -> tuple[Callable[..., "Frontend"], tuple[Any, ...]]:
+        if self._arguments is None:
+            raise TypeError(
+                f"the frontend of an inline robot cannot be pickled: it lives in this process. "
+                f"Attach to its segment: o80.Frontend({self.segment!r})"
+            )
+        return _open_again, (type(self), *self._arguments)
+
+    def __repr__(self) -> str:
+        state = "closed" if self.closed else self.life
+        return f"<o80.{type(self).__name__} of '{self.segment}' ({self.robot}), {state}>"
+
+
+def _open_again(
+    cls: type[Frontend],
+    segment: str,
+    timeout: float | None,
+    read_only: bool,
+    on_error: Literal["purge", "continue"],
+    dead: bool,
+) -> Frontend:
+    """A pickled frontend attaches again by name."""
+    return cls(segment, timeout, read_only=read_only, on_error=on_error, dead=dead)
+
+
+def burst(
+    members: Mapping[Frontend, int], timeout: float | None = None
+) -> dict[Frontend, _core.Observation]:
+    """Lets several bursting backends run at the same time, each its number of iterations.
+
+    All are granted theirs first, then all are waited for. Returns the observation of the last
+    iteration of each. Raises NotBursting (before anything runs), TimeoutError, BackendGone.
+    """
+    rows = _core.burst_group(list(members.items()), timeout)
+    return dict(zip(members, rows, strict=True))

@@ -1,0 +1,264 @@
+"""How the rows of a robot become NumPy arrays."""
+
+import json
+from collections.abc import Iterator
+from enum import IntEnum
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o80 import _core
+from o80.record import Record
+
+HEAD = (
+    ("iteration", "i8"),
+    ("time", "i8"),
+    ("lateness", "i8"),
+    ("overruns", "u4"),
+    ("skipped", "u4"),
+    ("fresh", "u4"),
+)
+
+
+def dtype_of_field(field: dict[str, Any]) -> np.dtype[Any]:
+    """The dtype of one element of a described field."""
+    kind = field["kind"]
+    if kind == "struct":
+        return dtype_of_type(field["type"])
+    if kind == "enum":
+        return np.dtype(f"{'i' if field['signed'] else 'u'}{field['size']}")
+    return np.dtype(kind)
+
+
+def is_plain(described: dict[str, Any]) -> bool:
+    """Whether a described type is a plain number."""
+    fields = described["fields"]
+    return len(fields) == 1 and not fields[0]["name"]
+
+
+def dtype_of_type(described: dict[str, Any]) -> np.dtype[Any]:
+    """The dtype of a described struct, or of the plain number it is."""
+    fields = described["fields"]
+    if is_plain(described):
+        return np.dtype((dtype_of_field(fields[0]), tuple(fields[0]["shape"])))
+    return np.dtype(
+        {
+            "names": [field["name"] for field in fields],
+            "formats": [(dtype_of_field(field), tuple(field["shape"])) for field in fields],
+            "offsets": [field["offset"] for field in fields],
+            "itemsize": described["size"],
+        }
+    )
+
+
+def dtype_of_block(groups: list[dict[str, Any]], size: int) -> np.dtype[Any]:
+    """The dtype of all states of a robot."""
+    formats = [
+        (dtype_of_type(group["type"]), (group["count"],) if group["array"] else ())
+        for group in groups
+    ]
+    if len(groups) == 1 and not groups[0]["name"]:
+        return np.dtype(formats[0])
+    return np.dtype(
+        {
+            "names": [group["name"] for group in groups],
+            "formats": formats,
+            "offsets": [group["offset"] for group in groups],
+            "itemsize": size,
+        }
+    )
+
+
+def fields_of(described: dict[str, Any]) -> Iterator[tuple[dict[str, Any], dict[str, Any]]]:
+    """Every field of a described type, nested ones included, with the struct it is in."""
+    for field in described["fields"]:
+        yield described, field
+        if field["kind"] == "struct":
+            yield from fields_of(field["type"])
+
+
+def runs_of(dtype: np.dtype[Any], offset: int) -> Iterator[tuple[np.dtype[Any], int, int]]:
+    """The numbers of a dtype in order: (kind, offset, how many)."""
+    if dtype.subdtype is not None:
+        element, shape = dtype.subdtype
+        count = int(np.prod(shape))
+        if element.names is None:
+            yield element, offset, count
+            return
+        for i in range(count):
+            yield from runs_of(element, offset + i * element.itemsize)
+    elif dtype.names is None:
+        yield dtype, offset, 1
+    else:
+        assert dtype.fields is not None
+        for name in dtype.names:
+            member = dtype.fields[name]
+            yield from runs_of(member[0], offset + member[1])
+
+
+def joined(
+    runs: Iterator[tuple[np.dtype[Any], int, int]],
+) -> list[tuple[np.dtype[Any], int, int]]:
+    """The same, neighbours of one kind made one."""
+    result: list[tuple[np.dtype[Any], int, int]] = []
+    for kind, offset, count in runs:
+        if result:
+            last, begin, length = result[-1]
+            if last == kind and begin + length * last.itemsize == offset:
+                result[-1] = (kind, begin, length + count)
+                continue
+        result.append((kind, offset, count))
+    return result
+
+
+class Layout:
+    """Reads the rows of one robot."""
+
+    def __init__(self, description: _core.Description) -> None:
+        schema: dict[str, Any] = json.loads(description.json())
+        row = schema["row"]
+        self.schema = schema
+        self.size: int = row["size"]
+        self.actuators = len(schema["actuators"])
+        self.states = dtype_of_block(schema["groups"], row["observed"] - row["desired"])
+        self.extras = dtype_of_type(schema["extended"]) if "extended" in schema else np.dtype([])
+        self._desired_at: int = row["desired"]
+        self._observed_at: int = row["observed"]
+        self._extended_at: int = row["extended"]
+        self._active_at: int = row["active"]
+        self._clamped_at: int = row["clamped"]
+        self._mask_bytes: int = row["mask_words"] * 8
+        self._is_array = self.states.subdtype is not None
+        self._element, self._shape = self.states.subdtype or (self.states, ())
+
+    @cached_property
+    def row(self) -> np.dtype[Any]:
+        """The dtype of a whole row; masks as bytes, a bit for each actuator."""
+        parts = [(name, np.dtype(kind), self.schema["row"][name]) for name, kind in HEAD]
+        if self.actuators:
+            mask = np.dtype(("u1", (self._mask_bytes,)))
+            parts += [
+                ("desired", self.states, self._desired_at),
+                ("observed", self.states, self._observed_at),
+                ("active", mask, self._active_at),
+                ("clamped", mask, self._clamped_at),
+            ]
+        if self.extras.itemsize:
+            parts.append(("extended", self.extras, self._extended_at))
+        names, formats, offsets = zip(*parts, strict=True)
+        return np.dtype(
+            {"names": names, "formats": formats, "offsets": offsets, "itemsize": self.size}
+        )
+
+    @cached_property
+    def runs(self) -> list[tuple[np.dtype[Any], int, int]]:
+        """All numbers of observed, then of extended: (kind, offset in the row, how many)."""
+        return joined(
+            run
+            for dtype, offset in (
+                (self.states, self._observed_at),
+                (self.extras, self._extended_at),
+            )
+            for run in runs_of(dtype, offset)
+        )
+
+    @cached_property
+    def enums(self) -> dict[str, type[IntEnum]]:
+        """An enum for each enumerated field: by its name, and by "Type.field"."""
+        found: dict[str, type[IntEnum]] = {}
+        ambiguous: set[str] = set()
+        types = [group["type"] for group in self.schema["groups"]]
+        types += [request["type"] for request in self.schema["requests"]]
+        if "extended" in self.schema:
+            types.append(self.schema["extended"])
+        for described in types:
+            for owner, field in fields_of(described):
+                if field["kind"] != "enum":
+                    continue
+                name = field["name"] or owner["name"]
+                values = IntEnum(name, field["labels"])  # type: ignore[misc]
+                found[f"{owner['name']}.{name}" if field["name"] else name] = values
+                if name in found and list(found[name].__members__) != list(values.__members__):
+                    ambiguous.add(name)
+                found.setdefault(name, values)
+        return {name: values for name, values in found.items() if name not in ambiguous}
+
+    # one row, as a buffer => arrays over its memory
+
+    def _block(self, row: Any, offset: int) -> Any:
+        if self._is_array:
+            return np.ndarray(self._shape, self._element, row, offset)
+        return Record(np.ndarray((), self.states, row, offset))
+
+    def desired(self, row: Any) -> Any:
+        return self._block(row, self._desired_at)
+
+    def observed(self, row: Any) -> Any:
+        return self._block(row, self._observed_at)
+
+    def extended(self, row: Any) -> Record:
+        return Record(np.ndarray((), self.extras, row, self._extended_at))
+
+    def _mask(self, row: Any, offset: int) -> NDArray[np.bool_]:
+        bits = np.ndarray((self._mask_bytes,), np.uint8, row, offset)
+        return np.unpackbits(bits, count=self.actuators, bitorder="little").view(np.bool_)
+
+    def active(self, row: Any) -> NDArray[np.bool_]:
+        return self._mask(row, self._active_at)
+
+    def clamped(self, row: Any) -> NDArray[np.bool_]:
+        return self._mask(row, self._clamped_at)
+
+    def flat(self, row: Any, dtype: Any = None) -> NDArray[Any]:
+        kind = np.dtype(np.float32 if dtype is None else dtype)
+        parts = [np.ndarray((count,), own, row, offset) for own, offset, count in self.runs]
+        if len(parts) == 1:
+            return parts[0].astype(kind)
+        if not parts:
+            return np.empty(0, kind)
+        return np.concatenate(parts, dtype=kind, casting="unsafe")
+
+    def text(self, row: Any) -> str:
+        lines = [f"<o80.Observation of iteration {row.iteration} at {row.time * 1e-9:.6f} s"]
+        if self.actuators:
+            lines += [f"  desired:  {row.desired}", f"  observed: {row.observed}"]
+        if self.extras.names:
+            lines.append(f"  extended: {row.extended}")
+        return "\n".join(lines) + ">"
+
+    # many rows, as an array of `row` => views with a first dimension
+
+    def many(self, rows: NDArray[Any], part: str) -> Any:
+        """The states of an array of rows: (T, actuators), or a record of groups."""
+        if not self.actuators:
+            return Record(np.empty(len(rows), np.dtype([])))
+        return rows[part] if self._is_array else Record(rows[part])
+
+    def many_extras(self, rows: NDArray[Any]) -> Record:
+        """The extended values of an array of rows."""
+        if not self.extras.itemsize:
+            return Record(np.empty(len(rows), np.dtype([])))
+        return Record(rows["extended"])
+
+    def many_masks(self, rows: NDArray[Any], part: str) -> NDArray[np.bool_]:
+        """A mask of an array of rows: bool (T, actuators)."""
+        if not self.actuators:
+            return np.zeros((len(rows), 0), np.bool_)
+        bits = np.ascontiguousarray(rows[part])
+        unpacked = np.unpackbits(bits, axis=-1, count=self.actuators, bitorder="little")
+        return unpacked.view(np.bool_)
+
+    def many_flat(self, rows: NDArray[Any], dtype: Any = None) -> NDArray[Any]:
+        """All observed numbers, then all extended ones: (T, numbers)."""
+        kind = np.dtype(np.float32 if dtype is None else dtype)
+        columns = sum(count for _, _, count in self.runs)
+        result = np.empty((len(rows), columns), kind)
+        column = 0
+        for own, offset, count in self.runs:
+            strides = (rows.strides[0], own.itemsize)
+            part: NDArray[Any] = np.ndarray((len(rows), count), own, rows, offset, strides)
+            result[:, column : column + count] = part
+            column += count
+        return result

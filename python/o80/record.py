@@ -1,0 +1,62 @@
+"""Values with names, read as attributes or by key."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Record:
+    """Described values of one row, or of many: a view into a structured array.
+
+    `record.force` and `record["force"]` are the same array: (T, ...) for T rows, and without the
+    first dimension (a number for a single value) for one row.
+    """
+
+    __slots__ = ("_array",)
+
+    def __init__(self, array: NDArray[Any]) -> None:
+        self._array = array
+
+    def __getitem__(self, name: str) -> Any:
+        try:
+            value = self._array[name]
+        except (KeyError, ValueError, IndexError):
+            there = ", ".join(self.keys()) or "there are none"
+            raise KeyError(f"there is no value {name!r}; there are: {there}") from None
+        if value.dtype.names and value.ndim == self._array.ndim:
+            return Record(value)
+        return value if value.ndim else value[()]
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        try:
+            return self[name]
+        except KeyError as error:
+            raise AttributeError(error.args[0]) from None
+
+    def keys(self) -> tuple[str, ...]:
+        """The names of the values."""
+        return self._array.dtype.names or ()
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.keys())
+
+    def __len__(self) -> int:
+        return len(self.keys())
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self.keys()]
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        return np.array(self._array, dtype=dtype, copy=copy)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Record) and bool(np.array_equal(self._array, other._array))
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        return f"Record({', '.join(f'{name}={self[name]!r}' for name in self)})"

@@ -1,0 +1,233 @@
+"""Robots: libraries that a process of their own runs, or this one.
+
+    with o80.robots.load("two_joints").start(frequency=500, gain=2.0) as process:
+        arm = process.frontend()
+
+    with o80.robots.load("two_joints").inline() as arm:
+        arm.burst(5)
+"""
+
+import builtins
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from typing import Any, Literal
+
+from o80 import _core
+from o80.errors import DriverError, InvalidArgument
+from o80.frontend import Frontend
+from o80.process import Process, start_process
+
+__all__ = ["Option", "Process", "Robot", "RobotFile", "list", "load"]
+
+GROUP = "o80.robots"
+
+
+@dataclass(frozen=True)
+class RobotFile:
+    """A robot that can be loaded by its name."""
+
+    name: str
+    path: Path
+
+
+@dataclass(frozen=True, kw_only=True)
+class Option:
+    """One value a robot can be started with, a field of its described Config."""
+
+    name: str
+    kind: str  #: number, integer, boolean, text, "one of: a, b", or "3 x number"
+    default: str  #: as text
+    help: str
+    unit: str
+
+
+def list() -> builtins.list[RobotFile]:
+    """All robots that can be loaded by name: of O80_ROBOT_PATH, bundled, and of Python packages."""
+    found = {name: Path(path) for name, path in _core.find_robots()}
+    for name, point in _packaged().items():
+        if name not in found:
+            found[name] = _path_of(point)
+    return [RobotFile(name, path) for name, path in found.items()]
+
+
+def load(name_or_path: str | os.PathLike[str]) -> "Robot":
+    """Loads a robot, by its name or by the path of its library.
+
+    Raises DriverError, whose text lists what there is.
+    """
+    text = os.fspath(name_or_path)
+    if os.sep not in text:
+        if text.endswith(".so") and Path(text).exists():
+            text = os.path.join(os.curdir, text)
+        elif text not in (name for name, _ in _core.find_robots()) and text in _packaged():
+            text = str(_path_of(_packaged()[text]))
+    return Robot(_core.load_robot(text))
+
+
+@cache
+def _packaged() -> Mapping[str, EntryPoint]:
+    """Robots that installed packages announce: an entry point gives a path, or a function of it."""
+    return {point.name: point for point in entry_points(group=GROUP)}
+
+
+def _path_of(point: EntryPoint) -> Path:
+    value = point.load()
+    path = value() if callable(value) else value
+    if not isinstance(path, (str, os.PathLike)):
+        raise DriverError(
+            f"entry point '{point.name}' of the group {GROUP} gives {path!r}: it must be the path "
+            f"of a robot library, or a function that gives it"
+        )
+    return Path(path)
+
+
+class Robot:
+    """A robot library that is loaded; no hardware is touched before it is started."""
+
+    def __init__(self, library: _core.RobotLibrary) -> None:
+        self._library = library
+
+    @property
+    def name(self) -> str:
+        """As it calls itself."""
+        return self._library.name
+
+    @property
+    def path(self) -> Path:
+        """Of its library."""
+        return Path(self._library.path)
+
+    @property
+    def built_with(self) -> str:
+        """Versions of o80 and of what it links."""
+        return self._library.built_with
+
+    @property
+    def options(self) -> builtins.list[Option]:
+        """What it can be started with, beyond what every robot can."""
+        return [
+            Option(
+                name=option.name,
+                kind=option.kind,
+                default=option.default,
+                help=option.help,
+                unit=option.unit,
+            )
+            for option in self._library.options
+        ]
+
+    def start(
+        self,
+        segment: str | None = None,
+        *,
+        frequency: float = 1000.0,
+        bursting: bool = False,
+        history: int | None = None,
+        lanes: int | None = None,
+        lane_blocks: int | None = None,
+        permission: int = 0o600,
+        stale: Literal["hold", "purge", "stop"] = "hold",
+        silence: float | None = None,
+        policy: Literal["other", "fifo", "rr"] = "other",
+        priority: int | None = None,
+        cpus: Sequence[int] = (),
+        lock_memory: bool = False,
+        timeout: float | None = 30.0,
+        **config: Any,
+    ) -> Process:
+        """Starts it as a process of its own, which ends when this one does.
+
+        segment: the name to attach to (None: the robot's).
+        frequency: iterations a second [1/s]; bursting, of simulated time.
+        bursting: stands still until a frontend asks for iterations.
+        history: observations kept (None: as many as 16 MiB hold, 100000 at most).
+        lanes, lane_blocks: frontends that may command at once, and blocks of 64 bytes that each
+            may have in flight.
+        permission: of the segment's file.
+        stale: what happens to the commands of a frontend that dies, or is silent for longer than
+            `silence` [s]: they are carried out, dropped, or the robot stops.
+        policy, priority, cpus, lock_memory: real-time scheduling; what the machine refuses is
+            warned about.
+        timeout: for the robot to be running [s].
+        config: its own options, see `options`.
+
+        Returns when it is running. Raises DriverError with the driver's fault, SegmentTaken,
+        InvalidArgument, TimeoutError.
+        """
+        flags: dict[str, Any] = {
+            "frequency": frequency,
+            "bursting": bursting,
+            "history": history,
+            "lanes": lanes,
+            "lane-blocks": lane_blocks,
+            "permission": f"{permission:o}",
+            "stale": stale,
+            "silence": silence,
+            "policy": policy,
+            "priority": priority,
+            "cpus": ",".join(map(str, cpus)) or None,
+            "lock-memory": lock_memory,
+        }
+        words: builtins.list[str] = []
+        for name, value in flags.items():
+            if value is True:
+                words.append(f"--{name}")
+            elif value is not None and value is not False:
+                words.append(f"--{name}={value}")
+        for name, text in self._config(config):
+            words.append(f"--{name}={text}")
+        return start_process(self._library.path, segment or self.name, words, timeout)
+
+    def inline(
+        self,
+        segment: str | None = None,
+        *,
+        frequency: float = 1000.0,
+        history: int | None = None,
+        **config: Any,
+    ) -> Frontend:
+        """Starts it inside this process: bursts of the frontend run in the thread that asks.
+
+        segment: a name for others to attach to (None: an unused one).
+        frequency: iterations a second of simulated time [1/s].
+        history: observations kept (None: as many as 16 MiB hold, 100000 at most).
+        config: its own options, see `options`.
+
+        Closing the frontend stops the robot. Raises DriverError, SegmentTaken, InvalidArgument.
+        """
+        if not (math.isfinite(frequency) and frequency > 0):
+            raise InvalidArgument(f"a frequency of {frequency} cannot be: it is above 0 [1/s]")
+        attachment = self._library.start_inline(
+            segment or "", round(1e9 / frequency), history or 0, self._config(config)
+        )
+        return Frontend._of(attachment)
+
+    def _config(self, config: Mapping[str, Any]) -> builtins.list[tuple[str, str]]:
+        """Names and texts of its options; the error lists what there is."""
+        known = {option.name for option in self.options}
+        for name in config:
+            if name not in known:
+                there = f"its options are {', '.join(sorted(known))}" if known else "it has none"
+                raise InvalidArgument(f"robot '{self.name}' has no option '{name}': {there}")
+        return [(name, _text_of(value)) for name, value in config.items()]
+
+    def __repr__(self) -> str:
+        return f"<o80.robots.Robot '{self.name}' of {self.path}>"
+
+
+def _text_of(value: Any) -> str:
+    """An option as the text that the robot reads."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, (str, os.PathLike)):
+        return os.fspath(value)
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, Sequence):
+        return ",".join(map(_text_of, value))
+    return str(value)

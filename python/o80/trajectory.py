@@ -1,0 +1,80 @@
+"""Targets of many rows, from Python values to the bytes of each actuator."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from o80.errors import InvalidArgument
+from o80.layout import Layout, dtype_of_type
+
+
+def states_of(
+    targets: ArrayLike | Mapping[str, ArrayLike],
+    actuators: Sequence[int],
+    single: bool,
+    layout: Layout,
+) -> tuple[NDArray[np.uint8], int]:
+    """Bytes of the rows of the first actuator, then of the next..., and how many rows."""
+    kind = _common_type(actuators, layout)
+    if isinstance(targets, Mapping):
+        array = _from_fields(targets, kind)
+    else:
+        try:
+            array = np.asarray(targets, kind)
+        except (TypeError, ValueError) as error:
+            raise InvalidArgument(f"the targets cannot be read as {kind}: {error}") from error
+    if single and array.ndim == 1:
+        array = array[:, np.newaxis]
+    if array.ndim != 2 or array.shape[1] != len(actuators):
+        expected = "(T,)" if single else f"(T, {len(actuators)})"
+        raise InvalidArgument(
+            f"the targets of {len(actuators)} actuators are {expected}, not {array.shape}"
+        )
+    return np.ascontiguousarray(array.T).reshape(-1).view(np.uint8), len(array)
+
+
+def _common_type(actuators: Sequence[int], layout: Layout) -> np.dtype[Any]:
+    """The state that all of them have."""
+    schema = layout.schema
+    groups = {schema["actuators"][actuator]["group"] for actuator in actuators}
+    kinds = {dtype_of_type(schema["groups"][group]["type"]) for group in groups}
+    if len(kinds) == 1:
+        return kinds.pop()
+    names = ", ".join(schema["groups"][group]["name"] for group in sorted(groups))
+    raise InvalidArgument(
+        f"the groups {names} have states of different types: give each a trajectory of its own"
+        if groups
+        else "a trajectory needs an actuator"
+    )
+
+
+def _from_fields(targets: Mapping[str, ArrayLike], kind: np.dtype[Any]) -> NDArray[Any]:
+    """One structured array from an array for each field."""
+    names = kind.names or ()
+    if set(targets) != set(names):
+        there = ", ".join(names) or "none, it is a plain number"
+        raise InvalidArgument(
+            f"a trajectory needs every field of the state ({there}), not {', '.join(targets)}"
+        )
+    columns = {name: np.asarray(values) for name, values in targets.items()}
+    assert kind.fields is not None
+    inner = {name: len(kind.fields[name][0].shape) for name in names}
+    shapes = {column.shape[: column.ndim - inner[name]] for name, column in columns.items()}
+    if len(shapes) != 1:
+        raise InvalidArgument(f"the fields have different numbers of targets: {sorted(shapes)}")
+    array = np.zeros(shapes.pop(), kind)
+    for name, column in columns.items():
+        array[name] = column
+    return array
+
+
+def times_of(times: ArrayLike) -> NDArray[np.int64]:
+    """[s] => [ns]"""
+    seconds = np.asarray(times, np.float64)
+    if seconds.ndim != 1 or not np.all(np.isfinite(seconds)):
+        raise InvalidArgument("the times of a trajectory are finite numbers (T,) [s]")
+    if np.any(np.abs(seconds) > 1e9):
+        raise InvalidArgument("the times of a trajectory are too long to be counted")
+    return np.rint(seconds * 1e9).astype(np.int64)
