@@ -13,13 +13,18 @@ endforeach()
 list(REMOVE_DUPLICATES test_folders)
 
 foreach(folder IN LISTS test_folders)
+  if(folder STREQUAL "mujoco" AND NOT TARGET mujoco::mujoco)
+    continue()
+  endif()
   set(sources ${test_sources})
   list(FILTER sources INCLUDE REGEX "/tests/cpp/${folder}/")
   set(target o80_test_${folder})
   add_executable(${target} ${sources})
   target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/tests/cpp ${PROJECT_SOURCE_DIR})
   target_compile_definitions(
-    ${target} PRIVATE O80_TEST_PREFIX="${PROJECT_BINARY_DIR}" O80_TEST_SOURCE="${PROJECT_SOURCE_DIR}"
+    ${target}
+    PRIVATE O80_TEST_PREFIX="${PROJECT_BINARY_DIR}" O80_TEST_SOURCE="${PROJECT_SOURCE_DIR}"
+            O80_TEST_COMPILER="${CMAKE_CXX_COMPILER}"
   )
   target_link_libraries(${target} PRIVATE o80 o80_warnings GTest::gmock GTest::gtest GTest::gmock_main)
   # the parts of a robot that its tests look into, when the robot keeps them in a library
