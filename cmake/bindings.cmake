@@ -19,5 +19,6 @@ nanobind_add_stub(
   MODULE _core
   OUTPUT ${PROJECT_BINARY_DIR}/python/_core.pyi
   PYTHON_PATH $<TARGET_FILE_DIR:_core>
-  DEPENDS _core
+  PATTERN_FILE ${PROJECT_SOURCE_DIR}/python/bindings/stub.pat
+  DEPENDS _core ${PROJECT_SOURCE_DIR}/python/bindings/stub.pat
 )

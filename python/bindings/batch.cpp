@@ -45,9 +45,9 @@ void bind_batch(nb::module_& m) {
   nb::class_<Handle>(m, "Handle", "What became of one command or request, when it was asked.")
       .def_ro("id", &Handle::id, "Names it within its frontend.")
       .def_prop_ro("status", [](const Handle& self) { return python_word(self.status); },
-                   nb::sig("def status(self) -> o80.words.Status"), "What became of it.")
+                   nb::sig("def status(self) -> Status"), "What became of it.")
       .def_prop_ro("reason", [](const Handle& self) { return python_word(self.reason); },
-                   nb::sig("def reason(self) -> o80.words.Reason"), "Why.")
+                   nb::sig("def reason(self) -> Reason"), "Why.")
       .def_prop_ro("iteration", [](const Handle& self) { return known(self.iteration); },
                    "The iteration at which the status changed; None while it is queued.")
       .def_ro("text", &Handle::text, "Why it was rejected or dropped, in words.")
@@ -61,7 +61,7 @@ void bind_batch(nb::module_& m) {
       .def_prop_ro("handles", &Batch::handles,
                    "A handle for each command, request and purge, in the order they were added.")
       .def_prop_ro("statuses", &statuses_of,
-                   nb::sig("def statuses(self) -> list[o80.words.Status]"),
+                   nb::sig("def statuses(self) -> list[Status]"),
                    "The status of each, in the order they were added.")
       .def_prop_ro("ended", &Batch::ended, "Whether every record has an end status.")
       .def_prop_ro("first_iteration",
