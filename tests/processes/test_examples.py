@@ -1,0 +1,96 @@
+"""The examples run as they stand and say what they promise."""
+
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+import o80
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+PYTHON_EXAMPLES = sorted((ROOT / "examples" / "python").glob("*.py"))
+
+SAYS = {
+    "bursting": ["the same to the last bit: True", "left is at iteration 5, right at 3"],
+    "embedded_backend": ["closed to [ 0.02 -0.02]"],
+    "embedded_simulation": ["iteration 300"],
+    "history": ["1000 rows, observed is an array of shape (1000, 2)"],
+    "mirroring": ["asked for exactly what was seen: True"],
+    "paces": [
+        "in 0.25 s:            250",
+        "at 10 rad/s:          100",
+        "smoothly at 10 rad/s: 188",
+    ],
+    "queue_and_overwrite": ["the slow command was overwritten", "the last one was purged"],
+    "several_frontends": ["both ended: COMPLETED, COMPLETED", "without control: REJECTED"],
+    "snapshots": ["the same to the last bit: True", "refused: "],
+    "waiting_or_not": ["asked for 0.30 rad", "is next"],
+}
+
+
+def run(command: list[str], folder: Path = ROOT) -> str:
+    """Runs a program to its end; its output."""
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, cwd=folder)
+    assert done.returncode == 0, f"{command} failed:\n{done.stdout}\n{done.stderr}"
+    return done.stdout
+
+
+@contextmanager
+def running(command: list[str], end: signal.Signals = signal.SIGTERM) -> Iterator[None]:
+    """A robot's process that is up, and stopped in order at the end."""
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    try:
+        assert "runs on segment" in process.stdout.readline()
+        yield
+    finally:
+        process.send_signal(end)
+        assert process.wait(timeout=20) == 0
+        process.stdout.close()
+
+
+@pytest.mark.parametrize("example", PYTHON_EXAMPLES, ids=lambda path: str(path.stem))
+def test_a_python_example_says_what_it_promises(example: Path, tmp_path: Path) -> None:
+    output = run([sys.executable, str(example)], folder=tmp_path)
+    for line in SAYS[example.stem]:
+        assert line in output
+
+
+def test_every_python_example_is_tested() -> None:
+    assert {path.stem for path in PYTHON_EXAMPLES} == set(SAYS)
+
+
+def test_the_cpp_embedded_simulation_steps_with_its_learner(build_prefix: Path) -> None:
+    output = run([str(build_prefix / "bin" / "example_embedded_simulation")])
+    assert "step 3: iteration 30, simulated time 0.030 s, cart at 0.30 m" in output
+
+
+def test_the_cpp_embedded_backend_runs_its_iterations(build_prefix: Path) -> None:
+    output = run([str(build_prefix / "bin" / "example_embedded_backend"), "50"])
+    assert "mixed for 51 iterations" in output
+
+
+def test_the_cpp_frontend_commands_a_robot(build_prefix: Path) -> None:
+    with running([str(build_prefix / "bin" / "o80-run"), "two_joints"]):
+        output = run([str(build_prefix / "bin" / "example_frontend")])
+    assert "blocking: asked for 0.500 rad" in output
+    assert "the slow command was overwritten, the quick one completed" in output
+
+
+def test_the_cpp_twin_mirrors_a_robot(build_prefix: Path) -> None:
+    program = [str(build_prefix / "bin" / "o80-run"), "two_joints"]
+    with running(program), running([*program, "--segment", "twin", "--bursting"]):
+        output = run([str(build_prefix / "bin" / "example_mirroring")])
+    assert "twin's iteration 200" in output
+
+
+def test_a_main_of_ones_own_is_a_robot_like_any_other(build_prefix: Path) -> None:
+    program = str(build_prefix / "bin" / "example_own_main")
+    assert "--swing number" in run([program, "--help"])
+    with running([program, "--base", "30"], signal.SIGINT):
+        with o80.Frontend("thermometer", read_only=True) as reader:
+            assert 24.9 < reader.latest().extended["temperature"] < 35.1
