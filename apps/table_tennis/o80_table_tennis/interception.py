@@ -7,21 +7,23 @@ leaves. Least squares finds those that send it to the target, near to a comforta
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .aerodynamics import Aerodynamics
 from .flight import AERODYNAMICS, BALL_GUN_SPIN, TABLE, predict
-from .kinematics import nearest_in_reach, posture_reaching, racket_pose
+from .kinematics import BLADE_THICKNESS, nearest_in_reach, posture_reaching, racket_pose
 from .racket_impact import RacketImpact, velocity_to_land
-from .table import Table
+from .table import BALL_RADIUS, Table
 
 FloatArray = NDArray[np.float64]
 
 PERIOD = 0.01
 """Of the rows of a predicted path [s]."""
+TOUCH = BALL_RADIUS + BLADE_THICKNESS / 2
+"""From the middle of the blade to the centre of a ball that touches it [m]."""
 LATEST = 1.6
 """No ball is followed further ahead than this [s]."""
 FIRST_ROUNDS = 4
@@ -39,13 +41,19 @@ class Strike:
     speeds: FloatArray
     """(4,) [rad/s]"""
 
+    def later(self, time: float) -> Strike:
+        """The same strike, seen `time` [s] later."""
+        return replace(self, time=self.time - time)
+
 
 @dataclass(frozen=True)
 class InterceptionSettings:
     """Which strikes are wanted."""
 
-    target: tuple[float, float] = (0.0, 2.5)
+    target_x: float = 0.0
     """Where on the table the ball shall land [m]."""
+    target_y: float = 2.5
+    """[m]"""
     flight: float = 0.55
     """How long it shall fly there [s]."""
     nearest: float = -0.15
@@ -56,14 +64,16 @@ class InterceptionSettings:
     """Speed of joint 1 [rad/s]."""
     steepest: float = 1.2
     """Angle of the wrist, either way [rad]."""
-    comfortable: tuple[float, float, float] = (0.05, 0.3, 1.5)
-    """y [m], wrist [rad], speed of joint 1 [rad/s] that are chosen if all do equally well."""
-    discomfort: tuple[float, float, float] = (0.5, 0.1, 0.05)
-    """What a deviation from them weighs, against an error of the ball's velocity [1/m, 1, s]."""
-    after_bounce: float = 0.02
-    """How long after its bounce a ball may be met at the earliest [s]."""
+    comfortable_y: float = 0.05
+    """Where the ball is met if all places do equally well [m]."""
+    comfortable_wrist: float = 0.3
+    """The same for joint 4 [rad]."""
+    comfortable_speed: float = 1.5
+    """The same for the speed of joint 1 [rad/s]."""
+    discomfort: tuple[float, float, float] = (0.2, 0.05, 0.02)
+    """What deviations from them weigh, against an error of the ball's velocity [1/s, m/s, m]."""
     spin: tuple[float, float, float] = BALL_GUN_SPIN
-    """Of the coming ball [rad/s]."""
+    """Of the ball, before and after the strike [rad/s]."""
     impact: RacketImpact = field(default_factory=RacketImpact)
     aerodynamics: Aerodynamics = AERODYNAMICS
     table: Table = TABLE
@@ -134,8 +144,9 @@ class StrikePlanner:
 
     def forget(self) -> None:
         """The next ball is another one."""
-        _, wrist, speed = self._settings.comfortable
-        self._place, self._wrist, self._speed = self._settings.comfortable[0], wrist, speed
+        self._place = self._settings.comfortable_y
+        self._wrist = self._settings.comfortable_wrist
+        self._speed = self._settings.comfortable_speed
         self._found = False
 
     def plan(self, ball: ComingBall) -> Strike | None:
@@ -143,17 +154,21 @@ class StrikePlanner:
         s = self._settings
         low = np.array([ball.time_at(s.farthest), -s.steepest, 0.0])
         high = np.array([ball.time_at(s.nearest), s.steepest, s.fastest])
-        comfort = np.array([ball.time_at(s.comfortable[0]), *s.comfortable[1:]])
-        position, velocity = ball.at(float(comfort[0]))
+        comfort = np.array(
+            [ball.time_at(s.comfortable_y), s.comfortable_wrist, s.comfortable_speed]
+        )
+        _, velocity = ball.at(float(comfort[0]))
         discomfort = np.array(s.discomfort) * [abs(float(velocity[1])), 1.0, 1.0]
 
         # Gauss-Newton, held within the limits
         guess = np.clip([ball.time_at(self._place), self._wrist, self._speed], low, high)
         probe = np.array([0.004, 0.02, 0.05])
-        target = np.array([*s.target, s.table.bounce_height])
+        target = np.array([s.target_x, s.target_y, s.table.bounce_height])
         for _ in range(1 if self._found else FIRST_ROUNDS):
             position, _ = ball.at(float(guess[0]))
-            wanted = velocity_to_land(position, target, s.flight, aerodynamics=s.aerodynamics)
+            wanted = velocity_to_land(
+                position, target, s.flight, spin=s.spin, aerodynamics=s.aerodynamics
+            )
             here = self._outcome(ball, guess)
             if here is None:
                 return None
@@ -191,6 +206,12 @@ class StrikePlanner:
         return self._settings.impact.outgoing(velocity, racket, normal)
 
 
-def _posture(position: FloatArray, wrist: float) -> FloatArray | None:
-    x, y, z = position.tolist()
-    return posture_reaching(nearest_in_reach((x, y, z)), wrist)
+def _posture(ball: FloatArray, wrist: float) -> FloatArray | None:
+    """The racket's face touches the ball, as near to its middle as reach allows."""
+    x, y, z = ball.tolist()
+    posture = posture_reaching(nearest_in_reach((x, y, z)), wrist)
+    if posture is None:
+        return None
+    nx, ny, nz = racket_pose(posture).normal
+    behind = (x - TOUCH * nx, y - TOUCH * ny, z - TOUCH * nz)
+    return posture_reaching(nearest_in_reach(behind), wrist)

@@ -26,6 +26,8 @@ JOINT_LIMIT = math.radians(89.8)
 """Either way [rad]."""
 BLADE = (0.5 * 0.1485, 0.5 * 0.1882)
 """Half axes of the elliptic blade, across and along the forearm [m]."""
+BLADE_THICKNESS = 0.0054
+"""[m]"""
 REACH = UPPER_ARM + FOREARM
 """From joint 2 to the centre of the racket when the arm is straight [m]."""
 SHORTEST_REACH = math.hypot(UPPER_ARM, FOREARM)

@@ -80,5 +80,6 @@ class PressureActions:
         delta = np.clip(np.clip(wanted, 0.0, 1.0) - self.asked, -0.49, 0.49)
         wished = 2.0 * np.arctanh(2.0 * delta) / self._factor
         action: NDArray[np.float32] = np.clip(wished, -1.0, 1.0).astype(np.float32)
-        self.asked = changed_pressures(self.asked, action, factor=self._factor)
+        taken = action.astype(np.float64)
+        self.asked = changed_pressures(self.asked, taken, factor=self._factor)
         return action

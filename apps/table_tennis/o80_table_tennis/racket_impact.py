@@ -34,20 +34,27 @@ def velocity_to_land(
     target: FloatArray,
     duration: float,
     *,
+    spin: tuple[float, float, float],
     aerodynamics: Aerodynamics,
     steps: int = 6,
     corrections: int = 2,
 ) -> FloatArray:
-    """With which a ball without spin flies from `position` to `target` (3,) in `duration` [s]."""
+    """With which a ball flies from `position` to `target` (3,) in `duration` [s].
+
+    Its `spin` (3,) [rad/s] is taken as constant.
+    """
     dt = duration / steps
+    turn = (
+        aerodynamics.magnus * spin[0],
+        aerodynamics.magnus * spin[1],
+        aerodynamics.magnus * spin[2],
+    )
     # a flight without air, then what the air took off it is aimed further
     velocity = (target - position) / duration
     velocity[2] += 0.5 * aerodynamics.gravity * duration
     for _ in range(corrections):
         state: State[float] = (*position.tolist(), *velocity.tolist())
         for _ in range(steps):
-            state = runge_kutta_step(
-                state, (0.0, 0.0, 0.0), aerodynamics.drag, aerodynamics.gravity, dt
-            )
+            state = runge_kutta_step(state, turn, aerodynamics.drag, aerodynamics.gravity, dt)
         velocity = velocity + (target - np.array(state[:3])) / duration
     return velocity

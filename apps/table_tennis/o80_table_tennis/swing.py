@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,20 +21,24 @@ class JointMotion:
     ddq: FloatArray
     """[rad/s^2]"""
 
-    @classmethod
-    def at_rest(cls, q: FloatArray) -> JointMotion:
-        """Standing still at `q`."""
-        return cls(q.copy(), np.zeros_like(q), np.zeros_like(q))
-
 
 @dataclass(frozen=True)
 class Swing:
-    """Polynomials of the fifth degree, one a joint, continued with constant speed."""
+    """Polynomials of the fifth degree, one a joint, continued with their last speed."""
 
     coefficients: FloatArray
     """(6, 4), of the powers of time"""
     duration: float
     """[s]"""
+    gone: float = 0.0
+    """How much of it is over [s]."""
+
+    @classmethod
+    def resting_at(cls, q: FloatArray) -> Swing:
+        """Stands still at q (4,) [rad]."""
+        coefficients = np.zeros((6, len(q)))
+        coefficients[0] = q
+        return cls(coefficients, duration=0.0)
 
     @classmethod
     def between(cls, start: JointMotion, end: JointMotion, duration: float) -> Swing:
@@ -58,8 +62,13 @@ class Swing:
             duration,
         )
 
+    def later(self, time: float) -> Swing:
+        """The same motion, seen `time` [s] later."""
+        return replace(self, gone=self.gone + time)
+
     def at(self, time: float) -> JointMotion:
-        """`time` [s] after its start."""
+        """In `time` [s] from now."""
+        time += self.gone
         t = min(time, self.duration)
         c = self.coefficients
         q = c[0] + t * (c[1] + t * (c[2] + t * (c[3] + t * (c[4] + t * c[5]))))
