@@ -4,7 +4,7 @@ import numpy as np
 
 import o80
 
-with o80.robots.load("two_joints").inline(period=0.001, history=5000) as arm:
+with o80.robots.load("two_joints").inline(frequency=1000, history=5000) as arm:
     arm.add_command("shoulder", 1.0, duration=1.0, profile="minimum_jerk")
     arm.add_command("elbow", -1.0, speed=2.0)
     arm.burst(1200)

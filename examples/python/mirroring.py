@@ -5,7 +5,7 @@ import numpy as np
 import o80
 
 robot = o80.robots.load("two_joints")
-with robot.start(frequency=200, segment="real") as process, robot.inline(period=0.005) as twin:
+with robot.start(frequency=200, segment="real") as process, robot.inline(frequency=200) as twin:
     real = process.frontend()
     real.add_command("shoulder", 0.8, duration=0.5, profile="minimum_jerk")
     real.pulse()

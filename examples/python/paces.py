@@ -4,7 +4,7 @@ from typing import Any
 
 import o80
 
-with o80.robots.load("two_joints").inline(period=0.001) as arm:
+with o80.robots.load("two_joints").inline(frequency=1000) as arm:
 
     def took(**pace: Any) -> int:
         """Iterations from zero to one radian and, at once, back."""

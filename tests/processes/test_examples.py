@@ -91,6 +91,8 @@ def test_the_cpp_twin_mirrors_a_robot(build_prefix: Path) -> None:
 def test_a_main_of_ones_own_is_a_robot_like_any_other(build_prefix: Path) -> None:
     program = str(build_prefix / "bin" / "example_own_main")
     assert "--swing number" in run([program, "--help"])
-    with running([program, "--base", "30"], signal.SIGINT):
-        with o80.Frontend("thermometer", read_only=True) as reader:
-            assert 24.9 < reader.latest().extended["temperature"] < 35.1
+    with (
+        running([program, "--base", "30"], signal.SIGINT),
+        o80.Frontend("thermometer", read_only=True) as reader,
+    ):
+        assert 24.9 < reader.latest().extended["temperature"] < 35.1

@@ -1,0 +1,67 @@
+"""The program ``o80``: one command a file, gathered here."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+import typer
+
+import o80
+from o80.cli.clean import clean
+from o80.cli.echo import echo
+from o80.cli.info import info
+from o80.cli.list_segments import list_segments
+from o80.cli.run import run
+from o80.cli.screen import complain
+from o80.cli.stop import stop
+
+app = typer.Typer(
+    name="o80",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode="rich",
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="A first try: [bold]o80 run two_joints[/bold] here, [bold]o80 list[/bold] and "
+    "[bold]o80 echo two_joints[/bold] in another terminal.",
+)
+app.command(
+    "run",
+    context_settings={"ignore_unknown_options": True, "allow_extra_args": True},
+    add_help_option=False,
+)(run)
+app.command("list")(list_segments)
+app.command("info")(info)
+app.command("echo")(echo)
+app.command("stop")(stop)
+app.command("clean")(clean)
+
+
+@app.callback(invoke_without_command=True)
+def root(
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+    prefix: Annotated[
+        bool, typer.Option("--prefix", help="Print where o80 is installed, for CMake's o80_ROOT.")
+    ] = False,
+) -> None:
+    """Run robots, see what runs, read it, stop it."""
+    if version:
+        typer.echo(o80.__version__)
+        raise typer.Exit()
+    if prefix:
+        typer.echo(o80.prefix())
+        raise typer.Exit()
+
+
+def main() -> None:
+    """Entry point: o80's own errors become one line and exit code 1."""
+    try:
+        app()
+    except o80.Error as error:
+        complain(str(error))
+        sys.exit(1)
+    except KeyboardInterrupt:
+        sys.exit(130)
+    except BrokenPipeError:
+        sys.exit(0)

@@ -1,0 +1,36 @@
+"""``o80 run``: becomes the robot's process."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import typer
+
+import o80
+from o80.cli.screen import out
+
+
+def run(context: typer.Context) -> None:
+    """Run a robot: [bold]o80 run ROBOT FLAGS[/bold].
+
+    ROBOT is a name (see [bold]o80 run[/bold] alone) or the path of a robot library.
+    [bold]o80 run ROBOT --help[/bold] lists the robot's own flags beside those of every robot:
+    --segment, --frequency, --bursting, --history, --policy, --cpus and more.
+    The process is a C++ program without Python in it; Ctrl-C stops it in order.
+    """
+    arguments = context.args
+    if not arguments or arguments[0] in ("-h", "--help"):
+        out.print(context.get_help())
+        _print_robots()
+        raise typer.Exit(0 if arguments else 2)
+    robot, flags = arguments[0], arguments[1:]
+    paths = {known.name: str(known.path) for known in o80.robots.list()}
+    program = Path(o80.prefix()) / "bin" / "o80-run"
+    os.execv(program, [str(program), paths.get(robot, robot), *flags])
+
+
+def _print_robots() -> None:
+    out.print("[bold]Robots[/bold]")
+    for robot in o80.robots.list():
+        out.print(f"  {robot.name:<16} {robot.path}", soft_wrap=True)

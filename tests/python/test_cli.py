@@ -1,0 +1,155 @@
+"""The command line, as a person and as a script would use it."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+O80 = str(Path(sys.executable).parent / "o80")
+
+
+@pytest.fixture
+def folder() -> Iterator[Path]:
+    """A folder of segments of this test's own: nobody else's are seen or stopped."""
+    path = Path(f"/dev/shm/cli-test-{os.getpid()}")
+    path.mkdir()
+    try:
+        yield path
+    finally:
+        for file in path.iterdir():
+            file.unlink()
+        path.rmdir()
+
+
+def o80(folder: Path, *words: str, fails: bool = False) -> str:
+    """What a command prints; its errors if it should fail."""
+    done = subprocess.run(
+        [O80, *words],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        env={**os.environ, "O80_DIRECTORY": str(folder), "COLUMNS": "100", "NO_COLOR": "1"},
+    )
+    assert (done.returncode != 0) == fails, done.stdout + done.stderr
+    assert "Traceback" not in done.stderr
+    return done.stderr if fails else done.stdout
+
+
+def start(folder: Path, *words: str) -> "subprocess.Popen[str]":
+    """A robot that is up."""
+    process = subprocess.Popen(
+        [O80, "run", *words],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "O80_DIRECTORY": str(folder)},
+    )
+    assert process.stdout is not None
+    assert "runs on segment" in process.stdout.readline()
+    return process
+
+
+@pytest.fixture
+def robot(folder: Path) -> Iterator["subprocess.Popen[str]"]:
+    process = start(folder, "two_joints", "--frequency", "200")
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+        assert process.stdout is not None
+        process.stdout.close()
+
+
+def test_help_teaches_and_lists_robots(folder: Path) -> None:
+    assert "o80 run two_joints" in o80(folder, "--help")
+    assert "two_joints" in o80(folder, "run", "--help")
+    assert "--gain number" in o80(folder, "run", "two_joints", "--help")
+
+
+def test_the_version_and_the_prefix_are_printed(folder: Path) -> None:
+    assert o80(folder, "--version").count(".") == 2
+    assert (Path(o80(folder, "--prefix").strip()) / "bin" / "o80-run").exists()
+
+
+def test_nothing_runs_at_first(folder: Path) -> None:
+    assert "Nothing runs" in o80(folder, "list")
+    assert json.loads(o80(folder, "list", "--json")) == []
+
+
+def test_a_running_robot_is_listed(folder: Path, robot: "subprocess.Popen[str]") -> None:
+    table = o80(folder, "list")
+    assert "two_joints" in table
+    assert "running" in table
+    assert "200 Hz" in table
+    (row,) = json.loads(o80(folder, "list", "--json"))
+    assert row["segment"] == "two_joints"
+    assert row["pid"] == robot.pid
+    assert row["frequency"] == 200.0
+
+
+def test_info_describes_a_robot(folder: Path, robot: "subprocess.Popen[str]") -> None:
+    text = o80(folder, "info", "two_joints")
+    assert "shoulder" in text
+    assert "-3 to 3" in text
+    assert "effort(2) [rad]" in text
+    assert "reset(seed)" in text
+    schema = json.loads(o80(folder, "info", "two_joints", "--json"))
+    assert [actuator["name"] for actuator in schema["actuators"]] == ["shoulder", "elbow"]
+
+
+def test_echo_prints_rows_in_order(folder: Path, robot: "subprocess.Popen[str]") -> None:
+    lines = o80(folder, "echo", "two_joints", "--every", "--count", "5", "--json").splitlines()
+    rows = [json.loads(line) for line in lines]
+    first = rows[0]["iteration"]
+    assert [row["iteration"] for row in rows] == list(range(first, first + 5))
+    assert rows[0]["extended"] == {"effort": [0.0, 0.0]}
+    assert "observed (0 0)" in o80(folder, "echo", "two_joints", "--count", "1")
+
+
+def test_stop_ends_a_robot_in_order(folder: Path, robot: "subprocess.Popen[str]") -> None:
+    assert "two_joints has stopped" in o80(folder, "stop", "two_joints")
+    assert robot.wait(timeout=20) == 0
+    assert "Nothing runs" in o80(folder, "list")
+
+
+def test_stop_names_what_runs(folder: Path, robot: "subprocess.Popen[str]") -> None:
+    assert "running: two_joints" in o80(folder, "stop", "arm", fails=True)
+    assert "--all" in o80(folder, "stop", fails=True)
+
+
+def test_a_killed_robot_is_shown_read_and_cleaned(
+    folder: Path, robot: "subprocess.Popen[str]"
+) -> None:
+    robot.send_signal(signal.SIGKILL)
+    robot.wait()
+    assert "killed" in o80(folder, "list")
+    assert "shoulder" in o80(folder, "info", "two_joints")
+    assert "removed two_joints" in o80(folder, "clean")
+    assert "Nothing to remove" in o80(folder, "clean")
+
+
+def test_a_living_robot_is_not_cleaned(folder: Path, robot: "subprocess.Popen[str]") -> None:
+    assert "two_joints" in o80(folder, "clean", "two_joints", fails=True)
+    assert "running" in o80(folder, "list")
+
+
+def test_a_second_robot_of_the_same_name_is_refused(
+    folder: Path, robot: "subprocess.Popen[str]"
+) -> None:
+    text = o80(folder, "run", "two_joints", fails=True)
+    assert f"pid {robot.pid}" in text
+    assert "--segment" in text
+
+
+def test_errors_name_the_cure(folder: Path) -> None:
+    assert "there are:" in o80(folder, "run", "no_such_robot", fails=True)
+    assert "--help" in o80(folder, "run", "two_joints", "--no-such-flag", fails=True)
+    assert "--frequency cannot be 'fast'" in o80(
+        folder, "run", "two_joints", "--frequency", "fast", fails=True
+    )
+    assert "o80 run" in o80(folder, "echo", "nobody", "--timeout", "0.1", fails=True)
