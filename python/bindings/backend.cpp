@@ -1,3 +1,299 @@
-#include "bindings.hpp"
+#include "o80/runtime/backend.hpp"
 
-void bind_backend(nanobind::module_&) {}
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <algorithm>
+#include <cstring>
+#include <exception>
+#include <memory>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "bindings.hpp"
+#include "o80/memory/fork.hpp"
+#include "o80/runtime/observation.hpp"
+#include "waiting.hpp"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+using o80::InvalidArgument;
+
+namespace {
+
+constexpr std::int64_t kLook = 50'000'000;  // between looks at signals [ns]
+
+/// A schema while Python describes it.
+struct SchemaBuilder {
+  o80::Schema schema;
+
+  explicit SchemaBuilder(const std::string& robot) { schema.head.robot = o80::NameText(robot); }
+
+  /// A type from its fields: (name, kind, shape, text, labels or None, type).
+  std::uint32_t add_type(const std::string& name, const nb::list& fields) {
+    std::vector<o80::FieldRow> members;
+    for (nb::handle each : fields) members.push_back(member(nb::cast<nb::tuple>(each)));
+    return schema.add_type(name, std::move(members));
+  }
+
+  std::uint32_t add_actuators(const std::string& group, std::uint32_t type, std::uint32_t count,
+                              bool is_array) {
+    return schema.add_actuators(group, type, count, is_array);
+  }
+
+  void set_extended(std::uint32_t type) { schema.head.extended = type; }
+
+  void add_request(const std::string& name, std::uint32_t type, const std::string& help) {
+    schema.add_request(name, type, help);
+  }
+
+  void name_actuator(std::uint32_t actuator, const std::string& name) {
+    schema.actuator(actuator).name(name);
+  }
+
+  void set_follow(std::uint32_t actuator) {
+    schema.actuator(actuator).when_idle(o80::WhenIdle::follow);
+  }
+
+  std::vector<std::string> actuators() const {
+    std::vector<std::string> names;
+    for (const o80::ActuatorRow& row : schema.actuators) names.push_back(row.name.str());
+    return names;
+  }
+
+  /// Of a field, or of the first number if it is empty.
+  void set_limits(std::uint32_t actuator, const std::string& field, double minimum, double maximum,
+                  double speed) {
+    const o80::Limits limits{minimum, maximum, speed};
+    if (field.empty()) {
+      schema.actuator(actuator).limits(limits);
+    } else {
+      schema.actuator(actuator).limits(field, limits);
+    }
+  }
+
+ private:
+  o80::FieldRow member(const nb::tuple& row) {
+    const auto name = nb::cast<std::string>(row[0]);
+    const auto shape = nb::cast<std::vector<std::uint32_t>>(row[2]);
+    if (shape.size() > 2) {
+      throw InvalidArgument("field '" + name + "' has " + std::to_string(shape.size()) +
+                            " dimensions: at most 2 can be described");
+    }
+    o80::FieldRow field = o80::scalar_field(name, kind_of(nb::cast<std::string>(row[1])),
+                                            nb::cast<std::string>(row[3]));
+    if (!shape.empty()) field.rows = shape[0];
+    if (shape.size() == 2) field.columns = shape[1];
+    if (field.kind == o80::Kind::structure) field.type = nb::cast<std::uint32_t>(row[5]);
+    if (field.kind == o80::Kind::enumeration) add_labels(field, nb::cast<nb::dict>(row[4]));
+    return field;
+  }
+
+  void add_labels(o80::FieldRow& field, const nb::dict& labels) {
+    field.size = 8;
+    field.is_signed = 1;
+    field.first_label = static_cast<std::uint32_t>(schema.labels.size());
+    field.labels = static_cast<std::uint32_t>(labels.size());
+    for (const auto& [name, value] : labels) {
+      schema.labels.push_back(
+          {o80::NameText(nb::cast<std::string>(name)), nb::cast<std::int64_t>(value)});
+    }
+  }
+
+  static o80::Kind kind_of(const std::string& name) {
+    using o80::Kind;
+    constexpr const char* kNames[] = {"bool",   "int8",   "int16",  "int32",   "int64",
+                                      "uint8",  "uint16", "uint32", "uint64",  "float32",
+                                      "float64", "enum",   "struct"};
+    for (std::size_t i = 0; i < std::size(kNames); ++i) {
+      if (name == kNames[i]) return static_cast<Kind>(i);
+    }
+    throw InvalidArgument("numbers of kind '" + name + "' cannot be described");
+  }
+};
+
+/// The compiled half of o80.Backend.
+class Backend final : public o80::RequestServer {
+ public:
+  /// `serve(index, payload)` gives None, a text (rejected), or True (start afresh: the blocks
+  /// observed, extended and fresh_desired were filled). What it raises ends the backend.
+  Backend(const SchemaBuilder& builder, const o80::BackendOptions& options)
+      : backend_(builder.schema, options, this),
+        fresh_desired_(std::max<std::size_t>(backend_.layout().block / 8, 1)) {}
+
+  nb::object serve_with = nb::none();
+
+  o80::UntypedBackend& checked() {
+    guard_.check("the backend of segment '" + backend_.name() + "'");
+    if (ended_) {
+      throw o80::Closed("the backend of segment '" + backend_.name() + "' has ended: make a new one");
+    }
+    return backend_;
+  }
+  const o80::UntypedBackend& backend() const { return backend_; }
+  bool ended() const { return ended_; }
+
+  void publish() {
+    o80::UntypedBackend& backend = checked();
+    backend.publish();
+    begun_ = true;
+  }
+
+  /// True if an iteration is under way, False if the backend is to end.
+  bool step(std::optional<double> timeout) {
+    o80::UntypedBackend& backend = checked();
+    if (!begun_) throw InvalidArgument("publish row 0 before the first step");
+    o80::Step step = backend.try_step();
+    if (step == o80::Step::standing) step = wait(timeout);
+    if (raised_) std::rethrow_exception(std::exchange(raised_, nullptr));
+    return step == o80::Step::run;
+  }
+
+  void end(bool failed, const std::string& text) {
+    if (ended_ || guard_.forked()) return;
+    ended_ = true;
+    backend_.end(failed ? o80::State::failed : o80::State::stopped, text);
+  }
+
+  std::byte* fresh_desired() { return reinterpret_cast<std::byte*>(fresh_desired_.data()); }
+
+ private:
+  o80::Step wait(std::optional<double> timeout) {
+    const o80::Deadline deadline(timeout_of(timeout));
+    const Waiting waiting;
+    while (true) {
+      const o80::Step step = backend_.step_within(deadline.left(kLook));
+      if (step != o80::Step::standing) return step;
+      if (deadline.over()) {
+        throw o80::TimeoutError("nobody asked '" + backend_.name() +
+                                "' for an iteration in time: it is bursting");
+      }
+      Waiting::check();
+    }
+  }
+
+  o80::Served serve(std::uint32_t request, std::span<const std::byte> payload) noexcept override {
+    const nb::gil_scoped_acquire locked;
+    try {
+      const nb::object answer =
+          serve_with(request, nb::bytes(payload.data(), payload.size()));
+      if (answer.is_none()) return o80::Served::done();
+      if (nb::isinstance<nb::str>(answer)) {
+        return o80::Served::rejected(nb::cast<std::string>(answer));
+      }
+      return o80::Served::start_afresh();
+    } catch (std::exception& error) {
+      raised_ = std::current_exception();
+      return o80::Served::failed(error.what());
+    }
+  }
+
+  /// The blocks were filled when the request was served.
+  bool read_fresh(o80::FreshReading& reading) noexcept override {
+    reading.has_desired = true;
+    std::memcpy(reading.desired, fresh_desired(), backend_.layout().block);
+    return true;
+  }
+
+  o80::UntypedBackend backend_;
+  o80::ForkGuard guard_;
+  std::vector<std::uint64_t> fresh_desired_;
+  std::exception_ptr raised_;
+  bool begun_ = false;
+  bool ended_ = false;
+};
+
+o80::Stale stale_of(const std::string& word) {
+  if (word == "hold") return o80::Stale::hold;
+  if (word == "purge") return o80::Stale::purge;
+  if (word == "stop") return o80::Stale::stop;
+  throw InvalidArgument("stale cannot be '" + word + "': it is 'hold', 'purge' or 'stop'");
+}
+
+Backend* make(const SchemaBuilder& builder, const std::string& segment, std::int64_t period,
+              bool bursting, std::uint64_t history, std::uint32_t lanes, std::uint32_t lane_blocks,
+              std::uint32_t permission, const std::string& stale, std::int64_t silence) {
+  o80::BackendOptions options;
+  options.segment = segment;
+  options.period = period;
+  options.bursting = bursting;
+  options.history = history;
+  options.lanes = lanes;
+  options.lane_blocks = lane_blocks;
+  options.permission = permission;
+  options.stale = stale_of(stale);
+  options.silence = silence;
+  return new Backend(builder, options);
+}
+
+/// A block of the backend's memory, for arrays that live as long as it does.
+nb::object view(const std::byte* block, std::size_t size, int flags) {
+  return nb::steal(PyMemoryView_FromMemory(
+      const_cast<char*>(reinterpret_cast<const char*>(block)), static_cast<Py_ssize_t>(size),
+      flags));
+}
+
+}  // namespace
+
+void bind_backend(nb::module_& m) {
+  nb::class_<SchemaBuilder>(m, "SchemaBuilder", "A robot while it is described.")
+      .def(nb::init<const std::string&>(), "robot"_a)
+      .def("add_type", &SchemaBuilder::add_type, "name"_a, "fields"_a)
+      .def("add_actuators", &SchemaBuilder::add_actuators, "group"_a, "type"_a, "count"_a,
+           "is_array"_a)
+      .def("set_extended", &SchemaBuilder::set_extended, "type"_a)
+      .def("add_request", &SchemaBuilder::add_request, "name"_a, "type"_a, "help"_a)
+      .def("name_actuator", &SchemaBuilder::name_actuator, "actuator"_a, "name"_a)
+      .def("set_follow", &SchemaBuilder::set_follow, "actuator"_a)
+      .def("set_limits", &SchemaBuilder::set_limits, "actuator"_a, "field"_a, "minimum"_a,
+           "maximum"_a, "speed"_a)
+      .def_prop_ro("actuators", &SchemaBuilder::actuators);
+
+  nb::class_<Backend>(m, "Backend", "The compiled half of o80.Backend.")
+      .def(nb::new_(&make), "builder"_a, "segment"_a, "period"_a, "bursting"_a, "history"_a,
+           "lanes"_a, "lane_blocks"_a, "permission"_a, "stale"_a, "silence"_a)
+      .def_rw("serve_with", &Backend::serve_with, nb::arg().none())
+      .def_prop_ro("description",
+                   [](const Backend& self) {
+                     auto description = std::make_shared<o80::Description>();
+                     description->schema = self.backend().schema();
+                     description->layout = self.backend().layout();
+                     return description;
+                   })
+      .def("observed", [](nb::handle self) {
+            auto& backend = nb::inst_ptr<Backend>(self)->checked();
+            return view(backend.observed(), backend.layout().block, PyBUF_WRITE);
+          }, nb::sig("def observed(self) -> memoryview"))
+      .def("extended", [](nb::handle self) {
+            auto& backend = nb::inst_ptr<Backend>(self)->checked();
+            return view(backend.extended(), backend.layout().extended_size, PyBUF_WRITE);
+          }, nb::sig("def extended(self) -> memoryview"))
+      .def("fresh_desired", [](nb::handle self) {
+            auto* backend = nb::inst_ptr<Backend>(self);
+            return view(backend->fresh_desired(), backend->backend().layout().block,
+                        PyBUF_WRITE);
+          }, nb::sig("def fresh_desired(self) -> memoryview"))
+      .def("desired", [](const Backend& self) {
+            return nb::bytearray(self.backend().desired(), self.backend().layout().block);
+          })
+      .def("active", [](const Backend& self) {
+            return nb::bytes(self.backend().active(), self.backend().layout().mask_words * 8);
+          })
+      .def("publish", &Backend::publish)
+      .def("step", &Backend::step, "timeout"_a.none())
+      .def("interrupt", [](Backend& self, std::uint32_t actuator) {
+            self.checked().interrupt(actuator);
+          }, "actuator"_a)
+      .def("ask_to_stop", [](Backend& self) { self.checked().ask_to_stop(); })
+      .def("end", &Backend::end, "failed"_a, "text"_a)
+      .def_prop_ro("ended", &Backend::ended)
+      .def_prop_ro("failure",
+                   [](const Backend& self) { return std::string(self.backend().failure()); })
+      .def_prop_ro("segment", [](const Backend& self) { return self.backend().name(); })
+      .def_prop_ro("iteration", [](const Backend& self) { return self.backend().iteration(); })
+      .def_prop_ro("time", [](const Backend& self) { return self.backend().time(); });
+}

@@ -26,7 +26,7 @@ Attachment start_inline(const o80::RobotLibrary& library, const std::string& seg
   backend.period = period;
   backend.history = history;
   auto robot = std::make_shared<o80::InlineRobot>(
-      std::make_unique<o80::Robot>(*library.table, options), std::move(backend));
+      std::make_unique<o80::Robot>(*library.table, options), std::move(backend), Waiting::check);
   return {std::make_shared<o80::UntypedFrontend>(robot->segment(), robot), robot};
 }
 

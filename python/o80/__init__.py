@@ -3,6 +3,7 @@
 from o80 import robots
 from o80._core import Batch, Burst, Handle, Observation, Stream, version
 from o80.actuator import Actuator, Number
+from o80.backend import Backend, StartAfresh
 from o80.errors import (
     BackendFailed,
     BackendGone,
@@ -39,6 +40,7 @@ __version__ = version()
 
 __all__ = [
     "Actuator",
+    "Backend",
     "BackendFailed",
     "BackendGone",
     "BackendKilled",
@@ -72,6 +74,7 @@ __all__ = [
     "SegmentError",
     "SegmentTaken",
     "Start",
+    "StartAfresh",
     "Status",
     "Stream",
     "TimeoutError",

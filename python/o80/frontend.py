@@ -11,7 +11,7 @@ from typing import Any, Literal, Self, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from o80 import _core, frontend_classes
+from o80 import _core, at_exit, frontend_classes
 from o80.actuator import Actuator, actuators_of
 from o80.errors import BackendGone, Closed, ControlTaken, Error, InvalidArgument, RequestRejected, SchemaMismatch
 from o80.history import History
@@ -73,6 +73,7 @@ class Frontend(_core.Frontend):
         self._on_error = "purge"
         self._arguments = None
         self._set_up(attachment)
+        at_exit.close_later(self)
         return self
 
     def _set_up(self, attachment: _core.Attachment) -> None:

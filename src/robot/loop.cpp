@@ -16,7 +16,13 @@ Loop::Loop(std::unique_ptr<Robot> robot, const BackendOptions& options)
   fault_.reserve(1024);
 }
 
-Loop::~Loop() { stop(); }
+Loop::~Loop() {
+  if (!guard_.forked()) {
+    stop();
+  } else {
+    static_cast<void>(robot_.release());  // the hardware belongs to the parent process
+  }
+}
 
 void Loop::start() {
   if (!robot_->start() || !read()) {
@@ -37,13 +43,13 @@ Ended Loop::run() noexcept {
   return stop();
 }
 
-bool Loop::run_granted() noexcept {
-  while (!ended_) {
+Step Loop::run_granted(std::uint32_t most) noexcept {
+  for (std::uint32_t i = 0; i < most && !ended_; ++i) {
     const Step step = finished_ ? Step::ended : backend_.try_step();
-    if (step == Step::standing) return true;
+    if (step == Step::standing) return step;
     if (step == Step::ended || !iterate()) stop();
   }
-  return false;
+  return ended_ ? Step::ended : Step::run;
 }
 
 bool Loop::iterate() noexcept {

@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <atomic>
 #include <cstring>
+#include <limits>
 #include <optional>
 #include <vector>
 
 #include "o80/base/time.hpp"
 #include "o80/control/controller.hpp"
 #include "o80/describe/table.hpp"
+#include "o80/memory/fork.hpp"
 #include "o80/memory/history.hpp"
 #include "o80/memory/lane.hpp"
 #include "o80/memory/liveness.hpp"
@@ -24,6 +26,7 @@ constexpr std::uint64_t kDefaultHistoryRows = 100'000;
 constexpr std::uint32_t kBlocksPerIteration = 1024;
 constexpr std::uint32_t kNobody = 0xFFFFFFFF;
 constexpr std::int64_t kUntilEnded = -1;
+constexpr std::int64_t kForEver = std::numeric_limits<std::int64_t>::max();
 
 Schema prepared(Schema schema, const BackendOptions& options) {
   if (options.period <= 0) {
@@ -103,7 +106,8 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
 
   std::byte* row() noexcept { return reinterpret_cast<std::byte*>(row_.data()); }
   void publish(bool fresh) noexcept;
-  Step step(bool may_wait) noexcept;
+  Step step(std::int64_t at_most) noexcept;
+  void cut_burst() noexcept;
   void end(State state, std::string_view text) noexcept;
   std::int64_t time() const noexcept {
     return schema.head.bursting != 0 ? iteration_ * schema.head.period : monotonic_now();
@@ -155,6 +159,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
 
   void give_back() noexcept;
 
+  ForkGuard guard_;
   RequestServer* server_;
   std::vector<LaneLife> lives_;
   std::vector<std::uint64_t> freed_;
@@ -415,7 +420,10 @@ void UntypedBackend::Body::watch_silence() noexcept {
 
 // ------------------------------------------------------------------------------ the two verbs
 
-Step UntypedBackend::Body::step(bool may_wait) noexcept {
+/// Waits for a grant so long [ns] at most.
+Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
+  const std::int64_t give_up =
+      at_most > 0 && at_most < kForEver ? monotonic_now() + at_most : at_most;
   while (true) {
     look_at_lives();
     if (stop.load(std::memory_order_relaxed)) return Step::ended;
@@ -429,8 +437,9 @@ Step UntypedBackend::Body::step(bool may_wait) noexcept {
     const bool all_told = controller.finish_pending();
     give_back();
     if (staging_ || !all_told) continue;
-    if (!may_wait) return Step::standing;
-    bell.wait(lanes.bell_seen());
+    const std::int64_t left = give_up > 0 && give_up < kForEver ? give_up - monotonic_now() : give_up;
+    if (left <= 0) return Step::standing;
+    bell.wait(lanes.bell_seen(), std::min(left, kSlice));
   }
   if (granted()) take_due();
   watch_silence();
@@ -446,6 +455,13 @@ void UntypedBackend::Body::count_burst() noexcept {
 void UntypedBackend::Body::end_burst(Iteration row) noexcept {
   lanes[burst_lane_].set_burst_done(burst_id_, row);
   burst_lane_ = kNobody;
+}
+
+void UntypedBackend::Body::cut_burst() noexcept {
+  if (!granted()) return;
+  burst_left_ = 0;
+  end_burst(iteration_ - 1);
+  lanes.look_again();
 }
 
 void UntypedBackend::Body::publish(bool fresh) noexcept {
@@ -481,6 +497,7 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
 }
 
 void UntypedBackend::Body::end(State state, std::string_view text) noexcept {
+  if (guard_.forked()) return;  // it is the parent's to end
   if (segment.state() != State::starting && segment.state() != State::running) return;
   // the burst under way has no last row: whoever waits for it learns that the backend is gone
   burst_left_ = 0;
@@ -511,8 +528,12 @@ std::byte* UntypedBackend::observed() noexcept { return body_->row() + body_->la
 std::byte* UntypedBackend::extended() noexcept { return body_->row() + body_->layout.extended; }
 void UntypedBackend::publish() noexcept { body_->publish(false); }
 
-Step UntypedBackend::step() noexcept { return body_->step(true); }
-Step UntypedBackend::try_step() noexcept { return body_->step(false); }
+Step UntypedBackend::step() noexcept { return body_->step(kForEver); }
+Step UntypedBackend::try_step() noexcept { return body_->step(0); }
+Step UntypedBackend::step_within(std::int64_t at_most) noexcept {
+  return body_->step(std::max<std::int64_t>(at_most, 0));
+}
+void UntypedBackend::cut_burst() noexcept { body_->cut_burst(); }
 const std::byte* UntypedBackend::desired() const noexcept { return body_->controller.desired(); }
 const std::uint64_t* UntypedBackend::active() const noexcept {
   return body_->controller.active_mask();

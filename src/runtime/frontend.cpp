@@ -212,11 +212,12 @@ void UntypedFrontend::refuse_if_full(const BatchBuilder& builder, const LaneSend
 
 /// Seals a batch, sends it, and lets an inline robot take it.
 Batch UntypedFrontend::send(BatchBuilder& builder, const BatchRecord& wanted) {
-  std::shared_ptr<LaneSender> lane;
   Batch batch;
+  std::shared_ptr<InlineRunner> runner;
   {
     const std::scoped_lock lock(link_->sending);
-    lane = link_->lane();
+    const std::shared_ptr<LaneSender> lane = link_->lane();
+    runner = link_->runner;
     link_->segment.throw_if_known_gone();
     refuse_if_full(builder, *lane);
     BatchRecord record = wanted;
@@ -226,7 +227,7 @@ Batch UntypedFrontend::send(BatchBuilder& builder, const BatchRecord& wanted) {
     builder.clear();
     batch = Batch(link_, lane, record.id, records);
   }
-  if (link_->runner) link_->runner->run();
+  if (runner) runner->run();
   return batch;
 }
 
@@ -428,6 +429,7 @@ void UntypedFrontend::close() {
   // batches that are still asked keep their statuses, not the lane
   if (link_->lane_) link_->lane_->give_back();
   link_->lane_.reset();
+  link_->runner.reset();
 }
 
 bool UntypedFrontend::closed() const { return link_->closed.load(std::memory_order_relaxed); }

@@ -14,8 +14,9 @@ namespace o80 {
 /// owner next bursts or pulses.
 class InlineRobot final : public InlineRunner {
  public:
-  /// Starts the robot. Throws as Loop.
-  InlineRobot(std::unique_ptr<Robot> robot, BackendOptions options);
+  /// Starts the robot. `check` is asked now and then in a burst; if it is false or throws, the rest
+  /// of the burst is not run. Throws as Loop.
+  InlineRobot(std::unique_ptr<Robot> robot, BackendOptions options, Check check = {});
 
   void run() override;
   /// Stops the robot; its frontends see a backend that stopped.
@@ -23,7 +24,11 @@ class InlineRobot final : public InlineRunner {
   const std::string& segment() const noexcept { return loop_.backend().name(); }
 
  private:
+  void look_around();
+
   std::mutex running_;
+  Check check_;
+  std::int64_t look_at_ = 0;  // when `check` is asked next [ns]
   Loop loop_;
 };
 

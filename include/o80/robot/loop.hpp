@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "o80/memory/fork.hpp"
 #include "o80/robot/pacer.hpp"
 #include "o80/robot/robot.hpp"
 #include "o80/runtime/backend.hpp"
@@ -34,8 +35,11 @@ class Loop final : public RequestServer {
   void start();
   /// Iterates until the end, at the period or by bursts. Never throws a driver's fault.
   Ended run() noexcept;
-  /// Bursting only: iterates in this thread until nothing is granted; false if the loop has ended.
-  bool run_granted() noexcept;
+  /// Bursting only: iterates in this thread until nothing is granted, at most so often; `run` if
+  /// more is granted.
+  Step run_granted(std::uint32_t most) noexcept;
+  /// What is left of the burst under way is not run.
+  void cut_burst() noexcept { backend_.cut_burst(); }
   /// Stops the robot and tells the frontends. Called by run() and the destructor.
   Ended stop() noexcept;
 
@@ -54,6 +58,7 @@ class Loop final : public RequestServer {
   bool failed(const char* verb) noexcept;
 
   std::unique_ptr<Robot> robot_;
+  ForkGuard guard_;
   UntypedBackend backend_;
   Pacer pacer_;
   bool paced_;             // by the clock

@@ -78,6 +78,10 @@ class UntypedBackend {
   /// Commands => desired. Bursting, `step` waits for a grant, `try_step` does not.
   Step step() noexcept;
   Step try_step() noexcept;
+  /// Waits so long [ns] at most; `standing` if nothing was granted.
+  Step step_within(std::int64_t at_most) noexcept;
+  /// Between two iterations: what is left of the burst under way is not run.
+  void cut_burst() noexcept;
   const std::byte* desired() const noexcept;
   /// One bit an actuator: a command gave its desired state.
   const std::uint64_t* active() const noexcept;

@@ -42,7 +42,7 @@ struct Link {
   std::shared_ptr<const Description> description;
   HistoryReader history;
   RowWaiter rows;
-  std::shared_ptr<InlineRunner> runner;
+  std::shared_ptr<InlineRunner> runner;  // guarded by `sending`, gone when closed
   mutable std::mutex sending;
   std::atomic<bool> closed{false};
 

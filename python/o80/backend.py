@@ -1,0 +1,290 @@
+"""The side that iterates, inside a Python program."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o80 import _core, at_exit
+from o80.description import Described, Limit, SchemaWriter
+from o80.errors import Closed, InvalidArgument, RequestRejected
+from o80.layout import Layout, dtype_of_type
+from o80.record import Record
+
+
+@dataclass(frozen=True)
+class StartAfresh:
+    """What the handler of a request returns if the robot jumped: what it reads now.
+
+    All queues are purged, desired = observed (or `desired`), in a row of its own; the count of
+    iterations goes on.
+    """
+
+    observed: Any
+    extended: Any = None
+    desired: Any = None
+
+
+Handler = Callable[[Record], StartAfresh | None]
+
+
+class Backend:
+    """A backend whose loop is a Python program's own.
+
+        with o80.Backend("arm", ["shoulder", "elbow"]) as backend:
+            backend.publish(read())                    # row 0
+            while (desired := backend.step()) is not None:
+                write(desired)
+                backend.publish(read())
+
+    segment: the name that frontends attach to.
+    actuators: their names; or how many; or a mapping from groups to a dtype (one actuator),
+        (dtype, how many) or (dtype, names).
+    dtype: of the state of an actuator, unless the groups say it: a NumPy dtype, float, int, bool,
+        an IntEnum, or a mapping from field names to these.
+    extended: dtype (or mapping) of further sensor values.
+    requests: names of the requests it serves, each with the dtype of its fields, or None; see `on`.
+    limits: of actuators: (minimum, maximum) or (minimum, maximum, speed [1/s]) of the first number
+        of the state, or a mapping from fields to these; None is no limit.
+    when_idle: "hold" or "follow", for all actuators or a mapping from each.
+    units: of fields, by their name or by "group.field".
+    frequency: iterations a second [1/s]. The program keeps the pace itself; bursting, it is that
+        of simulated time.
+    bursting: `step` waits until a frontend asks for iterations.
+    robot: what it calls itself (None: as the segment).
+    history: observations kept (None: as many as 16 MiB hold, 100000 at most).
+    lanes, lane_blocks, permission, stale, silence: as for `o80.robots.Robot.start`.
+
+    Leaving a `with` block by an exception ends it as failed: frontends raise its text.
+    Used by one thread. Raises SegmentTaken, SegmentError, InvalidArgument.
+    """
+
+    def __init__(
+        self,
+        segment: str,
+        actuators: Any = (),
+        dtype: Described = float,
+        *,
+        extended: Described | None = None,
+        requests: Mapping[str, Described | None] | None = None,
+        limits: Mapping[int | str, Limit | Mapping[str, Limit]] | None = None,
+        when_idle: str | Mapping[int | str, str] = "hold",
+        units: Mapping[str, str] | None = None,
+        frequency: float = 1000.0,
+        bursting: bool = False,
+        robot: str | None = None,
+        history: int | None = None,
+        lanes: int = 8,
+        lane_blocks: int = 16384,
+        permission: int = 0o600,
+        stale: Literal["hold", "purge", "stop"] = "hold",
+        silence: float | None = None,
+    ) -> None:
+        if not (math.isfinite(frequency) and frequency > 0):
+            raise InvalidArgument(f"a frequency of {frequency} cannot be: it is above 0 [1/s]")
+        writer = SchemaWriter(robot or segment, units or {})
+        writer.add_actuators(actuators, dtype)
+        if extended is not None:
+            writer.set_extended(extended)
+        writer.add_requests(requests or {})
+        writer.set_limits(limits or {})
+        writer.set_idle(when_idle)
+        self._native: _core.Backend | None = None
+        native = _core.Backend(
+            writer.builder,
+            segment,
+            round(1e9 / frequency),
+            bursting,
+            history or 0,
+            lanes,
+            lane_blocks,
+            permission,
+            stale,
+            0 if silence is None else round(silence * 1e9),
+        )
+        self._layout = Layout(native.description)
+        self._segment = segment
+        self._handlers: dict[str, Handler] = {}
+        self._observed = self._states(native.observed())
+        self._fresh_desired = self._states(native.fresh_desired())
+        self._extended: NDArray[Any] = np.ndarray((), self._layout.extras, native.extended())
+        native.serve_with = Server(self)
+        self._native = native
+        at_exit.close_later(self)
+
+    def _states(self, block: Any) -> NDArray[Any]:
+        """The states in a block of memory."""
+        element, shape = self._layout.states.subdtype or (self._layout.states, ())
+        return np.ndarray(shape, element, block)
+
+    @property
+    def _open(self) -> _core.Backend:
+        if self._native is None:
+            raise Closed(f"the backend of '{self._segment}' was closed: make a new one")
+        return self._native
+
+    # ------------------------------------------------------------------ the two verbs
+
+    def publish(self, observed: Any = None, extended: Any = None) -> None:
+        """Publishes a row: what came of the iteration under way; the first one is row 0.
+
+        observed: an array (actuators,), or a mapping from groups to states.
+        extended: a mapping from fields to values, or a record. What is None, or no field of the
+            mapping, is as it was in the row before.
+        """
+        native = self._open
+        if observed is not None:
+            fill(self._observed, observed, "observed")
+        if extended is not None:
+            fill(self._extended, extended, "extended")
+        native.publish()
+
+    def step(self, timeout: float | None = None) -> Any:
+        """Begins an iteration: the desired states, as a fresh array (or record), or None at the end.
+
+        Bursting, it waits until a frontend asks for iterations; raises TimeoutError after
+        `timeout` [s]. None follows `stop`. Requests are served in here: what a handler raises
+        (other than RequestRejected) is raised, and the backend is to be closed.
+        """
+        native = self._open
+        if not native.step(timeout):
+            return None
+        states = self._states(native.desired())
+        return states if self._layout.states.subdtype is not None else Record(states)
+
+    # ------------------------------------------------------------------ around them
+
+    def on(self, request: str, handler: Handler) -> None:
+        """Sets who serves a request: called between two iterations with its fields.
+
+        It returns None, or StartAfresh if the robot jumped; it raises RequestRejected, whose text
+        the sender reads.
+        """
+        known = [row["name"] for row in self._layout.schema["requests"]]
+        if request not in known:
+            there = ", ".join(known) or "none"
+            raise InvalidArgument(f"there is no request '{request}'; there are: {there}")
+        self._handlers[request] = handler
+
+    def interrupt(self, actuator: int | str) -> None:
+        """Ends the commands of an actuator as interrupted, in the iteration under way."""
+        rows = self._layout.schema["actuators"]
+        names = [row["name"] for row in rows]
+        if isinstance(actuator, str):
+            if actuator not in names:
+                raise InvalidArgument(
+                    f"there is no actuator '{actuator}': there are {', '.join(names)}"
+                )
+            actuator = names.index(actuator)
+        if not 0 <= actuator < len(names):
+            raise InvalidArgument(f"there is no actuator {actuator}: there are {len(names)}")
+        self._open.interrupt(actuator)
+
+    def stop(self) -> None:
+        """Makes `step` give None; from any thread."""
+        self._open.ask_to_stop()
+
+    def close(self, failure: str | None = None) -> None:
+        """Ends it, as failed if there is a failure: frontends raise its text."""
+        native, self._native = self._native, None
+        if native is None:
+            return
+        text = native.failure if failure is None else failure
+        native.end(bool(text), text)
+        self._handlers.clear()
+        native.serve_with = None
+        del self._observed, self._extended, self._fresh_desired
+
+    @property
+    def active(self) -> NDArray[np.bool_]:
+        """Whether a command gives the desired state: bool (actuators,)."""
+        bits = np.frombuffer(self._open.active(), np.uint8)
+        return np.unpackbits(bits, count=self._layout.actuators, bitorder="little").view(np.bool_)
+
+    @property
+    def iteration(self) -> int:
+        """The iteration under way."""
+        return self._open.iteration
+
+    @property
+    def time(self) -> int:
+        """Of the iteration under way [ns]: of the monotonic clock, or simulated in bursting."""
+        return self._open.time
+
+    @property
+    def segment(self) -> str:
+        """The name that frontends attach to."""
+        return self._segment
+
+    @property
+    def schema(self) -> dict[str, Any]:
+        """All that frontends learn of the robot."""
+        return self._layout.schema
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        failed = isinstance(error, Exception)
+        self.close(f"{type(error).__name__}: {error}" if failed else None)
+
+    def __repr__(self) -> str:
+        return f"<o80.Backend of '{self._segment}'{', closed' if self._native is None else ''}>"
+
+
+class Server:
+    """Hands requests to their handlers; knows no more of the backend than its memory."""
+
+    def __init__(self, backend: Backend) -> None:
+        self._handlers = backend._handlers
+        self._rows = backend._layout.schema["requests"]
+        self._observed = backend._observed
+        self._extended = backend._extended
+        self._desired = backend._fresh_desired
+
+    def __call__(self, index: int, payload: bytes) -> str | bool | None:
+        row = self._rows[index]
+        handler = self._handlers.get(row["name"])
+        if handler is None:
+            return f"nobody serves '{row['name']}' in this backend"
+        fields = np.frombuffer(bytearray(payload), np.uint8)
+        described = dtype_of_type(row["type"])
+        try:
+            answer = handler(Record(np.ndarray((), described, fields)))
+        except RequestRejected as why:
+            return str(why) or "the handler gave no reason"
+        if answer is None:
+            return None
+        fill(self._observed, answer.observed, "observed")
+        if answer.extended is not None:
+            fill(self._extended, answer.extended, "extended")
+        wanted = answer.observed if answer.desired is None else answer.desired
+        fill(self._desired, wanted, "desired")
+        return True
+
+
+def fill(block: NDArray[Any], values: Any, what: str) -> None:
+    """Writes states or sensor values into the memory of a row."""
+    names = block.dtype.names
+    if isinstance(values, Record):
+        block[...] = np.asarray(values)
+    elif isinstance(values, Mapping):
+        for name, value in values.items():
+            if names is None or name not in names:
+                there = ", ".join(names or ()) or "there are none"
+                raise InvalidArgument(f"{what} has no field {name!r}; its fields: {there}")
+            block[name] = value
+    else:
+        try:
+            block[...] = values
+        except (TypeError, ValueError) as error:
+            raise InvalidArgument(f"{what} of shape {block.shape}: {error}") from error

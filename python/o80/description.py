@@ -1,0 +1,145 @@
+"""A robot described from Python: NumPy dtypes become the schema of its segment."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+
+from o80 import _core
+from o80.errors import InvalidArgument
+
+# a dtype, a number type, an IntEnum, or a mapping from field names to any of these
+Described = Any
+Limit = Sequence[float | None]
+FieldRow = tuple[str, str, list[int], str, dict[str, int] | None, int]
+
+
+class SchemaWriter:
+    """Fills a schema from what Python says of a robot."""
+
+    def __init__(self, robot: str, units: Mapping[str, str]) -> None:
+        self.builder = _core.SchemaBuilder(robot)
+        self._units = units
+
+    def add_actuators(self, actuators: Any, dtype: Described) -> None:
+        """Names, a number of actuators, or a mapping from groups to what they are made of."""
+        if isinstance(actuators, Mapping):
+            for group, members in actuators.items():
+                self._add_group(group, members)
+        elif isinstance(actuators, int):
+            if actuators > 0:
+                self.builder.add_actuators("", self._type("State", dtype), actuators, True)
+        elif isinstance(actuators, Sequence) and not isinstance(actuators, str):
+            if actuators:
+                self._add_named("", actuators, dtype)
+        else:
+            raise InvalidArgument(
+                f"actuators are names, a number of them, or a mapping from groups to dtypes, "
+                f"not {actuators!r}"
+            )
+
+    def _add_group(self, group: str, members: Any) -> None:
+        """One actuator of a type, (type, how many), or (type, names)."""
+        if not (isinstance(members, tuple) and len(members) == 2):
+            self.builder.add_actuators(group, self._type(group, members), 1, False)
+            return
+        described, many = members
+        if isinstance(many, int):
+            self.builder.add_actuators(group, self._type(group, described), many, True)
+        else:
+            self._add_named(group, many, described)
+
+    def _add_named(self, group: str, names: Sequence[str], described: Described) -> None:
+        first = len(self.builder.actuators)
+        self.builder.add_actuators(group, self._type(group or "State", described), len(names), True)
+        for i, name in enumerate(names):
+            self.builder.name_actuator(first + i, name)
+
+    def set_extended(self, extended: Described) -> None:
+        """Further sensor values: a structured dtype, or a mapping."""
+        index = self._type("Extended", extended)
+        self.builder.set_extended(index)
+
+    def add_requests(self, requests: Mapping[str, Described | None]) -> None:
+        """Requests, each with its fields (None: it has none)."""
+        for name, fields in requests.items():
+            self.builder.add_request(name, self._type(name, {} if fields is None else fields), "")
+
+    def set_limits(self, limits: Mapping[int | str, Limit | Mapping[str, Limit]]) -> None:
+        """(minimum, maximum) or (minimum, maximum, speed) of actuators, or of their fields."""
+        for named, given in limits.items():
+            actuator = self._index(named)
+            for field, limit in given.items() if isinstance(given, Mapping) else [("", given)]:
+                low, high, speed = (*limit, None, None, None)[:3]
+                self.builder.set_limits(
+                    actuator,
+                    field,
+                    -np.inf if low is None else low,
+                    np.inf if high is None else high,
+                    np.inf if speed is None else speed,
+                )
+
+    def set_idle(self, when_idle: str | Mapping[int | str, str]) -> None:
+        """"hold" or "follow", for all actuators or for each."""
+        words = (
+            when_idle
+            if isinstance(when_idle, Mapping)
+            else dict.fromkeys(self.builder.actuators, when_idle)
+        )
+        for named, word in words.items():
+            if word not in ("hold", "follow"):
+                raise InvalidArgument(f"when_idle cannot be {word!r}: it is 'hold' or 'follow'")
+            if word == "follow":
+                self.builder.set_follow(self._index(named))
+
+    def _index(self, named: int | str) -> int:
+        names = self.builder.actuators
+        if isinstance(named, str):
+            if named in names:
+                return names.index(named)
+        elif 0 <= named < len(names):
+            return named
+        raise InvalidArgument(f"there is no actuator {named!r}: there are {', '.join(names)}")
+
+    # ------------------------------------------------------------------ types
+
+    def _type(self, name: str, described: Described) -> int:
+        fields = list(self._fields(name, described))
+        return self.builder.add_type(name, fields)
+
+    def _fields(self, owner: str, described: Described) -> Iterator[FieldRow]:
+        if isinstance(described, Mapping):
+            for name, inner in described.items():
+                yield self._field(owner, name, inner)
+            return
+        dtype = None if _is_enum(described) else np.dtype(described)
+        if dtype is None or dtype.names is None:
+            yield self._field(owner, "", described)
+            return
+        assert dtype.fields is not None
+        for name in dtype.names:
+            yield self._field(owner, name, dtype.fields[name][0])
+
+    def _field(self, owner: str, name: str, described: Described) -> FieldRow:
+        unit = self._units.get(f"{owner}.{name}", self._units.get(name, ""))
+        text = f"[{unit}]" if unit else ""
+        if _is_enum(described):
+            labels = {label: int(value) for label, value in described.__members__.items()}
+            return name, "enum", [], text, labels, 0
+        if isinstance(described, Mapping):
+            return name, "struct", [], text, None, self._type(name, described)
+        dtype = np.dtype(described)
+        element, shape = dtype.subdtype or (dtype, ())
+        if element.names is not None:
+            return name, "struct", list(shape), text, None, self._type(name, element)
+        if element.kind not in "biuf" or element.itemsize > 8 or element == np.dtype(np.float16):
+            raise InvalidArgument(
+                f"'{name or owner}' cannot be of dtype {element}: numbers of 1 to 8 bytes, "
+                f"booleans and enums can be shared"
+            )
+        return name, element.name, list(shape), text, None, 0
+
+
+def _is_enum(described: Described) -> bool:
+    return isinstance(described, type) and issubclass(described, IntEnum)
