@@ -9,9 +9,9 @@ namespace o80::mujoco {
 
 /// Where a ball is and how it moves.
 struct Ball {
-  Vector position;  // [m]
-  Vector velocity;  // [m/s]
-  Vector spin;      // [rad/s], in the world's axes
+  Vector position{};  // [m]
+  Vector velocity{};  // [m/s]
+  Vector spin{};      // [rad/s], in the world's axes
   bool operator==(const Ball&) const = default;
 };
 

@@ -15,9 +15,9 @@ namespace o80::mujoco {
 
 /// The way of a ball's centre from a share of the step to its end; straight.
 struct Path {
-  Vector from, to;                    // [m]
-  Vector velocity_from, velocity_to;  // [m/s]
-  double begin = 0;                   // share of the step
+  Vector from{}, to{};                    // [m]
+  Vector velocity_from{}, velocity_to{};  // [m/s]
+  double begin = 0;                       // share of the step
 
   double part(double share) const noexcept { return (share - begin) / (1 - begin); }
   Vector position(double share) const noexcept { return between(from, to, part(share)); }
@@ -28,10 +28,10 @@ struct Path {
 
 /// One contact of ball and surface.
 struct Touch {
-  double share = 0;         // of the step
-  Vector point;             // of the surface [m]
-  Vector normal;            // from the surface to the ball
-  Vector surface_velocity;  // at the point [m/s]
+  double share = 0;           // of the step
+  Vector point{};             // of the surface [m]
+  Vector normal{};            // from the surface to the ball
+  Vector surface_velocity{};  // at the point [m/s]
 };
 
 /// What a sweep found.

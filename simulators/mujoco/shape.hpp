@@ -12,20 +12,20 @@ namespace o80::mujoco {
 /// direction away from it.
 struct Near {
   double distance = 0;
-  Vector normal;
+  Vector normal{};
 };
 
 /// An elliptic plate of a racket, rounded at its rim: all points within half its thickness of a
 /// flat ellipse.
 struct Blade {
-  Vector half;   // half axes [m]
-  int thin = 1;  // the axis along which its faces look
+  Vector half{};  // half axes [m]
+  int thin = 1;   // the axis along which its faces look
 
   Near near(const Vector& point) const noexcept;
 };
 
 struct Box {
-  Vector half;  // [m]
+  Vector half{};  // [m]
 
   Near near(const Vector& point) const noexcept;
 };

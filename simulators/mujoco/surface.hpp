@@ -12,10 +12,10 @@ namespace o80::mujoco {
 
 /// Where a body is and how it moves.
 struct Pose {
-  Vector position;  // [m]
-  Rotation rotation;
-  Vector velocity;  // of the position [m/s]
-  Vector spin;      // [rad/s], in the world's axes
+  Vector position{};  // [m]
+  Rotation rotation{};
+  Vector velocity{};  // of the position [m/s]
+  Vector spin{};      // [rad/s], in the world's axes
 };
 
 /// A rigid motion from one pose to another, by shares of a step from 0 to 1: straight, and turning
@@ -64,9 +64,9 @@ enum class SurfaceKind : std::uint8_t { racket, table, net, floor };
 /// Something a ball bounces on, during a step.
 struct Surface {
   SurfaceKind kind = SurfaceKind::racket;
-  Shape shape;
+  Shape shape{};
   Restitution restitution{1, 1, 1};
-  Motion motion;
+  Motion motion{};
 };
 
 /// A ball leaves a surface at least this fast [m/s]: it hops on, it never rests.
