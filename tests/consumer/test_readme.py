@@ -1,0 +1,42 @@
+"""The README's programs run as they stand there."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import o80
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+README = (ROOT / "README.md").read_text()
+
+
+def blocks(language: str) -> list[str]:
+    """The code blocks of a language, in order."""
+    return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
+
+
+def run(*command: str, folder: Path) -> str:
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def test_the_first_minute_in_python(tmp_path: Path) -> None:
+    with_a_process, inline = blocks("python")
+    assert "(100, 2)" in run(sys.executable, "-c", with_a_process, folder=tmp_path)
+    assert "100 0.1 s" in run(sys.executable, "-c", inline, folder=tmp_path)
+
+
+def test_the_first_minute_in_cpp(tmp_path: Path) -> None:
+    (source,) = blocks("cpp")
+    (lists,) = blocks("cmake")
+    (tmp_path / "wheels.cpp").write_text(source)
+    (tmp_path / "CMakeLists.txt").write_text(lists)
+    run("cmake", "-B", "build", f"-Do80_ROOT={o80.prefix()}", folder=tmp_path)
+    run("cmake", "--build", "build", folder=tmp_path)
+    robot = o80.robots.load(tmp_path / "build" / "wheels.so")
+    with robot.start(gain=0.2) as process, process.frontend() as wheels:
+        wheels.add_command(0, 1.0, duration=0.1)
+        wheels.pulse_and_wait(timeout=20.0)
+        assert wheels.latest().desired[0] == 1.0
