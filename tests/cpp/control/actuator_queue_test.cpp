@@ -11,9 +11,7 @@
 namespace o80::test {
 namespace {
 
-using testing::DoubleNear;
 using testing::ElementsAre;
-using testing::Pointwise;
 
 TEST(ActuatorQueue, ReachesItsTargetExactlyAtTheLastIteration) {
   Rig rig(plain_robot(1));
@@ -149,6 +147,7 @@ TEST(ActuatorQueue, ADurationOfNothingTakesOneIteration) {
 
 std::vector<Iteration> ends_of(const Rig& rig, CommandId batch, CommandId commands) {
   std::vector<Iteration> ends;
+  ends.reserve(commands);
   for (CommandId i = 0; i < commands; ++i)
     ends.push_back(rig.witness.last(batch + 2 + i).iteration);
   return ends;
