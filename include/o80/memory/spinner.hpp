@@ -18,8 +18,8 @@ inline void pause_processor() noexcept {
 
 /// Decides whether spinning before a sleep is worth it; one for each waiting object.
 ///
-/// Never on a single processor. Eight spins in a row without success stop it; from then on one
-/// wait in 64 probes; one success restores it.
+/// Never if the process was given a single processor. Eight spins in a row without success stop
+/// it; from then on one wait in 64 probes; one success restores it.
 ///
 /// Writer / Readers: any threads of one process (an answer from a race is as good as another).
 /// Realtime: yes, up to `kLongest` a spin.
@@ -31,7 +31,7 @@ class Spinner {
 
   Spinner() noexcept;
   /// With a given number of processors, for tests.
-  explicit Spinner(int processors) noexcept : fixed_(processors) {}
+  explicit Spinner(int processors) noexcept : processors_(processors) {}
 
   /// Whether this wait should spin.
   bool worth() noexcept;
@@ -57,8 +57,7 @@ class Spinner {
   }
 
  private:
-  int fixed_;                       // 0: ask the machine
-  std::atomic<int> processors_{0};  // as last asked, 0: never
+  int processors_;
   std::atomic<std::uint32_t> failures_{0};
   std::atomic<std::uint32_t> refused_{0};
 };
