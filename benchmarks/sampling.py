@@ -13,7 +13,7 @@ def take_priority() -> None:
     Processes started from here on inherit it.
     """
     try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(20))
+        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(20))
     except PermissionError:
         print("without real-time priority: figures may be noisy", file=sys.stderr)
 

@@ -25,7 +25,7 @@ inline void sample(const char* name, const char* unit, double value) {
 /// threads started from here on inherit it.
 inline void take_priority() {
   const sched_param priority{.sched_priority = 20};
-  sched_setscheduler(0, SCHED_FIFO, &priority);
+  sched_setscheduler(0, SCHED_RR, &priority);
 }
 
 /// Keeps the calling thread on one processor.
