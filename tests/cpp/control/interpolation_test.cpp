@@ -29,7 +29,8 @@ TEST(Interpolation, AQuinticBeginsAsAskedAndEndsAtRest) {
 TEST(Interpolation, SlopeAndCurvatureAreTheDerivativesOfThePosition) {
   const Quintic quintic = Quintic::from(3.0, {0.0, 0.5, -0.02}, 10.0);
   constexpr double kStep = 1e-4;
-  for (double t = 0.05; t < 1.0; t += 0.05) {
+  for (int i = 1; i < 20; ++i) {
+    const double t = 0.05 * i;
     const double before = quintic.at(QuinticWeights::position(t - kStep));
     const double here = quintic.at(QuinticWeights::position(t));
     const double after = quintic.at(QuinticWeights::position(t + kStep));
