@@ -1,1 +1,10 @@
-"""Table tennis with a pneumatic arm: real robot, simulated ball."""
+"""Table tennis with a pneumatic arm: real robot, simulated ball.
+
+Importing it makes `o80/TableTennis-v0` and `o80/TableTennisRealTime-v0` known to Gymnasium.
+"""
+
+from .registration import ACCELERATED, REAL_TIME, register_environments
+
+__all__ = ["ACCELERATED", "REAL_TIME", "register_environments"]
+
+register_environments()

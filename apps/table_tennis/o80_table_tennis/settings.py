@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 from .actions import FINE, REAL_RANGE, SIMULATED_RANGE, PressureRange
@@ -49,6 +49,8 @@ class RigSettings:
     """Model of the muscles of the simulated arm: linear or hill."""
     ranges: str = "simulated"
     """Whose pressures may be asked for: simulated or real."""
+    start_noise: float = 0.0
+    """On each joint of the simulated arm at a reset, uniform in plus or minus this [rad]."""
     frequency: float = 500.0
     """Of the arm and of the twins [1/s]."""
     history: int | None = None
@@ -76,11 +78,23 @@ class RigSettings:
         """Of an iteration [s]."""
         return 1.0 / self.frequency
 
-    def balls_of_twin(self, twin: int) -> int:
-        """How many balls twin number `twin` holds; a twin has at least one."""
+    @property
+    def step(self) -> float:
+        """Of the environment [s]."""
+        return ITERATIONS * self.period
+
+    def paced(self, pacing: Pacing) -> RigSettings:
+        """The same rig in another way of pacing."""
+        return replace(self, pacing=pacing)
+
+    def extra_balls_of(self, twin: int) -> int:
+        """How many of the extra balls twin number `twin` holds."""
         share, more = divmod(self.extra_balls, self.twins)
-        extra = share + (1 if twin >= self.twins - more else 0)
-        return max(1, extra + (1 if twin == 0 else 0))
+        return share + (1 if twin < more else 0)
+
+    def balls_of(self, twin: int) -> int:
+        """How many balls twin number `twin` holds: every twin mirrors the arm for at least one."""
+        return max(1, self.extra_balls_of(twin) + (1 if twin == 0 else 0))
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,102 @@
+"""The arm as the environment sees it: eight pressures in, rows of joint angles out."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+import o80
+from numpy.typing import NDArray
+
+from .actions import MUSCLES
+from .row_words import words
+from .settings import ITERATIONS, JOINTS
+
+FloatArray = NDArray[np.float64]
+
+TIMEOUT = 5.0
+"""Longest wait for a row [s]."""
+RETURN_SECONDS = 0.6
+"""In which the pressures go back to those of the start [s]."""
+SETTLED_SPEED = 0.02
+"""Below this speed of every joint the arm stands [rad/s]."""
+SETTLED_ANGLE = 0.05
+"""The arm is back where it started when every joint is this near [rad]."""
+LONGEST_RETURN = 4.0
+"""After this the episode begins from wherever the arm stands [s]."""
+
+
+class Arm:
+    """A frontend to the arm, and its last five rows.
+
+    `q`, `dq` (5, 4) [rad], [rad/s] and `pressures` (5, 8), raw, are views that `advance` fills.
+    """
+
+    def __init__(self, frontend: o80.Frontend) -> None:
+        self.frontend = frontend
+        dtype = frontend.history(1).rows.dtype
+        self._rows = np.zeros(ITERATIONS, dtype)
+        numbers = self._rows.view(np.float64).reshape(ITERATIONS, -1)
+        self.iterations: NDArray[np.int64] = self._rows["iteration"]
+        self.q = numbers[:, words(dtype, "extended", "joint_positions")]
+        self.dq = numbers[:, words(dtype, "extended", "joint_velocities")]
+        self.pressures = numbers[:, words(dtype, "observed")]
+        self._asked = numbers[:, words(dtype, "desired")]
+        self.start_pressures = np.array(frontend.latest().desired)
+        self.start_angles = np.array(frontend.latest().extended.joint_positions)
+        assert self.start_pressures.shape == (MUSCLES,)
+        assert self.start_angles.shape == (JOINTS,)
+
+    @property
+    def newest(self) -> int:
+        """Iteration of the newest row."""
+        return self.frontend.published
+
+    def send(self, pressures: FloatArray, at: int) -> Any:
+        """Raw pressures (8,) from iteration `at` on, or at once if it has begun."""
+        self.frontend.add_trajectory(pressures[None, :])
+        return self.frontend.pulse(at=at, late="now")
+
+    def advance(self, first: int) -> None:
+        """Waits for the five rows from `first` on, or lets the arm make them, and reads them."""
+        if self.frontend.bursting:
+            self.frontend.burst(ITERATIONS)
+        else:
+            self.frontend.wait_for(first + ITERATIONS - 1, timeout=TIMEOUT)
+        self._read(first)
+
+    @property
+    def asked(self) -> FloatArray:
+        """Raw pressures (8,) asked for in the last row, a fresh array."""
+        return self._asked[-1].copy()
+
+    def reset(self, seed: int) -> None:
+        """To the start, at once: a simulated arm can."""
+        self.frontend.request("reset", seed=seed)
+
+    def go_back(self) -> None:
+        """To the start by commands, as a real arm must."""
+        for muscle in range(MUSCLES):
+            self.frontend.add_command(
+                muscle, self.start_pressures[muscle], duration=RETURN_SECONDS, mode="overwrite"
+            )
+        self.frontend.pulse_and_wait(timeout=RETURN_SECONDS + TIMEOUT)
+        end = time.monotonic() + LONGEST_RETURN
+        while time.monotonic() < end:
+            newest = self.read_newest()
+            still = float(np.abs(self.dq[-1]).max()) < SETTLED_SPEED
+            back = float(np.abs(self.q[-1] - self.start_angles).max()) < SETTLED_ANGLE
+            if still and back:
+                break
+            self.frontend.wait_for(newest + 10 * ITERATIONS, timeout=TIMEOUT)
+
+    def read_newest(self) -> int:
+        """Reads the last rows; returns the iteration of the newest one."""
+        newest = self.newest
+        self._read(newest - ITERATIONS + 1)
+        return newest
+
+    def _read(self, first: int) -> None:
+        rows = self.frontend.history(since=first, until=first + ITERATIONS - 1).rows
+        self._rows[ITERATIONS - len(rows) :] = rows

@@ -1,0 +1,172 @@
+"""The experiment from end to end: `python -m o80_table_tennis.demo`.
+
+Starts the arm in real time (500 Hz, a process of its own), its simulated twin (bursting, another
+one) and an environment between them, plays episodes, then plays accelerated, as processes and
+inline. Prints how well that went and writes plots, a film, the recorded history and a report.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from .balls import balls_from
+from .environment import TableTennisEnvironment
+from .episode_record import EpisodeRecord, EpisodeSummary, load_records
+from .playing import Played, play
+from .policies import DEFAULT_FACTOR, default_policy
+from .report import Report, write_report
+from .settings import Pacing, RigSettings, TaskSettings
+
+
+@dataclass(frozen=True)
+class DemoSettings:
+    """What the demo plays, and where it writes."""
+
+    balls: Path | None = None
+    """Recordings; None: simulated shots."""
+    episodes: int = 20
+    """Of each accelerated mode."""
+    real_time_episodes: int = 5
+    seed: int = 1
+    extra_balls: int = 0
+    muscle: str = "linear"
+    film: bool = True
+    output: Path = Path("build/demo")
+
+    def task(self) -> TaskSettings:
+        """What every environment of the demo plays."""
+        balls = None if self.balls is None else str(self.balls)
+        return TaskSettings(balls=balls, factor=DEFAULT_FACTOR)
+
+    def rig(self, pacing: Pacing) -> RigSettings:
+        """The arm and its twin, running like this."""
+        return RigSettings(pacing=pacing, extra_balls=self.extra_balls, muscle=self.muscle)
+
+    def episodes_of(self, pacing: Pacing) -> int:
+        """How many episodes are played like this."""
+        return self.real_time_episodes if pacing.real_time else self.episodes
+
+
+def run_demo(settings: DemoSettings, console: Console) -> Report:
+    """Plays all modes and writes everything; returns what was found."""
+    begin = time.monotonic()
+    settings.output.mkdir(parents=True, exist_ok=True)
+    available = len(balls_from(settings.task().balls))
+    modes: dict[Pacing, Played] = {}
+    with _progress(console) as progress:
+        for pacing in (Pacing.REAL_TIME, Pacing.PROCESSES, Pacing.INLINE):
+            episodes = settings.episodes_of(pacing)
+            if episodes == 0:
+                continue
+            bar = progress.add_task(pacing.value, total=episodes, hits=0)
+            modes[pacing] = _play_mode(settings, pacing, available, _advance(progress, bar))
+
+        bar = progress.add_task("plots and film", total=1, hits=0)
+        report = write_report(
+            settings.output,
+            modes,
+            {pacing: load_records(_history(settings, pacing)) for pacing in modes},
+            film=settings.film,
+            begin=begin,
+        )
+        progress.update(bar, completed=1)
+    return report
+
+
+def _play_mode(
+    settings: DemoSettings,
+    pacing: Pacing,
+    available: int,
+    after_each: Callable[[EpisodeSummary], None],
+) -> Played:
+    """Episodes of one mode, recorded by a logger of their own."""
+    folder = _history(settings, pacing)
+    folder.mkdir(parents=True, exist_ok=True)
+    for old in folder.glob("episode_*.npz"):
+        old.unlink()
+    environment = TableTennisEnvironment(
+        rig=settings.rig(pacing), task=settings.task(), log=folder
+    )
+    with environment:
+        balls = (number % available for number in range(settings.episodes_of(pacing)))
+        return play(
+            environment, default_policy(), balls, seed=settings.seed, after_each=after_each
+        )
+
+
+def _history(settings: DemoSettings, pacing: Pacing) -> Path:
+    return settings.output / "history" / pacing.name.lower()
+
+
+def _progress(console: Console) -> Progress:
+    return Progress(
+        TextColumn("{task.description:>16}"),
+        BarColumn(bar_width=30),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[hits]} hits"),
+        TimeElapsedColumn(),
+        console=console,
+    )
+
+
+def _advance(progress: Progress, bar: Any) -> Callable[[EpisodeSummary], None]:
+    """Moves a bar on by an episode."""
+    hits = 0
+
+    def advance(summary: EpisodeSummary) -> None:
+        nonlocal hits
+        hits += summary.returned
+        progress.update(bar, advance=1, hits=hits)
+
+    return advance
+
+
+def _end_in_order(number: int, _frame: FrameType | None) -> None:
+    """A request to terminate unwinds the stack, so that nothing is left behind."""
+    sys.exit(128 + number)
+
+
+def main(
+    balls: Annotated[
+        Path | None, typer.Option(help="A recording or a folder of them; else simulated shots.")
+    ] = None,
+    episodes: Annotated[int, typer.Option(min=0, help="Of each accelerated mode.")] = 20,
+    real_time_episodes: Annotated[int, typer.Option(min=0, help="In real time.")] = 5,
+    seed: Annotated[int, typer.Option(min=0, help="Of the environments.")] = 1,
+    extra_balls: Annotated[int, typer.Option(min=0, help="Balls beside the one played.")] = 0,
+    muscle: Annotated[str, typer.Option(help="Model of the muscles: linear or hill.")] = "linear",
+    film: Annotated[bool, typer.Option(help="Draw a film of a hit.")] = True,
+    output: Annotated[Path, typer.Option(help="Folder that is written.")] = Path("build/demo"),
+) -> None:
+    """Plays table tennis in real time, then accelerated, and reports how well that went."""
+    signal.signal(signal.SIGTERM, _end_in_order)
+    console = Console()
+    settings = DemoSettings(
+        balls=balls,
+        episodes=episodes,
+        real_time_episodes=real_time_episodes,
+        seed=seed,
+        extra_balls=extra_balls,
+        muscle=muscle,
+        film=film,
+        output=output,
+    )
+    if episodes == 0 and real_time_episodes == 0:
+        raise typer.BadParameter("nothing to play: ask for at least one episode")
+    run_demo(settings, console).print(console)
+    console.print(f"report, plots, film and history: {output}")
+
+
+if __name__ == "__main__":
+    typer.run(main)

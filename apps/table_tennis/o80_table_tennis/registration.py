@@ -1,0 +1,27 @@
+"""The ids under which Gymnasium makes the environments."""
+
+from __future__ import annotations
+
+import gymnasium
+
+ACCELERATED = "o80/TableTennis-v0"
+"""As fast as the machine can; the same seed, the same episode, bit for bit."""
+REAL_TIME = "o80/TableTennisRealTime-v0"
+"""The arm runs by the clock."""
+
+
+def register_environments() -> None:
+    """Makes both ids known; may be called twice.
+
+    Episodes end by their own count of steps, and environments check what they are given themselves.
+    """
+    for name, entry, nondeterministic in (
+        (ACCELERATED, "accelerated_environment", False),
+        (REAL_TIME, "real_time_environment", True),
+    ):
+        if name not in gymnasium.registry:
+            gymnasium.register(
+                id=name,
+                entry_point=f"o80_table_tennis.environment:{entry}",
+                nondeterministic=nondeterministic,
+            )

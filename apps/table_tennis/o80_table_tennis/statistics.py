@@ -1,0 +1,86 @@
+"""How an environment kept its time: rates, lateness, and whether each step was exact."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import o80
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass
+class StepCounts:
+    """What an environment counts while it plays."""
+
+    episodes: int = 0
+    steps: int = 0
+    exact_steps: int = 0
+    """Steps in which the arm and every twin made exactly five iterations."""
+    seconds: float = 0.0
+    """In episodes, from the first step to the last, the caller's own time included."""
+    late_actions: int = 0
+    """Actions that came after the iteration for which they were meant."""
+    stalled_episodes: int = 0
+    summed_lateness: int = 0
+    """[rows]"""
+    largest_lateness: int = 0
+    """[rows]"""
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Rates and lateness since an environment was made."""
+
+    episodes: int
+    steps: int
+    exact_steps: int
+    """Steps of exactly five iterations of the arm and five of every twin, by their numbers."""
+    steps_per_second: float
+    """While an episode was played, the caller's own time included [1/s]."""
+    step_seconds: float
+    """How long a step takes in real time [s]."""
+    late_actions: int
+    """Actions that came after the iteration for which they were meant, and acted at once."""
+    stalled_episodes: int
+    mean_lateness: float
+    """Of the end of a step: newest row of the arm less the one used [rows]; real time only."""
+    largest_lateness: int
+    """[rows]"""
+    arm_iterations: int
+    """All that the arm has made."""
+    arm_rate: float
+    """Iterations of the arm a second of its own clock [1/s]."""
+    arm_overruns: int
+    arm_skipped: int
+    """Periods that the arm left out to catch up."""
+    arm_lateness_us: FloatArray = field(repr=False)
+    """(T,) how late each iteration began, as far back as the history goes [us]; real time only."""
+    arm_periods_us: FloatArray = field(repr=False)
+    """(T - 1,) between the times of neighbouring rows [us]; real time only."""
+
+
+def statistics_of(counts: StepCounts, arm: o80.Frontend, *, step: float) -> Statistics:
+    """What was counted, and what the history of the arm tells; `step` lasts so long [s]."""
+    rows = arm.history()
+    seconds = float(rows.time[-1] - rows.time[0]) * 1e-9
+    nothing = np.empty(0)
+    return Statistics(
+        episodes=counts.episodes,
+        steps=counts.steps,
+        exact_steps=counts.exact_steps,
+        steps_per_second=counts.steps / counts.seconds if counts.seconds > 0 else 0.0,
+        step_seconds=step,
+        late_actions=counts.late_actions,
+        stalled_episodes=counts.stalled_episodes,
+        mean_lateness=counts.summed_lateness / max(1, counts.steps),
+        largest_lateness=counts.largest_lateness,
+        arm_iterations=int(rows.iteration[-1]),
+        arm_rate=(len(rows) - 1) / seconds if seconds > 0 else 0.0,
+        arm_overruns=int(rows.overruns[-1]),
+        arm_skipped=int(rows.skipped[-1]),
+        arm_lateness_us=nothing if arm.bursting else rows.lateness * 1e-3,
+        arm_periods_us=nothing if arm.bursting else np.diff(rows.time) * 1e-3,
+    )

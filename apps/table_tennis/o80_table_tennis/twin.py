@@ -1,0 +1,77 @@
+"""One twin as the environment sees it: it mirrors the arm, and holds balls."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import o80
+from numpy.typing import NDArray
+
+from .ball_watch import RecordReader
+from .row_words import WORD, words
+from .settings import ITERATIONS, JOINTS
+from .trajectories import SampledFlight
+
+FloatArray = NDArray[np.float64]
+
+BALL_NUMBERS = 6
+"""Position and velocity."""
+
+
+class Twin:
+    """A frontend to one simulation of the arm, the table and `balls` balls."""
+
+    def __init__(self, frontend: o80.Frontend) -> None:
+        self.frontend = frontend
+        dtype = frontend.history(1).rows.dtype
+        contacts = words(dtype, "extended", "contacts")
+        self._joints = words(dtype, "observed", "joints")
+        self._balls = words(dtype, "observed", "balls")
+        self._record_dtype = dtype["extended"]["contacts"].base
+        self._records_at = contacts.start * WORD
+        self.balls = (self._balls.stop - self._balls.start) // BALL_NUMBERS
+        self.played_ball = slice(self._balls.start, self._balls.start + BALL_NUMBERS)
+        """Words of a row that hold position and velocity of the first ball."""
+        names = [actuator.name for actuator in frontend.actuators]
+        self._joint_names, self._ball_names = names[:JOINTS], names[JOINTS:]
+        state = np.dtype([("position", np.float64), ("velocity", np.float64)])
+        self._motion = np.zeros((ITERATIONS, JOINTS), state)
+        self._ball_state = np.dtype(
+            [("position", np.float64, (3,)), ("velocity", np.float64, (3,))]
+        )
+
+    def record_reader(self) -> RecordReader:
+        """Of the first ball."""
+        return RecordReader(self._record_dtype, self._records_at)
+
+    def reset(self, seed: int) -> None:
+        """All balls and contacts forgotten."""
+        self.frontend.request("reset", seed=seed)
+
+    def begin(self, q: FloatArray, dq: FloatArray, flights: Sequence[SampledFlight]) -> None:
+        """Adds the arm (4,) as it stands and the whole flight of each ball, for the next burst."""
+        self._motion["position"][0], self._motion["velocity"][0] = q, dq
+        self.frontend.add_trajectory(self._motion[:1], self._joint_names)
+        for ball, flight in zip(self._ball_names, flights, strict=True):
+            states = np.empty(len(flight.positions), self._ball_state)
+            states["position"], states["velocity"] = flight.positions, flight.velocities
+            self.frontend.add_trajectory(states, ball)
+
+    def mirror(self, q: FloatArray, dq: FloatArray) -> None:
+        """Adds the arm's last rows (5, 4) as commands for the next burst."""
+        self._motion["position"], self._motion["velocity"] = q, dq
+        self.frontend.add_trajectory(self._motion, self._joint_names)
+
+    def all_balls(self, row: FloatArray) -> FloatArray:
+        """Positions and velocities (balls, 6) in the words of a row; a view."""
+        return row[self._balls].reshape(self.balls, BALL_NUMBERS)
+
+    def joint_positions(self, row: FloatArray) -> FloatArray:
+        """(4,) [rad] in the words of a row; a view."""
+        return row[self._joints][::2]
+
+    def records(self, row: Any) -> NDArray[Any]:
+        """The records (balls,) of a row, which is any buffer; a view."""
+        return np.ndarray((self.balls,), self._record_dtype, row, self._records_at)

@@ -1,0 +1,122 @@
+"""The balls beside the one that is played: each meets the same arm and is paid for on its own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .observations import JOINT_POSITIONS, PRESSURES, SIZE, Float32Array
+from .rewards import BallRecord, EndRule, RewardRule
+from .settings import RigSettings, TaskSettings
+from .trajectories import SampledFlight
+from .twin import Twin
+
+FloatArray = NDArray[np.float64]
+
+ARM = slice(JOINT_POSITIONS.start, PRESSURES.stop)
+"""What all observations of a step have in common."""
+BALL = slice(PRESSURES.stop, SIZE)
+
+
+class VirtualBalls:
+    """All extra balls, in the order of the twins that hold them."""
+
+    def __init__(self, twins: Sequence[Twin], rig: RigSettings, task: TaskSettings) -> None:
+        self._twins, self._rig = twins, rig
+        self._end: EndRule = task.end
+        self._reward: RewardRule = task.reward
+        self._low, self._high = task.bounds.low, task.bounds.high
+        # the first twin holds the ball that is played; a twin without extra balls mirrors it
+        self._extra = [
+            slice(twin.balls - rig.extra_balls_of(number), twin.balls)
+            for number, twin in enumerate(twins)
+        ]
+        self._rows: Sequence[Any] = ()
+        self.begin()
+
+    def begin(self) -> None:
+        """A new episode."""
+        self._ended = np.zeros(self._rig.extra_balls, np.bool_)
+        self._hits = np.zeros(self._rig.extra_balls, np.bool_)
+
+    def share(self, flights: Sequence[SampledFlight]) -> list[list[SampledFlight]]:
+        """The flights of each twin's balls, of all flights, the played one first."""
+        played, left = flights[0], list(flights[1:])
+        shared = []
+        for number, twin in enumerate(self._twins):
+            extra = self._rig.extra_balls_of(number)
+            mine, left = left[:extra], left[extra:]
+            shared.append([played] * (twin.balls - extra) + mine)
+        return shared
+
+    def look(
+        self, rows: Sequence[Any], observation: Float32Array, *, steps: int, over: bool
+    ) -> dict[str, Any]:
+        """What the rows of all twins say about the extra balls, beside the observation (22,).
+
+        A ball is paid for once: when its own episode ends, or at last when the played ball's is
+        `over`. After that, `ended` says that its entries mean nothing any more.
+        """
+        balls = [
+            twin.all_balls(np.frombuffer(row))[extra]
+            for twin, row, extra in zip(self._twins, rows, self._extra, strict=True)
+        ]
+        records = np.concatenate(
+            [
+                twin.records(row)[extra]
+                for twin, row, extra in zip(self._twins, rows, self._extra, strict=True)
+            ]
+        )
+        observations = np.empty((len(records), SIZE), np.float32)
+        observations[:, ARM] = observation[ARM]
+        observations[:, BALL] = np.concatenate(balls)
+        np.clip(observations, self._low, self._high, out=observations)
+        return {
+            "observations": observations,
+            "rewards": self._judge(records, observations[:, BALL.start + 1], over=over),
+            "hits": self._hits.copy(),
+            "ended": self._ended.copy(),
+        }
+
+    def positions(self, rows: Sequence[Any]) -> FloatArray:
+        """(1 + N, 3) of the played ball and the extra ones [m]."""
+        all_balls = [
+            twin.all_balls(np.frombuffer(row))
+            for twin, row in zip(self._twins, rows, strict=True)
+        ]
+        extra = [balls[its] for balls, its in zip(all_balls, self._extra, strict=True)]
+        return np.concatenate([all_balls[0][:1], *extra])[:, :3]
+
+    def _judge(self, records: NDArray[Any], y: NDArray[Any], *, over: bool) -> FloatArray:
+        """The rewards (N,) that are paid now."""
+        rewards = np.zeros(len(records))
+        self._hits |= ~self._ended & (records["count"] > 0)
+        settled = (
+            (records["landing_iteration"] >= 0)
+            | (records["net_count"] > 0)
+            | (records["floor_count"] > 0)
+            | (y < self._end.passed_y)
+        )
+        ending = ~self._ended & (settled | over)
+        for ball in np.flatnonzero(ending):
+            rewards[ball] = self._reward.reward(record_of(records[ball], float(y[ball])))
+        self._ended |= ending
+        return rewards
+
+
+def record_of(record: Any, y: float) -> BallRecord:
+    """What the twin says about one ball, which is at `y` [m]."""
+    landed = record["landing_iteration"] >= 0
+    at = record["landing_position"]
+    return BallRecord(
+        smallest_distance=float(record["smallest_distance"]),
+        y=y,
+        hit=bool(record["count"] > 0),
+        landing=(float(at[0]), float(at[1])) if landed else None,
+        touched_net=bool(record["net_count"] > 0),
+        touched_floor=bool(record["floor_count"] > 0),
+        largest_speed=float(record["largest_speed"]),
+    )
