@@ -1,0 +1,146 @@
+#include "o80/describe/table.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cstring>
+#include <random>
+
+#include "describe/described.hpp"
+#include "o80/describe/layout.hpp"
+
+namespace o80 {
+namespace {
+
+using described::message_of;
+using described::MixedRobot;
+using described::schema_of;
+using ::testing::HasSubstr;
+
+TEST(Table, ASchemaSurvivesTheWayThroughItsBytes) {
+  const Schema schema = schema_of<MixedRobot>();
+  const Schema again = schema_from_bytes(to_bytes(schema));
+  EXPECT_EQ(again, schema);
+  EXPECT_EQ(hash(again), hash(schema));
+  EXPECT_EQ(again.hooks.size(), schema.types.size());
+}
+
+TEST(Table, TheHashTellsSchemasApart) {
+  const Schema schema = schema_of<MixedRobot>();
+  Schema other = schema;
+  other.limits[3].maximum = 1;
+  EXPECT_NE(hash(other), hash(schema));
+  other = schema;
+  other.fields[0].unit = UnitText("deg");
+  EXPECT_NE(hash(other), hash(schema));
+}
+
+/// What `check` says after a change.
+template <class Change>
+std::string refusal(Change&& change) {
+  Schema schema = schema_of<MixedRobot>();
+  change(schema);
+  return message_of<InvalidArgument>([&] { check(schema); });
+}
+
+TEST(Table, RefusesWhatCannotBeUsed) {
+  check(schema_of<MixedRobot>());
+  EXPECT_THAT(refusal([](Schema& s) { s.actuators[1].name = s.actuators[0].name; }),
+              HasSubstr("two actuator 'joints_0'"));
+  EXPECT_THAT(refusal([](Schema& s) { s.actuators[1].name = NameText(); }), HasSubstr("no name"));
+  EXPECT_THAT(refusal([](Schema& s) { s.fields[0].offset = 9; }), HasSubstr("outside its struct"));
+  EXPECT_THAT(refusal([](Schema& s) { s.limits[0] = {2, 1, 1}; }),
+              HasSubstr("from 2.000000 to 1.000000"));
+  EXPECT_THAT(refusal([](Schema& s) { s.limits[0].speed = 0; }), HasSubstr("speed > 0"));
+  EXPECT_THAT(refusal([](Schema& s) { s.limits[0].minimum = std::nan(""); }), HasSubstr("limits"));
+  EXPECT_THAT(refusal([](Schema& s) { s.actuators[0].type = 99; }), HasSubstr("no type"));
+  EXPECT_THAT(refusal([](Schema& s) { s.actuators[8].offset = 4000; }),
+              HasSubstr("outside the row"));
+  EXPECT_THAT(refusal([](Schema& s) { s.requests[1].name = s.requests[0].name; }),
+              HasSubstr("two requests"));
+  EXPECT_THAT(refusal([](Schema& s) { s.groups[0].type = 99; }), HasSubstr("has no type"));
+  EXPECT_THAT(refusal([](Schema& s) { s.head.robot.chars[0] = '\n'; }),
+              HasSubstr("control character"));
+}
+
+TEST(Table, RefusesArraysWhoseSizeOverflows) {
+  EXPECT_THAT(refusal([](Schema& s) {
+                s.fields[0].rows = 1U << 31;
+                s.fields[0].columns = 1U << 31;
+              }),
+              HasSubstr("too many elements"));
+}
+
+TEST(Table, RefusesMoreActuatorsThanARecordCanName) {
+  Schema schema;
+  const auto type = schema.add_type("float64", {scalar_field("", Kind::float64)});
+  schema.add_actuators("cell", type, 65534);
+  check(schema);
+  schema.add_actuators("more", type, 1);
+  EXPECT_THAT(message_of<InvalidArgument>([&] { check(schema); }), HasSubstr("too many actuators"));
+}
+
+TEST(Table, RefusesTypesThatNestTooDeep) {
+  Schema schema;
+  auto type = schema.add_type("T0", {scalar_field("x", Kind::float64)});
+  const auto nest = [&] {
+    FieldRow field;
+    field.name = NameText("inner");
+    field.kind = Kind::structure;
+    field.type = type;
+    type = schema.add_type("T", {field});
+  };
+  for (int i = 0; i < 16; ++i) nest();
+  check(schema);
+  nest();
+  EXPECT_THAT(message_of<InvalidArgument>([&] { check(schema); }), HasSubstr("nests too deep"));
+}
+
+TEST(Table, RefusesForeignAndTruncatedBytes) {
+  std::vector<std::byte> bytes = to_bytes(schema_of<MixedRobot>());
+  const auto read = [](std::span<const std::byte> some) {
+    return message_of<SegmentError>([&] { schema_from_bytes(some); });
+  };
+  EXPECT_THAT(read({}), HasSubstr("too short"));
+  for (std::size_t size = 0; size < bytes.size(); size += 7) {
+    EXPECT_NE(read(std::span(bytes).first(size)), "") << size;
+  }
+  bytes[0] = std::byte{0};
+  EXPECT_THAT(read(bytes), HasSubstr("no schema"));
+}
+
+/// Reads every part of a schema that bytes have given.
+void use(const Schema& schema) {
+  to_json(schema);
+  difference(schema_of<MixedRobot>(), schema);
+  layout_difference(schema_of<MixedRobot>(), schema);
+  row_layout(schema);
+  for (const ActuatorRow& actuator : schema.actuators) schema.scalar_count(actuator.type);
+}
+
+TEST(Table, GarbageIsRefusedAndNeverCrashes) {
+  const std::vector<std::byte> good = to_bytes(schema_of<MixedRobot>());
+  std::mt19937 random(7);  // NOLINT(bugprone-random-generator-seed)
+  int survived = 0;
+  for (int round = 0; round < 5000; ++round) {
+    std::vector<std::byte> bytes = good;
+    const int changes = 1 + static_cast<int>(random() % 4);
+    for (int i = 0; i < changes; ++i) {
+      const std::size_t at = random() % (bytes.size() - 4);
+      // single bits, bytes and whole numbers, small and huge
+      const std::uint32_t kinds[] = {static_cast<std::uint32_t>(random()), 0xFFFFFFFFU, 0, 1,
+                                     0x80000000U};
+      const std::uint32_t value = kinds[random() % 5];
+      std::memcpy(&bytes[random() % 2 == 0 ? at / 4 * 4 : at], &value, random() % 2 == 0 ? 4 : 1);
+    }
+    try {
+      use(schema_from_bytes(bytes));
+      ++survived;
+    } catch (const Error&) {
+      // refused
+    }
+  }
+  EXPECT_GT(survived, 0) << "some changes do no harm";
+}
+
+}  // namespace
+}  // namespace o80
