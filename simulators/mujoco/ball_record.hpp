@@ -33,7 +33,8 @@ O80_DESCRIBE(BallRecord, (count, "contacts with the racket"),
              (table_count, "contacts with the table in free flight"),
              (net_count, "contacts with the net in free flight"),
              (floor_count, "contacts with the floor in free flight"),
-             (iteration, "of the first contact with the racket, or -1"),
+             (iteration,
+              "of the first contact with the racket, by the simulation's `clock`; or -1"),
              (fraction, "of that iteration that had passed, 0 to 1"),
              (position, "of that contact, in the world [m]"),
              (normal, "from the racket to the ball"), (velocity_before, "of the ball [m/s]"),
@@ -41,7 +42,7 @@ O80_DESCRIBE(BallRecord, (count, "contacts with the racket"),
              (racket_velocity, "where the ball touched it [m/s]"),
              (smallest_distance, "of the surfaces of ball and racket so far [m]"),
              (largest_speed, "of the ball since that contact [m/s]"),
-             (landing_iteration, "of the first contact with the table after it, or -1"),
+             (landing_iteration, "of the first contact with the table after it, likewise"),
              (landing_position, "where that was, in the world [m]"));
 static_assert(std::is_trivially_copyable_v<BallRecord>);
 
@@ -50,9 +51,9 @@ constexpr Vector vector(const std::array<double, 3>& v) noexcept { return {v[0],
 
 /// Which iteration, and which part of it, a step of the simulator is.
 struct Moment {
-  std::int64_t iteration = 0;
-  double begin = 0;  // share of the iteration
-  double share = 1;  // of the iteration that the step takes
+  std::int64_t iteration = 0;  // by the simulation's clock
+  double begin = 0;            // share of the iteration
+  double share = 1;            // of the iteration that the step takes
 };
 
 /// Adds an impact to what happened to a ball.

@@ -76,6 +76,8 @@ MujocoDriver::Places MujocoDriver::add_to(Schema& schema) const {
         structure("contacts", type, model.balls.size(), "what happened to each ball"));
     at.records = places<BallRecord>(first, model.balls.size());
   }
+  at.clock.offset = schema.add_sensor(scalar_field(
+      "clock", Kind::int64, "iterations since the start or a reset; a restore sets it back too"));
   if (simulation_.racket() != nullptr) {
     at.racket_position.offset = schema.add_sensor(
         scalar_field("racket_position", Kind::float64, "of the racket's centre [m]", 3));
@@ -127,7 +129,7 @@ void MujocoDriver::write(const Desired<MujocoDriver>& desired) {
   for (std::size_t i = 0; i < places_.balls.size(); ++i) {
     targets.balls[i] = {desired.at(places_.balls[i]), desired.active(places_.first_ball + i)};
   }
-  simulation_.advance(desired.iteration());
+  simulation_.advance();
 }
 
 void MujocoDriver::read(Reading<MujocoDriver>& reading) {
@@ -142,6 +144,7 @@ void MujocoDriver::read(Reading<MujocoDriver>& reading) {
     reading.extend(places_.records[i], simulation_.record(i));
     if (simulation_.released(i) && !reading.fresh()) reading.interrupt(places_.first_ball + i);
   }
+  reading.extend(places_.clock, simulation_.clock());
   for (std::size_t i = 0; i < places_.seen_joints.size(); ++i) {
     reading.extend(places_.seen_joints[i], simulation_.joint(i));
   }

@@ -51,6 +51,7 @@ class MujocoDriver {
     std::vector<Number> sensors;
     Place<std::array<double, 3>> racket_position;
     Place<std::array<double, 3>> racket_velocity;
+    Place<std::int64_t> clock;
     Place<std::uint32_t> engine_contacts;
     std::uint32_t first_ball = 0;  // actuator
   };

@@ -61,6 +61,7 @@ Simulation::Simulation(const Config& config) : config_(config), model_(config) {
 }
 
 void Simulation::reset() noexcept {
+  now_.clock = 0;
   mj_resetDataKeyframe(model_.model.get(), data_.get(), model_.keyframe);
   mj_forward(model_.model.get(), data_.get());
   for (std::size_t i = 0; i < now_.joints.size(); ++i) {
@@ -107,7 +108,8 @@ bool Simulation::restore(std::size_t slot) noexcept {
 }
 
 // targets => steps of engine, joints, surfaces and balls => what came of it
-void Simulation::advance(std::int64_t iteration) noexcept {
+void Simulation::advance() noexcept {
+  ++now_.clock;
   for (std::size_t i = 0; i < now_.targets.controls.size(); ++i) {
     data_->ctrl[model_.controls[i].address] = now_.targets.controls[i];
   }
@@ -116,12 +118,12 @@ void Simulation::advance(std::int64_t iteration) noexcept {
     const BallTarget& target = now_.targets.balls[i];
     if (target.imposed) ball_starts_[i] = imposed(now_.balls[i], target.state);
   }
-  for (std::uint32_t k = 0; k < config_.steps; ++k) step(k, iteration);
+  for (std::uint32_t k = 0; k < config_.steps; ++k) step(k);
   now_.joints = now_.targets.joints;
   look();
 }
 
-void Simulation::step(std::uint32_t k, std::int64_t iteration) noexcept {
+void Simulation::step(std::uint32_t k) noexcept {
   if (model_.driven) {
     data_->time += model_.model->opt.timestep;
   } else {
@@ -129,7 +131,7 @@ void Simulation::step(std::uint32_t k, std::int64_t iteration) noexcept {
   }
   impose_joints(k);
   move_surfaces();
-  for (std::size_t i = 0; i < now_.balls.size(); ++i) move_ball(i, k, iteration);
+  for (std::size_t i = 0; i < now_.balls.size(); ++i) move_ball(i, k);
 }
 
 void Simulation::impose_joints(std::uint32_t k) noexcept {
@@ -168,12 +170,12 @@ Ball Simulation::imposed(const BallNow& now, const BallState& target) const noex
   return {to - period() * velocity, velocity, {}};
 }
 
-void Simulation::move_ball(std::size_t i, std::uint32_t k, std::int64_t iteration) noexcept {
+void Simulation::move_ball(std::size_t i, std::uint32_t k) noexcept {
   const double step = model_.model->opt.timestep;
   const double radius = model_.balls[i].radius;
   const BallTarget& target = now_.targets.balls[i];
   BallNow& now = now_.balls[i];
-  const Moment moment{iteration, static_cast<double>(k) / config_.steps, 1.0 / config_.steps};
+  const Moment moment{now_.clock, static_cast<double>(k) / config_.steps, 1.0 / config_.steps};
   const auto impact = [&](const Surface& surface, const Touch& touch, const Ball& before,
                           const Ball& after) {
     note(now.record, moment, surface, touch, before, after);

@@ -53,7 +53,7 @@ class Simulation {
   Targets& targets() noexcept { return now_.targets; }
 
   /// One iteration, of as many steps as the configuration says.
-  void advance(std::int64_t iteration) noexcept;
+  void advance() noexcept;
 
   /// Back to the start.
   void reset() noexcept;
@@ -73,6 +73,8 @@ class Simulation {
   std::span<const double> sensor(std::size_t i) const noexcept;
   /// Where the first racket is and how it moves; null without one.
   const Pose* racket() const noexcept;
+  /// Iterations since the start; a restore sets it back too.
+  std::int64_t clock() const noexcept { return now_.clock; }
   /// Contacts between bodies that the engine sees.
   std::uint32_t engine_contacts() const noexcept { return static_cast<std::uint32_t>(data_->ncon); }
   /// A number is no number, or beyond all bounds: nothing good can follow.
@@ -86,6 +88,7 @@ class Simulation {
   };
   /// Everything that changes, but for the engine's data.
   struct State {
+    std::int64_t clock = 0;  // [iterations]
     Targets targets;
     std::vector<JointState> joints;  // as the last iteration left them
     std::vector<BallNow> balls;
@@ -97,10 +100,10 @@ class Simulation {
     bool filled = false;
   };
 
-  void step(std::uint32_t k, std::int64_t iteration) noexcept;
+  void step(std::uint32_t k) noexcept;
   void impose_joints(std::uint32_t k) noexcept;
   void move_surfaces() noexcept;
-  void move_ball(std::size_t i, std::uint32_t k, std::int64_t iteration) noexcept;
+  void move_ball(std::size_t i, std::uint32_t k) noexcept;
   void store_ball(std::size_t i) noexcept;
   Pose pose(const SurfacePlace& place) const noexcept;
   Ball imposed(const BallNow& now, const BallState& target) const noexcept;

@@ -181,8 +181,8 @@ TEST_P(EveryMuscleModel, RepeatsBitForBitAfterARestore) {
   arm.ask("agonist_3", 20000, {.mode = Mode::overwrite});
   arm.burst(60);
 
-  EXPECT_EQ(arm.rows(60), first);
-  EXPECT_NE(once, first);  // there the motions went on
+  EXPECT_TRUE(arm.rows(60) == first);
+  EXPECT_FALSE(once == first);  // there the motions went on
 }
 
 TEST_P(EveryMuscleModel, DoesTheSameInTwoRuns) {
@@ -196,7 +196,7 @@ TEST_P(EveryMuscleModel, DoesTheSameInTwoRuns) {
     arm->burst(100);
   }
 
-  EXPECT_EQ(one.rows(202), other.rows(202));
+  EXPECT_TRUE(one.rows(202) == other.rows(202));
 }
 
 TEST_P(EveryMuscleModel, StartsElsewhereWithAnotherSeedAndAlikeWithTheSame) {
@@ -208,8 +208,8 @@ TEST_P(EveryMuscleModel, StartsElsewhereWithAnotherSeedAndAlikeWithTheSame) {
   };
   const auto with_one = start_with(1);
 
-  EXPECT_NE(start_with(2), with_one);
-  EXPECT_EQ(start_with(1), with_one);
+  EXPECT_FALSE(start_with(2) == with_one);
+  EXPECT_TRUE(start_with(1) == with_one);
 }
 
 INSTANTIATE_TEST_SUITE_P(Muscles, EveryMuscleModel, testing::Values("linear", "hill"),

@@ -1,0 +1,574 @@
+#include "simulators/mujoco/driver.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <memory>
+#include <new>
+#include <string>
+#include <vector>
+
+#include "memory/private_directory.hpp"
+#include "o80/robot/inline_robot.hpp"
+#include "o80/robot/library.hpp"
+
+namespace {
+std::size_t allocations = 0;  // of this program, by any `new`
+}
+
+// not inlined: the compiler would take malloc and delete for a mismatch
+[[gnu::noinline]] void* operator new(std::size_t size) {
+  ++allocations;
+  if (void* memory = std::malloc(size)) return memory;
+  throw std::bad_alloc();
+}
+[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+
+namespace o80::mujoco {
+namespace {
+
+using testing::AllOf;
+using testing::DoubleNear;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::Pointwise;
+using testing::ThrowsMessage;
+
+constexpr std::int64_t kPeriod = 2'000'000;  // [ns]
+using Numbers = std::array<double, 3>;
+using Row = std::vector<std::byte>;
+
+OptionValues table_tennis(OptionValues more = {}) {
+  OptionValues options{
+      {"model", O80_TEST_SOURCE "/apps/table_tennis/o80_table_tennis/models/table_tennis.xml"},
+      {"balls", "ball"},
+      {"racket", "racket"},
+      {"table", "table"},
+      {"net", "net"},
+      {"floor", "floor"}};
+  for (auto& option : more) options.push_back(std::move(option));
+  return options;
+}
+
+/// One row of a simulation, by names.
+struct Seen {
+  UntypedObservation row;
+
+  const FieldRow& sensor(std::string_view name) const {
+    const Schema& schema = row.schema();
+    const TypeRow& type = schema.types.at(schema.head.extended);
+    for (std::uint32_t i = 0; i < type.fields; ++i) {
+      const FieldRow& field = schema.fields[type.first_field + i];
+      if (field.name.view() == name) return field;
+    }
+    throw std::out_of_range("no sensor " + std::string(name));
+  }
+  template <class T>
+  T extended(std::string_view name, std::size_t element = 0) const {
+    return unpack<T>(row.extended() + sensor(name).offset + element * sizeof(T));
+  }
+  BallRecord record(std::size_t ball = 0) const { return extended<BallRecord>("contacts", ball); }
+  template <class T>
+  T observed(std::uint32_t actuator) const {
+    return unpack<T>(row.observed() + row.schema().actuators[actuator].offset);
+  }
+  template <class T>
+  T desired(std::uint32_t actuator) const {
+    return unpack<T>(row.desired() + row.schema().actuators[actuator].offset);
+  }
+};
+
+/// A simulation inside this process, with a frontend.
+struct Inline {
+  explicit Inline(const OptionValues& options, std::int64_t period = kPeriod)
+      : segment(unused_segment_name("mujoco")),
+        robot(std::make_shared<InlineRobot>(
+            std::make_unique<Robot>(*robot_table<MujocoDriver>("mujoco"), options),
+            BackendOptions{.segment = segment, .period = period})),
+        frontend(segment, robot) {}
+
+  std::uint32_t at(std::string_view name) const { return frontend.actuator(name); }
+  Seen latest() { return {frontend.latest()}; }
+  Seen burst(std::int64_t n) { return {frontend.burst(n, std::chrono::seconds(60))}; }
+  template <class State>
+  void ask(std::string_view name, const State& state, const CommandOptions& options = {}) {
+    std::array<std::byte, sizeof(State)> bytes{};
+    pack(state, bytes.data());
+    frontend.add_command(at(name), bytes, options);
+  }
+  template <class Request>
+  void request(const Request& request) {
+    std::array<std::byte, sizeof(Request)> bytes{};
+    pack(request, bytes.data());
+    frontend.add_request(frontend.request_index(request_name<Request>()), bytes);
+  }
+  /// The last rows, without their iterations and times.
+  std::vector<Row> rows(std::size_t n) {
+    const Rows history = frontend.history(n);
+    std::vector<Row> all;
+    for (std::size_t i = 0; i < history.count; ++i) {
+      const auto row = history.row(i).subspan(sizeof(RowHead));
+      all.emplace_back(row.begin(), row.end());
+    }
+    return all;
+  }
+
+  std::string segment;
+  std::shared_ptr<InlineRobot> robot;
+  UntypedFrontend frontend;
+};
+
+/// Puts the arm where its racket looks along y, 0.37 m + ... above the base.
+constexpr std::array<double, 4> kPosture{0.1, 0.9, 0.4, -0.2};
+
+void pose_arm(Inline& twin, const std::array<double, 4>& q, const std::array<double, 4>& dq = {}) {
+  for (std::size_t j = 0; j < 4; ++j) {
+    twin.ask("joint_" + std::to_string(j + 1), JointState{q[j], dq[j]});
+  }
+}
+
+/// Replays a straight way of a ball that ends behind the racket, from 10 cm before it.
+struct Shot {
+  Vector from, velocity;
+  BallState at(int i) const { return {numbers(from + (i * 0.002) * velocity), numbers(velocity)}; }
+};
+Shot shot_at_the_racket(Inline& twin) {
+  pose_arm(twin, kPosture);
+  const Seen now = twin.burst(2);
+  const Vector racket = vector(now.extended<Numbers>("racket_position"));
+  return {racket + Vector{0, 0.12, 0.02}, {0, -4, -0.5}};
+}
+
+class MujocoDriverTest : public testing::Test {
+ protected:
+  PrivateDirectory directory_;
+
+  std::string file(const std::string& name, const std::string& text) {
+    const std::string path = directory_.path() + "/" + name;
+    std::ofstream(path) << text;
+    return path;
+  }
+};
+
+TEST_F(MujocoDriverTest, NamesJointsAndBallsAsTheModelDoes) {
+  Inline twin(table_tennis({{"extra_balls", "2"}}));
+
+  EXPECT_EQ(twin.at("joint_1"), 0u);
+  EXPECT_EQ(twin.at("joint_4"), 3u);
+  EXPECT_EQ(twin.at("ball"), 4u);
+  EXPECT_EQ(twin.at("ball_2"), 6u);
+  const Schema& schema = twin.frontend.schema();
+  EXPECT_EQ(schema.groups[0].name.view(), "joints");
+  EXPECT_EQ(schema.groups[1].name.view(), "balls");
+  EXPECT_EQ(twin.latest().sensor("contacts").rows, 3u);
+}
+
+TEST_F(MujocoDriverTest, ImposedJointsAreWhereTheyAreAskedToBeBitForBit) {
+  Inline twin(table_tennis());
+  for (int i = 0; i < 200; ++i) {
+    const double t = 0.002 * i;
+    for (std::size_t j = 0; j < 4; ++j) {
+      const double w = 3.0 + static_cast<double>(j);
+      twin.ask("joint_" + std::to_string(j + 1),
+               JointState{std::sin(w * t) / 3, w * std::cos(w * t) / 3});
+    }
+    const Seen seen = twin.burst(1);
+    for (std::uint32_t j = 0; j < 4; ++j) {
+      const auto observed = seen.observed<JointState>(j);
+      const auto desired = seen.desired<JointState>(j);
+      ASSERT_EQ(observed.position, desired.position);
+      ASSERT_EQ(observed.velocity, desired.velocity);
+    }
+    ASSERT_EQ(seen.desired<JointState>(0).position, std::sin(3.0 * t) / 3);
+  }
+}
+
+TEST_F(MujocoDriverTest, TheRacketMovesAsTheJointsSay) {
+  Inline twin(table_tennis());
+  const auto posture = [](double t) {
+    return std::array<double, 4>{0.3 * std::sin(4 * t), 0.5 + t, 0.2 - t, std::cos(5 * t)};
+  };
+  const auto speeds = [](double t) {
+    return std::array<double, 4>{1.2 * std::cos(4 * t), 1, -1, -5 * std::sin(5 * t)};
+  };
+  std::array<Seen, 3> seen{twin.latest(), twin.latest(), twin.latest()};
+  for (int i = 0; i < 30; ++i) {
+    pose_arm(twin, posture(0.002 * i), speeds(0.002 * i));
+    seen = {seen[1], seen[2], twin.burst(1)};
+  }
+  const Vector difference = (1 / 0.004) * (vector(seen[2].extended<Numbers>("racket_position")) -
+                                           vector(seen[0].extended<Numbers>("racket_position")));
+  EXPECT_THAT(seen[1].extended<Numbers>("racket_velocity"),
+              Pointwise(DoubleNear(1e-4), numbers(difference)));
+}
+
+TEST_F(MujocoDriverTest, ABallIsImposedWhileCommandedAndFliesOnAfterwards) {
+  Inline twin(table_tennis());
+  const Shot shot{{0.2, 1.0, 1.2}, {0.5, 2, 1}};
+  for (int i = 0; i < 10; ++i) twin.ask("ball", shot.at(i));
+  const Seen last = twin.burst(10);
+  EXPECT_EQ(last.observed<BallState>(4).position, shot.at(9).position);
+  EXPECT_EQ(last.observed<BallState>(4).velocity, shot.at(9).velocity);
+  EXPECT_TRUE(last.row.active(4));
+
+  const Seen free = twin.burst(1);
+  EXPECT_FALSE(free.row.active(4));
+  const Ball before{vector(shot.at(9).position), vector(shot.at(9).velocity), {30, 0, 0}};
+  const Air air = Air::of(1.18, 0.40, 1.47, 0.02, 0.0027, 0.5, {0, 0, -9.81});
+  const Ball after = flown(before, air, 0.002);
+  EXPECT_THAT(free.observed<BallState>(4).position,
+              Pointwise(DoubleNear(1e-15), numbers(after.position)));
+  EXPECT_THAT(free.observed<BallState>(4).velocity,
+              Pointwise(DoubleNear(1e-15), numbers(after.velocity)));
+}
+
+TEST_F(MujocoDriverTest, ABounceOfAReplayedBallIsPartOfTheReplay) {
+  Inline twin(table_tennis());
+  twin.ask("ball", Shot{{0.4, 1.0, 0.81}, {0, -2, -10}}.at(0));
+  for (int i = 0; i < 5; ++i) twin.ask("ball", Shot{{0.4, 1.0, 0.81}, {0, -2, -10}}.at(i));
+  const Seen inside = twin.burst(6);
+
+  EXPECT_LT(inside.observed<BallState>(4).position[2], 0.775);
+  EXPECT_EQ(inside.record().table_count, 0u);
+}
+
+TEST_F(MujocoDriverTest, AHitEndsTheReplayInThatVeryIteration) {
+  Inline twin(table_tennis());
+  const Shot shot = shot_at_the_racket(twin);
+  for (int i = 0; i < 60; ++i) twin.ask("ball", shot.at(i));
+  Batch batch = twin.frontend.pulse();
+  Seen seen = twin.burst(1);
+  int i = 0;
+  while (seen.record().count == 0 && ++i < 60) {
+    EXPECT_EQ(seen.observed<BallState>(4).position, shot.at(i - 1).position);
+    seen = twin.burst(1);
+  }
+
+  const BallRecord record = seen.record();
+  ASSERT_EQ(record.count, 1u);
+  EXPECT_EQ(record.iteration, seen.row.iteration());
+  EXPECT_GT(record.fraction, 0.0);
+  EXPECT_LT(record.fraction, 1.0);
+  EXPECT_EQ(record.smallest_distance, 0.0);
+  EXPECT_EQ(record.velocity_before, numbers(shot.velocity));
+  EXPECT_EQ(record.racket_velocity, (Numbers{}));
+  // turned round along the normal, and kept by its share
+  EXPECT_THAT(
+      record.velocity_after,
+      Pointwise(DoubleNear(1e-12),
+                numbers(0.78 * (shot.velocity - 2 * dot(shot.velocity, vector(record.normal)) *
+                                                    vector(record.normal)))));
+  // the rest of the iteration was flown with it
+  const Vector moved = vector(seen.observed<BallState>(4).position) - vector(record.position);
+  const Vector expected = 0.02 * vector(record.normal) +
+                          (0.002 * (1 - record.fraction)) * vector(record.velocity_after);
+  EXPECT_THAT(numbers(moved), Pointwise(DoubleNear(5e-5), numbers(expected)));
+
+  // all commands behind the one of this iteration ended as interrupted, in this iteration
+  EXPECT_EQ(batch.handle(static_cast<std::size_t>(i)).status, Status::completed);
+  for (const std::size_t n : {static_cast<std::size_t>(i + 1), std::size_t{59}}) {
+    EXPECT_EQ(batch.handle(n).status, Status::interrupted);
+    EXPECT_EQ(batch.handle(n).iteration, seen.row.iteration());
+  }
+
+  // and the ball flies freely from now on
+  const Seen next = twin.burst(1);
+  EXPECT_FALSE(next.row.active(4));
+  EXPECT_EQ(next.record().count, 1u);
+  EXPECT_GT(next.observed<BallState>(4).velocity[1], 0.0);
+}
+
+TEST_F(MujocoDriverTest, AReturnLandsOnTheTableAndIsRecorded) {
+  Inline twin(table_tennis());
+  // a still racket, its face towards the opponent
+  const std::array<double, 4> q{0.0, 0.9, 0.4, 0.0};
+  pose_arm(twin, q);
+  const Vector racket = vector(twin.burst(2).extended<Numbers>("racket_position"));
+  const Shot shot{racket + Vector{0, 0.1, 0}, {0, -4, 2}};
+  pose_arm(twin, q);
+  for (int i = 0; i < 40; ++i) twin.ask("ball", shot.at(i));
+  const Seen seen = twin.burst(600);
+
+  const BallRecord record = seen.record();
+  ASSERT_EQ(record.count, 1u);
+  ASSERT_GT(record.landing_iteration, record.iteration);
+  EXPECT_GE(record.table_count, 1u);
+  EXPECT_NEAR(record.landing_position[2], 0.775, 1e-6);
+  EXPECT_GT(record.landing_position[1], 0.2);
+  EXPECT_LT(record.landing_position[1], 2.94);
+  EXPECT_GE(record.largest_speed, length(vector(record.velocity_after)));
+  EXPECT_LT(record.largest_speed, 10);
+}
+
+TEST_F(MujocoDriverTest, ARacketThatIsPutElsewhereHitsNothingOnTheWay) {
+  Inline twin(table_tennis({{"spin", "0,0,0"}}));
+  pose_arm(twin, {-0.5, 1.2, 0.3, 0});
+  const Vector left = vector(twin.burst(2).extended<Numbers>("racket_position"));
+  pose_arm(twin, {0.5, 1.2, 0.3, 0});
+  const Vector right = vector(twin.burst(2).extended<Numbers>("racket_position"));
+  twin.ask("ball", BallState{numbers(0.5 * (left + right)), {}});
+  pose_arm(twin, {-0.5, 1.2, 0.3, 0});
+  const Seen seen = twin.burst(1);
+
+  EXPECT_EQ(seen.record().count, 0u);
+  EXPECT_GT(seen.record().smallest_distance, 0.05);
+}
+
+TEST_F(MujocoDriverTest, ABallThatIsPutElsewhereHitsNothingOnTheWay) {
+  Inline twin(table_tennis());
+  pose_arm(twin, kPosture);
+  const Vector racket = vector(twin.burst(2).extended<Numbers>("racket_position"));
+  twin.ask("ball", BallState{numbers(racket + Vector{0, 0.5, 0}), {0, -1, 0}});
+  twin.ask("ball", BallState{numbers(racket - Vector{0, 0.5, 0}), {0, -1, 0}});
+  twin.burst(1);
+
+  EXPECT_EQ(twin.burst(1).record().count, 0u);
+}
+
+TEST_F(MujocoDriverTest, ClearingForgetsTheContactsAndLeavesTheArmAlone) {
+  Inline twin(table_tennis({{"extra_balls", "1"}}));
+  const Shot shot = shot_at_the_racket(twin);
+  for (int i = 0; i < 60; ++i) twin.ask("ball", shot.at(i));
+  for (int i = 0; i < 60; ++i) twin.ask("ball_1", shot.at(i));
+  const Seen hit = twin.burst(60);
+  ASSERT_EQ(hit.record(0).count, 1u);
+  ASSERT_EQ(hit.record(1).count, 1u);
+
+  twin.request(ClearContacts{.ball = 2});
+  const Seen one = twin.burst(1);
+  EXPECT_EQ(one.record(0).count, 1u);
+  EXPECT_EQ(one.record(1).count, 0u);
+  EXPECT_EQ(one.record(1).iteration, -1);
+  EXPECT_GT(one.record(1).smallest_distance, 0.0);
+  EXPECT_LT(one.record(1).smallest_distance, 1.0);
+
+  twin.request(ClearContacts{});
+  const Seen all = twin.burst(1);
+  EXPECT_EQ(all.record(0).count, 0u);
+  EXPECT_EQ(all.observed<JointState>(1).position, kPosture[1]);
+  EXPECT_EQ(unpack<RowHead>(all.row.bytes()).fresh, 0u);
+
+  twin.request(ClearContacts{.ball = 3});
+  Batch batch = twin.frontend.pulse();
+  twin.burst(1);
+  EXPECT_THAT(batch.handle(0).text, HasSubstr("there are 2 balls"));
+}
+
+TEST_F(MujocoDriverTest, ResetGoesBackToTheStart) {
+  Inline twin(table_tennis());
+  const Row start = twin.rows(1).front();
+  const Shot shot = shot_at_the_racket(twin);
+  for (int i = 0; i < 60; ++i) twin.ask("ball", shot.at(i));
+  twin.burst(50);
+  twin.request(Reset{.seed = 4});
+  twin.burst(1);
+
+  EXPECT_TRUE(twin.rows(2).front() == start);
+}
+
+void play(Inline& twin, const Shot& shot, int from) {
+  for (int i = from; i < from + 60; ++i) {
+    pose_arm(twin, {0.1 + 0.001 * i, 0.9, 0.4, -0.2}, {0.5, 0, 0, 0});
+    twin.ask("ball", shot.at(i));
+    twin.ask("ball_1", shot.at(i / 2));
+  }
+}
+
+TEST_F(MujocoDriverTest, RepeatsBitForBitAfterARestore) {
+  Inline twin(table_tennis({{"extra_balls", "1"}, {"steps", "4"}, {"timestep", "0.0005"}}));
+  const Shot shot = shot_at_the_racket(twin);
+  play(twin, shot, 0);
+  twin.burst(15);  // before the hit
+  twin.request(Snapshot{.slot = 1});
+  twin.request(Restore{.slot = 1});
+  play(twin, shot, 15);
+  ASSERT_GE(twin.burst(400).record().count, 1u);
+  const auto once = twin.rows(401);
+
+  twin.request(Reset{});
+  play(twin, shot, 7);
+  twin.burst(33);
+  twin.request(Restore{.slot = 1});
+  play(twin, shot, 15);
+  twin.burst(400);
+
+  EXPECT_TRUE(twin.rows(401) == once);
+}
+
+TEST_F(MujocoDriverTest, GoesOnFromTheDesiredStatesOfASnapshot) {
+  Inline twin(table_tennis());
+  pose_arm(twin, kPosture);
+  twin.burst(1);
+  twin.request(Snapshot{});
+  pose_arm(twin, {});
+  twin.burst(1);
+  twin.request(Restore{});
+  const Seen seen = twin.burst(3);
+
+  for (std::uint32_t j = 0; j < 4; ++j) {
+    EXPECT_EQ(seen.desired<JointState>(j).position, kPosture[j]);
+    EXPECT_EQ(seen.observed<JointState>(j).position, kPosture[j]);
+  }
+}
+
+TEST_F(MujocoDriverTest, DoesTheSameInTwoRuns) {
+  Inline one(table_tennis({{"extra_balls", "1"}}));
+  Inline other(table_tennis({{"extra_balls", "1"}}));
+  for (Inline* twin : {&one, &other}) {
+    play(*twin, shot_at_the_racket(*twin), 0);
+    twin->burst(500);
+  }
+  EXPECT_TRUE(one.rows(503) == other.rows(503));
+}
+
+TEST_F(MujocoDriverTest, StepsOfTheSimulatorShareAnIteration) {
+  Inline coarse(table_tennis());
+  Inline fine(table_tennis({{"steps", "4"}, {"timestep", "0.0005"}}));
+  std::array<BallRecord, 2> records;
+  for (std::size_t n = 0; n < 2; ++n) {
+    Inline& twin = n == 0 ? coarse : fine;
+    const Shot shot = shot_at_the_racket(twin);
+    for (int i = 0; i < 60; ++i) twin.ask("ball", shot.at(i));
+    records[n] = twin.burst(60).record();
+  }
+  EXPECT_EQ(records[0].iteration, records[1].iteration);
+  EXPECT_NEAR(records[0].fraction, records[1].fraction, 1e-6);
+  EXPECT_THAT(records[0].position, Pointwise(DoubleNear(1e-8), records[1].position));
+}
+
+TEST_F(MujocoDriverTest, RefusesALoopOfAnotherPeriodAndSaysWhatToDo) {
+  Inline twin(table_tennis(), 10'000'000);
+
+  EXPECT_THAT([&] { twin.burst(1); },
+              ThrowsMessage<Error>(AllOf(HasSubstr("--frequency 500"), HasSubstr("steps=5"),
+                                         HasSubstr("timestep=0.01"))));
+}
+
+TEST_F(MujocoDriverTest, AnswersWrongNamesWithTheRightOnes) {
+  const auto start = [](const OptionValues& options) { return [=] { Inline twin(options); }; };
+  EXPECT_THAT(start(table_tennis({{"joints", "elbow"}})),
+              ThrowsMessage<Error>(AllOf(HasSubstr("no joint 'elbow'"), HasSubstr("joint_1"))));
+  EXPECT_THAT(start(table_tennis({{"balls", "racket"}})),
+              ThrowsMessage<Error>(HasSubstr("'racket' is no ball: it needs a free joint")));
+  EXPECT_THAT(start(table_tennis({{"racket", "bat"}})),
+              ThrowsMessage<Error>(AllOf(HasSubstr("no geom 'bat'"), HasSubstr("racket"))));
+  EXPECT_THAT(start({{"model", "nowhere.xml"}}), ThrowsMessage<Error>(HasSubstr("nowhere.xml")));
+  EXPECT_THAT(start({}), ThrowsMessage<Error>(HasSubstr("model=PATH")));
+}
+
+constexpr const char* kPendulum = R"(
+<mujoco>
+  <worldbody>
+    <body>
+      <joint name="hinge" type="hinge" axis="0 1 0" damping="0.1"/>
+      <geom name="bob" type="capsule" fromto="0 0 0 0 0 -0.5" size="0.02"/>
+    </body>
+    <body name="box" pos="2 0 0.11"><freejoint/><geom type="box" size="0.1 0.1 0.1"/></body>
+    <geom type="plane" size="5 5 1" pos="0 0 0"/>
+  </worldbody>
+  <actuator><motor name="motor" joint="hinge" ctrlrange="-2 2" ctrllimited="true"/></actuator>
+  <sensor>
+    <jointpos name="angle" joint="hinge"/>
+    <framepos name="box_position" objtype="body" objname="box"/>
+  </sensor>
+</mujoco>)";
+
+TEST_F(MujocoDriverTest, AnyModelRunsWithItsJointsImposedAndTheRestAsPhysicsSays) {
+  Inline twin({{"model", file("pendulum.xml", kPendulum)}});
+  twin.ask("hinge", JointState{0.5, 0});
+  const Seen seen = twin.burst(500);
+
+  EXPECT_EQ(seen.observed<JointState>(0).position, 0.5);
+  EXPECT_EQ(seen.extended<double>("angle"), 0.5);
+  // the box has settled on the floor
+  EXPECT_NEAR(seen.extended<Numbers>("box_position")[2], 0.1, 0.002);
+  EXPECT_GE(seen.extended<std::uint32_t>("engine_contacts"), 4u);
+}
+
+TEST_F(MujocoDriverTest, ControlsDriveTheModelsOwnActuatorsWithinTheirRange) {
+  Inline twin({{"model", file("pendulum.xml", kPendulum)}, {"mode", "control"}});
+
+  EXPECT_THAT([&] { twin.ask("motor", 3.0); }, ThrowsMessage<Error>(HasSubstr("2")));
+  twin.ask("motor", 1.5);
+  const Seen seen = twin.burst(100);
+  EXPECT_EQ(seen.observed<double>(0), 1.5);
+  EXPECT_GT(std::abs(seen.extended<JointState>("joints").position), 0.01);
+  EXPECT_EQ(seen.extended<JointState>("joints").position, seen.extended<double>("angle"));
+}
+
+TEST_F(MujocoDriverTest, AModelOfPhysicsRepeatsBitForBitAfterARestore) {
+  Inline twin({{"model", file("pendulum.xml", kPendulum)}, {"mode", "control"}});
+  twin.ask("motor", 1.5);
+  twin.burst(50);
+  twin.request(Snapshot{});
+  twin.burst(200);
+  const auto once = twin.rows(200);
+  twin.request(Restore{});
+  twin.burst(200);
+
+  EXPECT_TRUE(twin.rows(200) == once);
+}
+
+TEST_F(MujocoDriverTest, ADivergedSimulationIsAFault) {
+  Inline twin(
+      {{"model", file("pendulum.xml", kPendulum)}, {"mode", "control"}, {"timestep", "0.002"}});
+  // nothing a frontend may send: the engine's own state is broken
+  const std::string broken = R"(
+<mujoco>
+  <option timestep="0.002"/>
+  <worldbody><body><joint name="slide" type="slide" stiffness="-1e12"/>
+  <geom size="0.1" mass="1e-6"/></body></worldbody>
+  <actuator><motor name="motor" joint="slide"/></actuator>
+</mujoco>)";
+  const auto here = std::filesystem::current_path();
+  std::filesystem::current_path(directory_.path());  // the engine writes a log where it runs
+  Inline wild({{"model", file("broken.xml", broken)}, {"mode", "control"}});
+  wild.ask("motor", 1e6);
+  EXPECT_THAT([&] { wild.burst(1000); }, ThrowsMessage<Error>(HasSubstr("diverged")));
+  std::filesystem::current_path(here);
+}
+
+TEST_F(MujocoDriverTest, NamesBothVersionsWhenTheLibraryIsAnother) {
+  EXPECT_THAT([] { check_version(3'009'000, "3.9.0"); },
+              ThrowsMessage<DriverError>(AllOf(HasSubstr("built for MuJoCo 4.0.1"),
+                                               HasSubstr("MuJoCo 3.9.0 is loaded"),
+                                               HasSubstr("pip install mujoco-core==4.0.1"))));
+  EXPECT_NO_THROW(check_version(mj_version(), mj_versionString()));
+  EXPECT_STREQ(built_with(), "mujoco 4.0.1");
+}
+
+TEST_F(MujocoDriverTest, IsARobotLibraryThatNamesItsMujoco) {
+  const RobotLibrary library = RobotLibrary::load(O80_TEST_PREFIX "/lib/o80/robots/mujoco.so");
+
+  EXPECT_STREQ(library.table->name, "mujoco");
+  EXPECT_THAT(library.table->built_with, HasSubstr(built_with()));
+}
+
+TEST_F(MujocoDriverTest, AllocatesNothingInAnIteration) {
+  Config config;
+  for (const auto& [name, text] : table_tennis({{"extra_balls", "3"}})) {
+    set_option(config, name, text);
+  }
+  Simulation simulation(config);
+  for (BallTarget& ball : simulation.targets().balls) ball = {{{0, 0.3, 1.3}, {0, -4, 0}}, true};
+  simulation.advance();
+  for (BallTarget& ball : simulation.targets().balls) ball.imposed = false;
+
+  const std::size_t before = allocations;
+  for (int i = 2; i < 600; ++i) simulation.advance();
+  simulation.snapshot(0);
+  simulation.restore(0);
+  simulation.reset();
+  EXPECT_EQ(allocations, before);
+}
+
+}  // namespace
+}  // namespace o80::mujoco
