@@ -25,6 +25,37 @@ fs::path bundled_folder() {
   return library.parent_path() / "o80" / "robots";
 }
 
+/// Other versions of a shared library ("libx.so.4.0.1") where a wheel would put it: in the package
+/// "x" beside the one that the robot belongs to.
+std::string other_versions(const fs::path& robot, const std::string& missing) {
+  const std::string::size_type end = missing.find(".so");
+  if (end == std::string::npos || missing.rfind("lib", 0) != 0) return {};
+  const std::string package = missing.substr(3, end - 3);
+  const fs::path folder = robot.parent_path() / "../../../.." / package;
+  std::string found;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(folder, ignored)) {
+    const std::string name = entry.path().filename().string();
+    if (name.rfind(missing.substr(0, end + 3), 0) != 0) continue;
+    found += (found.empty() ? "" : ", ") + name;
+  }
+  return found;
+}
+
+/// What the dynamic linker said, with the cure: it names one library only.
+std::string why_not_loaded(const std::string& robot, const std::string& message) {
+  std::string text = "the robot library '" + robot + "' cannot be loaded: " + message + ". ";
+  const std::string missing = message.substr(0, message.find(':'));
+  if (message.find("cannot open shared object file") == std::string::npos || missing == robot) {
+    return text + "Build the robot again with the o80 that is installed";
+  }
+  const std::string there = other_versions(robot, missing);
+  text += "It was built for " + missing;
+  text += there.empty() ? ", which is not installed" : ", but installed is " + there;
+  return text + ". Install the version it was built for, or build the robot (or o80) again with " +
+         "the one that is there";
+}
+
 std::string where(const std::string& name_or_path) {
   if (name_or_path.find('/') != std::string::npos) return fs::absolute(name_or_path).string();
   std::string there;
@@ -78,11 +109,7 @@ RobotLibrary RobotLibrary::load(const std::string& name_or_path) {
     throw DriverError("there is no robot library '" + library.path + "'");
   }
   void* handle = dlopen(library.path.c_str(), RTLD_NOW | RTLD_LOCAL);
-  if (handle == nullptr) {
-    throw DriverError("the robot library '" + library.path + "' cannot be loaded: " + dlerror() +
-                      ". If it names a library in another version, build the robot (or o80) again "
-                      "with the one that is installed");
-  }
+  if (handle == nullptr) throw DriverError(why_not_loaded(library.path, dlerror()));
   auto* function = reinterpret_cast<RobotTableFunction>(dlsym(handle, kRobotSymbol));
   if (function == nullptr) {
     throw DriverError("'" + library.path +

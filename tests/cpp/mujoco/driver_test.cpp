@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <limits>
 #include <memory>
 #include <new>
@@ -550,6 +551,31 @@ TEST_F(MujocoDriverTest, IsARobotLibraryThatNamesItsMujoco) {
 
   EXPECT_STREQ(library.table->name, "mujoco");
   EXPECT_THAT(library.table->built_with, HasSubstr(built_with()));
+}
+
+TEST_F(MujocoDriverTest, SaysBothVersionsAndTheCureIfItsMujocoIsNotInstalled) {
+  // the robot as if built for another version, laid out as in a wheel
+  namespace fs = std::filesystem;
+  const fs::path site = directory_.path();
+  fs::create_directories(site / "o80/lib/o80/robots");
+  fs::create_directories(site / "mujoco");
+  std::ofstream(site / "mujoco/libmujoco.so.4.0.1") << "there";
+  std::ifstream in(O80_TEST_PREFIX "/lib/o80/robots/mujoco.so", std::ios::binary);
+  std::string bytes{std::istreambuf_iterator<char>(in), {}};
+  const std::string wanted = "libmujoco.so.4.0.1";
+  std::size_t replaced = 0;
+  for (auto at = bytes.find(wanted); at != std::string::npos; at = bytes.find(wanted, at)) {
+    bytes.replace(at, wanted.size(), "libmujoco.so.3.9.0");
+    ++replaced;
+  }
+  ASSERT_GT(replaced, 0u);
+  const std::string path = site / "o80/lib/o80/robots/mujoco.so";
+  std::ofstream(path, std::ios::binary) << bytes;
+
+  EXPECT_THAT([&] { RobotLibrary::load(path); },
+              ThrowsMessage<DriverError>(AllOf(HasSubstr("built for libmujoco.so.3.9.0"),
+                                               HasSubstr("installed is libmujoco.so.4.0.1"),
+                                               HasSubstr("Install the version it was built for"))));
 }
 
 TEST_F(MujocoDriverTest, AllocatesNothingInAnIteration) {
