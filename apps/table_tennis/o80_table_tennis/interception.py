@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .aerodynamics import Aerodynamics
 from .flight import AERODYNAMICS, BALL_GUN_SPIN, TABLE, predict
-from .kinematics import BLADE_THICKNESS, nearest_in_reach, posture_reaching, racket_pose
+from .kinematics import BLADE_THICKNESS, posture_towards, racket_pose
 from .racket_impact import RacketImpact, velocity_to_land
 from .table import BALL_RADIUS, Table
 
@@ -72,6 +72,8 @@ class InterceptionSettings:
     """The same for the speed of joint 1 [rad/s]."""
     discomfort: tuple[float, float, float] = (0.2, 0.05, 0.02)
     """What deviations from them weigh, against an error of the ball's velocity [1/s, m/s, m]."""
+    off_middle: float = 8.0
+    """What a touch off the middle of the blade weighs, against the same error [1/s]."""
     spin: tuple[float, float, float] = BALL_GUN_SPIN
     """Of the ball, before and after the strike [rad/s]."""
     impact: RacketImpact = field(default_factory=RacketImpact)
@@ -149,8 +151,8 @@ class StrikePlanner:
         self._speed = self._settings.comfortable_speed
         self._found = False
 
-    def plan(self, ball: ComingBall) -> Strike | None:
-        """The strike that sends the ball best to the target; None if none is within reach."""
+    def plan(self, ball: ComingBall) -> Strike:
+        """The strike that sends the ball best to the target, or comes nearest to the ball."""
         s = self._settings
         low = np.array([ball.time_at(s.farthest), -s.steepest, 0.0])
         high = np.array([ball.time_at(s.nearest), s.steepest, s.fastest])
@@ -163,55 +165,48 @@ class StrikePlanner:
         # Gauss-Newton, held within the limits
         guess = np.clip([ball.time_at(self._place), self._wrist, self._speed], low, high)
         probe = np.array([0.004, 0.02, 0.05])
-        target = np.array([s.target_x, s.target_y, s.table.bounce_height])
         for _ in range(1 if self._found else FIRST_ROUNDS):
-            position, _ = ball.at(float(guess[0]))
-            wanted = velocity_to_land(
-                position, target, s.flight, spin=s.spin, aerodynamics=s.aerodynamics
-            )
-            here = self._outcome(ball, guess)
-            if here is None:
-                return None
-            slopes = np.zeros((3, 3))
+            wanted = self._wanted(ball, guess)
+            error = self._error(ball, guess, wanted)
+            slopes = np.empty((len(error), 3))
             for i in range(3):
                 moved = guess.copy()
                 moved[i] += probe[i]
-                there = self._outcome(ball, moved)
-                if there is None:
-                    return None
-                slopes[:, i] = (there - here) / probe[i]
+                slopes[:, i] = (self._error(ball, moved, wanted) - error) / probe[i]
             matrix = slopes.T @ slopes + np.diag(discomfort**2)
-            right = slopes.T @ (wanted - here) + discomfort**2 * (comfort - guess)
+            right = discomfort**2 * (comfort - guess) - slopes.T @ error
             guess = np.clip(guess + np.linalg.solve(matrix, right), low, high)
-        self._found = True
-        return self._strike(ball, guess)
 
-    def _strike(self, ball: ComingBall, guess: FloatArray) -> Strike | None:
+        # guess => strike, and where the next search begins
         position, _ = ball.at(float(guess[0]))
         self._place, self._wrist, self._speed = float(position[1]), float(guess[1]), float(guess[2])
-        posture = _posture(position, self._wrist)
-        if posture is None:
-            return None
-        return Strike(float(guess[0]), posture, np.array([self._speed, 0.0, 0.0, 0.0]))
+        self._found = True
+        speeds = np.array([self._speed, 0.0, 0.0, 0.0])
+        return Strike(float(guess[0]), touching_posture(position, self._wrist), speeds)
 
-    def _outcome(self, ball: ComingBall, guess: FloatArray) -> FloatArray | None:
-        """Velocity of the ball after such a strike."""
+    def _wanted(self, ball: ComingBall, guess: FloatArray) -> FloatArray:
+        """Velocity (3,) with which the ball should leave."""
+        s = self._settings
+        position, _ = ball.at(float(guess[0]))
+        target = np.array([s.target_x, s.target_y, s.table.bounce_height])
+        return velocity_to_land(
+            position, target, s.flight, spin=s.spin, aerodynamics=s.aerodynamics
+        )
+
+    def _error(self, ball: ComingBall, guess: FloatArray, wanted: FloatArray) -> FloatArray:
+        """How much faster than `wanted` the ball leaves, and how far the racket is off it, (6,)."""
         position, velocity = ball.at(float(guess[0]))
-        posture = _posture(position, float(guess[1]))
-        if posture is None:
-            return None
         speed = float(guess[2])
+        pose = racket_pose(touching_posture(position, float(guess[1])))
+        normal = np.array(pose.normal)
         racket = np.array([-speed * position[1], speed * position[0], 0.0])
-        normal = np.array(racket_pose(posture).normal)
-        return self._settings.impact.outgoing(velocity, racket, normal)
+        leaving = self._settings.impact.outgoing(velocity, racket, normal)
+        off = position - TOUCH * normal - pose.position
+        return np.concatenate([leaving - wanted, self._settings.off_middle * off])
 
 
-def _posture(ball: FloatArray, wrist: float) -> FloatArray | None:
-    """The racket's face touches the ball, as near to its middle as reach allows."""
+def touching_posture(ball: FloatArray, wrist: float) -> FloatArray:
+    """Angles (4,) [rad] with which the racket's face touches the ball, if the arm reaches it."""
     x, y, z = ball.tolist()
-    posture = posture_reaching(nearest_in_reach((x, y, z)), wrist)
-    if posture is None:
-        return None
-    nx, ny, nz = racket_pose(posture).normal
-    behind = (x - TOUCH * nx, y - TOUCH * ny, z - TOUCH * nz)
-    return posture_reaching(nearest_in_reach(behind), wrist)
+    nx, ny, nz = racket_pose(posture_towards((x, y, z), wrist)).normal
+    return posture_towards((x - TOUCH * nx, y - TOUCH * ny, z - TOUCH * nz), wrist)

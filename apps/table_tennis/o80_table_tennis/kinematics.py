@@ -24,14 +24,8 @@ FOREARM = 0.370
 """Joint 3 to the centre of the racket [m]."""
 JOINT_LIMIT = math.radians(89.8)
 """Either way [rad]."""
-BLADE = (0.5 * 0.1485, 0.5 * 0.1882)
-"""Half axes of the elliptic blade, across and along the forearm [m]."""
 BLADE_THICKNESS = 0.0054
-"""[m]"""
-REACH = UPPER_ARM + FOREARM
-"""From joint 2 to the centre of the racket when the arm is straight [m]."""
-SHORTEST_REACH = math.hypot(UPPER_ARM, FOREARM)
-"""The same when the elbow is bent all it can, nearly a right angle [m]."""
+"""Of the racket [m]."""
 
 Vector = tuple[float, float, float]
 
@@ -59,48 +53,27 @@ def racket_pose(q: FloatArray) -> RacketPose:
     return RacketPose((c1 * out, s1 * out, height), normal)
 
 
-def racket_jacobian(q: FloatArray) -> FloatArray:
-    """Velocity of the racket's centre for each joint speed, (3, 4) [m]."""
-    q1, q2, q3, _ = q.tolist()
-    c1, s1, c2, s2 = math.cos(q1), math.sin(q1), math.cos(q2), math.sin(q2)
-    c23, s23 = math.cos(q2 + q3), math.sin(q2 + q3)
-    fore_out, fore_up = FOREARM * c23, -FOREARM * s23
-    both_out, both_up = UPPER_ARM * c2 + fore_out, -UPPER_ARM * s2 + fore_up
-    out = UPPER_ARM * s2 + FOREARM * s23
-    return np.array(
-        [
-            [-s1 * out, c1 * both_out, c1 * fore_out, 0.0],
-            [c1 * out, s1 * both_out, s1 * fore_out, 0.0],
-            [0.0, both_up, fore_up, 0.0],
-        ]
-    )
+def posture_towards(point: Vector, wrist: float) -> FloatArray:
+    """Angles (4,) [rad], the elbow up, that bring the racket's centre to `point` of the world [m].
 
-
-def posture_reaching(point: Vector, wrist: float) -> FloatArray | None:
-    """Angles (4,) [rad], the elbow up, with the racket's centre at `point` of the world [m].
-
-    `wrist` is the angle of joint 4. None if the point is out of reach.
+    `wrist` is the angle of joint 4. Where the joints do not reach: a posture near to the point.
     """
     x, y, z = point
     out, height = math.hypot(x, y), z - SHOULDER
-    cosine = (out * out + height * height - UPPER_ARM**2 - FOREARM**2) / (2 * UPPER_ARM * FOREARM)
-    if abs(cosine) > 1.0:
-        return None
     # the triangle of upper arm, forearm and the line from the shoulder to the racket
-    bend = math.acos(cosine)
+    square = out * out + height * height
+    cosine = (square - UPPER_ARM**2 - FOREARM**2) / (2 * UPPER_ARM * FOREARM)
+    bend = _held(math.acos(min(max(cosine, -1.0), 1.0)))
     lift = math.atan2(out, height) - math.atan2(
-        FOREARM * math.sin(bend), UPPER_ARM + FOREARM * cosine
+        FOREARM * math.sin(bend), UPPER_ARM + FOREARM * math.cos(bend)
     )
-    posture = np.array([math.atan2(y, x), lift, bend, wrist])
-    return posture if bool(np.all(np.abs(posture) <= JOINT_LIMIT)) else None
+    if abs(lift) > JOINT_LIMIT:
+        # the upper arm at its stop: the forearm points at the racket
+        lift = _held(lift)
+        elbow_out, elbow_height = UPPER_ARM * math.sin(lift), UPPER_ARM * math.cos(lift)
+        bend = _held(math.atan2(out - elbow_out, height - elbow_height) - lift)
+    return np.array([_held(math.atan2(y, x)), lift, bend, _held(wrist)])
 
 
-def nearest_in_reach(point: Vector, *, margin: float = 0.01) -> Vector:
-    """`point`, or where the line from the shoulder to it comes within reach [m].
-
-    `margin` is kept from the straight arm and from the elbow's stop [m].
-    """
-    x, y, height = point[0], point[1], point[2] - SHOULDER
-    distance = math.sqrt(x * x + y * y + height * height)
-    scale = min(max(distance, SHORTEST_REACH + margin), REACH - margin) / distance
-    return (scale * x, scale * y, SHOULDER + scale * height)
+def _held(angle: float) -> float:
+    return min(max(angle, -JOINT_LIMIT), JOINT_LIMIT)
