@@ -19,6 +19,7 @@ nanobind_add_stub(
   MODULE _core
   OUTPUT ${PROJECT_BINARY_DIR}/python/_core.pyi
   PYTHON_PATH $<TARGET_FILE_DIR:_core>
+  INCLUDE_PRIVATE
   PATTERN_FILE ${PROJECT_SOURCE_DIR}/python/bindings/stub.pat
   DEPENDS _core ${PROJECT_SOURCE_DIR}/python/bindings/stub.pat
 )

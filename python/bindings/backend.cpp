@@ -106,8 +106,8 @@ struct SchemaBuilder {
 
   static o80::Kind kind_of(const std::string& name) {
     using o80::Kind;
-    constexpr const char* kNames[] = {"bool",   "int8",   "int16",  "int32",   "int64",
-                                      "uint8",  "uint16", "uint32", "uint64",  "float32",
+    constexpr const char* kNames[] = {"bool",    "int8",   "int16",  "int32",  "int64",
+                                      "uint8",   "uint16", "uint32", "uint64", "float32",
                                       "float64", "enum",   "struct"};
     for (std::size_t i = 0; i < std::size(kNames); ++i) {
       if (name == kNames[i]) return static_cast<Kind>(i);
@@ -130,7 +130,8 @@ class Backend final : public o80::RequestServer {
   o80::UntypedBackend& checked() {
     guard_.check("the backend of segment '" + backend_.name() + "'");
     if (ended_) {
-      throw o80::Closed("the backend of segment '" + backend_.name() + "' has ended: make a new one");
+      throw o80::Closed("the backend of segment '" + backend_.name() +
+                        "' has ended: make a new one");
     }
     return backend_;
   }
@@ -179,8 +180,7 @@ class Backend final : public o80::RequestServer {
   o80::Served serve(std::uint32_t request, std::span<const std::byte> payload) noexcept override {
     const nb::gil_scoped_acquire locked;
     try {
-      const nb::object answer =
-          serve_with(request, nb::bytes(payload.data(), payload.size()));
+      const nb::object answer = serve_with(request, nb::bytes(payload.data(), payload.size()));
       if (answer.is_none()) return o80::Served::done();
       if (nb::isinstance<nb::str>(answer)) {
         return o80::Served::rejected(nb::cast<std::string>(answer));
@@ -232,9 +232,8 @@ Backend* make(const SchemaBuilder& builder, const std::string& segment, std::int
 
 /// A block of the backend's memory, for arrays that live as long as it does.
 nb::object view(const std::byte* block, std::size_t size, int flags) {
-  return nb::steal(PyMemoryView_FromMemory(
-      const_cast<char*>(reinterpret_cast<const char*>(block)), static_cast<Py_ssize_t>(size),
-      flags));
+  return nb::steal(PyMemoryView_FromMemory(const_cast<char*>(reinterpret_cast<const char*>(block)),
+                                           static_cast<Py_ssize_t>(size), flags));
 }
 
 }  // namespace
@@ -242,7 +241,8 @@ nb::object view(const std::byte* block, std::size_t size, int flags) {
 void bind_backend(nb::module_& m) {
   nb::class_<SchemaBuilder>(m, "SchemaBuilder", "A robot while it is described.")
       .def(nb::init<const std::string&>(), "robot"_a)
-      .def("add_type", &SchemaBuilder::add_type, "name"_a, "fields"_a)
+      .def("add_type", &SchemaBuilder::add_type, "name"_a, "fields"_a,
+           nb::sig("def add_type(self, name: str, fields: list[typing.Any]) -> int"))
       .def("add_actuators", &SchemaBuilder::add_actuators, "group"_a, "type"_a, "count"_a,
            "is_array"_a)
       .def("set_extended", &SchemaBuilder::set_extended, "type"_a)
@@ -264,30 +264,41 @@ void bind_backend(nb::module_& m) {
                      description->layout = self.backend().layout();
                      return description;
                    })
-      .def("observed", [](nb::handle self) {
+      .def(
+          "observed",
+          [](nb::handle self) {
             auto& backend = nb::inst_ptr<Backend>(self)->checked();
             return view(backend.observed(), backend.layout().block, PyBUF_WRITE);
-          }, nb::sig("def observed(self) -> memoryview"))
-      .def("extended", [](nb::handle self) {
+          },
+          nb::sig("def observed(self) -> memoryview"))
+      .def(
+          "extended",
+          [](nb::handle self) {
             auto& backend = nb::inst_ptr<Backend>(self)->checked();
             return view(backend.extended(), backend.layout().extended_size, PyBUF_WRITE);
-          }, nb::sig("def extended(self) -> memoryview"))
-      .def("fresh_desired", [](nb::handle self) {
+          },
+          nb::sig("def extended(self) -> memoryview"))
+      .def(
+          "fresh_desired",
+          [](nb::handle self) {
             auto* backend = nb::inst_ptr<Backend>(self);
-            return view(backend->fresh_desired(), backend->backend().layout().block,
-                        PyBUF_WRITE);
-          }, nb::sig("def fresh_desired(self) -> memoryview"))
-      .def("desired", [](const Backend& self) {
-            return nb::bytearray(self.backend().desired(), self.backend().layout().block);
-          })
-      .def("active", [](const Backend& self) {
-            return nb::bytes(self.backend().active(), self.backend().layout().mask_words * 8);
-          })
+            return view(backend->fresh_desired(), backend->backend().layout().block, PyBUF_WRITE);
+          },
+          nb::sig("def fresh_desired(self) -> memoryview"))
+      .def("desired",
+           [](const Backend& self) {
+             return nb::bytearray(self.backend().desired(), self.backend().layout().block);
+           })
+      .def("active",
+           [](const Backend& self) {
+             return nb::bytes(self.backend().active(), self.backend().layout().mask_words * 8);
+           })
       .def("publish", &Backend::publish)
       .def("step", &Backend::step, "timeout"_a.none())
-      .def("interrupt", [](Backend& self, std::uint32_t actuator) {
-            self.checked().interrupt(actuator);
-          }, "actuator"_a)
+      .def(
+          "interrupt",
+          [](Backend& self, std::uint32_t actuator) { self.checked().interrupt(actuator); },
+          "actuator"_a)
       .def("ask_to_stop", [](Backend& self) { self.checked().ask_to_stop(); })
       .def("end", &Backend::end, "failed"_a, "text"_a)
       .def_prop_ro("ended", &Backend::ended)

@@ -24,8 +24,8 @@ std::optional<o80::Iteration> known(o80::Iteration iteration) {
 }
 
 std::string text_of(const Handle& handle) {
-  std::string text = "<o80.Handle " + std::to_string(handle.id) + ": " +
-                     std::string(o80::to_text(handle.status));
+  std::string text =
+      "<o80.Handle " + std::to_string(handle.id) + ": " + std::string(o80::to_text(handle.status));
   if (handle.iteration >= 0) text += " at iteration " + std::to_string(handle.iteration);
   if (!handle.text.empty()) text += ", " + handle.text;
   return text + ">";
@@ -44,15 +44,19 @@ nb::list statuses_of(const Batch& batch) {
 void bind_batch(nb::module_& m) {
   nb::class_<Handle>(m, "Handle", "What became of one command or request, when it was asked.")
       .def_ro("id", &Handle::id, "Names it within its frontend.")
-      .def_prop_ro("status", [](const Handle& self) { return python_word(self.status); },
-                   nb::sig("def status(self) -> Status"), "What became of it.")
-      .def_prop_ro("reason", [](const Handle& self) { return python_word(self.reason); },
-                   nb::sig("def reason(self) -> Reason"), "Why.")
-      .def_prop_ro("iteration", [](const Handle& self) { return known(self.iteration); },
-                   "The iteration at which the status changed; None while it is queued.")
+      .def_prop_ro(
+          "status", [](const Handle& self) { return python_word(self.status); },
+          nb::sig("def status(self) -> Status"), "What became of it.")
+      .def_prop_ro(
+          "reason", [](const Handle& self) { return python_word(self.reason); },
+          nb::sig("def reason(self) -> Reason"), "Why.")
+      .def_prop_ro(
+          "iteration", [](const Handle& self) { return known(self.iteration); },
+          "The iteration at which the status changed; None while it is queued.")
       .def_ro("text", &Handle::text, "Why it was rejected or dropped, in words.")
-      .def_prop_ro("ended", [](const Handle& self) { return o80::is_end(self.status); },
-                   "Whether the status changes no more.")
+      .def_prop_ro(
+          "ended", [](const Handle& self) { return o80::is_end(self.status); },
+          "Whether the status changes no more.")
       .def("__repr__", &text_of);
 
   nb::class_<Batch>(m, "Batch", "What one pulse sent. Its length is that of its records.")
@@ -60,24 +64,25 @@ void bind_batch(nb::module_& m) {
       .def("__bool__", [](const Batch&) { return true; })
       .def_prop_ro("handles", &Batch::handles,
                    "A handle for each command, request and purge, in the order they were added.")
-      .def_prop_ro("statuses", &statuses_of,
-                   nb::sig("def statuses(self) -> list[Status]"),
+      .def_prop_ro("statuses", &statuses_of, nb::sig("def statuses(self) -> list[Status]"),
                    "The status of each, in the order they were added.")
       .def_prop_ro("ended", &Batch::ended, "Whether every record has an end status.")
-      .def_prop_ro("first_iteration",
-                   [](const Batch& self) { return known(self.first_iteration()); },
-                   "The iteration at which it was taken; None if it was not yet.")
-      .def_prop_ro("last_iteration", [](const Batch& self) { return known(self.last_iteration()); },
-                   "The iteration at which the last of its commands ended; None if not yet.")
-      .def("wait",
-           [](const Batch& self, std::optional<double> timeout) {
-             carrying(self, [&] {
-               const Waiting waiting;
-               self.wait(timeout_of(timeout), Waiting::check);
-             });
-           },
-           "timeout"_a = nb::none(),
-           R"(Waits until every record has an end status.
+      .def_prop_ro(
+          "first_iteration", [](const Batch& self) { return known(self.first_iteration()); },
+          "The iteration at which it was taken; None if it was not yet.")
+      .def_prop_ro(
+          "last_iteration", [](const Batch& self) { return known(self.last_iteration()); },
+          "The iteration at which the last of its commands ended; None if not yet.")
+      .def(
+          "wait",
+          [](const Batch& self, std::optional<double> timeout) {
+            carrying(self, [&] {
+              const Waiting waiting;
+              self.wait(timeout_of(timeout), Waiting::check);
+            });
+          },
+          "timeout"_a = nb::none(),
+          R"(Waits until every record has an end status.
 
 A bursting backend must be burst for that. Raises TimeoutError after `timeout` [s], which carries
 this batch, and BackendGone.)")
@@ -87,22 +92,25 @@ this batch, and BackendGone.)")
       });
 
   nb::class_<PendingBurst>(m, "Burst", "A burst under way.")
-      .def_prop_ro("batch", [](const PendingBurst& self) { return self.burst.batch(); },
-                   "What was sent with it.")
-      .def_prop_ro("done", [](const PendingBurst& self) { return self.burst.done(); },
-                   "Whether its last iteration is done.")
-      .def("wait",
-           [](const PendingBurst& self, std::optional<double> timeout) {
-             return carrying(self.burst.batch(), [&] {
-               o80::UntypedObservation row = [&] {
-                 const Waiting waiting;
-                 return self.burst.wait(timeout_of(timeout), Waiting::check);
-               }();
-               return Observation(self.decoder, std::move(row));
-             });
-           },
-           "timeout"_a = nb::none(),
-           R"(Waits for its last iteration and returns the observation of it.
+      .def_prop_ro(
+          "batch", [](const PendingBurst& self) { return self.burst.batch(); },
+          "What was sent with it.")
+      .def_prop_ro(
+          "done", [](const PendingBurst& self) { return self.burst.done(); },
+          "Whether its last iteration is done.")
+      .def(
+          "wait",
+          [](const PendingBurst& self, std::optional<double> timeout) {
+            return carrying(self.burst.batch(), [&] {
+              o80::UntypedObservation row = [&] {
+                const Waiting waiting;
+                return self.burst.wait(timeout_of(timeout), Waiting::check);
+              }();
+              return Observation(self.decoder, std::move(row));
+            });
+          },
+          "timeout"_a = nb::none(),
+          R"(Waits for its last iteration and returns the observation of it.
 
 Raises TimeoutError after `timeout` [s], and BackendGone.)");
 }

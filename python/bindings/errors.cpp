@@ -10,8 +10,8 @@ namespace {
 
 /// Raises the class of o80.errors that has the name of the C++ one.
 void translate(const std::exception_ptr& thrown, void*) {
-#define O80_TRANSLATE(Name)                    \
-  catch (const o80::Name& error) {             \
+#define O80_TRANSLATE(Name)                       \
+  catch (const o80::Name& error) {                \
     set_error(python_error(#Name), error.what()); \
   }
   try {
@@ -42,13 +42,9 @@ void translate(const std::exception_ptr& thrown, void*) {
 
 }  // namespace
 
-nb::object python_error(const char* name) {
-  return nb::module_::import_("o80.errors").attr(name);
-}
+nb::object python_error(const char* name) { return nb::module_::import_("o80.errors").attr(name); }
 
-void set_error(const nb::object& type, const char* text) {
-  PyErr_SetString(type.ptr(), text);
-}
+void set_error(const nb::object& type, const char* text) { PyErr_SetString(type.ptr(), text); }
 
 void raise_python(const char* name, const std::string& text) {
   set_error(python_error(name), text.c_str());

@@ -110,7 +110,7 @@ class Frontend {
 
  private:
   std::string name_of(std::uint32_t index) const {
-    return "actuator '" + untyped_->schema().actuators[index].name.str() + "'";
+    return "the target of actuator '" + untyped_->schema().actuators[index].name.str() + "'";
   }
 
   std::shared_ptr<UntypedFrontend> untyped_;
@@ -219,9 +219,9 @@ struct Bytes {
 /// One trajectory for each of several actuators, all or none.
 /// `states` holds the rows of the first, then those of the second...; `times` are ends [ns].
 void add_trajectories(const Frontend& self, const std::vector<std::uint32_t>& actuators,
-                      std::uint32_t rows, nb::handle states, nb::handle times,
-                      nb::handle speed, nb::handle iterations, nb::handle mode,
-                      nb::handle profile, nb::handle start) {
+                      std::uint32_t rows, nb::handle states, nb::handle times, nb::handle speed,
+                      nb::handle iterations, nb::handle mode, nb::handle profile,
+                      nb::handle start) {
   UntypedFrontend& frontend = self.untyped();
   o80::CommandOptions options{.pace = pace_of(nb::none(), speed, nb::none(), iterations),
                               .mode = mode_of(mode),
@@ -286,8 +286,8 @@ Observation burst(const Frontend& self, std::int64_t iterations, Seconds timeout
   return Observation(decoder, std::move(row));
 }
 
-std::vector<Observation> burst_group(
-    const std::vector<std::pair<Frontend*, std::int64_t>>& members, Seconds timeout) {
+std::vector<Observation> burst_group(const std::vector<std::pair<Frontend*, std::int64_t>>& members,
+                                     Seconds timeout) {
   std::vector<std::shared_ptr<UntypedFrontend>> alive;
   std::vector<std::pair<UntypedFrontend*, std::int64_t>> group;
   for (const auto& [member, iterations] : members) {
@@ -357,8 +357,8 @@ Observation next_row(const std::shared_ptr<UntypedFrontend>& frontend,
   Iteration next = position;
   {
     const Waiting waiting;
-    observation.missed = frontend->wait_for_next(next, observation.row.bytes(),
-                                                 timeout_of(timeout), Waiting::check);
+    observation.missed =
+        frontend->wait_for_next(next, observation.row.bytes(), timeout_of(timeout), Waiting::check);
   }
   position = std::max(position, next);
   return observation;
@@ -390,8 +390,8 @@ std::pair<Iteration, std::size_t> read_rows(const Frontend& self, Iteration firs
   const auto frontend = self.shared();
   const Waiting waiting;
   const std::size_t rows = bytes.span().size() / frontend->layout().size;
-  const o80::HistoryReader::Range range = frontend->link()->history.read_range(
-      first, rows, static_cast<std::byte*>(bytes.view.buf));
+  const o80::HistoryReader::Range range =
+      frontend->link()->history.read_range(first, rows, static_cast<std::byte*>(bytes.view.buf));
   return {range.first, range.count};
 }
 
@@ -414,17 +414,16 @@ std::shared_ptr<o80::Description> description_of(const Attachment& attachment) {
 void bind_frontend(nb::module_& m) {
   nb::class_<Attachment>(m, "Attachment", "A frontend that has no class yet.")
       .def_prop_ro("description", &description_of)
-      .def_prop_ro("robot", [](const Attachment& self) {
-        return self.frontend->schema().head.robot.str();
-      });
+      .def_prop_ro("robot",
+                   [](const Attachment& self) { return self.frontend->schema().head.robot.str(); });
   m.def("attach", &attach, "segment"_a, "timeout"_a.none(), "read_only"_a, "dead"_a);
   m.def("difference", [](const o80::Description& expected, const o80::Description& found) {
     return o80::difference(expected.schema, found.schema);
   });
 
   nb::class_<Stream>(m, "Stream", "Every observation, in order.")
-      .def("__iter__", [](nb::object self) { return self; },
-           nb::sig("def __iter__(self) -> Stream"))
+      .def(
+          "__iter__", [](nb::object self) { return self; }, nb::sig("def __iter__(self) -> Stream"))
       .def("__next__", [](Stream& self) {
         return next_row(self.frontend, self.decoder, self.next, self.timeout);
       });
@@ -457,36 +456,39 @@ Raises InvalidArgument for what the robot cannot follow.)")
       .def("_add_trajectories", &add_trajectories, "actuators"_a, "rows"_a, "states"_a,
            "times"_a.none(), "speed"_a.none(), "iterations"_a.none(), "mode"_a, "profile"_a,
            "start"_a)
-      .def("add_request",
-           [](const Frontend& self, std::string_view name, const nb::kwargs& fields) {
-             add_request(self, name, fields);
-           },
-           "name"_a, "fields"_a, nb::sig("def add_request(self, name: str, /, **fields: typing.Any) -> None"),
-           R"(Adds a request to what the next pulse sends.
+      .def(
+          "add_request",
+          [](const Frontend& self, std::string_view name, const nb::kwargs& fields) {
+            add_request(self, name, fields);
+          },
+          "name"_a, "fields"_a,
+          nb::sig("def add_request(self, name: str, /, **fields: typing.Any) -> None"),
+          R"(Adds a request to what the next pulse sends.
 
 It is served in order with the commands of that pulse; fields that are not given are zero.)")
-      .def("add_purge",
-           [](const Frontend& self, nb::handle actuator) {
-             self.untyped().add_purge(purged(self, actuator));
-           },
-           "actuator"_a = nb::none(),
-           nb::sig("def add_purge(self, actuator: int | str | None = None) -> None"),
-           "Adds a purge (of one actuator, or of all) to what the next pulse sends.")
-      .def("purge",
-           [](const Frontend& self, nb::handle actuator) {
-             const std::uint16_t which = purged(self, actuator);
-             return send_alone(self, [&](o80::BatchBuilder& batch) { batch.purge(which); });
-           },
-           "actuator"_a = nb::none(),
-           nb::sig("def purge(self, actuator: int | str | None = None) -> Batch"),
-           R"(Drops all commands of an actuator (None: of all), whoever sent them, at once.
+      .def(
+          "add_purge",
+          [](const Frontend& self, nb::handle actuator) {
+            self.untyped().add_purge(purged(self, actuator));
+          },
+          "actuator"_a = nb::none(),
+          nb::sig("def add_purge(self, actuator: int | str | None = None) -> None"),
+          "Adds a purge (of one actuator, or of all) to what the next pulse sends.")
+      .def(
+          "purge",
+          [](const Frontend& self, nb::handle actuator) {
+            const std::uint16_t which = purged(self, actuator);
+            return send_alone(self, [&](o80::BatchBuilder& batch) { batch.purge(which); });
+          },
+          "actuator"_a = nb::none(),
+          nb::sig("def purge(self, actuator: int | str | None = None) -> Batch"),
+          R"(Drops all commands of an actuator (None: of all), whoever sent them, at once.
 
 Needs no pulse; what was added and not pulsed stays added.)")
       .def("_purge_own",
            [](const Frontend& self) {
-             return send_alone(self, [](o80::BatchBuilder& batch) {
-               batch.purge_own(o80::kEveryActuator);
-             });
+             return send_alone(
+                 self, [](o80::BatchBuilder& batch) { batch.purge_own(o80::kEveryActuator); });
            })
       .def("_take_control",
            [](const Frontend& self) {
@@ -498,10 +500,12 @@ Needs no pulse; what was added and not pulsed stays added.)")
            })
       .def("_index", &Frontend::actuator, "named"_a)
       .def("_send_request", &send_request, "name"_a, "fields"_a)
-      .def_prop_ro("added", [](const Frontend& self) { return self.untyped().added(); },
-                   "How many commands, requests and purges were added and not pulsed.")
-      .def("forget_added", [](const Frontend& self) { self.untyped().forget_added(); },
-           "Drops what was added and not pulsed.")
+      .def_prop_ro(
+          "added", [](const Frontend& self) { return self.untyped().added(); },
+          "How many commands, requests and purges were added and not pulsed.")
+      .def(
+          "forget_added", [](const Frontend& self) { self.untyped().forget_added(); },
+          "Drops what was added and not pulsed.")
       .def("pulse", &pulse, nb::kw_only(), "at"_a = nb::none(), "late"_a = "reject",
            nb::sig("def pulse(self, *, at: int | None = None, late: str = 'reject') -> Batch"),
            R"(Sends what was added, as one batch; does not wait.
@@ -543,21 +547,27 @@ Raises TimeoutError after `timeout` [s], BackendGone.)")
 
 timeout: longest wait for one of them [s].)")
       .def("_read_rows", &read_rows, "first"_a, "array"_a)
-      .def_prop_ro("published", [](const Frontend& self) { return self.untyped().published(); },
-                   "The iteration of the newest observation.")
-      .def_prop_ro("oldest", [](const Frontend& self) { return self.untyped().oldest(); },
-                   "The iteration of the oldest observation still there.")
-      .def_prop_ro("segment", [](const Frontend& self) { return self.untyped().segment(); },
-                   "The name of the segment.")
-      .def_prop_ro("epoch", [](const Frontend& self) { return self.untyped().epoch(); },
-                   "Names this run of the backend; another one of the same name has another.")
-      .def_prop_ro("bursting", [](const Frontend& self) { return self.untyped().bursting(); },
-                   "Whether the backend stands still until it is burst.")
-      .def_prop_ro("life",
-                   [](const Frontend& self) { return std::string(name_of(self.untyped().life())); },
-                   "starting, running, stopped, failed, superseded or killed.")
-      .def_prop_ro("closed", [](const Frontend& self) { return self.untyped().closed(); },
-                   "Whether it was closed.")
+      .def_prop_ro(
+          "published", [](const Frontend& self) { return self.untyped().published(); },
+          "The iteration of the newest observation.")
+      .def_prop_ro(
+          "oldest", [](const Frontend& self) { return self.untyped().oldest(); },
+          "The iteration of the oldest observation still there.")
+      .def_prop_ro(
+          "segment", [](const Frontend& self) { return self.untyped().segment(); },
+          "The name of the segment.")
+      .def_prop_ro(
+          "epoch", [](const Frontend& self) { return self.untyped().epoch(); },
+          "Names this run of the backend; another one of the same name has another.")
+      .def_prop_ro(
+          "bursting", [](const Frontend& self) { return self.untyped().bursting(); },
+          "Whether the backend stands still until it is burst.")
+      .def_prop_ro(
+          "life", [](const Frontend& self) { return std::string(name_of(self.untyped().life())); },
+          "starting, running, stopped, failed, superseded or killed.")
+      .def_prop_ro(
+          "closed", [](const Frontend& self) { return self.untyped().closed(); },
+          "Whether it was closed.")
       .def_prop_ro("_is_inline", &Frontend::is_inline)
       .def("_close", &Frontend::close)
       .def("_reattach", &Frontend::reattach, "attachment"_a);

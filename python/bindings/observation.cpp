@@ -52,8 +52,8 @@ Observation* from_bytes(std::shared_ptr<const Decoder> decoder, nb::handle bytes
 
 std::shared_ptr<o80::Description> description_from(nb::bytes schema) {
   auto description = std::make_shared<o80::Description>();
-  description->schema = o80::schema_from_bytes(
-      std::as_bytes(std::span(schema.c_str(), schema.size())));
+  description->schema =
+      o80::schema_from_bytes(std::as_bytes(std::span(schema.c_str(), schema.size())));
   description->layout = o80::row_layout(description->schema);
   return description;
 }
@@ -76,63 +76,72 @@ void bind_observation(nb::module_& m) {
              return std::make_shared<Decoder>(std::move(description), std::move(layout));
            }),
            "description"_a, "layout"_a)
-      .def_ro("layout", &Decoder::layout);
+      .def_prop_ro(
+          "layout", [](const Decoder& self) { return self.layout; },
+          nb::sig("def layout(self) -> typing.Any"));
 
-  nb::class_<Observation>(m, "Observation", nb::type_slots(buffer_slots),
-                          R"(One row of the history: what was asked in an iteration and what came of it.
+  nb::class_<Observation>(
+      m, "Observation", nb::type_slots(buffer_slots),
+      R"(One row of the history: what was asked in an iteration and what came of it.
 
 The arrays share the memory of this observation, which is its own: nothing that happens later
 changes them.)")
       .def(nb::new_(&from_bytes), "decoder"_a, "row"_a)
-      .def_prop_ro("iteration", [](const Observation& self) { return self.row.iteration(); },
-                   "The iteration of this row.")
-      .def_prop_ro("time", [](const Observation& self) { return self.row.time(); },
-                   "When it was published [ns]: of the monotonic clock, or simulated in bursting.")
-      .def_prop_ro("lateness", [](const Observation& self) { return self.row.head().lateness; },
-                   "How long after its due moment the iteration began [ns].")
-      .def_prop_ro("overruns", [](const Observation& self) { return self.row.head().overruns; },
-                   "Iterations so far that were not done in time.")
-      .def_prop_ro("skipped", [](const Observation& self) { return self.row.head().skipped; },
-                   "Periods so far that were left out to catch up.")
-      .def_prop_ro("fresh", [](const Observation& self) { return self.row.head().fresh != 0; },
-                   "Whether the robot started afresh in this row.")
+      .def_prop_ro(
+          "iteration", [](const Observation& self) { return self.row.iteration(); },
+          "The iteration of this row.")
+      .def_prop_ro(
+          "time", [](const Observation& self) { return self.row.time(); },
+          "When it was published [ns]: of the monotonic clock, or simulated in bursting.")
+      .def_prop_ro(
+          "lateness", [](const Observation& self) { return self.row.head().lateness; },
+          "How long after its due moment the iteration began [ns].")
+      .def_prop_ro(
+          "overruns", [](const Observation& self) { return self.row.head().overruns; },
+          "Iterations so far that were not done in time.")
+      .def_prop_ro(
+          "skipped", [](const Observation& self) { return self.row.head().skipped; },
+          "Periods so far that were left out to catch up.")
+      .def_prop_ro(
+          "fresh", [](const Observation& self) { return self.row.head().fresh != 0; },
+          "Whether the robot started afresh in this row.")
       .def_ro("missed", &Observation::missed,
               "Rows between this one and the one read before it that were overwritten unread; "
               "set by wait_for_next and stream.")
-      .def_prop_ro("desired", [](nb::handle self) {
-            return nb::inst_ptr<Observation>(self)->decoder->desired(self);
-          },
+      .def_prop_ro(
+          "desired",
+          [](nb::handle self) { return nb::inst_ptr<Observation>(self)->decoder->desired(self); },
           nb::sig("def desired(self) -> typing.Any"),
           "The states that were asked: an array (actuators,), or a record of groups.")
-      .def_prop_ro("observed", [](nb::handle self) {
-            return nb::inst_ptr<Observation>(self)->decoder->observed(self);
-          },
+      .def_prop_ro(
+          "observed",
+          [](nb::handle self) { return nb::inst_ptr<Observation>(self)->decoder->observed(self); },
           nb::sig("def observed(self) -> typing.Any"),
           "The states that were read: an array (actuators,), or a record of groups.")
-      .def_prop_ro("extended", [](nb::handle self) {
-            return nb::inst_ptr<Observation>(self)->decoder->extended(self);
-          },
+      .def_prop_ro(
+          "extended",
+          [](nb::handle self) { return nb::inst_ptr<Observation>(self)->decoder->extended(self); },
           nb::sig("def extended(self) -> typing.Any"),
           "Further sensor values: a record with a value for each field.")
-      .def_prop_ro("active", [](nb::handle self) {
-            return nb::inst_ptr<Observation>(self)->decoder->active(self);
-          },
+      .def_prop_ro(
+          "active",
+          [](nb::handle self) { return nb::inst_ptr<Observation>(self)->decoder->active(self); },
           nb::sig("def active(self) -> typing.Any"),
           "Whether a command gave the desired state: bool (actuators,).")
-      .def_prop_ro("clamped", [](nb::handle self) {
-            return nb::inst_ptr<Observation>(self)->decoder->clamped(self);
-          },
+      .def_prop_ro(
+          "clamped",
+          [](nb::handle self) { return nb::inst_ptr<Observation>(self)->decoder->clamped(self); },
           nb::sig("def clamped(self) -> typing.Any"),
           "Whether the limits changed the desired state: bool (actuators,).")
-      .def("flat",
+      .def(
+          "flat",
           [](nb::handle self, nb::handle dtype) {
             return nb::inst_ptr<Observation>(self)->decoder->flat(self, dtype);
           },
-          "dtype"_a = nb::none(),
-          nb::sig("def flat(self, dtype: typing.Any = None) -> typing.Any"),
+          "dtype"_a = nb::none(), nb::sig("def flat(self, dtype: typing.Any = None) -> typing.Any"),
           "All observed numbers, then all extended ones, as one vector (default: float32).")
-      .def("__repr__", [](nb::handle self) {
-            return nb::inst_ptr<Observation>(self)->decoder->text(self);
-          },
+      .def(
+          "__repr__",
+          [](nb::handle self) { return nb::inst_ptr<Observation>(self)->decoder->text(self); },
           nb::sig("def __repr__(self) -> str"));
 }

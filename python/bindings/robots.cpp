@@ -43,9 +43,9 @@ void bind_robots(nb::module_& m) {
       .def_ro("path", &o80::RobotLibrary::path)
       .def_prop_ro("name",
                    [](const o80::RobotLibrary& self) { return std::string(self.table->name); })
-      .def_prop_ro("built_with", [](const o80::RobotLibrary& self) {
-        return std::string(self.table->built_with);
-      })
+      .def_prop_ro(
+          "built_with",
+          [](const o80::RobotLibrary& self) { return std::string(self.table->built_with); })
       .def_prop_ro("options",
                    [](const o80::RobotLibrary& self) { return o80::options_of(*self.table); })
       .def("start_inline", &start_inline, "segment"_a, "period"_a, "history"_a, "options"_a);
@@ -56,14 +56,17 @@ void bind_robots(nb::module_& m) {
     for (const o80::RobotFile& file : o80::find_robots()) found.emplace_back(file.name, file.path);
     return found;
   });
-  m.def("run_flags", [] {
-    std::size_t count = 0;
-    const o80::RunFlag* flags = o80::run_flags(count);
-    nb::list all;
-    for (std::size_t i = 0; i < count; ++i) {
-      all.append(nb::make_tuple(flags[i].name, flags[i].value, flags[i].help));
-    }
-    return all;
-  }, nb::sig("def run_flags() -> list[tuple[str, str | None, str]]"),
-     "Name, value and help of each flag of every robot's process.");
+  m.def(
+      "run_flags",
+      [] {
+        std::size_t count = 0;
+        const o80::RunFlag* flags = o80::run_flags(count);
+        nb::list all;
+        for (std::size_t i = 0; i < count; ++i) {
+          all.append(nb::make_tuple(flags[i].name, flags[i].value, flags[i].help));
+        }
+        return all;
+      },
+      nb::sig("def run_flags() -> list[tuple[str, str | None, str]]"),
+      "Name, value and help of each flag of every robot's process.");
 }

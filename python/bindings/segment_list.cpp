@@ -10,10 +10,11 @@ namespace nb = nanobind;
 
 void bind_segment_list(nb::module_& m) {
   using o80::SegmentEntry;
-  nb::class_<SegmentEntry>(m, "SegmentEntry", "A file in shared memory that bears a segment's name.")
+  nb::class_<SegmentEntry>(m, "SegmentEntry",
+                           "A file in shared memory that bears a segment's name.")
       .def_ro("name", &SegmentEntry::name)
-      .def_prop_ro(
-          "life", [](const SegmentEntry& entry) { return std::string(name_of(entry.life)); })
+      .def_prop_ro("life",
+                   [](const SegmentEntry& entry) { return std::string(name_of(entry.life)); })
       .def_ro("readable", &SegmentEntry::readable)
       .def_ro("pid", &SegmentEntry::pid)
       .def_ro("started_at", &SegmentEntry::started_at, "[s] since 1970")

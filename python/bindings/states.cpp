@@ -197,8 +197,8 @@ class Writer {
     const o80::TypeRow& row = schema_.types[type];
     const bool is_sequence = PySequence_Check(value.ptr()) != 0 && !PyUnicode_Check(value.ptr());
     if (!is_sequence || PySequence_Size(value.ptr()) != static_cast<Py_ssize_t>(row.fields)) {
-      refuse(what, "a mapping, a record, or all its fields in order (" + fields_of(schema_, type) +
-                       ")",
+      refuse(what,
+             "a mapping, a record, or all its fields in order (" + fields_of(schema_, type) + ")",
              value);
     }
     for (std::uint32_t i = 0; i < row.fields; ++i) {
@@ -265,8 +265,7 @@ const FieldRow* plain_number(const Schema& schema, std::uint32_t type) {
   const o80::TypeRow& row = schema.types[type];
   if (row.fields != 1) return nullptr;
   const FieldRow& field = schema.fields[row.first_field];
-  const bool plain =
-      field.name.view().empty() && field.rows == 0 && field.kind != Kind::structure;
+  const bool plain = field.name.view().empty() && field.rows == 0 && field.kind != Kind::structure;
   return plain ? &field : nullptr;
 }
 

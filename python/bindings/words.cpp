@@ -1,7 +1,7 @@
 #include "words.hpp"
 
-#include <array>
 #include <nanobind/stl/string.h>
+#include <array>
 
 #include <string>
 

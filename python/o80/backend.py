@@ -144,7 +144,7 @@ class Backend:
         native.publish()
 
     def step(self, timeout: float | None = None) -> Any:
-        """Begins an iteration: the desired states, as a fresh array (or record), or None at the end.
+        """Begins an iteration: its desired states, a fresh array or record; None at the end.
 
         Bursting, it waits until a frontend asks for iterations; raises TimeoutError after
         `timeout` [s]. None follows `stop`. Requests are served in here: what a handler raises
@@ -267,8 +267,9 @@ class Server:
         fill(self._observed, answer.observed, "observed")
         if answer.extended is not None:
             fill(self._extended, answer.extended, "extended")
-        wanted = answer.observed if answer.desired is None else answer.desired
-        fill(self._desired, wanted, "desired")
+        self._desired[...] = self._observed
+        if answer.desired is not None:
+            fill(self._desired, answer.desired, "desired")
         return True
 
 

@@ -81,7 +81,7 @@ class SchemaWriter:
                 )
 
     def set_idle(self, when_idle: str | Mapping[int | str, str]) -> None:
-        """"hold" or "follow", for all actuators or for each."""
+        """ "hold" or "follow", for all actuators or for each."""
         words = (
             when_idle
             if isinstance(when_idle, Mapping)

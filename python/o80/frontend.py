@@ -6,14 +6,22 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from enum import IntEnum
 from functools import cached_property
 from types import TracebackType
-from typing import Any, Literal, Self, overload
+from typing import Any, Literal, Self, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from o80 import _core, at_exit, frontend_classes
 from o80.actuator import Actuator, actuators_of
-from o80.errors import BackendGone, Closed, ControlTaken, Error, InvalidArgument, RequestRejected, SchemaMismatch
+from o80.errors import (
+    BackendGone,
+    Closed,
+    ControlTaken,
+    Error,
+    InvalidArgument,
+    RequestRejected,
+    SchemaMismatch,
+)
 from o80.history import History
 from o80.layout import Layout
 from o80.trajectory import states_of, times_of
@@ -34,6 +42,9 @@ class Frontend(_core.Frontend):
     If the robot's package has a class of its own for it, that one is made.
     """
 
+    _attachment: _core.Attachment  # from __new__ to __init__
+    _arguments: tuple[str, float | None, bool, Literal["purge", "continue"], bool] | None
+
     def __new__(
         cls,
         segment: str,
@@ -45,7 +56,7 @@ class Frontend(_core.Frontend):
     ) -> Self:
         attachment = _core.attach(segment, timeout, read_only, dead)
         chosen = frontend_classes.of(attachment.robot) if cls is Frontend else None
-        self = super().__new__(cls if chosen is None else chosen)
+        self = super().__new__(cls if chosen is None else cast(type[Self], chosen))
         self._attachment = attachment
         return self
 
@@ -118,7 +129,7 @@ class Frontend(_core.Frontend):
         chosen, single = self._chosen(actuators)
         states, rows = states_of(targets, chosen, single, self._layout)
         self._add_trajectories(
-            [actuator for actuator in chosen],
+            chosen,
             rows,
             states,
             None if times is None else times_of(times),
@@ -167,7 +178,8 @@ class Frontend(_core.Frontend):
         """Sends what was added and lets a bursting backend run exactly so many iterations.
 
         Returns the observation of the last one; with `wait=False` a Burst, to be waited for.
-        Raises NotBursting, TimeoutError after `timeout` [s], BackendGone, LaneFull, InvalidArgument.
+        Raises NotBursting, TimeoutError after `timeout` [s], BackendGone, LaneFull,
+        InvalidArgument.
         """
         return self._burst(iterations, timeout) if wait else self._start_burst(iterations)
 
@@ -211,7 +223,7 @@ class Frontend(_core.Frontend):
 
     def _read(self, first: int, count: int) -> History:
         rows = np.empty(count, self._layout.row)
-        begin, found = self._read_rows(first, rows.view(np.uint8)) if count else (first, 0)
+        _, found = self._read_rows(first, rows.view(np.uint8)) if count else (first, 0)
         return History(self._decoder, rows[:found])
 
     @property

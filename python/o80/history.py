@@ -66,7 +66,8 @@ class History:
     @property
     def fresh(self) -> NDArray[np.bool_]:
         """Whether the robot started afresh in that row: (T,)."""
-        return np.not_equal(self._part("fresh"), 0)
+        fresh: NDArray[np.bool_] = self._part("fresh") != 0
+        return fresh
 
     def _part(self, name: str) -> NDArray[Any]:
         part: NDArray[Any] = self.rows[name]

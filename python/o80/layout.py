@@ -28,8 +28,9 @@ def dtype_of_field(field: dict[str, Any]) -> np.dtype[Any]:
     if kind == "struct":
         return dtype_of_type(field["type"])
     if kind == "enum":
-        return np.dtype(f"{'i' if field['signed'] else 'u'}{field['size']}")
-    return np.dtype(kind)
+        kind = f"{'i' if field['signed'] else 'u'}{field['size']}"
+    dtype: np.dtype[Any] = np.dtype(kind)
+    return dtype
 
 
 def is_plain(described: dict[str, Any]) -> bool:

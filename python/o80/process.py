@@ -98,7 +98,7 @@ def start_process(
     library: str, segment: str, flags: Sequence[str], timeout: float | None
 ) -> Process:
     """Starts a robot library in a process and waits until it runs."""
-    output = tempfile.TemporaryFile()
+    output = tempfile.TemporaryFile()  # noqa: SIM115, it lives as long as the process
     popen = subprocess.Popen(
         [prefix() / "bin" / "o80-run", library, f"--segment={segment}", "--until-eof", *flags],
         stdin=subprocess.PIPE,

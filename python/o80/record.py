@@ -59,4 +59,4 @@ class Record:
     __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
-        return f"Record({', '.join(f'{name}={self[name]!r}' for name in self)})"
+        return f"Record({', '.join(f'{name}={self[name]}' for name in self)})"

@@ -1,10 +1,10 @@
 """Robots: libraries that a process of their own runs, or this one.
 
-    with o80.robots.load("two_joints").start(frequency=500, gain=2.0) as process:
-        arm = process.frontend()
+with o80.robots.load("two_joints").start(frequency=500, gain=2.0) as process:
+    arm = process.frontend()
 
-    with o80.robots.load("two_joints").inline() as arm:
-        arm.burst(5)
+with o80.robots.load("two_joints").inline() as arm:
+    arm.burst(5)
 """
 
 import builtins
