@@ -6,11 +6,6 @@
 namespace o80::mujoco {
 namespace {
 
-const Config& checked(const Config& config) {
-  check_version(mj_version(), mj_versionString());
-  return config;
-}
-
 FieldRow structure(std::string_view name, std::uint32_t type, std::size_t count,
                    std::string_view text) {
   FieldRow field = scalar_field(name, Kind::structure, text, static_cast<std::uint32_t>(count));
@@ -45,8 +40,7 @@ std::vector<Place<T>> add_group(Schema& schema, std::string_view group,
 
 }  // namespace
 
-MujocoDriver::MujocoDriver(const Config& config)
-    : simulation_(checked(config)), steps_(config.steps) {
+MujocoDriver::MujocoDriver(const Config& config) : simulation_(config), steps_(config.steps) {
   Schema schema;
   places_ = add_to(schema);
 }

@@ -107,6 +107,7 @@ std::vector<JointPlace> joints_of(const mjModel& model, const std::vector<std::s
     if (is_hinge_or_slide(model, id)) ids.push_back(id);
   }
   std::vector<JointPlace> joints;
+  joints.reserve(ids.size());
   for (const int id : ids) {
     joints.push_back({name_of(model, mjOBJ_JOINT, id, "joint"), id, model.jnt_qposadr[id],
                       model.jnt_dofadr[id]});
@@ -192,6 +193,7 @@ std::vector<std::string> names_in(std::string_view list) {
 }
 
 Model::Model(const Config& config) {
+  check_version(mj_version(), mj_versionString());
   std::vector<std::string> ball_names = names_in(config.balls);
   model = compiled(config, ball_names);
   if (config.timestep > 0) model->opt.timestep = config.timestep;

@@ -191,6 +191,22 @@ TEST(Impact, OnTheTableKeepsTheSharesOfItsRestitution) {
   EXPECT_NEAR(flight.end.position.z, 0.795 + 0.92 * 2 * (kStep - 0.001), 1e-8);
 }
 
+TEST(Impact, BouncesAsTheFlightModelOfTheExperimentDoes) {
+  // flight.predict((0.46, 2.95, 1.37), (0.24, -4.14, 2.28), 1.0, spin=(30, 0, 0)) of the
+  // application, which bounces once
+  const Air air = Air::of(1.18, 0.40, 1.47, 0.02, 0.0027, 0.5, {0, 0, -9.81});
+  Ball ball{{0.46, 2.95, 1.37}, {0.24, -4.14, 2.28}, {30, 0, 0}};
+  std::uint32_t bounces = 0;
+  for (int i = 0; i < 500; ++i) {
+    const Flight flight = step(ball, {table()}, air);
+    ball = flight.end;
+    bounces += flight.record.table_count;
+  }
+  EXPECT_EQ(bounces, 1u);
+  expect_near(ball.position, {0.63421394, -0.05990447, 1.33619891}, 1e-4);
+  expect_near(ball.velocity, {0.11350646, -1.97961788, -0.68067597}, 1e-3);
+}
+
 TEST(Impact, NeverAddsEnergyOnAStillSurface) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> velocity(-8, 8);
