@@ -1,0 +1,68 @@
+"""Steps a second of the accelerated table-tennis environment, beside the same without o80."""
+
+import time
+from collections.abc import Callable
+from contextlib import ExitStack, closing
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o80_table_tennis.balls import balls_from
+from o80_table_tennis.environment import accelerated_environment
+from plain_table_tennis import PlainEnvironment
+from sampling import built, rounds, sample, take_priority
+
+EPISODES = 3
+ARM_SEED = 1  # without noise at the start, any seed gives the same arm
+MOST_STEPS = 300
+
+Actions = NDArray[np.float32]
+Step = Callable[[Actions], tuple[NDArray[np.float32], float, bool, bool, Any]]
+
+
+def episode(step: Step, actions: Actions) -> tuple[float, int, list[NDArray[np.float32]]]:
+    """Time [s], steps, observations."""
+    seen = []
+    begin = time.perf_counter()
+    for action in actions:
+        observation, _, terminated, truncated, _ = step(action)
+        seen.append(observation)
+        if terminated or truncated:
+            break
+    return time.perf_counter() - begin, len(seen), seen
+
+
+def main() -> None:
+    take_priority()
+    random = np.random.default_rng(1)
+    actions = random.uniform(-1, 1, (MOST_STEPS, 8)).astype(np.float32)
+    balls = balls_from(None, 0, 0.002)
+    flights = [balls.flight(number) for number in range(EPISODES)]
+    with ExitStack() as stack:
+        inline = stack.enter_context(closing(accelerated_environment()))
+        processes = stack.enter_context(closing(accelerated_environment(processes=True)))
+        rows = inline.rig.twins[0].frontend.history(1).rows
+        record = rows.dtype["extended"]["contacts"].base
+        library = built() / "lib" / "plain_table_tennis.so"
+        plain = stack.enter_context(closing(PlainEnvironment(library, record)))
+
+        for turn in range(rounds() + 1):
+            flight = flights[turn % EPISODES]
+            plain.reset(flight, ARM_SEED)
+            results = {"steps_plain": episode(plain.step, actions)}
+            for name, env in (("steps_inline", inline), ("steps_processes", processes)):
+                env.reset(seed=1, options={"flight": flight})
+                results[name] = episode(env.step, actions)
+            # the same experiment, or there is nothing to compare
+            for name, (_, _, seen) in results.items():
+                if not np.array_equal(seen, results["steps_plain"][2]):
+                    raise RuntimeError(f"{name} saw something else than the plain environment")
+            if turn == 0:
+                continue  # everybody warms up
+            for name, (seconds, steps, _) in results.items():
+                sample(name, "steps/s", steps / seconds)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,123 @@
+// The table-tennis experiment in one process and without o80: the same plant, the same MuJoCo model
+// and the same law of impact, stepped by plain calls. What the environment is measured against.
+
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <exception>
+#include <memory>
+#include <span>
+
+#include "robots/pam/plant.hpp"
+#include "simulators/mujoco/simulation.hpp"
+
+namespace {
+
+constexpr int kIterations = 5;  // of arm and twin in a step
+
+/// What one step gives; laid out alike in Python.
+struct Seen {
+  double q[4];
+  double dq[4];
+  double pressures[8];
+  double ball[6];
+  o80::mujoco::BallRecord record;
+};
+
+class Plain {
+ public:
+  explicit Plain(const o80::mujoco::Config& config) : twin_(config) {}
+
+  void reset(std::uint64_t seed, std::span<const o80::mujoco::BallState> flight, Seen& seen) {
+    arm_.reset(seed);
+    twin_.reset();
+    asked_ = arm_.state().commanded;
+    flight_ = flight;
+    played_ = 0;
+    mirror();
+    look(seen);
+    for (std::size_t m = 0; m < 8; ++m) seen.pressures[m] = asked_[m];
+  }
+
+  void step(const double* pressures, int delay, Seen& seen) {
+    for (int i = 0; i < kIterations; ++i) {
+      if (i == delay) {
+        for (std::size_t m = 0; m < 8; ++m) {
+          asked_[m] = static_cast<std::int32_t>(std::lround(pressures[m]));
+        }
+      }
+      arm_.advance(asked_);
+      mirror();
+    }
+    look(seen);
+  }
+
+ private:
+  void mirror() {
+    o80::mujoco::Targets& targets = twin_.targets();
+    for (std::size_t i = 0; i < 4; ++i) targets.joints[i] = {arm_.q()[i], arm_.dq()[i]};
+    targets.balls[0].imposed = played_ < flight_.size();
+    if (targets.balls[0].imposed) targets.balls[0].state = flight_[played_++];
+    twin_.advance();
+    if (twin_.released(0)) played_ = flight_.size();
+  }
+
+  void look(Seen& seen) const {
+    for (std::size_t i = 0; i < 4; ++i) {
+      seen.q[i] = arm_.q()[i];
+      seen.dq[i] = arm_.dq()[i];
+    }
+    for (std::size_t m = 0; m < 8; ++m) {
+      seen.pressures[m] = arm_.config().ranges[m].pressure(arm_.state().activation[m]);
+    }
+    const o80::mujoco::BallState ball = twin_.ball(0);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      seen.ball[axis] = ball.position[axis];
+      seen.ball[3 + axis] = ball.velocity[axis];
+    }
+    seen.record = twin_.record(0);
+  }
+
+  o80::pam::Plant arm_;
+  o80::mujoco::Simulation twin_;
+  o80::pam::Pressures asked_{};
+  std::span<const o80::mujoco::BallState> flight_;  // the caller's memory
+  std::size_t played_ = 0;
+};
+
+}  // namespace
+
+extern "C" {
+
+__attribute__((visibility("default"))) Plain* plain_create(const char* model) {
+  try {
+    o80::mujoco::Config config;
+    config.model = model;
+    config.joints = "joint_1,joint_2,joint_3,joint_4";
+    config.balls = "ball";
+    config.racket = "racket";
+    config.table = "table";
+    config.net = "net";
+    config.floor = "floor";
+    config.timestep = 0.002;
+    return new Plain(config);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return nullptr;
+  }
+}
+
+__attribute__((visibility("default"))) void plain_reset(Plain* plain, std::uint64_t seed,
+                                                        const o80::mujoco::BallState* flight,
+                                                        std::size_t rows, Seen* seen) {
+  plain->reset(seed, {flight, rows}, *seen);
+}
+
+__attribute__((visibility("default"))) void plain_step(Plain* plain, const double* pressures,
+                                                       int delay, Seen* seen) {
+  plain->step(pressures, delay, *seen);
+}
+
+__attribute__((visibility("default"))) void plain_destroy(Plain* plain) { delete plain; }
+
+}  // extern "C"

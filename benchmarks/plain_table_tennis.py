@@ -1,0 +1,93 @@
+"""The table-tennis environment in one process and without o80, step for step the same."""
+
+import ctypes
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o80_table_tennis.actions import MUSCLES, changed_pressures
+from o80_table_tennis.ball_watch import BallWatch, RecordReader
+from o80_table_tennis.observations import JOINT_POSITIONS, JOINT_VELOCITIES, PRESSURES, SIZE
+from o80_table_tennis.rendering import MODEL
+from o80_table_tennis.rewards import End
+from o80_table_tennis.settings import RigSettings, TaskSettings
+from o80_table_tennis.trajectories import SampledFlight
+
+FloatArray = NDArray[np.float64]
+
+BALL = slice(PRESSURES.stop, SIZE)
+
+
+class PlainEnvironment:
+    """Same plant, model, observation and reward as the environment; nothing in between.
+
+    `record` is the dtype of what happened to a ball, as the environment's twin publishes it.
+    """
+
+    def __init__(self, library: Path, record: np.dtype[Any]) -> None:
+        self._library = ctypes.CDLL(str(library))
+        self._library.plain_create.restype = ctypes.c_void_p
+        plain = self._library.plain_create(str(MODEL).encode())
+        if not plain:
+            raise RuntimeError(f"{library.name} could not be set up")
+        self._plain = ctypes.c_void_p(plain)
+        self._seen = np.zeros(22 * 8 + record.itemsize, np.uint8)
+        self._numbers = self._seen[: 22 * 8].view(np.float64)
+        self._seen_at = ctypes.c_void_p(self._seen.ctypes.data)
+        self._raw = np.empty(MUSCLES)
+        self._raw_at = ctypes.c_void_p(self._raw.ctypes.data)
+
+        task = self._task = TaskSettings()
+        ranges = RigSettings().pressures
+        self._delay = ctypes.c_int(task.delay)
+        self._watch = BallWatch(RecordReader(record, 22 * 8), end=task.end, reward=task.reward)
+        self._least = np.array(ranges.least, dtype=np.float64)
+        self._span = np.array(ranges.most, dtype=np.float64) - self._least
+        self._low = task.bounds.low.astype(np.float64)
+        self._high = task.bounds.high.astype(np.float64)
+
+    def reset(self, flight: SampledFlight, arm_seed: int) -> NDArray[np.float32]:
+        self._flight = np.ascontiguousarray(np.hstack([flight.positions, flight.velocities]))
+        self._library.plain_reset(
+            self._plain,
+            ctypes.c_uint64(arm_seed),
+            ctypes.c_void_p(self._flight.ctypes.data),
+            ctypes.c_size_t(len(self._flight)),
+            self._seen_at,
+        )
+        self._steps = 0
+        self._asked = (self._numbers[8:16] - self._least) / self._span
+        return self._observe()
+
+    def step(
+        self, action: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+        self._asked = changed_pressures(self._asked, np.asarray(action), factor=self._task.factor)
+        np.rint(self._least + self._asked * self._span, out=self._raw)
+        self._library.plain_step(self._plain, self._raw_at, self._delay, self._seen_at)
+        self._steps += 1
+        observation = self._observe()
+        y = float(self._numbers[17])
+        end = self._watch.look(self._seen, y, self._steps)
+        reward = 0.0 if end is End.RUNNING else self._watch.reward(y)
+        info = {
+            "hit": self._watch.hit,
+            "smallest_distance": self._watch.smallest_distance,
+            "stalled": False,
+            "end": end.value,
+        }
+        return observation, reward, end.terminated, end.truncated, info
+
+    def _observe(self) -> NDArray[np.float32]:
+        numbers = self._numbers
+        observation = np.empty(SIZE)
+        observation[JOINT_POSITIONS] = numbers[0:4]
+        observation[JOINT_VELOCITIES] = numbers[4:8]
+        observation[PRESSURES] = (numbers[8:16] - self._least) / self._span
+        observation[BALL] = numbers[16:22]
+        return np.minimum(np.maximum(observation, self._low), self._high).astype(np.float32)
+
+    def close(self) -> None:
+        self._library.plain_destroy(self._plain)
