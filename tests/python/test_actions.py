@@ -16,7 +16,6 @@ from o80_table_tennis.actions import (
     START_PRESSURE,
     PressureRange,
     changed_pressures,
-    sigmoid,
 )
 from o80_table_tennis.observations import ObservationBounds, pack_observation
 
@@ -64,8 +63,11 @@ def test_a_wrong_action_is_refused(action: np.ndarray) -> None:
         changed_pressures(MIDDLE, action)
 
 
-def test_the_sigmoid_does_not_overflow() -> None:
-    np.testing.assert_allclose(sigmoid(np.array([-1e6, 0.0, 1e6])), [0.0, 0.5, 1.0])
+def test_a_change_is_the_sigmoid_of_the_action_less_a_half() -> None:
+    action = np.linspace(-1.0, 1.0, MUSCLES)
+    change = changed_pressures(MIDDLE, action, factor=COARSE) - MIDDLE
+
+    np.testing.assert_allclose(change, 1 / (1 + np.exp(-COARSE * action)) - 0.5, atol=1e-12)
 
 
 def test_the_published_start_lies_two_thirds_up_the_simulated_range() -> None:

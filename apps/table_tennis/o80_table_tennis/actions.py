@@ -6,6 +6,7 @@ on. Normalised pressures run from 0 (the least of the muscle's range) to 1 (the 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -22,6 +23,8 @@ COARSE = 1.0
 """Factor of the actions in the published coarse configuration."""
 START_PRESSURE = 18000
 """Raw pressure of every muscle at the start of a published episode."""
+
+NOUGHT = np.zeros(MUSCLES)
 
 
 @dataclass(frozen=True)
@@ -82,24 +85,22 @@ REAL_RANGE = PressureRange.of_pairs(
 """Of the real arm."""
 
 
-def sigmoid(values: FloatArray) -> FloatArray:
-    """1 / (1 + exp(-x)), without overflow."""
-    result: FloatArray = 0.5 * (1.0 + np.tanh(0.5 * values))
-    return result
-
-
 def changed_pressures(
     pressures: FloatArray, action: FloatArray, *, factor: float = FINE
 ) -> FloatArray:
     """Normalised pressures (8,) after an action (8,) in [-1, 1]; clipped to [0, 1], a fresh array.
 
-    delta = sigmoid(factor * action) - 1/2, as published. Raises ValueError for a wrong shape or a
-    number that is not finite; an action outside of [-1, 1] is clipped.
+    delta = sigmoid(factor * action) - 1/2, as published, which is tanh(factor * action / 2) / 2.
+    Raises ValueError for a wrong shape or a number that is not finite; an action outside of
+    [-1, 1] is clipped.
     """
     action = np.asarray(action, dtype=np.float64)
     if action.shape != (MUSCLES,):
         raise ValueError(f"an action has shape ({MUSCLES},), not {action.shape}")
-    if not np.isfinite(action).all():
+    # 0 times what is not finite is not a number
+    if math.isnan(action.dot(NOUGHT)):
         raise ValueError(f"an action must be finite, not {action}")
-    delta = sigmoid(factor * np.clip(action, -1.0, 1.0)) - 0.5
-    return np.clip(pressures + delta, 0.0, 1.0)
+    clipped = np.minimum(np.maximum(action, -1.0), 1.0)
+    changed = pressures + 0.5 * np.tanh(0.5 * factor * clipped)
+    result: FloatArray = np.minimum(np.maximum(changed, 0.0), 1.0)
+    return result

@@ -1,4 +1,8 @@
-"""The arm as the environment sees it: eight pressures in, rows of joint angles out."""
+"""The arm as the environment sees it: eight pressures in, rows of joint angles out.
+
+`send` and `advance` run in every step. They use the compiled half of the frontend, which takes
+arrays of the right kind as they are, and reads rows into memory that is there.
+"""
 
 from __future__ import annotations
 
@@ -42,6 +46,9 @@ class Arm:
         self.q = numbers[:, words(dtype, "extended", "joint_positions")]
         self.dq = numbers[:, words(dtype, "extended", "joint_velocities")]
         self.pressures = numbers[:, words(dtype, "observed")]
+        self._bytes = self._rows.view(np.uint8)
+        self._muscles = list(range(MUSCLES))
+        self._bursting = frontend.bursting
         self._asked = numbers[:, words(dtype, "desired")]
         self.start_pressures = np.array(frontend.latest().desired)
         self.start_angles = np.array(frontend.latest().extended.joint_positions)
@@ -55,16 +62,18 @@ class Arm:
 
     def send(self, pressures: FloatArray, at: int) -> Any:
         """Raw pressures (8,) from iteration `at` on, or at once if it has begun."""
-        self.frontend.add_trajectory(pressures[None, :])
+        self.frontend._add_trajectories(
+            self._muscles, 1, pressures, None, None, 1, "overwrite", "linear", "desired"
+        )
         return self.frontend.pulse(at=at, late="now")
 
     def advance(self, first: int) -> None:
         """Waits for the five rows from `first` on, or lets the arm make them, and reads them."""
-        if self.frontend.bursting:
-            self.frontend.burst(ITERATIONS)
+        if self._bursting:
+            self.frontend._burst(ITERATIONS, TIMEOUT)
         else:
             self.frontend.wait_for(first + ITERATIONS - 1, timeout=TIMEOUT)
-        self._read(first)
+        self.frontend._read_rows(first, self._bytes)
 
     @property
     def asked(self) -> FloatArray:
@@ -93,10 +102,6 @@ class Arm:
 
     def read_newest(self) -> int:
         """Reads the last rows; returns the iteration of the newest one."""
-        newest = self.newest
-        self._read(newest - ITERATIONS + 1)
-        return newest
-
-    def _read(self, first: int) -> None:
-        rows = self.frontend.history(since=first, until=first + ITERATIONS - 1).rows
+        rows = self.frontend.history(ITERATIONS).rows
         self._rows[ITERATIONS - len(rows) :] = rows
+        return int(self.iterations[-1])

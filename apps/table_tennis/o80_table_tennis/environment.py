@@ -112,6 +112,7 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         self._high = bounds.high.astype(np.float64)
         self._least = np.array(ranges.least, dtype=np.float64)
         self._span = np.array(ranges.most, dtype=np.float64) - self._least
+        self._observed = np.empty(SIZE)
 
     # ------------------------------------------------------------------ an episode
 
@@ -148,6 +149,7 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
             raise gymnasium.error.ResetNeeded("the episode is over: call reset() before step()")
         if not self._begun:
             self._begin()
+        called = time.perf_counter()
         rig, arm, row = self._rig, self._rig.arm, self._row
         if self._real_time and arm.newest - row > self._task.most_late:
             return self._stall()
@@ -168,11 +170,11 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         self._steps += 1
         observation = self._observe(rows)
         end = self._watch.look(rows[0], self._twin_words[self._twin.played_ball][1], self._steps)
-        if end is End.RUNNING:
-            return observation, 0.0, False, False, self._info(rows, observation, end)
-        reward = self._finish(end.value)
         info = self._info(rows, observation, end)
-        return observation, reward, end.terminated, end.truncated, info
+        self._counts.seconds_stepping += time.perf_counter() - called
+        if end is End.RUNNING:
+            return observation, 0.0, False, False, info
+        return observation, self._finish(end.value), end.terminated, end.truncated, info
 
     def _begin(self) -> None:
         """The first step: an episode begins with it, however long the caller took to think."""
@@ -192,7 +194,7 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
             "stalled": True,
             "end": "stalled",
         }
-        return self._observed.astype(np.float32), 0.0, False, True, info
+        return self._observe(self._rows), 0.0, False, True, info
 
     def _finish(self, end: str, reward: float | None = None) -> float:
         """The episode is over: its reward, its summary, its record."""
@@ -248,13 +250,12 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         arm = self._rig.arm
         self._rows = rows
         self._twin_words = words = np.frombuffer(rows[0])
-        observation = np.empty(SIZE)
-        observation[JOINT_POSITIONS] = arm.q[LAST]
-        observation[JOINT_VELOCITIES] = arm.dq[LAST]
-        observation[PRESSURES] = (arm.pressures[LAST] - self._least) / self._span
-        observation[BALL] = words[self._twin.played_ball]
-        self._observed = np.minimum(np.maximum(observation, self._low), self._high)
-        return self._observed.astype(np.float32)
+        observed = self._observed
+        observed[JOINT_POSITIONS] = arm.q[LAST]
+        observed[JOINT_VELOCITIES] = arm.dq[LAST]
+        observed[PRESSURES] = (arm.pressures[LAST] - self._least) / self._span
+        observed[BALL] = words[self._twin.played_ball]
+        return np.minimum(np.maximum(observed, self._low), self._high).astype(np.float32)
 
     def _info(self, rows: list[Any], observation: Float32Array, end: End) -> Info:
         if self._steps == 0:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table as Grid
 
 from .episode_record import EpisodeRecord
@@ -28,7 +29,8 @@ LABELS = {
     "best_reward": "best reward",
     "steps": "steps of the environment",
     "exact_steps": "steps of exactly 5 + 5 iterations",
-    "steps_per_second": "steps a second while playing [1/s]",
+    "steps_per_second": "steps a second, policy included [1/s]",
+    "bare_steps_per_second": "steps a second, policy left out [1/s]",
     "times_real_time": "times as fast as real time",
     "late_actions": "actions taken late",
     "stalled_episodes": "episodes given up as stalled",
@@ -59,7 +61,7 @@ class Report:
         rows = dict.fromkeys(key for numbers in self.modes.values() for key in numbers)
         for key in rows:
             values = [_text(numbers.get(key)) for numbers in self.modes.values()]
-            grid.add_row(LABELS.get(key, _percentile_label(key)), *values)
+            grid.add_row(escape(LABELS.get(key, _percentile_label(key))), *values)
         console.print(grid)
         for key, value in self.whole.items():
             console.print(f"{key.replace('_', ' ')}: {_text(value)}", highlight=False)
@@ -103,6 +105,7 @@ def mode_numbers(
         "steps": statistics.steps,
         "exact_steps": statistics.exact_steps,
         "steps_per_second": round(statistics.steps_per_second, 1),
+        "bare_steps_per_second": round(statistics.bare_steps_per_second, 1),
         "times_real_time": round(statistics.steps_per_second * statistics.step_seconds, 2),
         "arm_iterations": statistics.arm_iterations,
         "recorded_episodes": len(records),

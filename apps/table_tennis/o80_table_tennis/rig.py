@@ -10,7 +10,7 @@ from typing import Self
 
 import o80
 
-from .arm import Arm
+from .arm import TIMEOUT, Arm
 from .rendering import MODEL
 from .settings import ITERATIONS, Pacing, RigSettings
 from .twin import Twin
@@ -41,7 +41,6 @@ class Rig:
         except BaseException:
             self._stack.close()
             raise
-        self._bursts = {twin.frontend: ITERATIONS for twin in self.twins}
 
     def __enter__(self) -> Self:
         return self
@@ -61,8 +60,8 @@ class Rig:
     def burst_twins(self, iterations: int = ITERATIONS) -> list[o80.Observation]:
         """Lets all twins run at once; returns the last row of each."""
         if len(self.twins) == 1:
-            return [self.twins[0].frontend.burst(iterations)]
-        rows = o80.burst({twin.frontend: iterations for twin in self.twins})
+            return [self.twins[0].frontend._burst(iterations, TIMEOUT)]
+        rows = o80.burst({twin.frontend: iterations for twin in self.twins}, timeout=TIMEOUT)
         return [rows[twin.frontend] for twin in self.twins]
 
     def _open_arm(self) -> o80.Frontend:

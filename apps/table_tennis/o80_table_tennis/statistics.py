@@ -21,6 +21,8 @@ class StepCounts:
     """Steps in which the arm and every twin made exactly five iterations."""
     seconds: float = 0.0
     """In episodes, from the first step to the last, the caller's own time included."""
+    seconds_stepping: float = 0.0
+    """In steps, the caller's own time left out."""
     late_actions: int = 0
     """Actions that came after the iteration for which they were meant."""
     stalled_episodes: int = 0
@@ -39,7 +41,9 @@ class Statistics:
     exact_steps: int
     """Steps of exactly five iterations of the arm and five of every twin, by their numbers."""
     steps_per_second: float
-    """While an episode was played, the caller's own time included [1/s]."""
+    """While an episode was played, the caller's own time (its policy) included [1/s]."""
+    bare_steps_per_second: float
+    """The caller's own time left out: what a policy that needs no time would reach [1/s]."""
     step_seconds: float
     """How long a step takes in real time [s]."""
     late_actions: int
@@ -72,6 +76,9 @@ def statistics_of(counts: StepCounts, arm: o80.Frontend, *, step: float) -> Stat
         steps=counts.steps,
         exact_steps=counts.exact_steps,
         steps_per_second=counts.steps / counts.seconds if counts.seconds > 0 else 0.0,
+        bare_steps_per_second=(
+            counts.steps / counts.seconds_stepping if counts.seconds_stepping > 0 else 0.0
+        ),
         step_seconds=step,
         late_actions=counts.late_actions,
         stalled_episodes=counts.stalled_episodes,

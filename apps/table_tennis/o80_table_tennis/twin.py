@@ -36,8 +36,10 @@ class Twin:
         """Words of a row that hold position and velocity of the first ball."""
         names = [actuator.name for actuator in frontend.actuators]
         self._joint_names, self._ball_names = names[:JOINTS], names[JOINTS:]
-        state = np.dtype([("position", np.float64), ("velocity", np.float64)])
-        self._motion = np.zeros((ITERATIONS, JOINTS), state)
+        # row after row of each joint, as the compiled half of the frontend takes it
+        self._motion = np.zeros((JOINTS, ITERATIONS, 2))
+        self._positions, self._velocities = self._motion[..., 0].T, self._motion[..., 1].T
+        self._joint_numbers = list(range(JOINTS))
         self._ball_state = np.dtype(
             [("position", np.float64, (3,)), ("velocity", np.float64, (3,))]
         )
@@ -52,8 +54,8 @@ class Twin:
 
     def begin(self, q: FloatArray, dq: FloatArray, flights: Sequence[SampledFlight]) -> None:
         """Adds the arm (4,) as it stands and the whole flight of each ball, for the next burst."""
-        self._motion["position"][0], self._motion["velocity"][0] = q, dq
-        self.frontend.add_trajectory(self._motion[:1], self._joint_names)
+        targets = {"position": q[None, :], "velocity": dq[None, :]}
+        self.frontend.add_trajectory(targets, self._joint_names)
         for ball, flight in zip(self._ball_names, flights, strict=True):
             states = np.empty(len(flight.positions), self._ball_state)
             states["position"], states["velocity"] = flight.positions, flight.velocities
@@ -61,8 +63,18 @@ class Twin:
 
     def mirror(self, q: FloatArray, dq: FloatArray) -> None:
         """Adds the arm's last rows (5, 4) as commands for the next burst."""
-        self._motion["position"], self._motion["velocity"] = q, dq
-        self.frontend.add_trajectory(self._motion, self._joint_names)
+        self._positions[:], self._velocities[:] = q, dq
+        self.frontend._add_trajectories(
+            self._joint_numbers,
+            ITERATIONS,
+            self._motion,
+            None,
+            None,
+            1,
+            "queue",
+            "linear",
+            "desired",
+        )
 
     def all_balls(self, row: FloatArray) -> FloatArray:
         """Positions and velocities (balls, 6) in the words of a row; a view."""
