@@ -430,7 +430,7 @@ void bind_frontend(nb::module_& m) {
 
   nb::class_<Frontend>(m, "Frontend", "The compiled half of o80.Frontend.")
       .def(nb::init<const Attachment&, std::shared_ptr<Decoder>>())
-      .def("add_command", &add_command, "actuator"_a, "target"_a, nb::kw_only(),
+      .def("add_command", &add_command, "actuator"_a.none(), "target"_a.none(), nb::kw_only(),
            "duration"_a = nb::none(), "speed"_a = nb::none(), "until"_a = nb::none(),
            "iterations"_a = nb::none(), "mode"_a = "queue", "profile"_a = "linear",
            "start"_a = "desired",

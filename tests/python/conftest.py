@@ -1,0 +1,41 @@
+"""Robots and segment names of their own for the tests of the package."""
+
+import itertools
+import os
+from collections.abc import Iterator
+
+import pytest
+
+import o80
+
+_count = itertools.count()
+
+
+@pytest.fixture
+def segment() -> Iterator[str]:
+    """A name that no other test uses; what is left of it is removed."""
+    name = f"test-{os.getpid()}-{next(_count)}"
+    yield name
+    if any(entry.name == name and not entry.alive for entry in o80.segments()):
+        o80.clean(name)
+
+
+@pytest.fixture
+def arm(segment: str) -> Iterator[o80.Frontend]:
+    """Two joints inside this process: shoulder and elbow, each limited to 3 rad."""
+    with o80.robots.load("two_joints").inline(segment) as frontend:
+        yield frontend
+
+
+@pytest.fixture
+def process(segment: str) -> Iterator[o80.robots.Process]:
+    """Two joints in a process of their own, 1000 times a second."""
+    with o80.robots.load("two_joints").start(segment) as started:
+        yield started
+
+
+@pytest.fixture
+def bursting(segment: str) -> Iterator[o80.robots.Process]:
+    """Two joints in a process of their own, which stand still until they are burst."""
+    with o80.robots.load("two_joints").start(segment, bursting=True) as started:
+        yield started
