@@ -51,11 +51,13 @@ void PamDriver::begin() noexcept {
 void PamDriver::write(const Desired<PamDriver>& desired) {
   const std::int64_t period = std::llround(desired.period() * 1e9);
   if (period != period_) {
-    throw DriverError("the arm moves on by " + std::to_string(period_) +
-                      " ns an iteration, but the loop's period is " + std::to_string(period) +
-                      " ns. Run it at --frequency " +
-                      std::to_string(1e9 / static_cast<double>(period_)) +
-                      ", or give it period=" + std::to_string(static_cast<double>(period) * 1e-9));
+    std::array<char, 240> text{};
+    std::snprintf(text.data(), text.size(),
+                  "the arm moves on by %g s an iteration, but the loop's period is %g s. Run it at "
+                  "--frequency %g, or give the arm period=%g",
+                  static_cast<double>(period_) * 1e-9, desired.period(),
+                  1e9 / static_cast<double>(period_), desired.period());
+    throw DriverError(text.data());
   }
   now_.desired = desired.states;
   Pressures asked{};

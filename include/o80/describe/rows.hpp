@@ -44,7 +44,7 @@ struct FixedText {
       throw InvalidArgument("'" + std::string(text) + "' is too long: at most " +
                             std::to_string(Size - 1) + " bytes are kept");
     }
-    std::memcpy(chars.data(), text.data(), text.size());
+    if (!text.empty()) std::memcpy(chars.data(), text.data(), text.size());
   }
 
   std::string_view view() const { return {chars.data(), strnlen(chars.data(), Size)}; }
