@@ -54,7 +54,8 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
     `info` holds `hit` (the racket has touched the ball), `smallest_distance` (of the surfaces of
     ball and racket so far [m]), `stalled` (real time: the caller paused for so long that the
     episode was given up), `end` (why the episode ended, "running" before), and with extra balls
-    `virtual`: `observations` (N, 22), `rewards` (N,), `hits` (N,), `ended` (N,).
+    `virtual`: `observations` (N, 22), `rewards` (N,), `hits` (N,), `ended` (N,), and `balls` (N,),
+    their numbers.
 
     `options` of `reset`: `ball`, the number of the ball to be played (else drawn from the seed), or
     `flight`, a SampledFlight of the caller's own. `statistics()` tells rates and lateness.
@@ -121,7 +122,7 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
     ) -> tuple[Float32Array, Info]:
         """Arm and twins to the start; the ball flies from the first step on."""
         super().reset(seed=seed)
-        ball, flights = self._choose_balls(options or {})
+        numbers, flights = self._choose_balls(options or {})
         arm_seed = int(self.np_random.integers(SEEDS))
         twin_seed = int(self.np_random.integers(SEEDS))
 
@@ -136,10 +137,10 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
 
         self._twin_row = self._twin_first = rows[0].iteration
         self._asked = (rig.arm.asked - self._least) / self._span
-        self._ball, self._steps = ball, 0
+        self._ball, self._steps = numbers[0], 0
         self._begun, self._over, self._summary = False, False, None
         self._episode += 1
-        self._virtual.begin()
+        self._virtual.begin(numbers[1:])
         observation = self._observe(rows)
         return observation, self._info(rows, observation, End.RUNNING)
 
@@ -220,8 +221,10 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
             self._logger.add(self._summary)
         return float(reward)
 
-    def _choose_balls(self, options: Mapping[str, Any]) -> tuple[int, list[SampledFlight]]:
-        """The number of the ball that is played, its flight, and those of the extra balls."""
+    def _choose_balls(
+        self, options: Mapping[str, Any]
+    ) -> tuple[list[int], list[SampledFlight]]:
+        """Numbers and flights: of the ball that is played, then of the extra ones."""
         unknown = [name for name in options if name not in OPTIONS]
         if unknown:
             raise ValueError(
@@ -241,7 +244,7 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         else:
             numbers[0] = int(options.get("ball", numbers[0]))
             flights = [self._balls.flight(numbers[0])]
-        return numbers[0], flights + [self._balls.flight(number) for number in numbers[1:]]
+        return numbers, flights + [self._balls.flight(number) for number in numbers[1:]]
 
     # ------------------------------------------------------------------ rows => what is returned
 

@@ -106,10 +106,10 @@ def plot_overview(
         returned = sum(episode.returned for episode in played)
         values = np.array([episode.reward for episode in played])
         hit = np.array([episode.returned for episode in played], dtype=bool)
-        numbers = np.arange(len(played))
+        numbers = np.arange(len(played)) + 0.2 * row
         label = f"{mode}: {returned} of {len(played)} hit"
         rewards.plot(numbers[~hit], values[~hit], "x", color=f"C{row}")
-        rewards.plot(numbers[hit], values[hit], "o", color=f"C{row}", label=label)
+        rewards.plot(numbers[hit], values[hit], "o", markersize=5, color=f"C{row}", label=label)
     rewards.set_xlabel("episode (o: the ball flew back, x: it did not)")
     rewards.set_ylabel("reward")
     rewards.grid(alpha=0.3)
@@ -118,7 +118,7 @@ def plot_overview(
     bars = speed.barh(list(rates), list(rates.values()), color=[f"C{i}" for i in range(len(rates))])
     speed.bar_label(bars, fmt="%.0f", padding=3)
     speed.set_xscale("log")
-    speed.set_xlim(right=max(rates.values()) * 4)
+    speed.set_xlim(min(rates.values()) / 10, max(rates.values()) * 5)
     speed.set_xlabel("steps of the environment a second [1/s]")
     speed.invert_yaxis()
     figure.savefig(path, dpi=RESOLUTION)
@@ -149,9 +149,10 @@ def _touch_time(record: EpisodeRecord) -> float | None:
 def _histogram(axes: Axes, values: FloatArray, label: str) -> None:
     low, high = np.percentile(values, [0.1, 99.9])
     axes.hist(np.clip(values, low, high), bins=60, log=True, color="tab:blue")
+    axes.set_title("beyond 0.1 % and 99.9 %: in the outermost bars", fontsize=8)
     for percentile, colour in ((50, "tab:green"), (99, "tab:red")):
         value = float(np.percentile(values, percentile))
-        axes.axvline(value, color=colour, label=f"{percentile} %: {value:.0f} us")
+        axes.axvline(value, color=colour, label=f"{percentile} %: {value:.1f} us")
     axes.set_xlabel(label)
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8, title=f"largest: {values.max():.0f} us")

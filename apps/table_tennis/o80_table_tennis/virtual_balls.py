@@ -37,8 +37,9 @@ class VirtualBalls:
         self._rows: Sequence[Any] = ()
         self.begin()
 
-    def begin(self) -> None:
-        """A new episode."""
+    def begin(self, numbers: Sequence[int] = ()) -> None:
+        """A new episode with these balls."""
+        self._numbers = np.array(numbers, dtype=np.int64)
         self._ended = np.zeros(self._rig.extra_balls, np.bool_)
         self._hits = np.zeros(self._rig.extra_balls, np.bool_)
 
@@ -79,6 +80,7 @@ class VirtualBalls:
             "rewards": self._judge(records, observations[:, BALL.start + 1], over=over),
             "hits": self._hits.copy(),
             "ended": self._ended.copy(),
+            "balls": self._numbers.copy(),
         }
 
     def positions(self, rows: Sequence[Any]) -> FloatArray:
