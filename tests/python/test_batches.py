@@ -1,0 +1,184 @@
+"""What one pulse sent, and what became of it."""
+
+import pytest
+
+import o80
+
+WAIT = 30.0  # [s] longer than any wait should take
+
+
+def test_an_empty_batch_has_ended(arm: o80.Frontend) -> None:
+    batch = arm.pulse()
+
+    batch.wait(0.0)
+
+    assert len(batch) == 0
+    assert batch.ended
+    assert batch.handles == []
+    assert batch.first_iteration is None
+
+
+def test_a_batch_tells_when_it_was_taken_and_when_it_ended(arm: o80.Frontend) -> None:
+    arm.burst(3)
+    arm.add_command(0, 1.0, iterations=5)
+    batch = arm.pulse()
+    assert batch.last_iteration is None
+    arm.burst(10)
+
+    assert batch.ended
+    assert (batch.first_iteration, batch.last_iteration) == (4, 8)
+
+
+def test_handles_follow_the_order_of_adding(arm: o80.Frontend) -> None:
+    arm.add_command(1, 1.0, iterations=2)
+    arm.add_command(0, 1.0, iterations=4)
+    arm.add_command(1, 0.0, iterations=10)
+    batch = arm.pulse()
+    arm.burst(4)
+
+    assert batch.statuses == ["completed", "completed", "active"]
+    assert [handle.iteration for handle in batch.handles] == [2, 4, 3]
+    assert len({handle.id for handle in batch.handles}) == 3
+
+
+def test_statuses_are_words_and_strings(arm: o80.Frontend) -> None:
+    arm.add_command(0, 1.0)
+    batch = arm.pulse()
+    arm.burst(1)
+
+    handle = batch.handles[0]
+    assert handle.status is o80.Status.COMPLETED
+    assert handle.status == "completed"
+    assert handle.reason is o80.Reason.NONE
+    assert handle.ended
+
+
+def test_an_overwritten_command_says_so(arm: o80.Frontend) -> None:
+    arm.add_command(0, 1.0, iterations=10)
+    first = arm.pulse()
+    arm.burst(2)
+    arm.add_command(0, 0.0, mode="overwrite")
+    arm.burst(1)
+
+    assert first.statuses == [o80.Status.OVERWRITTEN]
+    assert first.handles[0].iteration == 3
+
+
+def test_a_batch_for_an_iteration_is_taken_there(arm: o80.Frontend) -> None:
+    arm.add_command(0, 1.0)
+    batch = arm.pulse(at=5)
+    arm.burst(10)
+
+    assert batch.first_iteration == 5
+    assert arm.history(since=4, until=5).desired[:, 0].tolist() == [0.0, 1.0]
+
+
+def test_a_late_batch_is_rejected(arm: o80.Frontend) -> None:
+    arm.burst(10)
+    arm.add_command(0, 1.0)
+    batch = arm.pulse(at=5)
+    arm.burst(1)
+
+    assert batch.statuses == [o80.Status.REJECTED]
+    assert batch.handles[0].reason == o80.Reason.LATE
+    assert batch.handles[0].text
+    assert arm.latest().desired[0] == 0.0
+
+
+def test_a_late_batch_may_be_taken_now(arm: o80.Frontend) -> None:
+    arm.burst(10)
+    arm.add_command(0, 1.0)
+
+    arm.pulse(at=5, late="now")
+
+    assert arm.burst(1).desired[0] == 1.0
+
+
+@pytest.mark.parametrize("options", [{"at": -1}, {"at": -7}, {"at": 1.5}, {"late": "never"}])
+def test_a_pulse_that_cannot_be_is_refused(
+    arm: o80.Frontend, options: dict[str, object]
+) -> None:
+    arm.add_command(0, 1.0)
+
+    with pytest.raises(o80.InvalidArgument):
+        arm.pulse(**options)  # type: ignore[arg-type]
+
+    assert arm.added == 1
+    arm.forget_added()
+
+
+def test_a_wait_that_times_out_carries_the_batch(process: o80.robots.Process) -> None:
+    with process.frontend() as arm:
+        arm.add_command(0, 1.0, duration=1000.0)
+
+        with pytest.raises(o80.TimeoutError) as caught:
+            arm.pulse_and_wait(timeout=0.01)
+
+        batch = caught.value.batch
+        assert batch is not None
+        assert batch.handles[0].status in (o80.Status.QUEUED, o80.Status.ACTIVE)
+        with pytest.raises(o80.TimeoutError) as again:
+            batch.wait(0.0)
+        assert again.value.batch is not None
+        arm.purge()
+        batch.wait(WAIT)
+        assert batch.statuses == [o80.Status.PURGED]
+
+
+def test_a_purge_ends_the_wait_for_a_batch(process: o80.robots.Process) -> None:
+    with process.frontend() as arm, process.frontend() as other:
+        arm.add_command(0, 1.0, duration=1000.0)
+        batch = arm.pulse()
+        other.purge()
+
+        batch.wait(WAIT)
+
+        assert batch.ended
+
+
+def test_pulse_and_wait_waits_for_every_actuator(process: o80.robots.Process) -> None:
+    with process.frontend() as arm:
+        arm.add_command(0, 0.5, iterations=3)
+        arm.add_command(1, -0.5, iterations=30)
+
+        observation = arm.pulse_and_wait(timeout=WAIT)
+
+        assert observation.desired.tolist() == [0.5, -0.5]
+
+
+def test_nobody_raises_for_what_was_rejected(process: o80.robots.Process) -> None:
+    with process.frontend() as arm:
+        arm.wait_for(5, timeout=WAIT)
+        arm.add_command(0, 0.5, until=3)
+        arm.pulse_and_wait(timeout=WAIT)
+        arm.add_command(0, 0.5, until=3)
+        batch = arm.pulse()
+        batch.wait(WAIT)
+
+        assert batch.statuses == [o80.Status.REJECTED]
+
+
+def test_a_command_clamped_at_its_end_is_limited(segment: str) -> None:
+    limits = {"a": (-1.0, 1.0, 10.0)}
+    with o80.Backend(segment, ["a"], limits=limits, frequency=100.0) as backend:
+        backend.publish([0.0])
+        with o80.Frontend(segment) as frontend:
+            frontend.add_command("a", 1.0)  # at once: too fast
+            batch = frontend.pulse()
+            desired = backend.step()
+            backend.publish(desired)
+
+            assert desired == pytest.approx([0.1])
+            assert batch.statuses == [o80.Status.LIMITED]
+            assert frontend.latest().clamped.tolist() == [True]
+
+
+def test_batches_outlive_their_frontend(process: o80.robots.Process) -> None:
+    with process.frontend() as arm:
+        arm.add_command(0, 0.5)
+        batch = arm.pulse()
+        batch.wait(WAIT)
+
+    assert batch.statuses == [o80.Status.COMPLETED]
+    assert "ended" in repr(batch)
+    assert "completed" in repr(batch.handles[0])

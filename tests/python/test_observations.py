@@ -1,0 +1,322 @@
+"""One observation, many of them, and waiting for the next."""
+
+from collections.abc import Iterator
+from enum import IntEnum
+
+import numpy as np
+import pytest
+
+import o80
+
+WAIT = 30.0  # [s] longer than any wait should take
+
+
+class Control(IntEnum):
+    IDLE = 0
+    POSITION = 1
+    TORQUE = 5
+
+
+JOINT = {"position": float, "velocity": np.float32}
+SENSORS = {"force": (float, 3), "pose": (np.int16, (2, 2)), "hand": {"open": bool, "grip": float}}
+
+
+@pytest.fixture
+def mixed(segment: str) -> Iterator[o80.Backend]:
+    """Three joints, a gripper and a mode."""
+    with o80.Backend(
+        segment,
+        {"joints": (JOINT, ["a", "b", "c"]), "gripper": float, "mode": Control},
+        extended=SENSORS,
+    ) as backend:
+        backend.publish(
+            {"gripper": 0.25, "mode": Control.POSITION},
+            {"force": [1.0, 2.0, 3.0], "hand": (True, 0.5)},
+        )
+        yield backend
+
+
+def test_states_of_one_number_are_a_float_array(arm: o80.Frontend) -> None:
+    arm.add_command("elbow", 0.5)
+    observation = arm.burst(1)
+
+    assert observation.desired.dtype == np.float64
+    assert observation.desired.tolist() == [0.0, 0.5]
+    assert observation.observed.shape == (2,)
+    assert observation.extended.effort.shape == (2,)
+    assert observation.extended["effort"][1] == 0.5
+    assert observation.active.tolist() == [False, True]
+    assert observation.clamped.tolist() == [False, False]
+
+
+def test_counters_come_with_each_observation(arm: o80.Frontend) -> None:
+    observation = arm.burst(7)
+
+    assert observation.iteration == 7
+    assert observation.time == 7_000_000
+    assert (observation.overruns, observation.skipped, observation.lateness) == (0, 0, 0)
+    assert not observation.fresh
+    assert observation.missed == 0
+
+
+def test_an_observation_changes_no_more(arm: o80.Frontend) -> None:
+    before = arm.latest()
+    observed = before.observed
+    arm.add_command(0, 1.0)
+    arm.burst(5)
+
+    assert observed.tolist() == [0.0, 0.0]
+    assert before.iteration == 0
+    observed[0] = 7.0
+    assert arm.latest().observed[0] != 7.0
+
+
+def test_groups_of_different_types_have_names(mixed: o80.Backend) -> None:
+    with o80.Frontend(mixed.segment) as frontend:
+        observed = frontend.latest().observed
+
+        assert observed.joints["position"].tolist() == [0.0, 0.0, 0.0]
+        assert observed.gripper == 0.25
+        assert observed["gripper"] == 0.25
+        assert observed.mode == Control.POSITION
+        assert observed.mode == frontend.enums["mode"].POSITION
+        assert list(observed) == ["joints", "gripper", "mode"]
+        with pytest.raises(AttributeError, match="joints, gripper, mode"):
+            _ = observed.wrist
+
+
+def test_extended_values_of_every_shape(mixed: o80.Backend) -> None:
+    with o80.Frontend(mixed.segment) as frontend:
+        extended = frontend.latest().extended
+
+        assert extended.force.tolist() == [1.0, 2.0, 3.0]
+        assert extended.pose.shape == (2, 2)
+        assert extended.hand.open
+        assert extended.hand["grip"] == 0.5
+        assert "force" in repr(extended)
+
+
+def test_histories_have_a_leading_dimension(mixed: o80.Backend) -> None:
+    for i in range(1, 5):
+        mixed.step()
+        mixed.publish({"gripper": float(i)}, {"force": np.full(3, i)})
+    with o80.Frontend(mixed.segment) as frontend:
+        history = frontend.history(4)
+
+        assert len(history) == 4
+        assert history.iteration.tolist() == [1, 2, 3, 4]
+        assert history.observed.gripper.tolist() == [1.0, 2.0, 3.0, 4.0]
+        assert history.observed.joints["velocity"].shape == (4, 3)
+        assert history.extended.force.shape == (4, 3)
+        assert history.extended.pose.shape == (4, 2, 2)
+        assert history.extended.hand.grip.tolist() == [0.5] * 4
+        assert history.active.shape == (4, 5)
+        assert np.all(np.diff(history.time) > 0)
+        assert not history.fresh.any()
+
+
+def test_flat_is_all_observed_then_all_extended(mixed: o80.Backend) -> None:
+    with o80.Frontend(mixed.segment) as frontend:
+        observation = frontend.latest()
+        expected = [0, 0, 0, 0, 0, 0, 0.25, 1, 1, 2, 3, 0, 0, 0, 0, 1, 0.5]
+
+        assert observation.flat().dtype == np.float32
+        assert observation.flat(np.float64).tolist() == expected
+        assert frontend.history(1).flat(np.float64).tolist() == [expected]
+
+
+def test_flat_of_plain_numbers(arm: o80.Frontend) -> None:
+    arm.add_command(0, 1.0)
+    observation = arm.burst(1)
+
+    whole = np.concatenate([observation.observed, observation.extended.effort])
+    assert np.array_equal(observation.flat(np.float64), whole)
+    assert np.array_equal(arm.history(1).flat(np.float64), whole[np.newaxis])
+
+
+def test_many_actuators_fill_several_words_of_a_mask(segment: str) -> None:
+    with o80.Backend(segment, 130) as backend:
+        backend.publish(np.zeros(130))
+        with o80.Frontend(segment) as frontend:
+            for actuator in (0, 63, 64, 129):
+                frontend.add_command(actuator, 1.0)
+            frontend.pulse()
+            backend.publish(backend.step())
+
+            assert np.flatnonzero(frontend.latest().active).tolist() == [0, 63, 64, 129]
+            assert np.flatnonzero(backend.active).tolist() == [0, 63, 64, 129]
+            assert np.flatnonzero(frontend.history(1).active[0]).tolist() == [0, 63, 64, 129]
+
+
+def test_a_pure_sensor_has_no_actuators(segment: str) -> None:
+    with o80.Backend(segment, extended={"force": (float, 3)}) as backend:
+        backend.publish(extended={"force": [1.0, 2.0, 3.0]})
+        with o80.Frontend(segment) as frontend:
+            observation = frontend.latest()
+
+            assert frontend.actuators == []
+            assert observation.extended.force.tolist() == [1.0, 2.0, 3.0]
+            assert observation.active.tolist() == []
+            assert len(observation.observed) == 0
+            assert observation.flat().tolist() == [1.0, 2.0, 3.0]
+            history = frontend.history()
+            assert history.extended.force.shape == (1, 3)
+            assert history.active.shape == (1, 0)
+            assert len(history.observed) == 0
+            assert "force" in repr(observation)
+
+
+def test_a_robot_without_sensors_has_no_extended_values(segment: str) -> None:
+    with o80.Backend(segment, ["a"]) as backend:
+        backend.publish([0.5])
+        with o80.Frontend(segment) as frontend:
+            assert len(frontend.latest().extended) == 0
+            assert frontend.latest().flat().tolist() == [0.5]
+            assert len(frontend.history().extended) == 0
+
+
+# ---------------------------------------------------------------------------- history
+
+
+def test_the_last_n_or_from_one_to_another(arm: o80.Frontend) -> None:
+    arm.burst(20)
+
+    assert arm.history(3).iteration.tolist() == [18, 19, 20]
+    assert arm.history(since=18).iteration.tolist() == [18, 19, 20]
+    assert arm.history(until=1).iteration.tolist() == [0, 1]
+    assert arm.history(since=4, until=6).iteration.tolist() == [4, 5, 6]
+    assert len(arm.history()) == 21
+    assert len(arm.history(1000)) == 21
+    assert len(arm.history(0)) == 0
+    assert len(arm.history(since=30)) == 0
+    assert len(arm.history(since=6, until=4)) == 0
+
+
+def test_a_history_that_cannot_be_is_refused(arm: o80.Frontend) -> None:
+    with pytest.raises(o80.InvalidArgument):
+        arm.history(3, since=1)
+    with pytest.raises(o80.InvalidArgument):
+        arm.history(-1)
+
+
+def test_a_history_is_a_sequence_of_observations(arm: o80.Frontend) -> None:
+    arm.add_command(0, 1.0, iterations=10)
+    arm.burst(10)
+    history = arm.history()
+
+    assert history[-1].desired[0] == 1.0
+    assert history[3].iteration == 3
+    assert [observation.iteration for observation in history] == list(range(11))
+    assert history[2:4].iteration.tolist() == [2, 3]
+    assert isinstance(history[0], o80.Observation)
+    with pytest.raises(IndexError):
+        history[11]
+    assert "0 to 10" in repr(history)
+    assert "no observation" in repr(arm.history(0))
+
+
+def test_histories_share_no_memory(arm: o80.Frontend) -> None:
+    arm.burst(3)
+    one, other = arm.history(), arm.history()
+
+    one.observed[:] = 7.0
+
+    assert not other.observed.any()
+
+
+def test_old_rows_are_left_out_of_a_history(segment: str) -> None:
+    with o80.robots.load("two_joints").inline(segment, history=16) as arm:
+        arm.burst(100)
+
+        history = arm.history()
+        assert history.iteration.tolist() == list(range(85, 101))
+        assert arm.oldest == 85
+        assert len(arm.history(since=0, until=90)) == 6
+
+
+# ---------------------------------------------------------------------------- waiting
+
+
+def test_a_past_row_is_there_at_once(arm: o80.Frontend) -> None:
+    arm.burst(10)
+
+    assert arm.wait_for(4, timeout=0.0).iteration == 4
+
+
+def test_an_overwritten_row_names_the_oldest_one(segment: str) -> None:
+    with o80.robots.load("two_joints").inline(segment, history=16) as arm:
+        arm.burst(100)
+
+        with pytest.raises(o80.RowOverwritten, match="85"):
+            arm.wait_for(4)
+
+
+def test_a_row_to_come_is_waited_for(process: o80.robots.Process) -> None:
+    with process.frontend() as arm:
+        row = arm.published + 20
+
+        assert arm.wait_for(row, timeout=WAIT).iteration == row
+
+
+def test_a_row_that_does_not_come_times_out(arm: o80.Frontend) -> None:
+    with pytest.raises(o80.TimeoutError, match="burst"):
+        arm.wait_for(5, timeout=0.01)
+
+
+def test_a_negative_row_is_refused(arm: o80.Frontend) -> None:
+    with pytest.raises(o80.InvalidArgument):
+        arm.wait_for(-1)
+
+
+def test_the_next_rows_come_in_sequence(process: o80.robots.Process) -> None:
+    with process.frontend() as arm:
+        first = arm.wait_for_next(WAIT).iteration
+
+        rows = [arm.wait_for_next(WAIT) for _ in range(20)]
+
+        assert [row.iteration for row in rows] == list(range(first + 1, first + 21))
+        assert not any(row.missed for row in rows)
+
+
+def test_a_slow_reader_is_told_what_it_missed(segment: str) -> None:
+    with o80.robots.load("two_joints").start(segment, bursting=True, history=16) as process:
+        with process.frontend() as reader, process.frontend() as arm:
+            arm.burst(1)
+            with pytest.raises(o80.TimeoutError):
+                reader.wait_for_next(0.0)  # its position is now row 2
+            arm.burst(100)
+
+            observation = reader.wait_for_next(WAIT)
+
+            assert observation.iteration >= 85
+            assert observation.missed == observation.iteration - 2
+            assert reader.wait_for_next(WAIT).missed == 0
+
+
+def test_a_stream_gives_every_row(process: o80.robots.Process) -> None:
+    with process.frontend() as arm:
+        rows = []
+        for observation in arm.stream(timeout=WAIT):
+            rows.append(observation.iteration)
+            if len(rows) == 50:
+                break
+
+        assert rows == list(range(rows[0], rows[0] + 50))
+
+
+def test_a_stream_may_begin_in_the_past(arm: o80.Frontend) -> None:
+    arm.burst(10)
+    stream = arm.stream(since=3, timeout=0.0)
+
+    assert [next(stream).iteration for _ in range(8)] == list(range(3, 11))
+    with pytest.raises(o80.TimeoutError):
+        next(stream)
+
+
+def test_streams_have_positions_of_their_own(arm: o80.Frontend) -> None:
+    one, other = arm.stream(timeout=0.0), arm.stream(timeout=0.0)
+    arm.burst(3)
+
+    assert [next(one).iteration for _ in range(3)] == [1, 2, 3]
+    assert [next(other).iteration for _ in range(3)] == [1, 2, 3]
+    assert next(arm.stream(since=2)).iteration == 2

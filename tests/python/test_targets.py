@@ -1,0 +1,240 @@
+"""What can be a target: numbers, mappings, records, labels, and arrays of many rows."""
+
+from collections.abc import Iterator
+from enum import IntEnum
+
+import numpy as np
+import pytest
+
+import o80
+
+WAIT = 30.0  # [s] longer than any wait should take
+
+
+class Control(IntEnum):
+    IDLE = 0
+    POSITION = 1
+    TORQUE = 5
+
+
+JOINT = {
+    "position": float,
+    "gains": (np.float32, 2),
+    "count": np.int8,
+    "on": bool,
+    "tool": {"size": float, "kind": Control},
+}
+
+
+class Robot:
+    """One backend and one frontend in this thread: what is added is what is desired next."""
+
+    def __init__(self, backend: o80.Backend, frontend: o80.Frontend) -> None:
+        self.backend = backend
+        self.frontend = frontend
+
+    def desired(self, actuator: int | str, target: object) -> o80.Record:
+        self.frontend.add_command(actuator, target)
+        self.frontend.pulse()
+        return self.step()
+
+    def step(self) -> o80.Record:
+        desired = self.backend.step()
+        self.backend.publish(desired)
+        return desired  # type: ignore[no-any-return]
+
+
+@pytest.fixture
+def robot(segment: str) -> Iterator[Robot]:
+    actuators = {"joints": (JOINT, ["a", "b"]), "mode": Control, "valve": bool, "gear": np.uint8}
+    limits = {"a": {"position": (-1.0, 1.0)}}
+    with o80.Backend(segment, actuators, limits=limits, units={"position": "rad"}) as backend:
+        backend.publish()
+        with o80.Frontend(segment) as frontend:
+            yield Robot(backend, frontend)
+
+
+def test_a_mapping_leaves_missing_fields_as_they_were_desired(robot: Robot) -> None:
+    robot.desired("a", {"position": 0.5, "count": 3})
+    joint = robot.desired("a", {"gains": [1, 2], "tool": {"size": 2.0}}).joints[0]
+
+    assert (joint["position"], joint["count"], joint["tool"]["size"]) == (0.5, 3, 2.0)
+    assert joint["gains"].tolist() == [1.0, 2.0]
+    assert robot.desired("a", {"tool": {"kind": "TORQUE"}}).joints[0]["tool"]["size"] == 2.0
+
+
+def test_a_record_is_a_target(robot: Robot) -> None:
+    robot.desired("a", {"position": 0.5, "gains": (3, 4), "on": True})
+    record = robot.frontend.latest().observed.joints[0]
+
+    assert robot.desired("b", record).joints[1] == record
+
+
+def test_fields_in_order_are_a_target(robot: Robot) -> None:
+    joint = robot.desired("b", (0.5, np.array([1, 2]), 3, True, (1.0, Control.TORQUE))).joints[1]
+
+    assert joint["position"] == 0.5
+    assert joint["on"]
+    assert joint["tool"]["kind"] == Control.TORQUE
+
+
+@pytest.mark.parametrize("label", ["TORQUE", Control.TORQUE, 5, np.int64(5)])
+def test_labels_are_given_by_name_or_value(robot: Robot, label: object) -> None:
+    assert robot.desired("mode", label).mode == Control.TORQUE
+
+
+@pytest.mark.parametrize(
+    ("actuator", "target", "text"),
+    [
+        ("mode", "FORCE", "IDLE, POSITION, TORQUE"),
+        ("mode", 2, "IDLE, POSITION, TORQUE"),
+        ("valve", 2, "valve.*True or False"),
+        ("valve", 0.5, "valve.*True or False"),
+        ("gear", 256, "gear.*0 to 255"),
+        ("gear", -1, "gear.*0 to 255"),
+        ("gear", 1.5, "gear.*integer"),
+        ("a", 0.5, "'a'.*position, gains, count, on, tool"),
+        ("a", {"angle": 1}, "'a'.*angle.*position, gains, count, on, tool"),
+        ("a", {"position": 2.0}, "rad"),
+        ("a", {"position": "x"}, "'position'.*'a'.*number"),
+        ("a", {"gains": 1.0}, "'gains'.*sequence of 2"),
+        ("a", {"gains": [1, 2, 3]}, "'gains'.*sequence of 2"),
+        ("a", {"gains": [1, "x"]}, r"'gains'.*\[1\].*number"),
+        ("a", {"tool": {"kind": "x"}}, "'kind' of 'tool'.*IDLE"),
+        ("a", (1, 2), "all its fields in order"),
+        ("a", {"count": 128}, "-128 to 127"),
+        ("a", {"position": float("nan")}, "position"),
+    ],
+)
+def test_a_refusal_names_the_actuator_the_field_and_what_there_is(
+    robot: Robot, actuator: str, target: object, text: str
+) -> None:
+    with pytest.raises(o80.InvalidArgument, match=text):
+        robot.frontend.add_command(actuator, target)
+
+    assert robot.frontend.added == 0
+
+
+@pytest.mark.parametrize("target", [True, np.True_, 1, 1.0])
+def test_booleans_are_given_as_such_or_as_one_and_zero(robot: Robot, target: object) -> None:
+    assert robot.desired("valve", target).valve
+
+
+@pytest.mark.parametrize("target", [7, 7.0, np.float64(7), np.uint8(7), np.array(7)])
+def test_whole_numbers_are_integers(robot: Robot, target: object) -> None:
+    assert robot.desired("gear", target).gear == 7
+
+
+# ---------------------------------------------------------------------------- trajectories
+
+
+def test_a_trajectory_moves_all_actuators_row_by_row(arm: o80.Frontend) -> None:
+    targets = np.arange(20.0).reshape(10, 2) / 10
+    arm.add_trajectory(targets)
+
+    arm.pulse_and_wait(timeout=WAIT)
+
+    assert np.array_equal(arm.history(10).desired, targets)
+
+
+def test_a_trajectory_has_one_command_an_actuator(arm: o80.Frontend) -> None:
+    arm.add_trajectory(np.zeros((100, 2)))
+
+    assert len(arm.pulse()) == 2
+
+
+def test_a_trajectory_takes_its_iterations_for_each_row(arm: o80.Frontend) -> None:
+    arm.add_trajectory([[1.0, -1.0], [0.0, 0.0]], iterations=4)
+
+    assert arm.pulse_and_wait(timeout=WAIT).iteration == 8
+    assert arm.history().desired[1:, 0].tolist() == [0.25, 0.5, 0.75, 1.0, 0.75, 0.5, 0.25, 0.0]
+
+
+def test_a_trajectory_may_have_its_own_times(arm: o80.Frontend) -> None:
+    arm.add_trajectory([1.0, 2.0], "elbow", times=[0.002, 0.010])
+
+    assert arm.pulse_and_wait(timeout=WAIT).iteration == 10
+    assert arm.history(since=2, until=2).desired[0, 1] == 1.0
+    assert arm.history(since=6, until=6).desired[0, 1] == 1.5
+
+
+def test_a_trajectory_may_keep_a_speed(arm: o80.Frontend) -> None:
+    arm.add_trajectory([1.0, 0.5], 0, speed=100.0)
+
+    assert arm.pulse_and_wait(timeout=WAIT).iteration == 15
+
+
+def test_a_trajectory_of_chosen_actuators(arm: o80.Frontend) -> None:
+    arm.add_trajectory([[1.0, 2.0]], ["elbow", 0])
+
+    assert arm.pulse_and_wait(timeout=WAIT).desired.tolist() == [2.0, 1.0]
+
+
+def test_a_trajectory_of_one_actuator_may_have_one_dimension(arm: o80.Frontend) -> None:
+    arm.add_trajectory([0.5, 1.0], actuators="elbow")
+
+    assert arm.pulse_and_wait(timeout=WAIT).desired.tolist() == [0.0, 1.0]
+
+
+def test_a_trajectory_may_overwrite(arm: o80.Frontend) -> None:
+    arm.add_command(0, 1.0, iterations=100)
+    arm.add_trajectory([0.5], 0, mode=o80.Mode.OVERWRITE)
+
+    assert arm.pulse_and_wait(timeout=WAIT).desired[0] == 0.5
+
+
+@pytest.mark.parametrize(
+    ("targets", "options", "text"),
+    [
+        (np.zeros(10), {}, r"\(T, 2\)"),
+        (np.zeros((10, 3)), {}, r"\(T, 2\)"),
+        (np.zeros((0, 2)), {}, "no row"),
+        ([["a", "b"]], {}, "cannot be read"),
+        (np.zeros((2, 2)), {"times": [0.1]}, "times"),
+        (np.zeros((2, 2)), {"times": [0.2, 0.1]}, "grow"),
+        (np.zeros((2, 2)), {"times": [0.1, float("nan")]}, "finite"),
+        (np.zeros((2, 2)), {"times": [0.1, 0.2], "iterations": 1}, "one pace"),
+        (np.zeros((2, 2)), {"iterations": 1, "speed": 1.0}, "one pace"),
+        (np.zeros((2, 2)), {"iterations": 0}, "at least 1"),
+        ([[0.0, 0.0], [0.0, 9.0]], {}, "elbow"),
+        (np.full((2, 2), np.nan), {}, "shoulder"),
+        ({"position": [0.0]}, {}, "plain number"),
+    ],
+)
+def test_a_trajectory_is_added_whole_or_not_at_all(
+    arm: o80.Frontend, targets: object, options: dict[str, object], text: str
+) -> None:
+    with pytest.raises(o80.InvalidArgument, match=text):
+        arm.add_trajectory(targets, **options)  # type: ignore[arg-type]
+
+    assert arm.added == 0
+
+
+def test_a_trajectory_of_states_with_fields(robot: Robot) -> None:
+    fields = {
+        "position": np.linspace(0, 1, 6).reshape(3, 2),
+        "gains": np.ones((3, 2, 2)),
+        "count": np.zeros((3, 2)),
+        "on": np.ones((3, 2), bool),
+    }
+    states = robot.frontend.latest().observed.joints
+    targets = np.zeros((3, 2), states.dtype)
+    for name, values in fields.items():
+        targets[name] = values
+
+    robot.frontend.add_trajectory(targets, ["a", "b"])
+    robot.frontend.pulse()
+    last = [robot.step() for _ in range(3)][-1]
+
+    assert last.joints["position"].tolist() == [0.8, 1.0]
+    assert last.joints["gains"].tolist() == [[1.0, 1.0], [1.0, 1.0]]
+
+
+def test_a_trajectory_from_a_mapping_needs_every_field(robot: Robot) -> None:
+    with pytest.raises(o80.InvalidArgument, match="every field"):
+        robot.frontend.add_trajectory({"position": np.zeros((3, 2))}, ["a", "b"])
+
+
+def test_a_trajectory_across_types_is_refused(robot: Robot) -> None:
+    with pytest.raises(o80.InvalidArgument, match="different types"):
+        robot.frontend.add_trajectory(np.zeros((3, 5)))
