@@ -53,8 +53,8 @@ void check_field(const Schema& schema, std::uint32_t type_index, const FieldRow&
   check_text(field.name, "a field's name");
   check_text(field.unit, "a unit");
   check_text(field.help, "a help");
-  const std::uint64_t elements = std::uint64_t{field.rows == 0 ? 1 : field.rows} *
-                                 (field.columns == 0 ? 1 : field.columns);
+  const std::uint64_t elements =
+      std::uint64_t{field.rows == 0 ? 1 : field.rows} * (field.columns == 0 ? 1 : field.columns);
   if (elements > kMostBytes) refuse(name + "has too many elements");
   if (field.offset + field.size * elements > type.size) refuse(name + "lies outside its struct");
   if (field.rows == 0 && field.columns != 0) refuse(name + "has columns but no rows");

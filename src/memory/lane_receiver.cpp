@@ -133,6 +133,17 @@ std::uint64_t LaneReceiver::closed() const noexcept {
   return page_->closed.load(std::memory_order_acquire);  // sync closed
 }
 
+std::uint64_t LaneReceiver::dead_predecessor() const noexcept {
+  const std::uint64_t present = incarnation();
+  return present > 1 && closed() < present - 1 ? present - 1 : 0;
+}
+
+bool LaneReceiver::next_is_of_dead() const noexcept {
+  // what the present owner found committed is not its own
+  return dead_predecessor() != 0 &&
+         static_cast<std::int64_t>(cursor_ - page_->began.load(std::memory_order_relaxed)) < 0;
+}
+
 LaneReceivers::LaneReceivers(const SegmentView& view, std::size_t ticket_offset)
     : view_(view), ticket_offset_(ticket_offset) {
   for (std::uint32_t i = 0; i < view.shape.lanes; ++i) lanes_.emplace_back(view, i);

@@ -53,6 +53,7 @@ LaneSender::LaneSender(const AttachedSegment& segment) : segment_(&segment), vie
     page_->next_id.store(1, std::memory_order_relaxed);
   store_text(page_->owner, std::size(page_->owner),
              "pid " + std::to_string(getpid()) + " (" + own_program() + ")");
+  page_->began.store(sent_, std::memory_order_relaxed);
   O80_CRASH_POINT("lane.before_incarnation");
   incarnation_ = page_->incarnation.load(std::memory_order_relaxed) + 1;
   page_->incarnation.store(incarnation_, std::memory_order_release);  // sync incarnation

@@ -83,6 +83,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
         schedule(pool.size() / 2),
         server_(server),
         lives_(lanes.size()),
+        mourned_(lanes.size()),
         freed_(lanes.size()),
         row_(layout.size / 8),
         payload_(largest_request(), std::byte{0}),
@@ -152,6 +153,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
 
   // what the helper thread saw
   void look_at_lives() noexcept;
+  void mourn(std::uint32_t lane, std::uint64_t incarnation) noexcept;
   void watch_holder() noexcept;
   void watch_silence() noexcept;
   void stale(std::uint32_t lane, Reason reason) noexcept;
@@ -162,6 +164,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   ForkGuard guard_;
   RequestServer* server_;
   std::vector<LaneLife> lives_;
+  std::vector<std::uint64_t> mourned_;  // last owner of each lane whose death was dealt with
   std::vector<std::uint64_t> freed_;
   std::vector<std::uint64_t> row_;  // 8-byte words: the row under way
   std::vector<std::byte> payload_;
@@ -175,6 +178,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
 
   // the batch being copied from its lane
   bool staging_ = false;
+  bool staging_of_dead_ = false;  // whose place another frontend has taken
   std::uint32_t staging_lane_ = 0;
   std::uint32_t staging_left_ = 0;  // blocks
   BlockChain staging_chain_;
@@ -185,6 +189,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   std::int64_t burst_left_ = 0;  // iterations, or kUntilEnded
   std::uint32_t burst_lane_ = kNobody;
   CommandId burst_id_ = 0;
+  std::uint64_t burst_incarnation_ = 0;
 };
 
 // ------------------------------------------------------------------------------ statuses out
@@ -274,7 +279,10 @@ void UntypedBackend::Body::begin_staging(std::uint32_t lane) noexcept {
     lanes[lane].reset();
     return;
   }
+  // an heir's first batch finds the house in order
+  mourn(lane, lanes[lane].dead_predecessor());
   staging_ = true;
+  staging_of_dead_ = lanes[lane].next_is_of_dead();
   staging_lane_ = lane;
   staging_left_ = blocks;
   staging_chain_ = {};
@@ -310,10 +318,14 @@ void UntypedBackend::Body::staged() noexcept {
   const BatchRecord batch = pool.batch(first);
   lanes[lane].set_staged(batch.id);
   last_batch_ = iteration_;
-  const ScheduledBatch sent{batch.at < 0 ? iteration_ : batch.at, batch.ticket, first, lane,
-                            batch.late_now != 0};
+  const ScheduledBatch sent{batch.at < 0 ? iteration_ : batch.at,
+                            batch.ticket,
+                            first,
+                            lane,
+                            batch.late_now != 0,
+                            staging_of_dead_};
   if (!admit(sent)) return;
-  grant(lane, batch);
+  if (!staging_of_dead_) grant(lane, batch);
   if (sent.at > iteration_) {
     schedule.add(sent);
   } else {
@@ -331,8 +343,8 @@ bool UntypedBackend::Body::admit(const ScheduledBatch& sent) noexcept {
   if (holder_ != kNobody && holder_ != sent.lane) return reject(Reason::exclusive, holder_);
   if (sent.at < iteration_ && !sent.late_now) return reject(Reason::late);
   const LaneLife& life = lives_[sent.lane];
-  const bool dead = life.state == LaneState::died &&
-                    life.incarnation == lanes[sent.lane].incarnation();
+  const bool dead = sent.of_dead || (life.state == LaneState::died &&
+                                     life.incarnation == lanes[sent.lane].incarnation());
   if (dead && stale_ == Stale::purge) return reject(Reason::dead_frontend);
   return true;
 }
@@ -343,6 +355,7 @@ void UntypedBackend::Body::grant(std::uint32_t lane, const BatchRecord& batch) n
   burst_left_ = until_ended ? kUntilEnded : batch.burst;
   burst_lane_ = lane;
   burst_id_ = batch.id;
+  burst_incarnation_ = lanes[lane].incarnation();
 }
 
 /// Batches sent for this iteration, or for one that a fresh start jumped over.
@@ -382,23 +395,26 @@ void UntypedBackend::Body::stale(std::uint32_t lane, Reason reason) noexcept {
 }
 
 void UntypedBackend::Body::look_at_lives() noexcept {
+  if (granted()) mourn(burst_lane_, lanes[burst_lane_].dead_predecessor());
   const std::uint32_t changes = liveness.changes();
   if (changes == seen_changes_) return;
   seen_changes_ = changes;
   for (std::uint32_t i = 0; i < lanes.size(); ++i) {
-    const LaneLife now = liveness.lane(i);
-    if (now == lives_[i]) continue;
-    const LaneLife before = lives_[i];
-    lives_[i] = now;
-    const bool replaced = before.state == LaneState::alive && now.state == LaneState::alive &&
-                          before.incarnation != now.incarnation &&
-                          lanes[i].closed() < before.incarnation;
-    if (now.state != LaneState::died && !replaced) continue;
-    stale(i, Reason::dead_frontend);
-    // nobody waits for the end of its burst
-    if (granted() && burst_lane_ == i) burst_left_ = 1;
-    lanes.look_again();
+    lives_[i] = liveness.lane(i);
+    const bool died = lives_[i].state == LaneState::died;
+    mourn(i, died ? lives_[i].incarnation : lanes[i].dead_predecessor());
   }
+}
+
+/// Does what is to be done when an owner of a lane has died, once.
+void UntypedBackend::Body::mourn(std::uint32_t lane, std::uint64_t incarnation) noexcept {
+  if (incarnation <= mourned_[lane]) return;
+  mourned_[lane] = incarnation;
+  stale(lane, Reason::dead_frontend);
+  // nobody waits for the end of its burst
+  if (granted() && burst_lane_ == lane && burst_incarnation_ <= incarnation) burst_left_ = 1;
+  // it may have died before it rang
+  lanes.look_again();
 }
 
 /// Control falls with its holder: closed, dead, or its lane in other hands.
@@ -437,7 +453,8 @@ Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
     const bool all_told = controller.finish_pending();
     give_back();
     if (staging_ || !all_told) continue;
-    const std::int64_t left = give_up > 0 && give_up < kForEver ? give_up - monotonic_now() : give_up;
+    const std::int64_t left =
+        give_up > 0 && give_up < kForEver ? give_up - monotonic_now() : give_up;
     if (left <= 0) return Step::standing;
     bell.wait(lanes.bell_seen(), std::min(left, kSlice));
   }

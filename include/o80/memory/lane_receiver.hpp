@@ -55,6 +55,10 @@ class LaneReceiver {
   /// Owner of the lane as its page has it: a count, 0 if never taken; and the last that closed.
   std::uint64_t incarnation() const noexcept;
   std::uint64_t closed() const noexcept;
+  /// The owner before the present one died: its count, else 0.
+  std::uint64_t dead_predecessor() const noexcept;
+  /// What is next was sent by that one.
+  bool next_is_of_dead() const noexcept;
 
  private:
   LaneSenderPage* page_;

@@ -72,6 +72,7 @@ struct LaneSenderPage {
   alignas(kLineBytes) std::atomic<std::uint64_t> committed;    // blocks, ever
   alignas(kLineBytes) std::atomic<std::uint64_t> incarnation;  // owners so far; 0: never owned
   std::atomic<std::uint64_t> closed;                           // last one that left in order
+  std::atomic<std::uint64_t> began;                            // blocks committed before the last
   alignas(kLineBytes) std::atomic<std::uint64_t> next_id;
   alignas(kLineBytes) std::atomic<std::uint32_t> waiting;   // somebody sleeps on `events`
   alignas(kLineBytes) std::atomic<std::uint64_t> owner[8];  // text

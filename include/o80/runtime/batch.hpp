@@ -67,7 +67,8 @@ class Batch {
 class Burst {
  public:
   Burst() = default;
-  Burst(std::shared_ptr<Link> link, Batch batch) : link_(std::move(link)), batch_(std::move(batch)) {}
+  Burst(std::shared_ptr<Link> link, Batch batch)
+      : link_(std::move(link)), batch_(std::move(batch)) {}
 
   const Batch& batch() const { return batch_; }
   /// Its last iteration is done, or its batch was rejected.

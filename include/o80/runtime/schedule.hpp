@@ -14,6 +14,7 @@ struct ScheduledBatch {
   BlockIndex batch = kNoBlock;
   std::uint32_t lane = 0;
   bool late_now = false;
+  bool of_dead = false;  // its sender had died when it was staged
 };
 
 /// Batches sent for a later iteration, the next one first.

@@ -77,9 +77,9 @@ TEST(Schema, RefusesTwoSensorsOfOneNameAndStaysWhole) {
   Schema schema = run_time_robot();
   schema.add_sensor(scalar_field("force", Kind::float64));
   const Schema before = schema;
-  EXPECT_THAT(message_of<InvalidArgument>(
-                  [&] { schema.add_sensor(scalar_field("force", Kind::float32)); }),
-              HasSubstr("already a sensor 'force'"));
+  EXPECT_THAT(
+      message_of<InvalidArgument>([&] { schema.add_sensor(scalar_field("force", Kind::float32)); }),
+      HasSubstr("already a sensor 'force'"));
   EXPECT_EQ(schema, before);
 }
 

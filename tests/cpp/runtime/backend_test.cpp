@@ -1,0 +1,445 @@
+#include "o80/runtime/backend.hpp"
+
+#include "runtime/station.hpp"
+
+namespace o80::test {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+class BackendTest : public StationTest {};
+
+TEST_F(BackendTest, RowZeroIsTheRobotBeforeAnythingWasAsked) {
+  Station station;
+  station.now = {0.25, -0.5};
+  station.start();
+  const UntypedFrontend frontend("pair");
+  const UntypedObservation row = frontend.latest();
+  EXPECT_EQ(row.iteration(), 0);
+  EXPECT_EQ(observed(row), 0.25);
+  EXPECT_EQ(desired(row), 0.25);
+  EXPECT_EQ(desired(row, 1), -0.5);
+  EXPECT_FALSE(row.active(0));
+}
+
+TEST_F(BackendTest, ARowShowsWhatWasAskedAndWhatCameOfIt) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  send(frontend, 0, 1.0);
+  station.run(1);
+  const UntypedObservation row = frontend.latest();
+  EXPECT_EQ(row.iteration(), 1);
+  EXPECT_EQ(desired(row), 1.0);
+  EXPECT_EQ(observed(row), 1.0);
+  EXPECT_EQ(unpack<double>(row.extended()), 1.0);
+  EXPECT_TRUE(row.active(0));
+  EXPECT_FALSE(row.active(1));
+}
+
+TEST_F(BackendTest, IsStartingUntilRowZeroAndRunningFromThenOn) {
+  Station station;
+  EXPECT_THROW(UntypedFrontend("pair", {.timeout = kAtOnce}), TimeoutError);
+  station.start();
+  EXPECT_EQ(UntypedFrontend("pair").life(), Life::running);
+}
+
+TEST_F(BackendTest, TakesABatchWholeForAllActuators) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  add(frontend, 0, 1.0, {.pace = iterations(2)});
+  station.run(2);
+  add(frontend, 1, 2.0, {.pace = iterations(2)});
+  station.run(1);
+  EXPECT_THAT(desired(frontend, 0, 3), ElementsAre(0, 0, 0, 0)) << "nothing was pulsed yet";
+  const Batch batch = frontend.pulse();
+  station.run(3);
+  EXPECT_THAT(desired(frontend, 3, 6), ElementsAre(0, 0.5, 1, 1));
+  EXPECT_THAT(desired(frontend, 3, 6, 1), ElementsAre(0, 1, 2, 2));
+  EXPECT_EQ(batch.first_iteration(), 4);
+  EXPECT_EQ(batch.last_iteration(), 5);
+}
+
+TEST_F(BackendTest, TakesBatchesInTheOrderOfTheirPulsesAcrossFrontends) {
+  Station station;
+  station.start();
+  UntypedFrontend one("pair");
+  UntypedFrontend two("pair");
+  std::vector<double> expected;
+  for (int i = 1; i <= 20; ++i) {
+    send(i % 3 == 0 ? one : two, 0, i);
+    expected.push_back(i);
+  }
+  station.run(20);
+  EXPECT_EQ(desired(one, 1, 20), expected) << "direct commands, one an iteration";
+
+  const Batch first = send(two, 0, 100, {.mode = Mode::overwrite});
+  const Batch second = send(one, 0, 200, {.mode = Mode::overwrite});
+  station.run(1);
+  EXPECT_EQ(desired(one.latest()), 200);
+  EXPECT_EQ(first.handle(0).status, Status::overwritten);
+  EXPECT_EQ(second.handle(0).status, Status::completed);
+}
+
+TEST_F(BackendTest, TakesABatchAtItsIterationExactly) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  add(frontend, 0, 1.0);
+  const Batch later = frontend.pulse({.at = 5});
+  add(frontend, 0, 2.0);
+  const Batch sooner = frontend.pulse({.at = 3});
+  add(frontend, 1, 7.0);
+  const Batch now = frontend.pulse({.at = 1});
+  station.run(6);
+  EXPECT_THAT(desired(frontend, 1, 6), ElementsAre(0, 0, 2, 2, 1, 1));
+  EXPECT_EQ(desired(frontend.wait_for(1, kAtOnce), 1), 7.0);
+  EXPECT_EQ(later.first_iteration(), 5);
+  EXPECT_EQ(sooner.first_iteration(), 3);
+  EXPECT_EQ(now.first_iteration(), 1);
+}
+
+TEST_F(BackendTest, RejectsABatchWhoseIterationHasBegunUnlessItMayBeLate) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  station.run(4);
+  add(frontend, 0, 1.0);
+  const Batch late = frontend.pulse({.at = 4});
+  add(frontend, 1, 2.0);
+  const Batch now = frontend.pulse({.at = 4, .late = PulseOptions::Late::now});
+  station.run(2);
+  EXPECT_EQ(late.handle(0).status, Status::rejected);
+  EXPECT_EQ(late.handle(0).reason, Reason::late);
+  EXPECT_EQ(late.handle(0).iteration, 5);
+  EXPECT_NE(late.rejection(), "");
+  EXPECT_EQ(now.handle(0).status, Status::completed);
+  EXPECT_EQ(desired(frontend.latest(), 0), 0.0);
+  EXPECT_EQ(desired(frontend.latest(), 1), 2.0);
+  EXPECT_THROW(frontend.pulse({.at = -7}), InvalidArgument);
+}
+
+TEST_F(BackendTest, StagesALargeBatchOverSeveralIterationsAndThenTakesItWhole) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  UntypedFrontend other("pair");
+  constexpr int kCommands = 3000;  // of a block each: three iterations of 1024
+  for (int i = 0; i < kCommands; ++i) add(frontend, 0, i + 1);
+  add(frontend, 1, -1.0);
+  const Batch large = frontend.pulse();
+  const Batch behind = send(other, 1, -2.0);
+  for (int i = 0; i < 10 && large.first_iteration() < 0; ++i) station.run(1);
+  station.run(1);
+  EXPECT_GE(large.first_iteration(), 3) << "1024 blocks an iteration";
+  const Iteration taken = large.first_iteration();
+  for (Iteration i = 1; i < taken; ++i) {
+    EXPECT_THAT(desired(frontend, i, i, 0), ElementsAre(0));
+    EXPECT_THAT(desired(frontend, i, i, 1), ElementsAre(0));
+  }
+  EXPECT_THAT(desired(frontend, taken, taken, 0), ElementsAre(1));
+  EXPECT_THAT(desired(frontend, taken, taken + 1, 1), ElementsAre(-1, -2)) << "in order";
+  station.run(kCommands);
+  EXPECT_EQ(desired(frontend.latest()), kCommands);
+  EXPECT_EQ(large.last_iteration(), taken + kCommands - 1) << "no idle iteration";
+  EXPECT_TRUE(behind.ended());
+}
+
+TEST_F(BackendTest, GivesTheMemoryOfALaneBackForEver) {
+  Station station({.segment = "pair", .lanes = 2, .lane_blocks = 64});
+  station.start();
+  UntypedFrontend frontend("pair");
+  for (int round = 0; round < 2000; ++round) {
+    for (int i = 0; i < 10; ++i) add(frontend, i % 2, round, {.mode = Mode::overwrite});
+    const Batch batch = frontend.pulse();
+    station.run(2);
+    ASSERT_TRUE(batch.ended()) << round;
+  }
+}
+
+TEST_F(BackendTest, InterruptsAnActuatorInTheIterationUnderWay) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  add(frontend, 0, 10.0, {.pace = iterations(10)});
+  add(frontend, 0, 20.0, {.pace = iterations(10)});
+  add(frontend, 1, 10.0, {.pace = iterations(10)});
+  const Batch batch = frontend.pulse();
+  station.run(2);
+  station.before_publish = [&] { station.backend.interrupt(0); };
+  station.run(1);
+  station.before_publish = {};
+  EXPECT_EQ(batch.handle(0).status, Status::interrupted);
+  EXPECT_EQ(batch.handle(0).iteration, 3);
+  EXPECT_EQ(batch.handle(1).status, Status::interrupted);
+  EXPECT_EQ(batch.handle(2).status, Status::active);
+  station.run(2);
+  EXPECT_THAT(desired(frontend, 3, 5), ElementsAre(3, 3, 3)) << "held where it was";
+  EXPECT_THAT(desired(frontend, 3, 5, 1), ElementsAre(3, 4, 5));
+}
+
+TEST_F(BackendTest, TellsTimeByTheIterationWhenItBursts) {
+  Station station({.segment = "pair", .period = 2'000'000, .bursting = true});
+  station.start();
+  UntypedFrontend frontend("pair");
+  frontend.start_burst(3);
+  EXPECT_EQ(station.drive(), Step::standing);
+  EXPECT_EQ(frontend.latest().time(), 6'000'000);
+  EXPECT_EQ(frontend.schema().head.clock, Clock::simulated);
+}
+
+TEST_F(BackendTest, PublishesTheTimingOfThePeriods) {
+  Station station;
+  station.start();
+  station.backend.set_timing({.lateness = 17, .overruns = 2, .skipped = 5});
+  station.run(1);
+  const RowHead head = UntypedFrontend("pair").latest().head();
+  EXPECT_EQ(head.lateness, 17);
+  EXPECT_EQ(head.overruns, 2U);
+  EXPECT_EQ(head.skipped, 5U);
+  EXPECT_GT(head.time, 0);
+}
+
+TEST_F(BackendTest, RefusesOptionsThatCannotBe) {
+  EXPECT_THAT(message_of<InvalidArgument>([] { Station({.segment = "pair", .period = 0}); }),
+              HasSubstr("above 0"));
+  EXPECT_THAT(message_of<InvalidArgument>(
+                  [] { Station({.segment = "pair", .stale = Stale::hold, .silence = 1000}); }),
+              HasSubstr("purge or stop"));
+  EXPECT_EQ(directory_.files(), 0U);
+}
+
+TEST_F(BackendTest, RefusesASecondOneOfItsNameNamingTheOwner) {
+  Station station;
+  EXPECT_THAT(message_of<SegmentTaken>([] { Station(); }),
+              HasSubstr("pid " + std::to_string(getpid())));
+}
+
+// ------------------------------------------------------------------------------ requests
+
+TEST_F(BackendTest, ServesRequestsInTheOrderOfTheBatch) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  station.now = {3, 4};
+  add_request<Snapshot>(frontend);
+  add_request<Refuse>(frontend);
+  add(frontend, 0, 1.0);
+  const Batch batch = frontend.pulse();
+  station.run(1);
+  EXPECT_EQ(batch.handle(0).status, Status::completed);
+  EXPECT_EQ(batch.handle(0).iteration, 1);
+  EXPECT_EQ(batch.handle(1).status, Status::rejected);
+  EXPECT_EQ(batch.handle(1).reason, Reason::driver);
+  EXPECT_EQ(batch.handle(1).text, "it does not want to");
+  EXPECT_EQ(batch.handle(2).status, Status::completed) << "the rest of the batch is taken";
+}
+
+TEST_F(BackendTest, StartsAfreshInARowOfItsOwn) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  const Batch moving = send(frontend, 1, 9.0, {.pace = iterations(9)});
+  station.run(3);
+  add_request(frontend, Reset{.seed = 5});
+  add(frontend, 1, 1.0);
+  const Batch batch = frontend.pulse();
+  station.run(1);
+  const UntypedObservation fresh = frontend.wait_for(4, kAtOnce);
+  EXPECT_EQ(fresh.head().fresh, 1U);
+  EXPECT_EQ(observed(fresh), 5.0);
+  EXPECT_EQ(desired(fresh), 5.0);
+  EXPECT_EQ(desired(fresh, 1), 0.0);
+  EXPECT_FALSE(fresh.active(1));
+  EXPECT_EQ(moving.handle(0).status, Status::purged);
+  EXPECT_EQ(moving.handle(0).reason, Reason::fresh_start);
+  EXPECT_EQ(moving.handle(0).iteration, 4);
+
+  const UntypedObservation after = frontend.latest();
+  EXPECT_EQ(after.iteration(), 5) << "the count goes on";
+  EXPECT_EQ(after.head().fresh, 0U);
+  EXPECT_EQ(desired(after, 1), 1.0) << "what came with the request acts after it";
+  EXPECT_EQ(batch.handle(0).status, Status::completed);
+  EXPECT_EQ(batch.handle(0).iteration, 4) << "that of the fresh row";
+  EXPECT_EQ(batch.first_iteration(), 4);
+  EXPECT_EQ(batch.last_iteration(), 5);
+}
+
+TEST_F(BackendTest, AloneAFreshStartEndsItsBatchInItsOwnRow) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  add_request(frontend, Reset{.seed = 5});
+  const Batch batch = frontend.pulse();
+  station.run(1);
+  EXPECT_EQ(batch.last_iteration(), 1);
+  EXPECT_EQ(frontend.wait_for(1, kAtOnce).head().fresh, 1U);
+}
+
+TEST_F(BackendTest, RepeatsARestoredRunBitForBit) {
+  Station station({.segment = "pair", .bursting = true});
+  station.start();
+  UntypedFrontend frontend("pair");
+  const auto play = [&] {
+    add(frontend, 0, 0.7, {.pace = iterations(7), .profile = Profile::minimum_jerk});
+    add(frontend, 1, 0.3, {.pace = speed(40)});
+    frontend.start_burst(20);
+    station.drive();
+    return frontend.history(20);
+  };
+  send(frontend, 0, 0.1);
+  frontend.start_burst(3);
+  station.drive();
+  add_request<Snapshot>(frontend);
+  frontend.pulse();
+  station.drive();
+  const Rows once = play();
+  add_request<Restore>(frontend);
+  frontend.pulse();
+  station.drive();
+  const Rows again = play();
+  ASSERT_EQ(once.count, 20U);
+  ASSERT_EQ(again.count, 20U);
+  for (std::size_t i = 0; i < 20; ++i) {
+    // all but iteration and time
+    EXPECT_THAT(again.row(i).subspan(16), ::testing::ElementsAreArray(once.row(i).subspan(16)));
+  }
+}
+
+TEST_F(BackendTest, EndsAsFailedWhenARequestBreaksIt) {
+  auto station = std::make_unique<Station>();
+  station->start();
+  UntypedFrontend frontend("pair");
+  add_request<Break>(frontend);
+  const Batch batch = frontend.pulse();
+  EXPECT_EQ(station->iterate(), Step::ended);
+  EXPECT_EQ(station->backend.failure(), "the arm fell off");
+  station.reset();
+  EXPECT_EQ(batch.handle(0).status, Status::rejected);
+  EXPECT_EQ(batch.handle(0).text, "the arm fell off");
+  EXPECT_THAT(message_of<BackendFailed>([&] { frontend.wait_for(9, kPatience); }),
+              HasSubstr("the arm fell off"));
+}
+
+// ------------------------------------------------------------------------------ exclusive control
+
+TEST_F(BackendTest, WhoHasControlHasItAlone) {
+  Station station;
+  station.start();
+  UntypedFrontend holder("pair");
+  UntypedFrontend other("pair");
+  const Batch before = send(other, 1, 5.0, {.pace = iterations(5)});
+  station.run(1);
+  holder.add_take_control();
+  const Batch taken = holder.pulse();
+  station.run(1);
+  EXPECT_EQ(taken.handle(0).status, Status::completed);
+
+  const Batch commands = send(other, 0, 1.0);
+  other.add_purge();
+  const Batch purge = other.pulse();
+  add_request(other, Reset{});
+  const Batch request = other.pulse();
+  other.add_take_control();
+  const Batch control = other.pulse();
+  station.run(1);
+  for (const Batch& batch : {commands, purge, request, control}) {
+    EXPECT_EQ(batch.handle(0).status, Status::rejected);
+    EXPECT_EQ(batch.handle(0).reason, Reason::exclusive);
+    EXPECT_THAT(batch.rejection(), HasSubstr("pid " + std::to_string(getpid())));
+    EXPECT_THAT(batch.rejection(), HasSubstr("has exclusive control"));
+  }
+  EXPECT_EQ(before.handle(0).status, Status::active) << "what was taken before goes on";
+
+  holder.add_release_control();
+  holder.pulse();
+  const Batch after = send(other, 0, 1.0);
+  station.run(1);
+  EXPECT_EQ(after.handle(0).status, Status::completed);
+}
+
+TEST_F(BackendTest, ControlFallsWhenItsHolderCloses) {
+  Station station;
+  station.start();
+  UntypedFrontend holder("pair");
+  UntypedFrontend other("pair");
+  holder.add_take_control();
+  const Batch kept = holder.pulse();
+  send(other, 1, 1.0);
+  station.run(1);
+  holder.close();
+  const Batch after = send(other, 0, 1.0);
+  station.run(1);
+  EXPECT_EQ(after.handle(0).status, Status::completed) << "though a batch of the holder is kept";
+  EXPECT_EQ(kept.handle(0).status, Status::completed) << "and still answers";
+}
+
+TEST_F(BackendTest, ControlDoesNotPassToWhoGetsTheLaneNext) {
+  Station station({.segment = "pair", .lanes = 2});
+  station.start();
+  auto holder = std::make_unique<UntypedFrontend>("pair");
+  UntypedFrontend other("pair");
+  holder->add_take_control();
+  holder->pulse();
+  send(other, 1, 1.0);
+  station.run(1);
+  holder.reset();
+  UntypedFrontend heir("pair");
+  const Batch of_heir = send(heir, 0, 1.0);
+  const Batch of_other = send(other, 0, 2.0);
+  station.run(2);
+  EXPECT_EQ(of_heir.handle(0).status, Status::completed);
+  EXPECT_EQ(of_other.handle(0).status, Status::completed);
+}
+
+// ------------------------------------------------------------------------------ silence, stopping
+
+TEST_F(BackendTest, PurgesAfterTooLongASilence) {
+  Station station(
+      {.segment = "pair", .period = 1'000'000, .stale = Stale::purge, .silence = 5'000'000});
+  station.start();
+  UntypedFrontend frontend("pair");
+  const Batch batch = send(frontend, 0, 100.0, {.pace = iterations(100)});
+  station.run(6);
+  EXPECT_EQ(batch.handle(0).status, Status::active);
+  station.run(2);
+  EXPECT_EQ(batch.handle(0).status, Status::purged);
+  EXPECT_EQ(batch.handle(0).reason, Reason::silence);
+  EXPECT_EQ(desired(frontend.latest()), 6.0) << "five iterations after the batch";
+}
+
+TEST_F(BackendTest, StopsAfterTooLongASilenceIfToldSo) {
+  Station station({.segment = "pair", .stale = Stale::stop, .silence = 5'000'000});
+  station.start();
+  UntypedFrontend frontend("pair");
+  send(frontend, 0, 100.0, {.pace = iterations(100)});
+  EXPECT_EQ(station.drive(), Step::ended);
+  EXPECT_THAT(std::string(station.backend.failure()), HasSubstr("longer than is allowed"));
+  EXPECT_LE(station.last(), 8);
+}
+
+TEST_F(BackendTest, EndsEveryCommandWhenItStops) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  add(frontend, 0, 1.0, {.pace = iterations(50)});
+  add(frontend, 0, 2.0, {.pace = iterations(50)});
+  const Batch running = frontend.pulse();
+  add(frontend, 1, 1.0);
+  const Batch scheduled = frontend.pulse({.at = 90});
+  station.run(2);
+  station.backend.end(State::stopped);
+  EXPECT_EQ(running.handle(0).status, Status::purged);
+  EXPECT_EQ(running.handle(0).reason, Reason::stopped);
+  EXPECT_EQ(running.handle(1).status, Status::purged);
+  EXPECT_EQ(scheduled.handle(0).status, Status::rejected);
+  EXPECT_EQ(scheduled.handle(0).reason, Reason::stopped);
+  EXPECT_THROW(running.wait(kPatience), BackendStopped);
+  EXPECT_THROW(scheduled.wait(kPatience), BackendStopped);
+  EXPECT_THROW(send(frontend, 0, 1.0), BackendStopped);
+}
+
+}  // namespace
+}  // namespace o80::test

@@ -1,0 +1,137 @@
+#include "o80/runtime/batch.hpp"
+
+#include "runtime/station.hpp"
+
+namespace o80::test {
+namespace {
+
+using ::testing::HasSubstr;
+
+class BatchTest : public StationTest {};
+
+TEST_F(BatchTest, FollowsEachCommandFromQueuedToItsEnd) {
+  Station station({.segment = "pair"},
+                  [](Schema& schema) { schema.actuator(1).limits({.speed = 1000}); });
+  station.start();
+  UntypedFrontend frontend("pair");
+  add(frontend, 0, 1.0, {.pace = iterations(2)});
+  add(frontend, 0, 2.0, {.pace = iterations(2)});
+  add(frontend, 1, 5.0);  // too fast: one a millisecond is allowed
+  add(frontend, 0, 3.0, {.pace = until(1)});
+  const Batch batch = frontend.pulse();
+  EXPECT_EQ(batch.handle(0).status, Status::queued);
+  EXPECT_EQ(batch.handle(0).iteration, -1);
+  EXPECT_EQ(batch.first_iteration(), -1);
+  EXPECT_FALSE(batch.ended());
+  station.run(1);
+  EXPECT_EQ(batch.handle(0).status, Status::active);
+  EXPECT_EQ(batch.handle(0).iteration, 1);
+  EXPECT_EQ(batch.handle(1).status, Status::queued);
+  EXPECT_EQ(batch.handle(2).status, Status::limited) << "clamped at its last iteration";
+  station.run(1);
+  EXPECT_EQ(batch.handle(0).status, Status::completed);
+  EXPECT_EQ(batch.handle(0).iteration, 2);
+  station.run(1);
+  EXPECT_EQ(batch.handle(1).status, Status::active);
+  EXPECT_EQ(batch.handle(1).iteration, 3);
+  EXPECT_FALSE(batch.ended());
+  EXPECT_EQ(batch.last_iteration(), -1);
+  station.run(2);
+  EXPECT_EQ(batch.handle(3).status, Status::rejected);
+  EXPECT_EQ(batch.handle(3).reason, Reason::late);
+  EXPECT_NE(batch.handle(3).text, "");
+  EXPECT_TRUE(batch.ended());
+  EXPECT_EQ(batch.handles().size(), 4U);
+  batch.wait(kAtOnce);
+  EXPECT_THROW(static_cast<void>(batch.handle(4)), InvalidArgument);
+}
+
+TEST_F(BatchTest, KeepsTheEndStatusesItSawAndForgetsTheRest) {
+  Station station({.segment = "pair", .lane_blocks = 16});
+  station.start();
+  UntypedFrontend frontend("pair");
+  const Batch seen = send(frontend, 0, 1.0);
+  const Batch unseen = send(frontend, 0, 2.0);
+  station.run(2);
+  EXPECT_EQ(seen.handle(0).status, Status::completed);
+  for (int i = 0; i < 100; ++i) {
+    send(frontend, 0, i);
+    station.run(1);
+  }
+  EXPECT_EQ(seen.handle(0).status, Status::completed);
+  EXPECT_EQ(unseen.handle(0).status, Status::forgotten);
+  unseen.wait(kAtOnce);
+}
+
+TEST_F(BatchTest, TheEndOfAnOldCommandDisturbsNoNewOne) {
+  Station station({.segment = "pair", .lane_blocks = 16});
+  station.start();
+  UntypedFrontend frontend("pair");
+  send(frontend, 0, 1.0, {.pace = iterations(200)});
+  Batch last;
+  for (int i = 0; i < 199; ++i) {
+    last = send(frontend, 1, i);
+    station.run(1);
+  }
+  std::vector<Batch> recent;
+  for (int i = 0; i < 6; ++i) recent.push_back(send(frontend, 1, i));
+  station.run(8);  // in these the old one ends
+  for (const Batch& batch : recent) {
+    EXPECT_EQ(batch.handle(0).status, Status::completed);
+    batch.wait(kAtOnce);
+  }
+}
+
+TEST_F(BatchTest, WaitsUntilTheLastOfItsCommandsHasEndedAndItsRowIsThere) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  add(frontend, 0, 1.0, {.pace = iterations(300)});
+  add(frontend, 1, 1.0, {.pace = iterations(500)});
+  const Batch batch = frontend.pulse();
+  std::thread runner([&] { station.run(1000); });
+  batch.wait(kPatience);
+  EXPECT_GE(frontend.published(), 500);
+  EXPECT_EQ(batch.last_iteration(), 500);
+  EXPECT_EQ(desired(frontend.wait_for(500, kAtOnce), 1), 1.0);
+  runner.join();
+}
+
+TEST_F(BatchTest, AWaitThatTakesTooLongSaysWhatToDo) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  const Batch batch = send(frontend, 0, 1.0);
+  EXPECT_THAT(message_of<TimeoutError>([&] { batch.wait(kAtOnce); }), HasSubstr("purge"));
+}
+
+TEST_F(BatchTest, CopiesMeanTheSameBatch) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  const Batch batch = send(frontend, 0, 1.0);
+  const Batch copy = batch;
+  station.run(1);
+  EXPECT_EQ(copy.id(), batch.id());
+  EXPECT_EQ(copy.handle(0).status, Status::completed);
+}
+
+TEST_F(BatchTest, GarbageInALaneIsRejectedAndHarmsNobody) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  BatchBuilder builder;
+  RecordHead head;
+  head.actuator = 77;
+  const double target = 1.0;
+  builder.command(head, std::as_bytes(std::span(&target, 1)));
+  const Batch bad = frontend.pulse(builder);
+  const Batch good = send(frontend, 0, 1.0);
+  station.run(2);
+  EXPECT_EQ(bad.handle(0).status, Status::rejected);
+  EXPECT_EQ(bad.handle(0).reason, Reason::invalid);
+  EXPECT_EQ(good.handle(0).status, Status::completed);
+}
+
+}  // namespace
+}  // namespace o80::test

@@ -1,0 +1,382 @@
+#include "o80/runtime/frontend.hpp"
+
+#include <atomic>
+
+#include "runtime/station.hpp"
+
+namespace o80::test {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+class FrontendTest : public StationTest {};
+
+TEST_F(FrontendTest, WaitsForABackendThatIsStillStarting) {
+  Station station;
+  std::atomic<bool> about_to_attach{false};
+  std::thread starter([&] {
+    while (!about_to_attach) std::this_thread::yield();
+    station.start();
+  });
+  about_to_attach = true;
+  const UntypedFrontend frontend("pair", {.timeout = kPatience});
+  starter.join();
+  EXPECT_EQ(frontend.latest().iteration(), 0);
+}
+
+TEST_F(FrontendTest, SaysWhatThereIsWhenItsBackendDoesNotCome) {
+  Station station;
+  station.start();
+  EXPECT_THAT(message_of<TimeoutError>([] { UntypedFrontend("arm", {.timeout = kAtOnce}); }),
+              AllOf(HasSubstr("arm"), HasSubstr("pair (running)")));
+}
+
+// ------------------------------------------------------------------------------ adding
+
+TEST_F(FrontendTest, RefusesWhatTheRobotCannotFollowWhenItIsAdded) {
+  Station station({.segment = "pair"}, [](Schema& schema) {
+    schema.actuator(1).limits({.minimum = -1, .maximum = 1, .speed = 10});
+  });
+  station.start();
+  UntypedFrontend frontend("pair");
+  const auto refusal = [&](auto&& call) { return message_of<InvalidArgument>(call); };
+  EXPECT_THAT(refusal([&] { add(frontend, 1, 1.5); }), HasSubstr("elbow"));
+  EXPECT_NE(refusal([&] { add(frontend, 0, std::nan("")); }), "");
+  EXPECT_NE(refusal([&] { add(frontend, 1, 0.5, {.pace = speed(11)}); }), "");
+  EXPECT_THAT(refusal([&] { add(frontend, 2, 0.5); }), HasSubstr("shoulder (0), elbow (1)"));
+  EXPECT_THAT(refusal([&] { static_cast<void>(frontend.actuator("hand")); }),
+              HasSubstr("shoulder (0), elbow (1)"));
+  EXPECT_NE(refusal([&] { add(frontend, 0, 0.5, {.pace = iterations(0)}); }), "");
+  EXPECT_NE(refusal([&] { add(frontend, 0, 0.5, {.pace = duration(-std::chrono::seconds(1))}); }),
+            "");
+  EXPECT_NE(refusal([&] { add(frontend, 0, 0.5, {.pace = until(-1)}); }), "");
+  EXPECT_THAT(refusal([&] { static_cast<void>(frontend.request_index("home")); }),
+              HasSubstr("reset, snapshot, restore, refuse, break"));
+  EXPECT_EQ(frontend.added(), 0U);
+}
+
+TEST_F(FrontendTest, FollowsATrajectoryRowByRow) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  const std::array<double, 3> rows{1, 2, 4};
+  frontend.add_trajectory(0, 3, std::as_bytes(std::span(rows)));
+  frontend.add_trajectory(1, 3, std::as_bytes(std::span(rows)), {.pace = iterations(2)});
+  const Batch batch = frontend.pulse();
+  EXPECT_EQ(batch.size(), 2U) << "one command for each actuator";
+  station.run(6);
+  EXPECT_THAT(desired(frontend, 1, 6), ElementsAre(1, 2, 4, 4, 4, 4));
+  EXPECT_THAT(desired(frontend, 1, 6, 1), ElementsAre(0.5, 1, 1.5, 2, 3, 4));
+}
+
+TEST_F(FrontendTest, RefusesATrajectoryWhoseTimesMakeNoSense) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  const std::array<double, 3> rows{1, 2, 4};
+  const auto add_with = [&](std::vector<std::int64_t> times, CommandOptions options = {}) {
+    return message_of<InvalidArgument>(
+        [&] { frontend.add_trajectory(0, 3, std::as_bytes(std::span(rows)), options, times); });
+  };
+  EXPECT_THAT(add_with({1000, 2000}), HasSubstr("3 rows needs as many times"));
+  EXPECT_THAT(add_with({1000, 3000, 2000}), HasSubstr("must grow"));
+  EXPECT_THAT(add_with({}, {.pace = duration(std::chrono::seconds(1))}), HasSubstr("times"));
+  EXPECT_THAT(add_with({}, {.pace = until(9)}), HasSubstr("one target"));
+  EXPECT_EQ(add_with({1'000'000, 2'000'000, 4'000'000}), "");
+}
+
+// ------------------------------------------------------------------------------ sending
+
+TEST_F(FrontendTest, AnEmptyBatchReturnsAtOnce) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  const Batch batch = frontend.pulse();
+  EXPECT_TRUE(batch.empty());
+  EXPECT_TRUE(batch.ended());
+  batch.wait(std::nullopt);
+  EXPECT_EQ(batch.first_iteration(), -1);
+  EXPECT_EQ(batch.rejection(), "");
+  EXPECT_EQ(frontend.pulse_and_wait(std::nullopt).iteration(), 0);
+}
+
+TEST_F(FrontendTest, AFullLaneIsAnErrorAndNothingIsSentAndNothingIsLost) {
+  Station station({.segment = "pair", .lane_blocks = 64});
+  station.start();
+  UntypedFrontend frontend("pair");
+  for (int i = 0; i < 40; ++i) add(frontend, 0, i, {.pace = iterations(2)});
+  const Batch first = frontend.pulse();
+  for (int i = 0; i < 40; ++i) add(frontend, 1, i);
+  station.run(1);
+  for (int tries = 0; tries < 1000; ++tries) {
+    ASSERT_THAT(message_of<LaneFull>([&] { frontend.pulse(); }),
+                AllOf(HasSubstr("takes 41 blocks"), HasSubstr("of 64 are free"),
+                      HasSubstr("Nothing was sent")));
+  }
+  EXPECT_EQ(frontend.added(), 40U);
+  EXPECT_EQ(desired(frontend.latest(), 1), 0);
+  station.run(40);
+  const Batch second = frontend.pulse();
+  station.run(60);
+  EXPECT_EQ(desired(frontend.latest(), 1), 39);
+  EXPECT_TRUE(second.ended());
+  EXPECT_EQ(first.handle(39).status, Status::completed) << "refused pulses age no status";
+  EXPECT_EQ(second.handle(39).status, Status::completed);
+}
+
+TEST_F(FrontendTest, ABatchLargerThanItsLaneSaysHowToSendIt) {
+  Station station({.segment = "pair", .lane_blocks = 64});
+  station.start();
+  UntypedFrontend frontend("pair");
+  for (int i = 0; i < 64; ++i) add(frontend, 0, i);
+  EXPECT_THAT(message_of<LaneFull>([&] { frontend.pulse(); }),
+              AllOf(HasSubstr("has 64"), HasSubstr("in parts")));
+  frontend.forget_added();
+  send(frontend, 0, 1.0);
+  station.run(1);
+  EXPECT_EQ(desired(frontend.latest()), 1.0);
+}
+
+TEST_F(FrontendTest, OneTooManyCommandingFrontendIsToldWhoTheOthersAre) {
+  Station station({.segment = "pair", .lanes = 2});
+  station.start();
+  std::array<UntypedFrontend, 3> frontends{UntypedFrontend("pair"), UntypedFrontend("pair"),
+                                           UntypedFrontend("pair")};
+  send(frontends[0], 0, 1.0);
+  send(frontends[1], 0, 1.0);
+  EXPECT_THAT(message_of<NoLane>([&] { send(frontends[2], 0, 1.0); }),
+              HasSubstr("pid " + std::to_string(getpid())));
+  EXPECT_EQ(frontends[2].latest().iteration(), 0) << "it still reads";
+  frontends[0] = UntypedFrontend("pair");
+  EXPECT_EQ(frontends[2].added(), 1U);
+  frontends[2].pulse();
+}
+
+TEST_F(FrontendTest, APureReaderTakesNoLaneAndMayBeReadOnly) {
+  Station station({.segment = "pair", .lanes = 1});
+  station.start();
+  UntypedFrontend reader("pair", {.access = Access::read_only});
+  UntypedFrontend another("pair");
+  UntypedFrontend commander("pair");
+  send(commander, 0, 1.0);
+  station.run(1);
+  EXPECT_EQ(desired(reader.latest()), 1.0);
+  EXPECT_EQ(reader.wait_for(1, kPatience).iteration(), 1);
+  EXPECT_THROW(send(reader, 0, 1.0), ReadOnly);
+}
+
+TEST_F(FrontendTest, ClosedItRefusesAllAndGivesItsLaneBack) {
+  Station station({.segment = "pair", .lanes = 1});
+  station.start();
+  UntypedFrontend frontend("pair");
+  const Batch batch = send(frontend, 0, 1.0, {.pace = iterations(2)});
+  frontend.close();
+  EXPECT_TRUE(frontend.closed());
+  EXPECT_THAT(message_of<Closed>([&] { add(frontend, 0, 1.0); }), HasSubstr("open a new one"));
+  EXPECT_THROW(static_cast<void>(frontend.latest()), Closed);
+  EXPECT_THROW(static_cast<void>(frontend.history(3)), Closed);
+  UntypedFrontend next("pair");
+  send(next, 1, 2.0);
+  station.run(2);
+  EXPECT_EQ(desired(next.latest(), 0), 1.0) << "sent motion goes on";
+  EXPECT_EQ(desired(next.latest(), 1), 2.0);
+  EXPECT_EQ(batch.handle(0).status, Status::completed) << "a kept batch still answers";
+}
+
+TEST_F(FrontendTest, SeveralThreadsMayPulseThroughOne) {
+  Station station({.segment = "pair", .lanes = 1});
+  station.start();
+  UntypedFrontend frontend("pair");
+  constexpr int kEach = 200;
+  std::atomic<int> ready{0};
+  std::vector<std::thread> threads;
+  for (std::uint32_t actuator : {0U, 1U}) {
+    threads.emplace_back([&, actuator] {
+      for (int i = 0; i < kEach; ++i) {
+        add(frontend, actuator, i + 1);
+        frontend.pulse();
+      }
+      ++ready;
+    });
+  }
+  while (ready < 2) station.iterate();
+  for (std::thread& thread : threads) thread.join();
+  station.run(kEach);
+  EXPECT_EQ(desired(frontend.latest(), 0), kEach);
+  EXPECT_EQ(desired(frontend.latest(), 1), kEach);
+}
+
+TEST_F(FrontendTest, APurgeDropsWithoutASuccessorAndLeavesNobodyWaiting) {
+  Station station;
+  station.start();
+  UntypedFrontend one("pair");
+  UntypedFrontend two("pair");
+  const Batch mine = send(one, 0, 9.0, {.pace = iterations(9)});
+  const Batch theirs = send(two, 0, 9.0, {.pace = iterations(9)});
+  station.run(2);
+  one.add_purge_own();
+  one.pulse();
+  station.run(1);
+  EXPECT_EQ(mine.handle(0).status, Status::purged);
+  mine.wait(kAtOnce);
+  EXPECT_EQ(theirs.handle(0).status, Status::active);
+  one.add_purge(0);
+  one.pulse();
+  station.run(2);
+  EXPECT_EQ(theirs.handle(0).status, Status::purged);
+  theirs.wait(kAtOnce);
+  EXPECT_FALSE(one.latest().active(0));
+}
+
+TEST_F(FrontendTest, ABatchRejectedWholeIsAnErrorForWhoWaitsForItsMotion) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  station.run(3);
+  std::thread runner([&] {
+    while (frontend.published() < 1000 && frontend.link()->lane_if_taken() == nullptr) {
+      std::this_thread::yield();
+    }
+    for (int i = 0; i < 100; ++i) station.iterate();
+  });
+  add(frontend, 0, 1.0);
+  EXPECT_THAT(message_of<Error>([&] { frontend.pulse_and_wait(kPatience, {.at = 1}); }),
+              HasSubstr("was rejected: it came after the iteration"));
+  runner.join();
+}
+
+// ------------------------------------------------------------------------------ reading
+
+TEST_F(FrontendTest, ReadsRowsByTheirIteration) {
+  Station station({.segment = "pair", .history = 10});
+  station.start();
+  UntypedFrontend frontend("pair");
+  station.run(25);
+  EXPECT_EQ(frontend.published(), 25);
+  EXPECT_EQ(frontend.oldest(), 16);
+  EXPECT_EQ(frontend.wait_for(16, kAtOnce).iteration(), 16);
+  EXPECT_THAT(message_of<RowOverwritten>([&] { frontend.wait_for(15, kAtOnce); }),
+              AllOf(HasSubstr("row 15"), HasSubstr("oldest one is 16")));
+  EXPECT_THAT(message_of<TimeoutError>([&] { frontend.wait_for(26, kAtOnce); }),
+              HasSubstr("it is at row 25"));
+  EXPECT_THROW(frontend.wait_for(-1, kAtOnce), InvalidArgument);
+
+  const Rows rows = frontend.history(4);
+  EXPECT_EQ(rows.first, 22);
+  ASSERT_EQ(rows.count, 4U);
+  EXPECT_EQ(unpack<RowHead>(rows.row(3).data()).iteration, 25);
+  EXPECT_EQ(frontend.history(100).count, 10U);
+  EXPECT_EQ(frontend.history(0).count, 0U);
+  EXPECT_EQ(frontend.history(18, 20).count, 3U);
+  EXPECT_EQ(frontend.history(0, 17).first, 16);
+  EXPECT_EQ(frontend.history(20, 99).count, 6U);
+  EXPECT_EQ(frontend.history(90, 99).count, 0U);
+}
+
+TEST_F(FrontendTest, ReadsOneRowAfterTheOtherAndCountsWhatItMissed) {
+  Station station({.segment = "pair", .history = 5});
+  station.start();
+  const UntypedFrontend frontend("pair");
+  UntypedObservation row(frontend.description());
+  Iteration position = 0;
+  EXPECT_EQ(frontend.wait_for_next(position, row.bytes(), kAtOnce), 0);
+  EXPECT_EQ(position, 1);
+  station.run(20);
+  EXPECT_EQ(frontend.wait_for_next(position, row.bytes(), kAtOnce), 15);
+  EXPECT_EQ(row.iteration(), 16);
+  EXPECT_EQ(frontend.wait_for_next(position, row.bytes(), kAtOnce), 0);
+  EXPECT_EQ(row.iteration(), 17);
+  position = 21;
+  EXPECT_THROW(frontend.wait_for_next(position, row.bytes(), kAtOnce), TimeoutError);
+  EXPECT_EQ(position, 21);
+}
+
+TEST_F(FrontendTest, AReaderThatIsOvertakenAllTheTimeStillReadsTrueRowsInOrder) {
+  Station station({.segment = "pair", .history = 1});
+  station.start();
+  const UntypedFrontend frontend("pair");
+  std::atomic<bool> done{false};
+  std::thread reader([&] {
+    UntypedObservation row(frontend.description());
+    Iteration position = 0;
+    std::int64_t missed = 0;
+    std::int64_t read = 0;
+    while (position <= 20'000) {
+      missed += frontend.wait_for_next(position, row.bytes(), kPatience);
+      ++read;
+      ASSERT_EQ(row.iteration(), position - 1);
+      ASSERT_EQ(read + missed, position);
+      ASSERT_LE(row.iteration(), frontend.published());
+    }
+    done = true;
+  });
+  while (!done) station.iterate();
+  reader.join();
+}
+
+TEST_F(FrontendTest, WaitsEndWithAnErrorThatSaysWhatBecameOfTheBackend) {
+  auto station = std::make_unique<Station>();
+  station->start();
+  UntypedFrontend frontend("pair");
+  const Batch batch = send(frontend, 0, 1.0, {.pace = iterations(50)});
+  station->run(1);
+  std::thread ender([&] { station->backend.end(State::failed, "the motor is hot"); });
+  EXPECT_THAT(message_of<BackendFailed>([&] { frontend.wait_for(99, kPatience); }),
+              AllOf(HasSubstr("pair"), HasSubstr("the motor is hot")));
+  EXPECT_THROW(batch.wait(kPatience), BackendFailed);
+  ender.join();
+  EXPECT_EQ(frontend.latest().iteration(), 1) << "its history can still be read";
+  EXPECT_EQ(frontend.life(), Life::failed);
+  station.reset();
+  EXPECT_EQ(frontend.history(10).count, 2U);
+  EXPECT_THROW(UntypedFrontend("pair", {.timeout = kPatience}), BackendFailed);
+  const UntypedFrontend late("pair", {.timeout = kPatience, .dead = true});
+  EXPECT_EQ(late.latest().iteration(), 1);
+}
+
+TEST_F(FrontendTest, AWaitEndsWhenItsCallerSaysSo) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  int asked = 0;
+  EXPECT_THROW(frontend.wait_for(99, kPatience, [&] { return ++asked < 2; }), Cancelled);
+  const Batch batch = send(frontend, 0, 1.0);
+  EXPECT_THROW(batch.wait(kPatience, [] { return false; }), Cancelled);
+}
+
+TEST_F(FrontendTest, AWaitEndsWhenItsFrontendIsClosed) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  std::atomic<bool> waits{false};
+  std::thread closer([&] {
+    while (!waits) std::this_thread::yield();
+    frontend.close();
+  });
+  EXPECT_THROW(frontend.wait_for(99, kPatience,
+                                 [&] {
+                                   waits = true;
+                                   return true;
+                                 }),
+               Closed);
+  closer.join();
+}
+
+TEST_F(FrontendTest, MeetsTheSuccessorOfADeadBackendUnderTheSameName) {
+  auto station = std::make_unique<Station>();
+  station->start();
+  UntypedFrontend frontend("pair");
+  const std::uint64_t epoch = frontend.epoch();
+  station.reset();
+  EXPECT_THROW(frontend.wait_for(1, kPatience), BackendGone);
+  Station successor;
+  successor.start();
+  const UntypedFrontend next("pair");
+  EXPECT_NE(next.epoch(), epoch);
+  EXPECT_EQ(next.latest().iteration(), 0);
+}
+
+}  // namespace
+}  // namespace o80::test

@@ -1,0 +1,181 @@
+// kill -9 of either side, at the level of frontends and backends.
+
+#include <signal.h>
+
+#include <cstdio>
+
+#include "memory/child_process.hpp"
+#include "o80/base/time.hpp"
+#include "runtime/station.hpp"
+
+namespace o80::test {
+namespace {
+
+class KillTest : public StationTest {};
+
+/// A backend in a process of its own that iterates for ever.
+void iterate_for_ever(const ChildProcess::Ready& ready) {
+  Station station;
+  station.start();
+  ready();
+  while (true) {
+    station.iterate();
+    const timespec millisecond{.tv_sec = 0, .tv_nsec = 1'000'000};
+    nanosleep(&millisecond, nullptr);
+  }
+}
+
+/// Kills the backend in the middle of a wait; the time until the error [ms].
+double time_to_the_error(ChildProcess& backend, UntypedFrontend& frontend) {
+  std::int64_t killed = 0;
+  const Check kill_once = [&] {
+    if (killed == 0) {
+      killed = monotonic_now();
+      ::kill(backend.pid(), SIGKILL);
+    }
+    return true;
+  };
+  EXPECT_THROW(frontend.wait_for(1'000'000, kPatience, kill_once), BackendKilled);
+  return static_cast<double>(monotonic_now() - killed) * 1e-6;
+}
+
+TEST_F(KillTest, AWaitingFrontendLearnsSoonThatItsBackendWasKilled) {
+  ChildProcess backend(iterate_for_ever);
+  ASSERT_TRUE(backend.wait_until_ready());
+  UntypedFrontend frontend("pair");
+  const Batch batch = send(frontend, 0, 1.0, {.pace = iterations(1'000'000)});
+  frontend.wait_for(20, kPatience);
+  const double milliseconds = time_to_the_error(backend, frontend);
+  RecordProperty("milliseconds", static_cast<int>(milliseconds));
+  std::printf("killed => error in %.1f ms\n", milliseconds);
+  EXPECT_LT(milliseconds, 2000);
+  EXPECT_THROW(batch.wait(kPatience), BackendKilled);
+  EXPECT_THROW(send(frontend, 0, 2.0), BackendKilled);
+
+  // its history is there to the end
+  const Iteration last = frontend.published();
+  EXPECT_GE(last, 20);
+  EXPECT_EQ(frontend.wait_for(last, kAtOnce).iteration(), last);
+  EXPECT_EQ(frontend.history(20).count, 20U);
+  const UntypedFrontend late("pair", {.timeout = kAtOnce, .dead = true});
+  EXPECT_EQ(late.life(), Life::killed);
+
+  // a new one takes the name over at once
+  backend.wait();
+  Station successor;
+  successor.start();
+  EXPECT_EQ(frontend.life(), Life::superseded);
+  EXPECT_EQ(UntypedFrontend("pair").latest().iteration(), 0);
+  EXPECT_EQ(frontend.wait_for(last, kAtOnce).iteration(), last) << "the old one stays readable";
+}
+
+TEST_F(KillTest, AForkedChildDoesNotKeepTheDeadAlive) {
+  int pipe_ends[2];
+  ASSERT_EQ(pipe(pipe_ends), 0);
+  ChildProcess backend([&](const ChildProcess::Ready& ready) {
+    Station station;
+    station.start();
+    const pid_t child = fork();
+    if (child == 0) pause_for_ever();
+    if (write(pipe_ends[1], &child, sizeof child) != sizeof child) return;
+    ready();
+    pause_for_ever();
+  });
+  ASSERT_TRUE(backend.wait_until_ready());
+  pid_t grandchild = 0;
+  ASSERT_EQ(read(pipe_ends[0], &grandchild, sizeof grandchild), ssize_t{sizeof grandchild});
+  UntypedFrontend frontend("pair");
+  EXPECT_LT(time_to_the_error(backend, frontend), 2000);
+  backend.wait();
+  EXPECT_EQ(::kill(grandchild, 0), 0) << "its child still lives";
+  Station successor;
+  successor.start();
+  EXPECT_EQ(UntypedFrontend("pair").latest().iteration(), 0);
+  ::kill(grandchild, SIGKILL);
+  ::close(pipe_ends[0]);
+  ::close(pipe_ends[1]);
+}
+
+/// A frontend in a process of its own that sends a long movement and takes control.
+class Commander {
+ public:
+  Commander() {
+    if (pipe(gate_) != 0) throw Error("no pipe");
+    child_.emplace([this](const ChildProcess::Ready& ready) {
+      char byte = 0;
+      if (read(gate_[0], &byte, 1) != 1) return;
+      UntypedFrontend frontend("pair", {.timeout = kPatience});
+      frontend.add_take_control();
+      add(frontend, 0, 1e6, {.pace = iterations(1'000'000)});
+      frontend.pulse();
+      add(frontend, 1, 1.0);
+      frontend.pulse({.at = 500'000});
+      ready();
+      pause_for_ever();
+    });
+  }
+  Commander(const Commander&) = delete;
+  Commander& operator=(const Commander&) = delete;
+  ~Commander() {
+    ::close(gate_[0]);
+    ::close(gate_[1]);
+  }
+  void command() {
+    ASSERT_EQ(write(gate_[1], "x", 1), 1);
+    ASSERT_TRUE(child_->wait_until_ready());
+  }
+  void kill_now() { child_->kill_now(); }
+
+ private:
+  int gate_[2];
+  std::optional<ChildProcess> child_;
+};
+
+TEST_F(KillTest, TheBackendGoesOnWhenACommandingFrontendIsKilledAndTheNextOneCommands) {
+  Commander commander;
+  Station station({.segment = "pair", .lanes = 1});
+  station.start();
+  commander.command();
+  station.run(3);
+  commander.kill_now();
+  UntypedFrontend next("pair");
+  station.run(2);
+  EXPECT_GT(desired(next.latest()), 4.0) << "held: the movement goes on";
+  const Batch batch = send(next, 0, -1.0, {.mode = Mode::overwrite});
+  station.run_until([&] { return batch.ended(); });
+  EXPECT_EQ(batch.handle(0).status, Status::completed) << "control fell with its holder";
+  EXPECT_EQ(desired(next.latest()), -1.0);
+}
+
+TEST_F(KillTest, PurgesTheCommandsOfADeadFrontendIfToldSo) {
+  Commander commander;
+  Station station({.segment = "pair", .stale = Stale::purge});
+  station.start();
+  UntypedFrontend reader("pair");
+  commander.command();
+  station.run(3);
+  EXPECT_TRUE(reader.latest().active(0));
+  commander.kill_now();
+  station.run_until([&] { return !reader.latest().active(0); });
+  // nor is what it had sent for later taken
+  while (station.last() < 500'010) station.iterate();
+  EXPECT_EQ(desired(reader.latest(), 1), 0.0);
+}
+
+TEST_F(KillTest, StopsWhenACommandingFrontendDiesIfToldSo) {
+  Commander commander;
+  Station station({.segment = "pair", .stale = Stale::stop});
+  station.start();
+  commander.command();
+  station.run(3);
+  commander.kill_now();
+  Step step = Step::run;
+  station.run_until([&] {
+    if (step != Step::ended) step = station.iterate();
+    return step == Step::ended;
+  });
+  EXPECT_EQ(station.backend.failure(), "a commanding frontend died");
+}
+
+}  // namespace
+}  // namespace o80::test

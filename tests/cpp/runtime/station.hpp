@@ -1,0 +1,218 @@
+#pragma once
+
+#include <gmock/gmock.h>
+
+#include <array>
+#include <chrono>
+#include <functional>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "memory/private_directory.hpp"
+#include "o80/robot/plant_requests.hpp"
+#include "o80/runtime/backend.hpp"
+#include "o80/runtime/frontend.hpp"
+#include "o80/runtime/robot_types.hpp"
+
+namespace o80::test {
+
+/// A request that is always rejected, with a reason.
+struct Refuse {};
+O80_DESCRIBE(Refuse);
+/// A request that breaks the robot.
+struct Break {};
+O80_DESCRIBE(Break);
+
+/// Two joints that are where they are asked to be; the extended value counts what they did.
+struct Pair {
+  struct Effort {
+    double total = 0;
+  };
+  using Actuators = std::array<double, 2>;
+  using Extended = Effort;
+  using Requests = o80::Requests<Reset, Snapshot, Restore, Refuse, Break>;
+};
+O80_DESCRIBE(Pair::Effort, total);
+
+inline constexpr Timeout kAtOnce = std::chrono::nanoseconds(0);
+/// Long enough for any machine; no test waits for it to pass.
+inline constexpr Timeout kPatience = std::chrono::seconds(60);
+
+/// A backend driven by hand, iteration after iteration, with no clock.
+class Station final : private RequestServer {
+ public:
+  explicit Station(const BackendOptions& options = {.segment = "pair"},
+                   const std::function<void(Schema&)>& describe = {})
+      : backend(schema_of(describe), options, this) {}
+
+  /// Row 0.
+  Station& start() {
+    publish();
+    return *this;
+  }
+  /// One iteration; what it came back with.
+  Step iterate() {
+    const Step step = backend.try_step();
+    if (step == Step::run) finish();
+    return step;
+  }
+  void run(int iterations) {
+    for (int i = 0; i < iterations; ++i) ASSERT_EQ(iterate(), Step::run) << i;
+  }
+  /// Bursting: until it stands still or ends.
+  Step drive() {
+    Step step = Step::run;
+    while (step == Step::run) step = iterate();
+    return step;
+  }
+  /// Iterates until something is true.
+  void run_until(const std::function<bool()>& done) {
+    for (int i = 0; i < 1'000'000 && !done(); ++i) {
+      iterate();
+      std::this_thread::yield();
+    }
+    ASSERT_TRUE(done());
+  }
+  /// Waits for grants, as a loop does, until the end.
+  void serve_bursts() {
+    while (backend.step() == Step::run) finish();
+  }
+  Iteration last() const { return backend.iteration() - 1; }
+
+  std::array<double, 2> now{};
+  double total = 0;
+  std::function<void()> before_publish;
+  UntypedBackend backend;
+
+ private:
+  struct State {
+    std::array<double, 2> now{};
+    double total = 0;
+  };
+
+  static Schema schema_of(const std::function<void(Schema&)>& describe) {
+    Schema schema;
+    schema.head.robot = NameText("pair");
+    describe_types<Pair>(schema);
+    schema.actuator(0).name("shoulder");
+    schema.actuator(1).name("elbow");
+    if (describe) describe(schema);
+    return schema;
+  }
+  void finish() {
+    const auto desired = unpack<std::array<double, 2>>(backend.desired());
+    for (std::size_t i = 0; i < 2; ++i) total += desired[i] - now[i];
+    now = desired;
+    if (before_publish) before_publish();
+    publish();
+  }
+  void publish() {
+    pack(now, backend.observed());
+    pack(total, backend.extended());
+    backend.publish();
+  }
+  Served serve(std::uint32_t request, std::span<const std::byte> payload) noexcept override {
+    switch (request) {
+      case 0:
+        now = {static_cast<double>(unpack<Reset>(payload.data()).seed), 0};
+        total = 0;
+        return Served::start_afresh();
+      case 1:
+        kept_ = {now, total};
+        return Served::done();
+      case 2:
+        now = kept_.now;
+        total = kept_.total;
+        return Served::start_afresh();
+      case 3:
+        return Served::rejected("it does not want to");
+      default:
+        return Served::failed("the arm fell off");
+    }
+  }
+  bool read_fresh(FreshReading& reading) noexcept override {
+    pack(now, reading.observed);
+    pack(total, reading.extended);
+    return true;
+  }
+
+  State kept_;
+};
+
+/// A station that serves bursts in a thread of its own.
+class BurstingStation {
+ public:
+  explicit BurstingStation(const std::string& segment = "pair",
+                           const std::function<void(Station&)>& prepare = {})
+      : station({.segment = segment, .bursting = true}) {
+    if (prepare) prepare(station);
+    station.start();
+    thread_ = std::thread([this] { station.serve_bursts(); });
+  }
+  BurstingStation(const BurstingStation&) = delete;
+  BurstingStation& operator=(const BurstingStation&) = delete;
+  ~BurstingStation() { stop(); }
+  /// The thread has ended; the segment is still there.
+  void stop() {
+    station.backend.ask_to_stop();
+    if (thread_.joinable()) thread_.join();
+  }
+
+  Station station;
+
+ private:
+  std::thread thread_;
+};
+
+inline std::uint32_t add(UntypedFrontend& frontend, std::uint32_t actuator, double target,
+                         const CommandOptions& options = {}) {
+  return frontend.add_command(actuator, std::as_bytes(std::span(&target, 1)), options);
+}
+inline Batch send(UntypedFrontend& frontend, std::uint32_t actuator, double target,
+                  const CommandOptions& options = {}) {
+  add(frontend, actuator, target, options);
+  return frontend.pulse();
+}
+template <class Request>
+std::uint32_t add_request(UntypedFrontend& frontend, const Request& request = {}) {
+  std::array<std::byte, sizeof(Request)> bytes{};
+  pack(request, bytes.data());
+  return frontend.add_request(frontend.request_index(request_name<Request>()), bytes);
+}
+
+inline double desired(const UntypedObservation& row, std::uint32_t actuator = 0) {
+  return unpack<double>(row.desired() + actuator * 8);
+}
+inline double observed(const UntypedObservation& row, std::uint32_t actuator = 0) {
+  return unpack<double>(row.observed() + actuator * 8);
+}
+/// One actuator's desired states, of rows that are there.
+inline std::vector<double> desired(const UntypedFrontend& frontend, Iteration first, Iteration last,
+                                   std::uint32_t actuator = 0) {
+  std::vector<double> states;
+  for (Iteration i = first; i <= last; ++i) {
+    states.push_back(desired(frontend.wait_for(i, kAtOnce), actuator));
+  }
+  return states;
+}
+
+/// What an error says, or "" if none is thrown.
+template <class Wanted, class Call>
+std::string message_of(Call&& call) {
+  try {
+    call();
+  } catch (const Wanted& error) {
+    return error.what();
+  }
+  return {};
+}
+
+/// A test with its own folder of segments.
+class StationTest : public ::testing::Test {
+ protected:
+  PrivateDirectory directory_;
+};
+
+}  // namespace o80::test

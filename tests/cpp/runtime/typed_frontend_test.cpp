@@ -1,0 +1,159 @@
+#include "o80/runtime/typed_frontend.hpp"
+
+#include "describe/described.hpp"
+#include "o80/runtime/typed_backend.hpp"
+#include "runtime/station.hpp"
+
+namespace o80::test {
+namespace {
+
+using described::ControlMode;
+using described::Gripper;
+using described::Joint;
+using described::LaunchBall;
+using described::MixedRobot;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+class TypedTest : public StationTest {};
+
+/// Another idea of the mixed robot.
+struct OtherJoint {
+  double position = 0, torque = 0;
+};
+O80_DESCRIBE(OtherJoint, (position, "[rad]"), (torque, "[Nm]"));
+struct OtherRobot {
+  using Actuators = std::array<OtherJoint, 7>;
+};
+
+struct Thermometer {
+  struct Reading {
+    double celsius = 0;
+  };
+  using Actuators = NoActuators;
+  using Extended = Reading;
+};
+O80_DESCRIBE(Thermometer::Reading, (celsius, "[°C]"));
+
+TEST_F(TypedTest, CommandsARobotOfMixedStatesByNameAndByIndex) {
+  Backend<MixedRobot> backend({.segment = "mixed"});
+  backend.publish({});
+  Frontend<MixedRobot> frontend("mixed");
+  frontend.add_command("joints_3", Joint{.position = 1, .velocity = 2});
+  frontend.add_command("gripper", Gripper{.width = 0.5F, .closed = true});
+  frontend.add_command(8, ControlMode::torque);
+  frontend.pulse();
+  const auto desired = backend.step();
+  ASSERT_TRUE(desired);
+  EXPECT_EQ(desired->joints[3].velocity, 2);
+  EXPECT_TRUE(desired->gripper.closed);
+  EXPECT_EQ(desired->mode, ControlMode::torque);
+  described::Sensors sensors;
+  sensors.matrix[2][1] = 4;
+  backend.publish(*desired, sensors);
+  const Observation<MixedRobot> row = frontend.latest();
+  EXPECT_EQ(row.observed().joints[3].position, 1);
+  EXPECT_EQ(row.desired().gripper.width, 0.5F);
+  EXPECT_EQ(row.extended().matrix[2][1], 4);
+}
+
+TEST_F(TypedTest, RefusesAStateOfAnotherTypeEvenIfItHasTheSameSize) {
+  Backend<MixedRobot> backend({.segment = "mixed"});
+  backend.publish({});
+  Frontend<MixedRobot> frontend("mixed");
+  EXPECT_THAT(message_of<InvalidArgument>([&] { frontend.add_command("gripper", 1.0); }),
+              HasSubstr("'gripper'"));
+  EXPECT_THROW(frontend.add_command("mode", std::uint8_t{3}), InvalidArgument);
+  EXPECT_THROW(frontend.add_command("mode", static_cast<ControlMode>(17)), InvalidArgument);
+  EXPECT_THROW(frontend.add_command(99, 1.0), InvalidArgument);
+}
+
+TEST_F(TypedTest, RefusesARobotThatIsLaidOutOtherwiseShowingTheDifference) {
+  Backend<MixedRobot> backend({.segment = "mixed"});
+  backend.publish({});
+  EXPECT_THAT(message_of<SchemaMismatch>([] { Frontend<OtherRobot> frontend("mixed"); }),
+              AllOf(HasSubstr("'mixed'"), HasSubstr("actuators: expected 7, found 9"),
+                    HasSubstr("actuator 0 field 'torque'"), HasSubstr("from the same types")));
+}
+
+TEST_F(TypedTest, AcceptsNamesAndLimitsThatTheBackendGives) {
+  Backend<MixedRobot> backend({.segment = "mixed"}, [](Schema& schema) {
+    schema.actuator(0).name("base").limits({.minimum = -1, .maximum = 1});
+  });
+  backend.publish({});
+  Frontend<MixedRobot> frontend("mixed");
+  frontend.add_command("base", Joint{.position = 0.5});
+  EXPECT_THROW(frontend.add_command("base", Joint{.position = 1.5}), InvalidArgument);
+}
+
+TEST_F(TypedTest, SendsRequestsWithAndWithoutFields) {
+  Backend<MixedRobot> backend({.segment = "mixed"});
+  double launched = 0;
+  int homed = 0;
+  backend.on<LaunchBall>([&](const LaunchBall& launch) {
+    launched = launch.speed;
+    return Served::done();
+  });
+  backend.on<described::Home>([&](const described::Home&) {
+    ++homed;
+    return Served::done();
+  });
+  backend.publish({});
+  Frontend<MixedRobot> frontend("mixed");
+  frontend.add_request(LaunchBall{.speed = 7, .mode = ControlMode::position});
+  frontend.add_request(described::Home{});
+  const Batch batch = frontend.pulse();
+  ASSERT_TRUE(backend.step());
+  backend.publish({});
+  EXPECT_EQ(batch.handle(0).status, Status::completed);
+  EXPECT_EQ(batch.handle(1).status, Status::completed);
+  EXPECT_EQ(launched, 7);
+  EXPECT_EQ(homed, 1);
+}
+
+TEST_F(TypedTest, RowsOfPaddedStatesCompareBitForBit) {
+  const auto run = [] {
+    Backend<MixedRobot> backend({.segment = "mixed", .bursting = true});
+    described::Actuators dirty;
+    described::Sensors sensors;
+    std::memset(static_cast<void*>(&dirty), 0x5A, sizeof dirty);
+    std::memset(static_cast<void*>(&sensors), 0xA5, sizeof sensors);
+    dirty = described::Actuators{};
+    sensors = described::Sensors{};
+    backend.publish(dirty, sensors);
+    return Frontend<>("mixed").history(1).bytes;
+  };
+  EXPECT_EQ(run(), run());
+}
+
+TEST_F(TypedTest, APureSensorHasNoActuators) {
+  Backend<Thermometer> backend({.segment = "room"});
+  backend.publish({}, {.celsius = 20});
+  Frontend<Thermometer> frontend("room");
+  ASSERT_TRUE(backend.step());
+  backend.publish({}, {.celsius = 21});
+  const Observation<Thermometer> row = frontend.latest();
+  EXPECT_EQ(row.iteration(), 1);
+  EXPECT_EQ(row.extended().celsius, 21);
+  static_cast<void>(row.desired());
+  EXPECT_THAT(message_of<InvalidArgument>([&] { frontend.add_command(0, 1.0); }),
+              HasSubstr("no actuators"));
+}
+
+TEST_F(TypedTest, FollowsATrajectory) {
+  Backend<MixedRobot> backend({.segment = "mixed"});
+  backend.publish({});
+  Frontend<MixedRobot> frontend("mixed");
+  const std::array<Joint, 3> rows{Joint{1, 0}, Joint{2, 0}, Joint{3, 0}};
+  frontend.add_trajectory("joints_0", std::span<const Joint>(rows));
+  frontend.pulse();
+  for (const Joint& row : rows) {
+    const auto desired = backend.step();
+    ASSERT_TRUE(desired);
+    EXPECT_EQ(desired->joints[0].position, row.position);
+    backend.publish(*desired);
+  }
+}
+
+}  // namespace
+}  // namespace o80::test
