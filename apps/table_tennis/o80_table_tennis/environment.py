@@ -288,7 +288,8 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
             lateness = arm.newest - (self._row + ITERATIONS)
             counts.summed_lateness += lateness
             counts.largest_lateness = max(counts.largest_lateness, lateness)
-            counts.late_actions += sent.first_iteration > at
+            begun = sent.first_iteration  # None: not even now
+            counts.late_actions += begun is None or begun > at
 
     # ------------------------------------------------------------------ beside the episode
 
