@@ -19,7 +19,7 @@ def command() -> None:
         print("closed to", observation.observed["position"].round(4))
 
 
-with o80.Backend("gripper", MOTOR, actuators=["left", "right"], frequency=200) as backend:
+with o80.Backend("gripper", ["left", "right"], MOTOR, frequency=200) as backend:
     fingers = np.zeros(2, MOTOR)
     backend.publish(fingers)  # row 0
     commander = threading.Thread(target=command)

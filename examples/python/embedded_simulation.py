@@ -20,17 +20,12 @@ def learn() -> None:
 
 SENSORS = np.dtype([("angle", float), ("speed", float)])
 
-with o80.Backend(
-    "pendulum", float, actuators=["torque"], extended=SENSORS, period=0.002, bursting=True
-) as backend:
+with o80.Backend("pendulum", ["torque"], extended=SENSORS, frequency=500, bursting=True) as backend:
     angle, speed = 0.1, 0.0
     backend.publish([0.0], (angle, speed))
-    learner = threading.Thread(target=learn)
+    learner = threading.Thread(target=lambda: (learn(), backend.stop()))
     learner.start()
-    while learner.is_alive():
-        desired = backend.step(timeout=0.1)  # None: nobody asked in time
-        if desired is None:
-            continue
+    while (desired := backend.step()) is not None:  # waits until iterations are granted
         speed += 0.002 * (desired[0] - 9.81 * np.sin(angle))
         angle += 0.002 * speed
         backend.publish(desired, (angle, speed))
