@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,7 +87,7 @@ REAL_RANGE = PressureRange.of_pairs(
 
 
 def changed_pressures(
-    pressures: FloatArray, action: FloatArray, *, factor: float = FINE
+    pressures: FloatArray, action: NDArray[np.floating[Any]], *, factor: float = FINE
 ) -> FloatArray:
     """Normalised pressures (8,) after an action (8,) in [-1, 1]; clipped to [0, 1], a fresh array.
 

@@ -10,8 +10,9 @@ import time
 from typing import Any
 
 import numpy as np
-import o80
 from numpy.typing import NDArray
+
+import o80
 
 from .actions import MUSCLES
 from .row_words import words
@@ -39,6 +40,7 @@ class Arm:
 
     def __init__(self, frontend: o80.Frontend) -> None:
         self.frontend = frontend
+        self._compiled: Any = frontend
         dtype = frontend.history(1).rows.dtype
         self._rows = np.zeros(ITERATIONS, dtype)
         numbers = self._rows.view(np.float64).reshape(ITERATIONS, -1)
@@ -62,7 +64,7 @@ class Arm:
 
     def send(self, pressures: FloatArray, at: int) -> Any:
         """Raw pressures (8,) from iteration `at` on, or at once if it has begun."""
-        self.frontend._add_trajectories(
+        self._compiled._add_trajectories(
             self._muscles, 1, pressures, None, None, 1, "overwrite", "linear", "desired"
         )
         return self.frontend.pulse(at=at, late="now")
@@ -70,15 +72,16 @@ class Arm:
     def advance(self, first: int) -> None:
         """Waits for the five rows from `first` on, or lets the arm make them, and reads them."""
         if self._bursting:
-            self.frontend._burst(ITERATIONS, TIMEOUT)
+            self._compiled._burst(ITERATIONS, TIMEOUT)
         else:
             self.frontend.wait_for(first + ITERATIONS - 1, timeout=TIMEOUT)
-        self.frontend._read_rows(first, self._bytes)
+        self._compiled._read_rows(first, self._bytes)
 
     @property
     def asked(self) -> FloatArray:
         """Raw pressures (8,) asked for in the last row, a fresh array."""
-        return self._asked[-1].copy()
+        asked: FloatArray = self._asked[-1].copy()
+        return asked
 
     def reset(self, seed: int) -> None:
         """To the start, at once: a simulated arm can."""

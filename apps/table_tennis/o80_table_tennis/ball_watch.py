@@ -43,13 +43,15 @@ class RecordReader:
 class BallWatch:
     """Watches the ball that is played."""
 
-    def __init__(
-        self, reader: RecordReader, *, end: EndRule, reward: RewardRule
-    ) -> None:
+    def __init__(self, reader: RecordReader, *, end: EndRule, reward: RewardRule) -> None:
         self._read = reader.read
         self._end, self._reward = end, reward
         place = reader.place
-        self._count, self._net, self._floor = place("count"), place("net_count"), place("floor_count")
+        self._count, self._net, self._floor = (
+            place("count"),
+            place("net_count"),
+            place("floor_count"),
+        )
         self._after = place("velocity_after")
         self._distance, self._speed = place("smallest_distance"), place("largest_speed")
         self._landing, self._landed_at = place("landing_iteration"), place("landing_position")

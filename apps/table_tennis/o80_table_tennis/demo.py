@@ -11,6 +11,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
@@ -22,7 +23,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from .balls import balls_from
 from .environment import TableTennisEnvironment
-from .episode_record import EpisodeRecord, EpisodeSummary, load_records
+from .episode_record import EpisodeSummary, load_records
 from .playing import Played, play
 from .policies import DEFAULT_FACTOR, default_policy
 from .report import Report, write_report
@@ -95,14 +96,10 @@ def _play_mode(
     folder.mkdir(parents=True, exist_ok=True)
     for old in folder.glob("episode_*.npz"):
         old.unlink()
-    environment = TableTennisEnvironment(
-        rig=settings.rig(pacing), task=settings.task(), log=folder
-    )
-    with environment:
+    environment = TableTennisEnvironment(rig=settings.rig(pacing), task=settings.task(), log=folder)
+    with closing(environment):
         balls = (number % available for number in range(settings.episodes_of(pacing)))
-        return play(
-            environment, default_policy(), balls, seed=settings.seed, after_each=after_each
-        )
+        return play(environment, default_policy(), balls, seed=settings.seed, after_each=after_each)
 
 
 def _history(settings: DemoSettings, pacing: Pacing) -> Path:
@@ -164,6 +161,10 @@ def main(
     )
     if episodes == 0 and real_time_episodes == 0:
         raise typer.BadParameter("nothing to play: ask for at least one episode")
+    try:
+        balls_from(settings.task().balls)
+    except (OSError, ValueError) as error:
+        raise typer.BadParameter(str(error), param_hint="--balls") from error
     run_demo(settings, console).print(console)
     console.print(f"report, plots, film and history: {output}")
 

@@ -221,9 +221,7 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
             self._logger.add(self._summary)
         return float(reward)
 
-    def _choose_balls(
-        self, options: Mapping[str, Any]
-    ) -> tuple[list[int], list[SampledFlight]]:
+    def _choose_balls(self, options: Mapping[str, Any]) -> tuple[list[int], list[SampledFlight]]:
         """Numbers and flights: of the ball that is played, then of the extra ones."""
         unknown = [name for name in options if name not in OPTIONS]
         if unknown:

@@ -11,7 +11,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterable
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from dataclasses import asdict
 from pathlib import Path
 from types import TracebackType
@@ -47,10 +47,8 @@ class EpisodeLogger(AbstractContextManager["EpisodeLogger"]):
     def close(self) -> None:
         """Waits until all episodes are written; may be called twice."""
         assert self._process.stdin is not None
-        try:
+        with suppress(BrokenPipeError):
             self._process.stdin.close()
-        except BrokenPipeError:
-            pass
         try:
             self._process.wait(LONGEST_WRITING)
         except BaseException:

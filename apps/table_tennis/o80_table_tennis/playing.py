@@ -9,9 +9,10 @@ from typing import Any
 
 import gymnasium
 
-from .environment import Statistics, TableTennisEnvironment
+from .environment import TableTennisEnvironment
 from .episode_record import EpisodeSummary
 from .policies import Policy
+from .statistics import Statistics
 
 
 @dataclass(frozen=True)

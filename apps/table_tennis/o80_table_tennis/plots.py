@@ -68,7 +68,9 @@ def plot_paths(path: Path, record: EpisodeRecord) -> None:
     side.add_patch(
         Rectangle((near, TABLE.top - TABLE.size[2]), far - near, TABLE.size[2], color="tab:blue")
     )
-    side.plot([TABLE.centre[1]] * 2, [TABLE.top, TABLE.top + NET_HEIGHT], color="black", label="net")
+    side.plot(
+        [TABLE.centre[1]] * 2, [TABLE.top, TABLE.top + NET_HEIGHT], color="black", label="net"
+    )
     left, right = _edges(0)
     above.add_patch(
         Rectangle((near, left), far - near, right - left, facecolor="tab:blue", alpha=0.3)

@@ -58,7 +58,7 @@ class RandomPolicy:
 
 @dataclass
 class SweepPolicy:
-    """Swings the first joint when the ball comes near: a baseline that looks at time, not height."""
+    """Swings the first joint when the ball comes near: a baseline that sees time, not height."""
 
     lead: float = 0.2
     """How long before the ball passes the arm the swing begins [s]."""

@@ -78,9 +78,7 @@ class Scene(AbstractContextManager["Scene"]):
         return int(self._model.joint(_ball_name(ball)).qposadr[0])
 
 
-def write_film(
-    path: Path, pictures: Iterable[Image], *, frames_per_second: float = 30.0
-) -> int:
+def write_film(path: Path, pictures: Iterable[Image], *, frames_per_second: float = 30.0) -> int:
     """Writes pictures (height, width, 3) as an MP4 film; returns how many frames it has."""
     import imageio_ffmpeg
 

@@ -6,14 +6,14 @@ import os
 from contextlib import ExitStack
 from itertools import count
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import o80
 
-from .arm import TIMEOUT, Arm
+from .arm import Arm
 from .rendering import MODEL
 from .settings import ITERATIONS, Pacing, RigSettings
-from .twin import Twin
+from .twin import TIMEOUT, Twin
 
 NUMBERS = count(1)
 JOINT_NAMES = "joint_1,joint_2,joint_3,joint_4"
@@ -35,9 +35,7 @@ class Rig:
         self._stack = ExitStack()
         try:
             self.arm = Arm(self._open_arm())
-            self.twins = [
-                Twin(self._open_twin(twin)) for twin in range(self.settings.twins)
-            ]
+            self.twins = [Twin(self._open_twin(twin)) for twin in range(self.settings.twins)]
         except BaseException:
             self._stack.close()
             raise
@@ -60,7 +58,7 @@ class Rig:
     def burst_twins(self, iterations: int = ITERATIONS) -> list[o80.Observation]:
         """Lets all twins run at once; returns the last row of each."""
         if len(self.twins) == 1:
-            return [self.twins[0].frontend._burst(iterations, TIMEOUT)]
+            return [self.twins[0].burst(iterations)]
         rows = o80.burst({twin.frontend: iterations for twin in self.twins}, timeout=TIMEOUT)
         return [rows[twin.frontend] for twin in self.twins]
 
@@ -92,12 +90,12 @@ class Rig:
         return self._open("mujoco", None, False, options)
 
     def _open(
-        self, robot: str, segment: str | None, real_time: bool, options: dict[str, object]
+        self, robot: str, segment: str | None, real_time: bool, options: dict[str, Any]
     ) -> o80.Frontend:
         """Starts a robot in the way of this rig, and opens a frontend to it."""
         settings = self.settings
         library = o80.robots.load(robot)
-        common = {
+        common: dict[str, Any] = {
             "segment": segment or unused_name(robot),
             "frequency": settings.frequency,
             "history": settings.history,

@@ -40,7 +40,7 @@ class RigSettings:
     arm_segment: str | None = None
     """Name of the arm's segment; None: an unused one."""
     attach: bool = False
-    """The arm is there already, in another process, as `arm_segment`: only the twins are started."""
+    """The arm runs already, in another process, as `arm_segment`: only the twins are started."""
     twins: int = 1
     """Simulations that mirror the arm; the first one holds the ball that is played."""
     extra_balls: int = 0

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-import o80
 from numpy.typing import NDArray
+
+import o80
 
 FloatArray = NDArray[np.float64]
 
@@ -70,7 +71,11 @@ def statistics_of(counts: StepCounts, arm: o80.Frontend, *, step: float) -> Stat
     """What was counted, and what the history of the arm tells; `step` lasts so long [s]."""
     rows = arm.history()
     seconds = float(rows.time[-1] - rows.time[0]) * 1e-9
-    nothing = np.empty(0)
+    lateness: FloatArray = np.empty(0)
+    periods: FloatArray = np.empty(0)
+    if not arm.bursting:
+        lateness = np.asarray(rows.lateness, np.float64) * 1e-3
+        periods = np.asarray(np.diff(rows.time), np.float64) * 1e-3
     return Statistics(
         episodes=counts.episodes,
         steps=counts.steps,
@@ -88,6 +93,6 @@ def statistics_of(counts: StepCounts, arm: o80.Frontend, *, step: float) -> Stat
         arm_rate=(len(rows) - 1) / seconds if seconds > 0 else 0.0,
         arm_overruns=int(rows.overruns[-1]),
         arm_skipped=int(rows.skipped[-1]),
-        arm_lateness_us=nothing if arm.bursting else rows.lateness * 1e-3,
-        arm_periods_us=nothing if arm.bursting else np.diff(rows.time) * 1e-3,
+        arm_lateness_us=lateness,
+        arm_periods_us=periods,
     )

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import o80
 from numpy.typing import NDArray
+
+import o80
 
 from .ball_watch import RecordReader
 from .row_words import WORD, words
@@ -16,6 +17,8 @@ from .trajectories import SampledFlight
 
 FloatArray = NDArray[np.float64]
 
+TIMEOUT = 5.0
+"""Longest wait for a burst [s]."""
 BALL_NUMBERS = 6
 """Position and velocity."""
 
@@ -25,6 +28,7 @@ class Twin:
 
     def __init__(self, frontend: o80.Frontend) -> None:
         self.frontend = frontend
+        self._compiled: Any = frontend
         dtype = frontend.history(1).rows.dtype
         contacts = words(dtype, "extended", "contacts")
         self._joints = words(dtype, "observed", "joints")
@@ -64,7 +68,7 @@ class Twin:
     def mirror(self, q: FloatArray, dq: FloatArray) -> None:
         """Adds the arm's last rows (5, 4) as commands for the next burst."""
         self._positions[:], self._velocities[:] = q, dq
-        self.frontend._add_trajectories(
+        self._compiled._add_trajectories(
             self._joint_numbers,
             ITERATIONS,
             self._motion,
@@ -75,6 +79,11 @@ class Twin:
             "linear",
             "desired",
         )
+
+    def burst(self, iterations: int) -> o80.Observation:
+        """Lets this twin run alone; returns its last row."""
+        row: o80.Observation = self._compiled._burst(iterations, TIMEOUT)
+        return row
 
     def all_balls(self, row: FloatArray) -> FloatArray:
         """Positions and velocities (balls, 6) in the words of a row; a view."""

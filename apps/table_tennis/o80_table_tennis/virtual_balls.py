@@ -86,8 +86,7 @@ class VirtualBalls:
     def positions(self, rows: Sequence[Any]) -> FloatArray:
         """(1 + N, 3) of the played ball and the extra ones [m]."""
         all_balls = [
-            twin.all_balls(np.frombuffer(row))
-            for twin, row in zip(self._twins, rows, strict=True)
+            twin.all_balls(np.frombuffer(row)) for twin, row in zip(self._twins, rows, strict=True)
         ]
         extra = [balls[its] for balls, its in zip(all_balls, self._extra, strict=True)]
         return np.concatenate([all_balls[0][:1], *extra])[:, :3]
