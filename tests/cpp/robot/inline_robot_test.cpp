@@ -1,0 +1,100 @@
+#include "o80/robot/inline_robot.hpp"
+
+#include "o80/robot/library.hpp"
+#include "o80/runtime/typed_frontend.hpp"
+#include "robot/puppet.hpp"
+
+namespace o80::test {
+namespace {
+
+using ::testing::HasSubstr;
+
+class InlineRobotTest : public PuppetTest {};
+
+std::unique_ptr<Robot> two_joints() {
+  static const RobotLibrary library = RobotLibrary::load(kTwoJoints);
+  return std::make_unique<Robot>(*library.table, OptionValues{{"gain", "30"}});
+}
+
+/// Commands, bursts, a reset and a restore.
+std::vector<std::byte> play(UntypedFrontend& frontend) {
+  for (int i = 0; i < 10; ++i) {
+    add(frontend, 0, 0.1 * i, {.pace = iterations(3), .profile = Profile::minimum_jerk});
+    add(frontend, 1, -0.05 * i, {.pace = speed(3), .mode = Mode::overwrite});
+    frontend.burst(1 + i % 5, kPatience);
+    if (i == 4) add_request(frontend, Snapshot{.slot = 1});
+    if (i == 6) add_request(frontend, Restore{.slot = 1});
+    if (i == 8) add_request(frontend, Reset{});
+  }
+  add(frontend, 0, 0.0, {.pace = iterations(40)});
+  frontend.pulse_and_wait(kPatience);
+  return frontend.history(1'000'000).bytes;
+}
+
+TEST_F(InlineRobotTest, GivesTheSameRowsBitForBitAsABurstingProcess) {
+  Program process({kRunProgram, kTwoJoints, "--bursting", "--gain", "30", "--segment", "process"});
+  UntypedFrontend frontend("process", {.timeout = kPatience});
+  const std::vector<std::byte> rows = play(frontend);
+  process.signal(SIGTERM);
+  EXPECT_EQ(process.end().code, 0);
+
+  const auto robot = std::make_shared<InlineRobot>(two_joints(), BackendOptions{.segment = "here"});
+  UntypedFrontend here("here", robot);
+  const std::vector<std::byte> again = play(here);
+  ASSERT_GT(rows.size(), 0U);
+  EXPECT_EQ(again, rows);
+}
+
+TEST_F(InlineRobotTest, LetsOthersWatchAndCommand) {
+  const auto robot = std::make_shared<InlineRobot>(two_joints(), BackendOptions{.segment = "here"});
+  UntypedFrontend owner("here", robot);
+  UntypedFrontend other("here");
+  const Batch theirs = send(other, 1, 1.0);
+  owner.burst(1, kAtOnce);
+  EXPECT_EQ(theirs.handle(0).status, Status::completed);
+  EXPECT_EQ(desired(other.latest(), 1), 1.0);
+  EXPECT_EQ(other.published(), 1);
+}
+
+TEST_F(InlineRobotTest, WaitsForNothingOfItsOwn) {
+  const auto robot = std::make_shared<InlineRobot>(two_joints(), BackendOptions{.segment = "here"});
+  UntypedFrontend frontend("here", robot);
+  add(frontend, 0, 1.0, {.pace = iterations(100)});
+  EXPECT_EQ(frontend.pulse_and_wait(kAtOnce).iteration(), 100);
+  EXPECT_EQ(frontend.burst(5, kAtOnce).iteration(), 105);
+  add_request(frontend, Reset{});
+  const Batch reset = frontend.pulse();
+  reset.wait(kAtOnce);
+  EXPECT_EQ(frontend.latest().head().fresh, 1U);
+}
+
+TEST_F(InlineRobotTest, RaisesAFaultWhereItWasBurst) {
+  const auto robot = std::make_shared<InlineRobot>(
+      std::make_unique<Robot>(table(), OptionValues{{"fails", "write"}}),
+      BackendOptions{.segment = "here"});
+  UntypedFrontend frontend("here", robot);
+  EXPECT_THAT(message_of<DriverError>([&] { frontend.burst(10, kPatience); }),
+              HasSubstr("wire cut"));
+  EXPECT_EQ(Puppet::calls.stopped, 1);
+  EXPECT_THROW(frontend.burst(1, kPatience), BackendFailed);
+  EXPECT_EQ(frontend.published(), 2);
+}
+
+TEST_F(InlineRobotTest, StopsWhenToldAndItsFrontendsSeeIt) {
+  const auto robot = std::make_shared<InlineRobot>(std::make_unique<Robot>(table(), OptionValues{}),
+                                                   BackendOptions{.segment = "here"});
+  UntypedFrontend frontend("here", robot);
+  frontend.burst(2, kAtOnce);
+  robot->stop();
+  EXPECT_EQ(Puppet::calls.stopped, 1);
+  EXPECT_THROW(frontend.burst(1, kPatience), BackendStopped);
+  EXPECT_EQ(frontend.latest().iteration(), 2);
+}
+
+TEST_F(InlineRobotTest, NamesThatNobodyUsesDiffer) {
+  EXPECT_NE(unused_segment_name("arm"), unused_segment_name("arm"));
+  EXPECT_THAT(unused_segment_name("arm"), HasSubstr("arm-"));
+}
+
+}  // namespace
+}  // namespace o80::test

@@ -1,0 +1,132 @@
+#include "o80/robot/run_options.hpp"
+
+#include "robot/puppet.hpp"
+
+namespace o80::test {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Pair;
+
+class RunOptionsTest : public PuppetTest {
+ protected:
+  static RunOptions parse(std::vector<std::string> words) {
+    words.insert(words.begin(), "o80-run");
+    std::vector<char*> arguments;
+    for (std::string& word : words) arguments.push_back(word.data());
+    arguments.push_back(nullptr);
+    return parse_run_options(table(), static_cast<int>(words.size()), arguments.data());
+  }
+  static std::string refusal(const std::vector<std::string>& words) {
+    return message_of<InvalidArgument>([&] { parse(words); });
+  }
+};
+
+TEST_F(RunOptionsTest, HaveDefaults) {
+  const RunOptions options = parse({});
+  EXPECT_EQ(options.backend.segment, "puppet");
+  EXPECT_EQ(options.backend.period, 1'000'000);
+  EXPECT_FALSE(options.backend.bursting);
+  EXPECT_EQ(options.backend.permission, 0600U);
+}
+
+TEST_F(RunOptionsTest, AreReadFromFlags) {
+  const RunOptions options = parse({"--segment=left",
+                                    "--frequency",
+                                    "500",
+                                    "--bursting",
+                                    "--history",
+                                    "42",
+                                    "--lanes",
+                                    "3",
+                                    "--lane-blocks",
+                                    "64",
+                                    "--permission",
+                                    "660",
+                                    "--stale",
+                                    "purge",
+                                    "--silence",
+                                    "0.5",
+                                    "--policy",
+                                    "fifo",
+                                    "--priority",
+                                    "50",
+                                    "--cpus",
+                                    "1,2",
+                                    "--lock-memory",
+                                    "--until-eof",
+                                    "--gain",
+                                    "2.5",
+                                    "--finish-at",
+                                    "7",
+                                    "--finish_at",
+                                    "8"});
+  EXPECT_EQ(options.backend.segment, "left");
+  EXPECT_EQ(options.backend.period, 2'000'000);
+  EXPECT_TRUE(options.backend.bursting);
+  EXPECT_EQ(options.backend.history, 42U);
+  EXPECT_EQ(options.backend.lanes, 3U);
+  EXPECT_EQ(options.backend.lane_blocks, 64U);
+  EXPECT_EQ(options.backend.permission, 0660U);
+  EXPECT_EQ(options.backend.stale, Stale::purge);
+  EXPECT_EQ(options.backend.silence, 500'000'000);
+  EXPECT_EQ(options.real_time.policy, RealTimeOptions::Policy::fifo);
+  EXPECT_EQ(options.real_time.priority, 50);
+  EXPECT_THAT(options.real_time.processors, ElementsAre(1, 2));
+  EXPECT_TRUE(options.real_time.lock_memory);
+  EXPECT_TRUE(options.until_eof);
+  EXPECT_THAT(options.robot,
+              ElementsAre(Pair("gain", "2.5"), Pair("finish_at", "7"), Pair("finish_at", "8")));
+}
+
+TEST_F(RunOptionsTest, RefuseWhatIsNotAllowedNamingTheFlag) {
+  EXPECT_THAT(refusal({"--frequency", "0"}), AllOf(HasSubstr("--frequency"), HasSubstr("from")));
+  EXPECT_THAT(refusal({"--frequency", "fast"}), HasSubstr("'fast'"));
+  EXPECT_THAT(refusal({"--frequency", "nan"}), HasSubstr("'nan'"));
+  EXPECT_THAT(refusal({"--lanes", "1.5"}), HasSubstr("it is a count"));
+  EXPECT_THAT(refusal({"--permission", "999"}), HasSubstr("octal"));
+  EXPECT_THAT(refusal({"--stale", "never"}), HasSubstr("hold, purge or stop"));
+  EXPECT_THAT(refusal({"--policy", "idle"}), HasSubstr("other, fifo or rr"));
+  EXPECT_THAT(refusal({"--cpus", ""}), HasSubstr("2,3"));
+  EXPECT_THAT(refusal({"--gain"}), HasSubstr("needs a value"));
+  EXPECT_THAT(refusal({"--gian", "2"}), HasSubstr("there is no flag --gian"));
+  EXPECT_THAT(refusal({"stray"}), HasSubstr("'stray' is no flag"));
+}
+
+TEST_F(RunOptionsTest, AreAllInTheHelp) {
+  const std::string help = run_help(table());
+  EXPECT_THAT(help, AllOf(HasSubstr("--gain number"), HasSubstr("of nothing [1/s] (default: 1.5)"),
+                          HasSubstr("--finish-at"), HasSubstr("one of: never")));
+  std::size_t count = 0;
+  const RunFlag* flags = run_flags(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    EXPECT_THAT(help, HasSubstr("--" + std::string(flags[i].name)));
+  }
+}
+
+/// A robot whose Config takes a flag of every robot for itself.
+struct Greedy {
+  struct Config {
+    int lane_blocks = 1;
+  };
+  using Actuators = NoActuators;
+  explicit Greedy(const Config&) {}
+  void start() {}
+  void write(const Desired<Greedy>&) {}
+  void read(Reading<Greedy>&) {}
+  void stop() noexcept {}
+};
+O80_DESCRIBE(Greedy::Config, lane_blocks);
+
+TEST_F(RunOptionsTest, RefuseARobotThatTakesAFlagOfEveryRobot) {
+  std::string program = "o80-run";
+  char* words[] = {program.data(), nullptr};
+  EXPECT_THAT(message_of<InvalidArgument>(
+                  [&] { parse_run_options(*robot_table<Greedy>("greedy"), 1, words); }),
+              AllOf(HasSubstr("'lane_blocks'"), HasSubstr("rename it")));
+}
+
+}  // namespace
+}  // namespace o80::test

@@ -1,0 +1,222 @@
+#include "o80/robot/run.hpp"
+
+#include <signal.h>
+
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <sstream>
+
+#include "memory/child_process.hpp"
+#include "robot/puppet.hpp"
+
+namespace o80::test {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+class RunTest : public PuppetTest {
+ protected:
+  static std::vector<std::string> two_joints(std::vector<std::string> flags = {}) {
+    flags.insert(flags.begin(), {kRunProgram, kTwoJoints});
+    return flags;
+  }
+};
+
+TEST_F(RunTest, RunsARobotLibraryUntilASignalStopsItInOrder) {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    Program program(two_joints({"--frequency", "500"}));
+    ASSERT_TRUE(program.says("two_joints runs on segment 'two_joints', 500 Hz"));
+    UntypedFrontend frontend("two_joints", {.timeout = kPatience});
+    frontend.wait_for(5, kPatience);
+    program.signal(signal);
+    const Outcome outcome = program.end();
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    EXPECT_EQ(outcome.err, "");
+    EXPECT_THROW(frontend.wait_for(1'000'000, kPatience), BackendStopped);
+    EXPECT_EQ(directory_.files(), 0U) << "nothing is left behind";
+  }
+}
+
+TEST_F(RunTest, ASignalEndsEvenALongPeriodAtOnce) {
+  Program program(two_joints({"--frequency", "0.001"}));
+  ASSERT_TRUE(program.says("runs on segment"));
+  program.signal(SIGINT);
+  EXPECT_EQ(program.end().code, 0);
+}
+
+TEST_F(RunTest, StopsABurstingRobotThatStandsStill) {
+  Program program(two_joints({"--bursting"}));
+  ASSERT_TRUE(program.says("bursting, 1 ms an iteration"));
+  UntypedFrontend frontend("two_joints", {.timeout = kPatience});
+  EXPECT_EQ(frontend.burst(3, kPatience).iteration(), 3);
+  program.signal(SIGTERM);
+  EXPECT_EQ(program.end().code, 0);
+}
+
+TEST_F(RunTest, StopsWhenItsInputEndsIfToldSo) {
+  Program program(two_joints({"--until-eof"}));
+  ASSERT_TRUE(program.says("runs on segment"));
+  program.close_input();
+  EXPECT_EQ(program.end().code, 0);
+  EXPECT_EQ(directory_.files(), 0U);
+}
+
+TEST_F(RunTest, ASecondOneOfTheNameIsRefusedNamingTheOwner) {
+  Program first(two_joints());
+  ASSERT_TRUE(first.says("runs on segment"));
+  Program second(two_joints());
+  const Outcome refused = second.end();
+  EXPECT_EQ(refused.code, 1);
+  EXPECT_THAT(refused.err, AllOf(HasSubstr("already has a backend"),
+                                 HasSubstr("pid " + std::to_string(first.pid()))));
+  EXPECT_EQ(UntypedFrontend("two_joints").life(), Life::running);
+  first.signal(SIGTERM);
+  EXPECT_EQ(first.end().code, 0);
+}
+
+/// Runs a table as a process would, in this one.
+int run_here(const RobotTable& table, std::vector<std::string> words) {
+  words.insert(words.begin(), "program");
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+  return run(table, static_cast<int>(words.size()), arguments.data());
+}
+
+TEST_F(RunTest, ASecondOneOfTheNameDoesNotEvenConstructItsDriver) {
+  Station owner({.segment = "puppet"});
+  ::testing::internal::CaptureStderr();
+  EXPECT_EQ(run_here(table(), {}), 1);
+  EXPECT_THAT(::testing::internal::GetCapturedStderr(), HasSubstr("already has a backend"));
+  EXPECT_EQ(Puppet::calls.constructed, 0);
+}
+
+TEST_F(RunTest, LeavesTheFaultOfAConstructorForWhoWaitsToAttach) {
+  for (const auto& [fails, why] :
+       {std::pair("construct", "no cable"), std::pair("describe", "no plan"),
+        std::pair("start", "no power")}) {
+    std::thread waiter([why = why] {
+      EXPECT_THAT(
+          message_of<BackendFailed>([] { UntypedFrontend("puppet", {.timeout = kPatience}); }),
+          HasSubstr(why));
+    });
+    ::testing::internal::CaptureStderr();
+    EXPECT_EQ(run_here(table(), {"--fails", fails}), 1);
+    EXPECT_THAT(::testing::internal::GetCapturedStderr(), HasSubstr(why));
+    waiter.join();
+    EXPECT_EQ(directory_.files(), 1U) << "it stays to be read";
+    std::filesystem::remove(directory_.file_of("puppet"));
+  }
+}
+
+TEST_F(RunTest, RunsInItsOwnMainAndFinishesInOrder) {
+  ::testing::internal::CaptureStdout();
+  EXPECT_EQ(run_here(table(), {"--finish-at", "3", "--frequency", "5000"}), 0);
+  EXPECT_THAT(::testing::internal::GetCapturedStdout(), HasSubstr("puppet runs on segment"));
+  EXPECT_EQ(Puppet::calls.stopped, 1);
+  EXPECT_EQ(Puppet::calls.destroyed, 1);
+  struct sigaction now{};
+  sigaction(SIGINT, nullptr, &now);
+  EXPECT_EQ(now.sa_handler, SIG_DFL) << "signals are as they were";
+}
+
+TEST_F(RunTest, SaysWhatIsWrongWithItsFlags) {
+  Program program(two_joints({"--frequency", "never"}));
+  const Outcome outcome = program.end();
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("--frequency cannot be 'never'"));
+  Program helped(two_joints({"--help"}));
+  const Outcome help = helped.end();
+  EXPECT_EQ(help.code, 0);
+  EXPECT_THAT(help.out, AllOf(HasSubstr("--reach number"), HasSubstr("--frequency HZ")));
+}
+
+TEST_F(RunTest, ReportsWhatTheMachineRefusesAndRunsOn) {
+  Program program(two_joints({"--cpus", "1000"}));
+  ASSERT_TRUE(program.says("runs on segment"));
+  program.signal(SIGTERM);
+  const Outcome outcome = program.end();
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr("processors 1000 were refused"), HasSubstr("taskset")));
+}
+
+TEST_F(RunTest, ReportsAFaultAndEndsWithAFailure) {
+  ::testing::internal::CaptureStderr();
+  EXPECT_EQ(run_here(table(), {"--fails", "read", "--frequency", "5000"}), 1);
+  EXPECT_THAT(::testing::internal::GetCapturedStderr(), HasSubstr("failed in read: went blind"));
+  EXPECT_EQ(Puppet::calls.stopped, 1);
+}
+
+/// Calls of each kind that the loop's thread made while strace looked on; empty if it may not.
+std::map<std::string, int> system_calls(const std::string& log) {
+  std::map<std::string, int> calls;
+  std::ifstream file(log);
+  for (std::string line; std::getline(file, line);) {
+    if (const auto bracket = line.find('('); bracket != std::string::npos) {
+      ++calls[line.substr(0, bracket)];
+    }
+  }
+  return calls;
+}
+
+TEST_F(RunTest, MakesOneSystemCallAnIterationTheOneThatPacesIt) {
+  if (std::system("strace -o /dev/null true > /dev/null 2>&1") != 0) {  // NOLINT(cert-env33-c)
+    GTEST_SKIP() << "strace is not there or may not trace";
+  }
+  Program program(two_joints({"--frequency", "1000"}));
+  ASSERT_TRUE(program.says("runs on segment"));
+  UntypedFrontend frontend("two_joints", {.timeout = kPatience});
+  frontend.wait_for(10, kPatience);
+
+  // the loop runs in the program's first thread, which alone is traced
+  const std::string log = directory_.path() + "/calls";
+  Program strace({"/usr/bin/strace", "-o", log, "-p", std::to_string(program.pid())});
+  std::ifstream none;
+  while (std::filesystem::exists(log) == false || std::filesystem::file_size(log) == 0) {
+    std::this_thread::yield();
+  }
+  const Iteration first = frontend.published();
+  for (int i = 0; i < 100; ++i) {
+    send(frontend, 0, 0.01 * i, {.pace = iterations(3)});
+    frontend.wait_for(first + 3 * i, kPatience);
+  }
+  strace.signal(SIGINT);
+  strace.end();
+  const Iteration last = frontend.published();
+  program.signal(SIGTERM);
+  EXPECT_EQ(program.end().code, 0);
+
+  std::map<std::string, int> calls = system_calls(log);
+  const int paced = calls["clock_nanosleep"];
+  const int woken = calls["futex"];
+  calls.erase("clock_nanosleep");
+  calls.erase("futex");
+  EXPECT_GT(paced, 100);
+  EXPECT_LE(paced, last + 1) << "at most one an iteration";
+  EXPECT_LE(woken, paced) << "and one to wake who waits";
+  calls.erase("restart_syscall");  // the one in which it was found
+  EXPECT_TRUE(calls.empty()) << calls.begin()->first;
+}
+
+TEST_F(RunTest, KilledItLeavesItsNameToTheNextAtOnce) {
+  Program first(two_joints());
+  ASSERT_TRUE(first.says("runs on segment"));
+  UntypedFrontend frontend("two_joints", {.timeout = kPatience});
+  frontend.wait_for(20, kPatience);
+  first.signal(SIGKILL);
+  EXPECT_EQ(first.end().code, -SIGKILL);
+  EXPECT_THROW(frontend.wait_for(1'000'000, kPatience), BackendKilled);
+  EXPECT_GE(frontend.history(20).count, 20U);
+  Program second(two_joints());
+  ASSERT_TRUE(second.says("runs on segment"));
+  EXPECT_EQ(frontend.life(), Life::superseded);
+  UntypedFrontend again("two_joints", {.timeout = kPatience});
+  again.wait_for(3, kPatience);
+  second.signal(SIGTERM);
+  EXPECT_EQ(second.end().code, 0);
+}
+
+}  // namespace
+}  // namespace o80::test
