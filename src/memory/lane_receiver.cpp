@@ -146,6 +146,7 @@ bool LaneReceiver::next_is_of_dead() const noexcept {
 
 LaneReceivers::LaneReceivers(const SegmentView& view, std::size_t ticket_offset)
     : view_(view), ticket_offset_(ticket_offset) {
+  lanes_.reserve(view.shape.lanes);
   for (std::uint32_t i = 0; i < view.shape.lanes; ++i) lanes_.emplace_back(view, i);
 }
 
@@ -181,7 +182,8 @@ std::optional<std::uint32_t> LaneReceivers::next() noexcept {
 }
 
 void LaneReceivers::flush_events() noexcept {
-  for (LaneReceiver& lane : lanes_) lane.flush();
+  for (LaneReceiver& lane : lanes_)
+    if (lane.has_news()) lane.flush();
 }
 
 }  // namespace o80

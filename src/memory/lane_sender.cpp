@@ -100,7 +100,7 @@ std::uint64_t LaneSender::next_ids(std::uint64_t n) noexcept {
 }
 
 std::uint64_t LaneSender::send(std::span<const std::byte> batch, std::size_t ticket_offset) {
-  guard_.check("segment '" + segment_->name() + "'");
+  if (guard_.forked()) guard_.check("segment '" + segment_->name() + "'");
   if (batch.empty() || batch.size() % kBlockSize != 0 || ticket_offset % 8 != 0 ||
       ticket_offset >= kBlockSize)
     throw InvalidArgument(

@@ -209,6 +209,7 @@ void UntypedBackend::Body::changed(const StatusChange& change) noexcept {
 
 void UntypedBackend::Body::give_back() noexcept {
   for (std::uint32_t i = 0; i < lanes.size(); ++i) {
+    if (lanes[i].in_flight() == 0) continue;
     const std::uint64_t freed = controller.freed(i);
     if (freed == freed_[i]) continue;
     lanes[i].free(static_cast<std::uint32_t>(freed - freed_[i]));

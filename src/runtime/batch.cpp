@@ -169,11 +169,11 @@ Iteration Burst::wait_done(Timeout timeout, const Check& check) const {
 }
 
 UntypedObservation Burst::wait(Timeout timeout, const Check& check) const {
+  UntypedObservation observation(link_->description);  // made while the backend works
   const Iteration row = wait_done(timeout, check);
   if (row < 0) {
     throw Error("the burst of '" + link_->segment.name() + "' was rejected: " + batch_.rejection());
   }
-  UntypedObservation observation(link_->description);
   if (!link_->history.read(row, observation.bytes())) {
     throw RowOverwritten("row " + std::to_string(row) + " of '" + link_->segment.name() +
                          "', the last of this burst, is no longer there");

@@ -197,13 +197,15 @@ void UntypedFrontend::forget_added() {
 /// Before anything is used up: ids that are drawn and never sent would age the statuses of others.
 void UntypedFrontend::refuse_if_full(const BatchBuilder& builder, const LaneSender& lane) const {
   const std::uint64_t needed = builder.blocks();
-  const std::string takes = "the batch takes " + std::to_string(needed) + " blocks of 64 bytes, ";
+  const auto takes = [&] {
+    return "the batch takes " + std::to_string(needed) + " blocks of 64 bytes, ";
+  };
   if (needed > lane.blocks()) {
-    throw LaneFull(takes + "a lane of '" + segment() + "' has " + std::to_string(lane.blocks()) +
+    throw LaneFull(takes() + "a lane of '" + segment() + "' has " + std::to_string(lane.blocks()) +
                    ": send it in parts, or start the backend with larger lanes (lane_blocks)");
   }
   if (const std::uint32_t free = lane.free_blocks(); needed > free) {
-    throw LaneFull(takes + std::to_string(free) + " of " + std::to_string(lane.blocks()) +
+    throw LaneFull(takes() + std::to_string(free) + " of " + std::to_string(lane.blocks()) +
                    " are free in the lane of '" + segment() +
                    "'. Nothing was sent, all stays added: pulse again when earlier commands have "
                    "ended, purge, or start the backend with larger lanes (lane_blocks)");

@@ -2,9 +2,9 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <optional>
 #include <string_view>
+#include <vector>
 
 #include "o80/memory/segment_layout.hpp"
 #include "o80/memory/status_word.hpp"
@@ -49,6 +49,8 @@ class LaneReceiver {
   void set_burst_done(std::uint64_t id, Iteration row) noexcept;
   /// Asks for the lane's waiters to be woken at the next flush.
   void flag() noexcept { flagged_ = true; }
+  /// flush() has something to do.
+  bool has_news() const noexcept { return flagged_ || freed_ != freed_published_; }
   /// Publishes what was freed and wakes, both only if there is cause; once an iteration.
   void flush() noexcept;
 
@@ -102,7 +104,7 @@ class LaneReceivers {
  private:
   SegmentView view_;
   std::size_t ticket_offset_;
-  std::deque<LaneReceiver> lanes_;
+  std::vector<LaneReceiver> lanes_;
   std::uint32_t bell_seen_ = 0;
   std::uint64_t below_ = 0;
   bool pending_ = true;
