@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .actions import COARSE, MUSCLES
+from .found_parameters import found_settings
+from .hitting_policy import HittingPolicy
 from .observations import BALL_POSITION, BALL_VELOCITY, JOINT_POSITIONS, Float32Array
 
 DEFAULT_FACTOR = COARSE
@@ -80,4 +82,4 @@ class SweepPolicy:
 
 def default_policy() -> Policy:
     """The best policy there is."""
-    return SweepPolicy()
+    return HittingPolicy(found_settings())
