@@ -1,13 +1,14 @@
 """A bursting backend inside a Python simulation: it stands still until it is asked to step."""
 
 import threading
+from collections.abc import Callable
 
 import numpy as np
 
 import o80
 
 
-def learn() -> None:
+def learn(world_ends: Callable[[], None]) -> None:
     """What a learner in another process would do."""
     with o80.Frontend("pendulum") as world:
         for step in range(3):
@@ -16,6 +17,7 @@ def learn() -> None:
             print(
                 f"iteration {observation.iteration}: angle {observation.extended['angle']:.3f} rad"
             )
+    world_ends()
 
 
 SENSORS = np.dtype([("angle", float), ("speed", float)])
@@ -23,7 +25,7 @@ SENSORS = np.dtype([("angle", float), ("speed", float)])
 with o80.Backend("pendulum", ["torque"], extended=SENSORS, frequency=500, bursting=True) as backend:
     angle, speed = 0.1, 0.0
     backend.publish([0.0], (angle, speed))
-    learner = threading.Thread(target=lambda: (learn(), backend.stop()))
+    learner = threading.Thread(target=learn, args=(backend.stop,))
     learner.start()
     while (desired := backend.step()) is not None:  # waits until iterations are granted
         speed += 0.002 * (desired[0] - 9.81 * np.sin(angle))

@@ -1,12 +1,14 @@
 """Requests to the driver itself: keep a state, go on, go back, and repeat it bit for bit."""
 
+from typing import Any
+
 import numpy as np
 
 import o80
 
 with o80.robots.load("two_joints").inline() as arm:
 
-    def swing() -> np.ndarray:
+    def swing() -> Any:
         arm.add_command("shoulder", 1.0, iterations=50)
         arm.add_command("shoulder", 0.0, iterations=50)
         last = arm.burst(100).iteration
