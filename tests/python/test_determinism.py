@@ -104,7 +104,7 @@ def run(rig: Rig, actions: NDArray[np.float64]) -> list[NDArray[Any]]:
         rig.arm.send(action, row + 2)
         rig.arm.advance(row + 1)
         for twin in rig.twins:
-            twin.mirror(rig.arm.q, rig.arm.dq)
+            twin.mirror(rig.arm.motion)
         rig.burst_twins()
     rows = len(actions) * ITERATIONS
     seen: list[NDArray[Any]] = [rig.arm.frontend.history(rows).flat(np.float64)]

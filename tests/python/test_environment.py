@@ -22,15 +22,14 @@ from o80_table_tennis.settings import ITERATIONS, Pacing, RigSettings, TaskSetti
 STILL = np.zeros(MUSCLES, dtype=np.float32)
 PUSH = np.array([1, -1, 0, 0, 0, 0, 0, 0], dtype=np.float32)
 ALL_MODES = list(Pacing)
+PATIENT = TaskSettings(factor=COARSE, most_late=1_000_000)  # however slow the machine is
 WAITING = 10.0  # [s]
 
 
 def opened(
     pacing: Pacing = Pacing.INLINE, *, task: TaskSettings | None = None, **rig: Any
 ) -> TableTennisEnvironment:
-    return TableTennisEnvironment(
-        rig=RigSettings(pacing=pacing, **rig), task=task or TaskSettings(factor=COARSE)
-    )
+    return TableTennisEnvironment(rig=RigSettings(pacing=pacing, **rig), task=task or PATIENT)
 
 
 @pytest.fixture
@@ -63,7 +62,7 @@ def move_on(environment: TableTennisEnvironment, rows: int) -> None:
         (o80_table_tennis.ACCELERATED, {}),
         (o80_table_tennis.ACCELERATED, {"processes": True}),
         (o80_table_tennis.ACCELERATED, {"rig": RigSettings(extra_balls=3, twins=2)}),
-        (o80_table_tennis.REAL_TIME, {}),
+        (o80_table_tennis.REAL_TIME, {"task": PATIENT}),
     ],
 )
 def test_gymnasium_finds_nothing_to_complain_of(
@@ -276,12 +275,13 @@ def test_extra_balls_are_judged_as_if_each_were_played_alone() -> None:
 
 
 def test_a_caller_who_pauses_too_long_loses_the_episode() -> None:
-    with closing(opened(Pacing.REAL_TIME)) as environment:
+    task = TaskSettings(most_late=200)
+    with closing(opened(Pacing.REAL_TIME, task=task)) as environment:
         environment.reset(seed=1)
-        move_on(environment, 60)  # before the first step there is all the time in the world
+        move_on(environment, 300)  # before the first step there is all the time in the world
         environment.step(STILL)
         twin = environment.rig.twins[0].frontend.published
-        move_on(environment, 30)
+        move_on(environment, 201)
         observation, reward, terminated, truncated, info = environment.step(STILL)
 
         assert (reward, terminated, truncated) == (0.0, False, True)

@@ -35,7 +35,8 @@ LONGEST_RETURN = 4.0
 class Arm:
     """A frontend to the arm, and its last five rows.
 
-    `q`, `dq` (5, 4) [rad], [rad/s] and `pressures` (5, 8), raw, are views that `advance` fills.
+    Views that `advance` fills: `q`, `dq` (5, 4) [rad], [rad/s], both as `motion` (4, 5, 2), a joint
+    after the other; of the last row `last_motion` (8,), q then dq, and `last_pressures` (8,), raw.
     """
 
     def __init__(self, frontend: o80.Frontend) -> None:
@@ -45,9 +46,14 @@ class Arm:
         self._rows = np.zeros(ITERATIONS, dtype)
         numbers = self._rows.view(np.float64).reshape(ITERATIONS, -1)
         self.iterations: NDArray[np.int64] = self._rows["iteration"]
-        self.q = numbers[:, words(dtype, "extended", "joint_positions")]
-        self.dq = numbers[:, words(dtype, "extended", "joint_velocities")]
-        self.pressures = numbers[:, words(dtype, "observed")]
+        q = words(dtype, "extended", "joint_positions")
+        dq = words(dtype, "extended", "joint_velocities")
+        assert q.stop == dq.start, "angles and velocities of the joints lie side by side"
+        self.q, self.dq = numbers[:, q], numbers[:, dq]
+        motion = numbers[:, q.start : dq.stop]
+        self.motion = motion.reshape(ITERATIONS, 2, JOINTS).transpose(2, 0, 1)
+        self.last_motion = motion[-1]
+        self.last_pressures = numbers[-1, words(dtype, "observed")]
         self._bytes = self._rows.view(np.uint8)
         self._muscles = list(range(MUSCLES))
         self._bursting = frontend.bursting

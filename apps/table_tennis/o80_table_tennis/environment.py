@@ -24,7 +24,7 @@ from .ball_watch import BallWatch
 from .balls import balls_from
 from .episode_record import EpisodeSummary
 from .logger import EpisodeLogger
-from .observations import JOINT_POSITIONS, JOINT_VELOCITIES, PRESSURES, SIZE, Float32Array
+from .observations import PRESSURES, SIZE, Float32Array
 from .rewards import End
 from .rig import Rig
 from .settings import ITERATIONS, Pacing, RigSettings, TaskSettings
@@ -36,6 +36,8 @@ FloatArray = NDArray[np.float64]
 Action = NDArray[np.float32]
 Info = dict[str, Any]
 
+MOTION = slice(0, PRESSURES.start)
+"""Angles, then velocities of the joints in an observation."""
 BALL = slice(PRESSURES.stop, SIZE)
 """Position and velocity of the ball in an observation."""
 BALL_Y = BALL.start + 1
@@ -163,7 +165,7 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
 
         # rows of the arm => the twins
         for twin in rig.twins:
-            twin.mirror(arm.q, arm.dq)
+            twin.mirror(arm.motion)
         rows = rig.burst_twins(ITERATIONS)
 
         self._count(rows[0].iteration, sent, at)
@@ -252,9 +254,8 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         self._rows = rows
         self._twin_words = words = np.frombuffer(rows[0])
         observed = self._observed
-        observed[JOINT_POSITIONS] = arm.q[LAST]
-        observed[JOINT_VELOCITIES] = arm.dq[LAST]
-        observed[PRESSURES] = (arm.pressures[LAST] - self._least) / self._span
+        observed[MOTION] = arm.last_motion
+        observed[PRESSURES] = (arm.last_pressures - self._least) / self._span
         observed[BALL] = words[self._twin.played_ball]
         return np.minimum(np.maximum(observed, self._low), self._high).astype(np.float32)
 

@@ -78,7 +78,7 @@ class Scene(AbstractContextManager["Scene"]):
         return int(self._model.joint(_ball_name(ball)).qposadr[0])
 
 
-def write_film(path: Path, pictures: Iterable[Image], *, frames_per_second: float = 30.0) -> int:
+def write_film(path: Path, pictures: Iterable[Image], *, frames_per_second: float = 25.0) -> int:
     """Writes pictures (height, width, 3) as an MP4 film; returns how many frames it has."""
     import imageio_ffmpeg
 
@@ -107,7 +107,7 @@ def film_episode(
     *,
     period: float,
     slow: float = 2.0,
-    frames_per_second: float = 30.0,
+    frames_per_second: float = 25.0,
     camera: str = "side",
     size: tuple[int, int] = SIZE,
 ) -> int:

@@ -162,10 +162,14 @@ def _draw(
 
 
 def best_record(records: Sequence[EpisodeRecord]) -> EpisodeRecord | None:
-    """Of the episodes in which the ball flew back the best paid, else the best paid of all."""
+    """The best paid in which the ball flew back, else the best paid of all that came to an end."""
     return max(
         records,
-        key=lambda record: (record.summary.returned, record.summary.reward),
+        key=lambda record: (
+            record.summary.returned,
+            record.summary.end != "stalled",
+            record.summary.reward,
+        ),
         default=None,
     )
 

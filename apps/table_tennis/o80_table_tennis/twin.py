@@ -42,7 +42,6 @@ class Twin:
         self._joint_names, self._ball_names = names[:JOINTS], names[JOINTS:]
         # row after row of each joint, as the compiled half of the frontend takes it
         self._motion = np.zeros((JOINTS, ITERATIONS, 2))
-        self._positions, self._velocities = self._motion[..., 0].T, self._motion[..., 1].T
         self._joint_numbers = list(range(JOINTS))
         self._ball_state = np.dtype(
             [("position", np.float64, (3,)), ("velocity", np.float64, (3,))]
@@ -65,9 +64,9 @@ class Twin:
             states["position"], states["velocity"] = flight.positions, flight.velocities
             self.frontend.add_trajectory(states, ball)
 
-    def mirror(self, q: FloatArray, dq: FloatArray) -> None:
-        """Adds the arm's last rows (5, 4) as commands for the next burst."""
-        self._positions[:], self._velocities[:] = q, dq
+    def mirror(self, motion: FloatArray) -> None:
+        """Adds angle and velocity of each joint in the arm's last rows (4, 5, 2), to be burst."""
+        self._motion[...] = motion
         self._compiled._add_trajectories(
             self._joint_numbers,
             ITERATIONS,
