@@ -117,29 +117,37 @@ struct SchemaBuilder {
 };
 
 /// The compiled half of o80.Backend.
+///
+/// Python fills `observed`, `extended` and `fresh_desired`, memory of its own; `publish` and a
+/// fresh start copy them into the row.
 class Backend final : public o80::RequestServer {
  public:
-  /// `serve(index, payload)` gives None, a text (rejected), or True (start afresh: the blocks
-  /// observed, extended and fresh_desired were filled). What it raises ends the backend.
   Backend(const SchemaBuilder& builder, const o80::BackendOptions& options)
-      : backend_(builder.schema, options, this),
-        fresh_desired_(std::max<std::size_t>(backend_.layout().block / 8, 1)) {}
+      : backend_(std::make_shared<o80::UntypedBackend>(builder.schema, options, this)),
+        name_(options.segment),
+        observed_(zeros(backend_->layout().block)),
+        extended_(zeros(backend_->layout().extended_size)),
+        fresh_desired_(zeros(backend_->layout().block)) {}
 
+  const nb::bytearray& observed() const { return observed_; }
+  const nb::bytearray& extended() const { return extended_; }
+  const nb::bytearray& fresh_desired() const { return fresh_desired_; }
+  /// Called with index and payload; gives None, a text (rejected), or True (start afresh).
   nb::object serve_with = nb::none();
 
-  o80::UntypedBackend& checked() {
-    guard_.check("the backend of segment '" + backend_.name() + "'");
-    if (ended_) {
-      throw o80::Closed("the backend of segment '" + backend_.name() +
-                        "' has ended: make a new one");
+  /// Throws Closed or UsedAfterFork.
+  o80::UntypedBackend& checked() const {
+    guard_.check("the backend of segment '" + name_ + "'");
+    if (!backend_) {
+      throw o80::Closed("the backend of segment '" + name_ + "' was closed: make a new one");
     }
-    return backend_;
+    return *backend_;
   }
-  const o80::UntypedBackend& backend() const { return backend_; }
-  bool ended() const { return ended_; }
 
   void publish() {
     o80::UntypedBackend& backend = checked();
+    copy(observed_, backend.observed());
+    copy(extended_, backend.extended());
     backend.publish();
     begun_ = true;
   }
@@ -154,23 +162,38 @@ class Backend final : public o80::RequestServer {
     return step == o80::Step::run;
   }
 
-  void end(bool failed, const std::string& text) {
-    if (ended_ || guard_.forked()) return;
-    ended_ = true;
-    backend_.end(failed ? o80::State::failed : o80::State::stopped, text);
+  /// Why the steps ended on their own; empty if they did not.
+  std::string failure() const {
+    return backend_ && !guard_.forked() ? std::string(backend_->failure()) : "";
   }
 
-  std::byte* fresh_desired() { return reinterpret_cast<std::byte*>(fresh_desired_.data()); }
+  /// Lets go of the name.
+  void end(bool failed, const std::string& text) {
+    if (!backend_ || guard_.forked()) return;
+    const std::shared_ptr<o80::UntypedBackend> ended = std::move(backend_);
+    ended->end(failed ? o80::State::failed : o80::State::stopped, text);
+    serve_with = nb::none();
+  }
 
  private:
+  static nb::bytearray zeros(std::size_t size) {
+    const std::vector<std::byte> bytes(size);
+    return nb::bytearray(bytes.data(), size);
+  }
+
+  static void copy(const nb::bytearray& from, std::byte* to) {
+    if (from.size() > 0) std::memcpy(to, from.c_str(), from.size());
+  }
+
   o80::Step wait(std::optional<double> timeout) {
+    const std::shared_ptr<o80::UntypedBackend> backend = backend_;
     const o80::Deadline deadline(timeout_of(timeout));
     const Waiting waiting;
     while (true) {
-      const o80::Step step = backend_.step_within(deadline.left(kLook));
+      const o80::Step step = backend->step_within(deadline.left(kLook));
       if (step != o80::Step::standing) return step;
       if (deadline.over()) {
-        throw o80::TimeoutError("nobody asked '" + backend_.name() +
+        throw o80::TimeoutError("nobody asked '" + name_ +
                                 "' for an iteration in time: it is bursting");
       }
       Waiting::check();
@@ -186,25 +209,32 @@ class Backend final : public o80::RequestServer {
         return o80::Served::rejected(nb::cast<std::string>(answer));
       }
       return o80::Served::start_afresh();
+    } catch (nb::python_error& error) {
+      raised_ = std::current_exception();
+      const auto type = nb::cast<std::string>(error.type().attr("__name__"));
+      return o80::Served::failed(type + ": " + nb::cast<std::string>(nb::str(error.value())));
     } catch (std::exception& error) {
       raised_ = std::current_exception();
       return o80::Served::failed(error.what());
     }
   }
 
-  /// The blocks were filled when the request was served.
+  /// The handler has read the robot anew.
   bool read_fresh(o80::FreshReading& reading) noexcept override {
+    const nb::gil_scoped_acquire locked;
+    copy(observed_, reading.observed);
+    copy(extended_, reading.extended);
+    copy(fresh_desired_, reading.desired);
     reading.has_desired = true;
-    std::memcpy(reading.desired, fresh_desired(), backend_.layout().block);
     return true;
   }
 
-  o80::UntypedBackend backend_;
+  std::shared_ptr<o80::UntypedBackend> backend_;
+  std::string name_;
+  nb::bytearray observed_, extended_, fresh_desired_;
   o80::ForkGuard guard_;
-  std::vector<std::uint64_t> fresh_desired_;
   std::exception_ptr raised_;
   bool begun_ = false;
-  bool ended_ = false;
 };
 
 o80::Stale stale_of(const std::string& word) {
@@ -228,12 +258,6 @@ Backend* make(const SchemaBuilder& builder, const std::string& segment, std::int
   options.stale = stale_of(stale);
   options.silence = silence;
   return new Backend(builder, options);
-}
-
-/// A block of the backend's memory, for arrays that live as long as it does.
-nb::object view(const std::byte* block, std::size_t size, int flags) {
-  return nb::steal(PyMemoryView_FromMemory(const_cast<char*>(reinterpret_cast<const char*>(block)),
-                                           static_cast<Py_ssize_t>(size), flags));
 }
 
 }  // namespace
@@ -260,51 +284,32 @@ void bind_backend(nb::module_& m) {
       .def_prop_ro("description",
                    [](const Backend& self) {
                      auto description = std::make_shared<o80::Description>();
-                     description->schema = self.backend().schema();
-                     description->layout = self.backend().layout();
+                     description->schema = self.checked().schema();
+                     description->layout = self.checked().layout();
                      return description;
                    })
-      .def(
-          "observed",
-          [](nb::handle self) {
-            auto& backend = nb::inst_ptr<Backend>(self)->checked();
-            return view(backend.observed(), backend.layout().block, PyBUF_WRITE);
-          },
-          nb::sig("def observed(self) -> memoryview"))
-      .def(
-          "extended",
-          [](nb::handle self) {
-            auto& backend = nb::inst_ptr<Backend>(self)->checked();
-            return view(backend.extended(), backend.layout().extended_size, PyBUF_WRITE);
-          },
-          nb::sig("def extended(self) -> memoryview"))
-      .def(
-          "fresh_desired",
-          [](nb::handle self) {
-            auto* backend = nb::inst_ptr<Backend>(self);
-            return view(backend->fresh_desired(), backend->backend().layout().block, PyBUF_WRITE);
-          },
-          nb::sig("def fresh_desired(self) -> memoryview"))
+      .def_prop_ro("observed", &Backend::observed)
+      .def_prop_ro("extended", &Backend::extended)
+      .def_prop_ro("fresh_desired", &Backend::fresh_desired)
       .def("desired",
            [](const Backend& self) {
-             return nb::bytearray(self.backend().desired(), self.backend().layout().block);
+             const o80::UntypedBackend& backend = self.checked();
+             return nb::bytearray(backend.desired(), backend.layout().block);
            })
       .def("active",
            [](const Backend& self) {
-             return nb::bytes(self.backend().active(), self.backend().layout().mask_words * 8);
+             const o80::UntypedBackend& backend = self.checked();
+             return nb::bytes(backend.active(), backend.layout().mask_words * 8);
            })
       .def("publish", &Backend::publish)
       .def("step", &Backend::step, "timeout"_a.none())
       .def(
           "interrupt",
-          [](Backend& self, std::uint32_t actuator) { self.checked().interrupt(actuator); },
+          [](const Backend& self, std::uint32_t actuator) { self.checked().interrupt(actuator); },
           "actuator"_a)
-      .def("ask_to_stop", [](Backend& self) { self.checked().ask_to_stop(); })
+      .def("ask_to_stop", [](const Backend& self) { self.checked().ask_to_stop(); })
       .def("end", &Backend::end, "failed"_a, "text"_a)
-      .def_prop_ro("ended", &Backend::ended)
-      .def_prop_ro("failure",
-                   [](const Backend& self) { return std::string(self.backend().failure()); })
-      .def_prop_ro("segment", [](const Backend& self) { return self.backend().name(); })
-      .def_prop_ro("iteration", [](const Backend& self) { return self.backend().iteration(); })
-      .def_prop_ro("time", [](const Backend& self) { return self.backend().time(); });
+      .def_prop_ro("failure", &Backend::failure)
+      .def_prop_ro("iteration", [](const Backend& self) { return self.checked().iteration(); })
+      .def_prop_ro("time", [](const Backend& self) { return self.checked().time(); });
 }

@@ -434,10 +434,11 @@ void bind_frontend(nb::module_& m) {
            "duration"_a = nb::none(), "speed"_a = nb::none(), "until"_a = nb::none(),
            "iterations"_a = nb::none(), "mode"_a = "queue", "profile"_a = "linear",
            "start"_a = "desired",
-           nb::sig("def add_command(self, actuator: int | str, target: typing.Any, *, "
-                   "duration: float | None = None, speed: float | None = None, "
-                   "until: int | None = None, iterations: int | None = None, "
-                   "mode: str = 'queue', profile: str = 'linear', start: str = 'desired') -> None"),
+           nb::sig(
+               "def add_command(self, actuator: typing.SupportsIndex | str, target: typing.Any, *, "
+               "duration: float | None = None, speed: float | None = None, "
+               "until: int | None = None, iterations: int | None = None, "
+               "mode: str = 'queue', profile: str = 'linear', start: str = 'desired') -> None"),
            R"(Adds a command to what the next pulse sends.
 
 actuator: its index or its name.
@@ -472,7 +473,8 @@ It is served in order with the commands of that pulse; fields that are not given
             self.untyped().add_purge(purged(self, actuator));
           },
           "actuator"_a = nb::none(),
-          nb::sig("def add_purge(self, actuator: int | str | None = None) -> None"),
+          nb::sig(
+              "def add_purge(self, actuator: typing.SupportsIndex | str | None = None) -> None"),
           "Adds a purge (of one actuator, or of all) to what the next pulse sends.")
       .def(
           "purge",
@@ -481,7 +483,7 @@ It is served in order with the commands of that pulse; fields that are not given
             return send_alone(self, [&](o80::BatchBuilder& batch) { batch.purge(which); });
           },
           "actuator"_a = nb::none(),
-          nb::sig("def purge(self, actuator: int | str | None = None) -> Batch"),
+          nb::sig("def purge(self, actuator: typing.SupportsIndex | str | None = None) -> Batch"),
           R"(Drops all commands of an actuator (None: of all), whoever sent them, at once.
 
 Needs no pulse; what was added and not pulsed stays added.)")

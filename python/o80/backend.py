@@ -71,8 +71,8 @@ class Backend:
         *,
         extended: Described | None = None,
         requests: Mapping[str, Described | None] | None = None,
-        limits: Mapping[int | str, Limit | Mapping[str, Limit]] | None = None,
-        when_idle: str | Mapping[int | str, str] = "hold",
+        limits: Mapping[Any, Limit | Mapping[str, Limit]] | None = None,
+        when_idle: str | Mapping[Any, str] = "hold",
         units: Mapping[str, str] | None = None,
         frequency: float = 1000.0,
         bursting: bool = False,
@@ -109,9 +109,9 @@ class Backend:
         self._layout = Layout(native.description)
         self._segment = segment
         self._handlers: dict[str, Handler] = {}
-        self._observed = self._states(native.observed())
-        self._fresh_desired = self._states(native.fresh_desired())
-        self._extended: NDArray[Any] = np.ndarray((), self._layout.extras, native.extended())
+        self._observed = self._states(native.observed)
+        self._fresh_desired = self._states(native.fresh_desired)
+        self._extended: NDArray[Any] = np.ndarray((), self._layout.extras, native.extended)
         native.serve_with = Server(self)
         self._native = native
         at_exit.close_later(self)
@@ -196,8 +196,6 @@ class Backend:
         text = native.failure if failure is None else failure
         native.end(bool(text), text)
         self._handlers.clear()
-        native.serve_with = None
-        del self._observed, self._extended, self._fresh_desired
 
     @property
     def active(self) -> NDArray[np.bool_]:
@@ -283,9 +281,15 @@ def fill(block: NDArray[Any], values: Any, what: str) -> None:
             if names is None or name not in names:
                 there = ", ".join(names or ()) or "there are none"
                 raise InvalidArgument(f"{what} has no field {name!r}; its fields: {there}")
-            block[name] = value
+            try:
+                block[name] = value
+            except (TypeError, ValueError) as error:
+                raise InvalidArgument(f"{what}: field {name!r}: {error}") from error
     else:
         try:
-            block[...] = values
+            array = np.asarray(values, block.dtype)
         except (TypeError, ValueError) as error:
-            raise InvalidArgument(f"{what} of shape {block.shape}: {error}") from error
+            raise InvalidArgument(f"{what} cannot be read as {block.dtype}: {error}") from error
+        if array.shape != block.shape:
+            raise InvalidArgument(f"{what} has the shape {block.shape}, not {array.shape}")
+        block[...] = array

@@ -66,7 +66,7 @@ class SchemaWriter:
         for name, fields in requests.items():
             self.builder.add_request(name, self._type(name, {} if fields is None else fields), "")
 
-    def set_limits(self, limits: Mapping[int | str, Limit | Mapping[str, Limit]]) -> None:
+    def set_limits(self, limits: Mapping[Any, Limit | Mapping[str, Limit]]) -> None:
         """(minimum, maximum) or (minimum, maximum, speed) of actuators, or of their fields."""
         for named, given in limits.items():
             actuator = self._index(named)
@@ -80,7 +80,7 @@ class SchemaWriter:
                     np.inf if speed is None else speed,
                 )
 
-    def set_idle(self, when_idle: str | Mapping[int | str, str]) -> None:
+    def set_idle(self, when_idle: str | Mapping[Any, str]) -> None:
         """ "hold" or "follow", for all actuators or for each."""
         words = (
             when_idle

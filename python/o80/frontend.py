@@ -3,7 +3,6 @@
 import contextlib
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from enum import IntEnum
 from functools import cached_property
 from types import TracebackType
 from typing import Any, Literal, Self, cast, overload
@@ -260,7 +259,7 @@ class Frontend(_core.Frontend):
         return {request["name"]: request["help"] for request in self.schema["requests"]}
 
     @property
-    def enums(self) -> dict[str, type[IntEnum]]:
+    def enums(self) -> dict[str, Any]:
         """An IntEnum for each enumerated field, by its name."""
         return self._layout.enums
 

@@ -9,6 +9,7 @@ with o80.robots.load("two_joints").inline() as arm:
 
 import builtins
 import math
+import numbers
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -209,12 +210,18 @@ class Robot:
 
     def _config(self, config: Mapping[str, Any]) -> builtins.list[tuple[str, str]]:
         """Names and texts of its options; the error lists what there is."""
-        known = {option.name for option in self.options}
-        for name in config:
-            if name not in known:
-                there = f"its options are {', '.join(sorted(known))}" if known else "it has none"
+        kinds = {option.name: option.kind for option in self.options}
+        texts = []
+        for name, value in config.items():
+            if name not in kinds:
+                there = f"its options are {', '.join(kinds)}" if kinds else "it has none"
                 raise InvalidArgument(f"robot '{self.name}' has no option '{name}': {there}")
-        return [(name, _text_of(value)) for name, value in config.items()]
+            if kinds[name] in ("number", "integer") and not isinstance(value, numbers.Real):
+                raise InvalidArgument(
+                    f"option '{name}' of robot '{self.name}' is a {kinds[name]}, not {value!r}"
+                )
+            texts.append((name, _text_of(value)))
+        return texts
 
     def __repr__(self) -> str:
         return f"<o80.robots.Robot '{self.name}' of {self.path}>"

@@ -95,9 +95,7 @@ def test_a_late_batch_may_be_taken_now(arm: o80.Frontend) -> None:
 
 
 @pytest.mark.parametrize("options", [{"at": -1}, {"at": -7}, {"at": 1.5}, {"late": "never"}])
-def test_a_pulse_that_cannot_be_is_refused(
-    arm: o80.Frontend, options: dict[str, object]
-) -> None:
+def test_a_pulse_that_cannot_be_is_refused(arm: o80.Frontend, options: dict[str, object]) -> None:
     arm.add_command(0, 1.0)
 
     with pytest.raises(o80.InvalidArgument):

@@ -316,7 +316,7 @@ def test_motion_may_go_on_after_an_error(bursting: o80.robots.Process) -> None:
 
 def fail_in(frontend: o80.Frontend) -> o80.Batch:
     """Sends a command of many iterations and leaves its block by an exception."""
-    with pytest.raises(ZeroDivisionError), frontend as arm:
+    with pytest.raises(ZeroDivisionError), frontend as arm:  # noqa: PT012
         arm.add_command(0, 1.0, iterations=100)
         batch = arm.pulse()
         arm.add_command(0, 2.0)  # never pulsed, and not worth a warning any more
@@ -371,16 +371,18 @@ def test_many_readers_attach_to_few_lanes(segment: str) -> None:
 
 
 def test_a_full_lane_is_an_error_and_sends_nothing(segment: str) -> None:
-    with o80.robots.load("two_joints").start(segment, lane_blocks=16) as process:
-        with process.frontend() as arm:
-            for _ in range(100):
-                arm.add_command(0, 0.5)
-            with pytest.raises(o80.LaneFull):
-                arm.pulse()
-            assert arm.added == 100
-            arm.forget_added()
+    with (
+        o80.robots.load("two_joints").start(segment, lane_blocks=16) as process,
+        process.frontend() as arm,
+    ):
+        for _ in range(100):
             arm.add_command(0, 0.5)
-            arm.pulse_and_wait(timeout=WAIT)
+        with pytest.raises(o80.LaneFull):
+            arm.pulse()
+        assert arm.added == 100
+        arm.forget_added()
+        arm.add_command(0, 0.5)
+        arm.pulse_and_wait(timeout=WAIT)
 
 
 def test_a_closed_frontend_says_so(arm: o80.Frontend) -> None:
@@ -406,13 +408,12 @@ def test_a_closed_inline_robot_leaves_no_segment(arm: o80.Frontend) -> None:
 
 
 def test_a_pickled_frontend_attaches_again(process: o80.robots.Process) -> None:
-    with process.frontend() as arm:
-        with pickle.loads(pickle.dumps(arm)) as copy:
-            assert isinstance(copy, o80.Frontend)
-            assert copy is not arm
-            assert copy.epoch == arm.epoch
-            copy.add_command(0, 0.5)
-            copy.pulse_and_wait(timeout=WAIT)
+    with process.frontend() as arm, pickle.loads(pickle.dumps(arm)) as copy:
+        assert isinstance(copy, o80.Frontend)
+        assert copy is not arm
+        assert copy.epoch == arm.epoch
+        copy.add_command(0, 0.5)
+        copy.pulse_and_wait(timeout=WAIT)
 
 
 def test_an_inline_frontend_cannot_be_pickled(arm: o80.Frontend) -> None:

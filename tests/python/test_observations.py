@@ -279,18 +279,21 @@ def test_the_next_rows_come_in_sequence(process: o80.robots.Process) -> None:
 
 
 def test_a_slow_reader_is_told_what_it_missed(segment: str) -> None:
-    with o80.robots.load("two_joints").start(segment, bursting=True, history=16) as process:
-        with process.frontend() as reader, process.frontend() as arm:
-            arm.burst(1)
-            with pytest.raises(o80.TimeoutError):
-                reader.wait_for_next(0.0)  # its position is now row 2
-            arm.burst(100)
+    with (
+        o80.robots.load("two_joints").start(segment, bursting=True, history=16) as process,
+        process.frontend() as reader,
+        process.frontend() as arm,
+    ):
+        arm.burst(1)
+        with pytest.raises(o80.TimeoutError):
+            reader.wait_for_next(0.0)  # its position is now row 2
+        arm.burst(100)
 
-            observation = reader.wait_for_next(WAIT)
+        observation = reader.wait_for_next(WAIT)
 
-            assert observation.iteration >= 85
-            assert observation.missed == observation.iteration - 2
-            assert reader.wait_for_next(WAIT).missed == 0
+        assert observation.iteration >= 85
+        assert observation.missed == observation.iteration - 2
+        assert reader.wait_for_next(WAIT).missed == 0
 
 
 def test_a_stream_gives_every_row(process: o80.robots.Process) -> None:

@@ -1,0 +1,366 @@
+"""A backend inside a Python program, by its own clock and bursting."""
+
+import os
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import o80
+
+WAIT = 30.0  # [s] longer than any wait should take
+
+
+def run(backend: o80.Backend) -> None:
+    """A robot that is at once where it is asked to be."""
+    while (desired := backend.step()) is not None:
+        backend.publish(desired)
+
+
+class Running:
+    """The loop of a bursting backend, in a thread of its own; what it raised is kept."""
+
+    def __init__(self, backend: o80.Backend, loop: Callable[[o80.Backend], None] = run) -> None:
+        self.backend = backend
+        self.raised: BaseException | None = None
+        self._thread = threading.Thread(target=self._run, args=(loop,))
+
+    def _run(self, loop: Callable[[o80.Backend], None]) -> None:
+        try:
+            loop(self.backend)
+        except Exception as error:
+            self.raised = error
+            self.backend.close(str(error))
+
+    def __enter__(self) -> "Running":
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.raised is None:
+            self.backend.stop()
+        self._thread.join(WAIT)
+        assert not self._thread.is_alive()
+
+
+def test_the_two_verbs_make_a_robot(segment: str) -> None:
+    with o80.Backend(segment, ["a", "b"], frequency=100.0) as backend:
+        backend.publish([0.5, -0.5])
+        with o80.Frontend(segment) as frontend:
+            frontend.add_command("a", 1.0, iterations=2)
+            frontend.pulse()
+            first = backend.step()
+            backend.publish(first)
+            second = backend.step()
+            backend.publish(second)
+
+            assert first.tolist() == [0.75, -0.5]
+            assert second.tolist() == [1.0, -0.5]
+            assert frontend.latest().observed.tolist() == [1.0, -0.5]
+            assert frontend.frequency == pytest.approx(100.0)
+            assert not frontend.bursting
+            assert backend.iteration == 3
+            assert frontend.robot == segment
+
+
+def test_desired_states_are_fresh_arrays(segment: str) -> None:
+    with o80.Backend(segment, ["a"]) as backend:
+        backend.publish([0.0])
+        with o80.Frontend(segment) as frontend:
+            first = backend.step()
+            first[0] = 99.0
+            backend.publish([0.0])
+            frontend.add_command(0, 1.0)
+            frontend.pulse()
+
+            assert backend.step().tolist() == [1.0]
+            assert first.tolist() == [99.0]
+
+
+def test_published_values_stay_until_they_are_given_anew(segment: str) -> None:
+    sensors = {"force": (float, 2), "count": int}
+    with o80.Backend(segment, ["a", "b"], extended=sensors) as backend:
+        backend.publish([1.0, 2.0], {"force": [3.0, 4.0], "count": 1})
+        with o80.Frontend(segment) as frontend:
+            backend.step()
+            backend.publish(extended={"count": 2})
+
+            observation = frontend.latest()
+            assert observation.observed.tolist() == [1.0, 2.0]
+            assert observation.extended.force.tolist() == [3.0, 4.0]
+            assert observation.extended.count == 2
+
+
+def test_dtypes_of_numpy_describe_a_robot(segment: str) -> None:
+    state = np.dtype([("position", "f8"), ("flags", "u1"), ("gains", "f4", (3,))])
+    sensors = np.dtype([("n", "i2"), ("state", state)])
+    with o80.Backend(segment, ["a"], state, extended=sensors) as backend:
+        observed = np.zeros(1, state)
+        observed["gains"] = [1, 2, 3]
+        backend.publish(observed, np.array((7, (0.5, 1, (4, 5, 6))), sensors))
+        with o80.Frontend(segment) as frontend:
+            observation = frontend.latest()
+            assert observation.observed["gains"].tolist() == [[1, 2, 3]]
+            assert observation.extended.n == 7
+            assert observation.extended.state.gains.tolist() == [4, 5, 6]
+
+
+def test_limits_idle_and_units_reach_the_frontend(segment: str) -> None:
+    with o80.Backend(
+        segment,
+        {"joints": ({"position": float, "torque": float}, 2), "hand": float},
+        limits={0: {"torque": (-5, None)}, "hand": (0, 1, 2)},
+        when_idle={"hand": "follow"},
+        units={"position": "rad", "hand.": "m"},
+    ) as backend:
+        backend.publish()
+        with o80.Frontend(segment) as frontend:
+            first, _, hand = frontend.actuators
+            assert [number.name for number in first.numbers] == ["position", "torque"]
+            assert first.unit == "rad"
+            assert first.numbers[1].minimum == -5.0
+            assert first.numbers[1].maximum == np.inf
+            assert (hand.minimum, hand.maximum, hand.speed) == (0.0, 1.0, 2.0)
+            assert hand.when_idle == "follow"
+            assert first.when_idle == "hold"
+            assert first.name == "joints_0"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        ({"actuators": ["a", "a"]}, "two actuator 'a'"),
+        ({"actuators": "ab"}, "names"),
+        ({"actuators": ["a"], "dtype": "U8"}, "dtype"),
+        ({"actuators": ["a"], "dtype": np.float16}, "float16"),
+        ({"actuators": ["a"], "dtype": complex}, "complex"),
+        ({"actuators": ["a"], "limits": {"b": (0, 1)}}, "there are a"),
+        ({"actuators": ["a"], "limits": {"a": (1, 0)}}, "limits of actuator 'a'"),
+        ({"actuators": ["a"], "when_idle": "rest"}, "'hold' or 'follow'"),
+        ({"actuators": ["a"], "frequency": 0}, "frequency"),
+        ({"actuators": ["a"], "frequency": float("nan")}, "frequency"),
+        ({"actuators": ["a"], "stale": "wait"}, "'hold', 'purge' or 'stop'"),
+        ({"actuators": ["a"], "extended": {"m": (float, (2, 2, 2))}}, "at most 2"),
+    ],
+)
+def test_a_description_that_cannot_be_is_refused(
+    segment: str, arguments: dict[str, Any], text: str
+) -> None:
+    with pytest.raises(o80.InvalidArgument, match=text):
+        o80.Backend(segment, **arguments)
+
+    assert segment not in [entry.name for entry in o80.segments()]
+
+
+def test_a_name_that_cannot_be_is_refused() -> None:
+    with pytest.raises(o80.Error):
+        o80.Backend("../arm", ["a"])
+
+
+def test_a_second_backend_of_the_name_is_refused(segment: str) -> None:
+    with o80.Backend(segment, ["a"]), pytest.raises(o80.SegmentTaken, match=segment):
+        o80.Backend(segment, ["a"])
+
+
+@pytest.mark.parametrize("observed", [[1.0], [1.0, 2.0, 3.0], ["x", "y"], {"a": 1.0}])
+def test_states_of_another_shape_are_refused(segment: str, observed: object) -> None:
+    with (
+        o80.Backend(segment, ["a", "b"]) as backend,
+        pytest.raises(o80.InvalidArgument, match="observed"),
+    ):
+        backend.publish(observed)
+
+
+def test_row_0_comes_before_the_first_step(segment: str) -> None:
+    with o80.Backend(segment, ["a"]) as backend, pytest.raises(o80.InvalidArgument, match="row 0"):
+        backend.step()
+
+
+def test_bursting_steps_wait_for_a_grant(segment: str) -> None:
+    with o80.Backend(segment, ["a"], bursting=True) as backend:
+        backend.publish([0.0])
+        with pytest.raises(o80.TimeoutError, match=segment):
+            backend.step(timeout=0.01)
+        with Running(backend), o80.Frontend(segment) as frontend:
+            frontend.add_command(0, 1.0, iterations=4)
+            assert frontend.burst(2, timeout=WAIT).observed.tolist() == [0.5]
+            frontend.add_command(0, 0.0, iterations=4)
+            assert frontend.pulse_and_wait(timeout=WAIT).iteration == 8
+            assert frontend.latest().time == 8_000_000
+
+
+def test_a_stop_from_another_thread_ends_the_steps(segment: str) -> None:
+    with o80.Backend(segment, ["a"], bursting=True) as backend:
+        backend.publish([0.0])
+        with Running(backend) as running:
+            backend.stop()
+        assert running.raised is None
+        with o80.Frontend(segment, dead=True) as frontend:
+            assert frontend.latest().iteration == 0
+
+
+def test_an_interrupted_command_says_so(segment: str) -> None:
+    with o80.Backend(segment, ["a", "b"]) as backend:
+        backend.publish([0.0, 0.0])
+        with o80.Frontend(segment) as frontend:
+            frontend.add_command("a", 1.0, iterations=10)
+            frontend.add_command("b", 1.0, iterations=10)
+            batch = frontend.pulse()
+            backend.step()
+            backend.interrupt("b")
+            backend.publish([0.0, 0.0])
+
+            assert batch.statuses == [o80.Status.ACTIVE, o80.Status.INTERRUPTED]
+            with pytest.raises(o80.InvalidArgument, match="a, b"):
+                backend.interrupt("c")
+            with pytest.raises(o80.InvalidArgument):
+                backend.interrupt(2)
+
+
+# ---------------------------------------------------------------------------- requests
+
+
+REQUESTS = {"reset": {"seed": np.uint64, "pose": (float, 2)}, "home": None}
+
+
+def test_requests_reach_their_handlers(segment: str) -> None:
+    heard: list[Any] = []
+
+    def reset(request: o80.Record) -> None:
+        heard.append((int(request.seed), request.pose.tolist()))
+
+    with o80.Backend(segment, ["a"], requests=REQUESTS, bursting=True) as backend:
+        backend.on("reset", reset)
+        backend.on("home", lambda request: heard.append(len(request)))
+        backend.publish([0.0])
+        with Running(backend), o80.Frontend(segment) as frontend:
+            frontend.request("reset", seed=2**63, pose=[1.0, 2.0], timeout=WAIT)
+            frontend.request("home", timeout=WAIT)
+
+    assert heard == [(2**63, [1.0, 2.0]), 0]
+
+
+def test_a_handler_may_reject(segment: str) -> None:
+    def home(_: o80.Record) -> None:
+        raise o80.RequestRejected("the brake is on")
+
+    with o80.Backend(segment, ["a"], requests=REQUESTS, bursting=True) as backend:
+        backend.on("home", home)
+        backend.publish([0.0])
+        with Running(backend), o80.Frontend(segment) as frontend:
+            with pytest.raises(o80.RequestRejected, match="the brake is on"):
+                frontend.request("home", timeout=WAIT)
+            with pytest.raises(o80.RequestRejected, match="nobody serves 'reset'"):
+                frontend.request("reset", timeout=WAIT)
+            frontend.burst(1, timeout=WAIT)
+
+
+def test_a_handler_may_start_afresh(segment: str) -> None:
+    with o80.Backend(
+        segment, ["a", "b"], extended={"n": int}, requests=REQUESTS, bursting=True
+    ) as backend:
+        backend.on("reset", lambda _: o80.StartAfresh([3.0, 4.0], {"n": 5}))
+        backend.on("home", lambda _: o80.StartAfresh([3.0, 4.0], desired=[1.0, 2.0]))
+        backend.publish([0.0, 0.0])
+        with Running(backend), o80.Frontend(segment) as frontend:
+            frontend.add_command(0, 1.0, iterations=100)
+            batch = frontend.pulse()
+            frontend.burst(10, timeout=WAIT)
+
+            frontend.request("reset", timeout=WAIT)
+
+            fresh = frontend.latest()
+            assert (fresh.fresh, fresh.iteration) == (True, 11)
+            assert fresh.observed.tolist() == fresh.desired.tolist() == [3.0, 4.0]
+            assert fresh.extended.n == 5
+            assert batch.statuses == [o80.Status.PURGED]
+            assert batch.handles[0].reason == o80.Reason.FRESH_START
+            assert frontend.burst(1, timeout=WAIT).desired.tolist() == [3.0, 4.0]
+
+            frontend.request("home", timeout=WAIT)
+
+            assert frontend.latest().desired.tolist() == [1.0, 2.0]
+
+
+def test_a_handler_that_fails_ends_the_backend(segment: str) -> None:
+    def home(_: o80.Record) -> None:
+        raise ZeroDivisionError("no such home")
+
+    with o80.Backend(segment, ["a"], requests=REQUESTS, bursting=True) as backend:
+        backend.on("home", home)
+        backend.publish([0.0])
+        with Running(backend) as running, o80.Frontend(segment) as frontend:
+            with pytest.raises(o80.Error, match="no such home"):
+                frontend.request("home", timeout=WAIT)
+            with pytest.raises(o80.BackendFailed, match="no such home"):
+                frontend.wait_for(10**6, timeout=WAIT)
+
+    assert isinstance(running.raised, ZeroDivisionError)
+
+
+def test_only_known_requests_have_handlers(segment: str) -> None:
+    with (
+        o80.Backend(segment, ["a"], requests=REQUESTS) as backend,
+        pytest.raises(o80.InvalidArgument, match="reset, home"),
+    ):
+        backend.on("launch", lambda _: None)
+
+
+# ---------------------------------------------------------------------------- its end
+
+
+def test_an_error_in_its_block_is_raised_by_frontends(segment: str) -> None:
+    with pytest.raises(ZeroDivisionError), o80.Backend(segment, ["a"]) as backend:  # noqa: PT012
+        backend.publish([0.0])
+        frontend = o80.Frontend(segment)
+        raise ZeroDivisionError("the sensor is off")
+
+    with pytest.raises(o80.BackendFailed, match="ZeroDivisionError: the sensor is off"):
+        frontend.wait_for(1, timeout=WAIT)
+    with pytest.raises(o80.BackendFailed, match="the sensor is off"):
+        o80.Frontend(segment, timeout=WAIT)
+    assert frontend.life == "failed"
+    assert frontend.latest().iteration == 0
+    frontend.close()
+
+
+def test_leaving_its_block_stops_it_in_order(segment: str) -> None:
+    with o80.Backend(segment, ["a"]) as backend:
+        backend.publish([0.0])
+        frontend = o80.Frontend(segment)
+
+    with pytest.raises(o80.BackendStopped, match=segment):
+        frontend.wait_for(1, timeout=WAIT)
+    assert segment not in [entry.name for entry in o80.segments()]
+    frontend.close()
+
+
+def test_a_closed_backend_says_so(segment: str) -> None:
+    backend = o80.Backend(segment, ["a"])
+    backend.close()
+    backend.close()
+
+    with pytest.raises(o80.Closed, match=segment):
+        backend.publish([0.0])
+    with pytest.raises(o80.Closed):
+        backend.step()
+    assert "closed" in repr(backend)
+
+
+def test_a_forked_child_leaves_a_backend_to_its_parent(segment: str) -> None:
+    with o80.Backend(segment, ["a"]) as backend:
+        backend.publish([0.0])
+        child = os.fork()
+        if child == 0:
+            try:
+                backend.publish([1.0])
+            except o80.UsedAfterFork:
+                backend.close()
+                os._exit(0)
+            os._exit(1)
+        assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+        with o80.Frontend(segment) as frontend:
+            assert frontend.alive
+            assert frontend.latest().iteration == 0

@@ -1,0 +1,275 @@
+"""Robots: found, loaded, started as processes and inside this one."""
+
+import os
+import select
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import o80
+
+WAIT = 30.0  # [s] longer than any wait should take
+
+
+def test_bundled_robots_are_listed() -> None:
+    robots = {robot.name: robot.path for robot in o80.robots.list()}
+
+    assert robots["two_joints"].exists()
+
+
+def test_a_robot_tells_its_options() -> None:
+    robot = o80.robots.load("two_joints")
+
+    gain = robot.options[0]
+    assert (robot.name, gain.name, gain.kind, gain.default) == (
+        "two_joints",
+        "gain",
+        "number",
+        "20",
+    )
+    assert gain.unit == "1/s"
+    assert gain.help
+    assert "two_joints" in repr(robot)
+
+
+def test_a_robot_is_loaded_by_path() -> None:
+    path = o80.robots.load("two_joints").path
+
+    assert o80.robots.load(path).name == "two_joints"
+    assert o80.robots.load(str(path)).path == path
+
+
+def test_an_unknown_robot_is_refused_with_what_there_is() -> None:
+    with pytest.raises(o80.DriverError, match="two_joints"):
+        o80.robots.load("three_joints")
+    with pytest.raises(o80.DriverError, match="no robot library"):
+        o80.robots.load("/nowhere/robot.so")
+
+
+def test_robots_of_further_folders_are_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copy(o80.robots.load("two_joints").path, tmp_path / "other_joints.so")
+    monkeypatch.setenv("O80_ROBOT_PATH", str(tmp_path))
+
+    assert "other_joints" in [robot.name for robot in o80.robots.list()]
+    assert o80.robots.load("other_joints").path.parent == tmp_path
+
+
+def test_python_packages_bring_robots_and_frontends(tmp_path: Path, segment: str) -> None:
+    package = tmp_path / "joints"
+    package.mkdir()
+    path = o80.robots.load("two_joints").path
+    (package / "__init__.py").write_text(
+        "import o80\n"
+        f"path = {str(path)!r}\n"
+        "def library(): return path\n"
+        "class Joints(o80.Frontend):\n"
+        "    def elbow(self): return self.latest().observed[1]\n"
+    )
+    metadata = tmp_path / "joints-1.0.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: joints\nVersion: 1.0\n")
+    (metadata / "entry_points.txt").write_text(
+        "[o80.robots]\njoints_of_a_package = joints:library\njoints_by_path = joints:path\n"
+        "[o80.frontends]\ntwo_joints = joints:Joints\n"
+    )
+    program = (
+        "import o80\n"
+        "assert 'joints_of_a_package' in [robot.name for robot in o80.robots.list()]\n"
+        "o80.robots.load('joints_by_path')\n"
+        f"with o80.robots.load('joints_of_a_package').inline({segment!r}) as arm:\n"
+        "    assert type(arm).__name__ == 'Joints', arm\n"
+        "    assert arm.elbow() == 0\n"
+        f"    with o80.Frontend({segment!r}) as other:\n"
+        "        assert type(other).__name__ == 'Joints', other\n"
+    )
+    environment = os.environ | {"PYTHONPATH": str(tmp_path)}
+
+    subprocess.run([sys.executable, "-c", program], env=environment, check=True, timeout=60)
+
+
+# ---------------------------------------------------------------------------- processes
+
+
+def test_a_process_runs_until_its_block_ends(segment: str) -> None:
+    with o80.robots.load("two_joints").start(segment, frequency=500.0) as process:
+        assert process.alive
+        with process.frontend() as arm:
+            assert arm.frequency == 500.0
+            arm.add_command("elbow", 0.5, duration=0.01)
+            assert arm.pulse_and_wait(timeout=WAIT).desired[1] == 0.5
+        assert str(process.pid) in repr(process)
+
+    assert not process.alive
+    assert process.wait() == 0
+    assert segment not in [entry.name for entry in o80.segments()]
+
+
+def test_the_segment_has_the_name_of_the_robot_unless_another_is_given() -> None:
+    with o80.robots.load("two_joints").start() as process:
+        assert process.segment == "two_joints"
+
+
+def test_options_and_flags_reach_the_robot(segment: str) -> None:
+    with o80.robots.load("two_joints").start(
+        segment,
+        bursting=True,
+        history=64,
+        lanes=2,
+        lane_blocks=64,
+        permission=0o640,
+        stale="purge",
+        silence=1.0,
+        reach=1.5,
+        gain=1e-9,
+    ) as process:
+        with process.frontend() as arm:
+            assert arm.bursting
+            assert arm.actuators[0].maximum == 1.5
+            arm.add_command(0, 1.0)
+            assert arm.burst(100, timeout=WAIT).observed[0] < 1e-6
+            assert len(arm.history()) == 64
+        file = Path("/dev/shm") / f"o80-{segment}"
+        assert file.stat().st_mode & 0o777 == 0o640
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"speed": 1.0}, "no option 'speed': its options are gain, reach"),
+        ({"gain": "fast"}, "gain"),
+        ({"gain": None}, "gain"),
+        ({"frequency": -1.0}, "frequency"),
+        ({"history": 0}, "history"),
+        ({"stale": "wait"}, "hold, purge or stop"),
+        ({"policy": "best"}, "fifo"),
+    ],
+)
+def test_options_that_cannot_be_are_refused(
+    segment: str, options: dict[str, object], text: str
+) -> None:
+    with pytest.raises(o80.InvalidArgument, match=text):
+        o80.robots.load("two_joints").start(segment, **options)  # type: ignore[arg-type]
+
+
+def test_a_taken_name_is_refused(process: o80.robots.Process) -> None:
+    with pytest.raises(o80.SegmentTaken, match=str(process.pid)):
+        o80.robots.load("two_joints").start(process.segment)
+
+
+def test_a_process_ends_with_the_program_that_started_it(segment: str) -> None:
+    program = (
+        "import os, o80\n"
+        f"process = o80.robots.load('two_joints').start({segment!r})\n"
+        "print(process.pid, flush=True)\n"
+        "os.kill(os.getpid(), 9)\n"
+    )
+    starter = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=60
+    )
+    assert starter.returncode == -signal.SIGKILL, starter.stderr
+
+    end_of(int(starter.stdout))
+    assert segment not in [entry.name for entry in o80.segments() if entry.alive]
+
+
+def end_of(process: int) -> None:
+    """Waits until a process that is not our child has ended."""
+    try:
+        descriptor = os.pidfd_open(process)
+    except ProcessLookupError:
+        return
+    readable, _, _ = select.select([descriptor], [], [], WAIT)
+    os.close(descriptor)
+    assert readable
+
+
+def test_a_process_never_stopped_is_warned_about_and_stopped(segment: str) -> None:
+    process = o80.robots.load("two_joints").start(segment)
+    popen = process._popen
+
+    with pytest.warns(ResourceWarning, match="never stopped"):
+        del process
+
+    assert popen.returncode == 0
+
+
+def test_waiting_for_a_process_times_out(process: o80.robots.Process) -> None:
+    with pytest.raises(o80.TimeoutError, match=process.segment):
+        process.wait(0.01)
+
+
+# ---------------------------------------------------------------------------- inline
+
+
+def test_inline_robots_may_be_many(segment: str) -> None:
+    robot = o80.robots.load("two_joints")
+    with robot.inline() as one, robot.inline() as other:
+        one.add_command(0, 1.0)
+        one.burst(5)
+        assert one.segment != other.segment
+        assert other.latest().iteration == 0
+
+
+def test_others_watch_and_command_an_inline_robot(arm: o80.Frontend) -> None:
+    with o80.Frontend(arm.segment) as other:
+        other.add_command("elbow", 0.5)
+        batch = other.pulse()
+        assert arm.burst(1).desired[1] == 0.5
+        assert batch.statuses == [o80.Status.COMPLETED]
+        assert other.latest().iteration == 1
+
+
+def test_inline_options_that_cannot_be_are_refused(segment: str) -> None:
+    robot = o80.robots.load("two_joints")
+    with pytest.raises(o80.InvalidArgument, match="gain, reach"):
+        robot.inline(segment, speed=1.0)
+    with pytest.raises(o80.InvalidArgument, match="gain"):
+        robot.inline(segment, gain="fast")
+    with pytest.raises(o80.InvalidArgument, match="frequency"):
+        robot.inline(segment, frequency=0.0)
+    with o80.Backend(segment, ["a"]), pytest.raises(o80.SegmentTaken, match=segment):
+        robot.inline(segment)
+
+
+def test_an_inline_robot_and_a_process_do_the_same(arm: o80.Frontend, segment: str) -> None:
+    robot = o80.robots.load("two_joints")
+    with (
+        robot.start(f"{segment}-process", bursting=True) as process,
+        process.frontend() as other,
+    ):
+        for frontend in (arm, other):
+            frontend.add_command(0, 1.0, iterations=30, profile="minimum_jerk")
+            frontend.add_command("elbow", -0.5, duration=0.01)
+            frontend.burst(20)
+            frontend.add_command(0, 0.2, speed=20.0, mode="overwrite")
+            frontend.burst(100)
+
+        assert arm.history().rows.tobytes() == other.history().rows.tobytes()
+
+
+def test_an_open_inline_robot_is_given_back_when_the_interpreter_ends(segment: str) -> None:
+    program = (
+        "import o80\n"
+        f"arm = o80.robots.load('two_joints').inline({segment!r})\n"
+        "backend = o80.Backend('" + segment + "-b', ['a'])\n"
+        "backend.publish([0.0])\n"
+        "keep = [arm, backend]; keep.append(keep)\n"
+        "arm.burst(3)\n"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True, timeout=60)
+
+    names = [entry.name for entry in o80.segments()]
+    assert segment not in names
+    assert f"{segment}-b" not in names
+
+
+def test_the_installation_is_found() -> None:
+    assert (o80.prefix() / "bin" / "o80-run").exists()
+    assert (o80.prefix() / "include" / "o80" / "o80.hpp").exists()
+    assert o80.__version__ == o80.version()
