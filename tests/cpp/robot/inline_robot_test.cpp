@@ -56,6 +56,32 @@ TEST_F(InlineRobotTest, LetsOthersWatchAndCommand) {
   EXPECT_EQ(other.published(), 1);
 }
 
+TEST_F(InlineRobotTest, LeavesTheRestOfABurstThatItsCallerCuts) {
+  int asked = 0;
+  const auto robot = std::make_shared<InlineRobot>(two_joints(), BackendOptions{.segment = "here"},
+                                                   [&asked] { return ++asked < 2; });
+  UntypedFrontend frontend("here", robot);
+  EXPECT_THROW(frontend.burst(1'000'000'000'000, kPatience), Cancelled);
+  const Iteration reached = frontend.published();
+  EXPECT_GT(reached, 0);
+  EXPECT_EQ(frontend.burst(1, kAtOnce).iteration(), reached + 1);
+}
+
+TEST_F(InlineRobotTest, LeavesTheHardwareToTheParentOfAForkedChild) {
+  auto loop = std::make_unique<Loop>(std::make_unique<Robot>(table(), OptionValues{}),
+                                     BackendOptions{.segment = "here", .bursting = true});
+  loop->start();
+  const pid_t child = fork();
+  if (child == 0) {
+    loop.reset();
+    _exit(Puppet::calls.stopped);
+  }
+  int status = -1;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+  EXPECT_EQ(UntypedFrontend("here").life(), Life::running);
+}
+
 TEST_F(InlineRobotTest, WaitsForNothingOfItsOwn) {
   const auto robot = std::make_shared<InlineRobot>(two_joints(), BackendOptions{.segment = "here"});
   UntypedFrontend frontend("here", robot);

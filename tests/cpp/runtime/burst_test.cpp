@@ -240,5 +240,28 @@ TEST_F(BurstTest, TwoRunsOfTheSameScriptGiveHistoriesIdenticalBitForBit) {
   EXPECT_EQ(once, again);
 }
 
+TEST_F(BurstTest, AStepWithinATimeGivesUpStanding) {
+  Station station({.segment = "pair", .bursting = true});
+  station.start();
+  EXPECT_EQ(station.backend.step_within(0), Step::standing);
+  EXPECT_EQ(station.backend.step_within(1'000'000), Step::standing);
+  UntypedFrontend frontend("pair");
+  frontend.start_burst(1);
+  EXPECT_EQ(station.backend.step_within(1'000'000), Step::run);
+}
+
+TEST_F(BurstTest, ThatIsCutIsDoneAndTheNextOneBegins) {
+  Station station({.segment = "pair", .bursting = true});
+  station.start();
+  UntypedFrontend frontend("pair");
+  const Burst first = frontend.start_burst(100);
+  const Burst second = frontend.start_burst(2);
+  station.run(3);
+  station.backend.cut_burst();
+  EXPECT_EQ(first.wait(kAtOnce).iteration(), 3);
+  EXPECT_EQ(station.drive(), Step::standing);
+  EXPECT_EQ(second.wait(kAtOnce).iteration(), 5);
+}
+
 }  // namespace
 }  // namespace o80::test
