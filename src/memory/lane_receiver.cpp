@@ -164,7 +164,7 @@ std::optional<std::uint32_t> LaneReceivers::next() noexcept {
   std::uint64_t lowest = below_;
   bool left_over = false;
   for (std::uint32_t i = 0; i < size(); ++i) {
-    if (lanes_[i].available() == 0) continue;
+    if (lanes_[i].is_quiet() || lanes_[i].available() == 0) continue;
     std::uint64_t ticket = lanes_[i].peek_word(ticket_offset_);
     if (ticket >= below_) {
       if (ticket < view_.bell().tickets.load(std::memory_order_seq_cst)) {  // sync tickets

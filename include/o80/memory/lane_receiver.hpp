@@ -23,6 +23,10 @@ class LaneReceiver {
  public:
   LaneReceiver(const SegmentView& view, std::uint32_t lane) noexcept;
 
+  /// Nothing was committed that was not taken: one load.
+  bool is_quiet() const noexcept {
+    return page_->committed.load(std::memory_order_acquire) == cursor_;  // sync lane
+  }
   /// Committed blocks not taken yet; resets the lane and answers 0 if that is impossible.
   std::uint32_t available() noexcept;
   /// Copies the next block (64 bytes) and moves on; false if none is committed.
