@@ -18,7 +18,7 @@ Loop::Loop(std::unique_ptr<Robot> robot, const BackendOptions& options)
 
 Loop::~Loop() {
   if (!guard_.forked()) {
-    stop();
+    static_cast<void>(stop());
   } else {
     static_cast<void>(robot_.release());  // the hardware belongs to the parent process
   }

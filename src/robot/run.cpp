@@ -96,8 +96,8 @@ void leave_fault(const BackendOptions& options, const char* why) noexcept {
     least.lane_blocks = 16;
     UntypedBackend backend(Schema(), least);
     backend.end(State::failed, why);
-  } catch (const std::exception&) {
-    // there is no segment to leave it in; the caller says it all the same
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "o80: who waits to attach cannot be told: %s\n", error.what());
   }
 }
 

@@ -95,8 +95,12 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
     for (std::uint32_t i = 0; i < lanes.size(); ++i) lives_[i] = liveness.lane(i);
   }
 
+  Body(const Body&) = delete;
+  Body& operator=(const Body&) = delete;
+  virtual ~Body() = default;
+
   // BatchHandler: what a batch can ask of the backend itself
-  Iteration iteration() const noexcept override { return iteration_; }
+  Iteration iteration() const noexcept override { return current; }
   Outcome request(std::uint32_t lane, CommandId id, std::uint32_t index,
                   Cursor payload) noexcept override;
   Outcome take_control(std::uint32_t lane) noexcept override;
@@ -111,7 +115,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   void cut_burst() noexcept;
   void end(State state, std::string_view text) noexcept;
   std::int64_t time() const noexcept {
-    return schema.head.bursting != 0 ? iteration_ * schema.head.period : monotonic_now();
+    return schema.head.bursting != 0 ? current * schema.head.period : monotonic_now();
   }
 
   const Schema schema;
@@ -128,7 +132,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   Timing timing;
   std::atomic<bool> stop{false};
   std::array<char, 248> failure{};
-  Iteration iteration_ = 0;  // under way, or about to be
+  Iteration current = 0;  // under way, or about to be
 
  private:
   std::size_t largest_request() const {
@@ -204,7 +208,7 @@ void UntypedBackend::Body::changed(const StatusChange& change) noexcept {
   if (burst_left_ != kUntilEnded || change.lane != burst_lane_ || change.id != burst_id_ + 1)
     return;
   burst_left_ = under_way_ ? 1 : 0;
-  if (!under_way_) end_burst(iteration_ - 1);
+  if (!under_way_) end_burst(current - 1);
 }
 
 void UntypedBackend::Body::give_back() noexcept {
@@ -252,7 +256,7 @@ Outcome UntypedBackend::Body::request(std::uint32_t lane, CommandId id, std::uin
     fail(kWhy);
     return reject(kWhy);
   }
-  controller.restart(reading.observed, reading.has_desired ? reading.desired : nullptr, iteration_);
+  controller.restart(reading.observed, reading.has_desired ? reading.desired : nullptr, current);
   publish(true);
   return {};
 }
@@ -318,8 +322,8 @@ void UntypedBackend::Body::staged() noexcept {
   const BlockIndex first = staging_chain_.first;
   const BatchRecord batch = pool.batch(first);
   lanes[lane].set_staged(batch.id);
-  last_batch_ = iteration_;
-  const ScheduledBatch sent{batch.at < 0 ? iteration_ : batch.at,
+  last_batch_ = current;
+  const ScheduledBatch sent{batch.at < 0 ? current : batch.at,
                             batch.ticket,
                             first,
                             lane,
@@ -327,7 +331,7 @@ void UntypedBackend::Body::staged() noexcept {
                             staging_of_dead_};
   if (!admit(sent)) return;
   if (!staging_of_dead_) grant(lane, batch);
-  if (sent.at > iteration_) {
+  if (sent.at > current) {
     schedule.add(sent);
   } else {
     controller.take(lane, first, *this);
@@ -337,12 +341,12 @@ void UntypedBackend::Body::staged() noexcept {
 /// Whether a batch may be taken, now or later; else it ends as rejected.
 bool UntypedBackend::Body::admit(const ScheduledBatch& sent) noexcept {
   const auto reject = [&](Reason reason, std::uint32_t aux = 0) {
-    controller.reject(sent.lane, sent.batch, reason, static_cast<std::uint8_t>(aux), iteration_);
+    controller.reject(sent.lane, sent.batch, reason, static_cast<std::uint8_t>(aux), current);
     return false;
   };
   watch_holder();
   if (holder_ != kNobody && holder_ != sent.lane) return reject(Reason::exclusive, holder_);
-  if (sent.at < iteration_ && !sent.late_now) return reject(Reason::late);
+  if (sent.at < current && !sent.late_now) return reject(Reason::late);
   const LaneLife& life = lives_[sent.lane];
   const bool dead = sent.of_dead || (life.state == LaneState::died &&
                                      life.incarnation == lanes[sent.lane].incarnation());
@@ -361,7 +365,7 @@ void UntypedBackend::Body::grant(std::uint32_t lane, const BatchRecord& batch) n
 
 /// Batches sent for this iteration, or for one that a fresh start jumped over.
 void UntypedBackend::Body::take_due() noexcept {
-  while (!schedule.empty() && schedule.next().at <= iteration_) {
+  while (!schedule.empty() && schedule.next().at <= current) {
     const ScheduledBatch due = schedule.next();
     schedule.drop_next();
     if (admit(due)) controller.take(due.lane, due.batch, *this);
@@ -388,7 +392,7 @@ void UntypedBackend::Body::take_batches() noexcept {
 // ------------------------------------------------------------------------------ who lives
 
 void UntypedBackend::Body::stale(std::uint32_t lane, Reason reason) noexcept {
-  if (stale_ == Stale::purge) controller.purge_lane(lane, kEveryActuator, iteration_, reason);
+  if (stale_ == Stale::purge) controller.purge_lane(lane, kEveryActuator, current, reason);
   if (stale_ == Stale::stop) {
     fail(reason == Reason::silence ? "no frontend sent anything for longer than is allowed"
                                    : "a commanding frontend died");
@@ -430,7 +434,7 @@ void UntypedBackend::Body::watch_holder() noexcept {
 }
 
 void UntypedBackend::Body::watch_silence() noexcept {
-  if (silence_ == 0 || iteration_ - last_batch_ <= silence_ || !controller.active()) return;
+  if (silence_ == 0 || current - last_batch_ <= silence_ || !controller.active()) return;
   if (stale_ == Stale::hold) return;
   for (std::uint32_t i = 0; i < lanes.size(); ++i) stale(i, Reason::silence);
 }
@@ -462,12 +466,14 @@ Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
   if (granted()) take_due();
   watch_silence();
   under_way_ = true;
-  controller.step(iteration_, row() + layout.observed);
+  controller.step(current, row() + layout.observed);
   return Step::run;
 }
 
 void UntypedBackend::Body::count_burst() noexcept {
-  if (burst_left_ > 0 && --burst_left_ == 0) end_burst(iteration_);
+  if (burst_left_ <= 0) return;
+  --burst_left_;
+  if (burst_left_ == 0) end_burst(current);
 }
 
 void UntypedBackend::Body::end_burst(Iteration row) noexcept {
@@ -478,7 +484,7 @@ void UntypedBackend::Body::end_burst(Iteration row) noexcept {
 void UntypedBackend::Body::cut_burst() noexcept {
   if (!granted()) return;
   burst_left_ = 0;
-  end_burst(iteration_ - 1);
+  end_burst(current - 1);
   lanes.look_again();
 }
 
@@ -487,7 +493,7 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
 
   // head, desired and masks join observed and extended, which are there
   RowHead head;
-  head.iteration = iteration_;
+  head.iteration = current;
   head.time = time();
   head.lateness = timing.lateness;
   head.overruns = timing.overruns;
@@ -499,7 +505,7 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
     std::memcpy(row() + layout.active, controller.active_mask(), layout.mask_words * 8);
     std::memcpy(row() + layout.clamped, controller.clamped_mask(), layout.mask_words * 8);
   }
-  history.publish(iteration_, row());
+  history.publish(current, row());
 
   // whoever waits for it
   if (!fresh) {
@@ -508,10 +514,10 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
     count_burst();
     give_back();
   }
-  row_signal.wake_readers(iteration_);
+  row_signal.wake_readers(current);
   if (!begun_) segment.set_state(State::running);
   begun_ = true;
-  ++iteration_;
+  ++current;
 }
 
 void UntypedBackend::Body::end(State state, std::string_view text) noexcept {
@@ -520,9 +526,9 @@ void UntypedBackend::Body::end(State state, std::string_view text) noexcept {
   // the burst under way has no last row: whoever waits for it learns that the backend is gone
   burst_left_ = 0;
   for (; !schedule.empty(); schedule.drop_next()) {
-    controller.reject(schedule.next().lane, schedule.next().batch, Reason::stopped, 0, iteration_);
+    controller.reject(schedule.next().lane, schedule.next().batch, Reason::stopped, 0, current);
   }
-  controller.purge(kEveryActuator, iteration_, Reason::stopped);
+  controller.purge(kEveryActuator, current, Reason::stopped);
   while (!controller.finish_pending()) {
   }
   give_back();
@@ -556,12 +562,12 @@ const std::byte* UntypedBackend::desired() const noexcept { return body_->contro
 const std::uint64_t* UntypedBackend::active() const noexcept {
   return body_->controller.active_mask();
 }
-Iteration UntypedBackend::iteration() const noexcept { return body_->iteration_; }
+Iteration UntypedBackend::iteration() const noexcept { return body_->current; }
 std::int64_t UntypedBackend::time() const noexcept { return body_->time(); }
 void UntypedBackend::set_timing(const Timing& timing) noexcept { body_->timing = timing; }
 
 void UntypedBackend::interrupt(std::uint32_t actuator) noexcept {
-  body_->controller.interrupt(actuator, body_->iteration_);
+  body_->controller.interrupt(actuator, body_->current);
 }
 
 void UntypedBackend::ask_to_stop() noexcept {
