@@ -74,7 +74,7 @@ ROWS = (
     ),
     Row(
         name="history-small",
-        row="the same in C++, rows of 96 B",
+        row="the same in C++, rows of 88 B",
         budget=HALF_MEMCPY,
         program="history",
         measured="history_small_rows",
