@@ -5,7 +5,6 @@ add_library(o80_headers INTERFACE)
 add_library(o80::headers ALIAS o80_headers)
 set_target_properties(o80_headers PROPERTIES EXPORT_NAME headers)
 target_compile_features(o80_headers INTERFACE cxx_std_20)
-target_compile_definitions(o80_headers INTERFACE O80_VERSION="${PROJECT_VERSION}")
 target_include_directories(
   o80_headers INTERFACE $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>
                         $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "o80/base/version.hpp"
+
 namespace o80 {
 
 std::vector<Option> options_of(const RobotTable& table) {

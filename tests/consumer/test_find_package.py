@@ -68,3 +68,12 @@ def test_a_robot_library_needs_no_library_of_o80_and_shows_only_what_it_exports(
     assert "libo80" not in run("readelf", "--dynamic", robot)
     assert "not_for_others" not in run("nm", "--dynamic", robot)
     assert ctypes.CDLL(str(robot)).stranger() == 1
+
+
+def test_a_robot_library_needs_the_headers_and_a_compiler_no_more(tmp_path: Path) -> None:
+    source = PROJECT.parent / "headers_only.cpp"
+    flags = ["-std=c++20", "-shared", "-fPIC", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
+    run("c++", *flags, f"-I{PACKAGE / 'include'}", source, "-o", tmp_path / "scale.so")
+
+    with o80.robots.load(tmp_path / "scale.so").inline() as scale:
+        assert scale.burst(2).extended.weight == 2.0

@@ -17,8 +17,7 @@
   extern "C" __attribute__((visibility("default"))) const ::o80::RobotTable* o80_robot_table(); \
   const ::o80::RobotTable* o80_robot_table() {                                                  \
     return ::o80::robot_table<DriverType>(#robot, versions);                                    \
-  }                                                                                             \
-  static_assert(true)
+  }
 
 namespace o80 {
 
