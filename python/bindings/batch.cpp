@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "bindings.hpp"
+#include "o80/base/error.hpp"
 #include "waiting.hpp"
 #include "words.hpp"
 
@@ -21,6 +22,11 @@ namespace {
 std::optional<o80::Iteration> known(o80::Iteration iteration) {
   if (iteration < 0) return {};
   return iteration;
+}
+
+o80::Iteration reached(o80::Iteration iteration, const char* not_yet) {
+  if (iteration >= 0) return iteration;
+  throw o80::Error(std::string("the batch ") + not_yet + ", or was empty: wait for it first");
 }
 
 std::string text_of(const Handle& handle) {
@@ -68,11 +74,17 @@ void bind_batch(nb::module_& m) {
                    "The status of each, in the order they were added.")
       .def_prop_ro("ended", &Batch::ended, "Whether every record has an end status.")
       .def_prop_ro(
-          "first_iteration", [](const Batch& self) { return known(self.first_iteration()); },
-          "The iteration at which it was taken; None if it was not yet.")
+          "taken", [](const Batch& self) { return self.first_iteration() >= 0; },
+          "Whether the backend has taken (or rejected) it.")
       .def_prop_ro(
-          "last_iteration", [](const Batch& self) { return known(self.last_iteration()); },
-          "The iteration at which the last of its commands ended; None if not yet.")
+          "first_iteration",
+          [](const Batch& self) { return reached(self.first_iteration(), "was not taken yet"); },
+          "The iteration at which it was taken. Raises Error if it was not yet; see `taken`.")
+      .def_prop_ro(
+          "last_iteration",
+          [](const Batch& self) { return reached(self.last_iteration(), "has not ended yet"); },
+          "The iteration at which the last of its commands ended. Raises Error if they have not "
+          "all; see `ended` and `wait`.")
       .def(
           "wait",
           [](const Batch& self, std::optional<double> timeout) {

@@ -15,14 +15,17 @@ def test_an_empty_batch_has_ended(arm: o80.Frontend) -> None:
     assert len(batch) == 0
     assert batch.ended
     assert batch.handles == []
-    assert batch.first_iteration is None
+    assert not batch.taken
+    with pytest.raises(o80.Error, match="not taken yet, or was empty"):
+        _ = batch.first_iteration
 
 
 def test_a_batch_tells_when_it_was_taken_and_when_it_ended(arm: o80.Frontend) -> None:
     arm.burst(3)
     arm.add_command(0, 1.0, iterations=5)
     batch = arm.pulse()
-    assert batch.last_iteration is None
+    with pytest.raises(o80.Error, match="has not ended yet"):
+        _ = batch.last_iteration
     arm.burst(10)
 
     assert batch.ended

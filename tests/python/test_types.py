@@ -18,7 +18,7 @@ with o80.robots.load("two_joints").start(frequency=500.0, gain=2.0) as process:
     observation: o80.Observation = arm.pulse_and_wait(timeout=5.0)
     batch: o80.Batch = arm.pulse(at=3)
     statuses: list[o80.Status] = batch.statuses
-    first: int | None = batch.first_iteration
+    later: int = batch.last_iteration + 10
     history: o80.History = arm.history(10)
     one: o80.Observation = history[0]
     some: o80.History = history[1:]

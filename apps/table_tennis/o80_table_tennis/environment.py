@@ -287,8 +287,7 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
             lateness = arm.newest - (self._row + ITERATIONS)
             counts.summed_lateness += lateness
             counts.largest_lateness = max(counts.largest_lateness, lateness)
-            begun = sent.first_iteration  # None: not even now
-            counts.late_actions += begun is None or begun > at
+            counts.late_actions += not sent.taken or sent.first_iteration > at
 
     # ------------------------------------------------------------------ beside the episode
 
