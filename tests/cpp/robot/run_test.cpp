@@ -162,6 +162,9 @@ std::map<std::string, int> system_calls(const std::string& log) {
 }
 
 TEST_F(RunTest, MakesOneSystemCallAnIterationTheOneThatPacesIt) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "a sanitizer makes calls of its own";
+#endif
   if (std::system("strace -o /dev/null true > /dev/null 2>&1") != 0) {  // NOLINT(cert-env33-c)
     GTEST_SKIP() << "strace is not there or may not trace";
   }
@@ -173,8 +176,7 @@ TEST_F(RunTest, MakesOneSystemCallAnIterationTheOneThatPacesIt) {
   // the loop runs in the program's first thread, which alone is traced
   const std::string log = directory_.path() + "/calls";
   Program strace({"/usr/bin/strace", "-o", log, "-p", std::to_string(program.pid())});
-  std::ifstream none;
-  while (std::filesystem::exists(log) == false || std::filesystem::file_size(log) == 0) {
+  while (!std::filesystem::exists(log) || std::filesystem::file_size(log) == 0) {
     std::this_thread::yield();
   }
   const Iteration first = frontend.published();
@@ -197,7 +199,7 @@ TEST_F(RunTest, MakesOneSystemCallAnIterationTheOneThatPacesIt) {
   EXPECT_LE(paced, last + 1) << "at most one an iteration";
   EXPECT_LE(woken, paced) << "and one to wake who waits";
   calls.erase("restart_syscall");  // the one in which it was found
-  EXPECT_TRUE(calls.empty()) << calls.begin()->first;
+  EXPECT_THAT(calls, ::testing::IsEmpty()) << "of any other kind";
 }
 
 TEST_F(RunTest, KilledItLeavesItsNameToTheNextAtOnce) {

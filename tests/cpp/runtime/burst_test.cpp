@@ -162,10 +162,8 @@ TEST_F(BurstTest, OfAGroupLetsAllRunBeforeItWaits) {
       };
     };
   };
-  BurstingStation left("left");
-  BurstingStation right("right");
-  meet(0)(left.station);
-  meet(1)(right.station);
+  BurstingStation left("left", meet(0));
+  BurstingStation right("right", meet(1));
   UntypedFrontend first("left");
   UntypedFrontend second("right");
   const std::pair<UntypedFrontend*, std::int64_t> group[] = {{&first, 5}, {&second, 3}};
