@@ -146,8 +146,7 @@ void Batch::wait(Timeout timeout, const Check& check) const {
 }
 
 bool Burst::done() const {
-  return lane().burst(batch_.id()).known != LaneSender::Known::not_yet ||
-         batch_.rejected();
+  return lane().burst(batch_.id()).known != LaneSender::Known::not_yet || batch_.rejected();
 }
 
 Iteration Burst::wait_done(Timeout timeout, const Check& check) const {
