@@ -22,7 +22,7 @@ Attachment start_inline(const o80::RobotLibrary& library, const std::string& seg
                         const o80::OptionValues& options) {
   const Waiting waiting;
   o80::BackendOptions backend;
-  backend.segment = segment.empty() ? o80::unused_segment_name(library.table->name) : segment;
+  backend.segment = segment;
   backend.period = period;
   backend.history = history;
   auto robot = std::make_shared<o80::InlineRobot>(

@@ -71,17 +71,19 @@ class Frontend(_core.Frontend):
         if on_error not in ("purge", "continue"):
             raise InvalidArgument(f"on_error cannot be {on_error!r}: it is 'purge' or 'continue'")
         self._on_error = on_error
+        self._unnamed = False
         self._arguments = (segment, timeout, read_only, on_error, dead)
         self._set_up(self.__dict__.pop("_attachment"))
 
     @classmethod
-    def _of(cls, attachment: _core.Attachment) -> "Frontend":
-        """The frontend of an inline robot."""
+    def _of(cls, attachment: _core.Attachment, *, unnamed: bool) -> "Frontend":
+        """The frontend of an inline robot; unnamed: nobody chose its segment's name."""
         chosen = frontend_classes.of(attachment.robot) or cls
         self = _core.Frontend.__new__(chosen)
         assert isinstance(self, Frontend)
         self._on_error = "purge"
         self._arguments = None
+        self._unnamed = unnamed
         self._set_up(attachment)
         at_exit.close_later(self)
         return self
@@ -293,6 +295,8 @@ class Frontend(_core.Frontend):
                 stacklevel=2,
             )
         self._close()
+        if self._unnamed:  # one that failed would stay, for others to read
+            _core.clean(self.segment)
 
     def reattach(self, timeout: float | None = 5.0) -> None:
         """Attaches to the backend that now owns the name, after the former one ended.

@@ -88,6 +88,7 @@ class Process:
                 f"the robot of '{self.segment}' was never stopped", ResourceWarning, stacklevel=2
             )
             self.stop()
+        self._output.close()
 
     def __repr__(self) -> str:
         state = f"pid {self.pid}" if self.alive else f"ended with {self._popen.returncode}"
@@ -140,7 +141,9 @@ def _runs(process: Process) -> bool:
 
 def _why_it_ended(process: Process) -> Error:
     code = process.wait()
-    text = process.output.strip().removeprefix("o80: ") or f"it ended with exit code {code}"
+    # what o80 says last, without what the driver printed before
+    text = process.output.strip().rpartition("\no80: ")[2].removeprefix("o80: ")
+    text = text or f"it ended with exit code {code}"
     if code == BAD_OPTIONS:
         return InvalidArgument(text)
     if "already has a backend" in text:

@@ -203,10 +203,18 @@ class Robot:
         """
         if not (math.isfinite(frequency) and frequency > 0):
             raise InvalidArgument(f"a frequency of {frequency} cannot be: it is above 0 [1/s]")
-        attachment = self._library.start_inline(
-            segment or "", round(1e9 / frequency), history or 0, self._config(config)
-        )
-        return Frontend._of(attachment)
+        if history is not None and history < 1:
+            raise InvalidArgument(f"a history of {history} observations: at least 1 is needed")
+        name = segment or _core.unused_segment_name(self.name)
+        try:
+            attachment = self._library.start_inline(
+                name, round(1e9 / frequency), history or 0, self._config(config)
+            )
+        except Exception:
+            if segment is None:
+                _core.clean(name)  # nobody knows the name to read the fault by
+            raise
+        return Frontend._of(attachment, unnamed=segment is None)
 
     def _config(self, config: Mapping[str, Any]) -> builtins.list[tuple[str, str]]:
         """Names and texts of its options; the error lists what there is."""

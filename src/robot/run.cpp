@@ -85,6 +85,12 @@ void watch_input() {
   pthread_sigmask(SIG_SETMASK, &before, nullptr);
 }
 
+/// On the standard error, behind all that the driver printed before.
+void complain(const char* text) {
+  std::fflush(stdout);
+  std::fprintf(stderr, "o80: %s\n", text);
+}
+
 /// A robot that cannot be made leaves its fault where others wait for it to attach.
 void leave_fault(const BackendOptions& options, const char* why) noexcept {
   try {
@@ -132,11 +138,11 @@ int run_robot(const RobotTable& table, const RunOptions& options) {
   if (options.until_eof) watch_input();
   loop->start();
   for (const std::string& refused : set_up_real_time(options.real_time)) {
-    std::fprintf(stderr, "o80: %s\n", refused.c_str());
+    complain(refused.c_str());
   }
   announce(table, loop->backend());
   const Ended ended = loop->run();
-  if (!ended.in_order) std::fprintf(stderr, "o80: %s\n", ended.fault.c_str());
+  if (!ended.in_order) complain(ended.fault.c_str());
   return ended.in_order ? 0 : 1;
 }
 
@@ -151,10 +157,10 @@ int run(const RobotTable& table, int argc, char** argv) {
     }
     return run_robot(table, options);
   } catch (const InvalidArgument& error) {
-    std::fprintf(stderr, "o80: %s\n", error.what());
+    complain(error.what());
     return 2;
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "o80: %s\n", error.what());
+    complain(error.what());
     return 1;
   }
 }

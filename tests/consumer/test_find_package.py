@@ -70,10 +70,47 @@ def test_a_robot_library_needs_no_library_of_o80_and_shows_only_what_it_exports(
     assert ctypes.CDLL(str(robot)).stranger() == 1
 
 
-def test_a_robot_library_needs_the_headers_and_a_compiler_no_more(tmp_path: Path) -> None:
-    source = PROJECT.parent / "headers_only.cpp"
+@pytest.fixture(scope="session")
+def scale(tmp_path_factory: pytest.TempPathFactory) -> o80.robots.Robot:
+    """A robot library made by a compiler alone."""
+    library = tmp_path_factory.mktemp("scale") / "scale.so"
     flags = ["-std=c++20", "-shared", "-fPIC", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
-    run("c++", *flags, f"-I{PACKAGE / 'include'}", source, "-o", tmp_path / "scale.so")
+    source = PROJECT.parent / "headers_only.cpp"
+    run("c++", *flags, f"-I{PACKAGE / 'include'}", source, "-o", library)
+    return o80.robots.load(library)
 
-    with o80.robots.load(tmp_path / "scale.so").inline() as scale:
-        assert scale.burst(2).extended.weight == 2.0
+
+def test_a_robot_library_needs_the_headers_and_no_more(scale: o80.robots.Robot) -> None:
+    with scale.inline() as robot:
+        assert robot.burst(2).extended.weight == 2.0
+
+
+def test_what_a_driver_prints_is_no_part_of_its_fault(scale: o80.robots.Robot) -> None:
+    with pytest.raises(o80.DriverError) as caught:
+        scale.start("scale-that-is-broken", broken=True)
+
+    assert str(caught.value) == "'scale' failed in start: it finds no zero"
+    o80.clean("scale-that-is-broken")
+
+
+def test_an_inline_robot_that_fails_leaves_no_segment_whose_name_nobody_knows(
+    scale: o80.robots.Robot,
+) -> None:
+    with pytest.raises(o80.DriverError, match="no zero"):
+        scale.inline(broken=True)
+    with scale.inline(full=2) as robot, pytest.raises(o80.DriverError, match="it is full"):
+        robot.burst(5)
+
+    assert not [entry for entry in o80.segments() if entry.name.startswith(f"scale-{os.getpid()}")]
+
+
+def test_an_inline_robot_that_fails_leaves_a_segment_that_was_named(
+    scale: o80.robots.Robot,
+) -> None:
+    name = f"named-{os.getpid()}"
+    with scale.inline(name, full=2) as robot, pytest.raises(o80.DriverError):
+        robot.burst(5)
+
+    with o80.Frontend(name, dead=True) as reader:
+        assert reader.history().extended.weight.tolist() == [0.0, 1.0]
+    o80.clean(name)

@@ -1,5 +1,6 @@
 """Robots: found, loaded, started as processes and inside this one."""
 
+import gc
 import os
 import select
 import shutil
@@ -273,3 +274,15 @@ def test_the_installation_is_found() -> None:
     assert (o80.prefix() / "bin" / "o80-run").exists()
     assert (o80.prefix() / "include" / "o80" / "o80.hpp").exists()
     assert o80.__version__ == o80.version()
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_process_that_was_stopped_leaves_nothing_open(segment: str) -> None:
+    before = set(os.listdir("/proc/self/fd"))
+    with o80.robots.load("two_joints").start(segment) as process:
+        assert "runs on segment" in process.output
+    assert "runs on segment" in process.output
+    del process
+    gc.collect()
+
+    assert set(os.listdir("/proc/self/fd")) <= before
