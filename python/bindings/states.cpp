@@ -196,6 +196,10 @@ class Writer {
                 const std::string& what) {
     const o80::TypeRow& row = schema_.types[type];
     const bool is_sequence = PySequence_Check(value.ptr()) != 0 && !PyUnicode_Check(value.ptr());
+    if (!is_sequence && schema_.scalar_count(type) == 1) {  // its only number needs no name
+      field(schema_.fields[row.first_field], value, to, number, what);
+      return;
+    }
     if (!is_sequence || PySequence_Size(value.ptr()) != static_cast<Py_ssize_t>(row.fields)) {
       refuse(what,
              "a mapping, a record, or all its fields in order (" + fields_of(schema_, type) + ")",

@@ -167,18 +167,21 @@ class Layout:
 
     @cached_property
     def enums(self) -> dict[str, type[IntEnum]]:
-        """An enum for each enumerated field: by its name, and by "Type.field"."""
+        """An enum for each enumerated field: by its name, and by "Type.field".
+
+        That of a state which is nothing but an enum: by the name of its group, or "state".
+        """
         found: dict[str, type[IntEnum]] = {}
         ambiguous: set[str] = set()
-        types = [group["type"] for group in self.schema["groups"]]
-        types += [request["type"] for request in self.schema["requests"]]
+        types = [(group["type"], group["name"]) for group in self.schema["groups"]]
+        types += [(request["type"], request["name"]) for request in self.schema["requests"]]
         if "extended" in self.schema:
-            types.append(self.schema["extended"])
-        for described in types:
+            types.append((self.schema["extended"], "extended"))
+        for described, place in types:
             for owner, field in fields_of(described):
                 if field["kind"] != "enum":
                     continue
-                name = field["name"] or owner["name"]
+                name = field["name"] or owner["name"] or place or "state"
                 values = IntEnum(name, field["labels"])  # type: ignore[misc]
                 found[f"{owner['name']}.{name}" if field["name"] else name] = values
                 if name in found and list(found[name].__members__) != list(values.__members__):

@@ -46,7 +46,13 @@ class Robot:
 
 @pytest.fixture
 def robot(segment: str) -> Iterator[Robot]:
-    actuators = {"joints": (JOINT, ["a", "b"]), "mode": Control, "valve": bool, "gear": np.uint8}
+    actuators = {
+        "joints": (JOINT, ["a", "b"]),
+        "mode": Control,
+        "valve": bool,
+        "gear": np.uint8,
+        "drive": {"speed": float},
+    }
     limits = {"a": {"position": (-1.0, 1.0)}}
     with o80.Backend(segment, actuators, limits=limits, units={"position": "rad"}) as backend:
         backend.publish()
@@ -238,3 +244,17 @@ def test_a_trajectory_from_a_mapping_needs_every_field(robot: Robot) -> None:
 def test_a_trajectory_across_types_is_refused(robot: Robot) -> None:
     with pytest.raises(o80.InvalidArgument, match="different types"):
         robot.frontend.add_trajectory(np.zeros((3, 5)))
+
+
+def test_the_only_number_of_a_struct_needs_no_name(robot: Robot) -> None:
+    assert robot.desired("drive", 2.0).drive.speed == 2.0
+    assert robot.desired("drive", {"speed": 3.0}).drive.speed == 3.0
+    with pytest.raises(o80.InvalidArgument, match="'drive' is a number, not 'fast'"):
+        robot.frontend.add_command("drive", "fast")
+
+
+def test_the_enum_of_an_actuator_has_its_name(robot: Robot) -> None:
+    modes = robot.frontend.enums["mode"]
+
+    assert robot.desired("mode", modes.TORQUE).mode == modes.TORQUE
+    assert robot.desired("mode", "IDLE").mode == modes.IDLE
