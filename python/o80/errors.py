@@ -4,7 +4,9 @@ import builtins
 from typing import TYPE_CHECKING, Optional
 
 if TYPE_CHECKING:
-    from o80._core import Batch
+    from collections.abc import Sequence
+
+    from o80._core import Batch, Handle
 
 
 class Error(Exception):
@@ -18,12 +20,17 @@ class InvalidArgument(Error, ValueError):
 class TimeoutError(Error, builtins.TimeoutError):
     """A wait ended without its result.
 
-    `batch` is what was waited for, if it was a batch: ask its handles, or wait again.
+    `batch` is what was waited for, if it was a batch: wait again, or ask its `handles`.
     """
 
     def __init__(self, text: str = "", batch: Optional["Batch"] = None) -> None:
         super().__init__(text)
         self.batch = batch
+
+    @property
+    def handles(self) -> "Sequence[Handle]":
+        """Of what was waited for, with their statuses; none if it was no batch."""
+        return [] if self.batch is None else self.batch.handles
 
 
 class SegmentTaken(Error):

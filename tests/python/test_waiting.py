@@ -245,3 +245,17 @@ def test_dead_segments_are_listed_and_cleaned(segment: str) -> None:
         assert (dead.alive, dead.life, dead.epoch) == (False, "killed", alive.epoch)
         assert o80.clean(segment) == [segment]
         assert o80.clean(segment) == []
+
+
+def test_a_timeout_carries_the_handles(arm: o80.Frontend) -> None:
+    arm.add_command(0, 1.0, iterations=5)
+    batch = arm.pulse()
+
+    with pytest.raises(TimeoutError) as waited:
+        batch.wait(0.0)
+    with pytest.raises(o80.TimeoutError) as without_batch:
+        arm.wait_for(10, timeout=0.0)
+
+    assert isinstance(waited.value, o80.TimeoutError)
+    assert [handle.status for handle in waited.value.handles] == [o80.Status.QUEUED]
+    assert list(without_batch.value.handles) == []
