@@ -153,3 +153,24 @@ def test_errors_name_the_cure(folder: Path) -> None:
         folder, "run", "two_joints", "--frequency", "fast", fails=True
     )
     assert "o80 run" in o80(folder, "echo", "nobody", "--timeout", "0.1", fails=True)
+
+
+def test_echo_prints_the_last_rows_of_a_dead_robot(
+    folder: Path, robot: "subprocess.Popen[str]"
+) -> None:
+    o80(folder, "echo", "two_joints", "--count", "3", "--every")
+    robot.kill()
+    robot.wait()
+
+    done = subprocess.run(
+        [O80, "echo", "two_joints", "--count", "3", "--json"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        env={**os.environ, "O80_DIRECTORY": str(folder)},
+    )
+
+    first, *_, last = (json.loads(line)["iteration"] for line in done.stdout.splitlines())
+    assert last == first + 2
+    assert "was killed" in done.stderr
+    assert done.returncode == 1

@@ -20,10 +20,17 @@ def echo(
     count: Annotated[int, typer.Option(help="Stop after so many rows; 0: never.")] = 0,
     every: Annotated[bool, typer.Option(help="Every row, in order, however many.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object a line.")] = False,
-    timeout: Annotated[float, typer.Option(help="How long to wait for a row [s].")] = 5.0,
+    timeout: Annotated[float, typer.Option(help="Seconds to wait for a row.")] = 5.0,
 ) -> None:
-    """Print observations: iteration, time, what was asked, what came of it."""
-    with o80.Frontend(segment, timeout=timeout, read_only=True) as frontend:
+    """Print observations: iteration, time, what was asked, what came of it.
+
+    Of a dead segment: the last ones, and why it ended.
+    """
+    with o80.Frontend(segment, timeout=timeout, read_only=True, dead=True) as frontend:
+        if not frontend.alive:
+            for row in frontend.history(max(count, 1)):
+                _print(row, as_json)
+            frontend.wait_for(frontend.published + 1, timeout=timeout)  # raises why it ended
         row = frontend.latest()
         printed = 0
         while True:

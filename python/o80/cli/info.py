@@ -14,7 +14,7 @@ from o80.cli.screen import out, print_json
 def info(
     segment: Annotated[str, typer.Argument(help="Name of a segment; see o80 list.")],
     as_json: Annotated[bool, typer.Option("--json", help="The whole schema, for tools.")] = False,
-    timeout: Annotated[float, typer.Option(help="How long to wait for the backend [s].")] = 1.0,
+    timeout: Annotated[float, typer.Option(help="Seconds to wait for the backend.")] = 1.0,
 ) -> None:
     """Describe a robot: actuators, limits, sensor values, requests."""
     with o80.Frontend(segment, timeout=timeout, read_only=True, dead=True) as frontend:

@@ -7,6 +7,7 @@ import sys
 from typing import Any
 
 from rich.console import Console
+from rich.markup import escape
 
 out = Console(highlight=False, soft_wrap=False)
 err = Console(stderr=True, highlight=False)
@@ -20,4 +21,4 @@ def print_json(value: Any) -> None:
 
 def complain(text: str) -> None:
     """An error, as a person reads it."""
-    err.print(f"[red]o80:[/red] {text}", soft_wrap=True, markup=True)
+    err.print(f"[red]o80:[/red] {escape(text)}", soft_wrap=True, markup=True)

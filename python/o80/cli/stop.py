@@ -16,7 +16,7 @@ from o80.cli.screen import out
 def stop(
     segments: Annotated[list[str] | None, typer.Argument(help="Names of segments.")] = None,
     every: Annotated[bool, typer.Option("--all", help="All backends that run.")] = False,
-    timeout: Annotated[float, typer.Option(help="How long to wait for the end [s].")] = 5.0,
+    timeout: Annotated[float, typer.Option(help="Seconds to wait for the end.")] = 5.0,
 ) -> None:
     """Stop backends in order: their drivers are stopped, frontends are told."""
     alive = {entry.name: entry for entry in o80.segments() if entry.life in ("running", "starting")}
