@@ -12,6 +12,13 @@ foreach(source IN LISTS test_sources)
 endforeach()
 list(REMOVE_DUPLICATES test_folders)
 
+# tests are compiled for a quick build: what they test keeps its own options
+if(O80_SANITIZE)
+  set(test_options -O0 -g1)
+else()
+  set(test_options -O1 -g1)
+endif()
+
 foreach(folder IN LISTS test_folders)
   if(folder STREQUAL "mujoco" AND NOT TARGET mujoco::mujoco)
     continue()
@@ -26,6 +33,7 @@ foreach(folder IN LISTS test_folders)
     PRIVATE O80_TEST_PREFIX="${PROJECT_BINARY_DIR}" O80_TEST_SOURCE="${PROJECT_SOURCE_DIR}"
             O80_TEST_COMPILER="${CMAKE_CXX_COMPILER}"
   )
+  target_compile_options(${target} PRIVATE ${test_options})
   target_link_libraries(${target} PRIVATE o80 o80_warnings GTest::gmock GTest::gtest GTest::gmock_main)
   # the parts of a robot that its tests look into, when the robot keeps them in a library
   if(TARGET o80_${folder})
