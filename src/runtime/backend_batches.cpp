@@ -1,0 +1,207 @@
+// How batches come from the lanes to the controller, and statuses go back.
+
+#include <cstring>
+#include <optional>
+
+#include "backend_body.hpp"
+
+namespace o80 {
+
+namespace {
+constexpr std::uint32_t kBlocksPerIteration = 1024;
+}
+
+// ------------------------------------------------------------------------------ statuses out
+
+void UntypedBackend::Body::changed(const StatusChange& change) noexcept {
+  LaneReceiver& lane = lanes[change.lane];
+  lane.set_status(change.id,
+                  {static_cast<std::uint8_t>(change.status),
+                   static_cast<std::uint8_t>(change.reason), change.aux, change.iteration});
+  if (is_end(change.status)) lane.flag();
+  // a burst that runs until its batch has ended: this iteration is its last, or there is none
+  if (burst_left_ != kUntilEnded || change.lane != burst_lane_ || change.id != burst_id_ + 1)
+    return;
+  burst_left_ = under_way_ ? 1 : 0;
+  if (!under_way_) end_burst(current - 1);
+}
+
+void UntypedBackend::Body::give_back() noexcept {
+  for (std::uint32_t i = 0; i < lanes.size(); ++i) {
+    if (lanes[i].in_flight() == 0) continue;
+    const std::uint64_t freed = controller.freed(i);
+    if (freed == freed_[i]) continue;
+    lanes[i].free(static_cast<std::uint32_t>(freed - freed_[i]));
+    freed_[i] = freed;
+  }
+  lanes.flush_events();
+}
+
+void UntypedBackend::Body::fail(std::string_view text) noexcept {
+  const std::size_t size = std::min(text.size(), failure.size() - 1);
+  std::memcpy(failure.data(), text.data(), size);
+  failure[size] = 0;
+  stop.store(true, std::memory_order_relaxed);
+}
+
+// ------------------------------------------------------------------------------ requests
+
+Outcome UntypedBackend::Body::request(std::uint32_t lane, CommandId id, std::uint32_t index,
+                                      Cursor payload) noexcept {
+  const std::size_t size = schema.types[schema.requests[index].type].size;
+  const auto reject = [&](std::string_view why) {
+    lanes[lane].set_message(id, why);
+    return Outcome{Status::rejected, Reason::driver, 0};
+  };
+  payload.read(payload_.data(), size);
+  if (server_ == nullptr) return reject("nobody serves requests in this backend");
+
+  const Served served = server_->serve(index, {payload_.data(), size});
+  if (served.kind == Served::Kind::done) return {};
+  if (served.kind == Served::Kind::rejected) return reject(served.why());
+  if (served.kind == Served::Kind::failed) {
+    fail(served.why());
+    return reject(served.why());
+  }
+  // a fresh start has a row of its own
+  auto* desired = reinterpret_cast<std::byte*>(fresh_desired_.data());
+  FreshReading reading{row() + layout.observed, row() + layout.extended, desired};
+  if (!server_->read_fresh(reading)) {
+    constexpr std::string_view kWhy = "the robot could not be read after a fresh start";
+    fail(kWhy);
+    return reject(kWhy);
+  }
+  controller.restart(reading.observed, reading.has_desired ? reading.desired : nullptr, current);
+  publish(true);
+  return {};
+}
+
+Outcome UntypedBackend::Body::take_control(std::uint32_t lane) noexcept {
+  // a batch of another lane never comes here while somebody has control
+  holder_ = lane;
+  holder_incarnation_ = lanes[lane].incarnation();
+  return {};
+}
+
+Outcome UntypedBackend::Body::release_control(std::uint32_t lane) noexcept {
+  if (holder_ == lane) holder_ = kNobody;
+  return {};
+}
+
+// ------------------------------------------------------------------------------ batches in
+
+void UntypedBackend::Body::begin_staging(std::uint32_t lane) noexcept {
+  constexpr auto kBatch = static_cast<std::uint64_t>(RecordKind::batch);
+  const std::uint64_t kind = lanes[lane].peek_word(offsetof(BatchRecord, kind)) & 0xFF;
+  const auto blocks =
+      static_cast<std::uint32_t>(lanes[lane].peek_word(offsetof(BatchRecord, blocks)));
+  if (kind != kBatch || blocks == 0 || blocks > lanes[lane].available()) {
+    lanes[lane].reset();
+    return;
+  }
+  // an heir's first batch finds the house in order
+  mourn(lane, lanes[lane].dead_predecessor());
+  staging_ = true;
+  staging_of_dead_ = lanes[lane].next_is_of_dead();
+  staging_lane_ = lane;
+  staging_left_ = blocks;
+  staging_chain_ = {};
+}
+
+/// Goes on with the batch that is being staged; false if the budget ended before it.
+bool UntypedBackend::Body::stage(std::uint32_t& budget) noexcept {
+  LaneReceiver& lane = lanes[staging_lane_];
+  Block block;
+  while (staging_left_ > 0 && budget > 0) {
+    if (!lane.take(block.bytes.data()) || !pool.append(staging_chain_, &block)) {
+      // the lane was reset under us: what there is of the batch is garbage
+      lane.free(staging_chain_.blocks);
+      pool.release(staging_chain_);
+      staging_ = false;
+      return true;
+    }
+    --staging_left_;
+    --budget;
+  }
+  if (staging_left_ > 0 || budget == 0) return false;
+  // what the copies left of the budget goes into a look at the records
+  if (!controller.check(staging_lane_, staging_chain_.first, budget)) return false;
+  staging_ = false;
+  staged();
+  return true;
+}
+
+/// The staged batch is complete: take it, put it off to its iteration, or refuse it.
+void UntypedBackend::Body::staged() noexcept {
+  const std::uint32_t lane = staging_lane_;
+  const BlockIndex first = staging_chain_.first;
+  const BatchRecord batch = pool.batch(first);
+  lanes[lane].set_staged(batch.id);
+  last_batch_ = current;
+  const ScheduledBatch sent{batch.at < 0 ? current : batch.at,
+                            batch.ticket,
+                            first,
+                            lane,
+                            batch.late_now != 0,
+                            staging_of_dead_};
+  if (!admit(sent)) return;
+  if (!staging_of_dead_) grant(lane, batch);
+  if (sent.at > current) {
+    schedule.add(sent);
+  } else {
+    controller.take(lane, first, *this);
+  }
+}
+
+/// Whether a batch may be taken, now or later; else it ends as rejected.
+bool UntypedBackend::Body::admit(const ScheduledBatch& sent) noexcept {
+  const auto reject = [&](Reason reason, std::uint32_t aux = 0) {
+    controller.reject(sent.lane, sent.batch, reason, static_cast<std::uint8_t>(aux), current);
+    return false;
+  };
+  watch_holder();
+  if (holder_ != kNobody && holder_ != sent.lane) return reject(Reason::exclusive, holder_);
+  if (sent.at < current && !sent.late_now) return reject(Reason::late);
+  const LaneLife& life = lives_[sent.lane];
+  const bool dead = sent.of_dead || (life.state == LaneState::died &&
+                                     life.incarnation == lanes[sent.lane].incarnation());
+  if (dead && stale_ == Stale::purge) return reject(Reason::dead_frontend);
+  return true;
+}
+
+void UntypedBackend::Body::grant(std::uint32_t lane, const BatchRecord& batch) noexcept {
+  const bool until_ended = (batch.flags & kBurstUntilEnded) != 0;
+  if (schema.head.bursting == 0 || (batch.burst <= 0 && !until_ended)) return;
+  burst_left_ = until_ended ? kUntilEnded : batch.burst;
+  burst_lane_ = lane;
+  burst_id_ = batch.id;
+  burst_incarnation_ = lanes[lane].incarnation();
+}
+
+/// Batches sent for this iteration, or for one that a fresh start jumped over.
+void UntypedBackend::Body::take_due() noexcept {
+  while (!schedule.empty() && schedule.next().at <= current) {
+    const ScheduledBatch due = schedule.next();
+    schedule.drop_next();
+    if (admit(due)) controller.take(due.lane, due.batch, *this);
+  }
+}
+
+/// Batches in the order of their tickets, as far as the work of one iteration may go.
+void UntypedBackend::Body::take_batches() noexcept {
+  std::uint32_t budget = kBlocksPerIteration;
+  const bool news = lanes.look();
+  // nothing sent after a burst acts in it
+  while (!granted()) {
+    if (!staging_) {
+      const auto lane = news ? lanes.next() : std::nullopt;
+      if (!lane) return;
+      begin_staging(*lane);
+    } else if (!stage(budget)) {
+      return;
+    }
+  }
+  lanes.look_again();
+}
+
+}  // namespace o80
