@@ -41,7 +41,11 @@ Waited RowWaiter::wait_for_row(Iteration k, const Deadline& deadline, const Chec
     if (ready()) return Waited::ready;
     if (gone) segment_->throw_if_gone();
   }
-  return ready() ? Waited::ready : Waited::timed_out;
+  // a wait too short to look around learns of the end all the same
+  const bool gone = segment_->gone();
+  if (ready()) return Waited::ready;
+  if (gone) segment_->throw_if_gone();
+  return Waited::timed_out;
 }
 
 void RowWaiter::sleep(Iteration k, std::int64_t at_most) noexcept {

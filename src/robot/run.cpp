@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cerrno>
 #include <cstdio>
+#include <cstring>
 #include <memory>
 #include <mutex>
 #include <thread>
@@ -147,6 +148,11 @@ int run_robot(const RobotTable& table, const RunOptions& options) {
 }
 
 }  // namespace
+
+const char* program_name(const char* path) noexcept {
+  const char* slash = std::strrchr(path, '/');
+  return slash == nullptr ? path : slash + 1;
+}
 
 int run(const RobotTable& table, int argc, char** argv) {
   try {

@@ -74,7 +74,13 @@ class LaneSender {
       const std::uint32_t seen = events();
       if (done()) return Waited::ready;
       if (spinner_.spin([&] { return events() != seen; }) && done()) return Waited::ready;
-      if (deadline.over()) return done() ? Waited::ready : Waited::timed_out;
+      if (deadline.over()) {
+        // a wait too short to look around learns of the end all the same
+        const bool gone = segment_->gone();
+        if (done()) return Waited::ready;
+        if (gone) segment_->throw_if_gone();
+        return Waited::timed_out;
+      }
       if (look_at == 0) look_at = monotonic_now() + kSlice;
       sleep(seen, deadline);
       if (monotonic_now() < look_at && !segment_->has_ended()) continue;

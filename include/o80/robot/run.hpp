@@ -8,10 +8,14 @@ namespace o80 {
 /// Returns 0 after an end in order, 1 after a failure, 2 for options that cannot be used.
 int run(const RobotTable& table, int argc, char** argv);
 
-/// One's own main: `int main(int argc, char** argv) { return o80::run<Arm>(argc, argv, "arm"); }`
+/// "arm" for "build/arm".
+const char* program_name(const char* path) noexcept;
+
+/// One's own main: `int main(int argc, char** argv) { return o80::run<Arm>(argc, argv); }`
+/// The robot is called as the program, unless a name is given.
 template <Driver D>
-int run(int argc, char** argv, const char* name) {
-  return run(*robot_table<D>(name), argc, argv);
+int run(int argc, char** argv, const char* name = nullptr) {
+  return run(*robot_table<D>(name == nullptr ? program_name(argv[0]) : name), argc, argv);
 }
 
 }  // namespace o80

@@ -2,6 +2,4 @@
 
 #include "o80/base/version.hpp"
 
-int main() {
-  std::cout << o80::version() << '\n';
-}
+int main() { std::cout << o80::version() << '\n'; }

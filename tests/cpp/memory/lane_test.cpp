@@ -351,6 +351,8 @@ TEST_F(LaneTest, EndsAWaitInTime) {
   std::thread waiter([&] { EXPECT_THROW(sender.wait_until(never, patient()), BackendStopped); });
   segment_.end(State::stopped);
   waiter.join();
+  EXPECT_THROW(sender.wait_until(never, Deadline(Timeout(0))), BackendStopped);
+  EXPECT_EQ(sender.wait_until([] { return true; }, Deadline(Timeout(0))), Waited::ready);
 }
 
 }  // namespace

@@ -111,6 +111,17 @@ TEST_F(SignalTest, GivesRowsThatCameBeforeTheEnd) {
   EXPECT_THROW(waiter.wait_for_row(6, patient()), BackendStopped);
 }
 
+TEST_F(SignalTest, RaisesTheEndHoweverShortTheWait) {
+  publish(0, 0);
+  RowWaiter waiter(attached_);
+  EXPECT_EQ(waiter.wait_for_row(1, Deadline(Timeout(0))), Waited::timed_out);
+
+  segment_.end(State::stopped);
+
+  EXPECT_EQ(waiter.wait_for_row(0, Deadline(Timeout(0))), Waited::ready);
+  EXPECT_THROW(waiter.wait_for_row(1, Deadline(Timeout(0))), BackendStopped);
+}
+
 TEST_F(SignalTest, EndsAWaitWhenTheCallerSaysSo) {
   RowWaiter waiter(attached_);
   EXPECT_THROW(waiter.wait_for_row(0, patient(), [] { return false; }), Cancelled);

@@ -122,6 +122,11 @@ TEST_F(RunTest, RunsInItsOwnMainAndFinishesInOrder) {
   EXPECT_EQ(now.sa_handler, SIG_DFL) << "signals are as they were";
 }
 
+TEST_F(RunTest, ARobotOfItsOwnMainIsCalledAsItsProgram) {
+  EXPECT_STREQ(program_name("build/bin/arm"), "arm");
+  EXPECT_STREQ(program_name("arm"), "arm");
+}
+
 TEST_F(RunTest, SaysWhatIsWrongWithItsFlags) {
   Program program(two_joints({"--frequency", "never"}));
   const Outcome outcome = program.end();
