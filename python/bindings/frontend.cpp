@@ -180,7 +180,9 @@ o80::PulseOptions pulse_options(nb::handle at, nb::handle late) {
   if (!at.is_none()) {
     options.at = count_of(at, "at");
     // -1 means now to the core, and nothing to a user
-    if (options.at < 0) options.at = std::min<Iteration>(options.at, -2);
+    if (options.at < 0) {
+      throw InvalidArgument("a batch cannot be taken at iteration " + std::to_string(options.at));
+    }
   }
   const auto word = nb::cast<std::string>(nb::str(late));
   if (word != "reject" && word != "now") {

@@ -97,12 +97,14 @@ def test_a_late_batch_may_be_taken_now(arm: o80.Frontend) -> None:
     assert arm.burst(1).desired[0] == 1.0
 
 
-@pytest.mark.parametrize("options", [{"at": -1}, {"at": -7}, {"at": 1.5}, {"late": "never"}])
-def test_a_pulse_that_cannot_be_is_refused(arm: o80.Frontend, options: dict[str, object]) -> None:
+@pytest.mark.parametrize(
+    ("option", "value"), [("at", -1), ("at", -7), ("at", 1.5), ("late", "never")]
+)
+def test_a_pulse_that_cannot_be_is_refused(arm: o80.Frontend, option: str, value: object) -> None:
     arm.add_command(0, 1.0)
 
-    with pytest.raises(o80.InvalidArgument):
-        arm.pulse(**options)  # type: ignore[arg-type]
+    with pytest.raises(o80.InvalidArgument, match=str(value)):
+        arm.pulse(**{option: value})  # type: ignore[arg-type]
 
     assert arm.added == 1
     arm.forget_added()
