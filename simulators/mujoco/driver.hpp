@@ -11,6 +11,7 @@ namespace o80::mujoco {
 
 /// Forgets what happened to a ball, and begins to note it anew.
 struct ClearContacts {
+  static constexpr std::string_view kHelp = "forget what balls have met";
   std::uint32_t ball = 0;
 };
 O80_DESCRIBE(ClearContacts, (ball, "which, counted from 1; 0: all of them"));

@@ -6,16 +6,18 @@ namespace o80 {
 
 namespace {
 
-/// Asked before any thread of the process is pinned: a loop that keeps to one processor is still
-/// rung from another one.
-const int processors_of_process = [] {
+int count_processors() noexcept {
   cpu_set_t processors;
   return sched_getaffinity(0, sizeof processors, &processors) == 0 ? CPU_COUNT(&processors) : 2;
-}();
+}
+
+/// Asked before any thread of the process is pinned: a loop that keeps to one processor is still
+/// rung from another one.
+const int kProcessors = count_processors();
 
 }  // namespace
 
-Spinner::Spinner() noexcept : Spinner(processors_of_process) {}
+Spinner::Spinner() noexcept : Spinner(kProcessors) {}
 
 bool Spinner::worth() noexcept {
   const auto relaxed = std::memory_order_relaxed;

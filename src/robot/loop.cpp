@@ -20,7 +20,7 @@ Loop::~Loop() {
   if (!guard_.forked()) {
     static_cast<void>(stop());
   } else {
-    static_cast<void>(robot_.release());  // the hardware belongs to the parent process
+    [[maybe_unused]] Robot* of_the_parent = robot_.release();  // so is its hardware
   }
 }
 

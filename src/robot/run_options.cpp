@@ -187,8 +187,9 @@ std::string run_help(const RobotTable& table) {
   if (!own.empty()) out << "\nThe robot:\n";
   for (const Option& each : own) {
     const std::string unit = each.unit.empty() ? "" : " [" + each.unit + "]";
-    line(out, "--" + dashed(each.name) + " " + each.kind,
-         each.help + unit + " (default: " + each.default_text + ")");
+    const std::string otherwise =
+        each.default_text.empty() ? "" : " (default: " + each.default_text + ")";
+    line(out, "--" + dashed(each.name) + " " + each.kind, each.help + unit + otherwise);
   }
   out << "\nThe loop:\n";
   for (const RunFlag& flag : kFlags) {

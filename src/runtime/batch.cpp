@@ -58,6 +58,7 @@ std::string words_for(const Link& link, const Handle& handle, std::uint8_t aux) 
 }  // namespace
 
 Handle Batch::ask(CommandId id) const {
+  link_->segment.check_process();
   {
     const std::scoped_lock lock(kept_->mutex);
     const auto known = kept_->ended.find(id);

@@ -424,16 +424,17 @@ def test_an_inline_frontend_cannot_be_pickled(arm: o80.Frontend) -> None:
 def test_a_forked_child_is_told_to_open_its_own(process: o80.robots.Process) -> None:
     with process.frontend() as arm:
         arm.add_command(0, 0.5)
-        arm.pulse_and_wait(timeout=WAIT)
+        batch = arm.pulse()
+        batch.wait(WAIT)
 
-        assert run_in_child(lambda: use_after_fork(arm)) == 0
+        assert run_in_child(lambda: use_after_fork(arm, batch)) == 0
 
         arm.add_command(0, 1.0)
         arm.pulse_and_wait(timeout=WAIT)
 
 
-def use_after_fork(arm: o80.Frontend) -> None:
-    for use in (arm.latest, arm.pulse, arm.wait_for_next):
+def use_after_fork(arm: o80.Frontend, batch: o80.Batch) -> None:
+    for use in (arm.latest, arm.pulse, arm.wait_for_next, lambda: batch.statuses):
         with pytest.raises(o80.UsedAfterFork, match="open it again in this process"):
             use()
     with pytest.raises(o80.UsedAfterFork):

@@ -15,16 +15,16 @@
 ///
 /// A text may hold a unit in brackets and a help. Every field must be named: a forgotten one does
 /// not compile.
-#define O80_DESCRIBE(Type, ...)                                                                 \
-  static_assert(std::is_aggregate_v<Type>, #Type " must be a plain struct to be described");    \
-  static_assert(::o80::field_count<Type>() == (0 O80_FOR_EACH(O80_PLUS_ONE, ~, __VA_ARGS__)),   \
-                #Type ": describe every field, once");                                          \
-  [[maybe_unused]] constexpr std::string_view o80_type_name(::o80::Tag<Type>) { return #Type; } \
-  template <class O80Visit>                                                                     \
-  constexpr void o80_describe(::o80::Tag<Type>, [[maybe_unused]] O80Visit&& o80_visit) {        \
-    using O80Type [[maybe_unused]] = Type;                                                      \
-    O80_FOR_EACH(O80_FIELD, ~, __VA_ARGS__)                                                     \
-  }                                                                                             \
+#define O80_DESCRIBE(Type, ...)                                                                  \
+  static_assert(std::is_aggregate_v<Type>, #Type " must be a plain struct to be described");     \
+  static_assert(::o80::field_count<Type>() == (0 O80_FOR_EACH(O80_PLUS_ONE, ~, __VA_ARGS__)),    \
+                #Type ": describe every field, once (arrays as std::array, 64 fields at most)"); \
+  [[maybe_unused]] constexpr std::string_view o80_type_name(::o80::Tag<Type>) { return #Type; }  \
+  template <class O80Visit>                                                                      \
+  constexpr void o80_describe(::o80::Tag<Type>, [[maybe_unused]] O80Visit&& o80_visit) {         \
+    using O80Type [[maybe_unused]] = Type;                                                       \
+    O80_FOR_EACH(O80_FIELD, ~, __VA_ARGS__)                                                      \
+  }                                                                                              \
   static_assert(true)
 
 /// Describes an enumeration: O80_DESCRIBE_ENUM(ControlMode, off, position, torque).

@@ -131,7 +131,7 @@ void set_option(Config& config, std::string_view name, std::string_view text) {
     known = true;
     if (!describing::parse_option(text, config.*member)) {
       throw InvalidArgument("option '" + std::string(name) + "' cannot be '" + std::string(text) +
-                            "': it is " + describing::option_kind<Field>());
+                            "': expected is " + describing::option_kind<Field>());
     }
   });
   if (!known) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string_view>
 
 #include "o80/describe/describe.hpp"
 
@@ -8,12 +9,15 @@ namespace o80 {
 
 /// What every simulator and simulated plant serves.
 struct Reset {
+  static constexpr std::string_view kHelp = "back to the start";
   std::uint64_t seed = 0;
 };
 struct Snapshot {
+  static constexpr std::string_view kHelp = "keep the whole state";
   std::uint32_t slot = 0;
 };
 struct Restore {
+  static constexpr std::string_view kHelp = "back to a state that was kept";
   std::uint32_t slot = 0;
 };
 O80_DESCRIBE(Reset, (seed, "of whatever the start draws by chance"));

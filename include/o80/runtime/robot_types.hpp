@@ -64,13 +64,25 @@ std::string request_name() {
   return name;
 }
 
+/// A request's help: `static constexpr std::string_view kHelp` of its struct, if it has one.
+template <Shareable Request>
+constexpr std::string_view request_help() {
+  if constexpr (requires { std::string_view(Request::kHelp); }) {
+    return Request::kHelp;
+  } else {
+    return "";
+  }
+}
+
 /// Describes what the types of a robot say: actuators, sensor values, requests.
 template <class R>
 void describe_types(Schema& schema) {
   if constexpr (!kIsRunTime<R>) describe_actuators<ActuatorsOf<R>>(schema);
   describe_extended<ExtendedOf<R>>(schema);
   [&]<class... Each>(Requests<Each...>) {
-    (schema.add_request(request_name<Each>(), describing::type_of<Each>(schema), ""), ...);
+    (schema.add_request(request_name<Each>(), describing::type_of<Each>(schema),
+                        request_help<Each>()),
+     ...);
   }(RequestsOf<R>{});
 }
 

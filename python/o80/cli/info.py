@@ -38,7 +38,7 @@ def info(
             out.print("\n[bold]requests[/bold]")
             for request in schema["requests"]:
                 fields = ", ".join(field["name"] for field in request["type"]["fields"])
-                out.print(f"  {request['name']}({fields})")
+                out.print(f"  {request['name']}({fields})  [dim]{request['help']}[/dim]")
 
 
 def _actuators(schema: dict[str, Any]) -> Table:

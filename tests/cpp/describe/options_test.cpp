@@ -61,7 +61,7 @@ std::string refusal(std::string_view name, std::string_view text) {
 
 TEST(Options, RefuseWhatIsNoSuchValue) {
   EXPECT_THAT(refusal("gain", "fast"),
-              AllOf(HasSubstr("'gain' cannot be 'fast'"), HasSubstr("it is number")));
+              AllOf(HasSubstr("'gain' cannot be 'fast'"), HasSubstr("expected is number")));
   EXPECT_NE(refusal("gain", "1.5x"), "");
   EXPECT_NE(refusal("gain", ""), "");
   EXPECT_NE(refusal("count", "1.5"), "");

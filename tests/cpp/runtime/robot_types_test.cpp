@@ -1,0 +1,37 @@
+#include "o80/runtime/robot_types.hpp"
+
+#include <gmock/gmock.h>
+
+namespace o80::test {
+namespace {
+
+struct LaunchBall {
+  static constexpr std::string_view kHelp = "shoot the next ball";
+  double speed = 0;
+};
+O80_DESCRIBE(LaunchBall, (speed, "[m/s]"));
+
+struct Home {};
+O80_DESCRIBE(Home);
+
+struct Launcher {
+  using Actuators = NoActuators;
+  using Requests = o80::Requests<LaunchBall, Home>;
+};
+
+TEST(RobotTypesTest, NameARequestAfterItsStruct) {
+  EXPECT_EQ(request_name<LaunchBall>(), "launch_ball");
+  EXPECT_EQ(request_name<Home>(), "home");
+}
+
+TEST(RobotTypesTest, TellTheHelpOfARequestThatHasOne) {
+  Schema schema;
+  describe_types<Launcher>(schema);
+
+  ASSERT_EQ(schema.requests.size(), 2U);
+  EXPECT_EQ(schema.requests[0].help.view(), "shoot the next ball");
+  EXPECT_EQ(schema.requests[1].help.view(), "");
+}
+
+}  // namespace
+}  // namespace o80::test
