@@ -12,6 +12,7 @@
 #include <cstring>
 #include <optional>
 
+#include "arguments.hpp"
 #include "batch.hpp"
 #include "bindings.hpp"
 #include "o80/control/batch_builder.hpp"
@@ -119,78 +120,6 @@ class Frontend {
   nb::dict indices_;
   std::vector<const o80::FieldRow*> plain_;  // of each actuator; null: a struct
 };
-
-// ------------------------------------------------------------------------------ arguments
-
-double number_of(nb::handle value, const char* name) {
-  const double number = PyFloat_AsDouble(value.ptr());
-  if ((number == -1.0 && PyErr_Occurred() != nullptr) || std::isnan(number)) {
-    PyErr_Clear();
-    throw InvalidArgument(std::string(name) + " is a number, not " +
-                          nb::cast<std::string>(nb::repr(value)));
-  }
-  return number;
-}
-
-std::int64_t count_of(nb::handle value, const char* name) {
-  const nb::object index = nb::steal(PyNumber_Index(value.ptr()));
-  std::int64_t number = 0;
-  if (!index.is_valid() || !nb::try_cast<std::int64_t>(index, number)) {
-    PyErr_Clear();
-    throw InvalidArgument(std::string(name) + " is an integer, not " +
-                          nb::cast<std::string>(nb::repr(value)));
-  }
-  return number;
-}
-
-/// [s] => [ns]
-std::chrono::nanoseconds nanoseconds_of(nb::handle value, const char* name) {
-  const double seconds = number_of(value, name);
-  const double limit = static_cast<double>(o80::kLongestDuration) * 1e-9;
-  if (std::abs(seconds) > limit) {
-    throw InvalidArgument(std::string(name) + " of " + std::to_string(seconds) +
-                          " s is too long to be counted");
-  }
-  return std::chrono::nanoseconds(std::llround(seconds * 1e9));
-}
-
-/// At most one of the paces may be given.
-o80::PaceSpec pace_of(nb::handle duration, nb::handle speed, nb::handle until,
-                      nb::handle iterations) {
-  o80::PaceSpec pace = o80::direct();
-  int given = 0;
-  if (!duration.is_none() && ++given == 1) {
-    pace = o80::duration(nanoseconds_of(duration, "duration"));
-  }
-  if (!speed.is_none() && ++given == 1) pace = o80::speed(number_of(speed, "speed"));
-  if (!until.is_none() && ++given == 1) pace = o80::until(count_of(until, "until"));
-  if (!iterations.is_none() && ++given == 1) {
-    pace = o80::iterations(count_of(iterations, "iterations"));
-  }
-  if (given > 1) {
-    throw InvalidArgument(
-        "a command has one pace: give one of duration, speed, until and iterations (or none, to "
-        "be there in one iteration)");
-  }
-  return pace;
-}
-
-o80::PulseOptions pulse_options(nb::handle at, nb::handle late) {
-  o80::PulseOptions options;
-  if (!at.is_none()) {
-    options.at = count_of(at, "at");
-    // -1 means now to the core, and nothing to a user
-    if (options.at < 0) {
-      throw InvalidArgument("a batch cannot be taken at iteration " + std::to_string(options.at));
-    }
-  }
-  const auto word = nb::cast<std::string>(nb::str(late));
-  if (word != "reject" && word != "now") {
-    throw InvalidArgument("late cannot be '" + word + "': it is 'reject' or 'now'");
-  }
-  options.late = word == "now" ? o80::PulseOptions::Late::now : o80::PulseOptions::Late::reject;
-  return options;
-}
 
 // ------------------------------------------------------------------------------ commanding
 

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+#include <chrono>
+#include <cstdint>
+
+#include "o80/runtime/command.hpp"
+
+// Arguments of Python calls as what the core takes; each throws InvalidArgument naming the
+// argument.
+
+double number_of(nanobind::handle value, const char* name);
+std::int64_t count_of(nanobind::handle value, const char* name);
+
+/// [s] => [ns]
+std::chrono::nanoseconds nanoseconds_of(nanobind::handle value, const char* name);
+
+/// At most one of the paces may be given.
+o80::PaceSpec pace_of(nanobind::handle duration, nanobind::handle speed, nanobind::handle until,
+                      nanobind::handle iterations);
+
+/// `at`: an iteration or None; `late`: "reject" or "now".
+o80::PulseOptions pulse_options(nanobind::handle at, nanobind::handle late);
