@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ctypes.util
+import importlib
 import os
+import sys
 from collections.abc import Iterable
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -132,9 +134,15 @@ def write_picture(path: Path, picture: Image) -> None:
 
 
 def _choose_renderer() -> None:
-    """EGL if it is there: MuJoCo asks this variable when its rendering is first imported."""
-    if "MUJOCO_GL" not in os.environ:
-        os.environ["MUJOCO_GL"] = "egl" if ctypes.util.find_library("EGL") else "osmesa"
+    """EGL if it is there, else OSMesa: neither needs a screen.
+
+    MuJoCo looks at the variable when it is first imported; if that is past, its choice is replaced.
+    """
+    usual = "egl" if ctypes.util.find_library("EGL") else "osmesa"
+    chosen = os.environ.setdefault("MUJOCO_GL", usual)
+    contexts: Any = sys.modules.get("mujoco.rendering.classic.gl_context")
+    if contexts is not None and chosen in ("egl", "osmesa"):
+        contexts.GLContext = importlib.import_module(f"mujoco.{chosen}").GLContext
 
 
 def _ball_name(ball: int) -> str:
