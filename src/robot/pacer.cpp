@@ -5,9 +5,9 @@
 namespace o80 {
 
 bool Pacer::in_time(std::int64_t now) noexcept {
-  if (now <= due_) return true;
-  ++timing_.overruns;
-  return false;
+  overrun_ = now > due_;
+  if (overrun_) ++timing_.overruns;
+  return !overrun_;
 }
 
 const Timing& Pacer::next(std::int64_t now) noexcept {
@@ -17,6 +17,7 @@ const Timing& Pacer::next(std::int64_t now) noexcept {
     const std::int64_t missed = (now - due_) / period_ + 1;
     timing_.skipped += static_cast<std::uint32_t>(missed);
     due_ += missed * period_;
+    if (!overrun_) ++timing_.overruns;
   }
   return timing_;
 }

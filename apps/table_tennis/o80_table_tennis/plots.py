@@ -59,7 +59,7 @@ def plot_motion(path: Path, record: EpisodeRecord) -> None:
 def plot_paths(path: Path, record: EpisodeRecord) -> None:
     """Ball and racket seen from the side and from above."""
     figure = Figure(figsize=(10, 7.5), layout="constrained")
-    side, above = figure.subplots(2, 1, sharex=True)
+    side, above = figure.subplots(2, 1)
     figure.suptitle(_title(record, "paths of ball and racket"))
     _draw_paths(side, record, vertical=2)
     _draw_paths(above, record, vertical=0)
@@ -79,7 +79,12 @@ def plot_paths(path: Path, record: EpisodeRecord) -> None:
     side.set_ylabel("z, up [m]")
     above.set_ylabel("x, across [m]")
     above.set_xlabel("y, towards the opponent [m]")
+    along = (
+        min(side.get_xlim()[0], above.get_xlim()[0]),
+        max(side.get_xlim()[1], above.get_xlim()[1]),
+    )
     for axes in (side, above):
+        axes.set_xlim(along)
         axes.set_aspect("equal")
         axes.grid(alpha=0.3)
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)

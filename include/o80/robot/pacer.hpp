@@ -8,8 +8,8 @@ namespace o80 {
 
 /// Keeps the account of a loop's periods; the caller tells it the time.
 ///
-/// An iteration that ends too late is counted; the periods it missed are left out, so that no
-/// burst of late iterations follows.
+/// An iteration whose work or wake-up comes too late is counted once; the periods it missed are
+/// left out, so that no burst of late iterations follows.
 ///
 /// Realtime: arithmetic only.
 class Pacer {
@@ -22,7 +22,8 @@ class Pacer {
   std::int64_t due() const noexcept { return due_; }
   /// The work of the period is done; false, and counted, if the period was over before.
   bool in_time(std::int64_t now) noexcept;
-  /// The period is over by the clock: measures how late, and sets the next one.
+  /// The period is over by the clock: measures how late, and sets the next one. Woken a whole
+  /// period late, or more, is an overrun too.
   const Timing& next(std::int64_t now) noexcept;
   /// The period is over because the robot ticked: the next one is measured from here.
   const Timing& tick(std::int64_t now) noexcept;
@@ -30,6 +31,7 @@ class Pacer {
  private:
   std::int64_t period_;
   std::int64_t due_ = 0;
+  bool overrun_ = false;  // counted in this period
   Timing timing_;
 };
 

@@ -47,6 +47,18 @@ TEST(Pacer, LeavesOutThePeriodsItMissedSoThatNoBurstOfLateIterationsFollows) {
   }
 }
 
+TEST(Pacer, CountsAWakeUpThatMissedAPeriodAsAnOverrun) {
+  Pacer pacer(100);
+  pacer.begin(0);
+  EXPECT_TRUE(pacer.in_time(10));
+  EXPECT_EQ(pacer.next(199).overruns, 0U) << "late, but the next period can still be kept";
+  EXPECT_TRUE(pacer.in_time(200));
+  const Timing timing = pacer.next(450);
+  EXPECT_EQ(timing.overruns, 1U);
+  EXPECT_EQ(timing.skipped, 2U);
+  EXPECT_EQ(pacer.due(), 500);
+}
+
 TEST(Pacer, FollowsARobotThatTicksByItsOwnClock) {
   Pacer pacer(100);
   pacer.begin(0);
