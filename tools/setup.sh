@@ -71,7 +71,7 @@ install_o80() {
 case $purpose in
   demo) ;;
   test) need_packages g++ libgtest-dev libgmock-dev strace ;;
-  bench) need_packages g++ libbenchmark-dev rt-tests ;;
+  bench) need_packages g++ rt-tests ;;
   *) say "unknown purpose '$purpose'"; exit 2 ;;
 esac
 # pictures without a screen, where EGL cannot make them; refused, only the film is missing
