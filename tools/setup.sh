@@ -3,6 +3,7 @@
 # Nothing is done twice; stamps of what was done lie in .venv/stamps.
 set -euo pipefail
 cd "$(dirname "$0")/.."
+PATH=$PATH:/usr/sbin:/sbin # ldconfig, for users whose path lacks them
 purpose=${1:?demo, test or bench}
 
 mkdir -p build
