@@ -70,10 +70,10 @@ def run_demo(settings: DemoSettings, console: Console) -> Report:
             episodes = settings.episodes_of(pacing)
             if episodes == 0:
                 continue
-            bar = progress.add_task(pacing.value, total=episodes, hits=0)
+            bar = progress.add_task(pacing.value, total=episodes, hits="0 hits")
             modes[pacing] = _play_mode(settings, pacing, available, _advance(progress, bar))
 
-        bar = progress.add_task("plots and film", total=1, hits=0)
+        bar = progress.add_task("plots and film", total=1, hits="")
         report = write_report(
             settings.output,
             modes,
@@ -111,7 +111,7 @@ def _progress(console: Console) -> Progress:
         TextColumn("{task.description:>16}"),
         BarColumn(bar_width=30),
         MofNCompleteColumn(),
-        TextColumn("{task.fields[hits]} hits"),
+        TextColumn("{task.fields[hits]}"),
         TimeElapsedColumn(),
         console=console,
     )
@@ -124,7 +124,7 @@ def _advance(progress: Progress, bar: Any) -> Callable[[EpisodeSummary], None]:
     def advance(summary: EpisodeSummary) -> None:
         nonlocal hits
         hits += summary.returned
-        progress.update(bar, advance=1, hits=hits)
+        progress.update(bar, advance=1, hits=f"{hits} hits")
 
     return advance
 

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from .episode_record import EpisodeRecord, EpisodeSummary
@@ -119,6 +120,7 @@ def plot_overview(
         rewards.plot(numbers[hit], values[hit], "o", markersize=5, color=f"C{row}", label=label)
     rewards.set_xlabel("episode (o: the ball flew back, x: it did not)")
     rewards.set_ylabel("reward")
+    rewards.xaxis.set_major_locator(MaxNLocator(integer=True))
     rewards.grid(alpha=0.3)
     rewards.legend(fontsize=8)
 
@@ -126,7 +128,7 @@ def plot_overview(
     speed.bar_label(bars, fmt="%.0f", padding=3)
     speed.set_xscale("log")
     speed.set_xlim(min(rates.values()) / 10, max(rates.values()) * 5)
-    speed.set_xlabel("steps of the environment a second [1/s]")
+    speed.set_xlabel("steps a second, policy included [1/s]")
     speed.invert_yaxis()
     figure.savefig(path, dpi=RESOLUTION)
 
