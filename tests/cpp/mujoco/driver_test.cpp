@@ -12,26 +12,13 @@
 #include <iterator>
 #include <limits>
 #include <memory>
-#include <new>
 #include <string>
 #include <vector>
 
+#include "count_allocations.hpp"
 #include "memory/private_directory.hpp"
 #include "o80/robot/inline_robot.hpp"
 #include "o80/robot/library.hpp"
-
-namespace {
-std::size_t allocations = 0;  // of this program, by any `new`
-}
-
-// not inlined: the compiler would take malloc and delete for a mismatch
-[[gnu::noinline]] void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
-[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace o80::mujoco {
 namespace {
