@@ -1,0 +1,146 @@
+#include "torture/actor.hpp"
+
+#include <fcntl.h>
+#include <sys/prctl.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <cstdlib>
+
+#include "o80/base/crash_point.hpp"
+#include "o80/memory/segment_name.hpp"
+
+namespace torture {
+
+Actor::Actor(Round& the_round, Slot& the_slot, std::string the_directory)
+    : round(the_round),
+      slot(the_slot),
+      chance(the_slot.seed),
+      directory(std::move(the_directory)),
+      schedule_(open("/proc/thread-self/schedstat", O_RDONLY | O_CLOEXEC)) {}
+
+void Actor::fail(Fault fault, const char* format, ...) {
+  std::uint32_t none = 0;
+  if (slot.fault.compare_exchange_strong(none, static_cast<std::uint32_t>(fault))) {
+    va_list arguments;
+    va_start(arguments, format);
+    std::vsnprintf(slot.fault_text, sizeof slot.fault_text, format, arguments);
+    va_end(arguments);
+  }
+  throw Broken{};
+}
+
+void Actor::pause(std::int64_t nanoseconds) {
+  const timespec time{.tv_sec = nanoseconds / 1'000'000'000,
+                      .tv_nsec = nanoseconds % 1'000'000'000};
+  nanosleep(&time, nullptr);
+}
+
+// ------------------------------------------------------------------------------ calls that block
+
+std::int64_t Actor::starved() const {
+  char text[64] = "";
+  if (pread(schedule_, text, sizeof text - 1, 0) <= 0) return 0;
+  long long ran = 0;
+  long long waited = 0;
+  return std::sscanf(text, "%lld %lld", &ran, &waited) == 2 ? waited : 0;
+}
+
+Actor::Measured::Measured(Actor& actor, const char* what, o80::Timeout timeout)
+    : actor_(actor),
+      what_(what),
+      timeout_(timeout ? timeout->count() : 0),
+      began_(o80::monotonic_now()),
+      stopped_(actor.stopped()),
+      starved_(actor.starved()),
+      exceptions_(std::uncaught_exceptions()) {
+  actor.slot.call = what;
+  actor.stopped_at_call_ = stopped_;
+  actor.slot.call_ends = began_ + timeout_;
+  actor.slot.calls.fetch_add(1, std::memory_order_relaxed);
+}
+
+Actor::Measured::~Measured() noexcept(false) {
+  const std::int64_t took = o80::monotonic_now() - began_;
+  actor_.slot.call_ends = 0;
+  if (took <= timeout_ + kGrace) return;
+  const std::int64_t stopped = actor_.stopped() - stopped_;
+  const std::int64_t starved = actor_.starved() - starved_;
+  if (took - stopped - starved <= timeout_ + kGrace) return;
+  try {
+    actor_.fail(Fault::hang,
+                "%s took %.1f ms with a timeout of %.1f ms (stopped for %.1f ms, without a "
+                "processor for %.1f ms)",
+                what_, static_cast<double>(took) / 1e6, static_cast<double>(timeout_) / 1e6,
+                static_cast<double>(stopped) / 1e6, static_cast<double>(starved) / 1e6);
+  } catch (const Broken&) {
+    // another error is on its way already: what was said stands
+    if (std::uncaught_exceptions() == exceptions_) throw;
+  }
+}
+
+// ------------------------------------------------------------------------------ deaths
+
+Generation* Actor::life_of(std::uint64_t epoch) {
+  const std::uint32_t count = round.generations;
+  for (std::uint32_t i = count; i > 0; --i)
+    if (round.lives[i - 1].epoch == epoch) return &round.lives[i - 1];
+  return nullptr;
+}
+
+Generation& Actor::life_of(const o80::UntypedFrontend& frontend) {
+  Generation* life = life_of(frontend.epoch());
+  if (life == nullptr) fail(Fault::wrong_row, "attached to a backend that nobody started");
+  return *life;
+}
+
+void Actor::judge_gone(Generation& life, const o80::BackendGone& error, std::int64_t call_began) {
+  const std::int64_t now = o80::monotonic_now();
+  const std::int64_t doomed = life.doomed_at;
+  const bool ending = life.ending_at != 0;
+  const bool killed = dynamic_cast<const o80::BackendKilled*>(&error) != nullptr;
+  const bool superseded = dynamic_cast<const o80::BackendSuperseded*>(&error) != nullptr;
+  if (killed && doomed == 0)
+    fail(Fault::false_death, "generation %ld lives, and was said to be killed: %s",
+         &life - round.lives.data(), error.what());
+  if (superseded && doomed == 0 && !ending)
+    fail(Fault::false_death, "generation %ld lives, and was said to be superseded: %s",
+         &life - round.lives.data(), error.what());
+  if (!killed && !superseded && !ending)
+    fail(Fault::false_death, "generation %ld did not end: %s", &life - round.lives.data(),
+         error.what());
+  if (doomed == 0 || doomed < call_began || stopped() != stopped_at_call_) return;
+  round.noticed.add(now - doomed);
+}
+
+void Actor::judge_timeout(Generation& life, std::int64_t call_began, std::int64_t stopped_before) {
+  slot.timeouts.fetch_add(1, std::memory_order_relaxed);
+  const std::int64_t dead = life.dead_at;
+  if (dead == 0 || stopped() != stopped_before) return;
+  if (call_began - dead > kGrace)
+    fail(Fault::unnoticed_death, "generation %ld was dead for %.0f ms before a wait that timed out",
+         &life - round.lives.data(), static_cast<double>(call_began - dead) / 1e6);
+}
+
+std::uint64_t epoch_of(const std::string& segment) {
+  o80::SegmentHeader header{};
+  const int file = open(o80::segment_path(segment).c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) return 0;
+  const bool read = pread(file, &header, sizeof header, 0) == sizeof header;
+  close(file);
+  return read ? header.epoch : 0;
+}
+
+// ------------------------------------------------------------------------------ orphans
+
+bool Actor::forked() const {
+  const pid_t child = fork();
+  if (child != 0) return false;
+  o80::crash_plan().passages_left = 0;
+  // an open file below /proc/PID makes the kernel spin where it takes down what is left of PID
+  close(schedule_);
+  return true;
+}
+
+}  // namespace torture

@@ -1,0 +1,162 @@
+#include "o80/runtime/backend.hpp"
+
+#include <cstring>
+
+#include "o80/describe/describe.hpp"
+#include "torture/actor.hpp"
+
+namespace torture {
+
+namespace {
+
+using States = std::array<double, kActuators>;
+
+struct Habits {
+  o80::BackendOptions options;
+  std::int64_t pause;  // of an iteration [ns]
+  bool interrupts;
+  o80::Iteration orphan_at;  // -1: never
+};
+
+Habits draw(Actor& actor, bool bursting) {
+  Chance& chance = actor.chance;
+  Habits habits;
+  habits.options.segment = segment_name(actor.slot.segment);
+  habits.options.bursting = bursting;
+  habits.pause = chance.percent(20) ? 0 : chance.between(50'000, 1'000'000);
+  habits.options.history = static_cast<std::uint64_t>(
+      chance.percent(50) ? chance.between(1, 40) : chance.between(100, 3000));
+  habits.options.lanes = static_cast<std::uint32_t>(chance.between(2, 8));
+  habits.options.lane_blocks = 16U << chance.below(7);
+  habits.options.stale = chance.percent(30) ? o80::Stale::purge : o80::Stale::hold;
+  habits.interrupts = chance.percent(30);
+  habits.orphan_at = chance.percent(15) ? chance.between(0, 200) : -1;
+  return habits;
+}
+
+/// A driver that keeps a journal of all it was told.
+class Machine final : private o80::RequestServer {
+ public:
+  Machine(Actor& actor, const Habits& habits)
+      : actor_(actor),
+        life_(actor.round.lives[actor.slot.generation]),
+        number_(actor.slot.generation),
+        backend_(schema_of("torture"), habits.options, this) {
+    life_.epoch = epoch_of(habits.options.segment);
+  }
+
+  o80::UntypedBackend& backend() { return backend_; }
+  bool is_full() const { return life_.rows.load() + 16 >= kMostRows; }
+
+  void publish() {
+    const States desired = states(backend_.desired());
+    const States observed = desired;
+    note(desired, static_cast<std::uint32_t>(backend_.active()[0]));
+    o80::pack(observed, backend_.observed());
+    o80::pack(sensors(desired, observed), backend_.extended());
+    chain_ = last_;
+    backend_.publish();
+  }
+
+ private:
+  static o80::Schema schema_of(const char* robot) {
+    o80::Schema schema;
+    schema.head.robot = o80::NameText(robot);
+    o80::describe_types<Robot>(schema);
+    return schema;
+  }
+  States states(const std::byte* bytes) const { return o80::unpack<States>(bytes); }
+
+  Sensors sensors(const States& desired, const States& observed) {
+    const Sensors made = sensors_of(number_, backend_.iteration(), chain_, desired, observed);
+    last_ = made.digest;
+    JournalRow& row = life_.journal[static_cast<std::size_t>(backend_.iteration())];
+    row.digest = made.digest;
+    return made;
+  }
+  void note(const States& desired, std::uint32_t active) {
+    JournalRow& row = life_.journal[static_cast<std::size_t>(backend_.iteration())];
+    row.desired = desired;
+    row.active = active;
+    life_.rows = backend_.iteration() + 1;
+  }
+
+  o80::Served serve(std::uint32_t request, std::span<const std::byte> payload) noexcept override {
+    const auto mark = o80::unpack<Mark>(payload.data());
+    if (request == 0 && is_refused(mark.id)) return o80::Served::rejected("a seventh one");
+    const std::uint32_t place = life_.served;
+    if (place < kMostServed) {
+      life_.requests[place] = {mark.id, backend_.iteration()};
+      life_.served = place + 1;
+    }
+    return request == 0 ? o80::Served::done() : o80::Served::start_afresh();
+  }
+  bool read_fresh(o80::FreshReading& reading) noexcept override {
+    const States observed = states(reading.observed);
+    note(observed, 0);
+    o80::pack(sensors(observed, observed), reading.extended);
+    chain_ = last_;
+    return true;
+  }
+
+  Actor& actor_;
+  Generation& life_;
+  std::uint32_t number_;
+  std::uint64_t chain_ = 0;  // digest of the last row
+  std::uint64_t last_ = 0;   // and of the one under way
+  o80::UntypedBackend backend_;
+};
+
+void run(Actor& actor, const Habits& habits, Machine& machine, Generation& life) {
+  o80::UntypedBackend& backend = machine.backend();
+  machine.publish();
+  while (true) {
+    if (actor.phase() == Phase::end || machine.is_full()) break;
+    const o80::Step step = backend.step_within(20 * kMillisecond);
+    if (step == o80::Step::standing) continue;
+    if (step == o80::Step::ended)
+      actor.fail(Fault::false_death, "a backend ended on its own: %s",
+                 std::string(backend.failure()).c_str());
+    if (backend.iteration() == habits.orphan_at) actor.leave_an_orphan([] {});
+    if (habits.interrupts && actor.chance.below(100) == 0)
+      backend.interrupt(static_cast<std::uint32_t>(actor.chance.below(kActuators)));
+    if (!habits.options.bursting && habits.pause > 0 && actor.acting()) actor.pause(habits.pause);
+    machine.publish();
+  }
+  life.ending_at = o80::monotonic_now();
+  backend.end(o80::State::stopped);
+}
+
+}  // namespace
+
+void be_a_backend(Actor& actor, bool bursting) {
+  const Habits habits = draw(actor, bursting);
+  Generation& life = actor.round.lives[actor.slot.generation];
+  life.purges_stale = habits.options.stale == o80::Stale::purge ? 1 : 0;
+  life.bursting = bursting ? 1 : 0;
+  try {
+    Machine machine(actor, habits);
+    run(actor, habits, machine, life);
+  } catch (const o80::SegmentTaken& error) {
+    actor.fail(Fault::unnoticed_death, "the successor of a dead backend was refused: %s",
+               error.what());
+  }
+}
+
+/// Starts a second backend beside one that lives, or is stopped: it must be refused.
+void be_a_usurper(Actor& actor) {
+  Generation& life = actor.round.lives[actor.slot.generation];
+  try {
+    o80::Schema schema;
+    schema.head.robot = o80::NameText("usurper");
+    o80::describe_types<Robot>(schema);
+    const o80::UntypedBackend backend(schema, {.segment = segment_name(actor.slot.segment)});
+    if (life.doomed_at == 0 && life.ending_at == 0)
+      actor.fail(Fault::taken_alive, "generation %u lives, and another backend took its name",
+                 actor.slot.generation);
+  } catch (const o80::SegmentTaken&) {
+    // as it must be
+  }
+}
+
+}  // namespace torture

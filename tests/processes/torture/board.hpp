@@ -1,0 +1,176 @@
+#pragma once
+
+// What all processes of a round share beside the segments: it outlives every kill, and the judge
+// reads it afterwards. Plain words in a file of its own, so that actors in Python can write it too.
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+
+#include "torture/robot.hpp"
+
+namespace torture {
+
+inline constexpr std::uint32_t kMostActors = 384;  // started in a round
+inline constexpr std::uint32_t kMostGenerations = 96;
+inline constexpr std::uint32_t kMostRows = 1U << 13;  // of a generation
+inline constexpr std::uint32_t kMostServed = 4096;
+inline constexpr std::uint32_t kMostBatches = 1024;  // of an actor
+inline constexpr std::uint32_t kMostCommands = 4096;
+inline constexpr std::uint32_t kMostSamples = 4096;
+
+enum class Phase : std::uint32_t { act, settle, audit, end };
+
+enum class Role : std::uint32_t {
+  backend,
+  bursting_backend,
+  commander,
+  burster,
+  group_burster,
+  reader,
+  auditor,
+  usurper,
+  python_commander,
+  python_reader,
+  count
+};
+const char* name_of(Role role);
+
+/// What went wrong, by kind.
+enum class Fault : std::uint32_t {
+  none,
+  hang,
+  wrong_row,
+  lost,
+  doubled,
+  falsely_told,
+  false_death,
+  unnoticed_death,
+  taken_alive,
+  bad_error,
+  crash,
+  left_over,
+  count
+};
+const char* name_of(Fault fault);
+
+/// One iteration as the driver saw it; written before the row is published.
+struct JournalRow {
+  std::uint64_t digest;
+  std::array<double, kActuators> desired;
+  std::uint32_t active;  // a bit an actuator
+  std::uint32_t reserved;
+};
+
+struct ServedRequest {
+  std::uint64_t mark;
+  std::int64_t iteration;
+};
+
+/// The life of one backend.
+struct Generation {
+  std::atomic<std::uint32_t> used;
+  std::atomic<std::uint32_t> actor;
+  std::atomic<std::uint64_t> epoch;        // of its segment
+  std::atomic<std::int64_t> begun_at;      // [ns], as all times here
+  std::atomic<std::int64_t> follows_kill;  // when the one before was killed, 0 if it was not
+  std::atomic<std::int64_t> first_seen_at;
+  std::atomic<std::int64_t> ending_at;  // it begins to end in order
+  std::atomic<std::int64_t> doomed_at;  // it is about to be killed
+  std::atomic<std::int64_t> dead_at;    // the kernel has taken it down
+  std::atomic<std::uint32_t> drained;   // all that was sent must have ended
+  std::uint32_t bursting;
+  std::uint32_t purges_stale;  // drops what the dead have sent
+  std::atomic<std::int64_t> rows;
+  std::atomic<std::uint32_t> served;
+  std::array<std::atomic<std::uint32_t>, 16> lane_owners;  // actor + 1
+  std::array<ServedRequest, kMostServed> requests;
+  std::array<JournalRow, kMostRows> journal;
+};
+
+inline constexpr std::uint32_t kNoLane = 0xFFFFFFFF;
+
+enum class Sent : std::uint32_t { nothing, under_way, sent, refused };
+
+/// What a commander sent, as it saw it.
+struct SentBatch {
+  std::atomic<std::uint32_t> sent;  // Sent
+  std::uint32_t generation;
+  std::uint32_t lane;
+  std::uint32_t first_command;
+  std::uint32_t commands;
+  std::uint32_t until_ended;  // a burst until all has ended
+  std::uint32_t late_now;
+  std::uint32_t reserved;
+  std::uint64_t id;
+  std::int64_t at;         // wanted iteration, -1: now
+  std::int64_t burst;      // iterations asked for
+  std::int64_t taken;      // iteration, -1: not told
+  std::int64_t burst_row;  // last row of the burst, -1: not told
+};
+
+enum class SentKind : std::uint32_t { command, mark, other };
+
+struct SentCommand {
+  std::uint64_t value;  // bits of the (last) target, or the mark of a request
+  SentKind kind;
+  std::uint32_t actuator;
+  std::uint32_t told;    // status as its sender saw it at the end, 0: it did not
+  std::uint32_t found;   // status as the auditor found it in the segment
+  std::int64_t told_at;  // iteration
+  std::int64_t found_at;
+  std::uint32_t found_reason;
+  std::uint32_t overwrite;
+};
+
+/// One started process.
+struct Slot {
+  std::atomic<std::int32_t> pid;
+  Role role;
+  std::uint32_t segment;  // which of its arena
+  std::uint32_t generation;
+  std::uint64_t seed;
+  char label[40];  // crash point at which it is to be killed or stopped
+  std::int32_t label_signal;
+  std::uint32_t passages;
+  std::atomic<std::int64_t> doomed_at;
+  std::atomic<std::int64_t> stopped;     // [ns] so far, for all stops that have ended
+  std::atomic<std::int64_t> stopped_at;  // of the present stop, 0 if it runs
+  std::atomic<std::uint32_t> label_reached;
+  std::atomic<std::int64_t> call_ends;  // when the blocking call under way must be over, 0: none
+  std::atomic<const char*> call;
+  std::atomic<std::uint32_t> fault;
+  char fault_text[600];
+  std::atomic<std::uint64_t> calls;  // blocking ones, measured
+  std::atomic<std::uint64_t> timeouts;
+  std::atomic<std::uint64_t> rows;  // verified
+  std::atomic<std::uint64_t> orphans;
+  std::atomic<std::uint32_t> batches;
+  std::atomic<std::uint32_t> commands;
+  std::array<SentBatch, kMostBatches> sent_batches;
+  std::array<SentCommand, kMostCommands> sent_commands;
+};
+
+/// Times [ns] that many processes add to.
+struct Samples {
+  std::atomic<std::uint32_t> count;
+  std::array<std::int64_t, kMostSamples> values;
+  void add(std::int64_t value) {
+    const std::uint32_t place = count.fetch_add(1);
+    if (place < kMostSamples) values[place] = value;
+  }
+};
+
+struct Round {
+  std::atomic<std::uint32_t> phase;
+  std::atomic<std::uint32_t> closing;  // orphans end
+  std::uint64_t seed;
+  Samples noticed;    // kill => a waiting frontend raises
+  Samples recovered;  // kill => first row of the next backend seen by another process
+  std::atomic<std::uint32_t> generations;
+  std::array<Generation, kMostGenerations> lives;
+  std::array<Slot, kMostActors> slots;
+};
+
+}  // namespace torture

@@ -1,0 +1,126 @@
+#include "torture/sender.hpp"
+
+namespace torture {
+
+namespace {
+
+template <class Wanted, class Call>
+void must_throw(Actor& actor, const char* what, Call&& call) {
+  try {
+    call();
+  } catch (const Wanted&) {
+    return;
+  } catch (const std::exception& error) {
+    actor.fail(Fault::bad_error, "%s in a forked child says: %s", what, error.what());
+  }
+  actor.fail(Fault::bad_error, "%s works in a forked child", what);
+}
+
+class Commander {
+ public:
+  explicit Commander(Actor& actor)
+      : actor_(actor),
+        most_open_(static_cast<std::size_t>(actor.chance.between(1, 60))),
+        orphans_(actor.chance.percent(15)),
+        keen_(actor.chance.percent(30)) {}
+
+  void run() {
+    while (actor_.acting()) {
+      const auto timeout = actor_.some_timeout();
+      try {
+        Sender sender(actor_, actor_.timed("attach", timeout, [&] {
+          return o80::UntypedFrontend(segment_name(actor_.slot.segment), {.timeout = timeout});
+        }));
+        serve(sender);
+      } catch (const o80::TimeoutError&) {
+        // nobody is there yet
+      }
+      if (actor_.slot.batches + 8 >= kMostBatches || actor_.slot.commands + 128 >= kMostCommands)
+        return;
+    }
+  }
+
+ private:
+  void serve(Sender& sender) {
+    try {
+      while (actor_.acting() && sender.has_room()) command(sender);
+      wind_up(sender);
+    } catch (const o80::BackendGone& error) {
+      actor_.judge_gone(sender.life(), error, call_began_);
+    }
+    sender.settle_all();
+    sender.close();
+  }
+
+  void command(Sender& sender) {
+    call_began_ = o80::monotonic_now();
+    if (sender.open_commands() < most_open_) {
+      sender.add_some();
+      sender.pulse(when(sender));
+    }
+    if (orphans_ && actor_.chance.below(50) == 0) leave_an_orphan(sender);
+    if (sender.open() > 0 && actor_.chance.percent(40)) wait(sender);
+    sender.settle();
+    if (sender.open_commands() >= most_open_ && sender.open() > 0) wait(sender);
+    if (!keen_) actor_.pause(actor_.chance.between(0, 3) * kMillisecond);
+  }
+
+  o80::PulseOptions when(Sender& sender) {
+    o80::PulseOptions options;
+    if (actor_.chance.percent(85)) return options;
+    options.at =
+        std::max<o80::Iteration>(0, sender.frontend().published() + actor_.chance.between(-2, 40));
+    if (actor_.chance.percent(50)) options.late = o80::PulseOptions::Late::now;
+    return options;
+  }
+
+  void wait(Sender& sender) {
+    const auto timeout = actor_.some_timeout();
+    const std::int64_t stopped = actor_.stopped();
+    call_began_ = o80::monotonic_now();
+    const o80::Batch batch = sender.last();
+    try {
+      actor_.timed("batch.wait", timeout, [&] { batch.wait(timeout); });
+      if (!batch.ended())
+        actor_.fail(Fault::falsely_told, "a wait returned before its batch ended");
+    } catch (const o80::TimeoutError&) {
+      actor_.judge_timeout(sender.life(), call_began_, stopped);
+    }
+  }
+
+  /// What was sent is waited for, for a while.
+  void wind_up(Sender& sender) {
+    for (int i = 0; i < 20 && sender.open() > 0; ++i) {
+      wait(sender);
+      sender.settle();
+    }
+  }
+
+  void leave_an_orphan(Sender& sender) {
+    actor_.leave_an_orphan([&] {
+      o80::UntypedFrontend& frontend = sender.frontend();
+      using o80::UsedAfterFork;
+      must_throw<UsedAfterFork>(actor_, "latest", [&] { frontend.latest(); });
+      must_throw<UsedAfterFork>(actor_, "wait_for",
+                                [&] { frontend.wait_for(0, std::chrono::milliseconds(1)); });
+      must_throw<UsedAfterFork>(actor_, "history", [&] { frontend.history(3); });
+      must_throw<UsedAfterFork>(actor_, "add_command", [&] {
+        const double target = 1;
+        frontend.add_command(0, std::as_bytes(std::span(&target, 1)));
+      });
+      must_throw<UsedAfterFork>(actor_, "pulse", [&] { frontend.pulse(); });
+    });
+  }
+
+  Actor& actor_;
+  std::size_t most_open_;
+  bool orphans_;
+  bool keen_;
+  std::int64_t call_began_ = 0;
+};
+
+}  // namespace
+
+void be_a_commander(Actor& actor) { Commander(actor).run(); }
+
+}  // namespace torture

@@ -1,0 +1,214 @@
+#include "torture/judge.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <map>
+
+#include "o80/control/status.hpp"
+
+namespace torture {
+
+namespace {
+
+using o80::Status;
+
+struct Done {
+  std::uint64_t value;
+  std::int64_t iteration;
+  std::uint32_t actuator;
+};
+
+/// What a driver did, by value.
+class Deeds {
+ public:
+  explicit Deeds(const Generation& life) {
+    const std::int64_t rows = std::min<std::int64_t>(life.rows, kMostRows);
+    for (std::int64_t k = 0; k < rows; ++k) {
+      const JournalRow& row = life.journal[static_cast<std::size_t>(k)];
+      for (std::uint32_t i = 0; i < kActuators; ++i)
+        if ((row.active >> i & 1) != 0)
+          done_.push_back({std::bit_cast<std::uint64_t>(row.desired[i]), k, i});
+    }
+    for (std::uint32_t i = 0; i < life.served; ++i) {
+      const ServedRequest& request = life.requests[i];
+      done_.push_back({request.mark, request.iteration, 0});
+      fresh_start_ = fresh_start_ || request.mark >> 63 != 0;
+    }
+    std::stable_sort(done_.begin(), done_.end(),
+                     [](const Done& a, const Done& b) { return a.value < b.value; });
+  }
+  std::vector<Done> of(const SentCommand& command) const {
+    std::vector<Done> found;
+    auto i =
+        std::lower_bound(done_.begin(), done_.end(), command.value,
+                         [](const Done& done, std::uint64_t value) { return done.value < value; });
+    for (; i != done_.end() && i->value == command.value; ++i)
+      if (i->actuator == command.actuator) found.push_back(*i);
+    return found;
+  }
+  bool fresh_start() const { return fresh_start_; }
+
+ private:
+  std::vector<Done> done_;  // by value
+  bool fresh_start_ = false;
+};
+
+bool has_ended(std::uint32_t status) {
+  const auto known = static_cast<Status>(status);
+  return known != Status::forgotten && o80::is_end(known);
+}
+
+const char* name_of(Status status) {
+  static constexpr const char* kNames[] = {"none",     "queued",      "active", "completed",
+                                           "limited",  "overwritten", "purged", "interrupted",
+                                           "rejected", "forgotten"};
+  return kNames[static_cast<std::size_t>(status)];
+}
+
+class Judge {
+ public:
+  explicit Judge(const Round& round) : round_(round) {}
+
+  std::vector<Failure> judge() {
+    for (const Slot& slot : round_.slots)
+      for (std::uint32_t i = 0; i < slot.batches; ++i) judge(slot, slot.sent_batches[i]);
+    for (const Slot& slot : round_.slots) judge_order(slot);
+    for (auto& [generation, bursts] : bursts_) judge_bursts(generation, bursts);
+    return std::move(failures_);
+  }
+
+ private:
+  const Deeds& deeds(std::uint32_t generation) {
+    const auto known = deeds_.find(generation);
+    if (known != deeds_.end()) return known->second;
+    return deeds_.emplace(generation, Deeds(round_.lives[generation])).first->second;
+  }
+
+  void add(Fault fault, const Slot& slot, const SentBatch& batch, const SentCommand& command,
+           const std::string& what) {
+    const auto number = &slot - round_.slots.data();
+    failures_.push_back(
+        {fault, "command " + std::to_string(&command - slot.sent_commands.data()) + " of actor " +
+                    std::to_string(number) + " (" + torture::name_of(slot.role) + "), batch " +
+                    std::to_string(batch.id) + " in lane " + std::to_string(batch.lane) +
+                    " of generation " + std::to_string(batch.generation) + ", told " +
+                    name_of(static_cast<Status>(command.told)) + " at " +
+                    std::to_string(command.told_at) + ", found " +
+                    name_of(static_cast<Status>(command.found)) + " at " +
+                    std::to_string(command.found_at) + ": " + what});
+  }
+
+  void judge(const Slot& slot, const SentBatch& batch) {
+    for (std::uint32_t i = 0; i < batch.commands; ++i)
+      judge(slot, batch, slot.sent_commands[batch.first_command + i]);
+    if (batch.burst > 0 && batch.burst_row >= 0)
+      bursts_[batch.generation].emplace_back(batch.burst_row - batch.burst + 1, batch.burst_row);
+    if (batch.at < 0 || batch.taken < 0 || batch.commands == 0) return;
+    const SentCommand& first = slot.sent_commands[batch.first_command];
+    if (static_cast<Status>(first.told) == Status::rejected) return;
+    const bool late =
+        batch.taken > batch.at && batch.late_now == 0 && !deeds(batch.generation).fresh_start();
+    if (batch.taken < batch.at || late)
+      add(Fault::falsely_told, slot, batch, first,
+          "sent for iteration " + std::to_string(batch.at) + ", taken at " +
+              std::to_string(batch.taken));
+  }
+
+  void judge(const Slot& slot, const SentBatch& batch, const SentCommand& command) {
+    if (command.kind == SentKind::other) return;
+    const Generation& life = round_.lives[batch.generation];
+    const std::vector<Done> done = deeds(batch.generation).of(command);
+    const auto sent = static_cast<Sent>(batch.sent.load());
+    if (done.size() > 1)
+      return add(Fault::doubled, slot, batch, command,
+                 "done at " + std::to_string(done[0].iteration) + " and " +
+                     std::to_string(done[1].iteration));
+    if (sent == Sent::refused && !done.empty())
+      return add(Fault::falsely_told, slot, batch, command, "refused, and done all the same");
+    if (sent != Sent::sent) return;
+    if (has_ended(command.told) && has_ended(command.found) &&
+        (command.told != command.found || command.told_at != command.found_at))
+      return add(Fault::falsely_told, slot, batch, command, "its end changed");
+
+    const bool told = has_ended(command.told);
+    if (told || has_ended(command.found)) {
+      const auto status = static_cast<Status>(told ? command.told : command.found);
+      const std::int64_t at = told ? command.told_at : command.found_at;
+      return judge_end(slot, batch, command, status, at, done);
+    }
+    if (static_cast<Status>(command.found) == Status::forgotten || batch.lane == kNoLane) return;
+    if (life.drained != 0) return add(Fault::lost, slot, batch, command, "it never ended");
+    if (command.found != 0 && done.size() == 1 && done[0].iteration + 1 < life.rows)
+      add(Fault::falsely_told, slot, batch, command,
+          "done at " + std::to_string(done[0].iteration) + ", and nobody was told");
+  }
+
+  void judge_end(const Slot& slot, const SentBatch& batch, const SentCommand& command,
+                 Status status, std::int64_t at, const std::vector<Done>& done) {
+    if (status == Status::completed) {
+      if (done.empty())
+        return add(Fault::falsely_told, slot, batch, command,
+                   "never done; the driver saw " +
+                       std::to_string(round_.lives[batch.generation].rows) + " rows");
+      if (command.kind == SentKind::command && done[0].iteration != at)
+        add(Fault::falsely_told, slot, batch, command,
+            "done at " + std::to_string(done[0].iteration));
+      return;
+    }
+    if (status == Status::limited)
+      return add(Fault::falsely_told, slot, batch, command, "there are no limits");
+    if (!done.empty())
+      add(Fault::falsely_told, slot, batch, command,
+          "done at " + std::to_string(done[0].iteration) + " all the same");
+  }
+
+  /// What one sender sent for one actuator is done in the order in which it was sent.
+  void judge_order(const Slot& slot) {
+    std::map<std::pair<std::uint32_t, std::uint32_t>, std::int64_t> last;
+    for (std::uint32_t i = 0; i < slot.batches; ++i) {
+      const SentBatch& batch = slot.sent_batches[i];
+      if (batch.at >= 0) continue;
+      for (std::uint32_t k = 0; k < batch.commands; ++k) {
+        const SentCommand& command = slot.sent_commands[batch.first_command + k];
+        if (command.kind != SentKind::command ||
+            static_cast<Status>(command.told) != Status::completed)
+          continue;
+        const auto place = std::pair(batch.generation, command.actuator);
+        const auto before = last.find(place);
+        if (before != last.end() && before->second >= command.told_at)
+          add(Fault::doubled, slot, batch, command,
+              "the one before it ended at " + std::to_string(before->second));
+        last[place] = command.told_at;
+      }
+    }
+  }
+
+  /// No iteration was granted twice.
+  void judge_bursts(std::uint32_t generation,
+                    std::vector<std::pair<std::int64_t, std::int64_t>>& bursts) {
+    std::sort(bursts.begin(), bursts.end());
+    for (std::size_t i = 1; i < bursts.size(); ++i)
+      if (bursts[i].first <= bursts[i - 1].second)
+        failures_.push_back({Fault::doubled, "generation " + std::to_string(generation) +
+                                                 ": the bursts that ended with rows " +
+                                                 std::to_string(bursts[i - 1].second) + " and " +
+                                                 std::to_string(bursts[i].second) + " overlap"});
+  }
+
+  const Round& round_;
+  std::map<std::uint32_t, Deeds> deeds_;
+  std::map<std::uint32_t, std::vector<std::pair<std::int64_t, std::int64_t>>> bursts_;
+  std::vector<Failure> failures_;
+};
+
+}  // namespace
+
+std::vector<Failure> judge(const Round& round) { return Judge(round).judge(); }
+
+std::uint64_t commands_of(const Round& round) {
+  std::uint64_t count = 0;
+  for (const Slot& slot : round.slots) count += slot.commands;
+  return count;
+}
+
+}  // namespace torture

@@ -1,0 +1,226 @@
+#include "torture/sender.hpp"
+
+#include <bit>
+
+namespace torture {
+
+namespace {
+
+template <class T>
+std::span<const std::byte> bytes_of(const T& value) {
+  return std::as_bytes(std::span(&value, 1));
+}
+
+std::uint64_t bits_of(double value) { return std::bit_cast<std::uint64_t>(value); }
+
+}  // namespace
+
+Sender::Sender(Actor& actor, o80::UntypedFrontend frontend)
+    : actor_(actor), frontend_(std::move(frontend)), life_(actor.life_of(frontend_)) {
+  first_ = actor_.slot.commands;
+}
+
+Sender::~Sender() = default;
+
+bool Sender::has_room() const {
+  return actor_.slot.batches + 4 < kMostBatches && actor_.slot.commands + 64 < kMostCommands;
+}
+
+// ------------------------------------------------------------------------------ adding
+
+SentCommand& Sender::note(SentKind kind, std::uint64_t value, std::uint32_t actuator) {
+  const std::uint32_t place = actor_.slot.commands;
+  SentCommand& command = actor_.slot.sent_commands[place];
+  command.kind = kind;
+  command.value = value;
+  command.actuator = actuator;
+  actor_.slot.commands = place + 1;
+  return command;
+}
+
+void Sender::add_command() {
+  Chance& chance = actor_.chance;
+  const auto actuator = static_cast<std::uint32_t>(chance.below(kActuators));
+  const double target = unique_target(chance.bits());
+  o80::CommandOptions options;
+  switch (chance.below(6)) {
+    case 0:
+      options.pace = o80::iterations(chance.between(1, 20));
+      break;
+    case 1:
+      options.pace = o80::duration(std::chrono::nanoseconds(chance.between(0, 3'000'000)));
+      break;
+    case 2:
+      options.pace =
+          o80::until(std::max<o80::Iteration>(0, frontend_.published()) + chance.between(0, 30));
+      break;
+    default:
+      break;
+  }
+  if (chance.percent(20)) options.mode = o80::Mode::overwrite;
+  if (chance.percent(20)) options.profile = o80::Profile::minimum_jerk;
+  if (chance.percent(20)) options.start = o80::Start::observed;
+  note(SentKind::command, bits_of(target), actuator).overwrite =
+      options.mode == o80::Mode::overwrite ? 1 : 0;
+  frontend_.add_command(actuator, bytes_of(target), options);
+}
+
+void Sender::add_trajectory() {
+  Chance& chance = actor_.chance;
+  const auto actuator = static_cast<std::uint32_t>(chance.below(kActuators));
+  std::vector<double> rows(static_cast<std::size_t>(chance.between(2, 30)));
+  for (double& row : rows) row = unique_target(chance.bits());
+  note(SentKind::command, bits_of(rows.back()), actuator);
+  frontend_.add_trajectory(actuator, static_cast<std::uint32_t>(rows.size()),
+                           std::as_bytes(std::span(rows)),
+                           {.pace = o80::iterations(chance.between(1, 3))});
+}
+
+void Sender::add_some() {
+  Chance& chance = actor_.chance;
+  for (std::int64_t n = chance.between(1, 5); n > 0; --n) {
+    const std::uint64_t kind = chance.below(100);
+    if (kind < 70) {
+      add_command();
+    } else if (kind < 80) {
+      add_trajectory();
+    } else if (kind < 92) {
+      const Mark mark{chance.bits() >> 1};
+      note(SentKind::mark, mark.id, 0);
+      frontend_.add_request(0, bytes_of(mark));
+    } else if (kind < 94) {
+      note(SentKind::other, 0, 0);
+      frontend_.add_purge_own();
+    } else if (kind < 96) {
+      note(SentKind::other, 0, 0);
+      frontend_.add_purge(static_cast<std::uint32_t>(chance.below(kActuators)));
+    } else if (kind < 97) {
+      const Again again{chance.bits() >> 1 | 1ULL << 63};
+      note(SentKind::mark, again.id, 0);
+      frontend_.add_request(1, bytes_of(again));
+    } else if (kind < 98) {
+      note(SentKind::other, 0, 0);
+      frontend_.add_take_control();
+    } else {
+      note(SentKind::other, 0, 0);
+      frontend_.add_release_control();
+    }
+  }
+}
+
+// ------------------------------------------------------------------------------ sending
+
+bool Sender::send(std::int64_t at, bool late_now, std::int64_t burst, bool until_ended,
+                  const std::function<o80::Batch()>& send) {
+  const std::uint32_t place = actor_.slot.batches;
+  SentBatch& entry = actor_.slot.sent_batches[place];
+  entry.generation = static_cast<std::uint32_t>(&life_ - actor_.round.lives.data());
+  entry.first_command = first_;
+  entry.commands = actor_.slot.commands - first_;
+  entry.at = at;
+  entry.late_now = late_now ? 1 : 0;
+  entry.burst = burst;
+  entry.until_ended = until_ended ? 1 : 0;
+  entry.taken = -1;
+  entry.burst_row = -1;
+  entry.sent = static_cast<std::uint32_t>(Sent::under_way);
+  actor_.slot.batches = place + 1;
+  first_ = actor_.slot.commands;
+  const auto refused = [&] {
+    entry.sent = static_cast<std::uint32_t>(Sent::refused);
+    frontend_.forget_added();
+    return false;
+  };
+  try {
+    const o80::Batch batch = send();
+    entry.id = batch.id();
+    entry.lane = frontend_.link()->lane()->lane();
+    entry.sent = static_cast<std::uint32_t>(Sent::sent);
+    open_.push_back({batch, &entry});
+  } catch (const o80::LaneFull&) {
+    return refused();
+  } catch (const o80::NoLane&) {
+    return refused();
+  } catch (const o80::BackendGone&) {
+    refused();
+    throw;
+  }
+  watch_lane();
+  return true;
+}
+
+bool Sender::pulse(const o80::PulseOptions& options) {
+  if (actor_.slot.commands == first_) return false;
+  return send(options.at, options.late == o80::PulseOptions::Late::now, 0, false,
+              [&] { return frontend_.pulse(options); });
+}
+
+std::optional<o80::Burst> Sender::burst(std::int64_t iterations) {
+  std::optional<o80::Burst> burst;
+  if (iterations == 0 && actor_.slot.commands == first_) return burst;
+  send(o80::kNow, false, iterations, iterations == 0, [&] {
+    if (iterations > 0) {
+      burst = frontend_.start_burst(iterations);
+    } else {
+      burst.emplace(frontend_.link(), frontend_.pulse_to_end());
+    }
+    return burst->batch();
+  });
+  return burst;
+}
+
+/// Nobody has taken the lane of a sender that lives.
+void Sender::watch_lane() {
+  const auto lane = frontend_.link()->lane();
+  const std::uint64_t counted =
+      frontend_.link()->segment.view().lane(lane->lane()).incarnation.load();
+  if (counted != lane->incarnation())
+    actor_.fail(Fault::taken_alive, "lane %u of a living frontend has another owner", lane->lane());
+  if (lane_ != kNoLane) return;
+  lane_ = lane->lane();
+  const std::uint32_t former = life_.lane_owners[lane_].exchange(actor_.number() + 1);
+  if (former == 0 || actor_.round.slots[former - 1].doomed_at != 0) return;
+  actor_.fail(Fault::taken_alive, "lane %u was taken from actor %u, which lives", lane_,
+              former - 1);
+}
+
+void Sender::close() {
+  if (lane_ != kNoLane) {
+    std::uint32_t own = actor_.number() + 1;
+    life_.lane_owners[lane_].compare_exchange_strong(own, 0);
+  }
+  frontend_.close();
+}
+
+// ------------------------------------------------------------------------------ settling
+
+std::size_t Sender::open_commands() const {
+  std::size_t count = 0;
+  for (const Open& open : open_) count += open.entry->commands;
+  return count;
+}
+
+void Sender::settle(const Open& open) {
+  if (open.batch.rejection().empty()) open.entry->taken = open.batch.first_iteration();
+  for (std::uint32_t i = 0; i < open.entry->commands; ++i) {
+    const o80::Handle handle = open.batch.handle(i);
+    SentCommand& command = actor_.slot.sent_commands[open.entry->first_command + i];
+    command.told_at = handle.iteration;
+    command.told = static_cast<std::uint32_t>(handle.status);
+  }
+}
+
+void Sender::settle() {
+  std::erase_if(open_, [&](const Open& open) {
+    if (!open.batch.ended()) return false;
+    settle(open);
+    return true;
+  });
+}
+
+void Sender::settle_all() {
+  for (const Open& open : open_) settle(open);
+  open_.clear();
+}
+
+}  // namespace torture
