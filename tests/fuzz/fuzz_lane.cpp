@@ -1,0 +1,341 @@
+// A frontend that lies: garbage in its lane and on the bell's page while the backend iterates.
+// The loop goes on, no desired state leaves its limits, and another frontend is served.
+
+#include <stdlib.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "fuzz/bytes.hpp"
+#include "fuzz/robot.hpp"
+#include "o80/base/error.hpp"
+#include "o80/control/batch_builder.hpp"
+#include "o80/memory/atomic_words.hpp"
+#include "o80/memory/lane.hpp"
+#include "o80/memory/liveness.hpp"
+#include "o80/runtime/backend.hpp"
+#include "o80/runtime/frontend.hpp"
+
+namespace o80::fuzz {
+namespace {
+
+constexpr std::uint32_t kBlocks = 32;                 // of a lane
+constexpr std::int64_t kPeriod = 1'000'000;           // [ns]
+constexpr double kFarthest = kSpeed * 1e-3;           // in an iteration [rad]
+constexpr std::uint64_t kAnyLine = 64 * kBlocks / 8;  // words of the transport
+
+void must(bool holds) {
+  if (!holds) std::abort();
+}
+
+/// A directory of segments, which goes with the process.
+class Directory {
+ public:
+  Directory() {
+    char path[] = "/dev/shm/o80-fuzz-XXXXXX";
+    must(mkdtemp(path) != nullptr);
+    path_ = path;
+    setenv("O80_DIRECTORY", path, 1);
+    // a backend of its own keeps the helper thread of this process from coming and going
+    idle_.emplace(schema_of_robot(),
+                  BackendOptions{.segment = "idle", .history = 1, .lanes = 1, .lane_blocks = 1});
+  }
+  Directory(const Directory&) = delete;
+  Directory& operator=(const Directory&) = delete;
+  ~Directory() {
+    idle_.reset();
+    rmdir(path_.c_str());
+  }
+
+ private:
+  std::string path_;
+  std::optional<UntypedBackend> idle_;
+};
+
+/// The robot, watched: every desired state is one it can bear.
+class Plant final : private RequestServer {
+ public:
+  Plant(bool bursting, Stale stale)
+      : backend(schema_of_robot(),
+                {.segment = "robot",
+                 .period = kPeriod,
+                 .bursting = bursting,
+                 .history = 16,
+                 .lanes = 2,
+                 .lane_blocks = kBlocks,
+                 .stale = stale},
+                this) {
+    backend.publish();
+  }
+
+  void iterate() {
+    const Step step = backend.try_step();
+    must(step != Step::ended);
+    if (step != Step::run) return;
+    const auto now = unpack<Robot::Actuators>(backend.desired());
+    for (std::size_t i = 0; i < now.joints.size(); ++i) {
+      must(std::isfinite(now.joints[i]) && std::abs(now.joints[i]) <= kReach);
+      must(std::abs(now.joints[i] - last_.joints[i]) <= kFarthest * (1 + 1e-9));
+    }
+    must(std::isfinite(now.hand.width));
+    // as bytes: a boolean that is none cannot be looked at
+    const std::byte* hand = backend.desired() + sizeof now.joints;
+    must(hand[offsetof(Hand, closed)] <= std::byte{1});
+    const auto gear = std::to_integer<int>(hand[offsetof(Hand, gear)]);
+    must(gear <= 1 || gear == 7);
+    last_ = now;
+    backend.publish();
+  }
+
+  UntypedBackend backend;
+
+ private:
+  Served serve(std::uint32_t request, std::span<const std::byte> payload) noexcept override {
+    must(request < 3);
+    switch (request == 0 ? unpack<Reset>(payload.data()).seed % 3 : request) {
+      case 0:
+        return Served::done();
+      case 1:
+        return Served::rejected("no");
+      default:
+        return Served::start_afresh();
+    }
+  }
+  bool read_fresh(FreshReading& reading) noexcept override {
+    last_ = {};
+    pack(last_, reading.observed);
+    return true;
+  }
+
+  Robot::Actuators last_{};
+};
+
+/// Everything the owner of a lane can write.
+class Liar {
+ public:
+  Liar()
+      : segment_(AttachedSegment::attach("robot", Access::read_write, Deadline(kAtOnce))),
+        sender_(std::make_unique<LaneSender>(segment_)),
+        view_(segment_.view()),
+        page_(view_.lane(sender_->lane())) {}
+
+  void write_page(Bytes& bytes) {
+    const auto which = bytes.below(7);
+    const std::uint64_t word = bytes.word();
+    switch (which) {
+      case 0:
+        page_.committed.store(word);
+        break;
+      case 1:
+        page_.committed.fetch_add(bytes.below(kBlocks + 2));
+        break;
+      case 2:
+        page_.incarnation.store(word);
+        break;
+      case 3:
+        page_.closed.store(word);
+        break;
+      case 4:
+        page_.began.store(word);
+        break;
+      case 5:
+        page_.next_id.store(word);
+        break;
+      default:
+        page_.owner[word % 8].store(bytes.word());
+    }
+  }
+  void write_bell(Bytes& bytes) {
+    const auto which = bytes.below(4);
+    const std::uint64_t word = bytes.word();
+    Bell& bell = view_.bell();
+    switch (which) {
+      case 0:
+        bell.rung.store(static_cast<std::uint32_t>(word));
+        break;
+      case 1:
+        bell.tickets.store(word);
+        break;
+      case 2:
+        bell.wanted.store(static_cast<std::int64_t>(word));
+        break;
+      default:
+        bell.passed_on.store(static_cast<std::uint32_t>(word));
+    }
+  }
+  void write_transport(Bytes& bytes) {
+    auto* words = reinterpret_cast<std::uint64_t*>(view_.transport(sender_->lane()));
+    const std::uint32_t at = bytes.below(kAnyLine);
+    std::atomic_ref(words[at]).store(bytes.word());
+  }
+  /// A batch as a frontend makes it, but for what the fuzzer changes, sent as usual.
+  void send(Bytes& bytes) {
+    BatchBuilder builder;
+    const std::uint32_t records = bytes.below(6);
+    for (std::uint32_t i = 0; i < records; ++i) add_record(bytes, builder);
+    BatchRecord batch;
+    const auto flags = bytes.number<std::uint8_t>();
+    batch.late_now = flags & 1;
+    if ((flags & 2) != 0) batch.flags = kBurstUntilEnded;
+    if ((flags & 4) != 0) batch.burst = static_cast<std::int64_t>(bytes.word());
+    if ((flags & 8) != 0) batch.at = static_cast<std::int64_t>(bytes.word());
+    batch.id = (flags & 16) != 0 ? bytes.word() : sender_->next_id();
+    sender_->draw_ids(batch.id + records + 2);
+    const std::span<const Block> sealed = builder.seal(batch);
+    std::vector<Block> blocks(sealed.begin(), sealed.end());
+    auto* words = reinterpret_cast<std::byte*>(blocks.data());
+    for (std::uint32_t i = bytes.below(4); i > 0; --i) {
+      const std::uint64_t word = bytes.word();
+      std::memcpy(words + 8 * bytes.below(static_cast<std::uint32_t>(8 * blocks.size())), &word, 8);
+    }
+    try {
+      sender_->send(std::as_bytes(std::span(blocks)), offsetof(BatchRecord, ticket));
+    } catch (const LaneFull&) {
+      return;
+    }
+  }
+  /// Its last words: whatever it held, it lets go of. Its batches live on.
+  void leave() {
+    sender_->give_back();
+    page_.closed.store(~std::uint64_t{0});
+  }
+
+ private:
+  static constexpr std::chrono::nanoseconds kAtOnce{0};
+
+  static void add_record(Bytes& bytes, BatchBuilder& builder) {
+    RecordHead head;
+    const auto kind = bytes.below(8);
+    head.actuator = static_cast<std::uint16_t>(bytes.below(4));
+    if (kind == 0) {
+      builder.purge(head.actuator == 3 ? kEveryActuator : head.actuator);
+    } else if (kind == 1) {
+      builder.purge_own(kEveryActuator);
+    } else if (kind == 2) {
+      builder.take_control();
+    } else if (kind == 3) {
+      const std::array<std::uint64_t, 1> payload{bytes.word()};
+      builder.request(0, std::as_bytes(std::span(payload)));
+    } else {
+      add_command(bytes, head, builder);
+    }
+  }
+  static void add_command(Bytes& bytes, RecordHead& head, BatchBuilder& builder) {
+    head.mode = static_cast<Mode>(bytes.below(2));
+    head.pace = static_cast<Pace>(bytes.below(5));
+    head.profile = static_cast<Profile>(bytes.below(2));
+    head.start = static_cast<Start>(bytes.below(2));
+    head.amount = static_cast<std::int64_t>(bytes.word());
+    const std::uint32_t rows = 1 + bytes.below(3);
+    const std::size_t size = head.actuator < 2 ? sizeof(double) : sizeof(Hand);
+    std::vector<std::byte> states(rows * size);
+    for (std::byte& byte : states) byte = bytes.number<std::byte>();
+    const bool partial = bytes.below(2) == 1;
+    const std::array<std::uint64_t, 1> mask{bytes.word()};
+    std::vector<std::int64_t> times;
+    if (head.pace == Pace::duration && rows > 1)
+      for (std::uint32_t i = 0; i < rows; ++i)
+        times.push_back(static_cast<std::int64_t>(bytes.word()));
+    builder.command(
+        head, partial ? std::span<const std::uint64_t>(mask) : std::span<const std::uint64_t>(),
+        times, rows, states);
+  }
+
+  AttachedSegment segment_;
+  std::unique_ptr<LaneSender> sender_;
+  SegmentView view_;
+  LaneSenderPage& page_;
+};
+
+class HonestFrontend {
+ public:
+  HonestFrontend() : frontend_("robot", {.timeout = std::chrono::nanoseconds(0)}) {
+    frontend_.add_purge_own();  // takes a lane
+    frontend_.pulse();
+  }
+
+  Batch send(double target, const CommandOptions& options) {
+    frontend_.add_command(0, std::as_bytes(std::span(&target, 1)), options);
+    return frontend_.bursting() ? frontend_.start_burst(8).batch() : frontend_.pulse();
+  }
+  void send_something(Bytes& bytes) {
+    // it keeps room for a purge: its commands may stand behind one of the other's for ever
+    if (frontend_.link()->lane()->free_blocks() < kBlocks / 2) return;
+    send(bytes.below(2) == 0 ? -kReach : kReach, {.pace = iterations(1 + bytes.below(5))});
+  }
+  /// Once the liar is gone, what it asked for lasts no longer than its batches.
+  void is_served_by(Plant& plant) {
+    for (int attempt = 0; attempt < 3 * static_cast<int>(kBlocks); ++attempt) {
+      if (serve(plant)) return;
+    }
+    std::abort();
+  }
+
+ private:
+  bool serve(Plant& plant) {
+    constexpr double kTarget = 0.75;
+    std::optional<Batch> batch;
+    for (int i = 0; i < 20; ++i) {
+      // no burst of the liar's stands before it for ever
+      if (!batch || batch->first_iteration() < 0) plant.backend.cut_burst();
+      if (!batch) {
+        frontend_.add_purge();
+        batch = send(kTarget, {.pace = iterations(5), .mode = Mode::overwrite});
+      }
+      plant.iterate();
+      if (batch && batch->ended()) break;
+    }
+    if (!batch->ended()) return false;
+    return batch->handle(1).status == Status::completed &&
+           unpack<double>(frontend_.wait_for(batch->last_iteration(), std::chrono::nanoseconds(0))
+                              .desired()) == kTarget;
+  }
+
+  UntypedFrontend frontend_;
+};
+
+void run(Bytes bytes) {
+  static const Directory directory;
+  const auto kind = bytes.number<std::uint8_t>();
+  Plant plant((kind & 1) != 0, (kind & 2) != 0 ? Stale::purge : Stale::hold);
+  Liar liar;
+  HonestFrontend honest;
+  for (int operations = 0; operations < 200 && !bytes.empty(); ++operations) {
+    switch (bytes.number<std::uint8_t>() % 8) {
+      case 0:
+        liar.write_page(bytes);
+        break;
+      case 1:
+        liar.write_bell(bytes);
+        break;
+      case 2:
+        liar.write_transport(bytes);
+        break;
+      case 3:
+      case 4:
+        liar.send(bytes);
+        break;
+      case 5:
+        honest.send_something(bytes);
+        break;
+      default:
+        for (auto n = bytes.below(4); n < 4; ++n) plant.iterate();
+    }
+  }
+  liar.leave();
+  honest.is_served_by(plant);
+}
+
+}  // namespace
+}  // namespace o80::fuzz
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  o80::fuzz::run({data, size});
+  return 0;
+}

@@ -1,0 +1,194 @@
+// A file that lies: a good segment with bytes of any part changed, cut or stretched. Whoever
+// attaches to it works or is told what is wrong, and goes on.
+
+#include <fcntl.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "fuzz/bytes.hpp"
+#include "fuzz/robot.hpp"
+#include "o80/base/error.hpp"
+#include "o80/describe/table.hpp"
+#include "o80/memory/segment.hpp"
+#include "o80/memory/segment_file.hpp"
+#include "o80/memory/segment_name.hpp"
+#include "o80/runtime/backend.hpp"
+#include "o80/runtime/frontend.hpp"
+#include "o80/runtime/typed_frontend.hpp"
+
+namespace o80::fuzz {
+namespace {
+
+constexpr std::size_t kMostBytes = 1U << 20;  // of a file
+
+/// A good segment of a few rows, as its backend left it when it was killed.
+class Original {
+ public:
+  Original() {
+    char path[] = "/dev/shm/o80-fuzz-XXXXXX";
+    if (mkdtemp(path) == nullptr) std::abort();
+    directory_ = path;
+    setenv("O80_DIRECTORY", path, 1);
+    UntypedBackend backend(schema_of_robot(),
+                           {.segment = "robot", .history = 4, .lanes = 2, .lane_blocks = 16});
+    backend.publish();
+    UntypedFrontend frontend("robot");
+    offsets_ = frontend.link()->segment.view().offsets;
+    const double target = 0.5;
+    for (int i = 0; i < 6; ++i) {
+      frontend.add_command(0, std::as_bytes(std::span(&target, 1)));
+      frontend.pulse();
+      if (backend.try_step() == Step::run) backend.publish();
+    }
+    std::ifstream file(path_of(), std::ios::binary);
+    bytes_.assign(std::istreambuf_iterator<char>(file), {});
+  }
+  Original(const Original&) = delete;
+  Original& operator=(const Original&) = delete;
+  ~Original() { std::filesystem::remove_all(directory_); }
+
+  std::string path_of() const { return directory_ + "/o80-robot"; }
+  const std::vector<char>& bytes() const { return bytes_; }
+  /// Where a part begins, and where the one after it does.
+  std::pair<std::size_t, std::size_t> part(std::uint32_t which) const {
+    const std::size_t begins[] = {0,
+                                  offsets_.schema,
+                                  offsets_.counters,
+                                  offsets_.bell,
+                                  offsets_.lanes,
+                                  offsets_.feedback,
+                                  offsets_.feedback + offsets_.statuses,
+                                  offsets_.history,
+                                  offsets_.file_bytes};
+    return {begins[which % 8], begins[which % 8 + 1]};
+  }
+
+ private:
+  std::string directory_;
+  SegmentOffsets offsets_{};
+  std::vector<char> bytes_;
+};
+
+/// The original as the fuzzer wants it.
+std::vector<char> lie(const Original& original, Bytes& bytes) {
+  std::vector<char> file = original.bytes();
+  while (!bytes.empty()) {
+    const auto what = bytes.number<std::uint8_t>();
+    const auto [begin, end] = original.part(what >> 4);
+    switch (what & 7) {
+      case 0:
+        file.resize(std::min<std::size_t>(bytes.number<std::uint32_t>(), kMostBytes));
+        break;
+      case 1:
+        file.resize(begin + bytes.below(16));
+        break;
+      case 2:
+      case 3: {  // bytes of its own
+        const std::size_t at = begin + bytes.below(static_cast<std::uint32_t>(end - begin));
+        const auto with = bytes.take(bytes.number<std::uint8_t>());
+        if (at + with.size() <= file.size() && !with.empty())
+          std::memcpy(file.data() + at, with.data(), with.size());
+        break;
+      }
+      default: {  // a word that means something, most often near the beginning of its part
+        const std::uint32_t within = static_cast<std::uint32_t>(end - begin) / 8;
+        const std::size_t at = begin + 8 * bytes.below((what & 7) < 7 ? 32 : within);
+        const std::uint64_t word = bytes.word();
+        if (at + 8 <= file.size()) std::memcpy(file.data() + at, &word, 8);
+      }
+    }
+  }
+  return file;
+}
+
+constexpr Timeout kAtOnce = std::chrono::nanoseconds(0);
+
+template <class Call>
+void may_refuse(Call&& call) {
+  try {
+    call();
+  } catch (const Error&) {
+    return;
+  }
+}
+
+void read_all(UntypedFrontend& frontend) {
+  if (to_json(frontend.schema()).empty()) std::abort();
+  may_refuse([&] { frontend.latest(); });
+  may_refuse([&] { frontend.history(3); });
+  may_refuse([&] { frontend.history(0, 1'000'000); });
+  may_refuse([&] { frontend.wait_for(2, kAtOnce); });
+  may_refuse([&] { frontend.wait_for(frontend.published(), kAtOnce); });
+  std::vector<std::byte> row(frontend.layout().size);
+  Iteration position = 0;
+  for (int i = 0; i < 8; ++i)
+    may_refuse([&] { frontend.wait_for_next(position, row.data(), kAtOnce); });
+}
+
+void command(UntypedFrontend& frontend) {
+  may_refuse([&] {
+    const double target = 0.25;
+    frontend.add_command(0, std::as_bytes(std::span(&target, 1)), {.pace = iterations(3)});
+    const Batch batch = frontend.pulse();
+    batch.handles();
+    batch.ended();
+    batch.first_iteration();
+    batch.rejection();
+    batch.wait(kAtOnce);
+  });
+  may_refuse([&] { frontend.burst(2, kAtOnce); });
+  may_refuse([&] {
+    frontend.add_purge();
+    frontend.pulse_and_wait(kAtOnce);
+  });
+}
+
+void attach(const FrontendOptions& options) {
+  may_refuse([&] {
+    UntypedFrontend frontend("robot", options);
+    read_all(frontend);
+    if (options.access == Access::read_write) command(frontend);
+    frontend.life();
+  });
+  may_refuse([&] { Frontend<Robot>("robot", options).latest(); });
+}
+
+void run(Bytes bytes) {
+  static const Original original;
+  const bool alive = bytes.number<std::uint8_t>() % 2 == 0;
+  const std::vector<char> file = lie(original, bytes);
+  {
+    std::ofstream out(original.path_of(), std::ios::binary | std::ios::trunc);
+    out.write(file.data(), static_cast<std::streamsize>(file.size()));
+    if (!out) std::abort();
+  }
+  list_segments();
+  if (alive) {
+    // somebody holds its byte 0: it looks like the segment of a living backend
+    LockFile backend = LockFile::open(original.path_of(), O_RDWR);
+    if (!backend.try_lock(kBackendByte)) std::abort();
+    attach({.timeout = kAtOnce});
+  }
+  attach({.timeout = kAtOnce, .access = Access::read_only, .dead = true});
+  attach({.timeout = kAtOnce, .dead = true});
+  // and a new backend comes whatever it finds
+  OwnedSegment::create(
+      {.name = "robot", .schema = {}, .row_bytes = 64, .rows = 1, .lanes = 1, .lane_blocks = 1});
+  if (std::filesystem::exists(original.path_of())) std::abort();
+}
+
+}  // namespace
+}  // namespace o80::fuzz
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  o80::fuzz::run({data, size});
+  return 0;
+}
