@@ -1,0 +1,139 @@
+"""Reads what the machine said: results for people, and what is wrong with them."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from real_time.machine import Console
+
+PRIORITY = 80
+FIFO = "1"  # SCHED_FIFO, as the kernel prints it
+
+
+@dataclass
+class Findings:
+    """The lines of a machine that begin with "rt:", by their first word."""
+
+    lines: dict[str, list[str]] = field(default_factory=dict)
+
+    @classmethod
+    def read(cls, console: Console) -> "Findings":
+        findings = cls()
+        for line in console.text.splitlines():
+            if line.startswith("rt: "):
+                word, _, rest = line.removeprefix("rt: ").partition(" ")
+                findings.lines.setdefault(word, []).append(rest.strip())
+        return findings
+
+    def all(self, word: str) -> list[str]:
+        return self.lines.get(word, [])
+
+    def one(self, word: str) -> str:
+        return (self.all(word) or [""])[-1]
+
+    def account(self, word: str) -> dict[str, int]:
+        """Of a line "word key=number key=number"."""
+        pairs = (pair.partition("=") for pair in self.one(word).split())
+        return {key: int(value) for key, _, value in pairs}
+
+    def tests(self) -> list[tuple[str, int, str]]:
+        """Program, exit code, closing line."""
+        split = (line.split(maxsplit=2) for line in self.all("test"))
+        return [(words[0], int(words[1]), " ".join(words[2:])) for words in split]
+
+    def lateness_of_loop(self) -> dict[int, int]:
+        """Iterations by lateness [us]."""
+        pairs = (line.split() for line in self.all("lateness"))
+        return {int(lateness): int(count) for lateness, count in pairs}
+
+    def lateness_of_cyclictest(self) -> dict[int, int]:
+        """Cycles by latency [us]; those beyond its histogram count as the longest."""
+        if not self.one("cyclictest"):
+            return {}
+        thread = json.loads(self.one("cyclictest"))["thread"]["0"]
+        histogram = {int(late): int(count) for late, count in thread["histogram"].items()}
+        beyond = int(thread["cycles"]) - sum(histogram.values())
+        if beyond > 0:
+            histogram[int(thread["max"])] = beyond
+        return histogram
+
+
+def percentile(histogram: dict[int, int], share: float) -> int:
+    """Lowest lateness below or at which so large a share lies."""
+    wanted = share * sum(histogram.values())
+    seen = 0
+    for lateness in sorted(histogram):
+        seen += histogram[lateness]
+        if seen >= wanted:
+            return lateness
+    raise ValueError("nothing was measured")
+
+
+def jitter(findings: Findings) -> Iterator[str]:
+    """Lateness of the loop beside that of cyclictest, as percentiles and as a histogram."""
+    both = (findings.lateness_of_loop(), findings.lateness_of_cyclictest())
+    if not all(both):
+        return
+    yield f"{'lateness [us]':>16} {'loop':>9} {'cyclictest':>11}"
+    for name, share in (("median", 0.5), ("90 %", 0.9), ("99 %", 0.99), ("99.9 %", 0.999)):
+        loop, bare = (percentile(each, share) for each in both)
+        yield f"{name:>16} {loop:9} {bare:11}"
+    yield f"{'longest':>16} {max(both[0]):9} {max(both[1]):11}"
+    edges = [0, 50, 100, 200, 500, 1000, 2000, 5000, 10000]
+    for low, high in zip(edges, [*edges[1:], None], strict=True):
+        loop, bare = (
+            sum(n for late, n in each.items() if late >= low and (high is None or late < high))
+            for each in both
+        )
+        span = f"{low} to {high}" if high is not None else f"{low} and more"
+        yield f"{span:>16} {loop:9} {bare:11}"
+
+
+def report(findings: Findings) -> Iterator[str]:
+    """What to show."""
+    yield f"kernel {findings.one('kernel')}"
+    yield from (f"{program}: {closing}" for program, _, closing in findings.tests())
+    yield from jitter(findings)
+    yield f"frontend: {findings.one('frontend:')}"
+    yield (
+        f"loop: {findings.one('loop:')} locked={findings.one('locked')} kB "
+        f"processors={findings.one('processors')}"
+    )
+
+
+def faults(console: Console, findings: Findings, programs: list[str]) -> Iterator[str]:
+    """What is wrong. Emulated time is slow: how late the loop was is no fault."""
+    if not console.powered_off or not findings.all("over"):
+        yield "the machine did not power off by itself"
+    if "Kernel panic" in console.text:
+        yield "the kernel panicked"
+    if "PREEMPT_RT" not in findings.one("kernel") or findings.one("realtime") != "1":
+        yield "the kernel is not PREEMPT_RT"
+    passed = {program for program, code, closing in findings.tests() if code == 0 and closing}
+    yield from (f"{program} failed" for program in programs if program not in passed)
+    ends = [each.split() for each in findings.all("ended")]
+    if ends != [["loop", "0"], ["frontend", "0"]]:
+        yield f"the loop and its frontend ended otherwise than in order: {findings.all('ended')}"
+    yield from (f"refused: {line}" for line in findings.all("refused"))
+    yield from faults_of_loop(findings)
+    if not findings.lateness_of_loop() or not findings.lateness_of_cyclictest():
+        yield "the lateness of the loop or of cyclictest is missing"
+
+
+def faults_of_loop(findings: Findings) -> Iterator[str]:
+    """The options must hold, seen from outside and inside; the loop takes nothing anew."""
+    loop = findings.account("loop:")
+    # the kernel counts real-time priorities downwards from 99
+    if (findings.one("policy"), findings.one("prio")) != (FIFO, str(99 - PRIORITY)):
+        yield "the loop was not scheduled at its class and priority, as the kernel sees it"
+    if (loop.get("policy"), loop.get("priority")) != (int(FIFO), PRIORITY):
+        yield "the loop was not scheduled at its class and priority, as it sees itself"
+    if int(findings.one("locked") or 0) == 0:
+        yield "the loop's memory was not locked"
+    if findings.one("processors") != "1":
+        yield "the loop was not kept on its processor"
+    for what in ("allocations", "minor_faults", "major_faults"):
+        if loop.get(what) != 0:
+            yield f"{what.replace('_', ' ')} in the loop: {loop.get(what, 'unknown')}"
+    if findings.account("frontend:").get("batches", 0) == 0:
+        yield "the frontend completed no batch"
