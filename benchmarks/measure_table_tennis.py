@@ -3,8 +3,9 @@
 import time
 from collections.abc import Callable
 from contextlib import ExitStack, closing
-from typing import Any
+from typing import Any, SupportsFloat
 
+import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,23 +15,33 @@ from plain_table_tennis import PlainEnvironment
 from sampling import built, rounds, sample, take_priority
 
 EPISODES = 3
-ARM_SEED = 1  # without noise at the start, any seed gives the same arm
 MOST_STEPS = 300
 
 Actions = NDArray[np.float32]
-Step = Callable[[Actions], tuple[NDArray[np.float32], float, bool, bool, Any]]
+Step = Callable[[Any], tuple[Any, SupportsFloat, bool, bool, Any]]
 
 
-def episode(step: Step, actions: Actions) -> tuple[float, int, list[NDArray[np.float32]]]:
-    """Time [s], steps, observations."""
-    seen = []
+Seen = list[tuple[NDArray[np.float32], SupportsFloat]]
+
+
+def episode(step: Step, actions: Actions) -> tuple[float, int, Seen]:
+    """Time [s], steps, observations and rewards."""
+    seen: Seen = []
     begin = time.perf_counter()
     for action in actions:
-        observation, _, terminated, truncated, _ = step(action)
-        seen.append(observation)
+        observation, reward, terminated, truncated, _ = step(action)
+        seen.append((observation, reward))
         if terminated or truncated:
             break
     return time.perf_counter() - begin, len(seen), seen
+
+
+def same(one: Seen, other: Seen) -> bool:
+    """Bit for bit."""
+    return len(one) == len(other) and all(
+        np.array_equal(a, b) and paid == owed
+        for (a, paid), (b, owed) in zip(one, other, strict=True)
+    )
 
 
 def main() -> None:
@@ -47,16 +58,20 @@ def main() -> None:
         library = built() / "lib" / "plain_table_tennis.so"
         plain = stack.enter_context(closing(PlainEnvironment(library, record)))
 
+        environments: dict[str, gymnasium.Env[Any, Any]] = {
+            "steps_plain": plain,
+            "steps_inline": inline,
+            "steps_processes": processes,
+        }
         for turn in range(rounds() + 1):
             flight = flights[turn % EPISODES]
-            plain.reset(flight, ARM_SEED)
-            results = {"steps_plain": episode(plain.step, actions)}
-            for name, env in (("steps_inline", inline), ("steps_processes", processes)):
+            results = {}
+            for name, env in environments.items():
                 env.reset(seed=1, options={"flight": flight})
                 results[name] = episode(env.step, actions)
             # the same experiment, or there is nothing to compare
             for name, (_, _, seen) in results.items():
-                if not np.array_equal(seen, results["steps_plain"][2]):
+                if not same(seen, results["steps_plain"][2]):
                     raise RuntimeError(f"{name} saw something else than the plain environment")
             if turn == 0:
                 continue  # everybody warms up

@@ -187,6 +187,22 @@ ROWS = (
         limit=3.0,
     ),
     Row(
+        name="memory-reserved",
+        row="a segment of 8 actuators and 1e5 rows, reserved",
+        budget="1.3 x rows and lanes",
+        program="memory",
+        measured="reserved",
+        limit=(1.3, "payload"),
+    ),
+    Row(
+        name="memory-resident",
+        row="the same, resident",
+        budget="1.3 x rows and lanes",
+        program="memory",
+        measured="resident",
+        limit=(1.3, "payload"),
+    ),
+    Row(
         name="table-tennis",
         row="accelerated table-tennis environment, inline",
         budget="0.9 x the same steps in one process without o80",

@@ -1,4 +1,4 @@
-// burst(1) there and back, beside a bare cache line's round trip.
+// burst(1) there and back, beside a bare cache line's round trip, and its work without any way.
 
 #include "empty_robot.hpp"
 #include "ping_pong.hpp"
@@ -21,6 +21,12 @@ void measure(int rounds) {
   burst_round_trip(frontend, 1000);
   PingPong line;
 
+  // the same calls, frontend's and backend's one after the other in one thread
+  const auto inline_robot = std::make_shared<InlineRobot>(
+      std::make_unique<Robot>(*robot_table<TwoEmpty>("empty"), OptionValues{}),
+      BackendOptions{.segment = name + "-inline", .bursting = true});
+  UntypedFrontend inline_frontend(name + "-inline", inline_robot);
+
   for (int round = 0; round < rounds; ++round) {
     line.rest(false);
     line.round_trip(1000);
@@ -28,6 +34,7 @@ void measure(int rounds) {
     line.rest(true);
     burst_round_trip(frontend, 200);
     sample("burst_1", "ns", burst_round_trip(frontend, 5000));
+    sample("burst_1_inline", "ns", burst_round_trip(inline_frontend, 5000));
   }
 }
 
