@@ -12,12 +12,19 @@ target_include_directories(
 
 file(GLOB o80_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/*/*.cpp)
 list(FILTER o80_sources EXCLUDE REGEX "/src/programs/")
-add_library(o80 SHARED ${o80_sources})
+if(O80_STATIC)
+  add_library(o80 STATIC ${o80_sources})
+  add_link_options(-static)
+else()
+  add_library(o80 SHARED ${o80_sources})
+endif()
 add_library(o80::o80 ALIAS o80)
 target_link_libraries(o80 PUBLIC o80_headers Threads::Threads PRIVATE ${CMAKE_DL_LIBS} o80_warnings)
 # no fused multiply-add: machines agree on every desired state, bit for bit
 target_compile_options(o80 PRIVATE -ffp-contract=off)
-target_link_options(o80 PRIVATE -Wl,--no-undefined)
+if(NOT O80_SANITIZE) # whose functions are in the program
+  target_link_options(o80 PRIVATE -Wl,--no-undefined)
+endif()
 if(NOT DEFINED SKBUILD) # a wheel has no symbolic links and would carry three copies
   set_target_properties(o80 PROPERTIES VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR})
 endif()

@@ -8,7 +8,9 @@ function(o80_add_robot name)
   target_compile_features(${name} PRIVATE cxx_std_20)
   target_link_libraries(${name} PRIVATE o80::headers)
   # a symbol that nobody defines is an error here, not when the robot is started
-  target_link_options(${name} PRIVATE -Wl,--no-undefined)
+  if(NOT O80_SANITIZE) # whose functions are in the program
+    target_link_options(${name} PRIVATE -Wl,--no-undefined)
+  endif()
   set_target_properties(
     ${name}
     PROPERTIES PREFIX ""

@@ -1,6 +1,6 @@
 # One test program for each folder of tests/cpp, named after it. A test finds the built programs
 # and robots below O80_TEST_PREFIX, laid out as when installed.
-find_package(GTest REQUIRED)
+include(cmake/googletest.cmake)
 include(GoogleTest)
 
 file(GLOB test_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tests/cpp/*/*_test.cpp)
@@ -11,6 +11,10 @@ foreach(source IN LISTS test_sources)
   list(APPEND test_folders ${folder})
 endforeach()
 list(REMOVE_DUPLICATES test_folders)
+if(O80_TEST_FOLDERS)
+  set(test_folders ${O80_TEST_FOLDERS})
+endif()
+set(test_targets)
 
 # tests are compiled for a quick build: what they test keeps its own options
 if(O80_SANITIZE)
@@ -19,13 +23,25 @@ else()
   set(test_options -O1 -g1)
 endif()
 
+# the control layer once more, with each look at a block counted
+file(GLOB control_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/control/*.cpp)
+add_library(o80_bounded OBJECT EXCLUDE_FROM_ALL ${control_sources})
+target_compile_definitions(o80_bounded PUBLIC O80_COUNT_BLOCKS)
+target_compile_options(o80_bounded PRIVATE -ffp-contract=off)
+target_link_libraries(o80_bounded PRIVATE o80_headers o80_warnings)
+
 foreach(folder IN LISTS test_folders)
   if(folder STREQUAL "mujoco" AND NOT TARGET mujoco::mujoco)
+    continue()
+  endif()
+  # it stands in front of shared libraries, as sanitizers do
+  if(folder STREQUAL "iteration" AND (O80_STATIC OR O80_SANITIZE))
     continue()
   endif()
   set(sources ${test_sources})
   list(FILTER sources INCLUDE REGEX "/tests/cpp/${folder}/")
   set(target o80_test_${folder})
+  list(APPEND test_targets ${target})
   add_executable(${target} ${sources})
   target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/tests/cpp ${PROJECT_SOURCE_DIR})
   target_compile_definitions(
@@ -33,6 +49,16 @@ foreach(folder IN LISTS test_folders)
     PRIVATE O80_TEST_PREFIX="${PROJECT_BINARY_DIR}" O80_TEST_SOURCE="${PROJECT_SOURCE_DIR}"
             O80_TEST_COMPILER="${CMAKE_CXX_COMPILER}"
   )
+  if(O80_SANITIZE)
+    target_compile_definitions(${target} PRIVATE O80_TEST_SANITIZED)
+  endif()
+  if(O80_SANITIZE STREQUAL "thread")
+    target_compile_definitions(${target} PRIVATE O80_TEST_THREAD_SANITIZED)
+  endif()
+  if(CMAKE_CROSSCOMPILING_EMULATOR)
+    list(JOIN CMAKE_CROSSCOMPILING_EMULATOR " " emulator)
+    target_compile_definitions(${target} PRIVATE O80_TEST_EMULATOR="${emulator}")
+  endif()
   target_compile_options(${target} PRIVATE ${test_options})
   target_link_libraries(${target} PRIVATE o80 o80_warnings GTest::gmock GTest::gtest GTest::gmock_main)
   # the parts of a robot that its tests look into, when the robot keeps them in a library
@@ -42,10 +68,36 @@ foreach(folder IN LISTS test_folders)
   if(o80_programs OR o80_robots)
     add_dependencies(${target} ${o80_programs} ${o80_robots})
   endif()
-  gtest_discover_tests(
-    ${target} DISCOVERY_MODE PRE_TEST TEST_PREFIX "${folder}." PROPERTIES TIMEOUT 120
-  )
+  if(CMAKE_CROSSCOMPILING)
+    # each start of an emulator is slow; what maps memory is tested with large pages too
+    set(pages 4096)
+    if(folder MATCHES "^(memory|runtime|robot)$")
+      list(APPEND pages 65536)
+    endif()
+    foreach(page IN LISTS pages)
+      add_test(NAME ${folder}.pages_of_${page} COMMAND ${target})
+      set_tests_properties(
+        ${folder}.pages_of_${page} PROPERTIES TIMEOUT 600 ENVIRONMENT QEMU_PAGESIZE=${page}
+      )
+    endforeach()
+  else()
+    gtest_discover_tests(
+      ${target} DISCOVERY_MODE PRE_TEST TEST_PREFIX "${folder}." PROPERTIES TIMEOUT 120
+    )
+  endif()
 endforeach()
+
+# the folders chosen, and what their tests start
+add_custom_target(o80-core-tests DEPENDS ${test_targets})
+
+# the machine with a real-time kernel runs these beside the tests
+if(O80_STATIC)
+  foreach(program o80-rt-loop o80-rt-frontend)
+    add_executable(${program} ${PROJECT_SOURCE_DIR}/tests/rt/${program}.cpp)
+    target_include_directories(${program} PRIVATE ${PROJECT_SOURCE_DIR}/tests/cpp)
+    target_link_libraries(${program} PRIVATE o80 o80_warnings)
+  endforeach()
+endif()
 
 # each C++ file of tests/processes is a program that the process tests start: bin/<stem>
 file(GLOB process_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tests/processes/*.cpp)
@@ -55,3 +107,5 @@ foreach(source IN LISTS process_sources)
   target_include_directories(${program} PRIVATE ${PROJECT_SOURCE_DIR})
   target_link_libraries(${program} PRIVATE o80 o80_warnings)
 endforeach()
+
+include(cmake/torture.cmake)

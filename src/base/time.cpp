@@ -9,13 +9,16 @@ namespace o80 {
 
 namespace {
 constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
-}
 
-std::int64_t monotonic_now() noexcept {
+std::int64_t read_clock(clockid_t clock) noexcept {
   timespec now;
-  clock_gettime(CLOCK_MONOTONIC, &now);
+  clock_gettime(clock, &now);
   return static_cast<std::int64_t>(now.tv_sec) * 1'000'000'000 + now.tv_nsec;
 }
+}  // namespace
+
+std::int64_t monotonic_now() noexcept { return read_clock(CLOCK_MONOTONIC); }
+std::int64_t monotonic_roughly_now() noexcept { return read_clock(CLOCK_MONOTONIC_COARSE); }
 
 Deadline::Deadline(Timeout timeout) noexcept : end_(kNever) {
   if (!timeout) return;

@@ -4,11 +4,13 @@
 #include <cmath>
 #include <utility>
 
+#include "o80/control/record_check.hpp"
+
 namespace o80 {
 
 ActuatorQueue::ActuatorQueue(const Schema& schema, const ActuatorRow& row,
                              const StateLayout& layout, BlockPool& pool, Ledger& ledger,
-                             std::byte* desired)
+                             std::byte* desired, std::uint32_t lanes)
     : layout_(&layout),
       pool_(&pool),
       ledger_(&ledger),
@@ -18,19 +20,9 @@ ActuatorQueue::ActuatorQueue(const Schema& schema, const ActuatorRow& row,
       carry_(schema.head.period),
       period_(static_cast<double>(schema.head.period) / 1e9),
       when_idle_(row.when_idle),
+      queue_(pool, lanes),
       mask_(mask_words(static_cast<std::uint32_t>(layout.numbers().size()))),
       scratch_((layout.size() + 7) / 8) {}
-
-void ActuatorQueue::append(BlockIndex first, BlockIndex last, std::uint32_t lane) noexcept {
-  if (head_ == kNoBlock) {
-    head_ = first;
-    lane_ = lane;
-  } else {
-    pool_->head(tail_).own[Own::kNext] = first;
-    if (lane_ != lane) lane_ = kSeveralLanes;
-  }
-  tail_ = last;
-}
 
 void ActuatorQueue::drop(Status status, Reason reason, Iteration iteration) noexcept {
   if (status != Status::overwritten) {
@@ -42,8 +34,7 @@ void ActuatorQueue::drop(Status status, Reason reason, Iteration iteration) noex
   }
   carry_.reset();
   running_ = false;
-  ledger_->drop(head_, status, reason, iteration);
-  head_ = tail_ = kNoBlock;
+  while (!queue_.empty()) ledger_->drop(queue_.take_any(), status, reason, iteration);
 }
 
 void ActuatorQueue::halt() noexcept {
@@ -54,26 +45,9 @@ void ActuatorQueue::halt() noexcept {
 
 void ActuatorQueue::drop_lane(std::uint32_t lane, Status status, Reason reason,
                               Iteration iteration) noexcept {
-  if (lane_ == lane) return drop(status, reason, iteration);
-  if (lane_ != kSeveralLanes) return;
-
-  // part the queue in two: what goes and what stays
-  BlockIndex gone = kNoBlock;
-  BlockIndex last_gone = kNoBlock;
-  BlockIndex next = head_;
-  if (running_ && ledger_->lane_of(head_) == lane) halt();
-  head_ = tail_ = kNoBlock;
-  while (next != kNoBlock) {
-    const BlockIndex record = next;
-    next = pool_->head(record).own[Own::kNext];
-    const bool goes = ledger_->lane_of(record) == lane;
-    BlockIndex& first = goes ? gone : head_;
-    BlockIndex& last = goes ? last_gone : tail_;
-    (first == kNoBlock ? first : pool_->head(last).own[Own::kNext]) = record;
-    last = record;
-    pool_->head(record).own[Own::kNext] = kNoBlock;
-  }
-  ledger_->drop(gone, status, reason, iteration);
+  if (running_ && queue_.front_lane() == lane) halt();
+  ledger_->drop(queue_.take(lane), status, reason, iteration);
+  if (queue_.empty()) halt();
 }
 
 ActuatorQueue::Moved ActuatorQueue::step(Iteration iteration, const std::byte* observed,
@@ -96,9 +70,9 @@ ActuatorQueue::Moved ActuatorQueue::step(Iteration iteration, const std::byte* o
 }
 
 void ActuatorQueue::end_running(Iteration iteration) noexcept {
-  const BlockIndex record = head_;
+  const BlockIndex record = queue_.front();
   running_ = false;
-  pop();
+  queue_.pop();
   if (clamped_) {
     ledger_->end(record, Status::limited, Reason::limits, 0, iteration);
   } else {
@@ -106,48 +80,45 @@ void ActuatorQueue::end_running(Iteration iteration) noexcept {
   }
 }
 
-void ActuatorQueue::pop() noexcept {
-  head_ = pool_->head(head_).own[Own::kNext];
-  if (head_ == kNoBlock) tail_ = kNoBlock;
-}
-
 bool ActuatorQueue::begin_next(Iteration iteration, const std::byte* observed,
                                std::uint32_t& late_budget) noexcept {
   // skip what was to end before now
-  while (head_ != kNoBlock) {
-    const RecordHead& late = pool_->head(head_);
+  while (!queue_.empty()) {
+    const RecordHead& late = pool_->head(queue_.front());
     if (late.pace != Pace::until || late.amount >= iteration) break;
     if (late_budget == 0) return false;
     --late_budget;
     carry_.reset();
-    const BlockIndex record = head_;
-    pop();
+    const BlockIndex record = queue_.front();
+    queue_.pop();
     ledger_->end(record, Status::rejected, Reason::late, 0, iteration);
   }
-  if (head_ == kNoBlock) return false;
+  if (queue_.empty()) return false;
 
   // mask, times and rows of the command lie behind its head
-  const RecordHead& head = pool_->head(head_);
-  rows_ = Cursor(*pool_, head_, sizeof(RecordHead), head.payload_bytes);
+  const BlockIndex record = queue_.front();
+  const RecordHead& head = pool_->head(record);
+  rows_ = Cursor(*pool_, record, sizeof(RecordHead), head.payload_bytes);
   partial_ = head.partial != 0;
   if (partial_) rows_.read(mask_.data(), mask_.size() * sizeof mask_.front());
   timed_ = head.pace == Pace::duration && head.rows > 1;
   time_ = 0;
   if (timed_) {
+    // the check has noted where the rows begin
     times_ = rows_;
-    rows_.skip(std::uint64_t{head.rows} * sizeof time_);
+    rows_ = rows_of_timed(*pool_, head, layout_->size());
   }
   rows_left_ = head.rows;
   first_row_ = true;
   running_ = true;
   clamped_ = false;
-  ledger_->activate(head_, iteration);
+  ledger_->activate(record, iteration);
   begin_row(iteration, observed);
   return true;
 }
 
 void ActuatorQueue::begin_row(Iteration iteration, const std::byte* observed) noexcept {
-  const RecordHead& head = pool_->head(head_);
+  const RecordHead& head = pool_->head(queue_.front());
   const std::uint64_t* mask = partial_ ? mask_.data() : nullptr;
 
   // desired or observed => from

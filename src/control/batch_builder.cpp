@@ -44,6 +44,7 @@ std::uint32_t BatchBuilder::command(const RecordHead& head, std::span<const std:
   assert(times.empty() || (times.size() == rows && head.pace == Pace::duration));
   RecordHead written = head;
   written.kind = RecordKind::command;
+  has_commands_ = true;
   written.partial = mask.empty() ? 0 : 1;
   written.rows = rows;
   std::byte* bytes = open(written, mask.size_bytes() + times.size_bytes() + states.size_bytes());
@@ -107,6 +108,7 @@ void BatchBuilder::set_ticket(std::uint64_t ticket) noexcept {
 void BatchBuilder::clear() {
   blocks_.resize(1);
   records_ = 0;
+  has_commands_ = false;
 }
 
 }  // namespace o80

@@ -31,7 +31,7 @@ BatchPlanner::BatchPlanner(const Schema& schema, RecordCheck::Layouts layouts, B
 void BatchPlanner::begin(Lane& lane, BlockIndex batch) noexcept {
   lane.batch = batch;
   lane.cursor = pool_.next(batch);
-  lane.last = kNoBlock;
+  lane.begun = false;
   lane.last_step = kNoBlock;
   lane.invalid = kNoBlock;
   lane.place = 0;
@@ -46,7 +46,8 @@ bool BatchPlanner::check(std::uint32_t lane_index, BlockIndex batch,
   Lane& lane = lanes_[lane_index];
   if (lane.batch != batch) begin(lane, batch);
   const BatchRecord& record = pool_.batch(batch);
-  if (record.kind != RecordKind::batch || record.records >= record.blocks) {
+  if (record.kind != RecordKind::batch || record.records >= record.blocks ||
+      record.blocks != pool_.chain(batch).blocks) {
     lane.batch = kNoBlock;
     known_[batch] = Known::garbage;
     return true;
@@ -59,55 +60,79 @@ bool BatchPlanner::check(std::uint32_t lane_index, BlockIndex batch,
 }
 
 void BatchPlanner::complete(Lane& lane) noexcept {
+  const BlockChain chain = pool_.chain(lane.batch);
   BatchRecord& record = record_of(pool_, lane.batch);
   record.own[kMissingFrom] = lane.place;
-  for (BlockIndex spare = lane.cursor; spare != kNoBlock; spare = pool_.next(spare)) {
-    if (record.own[kSpareBlocks]++ == 0) record.own[kSpareFirst] = spare;
-    record.own[kSpareLast] = spare;
-  }
-  const bool whole = lane.blocks + record.own[kSpareBlocks] == record.blocks;
-  known_[lane.batch] = whole ? Known::plan : Known::garbage;
+  record.own[kSpareFirst] = lane.cursor;
+  record.own[kSpareLast] = chain.last;
+  record.own[kSpareBlocks] = chain.blocks - lane.blocks;
+  known_[lane.batch] = Known::plan;
   lane.batch = kNoBlock;
 }
 
-RecordCheck::Verdict BatchPlanner::begin_record(Lane& lane) noexcept {
-  // the blocks it says it has, as far as they are there
+void BatchPlanner::begin_record(Lane& lane) noexcept {
+  using Verdict = RecordCheck::Verdict;
   const RecordHead& head = pool_.head(lane.cursor);
+  const BlockChain chain = pool_.chain(lane.batch);
   const std::uint64_t claimed = blocks_of(head.payload_bytes);
+  const std::uint32_t there = chain.blocks - lane.blocks;
+  lane.begun = true;
   lane.last = lane.cursor;
-  lane.record_blocks = 1;
-  while (lane.record_blocks < claimed && pool_.next(lane.last) != kNoBlock) {
-    lane.last = pool_.next(lane.last);
-    ++lane.record_blocks;
+  lane.to_walk = 0;
+  if (claimed > there) {
+    // it has what is left
+    lane.verdict = Verdict::invalid;
+    lane.record_blocks = there;
+    lane.last = chain.last;
+    return;
   }
-  const CommandId id = record_id(pool_.batch(lane.batch).id, lane.place);
-  if (lane.record_blocks < claimed || head.id != id) return RecordCheck::Verdict::invalid;
-  return check_.begin(pool_, lane.cursor, lane.progress);
+  lane.record_blocks = static_cast<std::uint32_t>(claimed);
+  if (head.id != record_id(pool_.batch(lane.batch).id, lane.place)) {
+    lane.verdict = Verdict::invalid;
+    lane.to_walk = lane.record_blocks - 1;
+    return;
+  }
+  lane.verdict = check_.begin(pool_, lane.cursor, lane.progress);
+  if (lane.verdict != Verdict::unfinished) stop_reading(lane);
+}
+
+/// The check is done: the record ends where it has read to, or so many blocks later.
+void BatchPlanner::stop_reading(Lane& lane) noexcept {
+  const Cursor& payload = lane.progress.payload;
+  const std::uint64_t here = kBlockBytes - payload.offset();
+  const std::uint64_t behind = payload.left() > here ? payload.left() - here : 0;
+  lane.last = payload.block();
+  lane.to_walk = static_cast<std::uint32_t>((behind + kBlockBytes - 1) / kBlockBytes);
 }
 
 bool BatchPlanner::check_record(std::uint32_t lane_index, std::uint32_t& budget) noexcept {
   using Verdict = RecordCheck::Verdict;
   Lane& lane = lanes_[lane_index];
-  Verdict verdict = Verdict::unfinished;
-  if (lane.last == kNoBlock) {
-    verdict = begin_record(lane);
+  if (!lane.begun) {
+    begin_record(lane);
     --budget;
   }
-  if (verdict == Verdict::unfinished) {
-    verdict = check_.go_on(pool_, lane.cursor, lane.progress, budget);
-    if (verdict == Verdict::unfinished) return false;
+  if (lane.verdict == Verdict::unfinished) {
+    lane.verdict = check_.go_on(pool_, lane.cursor, lane.progress, budget);
+    if (lane.verdict == Verdict::unfinished) return false;
+    stop_reading(lane);
+  }
+  for (; lane.to_walk > 0; --lane.to_walk, --budget) {
+    if (budget == 0) return false;
+    lane.last = pool_.next(lane.last);
   }
   RecordHead& head = pool_.head(lane.cursor);
-  if (verdict == Verdict::invalid) {
+  if (lane.verdict == Verdict::invalid) {
     head.kind = kInvalidRecord;
     head.id = record_id(pool_.batch(lane.batch).id, lane.place);
     head.payload_bytes =
         static_cast<std::uint32_t>(lane.record_blocks * kBlockBytes - sizeof(RecordHead));
   }
+  if (is_timed(head)) note_rows(head, lane.progress.rows);
   head.own = {kNoBlock, lane.batch, lane.last, kNoBlock};
   add(lane_index, lane.cursor);
   lane.cursor = pool_.next(lane.last);
-  lane.last = kNoBlock;
+  lane.begun = false;
   lane.blocks += lane.record_blocks;
   ++lane.place;
   return true;

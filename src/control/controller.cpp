@@ -119,7 +119,8 @@ Controller::Body::Body(const Schema& schema, BlockPool& blocks, StatusSink& sink
   for (std::uint32_t i = 0; i < count; ++i) {
     const ActuatorRow& row = schema.actuators[i];
     offsets_.push_back(row.offset);
-    actuators_.emplace_back(schema, row, *layouts_[row.type], pool, ledger, block + row.offset);
+    actuators_.emplace_back(schema, row, *layouts_[row.type], pool, ledger, block + row.offset,
+                            lanes);
     busy_[i / 64] |= std::uint64_t{1} << (i % 64);
     if (row.when_idle == WhenIdle::follow) follow_[i / 64] |= std::uint64_t{1} << (i % 64);
   }

@@ -61,12 +61,9 @@ void Ledger::reject_from(BlockIndex block, std::uint32_t place, Reason reason, s
 void Ledger::reject(std::uint32_t lane, BlockIndex block, Reason reason, std::uint8_t aux,
                     Iteration iteration) noexcept {
   // how many blocks there really are decides how many records there can be
-  BlockChain spare;
-  for (BlockIndex next = pool_.next(block); next != kNoBlock; next = pool_.next(next)) {
-    if (spare.blocks == 0) spare.first = next;
-    spare.last = next;
-    ++spare.blocks;
-  }
+  BlockChain spare = pool_.chain(block);
+  spare.first = pool_.next(block);
+  --spare.blocks;
   const BatchRecord record = pool_.batch(block);
   TakenBatch taken;
   taken.end = Status::rejected;

@@ -65,8 +65,14 @@ void Motion::begin(Iteration first, std::int64_t iterations, Profile profile, Pa
   pace_ = pace;
   quintic_ = moving_ && profile == Profile::minimum_jerk;
   moving_ = false;
-  if (iterations == 1 && pace == Pace::direct) return;  // nothing lies between
+  measured_ = false;
+  if (iterations > 1) measure();  // else nothing lies between
+}
 
+/// The ways of all numbers; asked for as late as possible, for most rows of one iteration need
+/// none.
+void Motion::measure() noexcept {
+  measured_ = true;
   const auto& numbers = layout_.numbers();
   for (std::size_t i = 0; i < numbers.size(); ++i) {
     if (!numbers[i].moves()) continue;
@@ -166,6 +172,7 @@ void Motion::mixed_state(double share, double time, std::byte* out) const noexce
 void Motion::keep_moving() noexcept {
   moving_ = pace_ != Pace::direct && layout_.hooks().blend == nullptr;
   if (!moving_) return;
+  if (!measured_) measure();
   const double time = std::min(1.0, static_cast<double>(now_ - first_ + 1) / iterations_);
   const bool linear = profile_ == Profile::linear;
   const QuinticWeights slope = QuinticWeights::slope(time);

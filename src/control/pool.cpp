@@ -11,7 +11,8 @@
 
 namespace o80 {
 
-BlockPool::BlockPool(std::uint32_t blocks) : size_(blocks), available_(blocks), next_(blocks) {
+BlockPool::BlockPool(std::uint32_t blocks)
+    : size_(blocks), available_(blocks), next_(blocks), ends_(blocks) {
   if (blocks == 0 || blocks == kNoBlock) {
     throw InvalidArgument("a pool of " + std::to_string(blocks) +
                           " blocks cannot be: give it 1 to " + std::to_string(kNoBlock - 1));
@@ -36,7 +37,8 @@ BlockPool::BlockPool(BlockPool&& other) noexcept
       size_(std::exchange(other.size_, 0)),
       available_(std::exchange(other.available_, 0)),
       free_(std::exchange(other.free_, kNoBlock)),
-      next_(std::move(other.next_)) {}
+      next_(std::move(other.next_)),
+      ends_(std::move(other.ends_)) {}
 
 BlockPool::~BlockPool() {
   if (blocks_ != nullptr) munmap(blocks_, std::size_t{size_} * kBlockBytes);
@@ -62,20 +64,6 @@ bool Cursor::read(void* out, std::size_t bytes) noexcept {
     offset_ += static_cast<std::uint32_t>(here);
   }
   return true;
-}
-
-void Cursor::skip(std::uint64_t bytes) noexcept {
-  bytes = std::min(bytes, left_);
-  left_ -= bytes;
-  while (bytes > 0) {
-    if (offset_ == kBlockBytes) {
-      block_ = pool_->next(block_);
-      offset_ = 0;
-    }
-    const std::uint64_t here = std::min<std::uint64_t>(bytes, kBlockBytes - offset_);
-    bytes -= here;
-    offset_ += static_cast<std::uint32_t>(here);
-  }
 }
 
 }  // namespace o80

@@ -31,6 +31,17 @@ bool sane_pace(const RecordHead& head) noexcept {
 
 }  // namespace
 
+void note_rows(RecordHead& head, const Cursor& rows) noexcept {
+  head.amount = static_cast<std::int64_t>(std::uint64_t{rows.offset()} << 32 | rows.block());
+}
+
+Cursor rows_of_timed(const BlockPool& pool, const RecordHead& head,
+                     std::uint32_t row_bytes) noexcept {
+  const auto noted = static_cast<std::uint64_t>(head.amount);
+  return {pool, static_cast<BlockIndex>(noted & 0xFFFFFFFF),
+          static_cast<std::uint32_t>(noted >> 32), std::uint64_t{head.rows} * row_bytes};
+}
+
 RecordCheck::RecordCheck(const Schema& schema, Layouts layouts) : layouts_(std::move(layouts)) {
   std::uint32_t size = 0;
   std::size_t numbers = 0;
@@ -110,6 +121,7 @@ RecordCheck::Verdict RecordCheck::go_on(const BlockPool& pool, BlockIndex block,
     if (time < progress.time || time > kLongestDuration) return Verdict::invalid;
     progress.time = time;
     bytes_left -= sizeof time;
+    progress.rows = progress.payload;
   }
   auto* state = reinterpret_cast<std::byte*>(state_.data());
   for (; progress.rows_left > 0 && bytes_left > 0; --progress.rows_left) {
@@ -121,7 +133,7 @@ RecordCheck::Verdict RecordCheck::go_on(const BlockPool& pool, BlockIndex block,
   return progress.rows_left > 0 ? Verdict::unfinished : Verdict::valid;
 }
 
-RecordCheck::Verdict RecordCheck::check_request(const RecordHead& head, Cursor payload) noexcept {
+RecordCheck::Verdict RecordCheck::check_request(const RecordHead& head, Cursor& payload) noexcept {
   if (head.actuator >= request_types_.size()) return Verdict::invalid;
   const std::uint32_t type = request_types_[head.actuator];
   const StateLayout* layout = type == kNoType ? nullptr : layouts_[type];

@@ -80,6 +80,13 @@ bool StateLayout::proper(const std::byte* state, const std::uint64_t* mask) cons
 }
 
 bool StateLayout::finite(const std::byte* state, const std::uint64_t* mask) const noexcept {
+  if (plain_ && mask == nullptr) {
+    bool all = true;
+    for (std::uint32_t at = 0; at < size_; at += sizeof(double)) {
+      all = all && std::isfinite(load<double>(state + at));
+    }
+    return all;
+  }
   for (std::size_t i = 0; i < numbers_.size(); ++i) {
     if (!masked(mask, i)) continue;
     const std::byte* at = state + numbers_[i].offset;

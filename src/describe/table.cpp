@@ -37,6 +37,32 @@ void each_table(SchemaLike& schema, Visit&& visit) {
   throw InvalidArgument("the description cannot be used: " + why);
 }
 
+/// Whether other programs can read it as text: no byte out of place, no character twice as long as
+/// it needs, none that is no character.
+bool is_utf8(std::string_view text) {
+  for (std::size_t i = 0; i < text.size();) {
+    const auto first = static_cast<unsigned char>(text[i]);
+    const std::size_t more = first < 0x80   ? 0
+                             : first < 0xC2 ? 4
+                             : first < 0xE0 ? 1
+                             : first < 0xF0 ? 2
+                             : first < 0xF5 ? 3
+                                            : 4;
+    if (more == 4 || i + more >= text.size()) return false;
+    std::uint32_t code = more == 0 ? first : first & (0x3FU >> more);
+    for (std::size_t k = 1; k <= more; ++k) {
+      const auto next = static_cast<unsigned char>(text[i + k]);
+      if ((next & 0xC0) != 0x80) return false;
+      code = code << 6 | (next & 0x3F);
+    }
+    constexpr std::uint32_t kShortest[] = {0, 0x80, 0x800, 0x10000};
+    if (code < kShortest[more] || code > 0x10FFFF || (code >= 0xD800 && code < 0xE000))
+      return false;
+    i += more + 1;
+  }
+  return true;
+}
+
 template <class Row>
 void check_text(const Row& text, const char* what) {
   for (const char c : text.view()) {
@@ -45,6 +71,7 @@ void check_text(const Row& text, const char* what) {
     }
   }
   if (text.chars.back() != 0) refuse(std::string(what) + " has no end");
+  if (!is_utf8(text.view())) refuse(std::string(what) + " is no UTF-8");
 }
 
 void check_field(const Schema& schema, std::uint32_t type_index, const FieldRow& field) {
@@ -194,6 +221,12 @@ void check(const Schema& schema) {
   }
   for (const LabelRow& label : schema.labels) check_text(label.name, "a label");
   check_actuators(schema, numbers);
+  // also of those that belong to no actuator: a schema equals itself
+  for (const LimitRow& limit : schema.limits) {
+    if (std::isnan(limit.minimum) || std::isnan(limit.maximum) || std::isnan(limit.speed)) {
+      refuse("a limit is not a number");
+    }
+  }
   check_groups(schema);
   if (schema.requests.size() >= kMostActuators) refuse("there are too many requests");
   std::set<std::string_view> names;

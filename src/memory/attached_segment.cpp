@@ -194,7 +194,7 @@ void AttachedSegment::throw_gone(Life life) const {
 }
 
 void AttachedSegment::throw_if_known_gone() const {
-  const std::int64_t now = monotonic_now();
+  const std::int64_t now = monotonic_roughly_now();
   const bool fresh = now - asked_.load(std::memory_order_relaxed) < kKnownFor;
   if (fresh && !has_ended()) return check_process();
   throw_if_gone();

@@ -26,7 +26,9 @@ bool is_byte_locked(int descriptor, std::uint64_t byte) noexcept {
 
 LockFile LockFile::open(const std::string& path, int flags, mode_t permission) {
   LockFile file;
-  file.descriptor_ = open_for_this_process(path.c_str(), flags | O_CLOEXEC, permission);
+  // what bears the name may be a pipe or a device: opening it must neither wait nor take it over
+  file.descriptor_ =
+      open_for_this_process(path.c_str(), flags | O_CLOEXEC | O_NONBLOCK | O_NOCTTY, permission);
   return file;
 }
 

@@ -6,6 +6,7 @@
 
 #include "o80/base/crash_point.hpp"
 #include "o80/memory/atomic_words.hpp"
+#include "o80/memory/prefetch.hpp"
 
 // The thread sanitizer does not model fences; every word they order is atomic, so it has nothing
 // to report either.
@@ -14,6 +15,14 @@
 #endif
 
 namespace o80 {
+
+namespace {
+
+// further than any backend comes; what a damaged file says is cut to it, and never overflows
+constexpr Iteration kFarthest = Iteration{1} << 60;
+constexpr int kTries = 100;  // of a row that is overtaken without the writer moving on
+
+}  // namespace
 
 HistoryWriter::HistoryWriter(const SegmentView& view) noexcept
     : counters_(&view.counters()),
@@ -34,6 +43,15 @@ void HistoryWriter::publish(Iteration k, const std::byte* row) noexcept {
   O80_CRASH_POINT("history.after_published");
 }
 
+void HistoryWriter::expect(Iteration k) const noexcept {
+  constexpr std::size_t kMost = 512;  // from there on the processor sees where the stores go
+  prefetch_to_write(&counters_->begun);
+  const std::byte* slot = slots_begin_ + static_cast<std::uint64_t>(k) % slots_ * row_bytes_;
+  const std::size_t bytes = std::min(row_bytes_, kMost);
+  for (std::size_t at = 0; at < bytes; at += kLineBytes) prefetch_to_write(slot + at);
+  prefetch_to_write(slot + bytes - 1);
+}
+
 HistoryReader::HistoryReader(const SegmentView& view) noexcept
     : counters_(&view.counters()),
       slots_begin_(view.history()),
@@ -41,7 +59,24 @@ HistoryReader::HistoryReader(const SegmentView& view) noexcept
       slots_(view.shape.slots) {}
 
 Iteration HistoryReader::published() const noexcept {
-  return counters_->published.load(std::memory_order_acquire);  // sync published
+  const Iteration k = counters_->published.load(std::memory_order_acquire);  // sync published
+  return std::clamp<Iteration>(k, -1, kFarthest);
+}
+
+Iteration HistoryReader::begun() const noexcept {
+  return std::clamp<Iteration>(counters_->begun.load(std::memory_order_relaxed), -1, kFarthest);
+}
+
+bool HistoryReader::is_damaged() const noexcept {
+  // a writer is one row ahead at most; who reads both has to see it standing still
+  for (int i = 0; i < kTries; ++i) {
+    const Iteration before = published();
+    std::atomic_thread_fence(std::memory_order_seq_cst);
+    const Iteration under_way = begun();
+    std::atomic_thread_fence(std::memory_order_seq_cst);
+    if (under_way <= before + 1 || published() != before) return false;
+  }
+  return true;
 }
 
 Iteration HistoryReader::oldest() const noexcept {
@@ -54,7 +89,7 @@ const std::byte* HistoryReader::slot(Iteration k) const noexcept {
 
 Iteration HistoryReader::first_true() const noexcept {
   std::atomic_thread_fence(std::memory_order_acquire);  // sync row
-  return counters_->begun.load(std::memory_order_relaxed) - static_cast<Iteration>(slots_) + 1;
+  return begun() - static_cast<Iteration>(slots_) + 1;
 }
 
 bool HistoryReader::read(Iteration k, std::byte* to) const noexcept {
@@ -64,18 +99,23 @@ bool HistoryReader::read(Iteration k, std::byte* to) const noexcept {
 }
 
 Iteration HistoryReader::latest(std::byte* to) const noexcept {
-  while (true) {
+  Iteration last = -1;
+  for (int tries = 0; tries < kTries;) {
     const Iteration k = published();
     if (k < 0) return -1;
     load_words(to, slot(k), row_bytes_);
     if (k >= first_true()) return k;
+    // overtaken: a living writer has published since
+    tries = k == last ? tries + 1 : 0;
+    last = k;
   }
+  return -1;
 }
 
 HistoryReader::Range HistoryReader::read_range(Iteration first, std::size_t count,
                                                std::byte* to) const noexcept {
   const Iteration newest = published();
-  const auto behind = static_cast<std::uint64_t>(std::max<Iteration>(0, -first));
+  const std::uint64_t behind = first < 0 ? -static_cast<std::uint64_t>(first) : 0;
   if (count <= behind) return {0, 0};
   const Iteration begin = std::max(first, oldest());
   if (begin > newest) return {begin, 0};

@@ -77,8 +77,12 @@ void LaneReceiver::set_message(std::uint64_t id, std::string_view text) noexcept
   slot.id.store(id, std::memory_order_release);  // sync message
 }
 
-void LaneReceiver::set_staged(std::uint64_t id) noexcept {
+void LaneReceiver::set_staged(std::uint64_t id, std::uint64_t ids_end) noexcept {
+  ids_ = std::max(ids_, ids_end);
+  feedback_->ids.store(ids_, std::memory_order_relaxed);
+  O80_CRASH_POINT("staged.before");
   feedback_->staged.store(id, std::memory_order_release);  // sync staged
+  O80_CRASH_POINT("staged.after");
 }
 
 void LaneReceiver::set_ended(std::uint64_t id) noexcept {
@@ -90,8 +94,10 @@ namespace {
 
 void write_burst(BurstSlot& slot, std::uint64_t id, Iteration row) noexcept {
   slot.id.store(0, std::memory_order_relaxed);
+  O80_CRASH_POINT("burst.before_row");
   slot.row.store(row, std::memory_order_release);  // sync burst_row
-  slot.id.store(id, std::memory_order_release);    // sync burst
+  O80_CRASH_POINT("burst.before_id");
+  slot.id.store(id, std::memory_order_release);  // sync burst
 }
 
 }  // namespace
@@ -106,12 +112,14 @@ void LaneReceiver::set_burst_done(std::uint64_t id, Iteration row) noexcept {
   flag();
 }
 
-void LaneReceiver::flush() noexcept {
+bool LaneReceiver::flush() noexcept {
   if (freed_ != freed_published_) {
     freed_published_ = freed_;
+    O80_CRASH_POINT("lane.before_freed");
     feedback_->freed.store(freed_, std::memory_order_release);  // sync freed
+    O80_CRASH_POINT("lane.after_freed");
   }
-  if (!flagged_) return;
+  if (!flagged_) return false;
   flagged_ = false;
 
   // the flag is taken down before the events move: who raises it later has seen them or sees them
@@ -121,25 +129,25 @@ void LaneReceiver::flush() noexcept {
   O80_CRASH_POINT("events.before");
   feedback_->events.fetch_add(1, std::memory_order_seq_cst);  // sync events
   O80_CRASH_POINT("events.after");
-  sleepers = sleepers || waiting.load(std::memory_order_seq_cst) != 0;  // sync waiting
-  if (sleepers) futex_wake(feedback_->events, kEverybody);
+  return sleepers || waiting.load(std::memory_order_seq_cst) != 0;  // sync waiting
 }
 
 std::uint64_t LaneReceiver::incarnation() const noexcept {
-  return page_->incarnation.load(std::memory_order_acquire);  // sync incarnation
+  return page_->incarnation.load(std::memory_order_acquire) & kIncarnations;  // sync incarnation
 }
 
 std::uint64_t LaneReceiver::closed() const noexcept {
-  return page_->closed.load(std::memory_order_acquire);  // sync closed
+  return page_->closed.load(std::memory_order_acquire) & kIncarnations;  // sync closed
 }
 
 std::uint64_t LaneReceiver::dead_predecessor() const noexcept {
   const std::uint64_t present = incarnation();
-  return present > 1 && closed() < present - 1 ? present - 1 : 0;
+  const std::uint64_t lost = page_->lost.load(std::memory_order_relaxed) & kIncarnations;
+  return lost < present ? lost : 0;
 }
 
 bool LaneReceiver::next_is_of_dead() const noexcept {
-  // what the present owner found committed is not its own
+  // what the heir of the last dead one found committed is not its own, nor of those after it
   return dead_predecessor() != 0 &&
          static_cast<std::int64_t>(cursor_ - page_->began.load(std::memory_order_relaxed)) < 0;
 }
@@ -181,9 +189,18 @@ std::optional<std::uint32_t> LaneReceivers::next() noexcept {
   return first;
 }
 
-void LaneReceivers::flush_events() noexcept {
+bool LaneReceivers::announce() noexcept {
+  bool sleepers = false;
   for (LaneReceiver& lane : lanes_)
-    if (lane.has_news()) lane.flush();
+    if (lane.has_news()) sleepers = lane.flush() || sleepers;
+  // after the events: who read the old value before it raised its flag does not sleep on it
+  if (sleepers)
+    view_.counters().lane_wake.fetch_add(1, std::memory_order_seq_cst);  // sync lane_wake
+  return sleepers;
+}
+
+void LaneReceivers::flush_events() noexcept {
+  if (announce()) futex_wake(view_.counters().lane_wake, kEverybody);
 }
 
 }  // namespace o80

@@ -6,8 +6,10 @@
 
 #include "o80/base/crash_point.hpp"
 #include "o80/base/error.hpp"
+#include "o80/base/printable.hpp"
 #include "o80/memory/atomic_words.hpp"
 #include "o80/memory/futex.hpp"
+#include "o80/memory/prefetch.hpp"
 #include "o80/memory/segment_file.hpp"
 
 namespace o80 {
@@ -15,12 +17,13 @@ namespace o80 {
 namespace {
 
 constexpr int kTries = 1000;  // of a status that is being written
+constexpr std::uint32_t kDrawsUnasked = 64;
 
 std::string holders(const SegmentView& view) {
   std::string text;
   for (std::uint32_t i = 0; i < view.shape.lanes; ++i) {
     const LaneSenderPage& page = view.lane(i);
-    text += (i == 0 ? "" : ", ") + load_text(page.owner, std::size(page.owner));
+    text += (i == 0 ? "" : ", ") + printable(load_text(page.owner, std::size(page.owner)));
   }
   return text;
 }
@@ -40,6 +43,7 @@ LaneSender::LaneSender(const AttachedSegment& segment) : segment_(&segment), vie
                  ". Close one of these frontends, or start the backend with more lanes.");
 
   // ours: writable through the descriptor that bears no lock
+  O80_CRASH_POINT("lane.after_lock");
   const std::uint64_t offset = view_.offsets.lanes + lane_ * view_.offsets.lane_stride;
   Mapping::make_writable(view_.base, segment.descriptor(), offset, view_.offsets.lane_stride);
   page_ = &view_.lane(lane_);
@@ -49,13 +53,22 @@ LaneSender::LaneSender(const AttachedSegment& segment) : segment_(&segment), vie
 
   // go on where the last owner left off
   sent_ = page_->committed.load(std::memory_order_relaxed);
-  if (page_->next_id.load(std::memory_order_relaxed) == 0)
-    page_->next_id.store(1, std::memory_order_relaxed);
+  // its ids too, unless it wrote nonsense there
+  const std::uint64_t taken =
+      std::max<std::uint64_t>(1, feedback_->ids.load(std::memory_order_relaxed));
+  if (page_->next_id.load(std::memory_order_relaxed) - taken > kLeap / 2)
+    page_->next_id.store(taken, std::memory_order_relaxed);
+  next_id_ = page_->next_id.load(std::memory_order_relaxed);
   store_text(page_->owner, std::size(page_->owner),
              "pid " + std::to_string(getpid()) + " (" + own_program() + ")");
-  page_->began.store(sent_, std::memory_order_relaxed);
   O80_CRASH_POINT("lane.before_incarnation");
   incarnation_ = page_->incarnation.load(std::memory_order_relaxed) + 1;
+  // whoever held the lane before and did not close it is dead: this one may be gone before anybody
+  // asks, so it says so for good
+  if (page_->closed.load(std::memory_order_relaxed) < incarnation_ - 1) {
+    page_->began.store(sent_, std::memory_order_relaxed);
+    page_->lost.store(incarnation_ - 1, std::memory_order_relaxed);
+  }
   page_->incarnation.store(incarnation_, std::memory_order_release);  // sync incarnation
   O80_CRASH_POINT("lane.after_incarnation");
 
@@ -74,6 +87,8 @@ LaneSender::LaneSender(LaneSender&& other) noexcept
       transport_(other.transport_),
       incarnation_(other.incarnation_),
       sent_(other.sent_),
+      next_id_(other.next_id_),
+      draws_(other.draws_),
       guard_(other.guard_) {}
 
 LaneSender::~LaneSender() { give_back(); }
@@ -93,10 +108,14 @@ std::uint32_t LaneSender::free_blocks() const noexcept {
   return in_flight > blocks() ? 0 : blocks() - static_cast<std::uint32_t>(in_flight);
 }
 
-std::uint64_t LaneSender::next_ids(std::uint64_t n) noexcept {
-  const std::uint64_t first = page_->next_id.load(std::memory_order_relaxed);
-  page_->next_id.store(first + n, std::memory_order_relaxed);
-  return first;
+void LaneSender::draw_ids(std::uint64_t next) noexcept {
+  O80_CRASH_POINT("lane.before_ids");
+  next_id_ = std::max(next, next_id_);
+  // nobody else draws them, unless a former owner goes on writing: the backend, which may be
+  // writing on that very line, is asked now and then
+  if (++draws_ % kDrawsUnasked == 0)
+    next_id_ = std::max(next_id_, feedback_->ids.load(std::memory_order_relaxed));
+  page_->next_id.store(next_id_, std::memory_order_relaxed);
 }
 
 std::uint64_t LaneSender::send(std::span<const std::byte> batch, std::size_t ticket_offset) {
@@ -134,11 +153,13 @@ std::uint64_t LaneSender::send(std::span<const std::byte> batch, std::size_t tic
   page_->committed.store(sent_, std::memory_order_release);  // sync lane
   O80_CRASH_POINT("lane.after_commit");
   ring_bell(view_);
+  // the backend has read the next block last, a lap ago
+  prefetch_to_write(transport_ + (sent_ & (blocks() - 1)) * kBlockSize);
   return ticket;
 }
 
 LaneSender::StatusAnswer LaneSender::status(std::uint64_t id) const noexcept {
-  const StatusSlot& slot = statuses_[id & (2 * std::uint64_t{blocks()} - 1)];
+  const StatusSlot& slot = statuses_[id & (statuses() - 1)];
   for (int i = 0; i < kTries; ++i) {
     const std::uint64_t word = slot.word.load(std::memory_order_acquire);  // sync status
     const std::uint64_t owner = slot.id.load(std::memory_order_acquire);   // sync status_id
@@ -172,6 +193,9 @@ bool read_burst(const BurstSlot& slot, std::uint64_t id, Iteration& row) noexcep
 LaneSender::BurstAnswer LaneSender::burst(std::uint64_t id) const noexcept {
   Iteration row = -1;
   if (read_burst(feedback_->burst, id, row)) return {Known::yes, row};
+  // bursts of a lane are done in the order of their ids
+  const std::uint64_t newest = feedback_->burst.id.load(std::memory_order_acquire);  // sync burst
+  if (newest != 0 && newest < id) return {Known::not_yet, -1};
 
   // not the newest: look through the recent ones
   const std::uint64_t done = feedback_->bursts.load(std::memory_order_acquire);  // sync bursts
@@ -192,11 +216,17 @@ std::uint64_t LaneSender::ended() const noexcept {
   return feedback_->ended.load(std::memory_order_acquire);  // sync ended
 }
 
-void LaneSender::sleep(std::uint32_t seen, const Deadline& deadline) {
+void LaneSender::sleep(std::uint32_t seen, std::int64_t at_most) {
   if (guard_.forked()) guard_.check("segment '" + segment_->name() + "'");
-  page_->waiting.store(1, std::memory_order_seq_cst);             // sync waiting
+  // one word for all lanes, so that one call of the loop wakes whoever it has news for
+  const std::atomic<std::uint32_t>& wake = view_.counters().lane_wake;
+  const std::uint32_t now = wake.load(std::memory_order_seq_cst);  // sync lane_wake
+  page_->waiting.store(1, std::memory_order_seq_cst);              // sync waiting
+  O80_CRASH_POINT("lane.before_sleep");
+  // who has seen the wake of an end sees the end
+  if (segment_->has_ended()) return;
   if (feedback_->events.load(std::memory_order_seq_cst) == seen)  // sync events
-    futex_wait(feedback_->events, seen, deadline.left(kSlice));
+    futex_wait(wake, now, at_most);
 }
 
 bool LaneSender::look_around(const Check& check) const {

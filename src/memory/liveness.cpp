@@ -47,20 +47,23 @@ struct LaneLiveness::Watched {
       changed = true;
     }
     if (changed) changes.fetch_add(1, std::memory_order_release);  // sync changes
+    rounds.fetch_add(1, std::memory_order_relaxed);
   }
 
   LaneLife ask_lane(std::uint32_t i, LaneLife last) const noexcept {
     const LaneSenderPage& page = view.lane(i);
     // whoever has counted itself has held the lock: if it is not held now, that one is gone
     const std::uint64_t before =
-        page.incarnation.load(std::memory_order_acquire);  // sync incarnation
+        page.incarnation.load(std::memory_order_acquire) & kIncarnations;  // sync incarnation
     const bool held = is_byte_locked(descriptor, kFirstLaneByte + i);
     if (!held) {
       if (before == 0) return {};
-      const bool in_order = page.closed.load(std::memory_order_acquire) == before;  // sync closed
+      const bool in_order =
+          (page.closed.load(std::memory_order_acquire) & kIncarnations) == before;  // sync closed
       return {in_order ? LaneState::closed : LaneState::died, before};
     }
-    const std::uint64_t now = page.incarnation.load(std::memory_order_acquire);  // sync incarnation
+    const std::uint64_t now =
+        page.incarnation.load(std::memory_order_acquire) & kIncarnations;  // sync incarnation
     // held, but the new owner has not counted itself yet
     const bool ended = last.state == LaneState::died || last.state == LaneState::closed;
     if (now == 0 || (ended && now == last.incarnation)) return last;
@@ -71,6 +74,7 @@ struct LaneLiveness::Watched {
   SegmentView view;
   std::deque<std::atomic<std::uint64_t>> lanes;
   std::atomic<std::uint32_t> changes{0};
+  std::atomic<std::uint32_t> rounds{0};
 };
 
 /// The helper of a process; everything in it is guarded by fork_mutex().
@@ -129,7 +133,6 @@ class LivenessThread {
     // it may have been started by a real-time thread
     const sched_param ordinary{};
     pthread_setschedparam(thread_.native_handle(), SCHED_OTHER, &ordinary);
-    pthread_setname_np(thread_.native_handle(), "o80-liveness");
     settle();
   }
 
@@ -158,6 +161,8 @@ class LivenessThread {
   }
 
   void run() noexcept {
+    // by itself: named by another, it would leave an entry below /proc for the kernel to take down
+    pthread_setname_np(pthread_self(), "o80-liveness");
     while (stop_.load(std::memory_order_acquire) == 0) {
       {
         const std::lock_guard lock(fork_mutex());
@@ -185,6 +190,10 @@ LaneLiveness::~LaneLiveness() {
 
 std::uint32_t LaneLiveness::changes() const noexcept {
   return watched_->changes.load(std::memory_order_acquire);  // sync changes
+}
+
+std::uint32_t LaneLiveness::rounds() const noexcept {
+  return watched_->rounds.load(std::memory_order_relaxed);
 }
 
 LaneLife LaneLiveness::lane(std::uint32_t i) const noexcept {

@@ -190,6 +190,7 @@ OwnedSegment OwnedSegment::create(const SegmentSpec& spec) {
 
   // a complete file, held by us, that nobody can see
   Draft draft(spec.name, path);
+  O80_CRASH_POINT("create.after_lock");
   reserve(draft, spec.name, view.offsets.file_bytes);
   OwnedSegment segment;
   segment.query_ = LockFile::open(draft.path(), kOpen);

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "o80/base/crash_point.hpp"
+#include "o80/base/printable.hpp"
 #include "o80/base/time.hpp"
 #include "o80/memory/file_lock.hpp"
 #include "o80/memory/futex.hpp"
@@ -20,7 +21,9 @@ namespace o80 {
 
 namespace {
 
-std::string text_of(const char* chars, std::size_t most) { return {chars, strnlen(chars, most)}; }
+std::string text_of(const char* chars, std::size_t most) {
+  return printable({chars, strnlen(chars, most)});
+}
 
 bool read_header(int descriptor, SegmentHeader& header) noexcept {
   return pread(descriptor, &header, sizeof header, 0) == sizeof header;
@@ -61,7 +64,8 @@ bool is_held(int descriptor, const std::string& path) {
 
 std::string taken_text(std::string_view name, int descriptor) {
   SegmentHeader header{};
-  const bool known = read_header(descriptor, header) && header.magic == kSegmentMagic;
+  const bool known = read_header(descriptor, header) && header.magic == kSegmentMagic &&
+                     header.version == kSegmentVersion;
   return "segment '" + std::string(name) + "' already has a backend" +
          (known ? " (" + describe_owner(header) + ")" : std::string()) +
          ".\nStop it first with `o80 stop " + std::string(name) +
@@ -133,8 +137,9 @@ void end_segment(const SegmentView& view, State state) noexcept {
   for (std::uint32_t i = 0; i < view.shape.lanes; ++i) {
     LaneFeedback& feedback = view.feedback(i);
     feedback.events.fetch_add(1, std::memory_order_seq_cst);  // sync events
-    futex_wake(feedback.events, kEverybody);
   }
+  counters.lane_wake.fetch_add(1, std::memory_order_seq_cst);  // sync lane_wake
+  futex_wake(counters.lane_wake, kEverybody);
 }
 
 std::string describe_owner(const SegmentHeader& header) {

@@ -10,6 +10,7 @@
 #include <cstring>
 
 #include "o80/base/error.hpp"
+#include "o80/base/printable.hpp"
 #include "o80/memory/file_lock.hpp"
 #include "o80/memory/segment_file.hpp"
 #include "o80/memory/segment_name.hpp"
@@ -35,7 +36,7 @@ std::vector<std::string> file_names() {
 bool is_draft(std::string_view name) { return name.find(kDraft) != std::string_view::npos; }
 
 LockFile open_file(const std::string& path, int mode) {
-  return LockFile::open(path, mode | O_NOFOLLOW | O_NONBLOCK);
+  return LockFile::open(path, mode | O_NOFOLLOW);
 }
 
 SegmentEntry describe(const std::string& name) {
@@ -54,8 +55,8 @@ SegmentEntry describe(const std::string& name) {
   entry.readable = true;
   entry.pid = header.pid;
   entry.started_at = header.started_at;
-  entry.user.assign(header.user, strnlen(header.user, sizeof header.user));
-  entry.program.assign(header.program, strnlen(header.program, sizeof header.program));
+  entry.user = printable({header.user, strnlen(header.user, sizeof header.user)});
+  entry.program = printable({header.program, strnlen(header.program, sizeof header.program)});
   entry.epoch = header.epoch;
   entry.bytes = header.file_bytes;
   return entry;

@@ -26,14 +26,17 @@ Waited RowWaiter::wait_for_row(Iteration k, const Deadline& deadline, const Chec
   };
   if (spinner_.spin(ready)) return Waited::ready;
   std::int64_t look_at = monotonic_now() + kSlice;
+  std::int64_t nap = kSlice;  // what is left until then
   while (!deadline.over()) {
     if (segment_->access() == Access::read_write)
-      sleep(k, deadline.left(kSlice));
+      sleep(k, deadline.left(nap));
     else
-      poll(k, deadline.left(kSlice));
+      poll(k, deadline.left(nap));
     if (ready()) return Waited::ready;
-    if (monotonic_now() < look_at && !segment_->has_ended()) continue;
+    nap = look_at - monotonic_now();
+    if (nap > 0 && !segment_->has_ended()) continue;
     look_at = monotonic_now() + kSlice;
+    nap = kSlice;
     if (check && !check())
       throw Cancelled("the wait for a row of segment '" + segment_->name() + "' was cancelled");
     // rows may have come before the end
@@ -53,17 +56,22 @@ void RowWaiter::sleep(Iteration k, std::int64_t at_most) noexcept {
   Bell& bell = view_.bell();
 
   // lower the word, look again, sleep
+  O80_CRASH_POINT("rows.before_register");
   const std::uint32_t seen = counters.row_wake.load(std::memory_order_seq_cst);  // sync row_wake
-  Iteration lowest = bell.wanted.load(std::memory_order_seq_cst);                // sync wanted
+  // an end is said before it wakes: who has seen that wake sees the end
+  if (segment_->has_ended()) return;
+  Iteration lowest = bell.wanted.load(std::memory_order_seq_cst);  // sync wanted
   while (k < lowest &&
          !bell.wanted.compare_exchange_weak(lowest, k, std::memory_order_seq_cst)) {  // sync wanted
   }
+  O80_CRASH_POINT("rows.before_sleep");
   if (counters.published.load(std::memory_order_seq_cst) >= k) return;  // sync published
   if (!futex_wait(counters.row_wake, seen, at_most)) return;
 
   // the writer woke one: the first awake after each of its wakes tells the rest
   const std::uint32_t now = counters.row_wake.load(std::memory_order_seq_cst);  // sync row_wake
   if (now == seen || bell.passed_on.exchange(now, std::memory_order_relaxed) == now) return;
+  O80_CRASH_POINT("rows.before_pass_on");
   futex_wake(counters.row_wake, kEverybody);
 }
 
@@ -80,16 +88,20 @@ void RowWaiter::poll(Iteration k, std::int64_t at_most) noexcept {
   }
 }
 
-void RowSignal::wake_readers(Iteration k) noexcept {
+bool RowSignal::announce(Iteration k) noexcept {
   Bell& bell = view_.bell();
-  if (bell.wanted.load(std::memory_order_seq_cst) > k) return;  // sync wanted
+  if (bell.wanted.load(std::memory_order_seq_cst) > k) return false;  // sync wanted
   O80_CRASH_POINT("rows.before_reset");
   bell.wanted.store(kNobody, std::memory_order_seq_cst);  // sync wanted
   O80_CRASH_POINT("rows.before_wake");
   // after the reset: who registered before it still has the old value and will not sleep on it
-  std::atomic<std::uint32_t>& wake = view_.counters().row_wake;
-  wake.fetch_add(1, std::memory_order_seq_cst);  // sync row_wake
-  futex_wake(wake, 1);
+  view_.counters().row_wake.fetch_add(1, std::memory_order_seq_cst);  // sync row_wake
+  return true;
+}
+
+void RowSignal::wake_readers(Iteration k) noexcept {
+  if (!announce(k)) return;
+  futex_wake(view_.counters().row_wake, 1);
   O80_CRASH_POINT("rows.after_wake");
 }
 
@@ -102,9 +114,11 @@ bool BellWaiter::wait(std::uint32_t seen, std::int64_t at_most) noexcept {
   if (spinner_.spin(rang)) return true;
   std::atomic<std::uint32_t>& sleeping = view_.counters().sleeping;
   sleeping.store(1, std::memory_order_seq_cst);  // sync sleeping
+  O80_CRASH_POINT("bell.before_sleep");
   const Bell& bell = view_.bell();
   if (bell.rung.load(std::memory_order_seq_cst) == seen)  // sync bell
     futex_wait(bell.rung, seen, std::min(at_most, kSlice));
+  O80_CRASH_POINT("bell.after_sleep");
   sleeping.store(0, std::memory_order_relaxed);
   return rang();
 }

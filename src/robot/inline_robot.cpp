@@ -2,15 +2,19 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
+#include <utility>
 
 #include "o80/base/error.hpp"
+#include "o80/memory/futex.hpp"
 
 namespace o80 {
 
 namespace {
 
-constexpr std::uint32_t kIterationsAtOnce = 64;  // between looks at the clock
+constexpr std::uint32_t kMostAtOnce = 64;          // iterations between looks at the clock
+constexpr std::int64_t kLongAtOnce = kSlice / 10;  // [ns] they take less than that
 
 BackendOptions bursting(BackendOptions options) {
   options.bursting = true;
@@ -18,22 +22,68 @@ BackendOptions bursting(BackendOptions options) {
 }
 }  // namespace
 
+/// The right to run iterations: one thread at a time. Waiting for it asks `check`.
+class InlineRobot::Turn {
+ public:
+  Turn(InlineRobot& robot, const Check& check) : robot_(robot) {
+    std::atomic<std::uint32_t>& turn = robot.turn_;
+    std::uint32_t free = 0;
+    if (!turn.compare_exchange_strong(free, 1, std::memory_order_acquire)) {  // sync turn
+      while (turn.exchange(2, std::memory_order_acquire) != 0) {              // sync turn
+        futex_wait(turn, 2, kSlice);
+        if (check && !check()) {
+          throw Cancelled("the wait for '" + robot.segment() + "' was cut by its caller");
+        }
+      }
+    }
+    robot_.runner_.store(std::this_thread::get_id(), std::memory_order_relaxed);
+  }
+  Turn(const Turn&) = delete;
+  Turn& operator=(const Turn&) = delete;
+  ~Turn() {
+    robot_.runner_.store(std::thread::id(), std::memory_order_relaxed);
+    if (robot_.turn_.exchange(0, std::memory_order_release) == 2) {  // sync turn
+      futex_wake(robot_.turn_, 1);
+    }
+  }
+
+ private:
+  InlineRobot& robot_;
+};
+
 InlineRobot::InlineRobot(std::unique_ptr<Robot> robot, BackendOptions options, Check check)
-    : check_(std::move(check)), loop_(std::move(robot), bursting(std::move(options))) {
+    : check_(std::move(check)),
+      at_once_(check_ ? 1 : kMostAtOnce),
+      loop_(std::move(robot), bursting(std::move(options))) {
   loop_.start();
 }
 
 void InlineRobot::run() {
-  const std::scoped_lock lock(running_);
+  const Turn turn(*this, check_);
+  if (check_) looked_at_ = monotonic_now();
   Step step = Step::run;
-  while ((step = loop_.run_granted(kIterationsAtOnce)) == Step::run) look_around();
+  while (!stopping_ && (step = loop_.run_granted(at_once_)) == Step::run) look_around();
+  if (stopping_) {
+    loop_.stop();
+    throw Closed("the inline robot of '" + segment() + "' was closed while it ran");
+  }
   if (step == Step::ended && !loop_.fault().empty()) throw DriverError(loop_.fault());
 }
 
-/// Asks the check every slice of time.
+void InlineRobot::refuse_nested() const {
+  if (!runs_here()) return;
+  throw Error("a burst of '" + segment() +
+              "' runs in this very thread: send to it when that is done, or from another thread");
+}
+
+/// Asks the check every slice of time; the slower the robot, the fewer iterations lie between.
 void InlineRobot::look_around() {
-  if (!check_ || monotonic_now() < look_at_) return;
-  look_at_ = monotonic_now() + kSlice;
+  if (!check_) return;
+  const std::int64_t now = monotonic_now();
+  const std::int64_t took = now - std::exchange(looked_at_, now);
+  at_once_ = took > kLongAtOnce ? std::max(1U, at_once_ / 2) : std::min(kMostAtOnce, at_once_ * 2);
+  if (now < look_at_) return;
+  look_at_ = now + kSlice;
   try {
     if (!check_()) throw Cancelled("the burst of '" + segment() + "' was cut by its caller");
   } catch (...) {
@@ -43,7 +93,10 @@ void InlineRobot::look_around() {
 }
 
 void InlineRobot::stop() noexcept {
-  const std::scoped_lock lock(running_);
+  if (guard_.forked()) return;  // the hardware and the turns are the parent's
+  stopping_ = true;
+  if (runs_here()) return;  // the burst that asked stops it
+  const Turn turn(*this, {});
   loop_.stop();
 }
 

@@ -1,9 +1,11 @@
 #include "o80/robot/loop.hpp"
 
+#include <algorithm>
 #include <bit>
 
 #include "o80/base/error.hpp"
 #include "o80/base/time.hpp"
+#include "o80/memory/signal.hpp"
 
 namespace o80 {
 
@@ -73,7 +75,11 @@ bool Loop::pace() noexcept {
     backend_.set_timing(pacer_.tick(monotonic_now()));
     return true;
   }
-  while (in_time && !sleep_until(pacer_.due()) && !backend_.stop_asked()) {
+  // a signal may come just before the sleep, and wake nobody: a long one is cut into slices
+  bool over = !in_time;
+  while (!over && !backend_.stop_asked()) {
+    const std::int64_t slice = std::min(pacer_.due(), monotonic_now() + kSlice);
+    over = sleep_until(slice) && slice == pacer_.due();
   }
   backend_.set_timing(pacer_.next(monotonic_now()));
   return true;

@@ -41,6 +41,10 @@ void set_policy(const RealTimeOptions& options, std::vector<std::string>& refuse
                     "or `sudo setcap cap_sys_nice+ep` on the program");
 }
 
+bool is_in(int processor, const cpu_set_t& set) {
+  return processor >= 0 && processor < CPU_SETSIZE && CPU_ISSET(processor, &set);
+}
+
 void set_processors(const RealTimeOptions& options, std::vector<std::string>& refused) {
   cpu_set_t set;
   CPU_ZERO(&set);
@@ -48,10 +52,17 @@ void set_processors(const RealTimeOptions& options, std::vector<std::string>& re
     if (processor >= 0 && processor < CPU_SETSIZE) CPU_SET(processor, &set);
   }
   LaneLiveness::avoid_processors(options.processors);
-  if (sched_setaffinity(0, sizeof set, &set) == 0) return;
-  refused.push_back("processors " + list(options.processors) + " were refused (" +
-                    std::strerror(errno) + "). This machine has " +
-                    std::to_string(sysconf(_SC_NPROCESSORS_ONLN)) +
+  std::vector<int> missing = options.processors;
+  std::string why = "the others are used";
+  if (sched_setaffinity(0, sizeof set, &set) != 0) {
+    why = std::strerror(errno);
+  } else if (sched_getaffinity(0, sizeof set, &set) == 0) {
+    // the kernel takes a list in which one is there, and says nothing of the rest
+    std::erase_if(missing, [&](int processor) { return is_in(processor, set); });
+  }
+  if (missing.empty()) return;
+  refused.push_back("processors " + list(missing) + " were refused (" + why +
+                    "). This machine has " + std::to_string(sysconf(_SC_NPROCESSORS_ONLN)) +
                     "; see them with `lscpu`, and what may be used with `taskset -p $$`");
 }
 

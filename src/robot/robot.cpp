@@ -26,11 +26,29 @@ void check_table(const RobotTable& table, const std::string& where) {
   }
 }
 
-Robot::Robot(const RobotTable& table, const OptionValues& options) : table_(table) {
-  check_table(table, table.name);
+namespace {
+
+std::vector<OptionValue> plain(const OptionValues& options) {
   std::vector<OptionValue> values;
   values.reserve(options.size());
   for (const auto& [name, text] : options) values.push_back({name.c_str(), text.c_str()});
+  return values;
+}
+
+}  // namespace
+
+void check_options(const RobotTable& table, const OptionValues& options) {
+  const std::vector<OptionValue> values = plain(options);
+  FaultText fault{};
+  if (table.accepts(values.data(), static_cast<std::uint32_t>(values.size()), &fault) != 0) {
+    throw InvalidArgument("robot '" + std::string(table.name) + "': " + fault.text);
+  }
+}
+
+Robot::Robot(const RobotTable& table, const OptionValues& options) : table_(table) {
+  check_table(table, table.name);
+  check_options(table, options);
+  const std::vector<OptionValue> values = plain(options);
   driver_ = table.create(values.data(), static_cast<std::uint32_t>(values.size()), &fault_);
   if (driver_ == nullptr) {
     throw DriverError("robot '" + std::string(table.name) + "' cannot be made: " + fault_.text);

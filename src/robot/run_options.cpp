@@ -177,6 +177,7 @@ RunOptions parse_run_options(const RobotTable& table, int argc, char** argv) {
   if (optind < argc) {
     throw InvalidArgument("'" + std::string(argv[optind]) + "' is no flag; see --help");
   }
+  check_options(table, options.robot);
   return options;
 }
 

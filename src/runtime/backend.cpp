@@ -7,6 +7,7 @@
 #include <string>
 
 #include "backend_body.hpp"
+#include "o80/base/crash_point.hpp"
 #include "o80/describe/table.hpp"
 
 namespace o80 {
@@ -85,6 +86,8 @@ UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, Reques
       stale_(options.stale),
       silence_(options.silence <= 0 ? 0
                                     : std::max<std::int64_t>(1, options.silence / options.period)) {
+  // completed and late commands, and their batches
+  untold_.reserve(2 * (schema.actuators.size() + Controller::kStatusesPerIteration));
   for (std::uint32_t i = 0; i < lanes.size(); ++i) lives_[i] = liveness.lane(i);
 }
 
@@ -105,17 +108,22 @@ Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
     if (schema.head.bursting == 0 || granted()) break;
     // standing still: everybody is told before anybody waits
     const bool all_told = controller.finish_pending();
-    give_back();
+    wake(give_back(), false);
     if (staging_ || !all_told) continue;
     const std::int64_t left =
         give_up > 0 && give_up < kForEver ? give_up - monotonic_now() : give_up;
     if (left <= 0) return Step::standing;
     bell.wait(lanes.bell_seen(), std::min(left, kSlice));
   }
+  O80_CRASH_POINT("backend.after_take");
   if (granted()) take_due();
   watch_silence();
   under_way_ = true;
+  stepping_ = true;
+  if (burst_left_ == 1) history.expect(current);
   controller.step(current, row() + layout.observed);
+  stepping_ = false;
+  O80_CRASH_POINT("backend.after_step");
   return Step::run;
 }
 
@@ -158,12 +166,15 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
 
   // whoever waits for it
   if (!fresh) {
+    tell_of_the_row(true);
     controller.finish_pending();
     under_way_ = false;
+    // whoever spins on the line in which the end of a burst stands gets it once, all written
+    free_blocks();
     count_burst();
-    give_back();
   }
-  row_signal.wake_readers(current);
+  const bool lanes_wait = !fresh && lanes.announce();
+  wake(lanes_wait, row_signal.announce(current));
   if (!begun_) segment.set_state(State::running);
   begun_ = true;
   ++current;
@@ -177,10 +188,11 @@ void UntypedBackend::Body::end(State state, std::string_view text) noexcept {
   for (; !schedule.empty(); schedule.drop_next()) {
     controller.reject(schedule.next().lane, schedule.next().batch, Reason::stopped, 0, current);
   }
+  tell_of_the_row(false);
   controller.purge(kEveryActuator, current, Reason::stopped);
   while (!controller.finish_pending()) {
   }
-  give_back();
+  wake(give_back(), false);
   segment.end(state, text);
 }
 

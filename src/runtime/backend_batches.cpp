@@ -1,9 +1,11 @@
 // How batches come from the lanes to the controller, and statuses go back.
 
+#include <algorithm>
 #include <cstring>
 #include <optional>
 
 #include "backend_body.hpp"
+#include "o80/memory/futex.hpp"
 
 namespace o80 {
 
@@ -13,12 +15,22 @@ constexpr std::uint32_t kBlocksPerIteration = 1024;
 
 // ------------------------------------------------------------------------------ statuses out
 
-void UntypedBackend::Body::changed(const StatusChange& change) noexcept {
+void UntypedBackend::Body::tell(const StatusChange& change) noexcept {
   LaneReceiver& lane = lanes[change.lane];
   lane.set_status(change.id,
                   {static_cast<std::uint8_t>(change.status),
                    static_cast<std::uint8_t>(change.reason), change.aux, change.iteration});
   if (is_end(change.status)) lane.flag();
+}
+
+void UntypedBackend::Body::changed(const StatusChange& change) noexcept {
+  // nothing is completed before its row is out: whoever is killed until then has not done it
+  const bool waits = stepping_ && is_end(change.status) && untold_.size() < untold_.capacity();
+  if (waits) {
+    untold_.push_back(change);
+  } else {
+    tell(change);
+  }
   // a burst that runs until its batch has ended: this iteration is its last, or there is none
   if (burst_left_ != kUntilEnded || change.lane != burst_lane_ || change.id != burst_id_ + 1)
     return;
@@ -26,7 +38,19 @@ void UntypedBackend::Body::changed(const StatusChange& change) noexcept {
   if (!under_way_) end_burst(current - 1);
 }
 
-void UntypedBackend::Body::give_back() noexcept {
+/// What ended in the step of the row that was published, or never will be.
+void UntypedBackend::Body::tell_of_the_row(bool published) noexcept {
+  for (StatusChange& change : untold_) {
+    if (!published && (change.status == Status::completed || change.status == Status::limited)) {
+      change.status = Status::purged;
+      change.reason = Reason::stopped;
+    }
+    tell(change);
+  }
+  untold_.clear();
+}
+
+void UntypedBackend::Body::free_blocks() noexcept {
   for (std::uint32_t i = 0; i < lanes.size(); ++i) {
     if (lanes[i].in_flight() == 0) continue;
     const std::uint64_t freed = controller.freed(i);
@@ -34,7 +58,23 @@ void UntypedBackend::Body::give_back() noexcept {
     lanes[i].free(static_cast<std::uint32_t>(freed - freed_[i]));
     freed_[i] = freed;
   }
-  lanes.flush_events();
+}
+
+bool UntypedBackend::Body::give_back() noexcept {
+  free_blocks();
+  return lanes.announce();
+}
+
+/// Whoever waits is woken by one system call at most.
+void UntypedBackend::Body::wake(bool lanes_wait, bool reader_waits) noexcept {
+  Counters& counters = segment.view().counters();
+  if (lanes_wait && reader_waits) {
+    futex_wake_both(counters.row_wake, 1, counters.lane_wake);
+  } else if (lanes_wait) {
+    futex_wake(counters.lane_wake, kEverybody);
+  } else if (reader_waits) {
+    futex_wake(counters.row_wake, 1);
+  }
 }
 
 void UntypedBackend::Body::fail(std::string_view text) noexcept {
@@ -90,19 +130,24 @@ Outcome UntypedBackend::Body::release_control(std::uint32_t lane) noexcept {
 
 // ------------------------------------------------------------------------------ batches in
 
-void UntypedBackend::Body::begin_staging(std::uint32_t lane) noexcept {
+void UntypedBackend::Body::begin_staging(std::uint32_t lane, std::uint32_t& budget) noexcept {
   constexpr auto kBatch = static_cast<std::uint64_t>(RecordKind::batch);
   const std::uint64_t kind = lanes[lane].peek_word(offsetof(BatchRecord, kind)) & 0xFF;
   const auto blocks =
       static_cast<std::uint32_t>(lanes[lane].peek_word(offsetof(BatchRecord, blocks)));
   if (kind != kBatch || blocks == 0 || blocks > lanes[lane].available()) {
+    // who writes garbage faster than it is thrown away must not keep the loop here
+    --budget;
     lanes[lane].reset();
     return;
   }
   // an heir's first batch finds the house in order
   mourn(lane, lanes[lane].dead_predecessor());
   staging_ = true;
-  staging_of_dead_ = lanes[lane].next_is_of_dead();
+  // who was mourned may have left this, and no heir come yet
+  staging_incarnation_ = lanes[lane].incarnation();
+  staging_of_dead_ = lanes[lane].next_is_of_dead() ||
+                     (staging_incarnation_ != 0 && staging_incarnation_ <= mourned_[lane]);
   staging_lane_ = lane;
   staging_left_ = blocks;
   staging_chain_ = {};
@@ -111,13 +156,15 @@ void UntypedBackend::Body::begin_staging(std::uint32_t lane) noexcept {
 /// Goes on with the batch that is being staged; false if the budget ended before it.
 bool UntypedBackend::Body::stage(std::uint32_t& budget) noexcept {
   LaneReceiver& lane = lanes[staging_lane_];
-  Block block;
+  Block block{};
   while (staging_left_ > 0 && budget > 0) {
-    if (!lane.take(block.bytes.data()) || !pool.append(staging_chain_, &block)) {
-      // the lane was reset under us: what there is of the batch is garbage
-      lane.free(staging_chain_.blocks);
-      pool.release(staging_chain_);
-      staging_ = false;
+    const bool taken = lane.take(block.bytes.data());
+    BatchRecord first;
+    std::memcpy(&first, block.bytes.data(), sizeof first);
+    const bool expected = staging_chain_.blocks > 0 || lane.expects(first.id);
+    if (!taken || !expected || !pool.append(staging_chain_, &block)) {
+      drop_staged(taken ? 1 : 0);
+      --budget;
       return true;
     }
     --staging_left_;
@@ -131,12 +178,21 @@ bool UntypedBackend::Body::stage(std::uint32_t& budget) noexcept {
   return true;
 }
 
+/// What there is of the batch is garbage, or the lane was reset under us.
+void UntypedBackend::Body::drop_staged(std::uint32_t blocks_outside) noexcept {
+  LaneReceiver& lane = lanes[staging_lane_];
+  lane.free(staging_chain_.blocks + blocks_outside);
+  lane.reset();
+  pool.release(staging_chain_);
+  staging_ = false;
+}
+
 /// The staged batch is complete: take it, put it off to its iteration, or refuse it.
 void UntypedBackend::Body::staged() noexcept {
   const std::uint32_t lane = staging_lane_;
   const BlockIndex first = staging_chain_.first;
   const BatchRecord batch = pool.batch(first);
-  lanes[lane].set_staged(batch.id);
+  lanes[lane].set_staged(batch.id, record_id(batch.id, std::min(batch.records, batch.blocks)));
   last_batch_ = current;
   const ScheduledBatch sent{batch.at < 0 ? current : batch.at,
                             batch.ticket,
@@ -195,13 +251,13 @@ void UntypedBackend::Body::take_batches() noexcept {
   while (!granted()) {
     if (!staging_) {
       const auto lane = news ? lanes.next() : std::nullopt;
-      if (!lane) return;
-      begin_staging(*lane);
+      if (!lane || budget == 0) return;
+      begin_staging(*lane, budget);
     } else if (!stage(budget)) {
       return;
     }
   }
-  lanes.look_again();
+  lanes.look_again_if_any();
 }
 
 }  // namespace o80

@@ -71,8 +71,9 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   // batches => controller
   void take_batches() noexcept;
   void take_due() noexcept;
-  void begin_staging(std::uint32_t lane) noexcept;
+  void begin_staging(std::uint32_t lane, std::uint32_t& budget) noexcept;
   bool stage(std::uint32_t& budget) noexcept;
+  void drop_staged(std::uint32_t blocks_outside) noexcept;
   void staged() noexcept;
   bool admit(const ScheduledBatch& sent) noexcept;
   void grant(std::uint32_t lane, const BatchRecord& batch) noexcept;
@@ -88,7 +89,13 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   void stale(std::uint32_t lane, Reason reason) noexcept;
   void fail(std::string_view text) noexcept;
 
-  void give_back() noexcept;
+  void tell(const StatusChange& change) noexcept;
+  void tell_of_the_row(bool published) noexcept;
+
+  void free_blocks() noexcept;
+  /// True if somebody who waits for it is to be woken.
+  bool give_back() noexcept;
+  void wake(bool lanes_wait, bool reader_waits) noexcept;
 
   ForkGuard guard_;
   RequestServer* server_;
@@ -102,13 +109,17 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   std::int64_t silence_;  // [iterations], 0: no limit
   Iteration last_batch_ = 0;
   std::uint32_t seen_changes_ = 0;
+  std::uint32_t seen_rounds_ = 0;
   bool begun_ = false;      // row 0 is out
   bool under_way_ = false;  // from step to publish: what ends now ends in this iteration
+  bool stepping_ = false;   // what the controller says now is told when the row is out
+  std::vector<StatusChange> untold_;
 
   // the batch being copied from its lane
   bool staging_ = false;
   bool staging_of_dead_ = false;  // whose place another frontend has taken
   std::uint32_t staging_lane_ = 0;
+  std::uint64_t staging_incarnation_ = 0;
   std::uint32_t staging_left_ = 0;  // blocks
   BlockChain staging_chain_;
 

@@ -14,6 +14,11 @@ void UntypedBackend::Body::stale(std::uint32_t lane, Reason reason) noexcept {
 
 void UntypedBackend::Body::look_at_lives() noexcept {
   if (granted()) mourn(burst_lane_, lanes[burst_lane_].dead_predecessor());
+  // the bell stands where every frontend writes: whatever it says, lanes are looked at now and then
+  const std::uint32_t rounds = liveness.rounds();
+  if (rounds != seen_rounds_) lanes.look_again();
+  seen_rounds_ = rounds;
+
   const std::uint32_t changes = liveness.changes();
   if (changes == seen_changes_) return;
   seen_changes_ = changes;
@@ -29,6 +34,9 @@ void UntypedBackend::Body::mourn(std::uint32_t lane, std::uint64_t incarnation) 
   if (incarnation <= mourned_[lane]) return;
   mourned_[lane] = incarnation;
   stale(lane, Reason::dead_frontend);
+  schedule.disown(lane);
+  if (staging_ && staging_lane_ == lane && staging_incarnation_ <= incarnation)
+    staging_of_dead_ = true;
   // nobody waits for the end of its burst
   if (granted() && burst_lane_ == lane && burst_incarnation_ <= incarnation) burst_left_ = 1;
   // it may have died before it rang

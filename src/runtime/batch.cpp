@@ -4,6 +4,7 @@
 #include <unordered_map>
 
 #include "o80/base/error.hpp"
+#include "o80/base/printable.hpp"
 #include "o80/memory/atomic_words.hpp"
 
 namespace o80 {
@@ -14,12 +15,11 @@ struct Batch::Kept {
   std::unordered_map<CommandId, Handle> ended;
 };
 
-Batch::Batch(std::shared_ptr<Link> link, std::shared_ptr<LaneSender> lane, CommandId id,
-             std::uint32_t records)
+Batch::Batch(std::shared_ptr<Link> link, Sent sent)
     : link_(std::move(link)),
-      lane_(std::move(lane)),
-      id_(id),
-      records_(records),
+      lane_(std::move(sent.lane)),
+      id_(sent.id),
+      records_(sent.records),
       kept_(std::make_shared<Kept>()) {}
 
 namespace {
@@ -29,7 +29,13 @@ std::string owner_of(const Link& link, std::uint32_t lane) {
   const SegmentView& view = link.segment.view();
   if (lane >= view.shape.lanes) return "another frontend";
   const LaneSenderPage& page = view.lane(lane);
-  return "the frontend of " + load_text(page.owner, std::size(page.owner));
+  return "the frontend of " + printable(load_text(page.owner, std::size(page.owner)));
+}
+
+bool is_rejected(const LaneSender& lane, CommandId batch) noexcept {
+  const LaneSender::StatusAnswer answer = lane.status(batch);
+  return answer.known == LaneSender::Known::yes &&
+         static_cast<Status>(answer.word.status) == Status::rejected;
 }
 
 std::string words_for(const Link& link, const Handle& handle, std::uint8_t aux) {
@@ -114,12 +120,6 @@ Iteration Batch::last_iteration() const {
   return is_end(handle.status) ? handle.iteration : -1;
 }
 
-bool Batch::rejected() const noexcept {
-  const LaneSender::StatusAnswer answer = lane_->status(id_);
-  return answer.known == LaneSender::Known::yes &&
-         static_cast<Status>(answer.word.status) == Status::rejected;
-}
-
 std::string Batch::rejection() const {
   if (id_ == 0) return "";
   const Handle handle = ask(id_);
@@ -147,25 +147,40 @@ void Batch::wait(Timeout timeout, const Check& check) const {
 }
 
 bool Burst::done() const {
-  return lane().burst(batch_.id()).known != LaneSender::Known::not_yet || batch_.rejected();
+  link_->segment.check_process();
+  return lane().burst(batch_.id()).known != LaneSender::Known::not_yet ||
+         is_rejected(lane(), batch_.id());
 }
 
-Iteration Burst::wait_done(Timeout timeout, const Check& check) const {
+Iteration wait_for_burst(const Link& link, LaneSender& lane, CommandId id, Timeout timeout,
+                         const Check& check, std::optional<std::uint32_t> quiet) {
+  link.segment.check_process();
   LaneSender::BurstAnswer answer{};
   const auto over = [&] {
-    answer = lane().burst(batch_.id());
-    return answer.known != LaneSender::Known::not_yet || batch_.rejected();
+    answer = lane.burst(id);
+    return answer.known != LaneSender::Known::not_yet || is_rejected(lane, id);
   };
-  if (lane().wait_until(over, Deadline(timeout), link_->guarded(check)) == Waited::timed_out) {
-    throw TimeoutError("the burst of '" + link_->segment.name() +
+  if (lane.wait_until(over, Deadline(timeout), link.guarded(check), quiet) == Waited::timed_out) {
+    throw TimeoutError("the burst of '" + link.segment.name() +
                        "' was not done in time: give more time, or see whether another "
                        "frontend's burst comes before it");
   }
   if (answer.known == LaneSender::Known::forgotten) {
-    throw RowOverwritten("this burst of '" + link_->segment.name() +
+    throw RowOverwritten("this burst of '" + link.segment.name() +
                          "' is no longer remembered: wait for a burst before sending many more");
   }
   return answer.known == LaneSender::Known::yes ? answer.row : -1;
+}
+
+Iteration Burst::wait_done(Timeout timeout, const Check& check) const {
+  return wait_for_burst(*link_, lane(), batch_.id(), timeout, check);
+}
+
+void read_last_row(const Link& link, Iteration row, UntypedObservation& observation) {
+  if (!link.history.read(row, observation.bytes())) {
+    throw RowOverwritten("row " + std::to_string(row) + " of '" + link.segment.name() +
+                         "', the last of this burst, is no longer there");
+  }
 }
 
 UntypedObservation Burst::wait(Timeout timeout, const Check& check) const {
@@ -174,10 +189,7 @@ UntypedObservation Burst::wait(Timeout timeout, const Check& check) const {
   if (row < 0) {
     throw Error("the burst of '" + link_->segment.name() + "' was rejected: " + batch_.rejection());
   }
-  if (!link_->history.read(row, observation.bytes())) {
-    throw RowOverwritten("row " + std::to_string(row) + " of '" + link_->segment.name() +
-                         "', the last of this burst, is no longer there");
-  }
+  read_last_row(*link_, row, observation);
   return observation;
 }
 

@@ -42,7 +42,10 @@ std::shared_ptr<const Description> UntypedFrontend::description() const {
 std::uint64_t UntypedFrontend::epoch() const { return link_->segment.epoch(); }
 bool UntypedFrontend::bursting() const { return schema().head.bursting != 0; }
 std::int64_t UntypedFrontend::period() const { return schema().head.period; }
-Life UntypedFrontend::life() const { return link_->segment.life(); }
+Life UntypedFrontend::life() const {
+  link_->segment.check_process();
+  return link_->segment.life();
+}
 
 std::uint32_t UntypedFrontend::actuator(std::string_view name) const {
   return check_->actuator(name);
@@ -73,6 +76,7 @@ Iteration UntypedFrontend::oldest() const {
 void UntypedFrontend::latest(std::byte* row) const {
   link_->check_usable();
   if (link_->history.latest(row) < 0) {
+    if (link_->history.is_damaged()) throw damaged();
     throw Error("'" + segment() + "' has no row yet");
   }
 }
@@ -81,6 +85,11 @@ UntypedObservation UntypedFrontend::latest() const {
   UntypedObservation observation(link_->description);
   latest(observation.bytes());
   return observation;
+}
+
+SegmentError UntypedFrontend::damaged() const {
+  return SegmentError("the history of '" + segment() +
+                      "' is damaged: its counters contradict each other. Start its backend again.");
 }
 
 void UntypedFrontend::missing(Iteration k) const {
@@ -148,17 +157,23 @@ std::int64_t UntypedFrontend::wait_for_next(Iteration& position, std::byte* row,
     }
   }
   Iteration next = wanted;
-  while (!link_->history.read(next, row)) next = std::max(next, link_->history.oldest());
+  while (!link_->history.read(next, row)) {
+    if (next > link_->history.published() || link_->history.is_damaged()) throw damaged();
+    next = std::max(next, link_->history.oldest());
+  }
   position = next + 1;
   return next - wanted;
 }
 
 void UntypedFrontend::close() {
   link_->closed.store(true, std::memory_order_relaxed);
+  // a thread that does not exist here may hold the lock, and the lane is the parent's
+  if (link_->segment.forked()) return;
   const std::scoped_lock lock(link_->sending);
   // batches that are still asked keep their statuses, not the lane
   if (link_->lane_) link_->lane_->give_back();
   link_->lane_.reset();
+  builder_.clear();
   link_->runner.reset();
 }
 

@@ -72,15 +72,15 @@ std::uint32_t UntypedFrontend::add_command(std::uint32_t actuator, std::span<con
   check_->targets(index, state, mask);
   check_pace(options.pace, 1);
   if (options.pace.pace == Pace::speed) check_->speed(index, options.pace.per_second);
-  const std::scoped_lock lock(link_->sending);
-  link_->check_usable();
+  const auto lock = link_->lock_to_send();
   return builder_.command(head_of(index, options), mask, {}, 1, state);
 }
 
-std::uint32_t UntypedFrontend::add_trajectory(std::uint32_t actuator, std::uint32_t rows,
-                                              std::span<const std::byte> states,
-                                              const CommandOptions& options,
-                                              std::span<const std::int64_t> times) {
+/// Checks a trajectory; its options, with the pace that follows from its times.
+CommandOptions UntypedFrontend::checked_trajectory(std::uint32_t actuator, std::uint32_t rows,
+                                                   std::span<const std::byte> states,
+                                                   const CommandOptions& options,
+                                                   std::span<const std::int64_t> times) const {
   const std::uint32_t index = check_->actuator(std::int64_t{actuator});
   if (rows == 0) throw InvalidArgument("the trajectory has no row");
   check_->targets(index, states);
@@ -93,90 +93,151 @@ std::uint32_t UntypedFrontend::add_trajectory(std::uint32_t actuator, std::uint3
   }
   check_pace(paced.pace, rows);
   if (paced.pace.pace == Pace::speed) check_->speed(index, paced.pace.per_second);
-  const std::scoped_lock lock(link_->sending);
-  link_->check_usable();
-  return builder_.command(head_of(index, paced), {},
-                          rows > 1 ? times : std::span<const std::int64_t>{}, rows, states);
+  return paced;
+}
+
+std::uint32_t UntypedFrontend::add_trajectory(std::uint32_t actuator, std::uint32_t rows,
+                                              std::span<const std::byte> states,
+                                              const CommandOptions& options,
+                                              std::span<const std::int64_t> times) {
+  return add_trajectories({&actuator, 1}, rows, states, options, times);
+}
+
+std::uint32_t UntypedFrontend::add_trajectories(std::span<const std::uint32_t> actuators,
+                                                std::uint32_t rows,
+                                                std::span<const std::byte> states,
+                                                const CommandOptions& options,
+                                                std::span<const std::int64_t> times) {
+  const std::size_t each = states.size() / std::max<std::size_t>(1, actuators.size());
+  CommandOptions paced = options;
+  for (std::size_t i = 0; i < actuators.size(); ++i) {
+    paced = checked_trajectory(actuators[i], rows, states.subspan(i * each, each), options, times);
+  }
+  // under one lock: the pulse of another thread sends all or none of them
+  const auto lock = link_->lock_to_send();
+  const std::uint32_t first = builder_.records();
+  for (std::size_t i = 0; i < actuators.size(); ++i) {
+    builder_.command(head_of(actuators[i], paced), {},
+                     rows > 1 ? times : std::span<const std::int64_t>{}, rows,
+                     states.subspan(i * each, each));
+  }
+  return first;
 }
 
 std::uint32_t UntypedFrontend::add_purge(std::uint32_t actuator) {
   if (actuator != kEveryActuator) check_->actuator(std::int64_t{actuator});
-  const std::scoped_lock lock(link_->sending);
+  const auto lock = link_->lock_to_send();
   return builder_.purge(static_cast<std::uint16_t>(actuator));
 }
 
 std::uint32_t UntypedFrontend::add_purge_own() {
-  const std::scoped_lock lock(link_->sending);
+  const auto lock = link_->lock_to_send();
   return builder_.purge_own(kEveryActuator);
 }
 
 std::uint32_t UntypedFrontend::add_request(std::uint32_t request,
                                            std::span<const std::byte> payload) {
   check_->request(request, payload);
-  const std::scoped_lock lock(link_->sending);
-  link_->check_usable();
+  const auto lock = link_->lock_to_send();
   return builder_.request(static_cast<std::uint16_t>(request), payload);
 }
 
 std::uint32_t UntypedFrontend::add_take_control() {
-  const std::scoped_lock lock(link_->sending);
+  const auto lock = link_->lock_to_send();
   return builder_.take_control();
 }
 
 std::uint32_t UntypedFrontend::add_release_control() {
-  const std::scoped_lock lock(link_->sending);
+  const auto lock = link_->lock_to_send();
   return builder_.release_control();
 }
 
 std::size_t UntypedFrontend::added() const {
+  link_->segment.check_process();
   const std::scoped_lock lock(link_->sending);
   return builder_.records();
 }
 
 void UntypedFrontend::forget_added() {
+  link_->segment.check_process();
   const std::scoped_lock lock(link_->sending);
   builder_.clear();
 }
 
 // ------------------------------------------------------------------------------ sending
 
+/// Blocks of a lane that commands leave free.
+constexpr std::uint32_t kept_free(std::uint32_t blocks) noexcept {
+  return std::clamp(blocks / 16, 2U, 16U);
+}
+
 /// Before anything is used up: ids that are drawn and never sent would age the statuses of others.
-void UntypedFrontend::refuse_if_full(const BatchBuilder& builder, const LaneSender& lane) const {
+void UntypedFrontend::refuse_if_full(const BatchBuilder& builder, const BatchRecord& wanted,
+                                     const LaneSender& lane) const {
   const std::uint64_t needed = builder.blocks();
+  // what stays in the lane leaves room for what lets it go on: a burst, a purge, a request
+  const bool stays = builder.has_commands() || wanted.at != kNow;
+  const std::uint32_t most = lane.blocks() - (stays ? kept_free(lane.blocks()) : 0);
+  const std::uint32_t sent = lane.blocks() - lane.free_blocks();
   const auto takes = [&] {
     return "the batch takes " + std::to_string(needed) + " blocks of 64 bytes, ";
   };
-  if (needed > lane.blocks()) {
-    throw LaneFull(takes() + "a lane of '" + segment() + "' has " + std::to_string(lane.blocks()) +
+  if (needed > most) {
+    throw LaneFull(takes() + "a lane of '" + segment() + "' has " + std::to_string(most) +
                    ": send it in parts, or start the backend with larger lanes (lane_blocks)");
   }
-  if (const std::uint32_t free = lane.free_blocks(); needed > free) {
-    throw LaneFull(takes() + std::to_string(free) + " of " + std::to_string(lane.blocks()) +
+  if (const std::uint32_t free = most - std::min(sent, most); needed > free) {
+    throw LaneFull(takes() + std::to_string(free) + " of " + std::to_string(most) +
                    " are free in the lane of '" + segment() +
                    "'. Nothing was sent, all stays added: pulse again when earlier commands have "
                    "ended, purge, or start the backend with larger lanes (lane_blocks)");
   }
 }
 
+/// Passes over the statuses of batches that still run.
+CommandId UntypedFrontend::draw_ids(LaneSender& lane, std::uint64_t n) {
+  const auto has_ended = [&](CommandId id) {
+    const LaneSender::StatusAnswer answer = lane.status(id);
+    return answer.known == LaneSender::Known::forgotten ||
+           (answer.known == LaneSender::Known::yes &&
+            is_end(static_cast<Status>(answer.word.status)));
+  };
+  const std::optional<CommandId> first = link_->ids.draw(lane.next_id(), n, has_ended);
+  if (!first) {
+    throw LaneFull("the batches in the lane of '" + segment() +
+                   "' that have not ended leave no room for the statuses of " +
+                   std::to_string(n - 2) +
+                   " more records. Nothing was sent, all stays added: wait for a batch, purge, or "
+                   "start the backend with larger lanes (lane_blocks)");
+  }
+  lane.draw_ids(*first + n);
+  return *first;
+}
+
 /// Seals a batch, sends it, and lets an inline robot take it.
-Batch UntypedFrontend::send(BatchBuilder& builder, const BatchRecord& wanted) {
-  Batch batch;
+Sent UntypedFrontend::send(BatchBuilder& builder, const BatchRecord& wanted) {
+  Sent sent;
   std::shared_ptr<InlineRunner> runner;
   {
-    const std::scoped_lock lock(link_->sending);
-    const std::shared_ptr<LaneSender> lane = link_->lane();
+    const auto lock = link_->lock_to_send();
     runner = link_->runner;
+    if (runner) runner->refuse_nested();
+    sent.lane = link_->lane();
+    LaneSender* const lane = sent.lane.get();
     link_->segment.throw_if_known_gone();
-    refuse_if_full(builder, *lane);
+    refuse_if_full(builder, wanted, *lane);
     BatchRecord record = wanted;
     const std::uint32_t records = builder.records();
-    record.id = lane->next_ids(std::uint64_t{records} + 2);
+    sent.quiet = lane->events();
+    record.id = draw_ids(*lane, std::uint64_t{records} + 2);
     lane->send(std::as_bytes(builder.seal(record)), offsetof(BatchRecord, ticket));
     builder.clear();
-    batch = Batch(link_, lane, record.id, records);
+    if (records > 0) link_->ids.sent(record.id, std::uint64_t{records} + 2);
+    sent.id = record.id;
+    sent.records = records;
   }
   if (runner) runner->run();
-  return batch;
+  return sent;
 }
 
 Batch UntypedFrontend::pulse(const PulseOptions& options, std::uint16_t flags) {
@@ -188,16 +249,15 @@ Batch UntypedFrontend::pulse(const PulseOptions& options, std::uint16_t flags) {
   record.late_now = options.late == PulseOptions::Late::now ? 1 : 0;
   record.flags = flags;
   {
-    const std::scoped_lock lock(link_->sending);
-    link_->check_usable();
+    const auto lock = link_->lock_to_send();
     if (builder_.empty()) return {};
   }
-  return send(builder_, record);
+  return {link_, send(builder_, record)};
 }
 
 Batch UntypedFrontend::pulse(BatchBuilder& batch) {
   link_->check_usable();
-  return batch.empty() ? Batch() : send(batch, {});
+  return batch.empty() ? Batch() : Batch(link_, send(batch, {}));
 }
 
 Batch UntypedFrontend::pulse_to_end(const PulseOptions& options) {
@@ -226,7 +286,8 @@ UntypedObservation UntypedFrontend::pulse_and_wait(Timeout timeout, const PulseO
   return wait_for_end(pulse_to_end(options), timeout, check);
 }
 
-Burst UntypedFrontend::start_burst(std::int64_t iterations) {
+Sent UntypedFrontend::send_burst(std::int64_t iterations) {
+  link_->check_usable();
   if (!bursting()) {
     throw NotBursting("'" + segment() +
                       "' runs by its own clock and cannot be burst: start it with bursting");
@@ -237,12 +298,22 @@ Burst UntypedFrontend::start_burst(std::int64_t iterations) {
   }
   BatchRecord record;
   record.burst = iterations;
-  return {link_, send(builder_, record)};
+  return send(builder_, record);
+}
+
+Burst UntypedFrontend::start_burst(std::int64_t iterations) {
+  return {link_, Batch(link_, send_burst(iterations))};
 }
 
 UntypedObservation UntypedFrontend::burst(std::int64_t iterations, Timeout timeout,
                                           const Check& check) {
-  return start_burst(iterations).wait(timeout, check);
+  // as start_burst(iterations).wait(timeout, check), without what only a later question needs
+  const Sent sent = send_burst(iterations);
+  UntypedObservation observation(link_->description);  // made while the backend works
+  const Iteration row = wait_for_burst(*link_, *sent.lane, sent.id, timeout, check, sent.quiet);
+  if (row < 0) return Burst(link_, Batch(link_, sent)).wait(timeout, check);  // says why
+  read_last_row(*link_, row, observation);
+  return observation;
 }
 
 std::vector<UntypedObservation> burst(
@@ -250,6 +321,7 @@ std::vector<UntypedObservation> burst(
     const Check& check) {
   // nothing is granted if one of them cannot burst
   for (const auto& [frontend, iterations] : frontends) {
+    frontend->link()->check_usable();
     if (!frontend->bursting()) {
       throw NotBursting("'" + frontend->segment() +
                         "' runs by its own clock and cannot be burst: start it with bursting");

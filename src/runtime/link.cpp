@@ -24,7 +24,8 @@ Link::Link(AttachedSegment attached, std::shared_ptr<InlineRunner> inline_runner
       description(describe(segment)),
       history(segment.view()),
       rows(segment),
-      runner(std::move(inline_runner)) {}
+      runner(std::move(inline_runner)),
+      ids(2 * std::uint64_t{segment.view().shape.lane_blocks}) {}
 
 std::shared_ptr<LaneSender> Link::lane() {
   check_usable();
@@ -36,6 +37,7 @@ std::shared_ptr<LaneSender> Link::lane() {
 }
 
 std::shared_ptr<LaneSender> Link::lane_if_taken() const {
+  segment.check_process();
   const std::scoped_lock lock(sending);
   return lane_;
 }
@@ -45,6 +47,13 @@ void Link::check_usable() const {
   if (closed.load(std::memory_order_relaxed)) {
     throw Closed("the frontend of '" + segment.name() + "' was closed: open a new one");
   }
+}
+
+std::unique_lock<std::mutex> Link::lock_to_send() const {
+  segment.check_process();
+  std::unique_lock lock(sending);
+  check_usable();
+  return lock;
 }
 
 Check Link::guarded(const Check& check) const {

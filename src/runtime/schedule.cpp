@@ -21,4 +21,9 @@ void Schedule::drop_next() noexcept {
   heap_.pop_back();
 }
 
+void Schedule::disown(std::uint32_t lane) noexcept {
+  for (ScheduledBatch& batch : heap_)
+    if (batch.lane == lane) batch.of_dead = true;
+}
+
 }  // namespace o80

@@ -11,6 +11,8 @@ using Iteration = std::int64_t;
 
 /// Nanoseconds of the monotonic clock [ns].
 std::int64_t monotonic_now() noexcept;
+/// The same clock as of the last tick of the kernel, some milliseconds late but a load away [ns].
+std::int64_t monotonic_roughly_now() noexcept;
 
 /// How long a caller is ready to wait; empty is for ever.
 using Timeout = std::optional<std::chrono::nanoseconds>;

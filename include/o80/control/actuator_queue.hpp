@@ -6,6 +6,7 @@
 
 #include "o80/control/clamp.hpp"
 #include "o80/control/duration.hpp"
+#include "o80/control/lane_lists.hpp"
 #include "o80/control/ledger.hpp"
 #include "o80/control/motion.hpp"
 #include "o80/control/pool.hpp"
@@ -28,17 +29,19 @@ class ActuatorQueue {
 
   /// `desired` is the actuator's own place in the desired block.
   ActuatorQueue(const Schema& schema, const ActuatorRow& row, const StateLayout& layout,
-                BlockPool& pool, Ledger& ledger, std::byte* desired);
+                BlockPool& pool, Ledger& ledger, std::byte* desired, std::uint32_t lanes);
 
   /// Adds a list of commands of one lane.
-  void append(BlockIndex first, BlockIndex last, std::uint32_t lane) noexcept;
+  void append(BlockIndex first, BlockIndex last, std::uint32_t lane) noexcept {
+    queue_.append(first, last, lane);
+  }
   /// Ends everything; what overwrites it may continue its motion.
   void drop(Status status, Reason reason, Iteration iteration) noexcept;
   /// Ends what one lane sent.
   void drop_lane(std::uint32_t lane, Status status, Reason reason, Iteration iteration) noexcept;
   /// `late_budget` is how many late commands may still be told in this iteration.
   Moved step(Iteration iteration, const std::byte* observed, std::uint32_t& late_budget) noexcept;
-  bool empty() const noexcept { return head_ == kNoBlock; }
+  bool empty() const noexcept { return queue_.empty(); }
 
   /// The state of an actuator that has just become idle.
   void settle(const std::byte* observed) noexcept;
@@ -47,15 +50,12 @@ class ActuatorQueue {
   bool follows() const noexcept { return when_idle_ == WhenIdle::follow; }
 
  private:
-  static constexpr std::uint32_t kSeveralLanes = 0xFFFFFFFF;
-
   bool begin_next(Iteration iteration, const std::byte* observed,
                   std::uint32_t& late_budget) noexcept;
   void begin_row(Iteration iteration, const std::byte* observed) noexcept;
   std::int64_t iterations(const RecordHead& head, Iteration iteration) noexcept;
   std::int64_t iterations_at(double speed, Profile profile) noexcept;
   void end_running(Iteration iteration) noexcept;
-  void pop() noexcept;
   void halt() noexcept;
 
   const StateLayout* layout_;
@@ -68,9 +68,7 @@ class ActuatorQueue {
   double period_;  // [s]
   WhenIdle when_idle_;
 
-  BlockIndex head_ = kNoBlock;  // the one that runs, if one does
-  BlockIndex tail_ = kNoBlock;
-  std::uint32_t lane_ = kSeveralLanes;  // of all in the queue
+  LaneLists queue_;  // in front the one that runs, if one does
   bool running_ = false;
   bool clamped_ = false;  // by the last iteration
 

@@ -40,6 +40,7 @@ class BatchBuilder {
   void clear();
   bool empty() const noexcept { return records_ == 0; }
   std::uint32_t records() const noexcept { return records_; }
+  bool has_commands() const noexcept { return has_commands_; }
   /// Blocks that the batch takes in its lane.
   std::uint64_t blocks() const noexcept { return blocks_.size(); }
 
@@ -48,6 +49,7 @@ class BatchBuilder {
 
   std::vector<Block> blocks_;  // the batch's own block first
   std::uint32_t records_ = 0;
+  bool has_commands_ = false;
 };
 
 }  // namespace o80

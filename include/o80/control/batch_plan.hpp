@@ -52,7 +52,10 @@ class BatchPlanner {
   struct Lane {
     BlockIndex batch = kNoBlock;   // being checked
     BlockIndex cursor = kNoBlock;  // first block of the record being checked
-    BlockIndex last = kNoBlock;    // its last one; none before it has been walked
+    bool begun = false;            // it has been looked at
+    RecordCheck::Verdict verdict = RecordCheck::Verdict::unfinished;
+    BlockIndex last = kNoBlock;  // its last one, or as far as an invalid one has been walked
+    std::uint32_t to_walk = 0;   // blocks of it behind `last`
     BlockIndex last_step = kNoBlock;
     BlockIndex invalid = kNoBlock;
     std::uint32_t place = 0;
@@ -63,7 +66,8 @@ class BatchPlanner {
   };
 
   void begin(Lane& lane, BlockIndex batch) noexcept;
-  RecordCheck::Verdict begin_record(Lane& lane) noexcept;
+  void begin_record(Lane& lane) noexcept;
+  static void stop_reading(Lane& lane) noexcept;
   bool check_record(std::uint32_t lane, std::uint32_t& budget) noexcept;
   void add(std::uint32_t lane, BlockIndex record) noexcept;
   void add_step(Lane& lane, BlockIndex record) noexcept;

@@ -50,7 +50,7 @@ class Controller {
 
   /// Drops what an actuator (or kEveryActuator) runs and queues; O(1) an actuator.
   void purge(std::uint32_t actuator, Iteration iteration, Reason reason = Reason::none) noexcept;
-  /// Drops what one lane sent; walks the queues that it shares with others.
+  /// Drops what one lane sent, to an actuator or to every one; O(lanes) an actuator.
   void purge_lane(std::uint32_t lane, std::uint32_t actuator, Iteration iteration,
                   Reason reason = Reason::none) noexcept;
   /// Ends what an actuator runs and queues as interrupted.

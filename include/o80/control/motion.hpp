@@ -35,6 +35,7 @@ class Motion {
   Moment first_moment() const noexcept { return moving_ ? moments_.front() : Moment{}; }
 
  private:
+  void measure() noexcept;
   void plain_state(double share, std::byte* out) const noexcept;
   void mixed_state(double share, double time, std::byte* out) const noexcept;
   double moved(std::size_t number, double share, double time) const noexcept;
@@ -57,6 +58,7 @@ class Motion {
   Pace pace_ = Pace::direct;
   bool quintic_ = false;  // sets out with a velocity
   bool moving_ = false;
+  bool measured_ = false;  // the ways are known
 };
 
 }  // namespace o80

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "o80/control/record.hpp"
+#include "o80/control/visit_block.hpp"
 
 namespace o80 {
 
@@ -45,6 +46,7 @@ class BlockPool {
     (chain.first == kNoBlock ? chain.first : next_[chain.last]) = taken;
     chain.last = taken;
     ++chain.blocks;
+    ends_[chain.first] = {taken, chain.blocks};
     return true;
   }
   /// Gives back the chain from `first` to `last`.
@@ -57,10 +59,21 @@ class BlockPool {
     if (chain.blocks > 0) release(chain.first, chain.last, chain.blocks);
   }
 
-  BlockIndex next(BlockIndex block) const noexcept { return next_[block]; }
+  BlockIndex next(BlockIndex block) const noexcept {
+    O80_VISIT_BLOCK(block);
+    return next_[block];
+  }
+  /// The chain that was appended from this first block on.
+  BlockChain chain(BlockIndex first) const noexcept {
+    return {first, ends_[first].last, ends_[first].blocks};
+  }
   void link(BlockIndex block, BlockIndex next) noexcept { next_[block] = next; }
-  std::byte* bytes(BlockIndex block) noexcept { return blocks_ + std::size_t{block} * kBlockBytes; }
+  std::byte* bytes(BlockIndex block) noexcept {
+    O80_VISIT_BLOCK(block);
+    return blocks_ + std::size_t{block} * kBlockBytes;
+  }
   const std::byte* bytes(BlockIndex block) const noexcept {
+    O80_VISIT_BLOCK(block);
     return blocks_ + std::size_t{block} * kBlockBytes;
   }
   /// The batch record in the first block of a chain.
@@ -75,11 +88,17 @@ class BlockPool {
   }
 
  private:
+  struct End {
+    BlockIndex last;
+    std::uint32_t blocks;
+  };
+
   std::byte* blocks_ = nullptr;
   std::uint32_t size_ = 0;
   std::uint32_t available_ = 0;
   BlockIndex free_ = kNoBlock;
   std::vector<BlockIndex> next_;
+  std::vector<End> ends_;  // of the chain that begins there
 };
 
 /// Reads along the chain of a record's blocks; never past its end.
@@ -95,7 +114,6 @@ class Cursor {
   std::uint32_t offset() const noexcept { return offset_; }
   /// Copies the next bytes; what is past the end reads as zero, and false is returned.
   bool read(void* out, std::size_t bytes) noexcept;
-  void skip(std::uint64_t bytes) noexcept;
 
  private:
   const BlockPool* pool_ = nullptr;

@@ -10,6 +10,16 @@
 
 namespace o80 {
 
+/// A command whose rows have their own times.
+inline bool is_timed(const RecordHead& head) noexcept {
+  return head.kind == RecordKind::command && head.pace == Pace::duration && head.rows > 1;
+}
+/// Keeps in the head of such a command, whose `amount` means nothing, where its rows begin...
+void note_rows(RecordHead& head, const Cursor& rows) noexcept;
+/// ... so that nobody goes along its times to get there.
+Cursor rows_of_timed(const BlockPool& pool, const RecordHead& head,
+                     std::uint32_t row_bytes) noexcept;
+
 /// Judges records that crossed a lane: whatever their bytes are, they do no harm.
 ///
 /// Realtime: everything but construction.
@@ -26,9 +36,11 @@ class RecordCheck {
     std::uint32_t times_left = 0;
     std::uint32_t rows_left = 0;
     std::int64_t time = 0;  // end of the row before [ns]
+    Cursor rows{};          // where they begin
   };
 
   /// Judges all but the times and rows of the record starting at `block`, whose blocks are there.
+  /// The payload of a valid record has been read to its end.
   Verdict begin(const BlockPool& pool, BlockIndex block, Progress& progress) noexcept;
   /// Goes on with times and rows, for about `budget` blocks, which it takes off.
   Verdict go_on(const BlockPool& pool, BlockIndex block, Progress& progress,
@@ -36,7 +48,7 @@ class RecordCheck {
 
  private:
   Verdict begin_command(const RecordHead& head, Progress& progress) noexcept;
-  Verdict check_request(const RecordHead& head, Cursor payload) noexcept;
+  Verdict check_request(const RecordHead& head, Cursor& payload) noexcept;
 
   Layouts layouts_;
   std::vector<std::uint32_t> actuator_types_;

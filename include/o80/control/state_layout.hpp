@@ -44,7 +44,9 @@ class StateLayout {
 
   /// Copies the numbers; padding stays as it is.
   void copy(std::byte* to, const std::byte* from) const noexcept {
-    if (!padded_) {
+    if (size_ == sizeof(double) && !padded_) {  // most states: no call
+      std::memcpy(to, from, sizeof(double));
+    } else if (!padded_) {
       std::memcpy(to, from, size_);
     } else {
       copy_numbers(to, from);

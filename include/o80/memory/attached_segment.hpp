@@ -68,6 +68,7 @@ class AttachedSegment {
   void throw_if_known_gone() const;
   /// Throws UsedAfterFork.
   void check_process() const;
+  bool forked() const noexcept { return guard_.forked(); }
   /// Another open file of the same segment, for the lock of a lane.
   LockFile open_again() const;
 

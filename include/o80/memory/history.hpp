@@ -20,6 +20,8 @@ class HistoryWriter {
   std::size_t row_bytes() const noexcept { return row_bytes_; }
   /// Row k = `row`, row_bytes of private memory; k is one more than the last.
   void publish(Iteration k, const std::byte* row) noexcept;
+  /// Row k will follow soon: fetches what its publication writes.
+  void expect(Iteration k) const noexcept;
 
  private:
   Counters* counters_;
@@ -51,13 +53,17 @@ class HistoryReader {
   Iteration oldest() const noexcept;
   /// Copies row k; false if not published yet or overwritten.
   bool read(Iteration k, std::byte* to) const noexcept;
-  /// Copies the newest row; its iteration, or -1.
+  /// Copies the newest row; its iteration, or -1 if there is none (or is_damaged()).
   Iteration latest(std::byte* to) const noexcept;
+  /// No backend leaves counters like these: no row can be told from one being overwritten.
+  bool is_damaged() const noexcept;
   /// Copies rows first .. first + count - 1 as far as they are there, packed at the start of `to`.
   Range read_range(Iteration first, std::size_t count, std::byte* to) const noexcept;
 
  private:
   const std::byte* slot(Iteration k) const noexcept;
+  /// The row being written, or the newest.
+  Iteration begun() const noexcept;
   /// Of what was copied before this call, rows from here on are whole.
   Iteration first_true() const noexcept;
 

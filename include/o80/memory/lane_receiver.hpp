@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -18,7 +19,7 @@ namespace o80 {
 ///
 /// Writer:   the backend's thread.
 /// Readers:  LaneSender.
-/// Realtime: yes; flush() makes one system call if somebody sleeps.
+/// Realtime: yes.
 class LaneReceiver {
  public:
   LaneReceiver(const SegmentView& view, std::uint32_t lane) noexcept;
@@ -43,11 +44,15 @@ class LaneReceiver {
   /// Blocks taken and not given back.
   std::uint64_t in_flight() const noexcept { return cursor_ - freed_; }
 
-  /// Visible at once; wakes nobody until flag() and flush().
+  /// Visible at once; nobody is to be woken before flag() and flush().
   void set_status(std::uint64_t id, StatusWord word) noexcept;
   /// A text for an id, cut to 247 bytes; to be written before the status that it explains.
   void set_message(std::uint64_t id, std::string_view text) noexcept;
-  void set_staged(std::uint64_t id) noexcept;
+  /// Whether a batch may have this id: they grow, and not by leaps. Who could choose any id could
+  /// spoil the statuses of all who own the lane after him.
+  bool expects(std::uint64_t id) const noexcept { return id - ids_ <= kLeap; }
+  /// Its ids end before `ids_end`.
+  void set_staged(std::uint64_t id, std::uint64_t ids_end) noexcept;
   /// Both flag.
   void set_ended(std::uint64_t id) noexcept;
   void set_burst_done(std::uint64_t id, Iteration row) noexcept;
@@ -55,13 +60,14 @@ class LaneReceiver {
   void flag() noexcept { flagged_ = true; }
   /// flush() has something to do.
   bool has_news() const noexcept { return flagged_ || freed_ != freed_published_; }
-  /// Publishes what was freed and wakes, both only if there is cause; once an iteration.
-  void flush() noexcept;
+  /// Publishes what was freed and moves the events, both only if there is cause; once an iteration.
+  /// True if somebody sleeps until then.
+  bool flush() noexcept;
 
   /// Owner of the lane as its page has it: a count, 0 if never taken; and the last that closed.
   std::uint64_t incarnation() const noexcept;
   std::uint64_t closed() const noexcept;
-  /// The owner before the present one died: its count, else 0.
+  /// The last owner that died and has an heir: its count, else 0.
   std::uint64_t dead_predecessor() const noexcept;
   /// What is next was sent by that one.
   bool next_is_of_dead() const noexcept;
@@ -79,6 +85,7 @@ class LaneReceiver {
   std::uint64_t bursts_ = 0;
   std::uint64_t messages_ = 0;
   std::uint64_t resets_ = 0;
+  std::uint64_t ids_ = 1;  // all below belong to batches that were staged
   bool flagged_ = false;
 };
 
@@ -100,9 +107,15 @@ class LaneReceivers {
   std::optional<std::uint32_t> next() noexcept;
   /// Makes the next look() look whatever the bell says (a lane's owner died).
   void look_again() noexcept { pending_ = true; }
+  /// The same if there is anything now; what is committed later rings.
+  void look_again_if_any() noexcept {
+    pending_ = !std::ranges::all_of(lanes_, &LaneReceiver::is_quiet);
+  }
   /// The bell as look() found it, for BellWaiter::wait.
   std::uint32_t bell_seen() const noexcept { return bell_seen_; }
-  /// flush() on every lane.
+  /// flush() on every lane; true if those who sleep on `lane_wake` are to be woken.
+  bool announce() noexcept;
+  /// The same, and wakes them: one system call at most.
   void flush_events() noexcept;
 
  private:

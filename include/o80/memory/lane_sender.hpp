@@ -17,7 +17,8 @@ namespace o80 {
 ///
 /// Ids and positions go on where former owners left them.
 ///
-/// Writer:   its owner, which guards the sending calls (next_ids, free_blocks, send) if it has
+/// Writer:   its owner, which guards the sending calls (next_id, draw_ids, free_blocks, send) if it
+/// has
 ///           several threads.
 /// Readers:  the backend; statuses, bursts, messages and waits may be asked from any thread.
 /// Realtime: send and the questions, yes; taking and waiting, no.
@@ -49,8 +50,12 @@ class LaneSender {
   std::uint32_t blocks() const noexcept { return view_.shape.lane_blocks; }
   /// Blocks that may be sent now.
   std::uint32_t free_blocks() const noexcept;
-  /// The first of n ids in a row, from 1.
-  std::uint64_t next_ids(std::uint64_t n) noexcept;
+  /// The lowest id that was never drawn, from 1.
+  std::uint64_t next_id() const noexcept { return next_id_; }
+  /// All ids below `next` are drawn. Ids never go back.
+  void draw_ids(std::uint64_t next) noexcept;
+  /// Ids whose status is remembered: each at its id modulo this.
+  std::uint64_t statuses() const noexcept { return 2 * std::uint64_t{blocks()}; }
   /// Copies a whole batch of blocks, draws its ticket, writes it at `ticket_offset` (multiple of 8)
   /// of the first block, commits all with one store, rings. Returns the ticket.
   /// Throws LaneFull with nothing sent, InvalidArgument, UsedAfterFork.
@@ -65,14 +70,21 @@ class LaneSender {
   std::uint64_t staged() const noexcept;
   std::uint64_t ended() const noexcept;
 
-  /// Until `done()`, which is asked again whenever the backend has flagged the lane.
+  /// Changes whenever the backend has news for this lane.
+  std::uint32_t events() const noexcept {
+    return feedback_->events.load(std::memory_order_acquire);  // sync events
+  }
+  /// Until `done()`, which is asked again whenever the backend has flagged the lane. `quiet` are
+  /// the events before that was sent which is waited for: nothing is asked while they stand there.
   /// Throws BackendGone (any of it) and Cancelled.
   template <class Done>
-  Waited wait_until(Done&& done, const Deadline& deadline, const Check& check = {}) {
+  Waited wait_until(Done&& done, const Deadline& deadline, const Check& check = {},
+                    std::optional<std::uint32_t> quiet = {}) {
     std::int64_t look_at = 0;
+    std::int64_t nap = kSlice;  // what is left until then
     while (true) {
       const std::uint32_t seen = events();
-      if (done()) return Waited::ready;
+      if (seen != quiet && done()) return Waited::ready;
       if (spinner_.spin([&] { return events() != seen; }) && done()) return Waited::ready;
       if (deadline.over()) {
         // a wait too short to look around learns of the end all the same
@@ -82,9 +94,11 @@ class LaneSender {
         return Waited::timed_out;
       }
       if (look_at == 0) look_at = monotonic_now() + kSlice;
-      sleep(seen, deadline);
-      if (monotonic_now() < look_at && !segment_->has_ended()) continue;
+      sleep(seen, deadline.left(nap));
+      nap = look_at - monotonic_now();
+      if (nap > 0 && !segment_->has_ended()) continue;
       look_at = monotonic_now() + kSlice;
+      nap = kSlice;
       // what is done is done, whatever became of the backend
       const bool gone = look_around(check);
       if (done()) return Waited::ready;
@@ -93,11 +107,8 @@ class LaneSender {
   }
 
  private:
-  std::uint32_t events() const noexcept {
-    return feedback_->events.load(std::memory_order_acquire);  // sync events
-  }
-  /// One slice at most.
-  void sleep(std::uint32_t seen, const Deadline& deadline);
+  /// So long [ns] at most.
+  void sleep(std::uint32_t seen, std::int64_t at_most);
   /// True if the backend is gone. Throws Cancelled.
   bool look_around(const Check& check) const;
 
@@ -111,6 +122,8 @@ class LaneSender {
   std::byte* transport_ = nullptr;
   std::uint64_t incarnation_ = 0;
   std::uint64_t sent_ = 0;
+  std::uint64_t next_id_ = 1;
+  std::uint32_t draws_ = 0;
   Spinner spinner_;
   ForkGuard guard_;
 };

@@ -23,7 +23,7 @@ struct LaneLife {
 ///
 /// Writer:   the helper thread.
 /// Readers:  the backend's thread.
-/// Realtime: changes() and lane(), one load each.
+/// Realtime: changes(), rounds() and lane(), one load each.
 class LaneLiveness {
  public:
   explicit LaneLiveness(const OwnedSegment& segment);
@@ -34,6 +34,9 @@ class LaneLiveness {
   /// Counts changes: nothing to look at while it stands still.
   std::uint32_t changes() const noexcept;
   LaneLife lane(std::uint32_t i) const noexcept;
+  /// Counts how often the helper has asked: whoever waits for a signal that anybody could spoil
+  /// looks for himself when it has moved.
+  std::uint32_t rounds() const noexcept;
   /// Asks now, in the calling thread. Not for the loop.
   void refresh() noexcept;
 

@@ -23,6 +23,8 @@ inline constexpr std::size_t kBlockSize = 64;    // of a lane [B]
 inline constexpr std::size_t kMessages = 64;     // kept for a lane
 inline constexpr std::size_t kBurstsKept = 256;  // for a lane
 inline constexpr std::uint32_t kMostLanes = 1024;
+inline constexpr std::uint64_t kIncarnations = (1ULL << 62) - 1;  // what a lane's count is cut to
+inline constexpr std::uint64_t kLeap = 1ULL << 28;  // ids that a lane's owners may leave out
 
 /// The numbers from which every offset in the file follows.
 struct SegmentShape {
@@ -54,6 +56,7 @@ struct Counters {
   std::atomic<std::int64_t> published;                  // newest row, -1 before the first
   alignas(kLineBytes) std::atomic<std::uint32_t> state;
   std::atomic<std::uint32_t> row_wake;                        // futex of those who wait for a row
+  std::atomic<std::uint32_t> lane_wake;                       // and for something of their lane
   alignas(kLineBytes) std::atomic<std::uint32_t> sleeping;    // the backend sleeps at the bell
   alignas(kLineBytes) std::atomic<std::uint64_t> fault[128];  // text
 };
@@ -72,9 +75,10 @@ struct LaneSenderPage {
   alignas(kLineBytes) std::atomic<std::uint64_t> committed;    // blocks, ever
   alignas(kLineBytes) std::atomic<std::uint64_t> incarnation;  // owners so far; 0: never owned
   std::atomic<std::uint64_t> closed;                           // last one that left in order
-  std::atomic<std::uint64_t> began;                            // blocks committed before the last
+  std::atomic<std::uint64_t> began;  // blocks committed before the heir of `lost`
+  std::atomic<std::uint64_t> lost;   // last one that its heir found dead
   alignas(kLineBytes) std::atomic<std::uint64_t> next_id;
-  alignas(kLineBytes) std::atomic<std::uint32_t> waiting;   // somebody sleeps on `events`
+  alignas(kLineBytes) std::atomic<std::uint32_t> waiting;   // somebody sleeps until `events` moves
   alignas(kLineBytes) std::atomic<std::uint64_t> owner[8];  // text
 };
 static_assert(sizeof(LaneSenderPage) == 5 * kLineBytes);
@@ -103,8 +107,9 @@ struct LaneFeedback {
   std::atomic<std::uint64_t> ended;                       // last batch whose commands have ended
   BurstSlot burst;                                        // the newest
   std::atomic<std::uint64_t> bursts;                      // done, ever
-  std::atomic<std::uint32_t> events;                      // futex; changes at each flush
+  std::atomic<std::uint32_t> events;                      // changes at each flush
   alignas(kLineBytes) std::atomic<std::uint64_t> staged;  // last batch staged whole
+  std::atomic<std::uint64_t> ids;                         // all below belong to batches taken
   alignas(kLineBytes) BurstSlot recent_bursts[kBurstsKept];
   MessageSlot messages[kMessages];
 };

@@ -46,6 +46,9 @@ class RowWaiter {
 class RowSignal {
  public:
   explicit RowSignal(const SegmentView& view) noexcept : view_(view) {}
+  /// True if one of those who sleep on `row_wake` is to be woken.
+  bool announce(Iteration k) noexcept;
+  /// The same, and wakes it.
   void wake_readers(Iteration k) noexcept;
 
  private:

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <atomic>
+#include <cstdint>
 #include <memory>
-#include <mutex>
+#include <thread>
 
 #include "o80/robot/loop.hpp"
 #include "o80/runtime/frontend.hpp"
@@ -18,17 +20,29 @@ class InlineRobot final : public InlineRunner {
   /// of the burst is not run. Throws as Loop.
   InlineRobot(std::unique_ptr<Robot> robot, BackendOptions options, Check check = {});
 
+  /// Threads run one after the other. Throws DriverError, Closed if `stop` cut it.
   void run() override;
-  /// Stops the robot; its frontends see a backend that stopped.
+  void refuse_nested() const override;
+  /// Stops the robot, at the next iteration of a burst that runs; its frontends see a backend that
+  /// stopped. From any thread, also from within `check`; does nothing in a forked child.
   void stop() noexcept;
   const std::string& segment() const noexcept { return loop_.backend().name(); }
 
  private:
+  class Turn;
+  bool runs_here() const noexcept {
+    return runner_.load(std::memory_order_relaxed) == std::this_thread::get_id();
+  }
   void look_around();
 
-  std::mutex running_;
+  std::atomic<std::uint32_t> turn_{0};     // taken by Turn: 0 free, 1 taken, 2 taken and waited for
+  std::atomic<std::thread::id> runner_{};  // who runs iterations: each thread asks for itself only
+  std::atomic<bool> stopping_{false};
+  ForkGuard guard_;
   Check check_;
-  std::int64_t look_at_ = 0;  // when `check` is asked next [ns]
+  std::int64_t look_at_ = 0;    // when `check` is asked next [ns]
+  std::int64_t looked_at_ = 0;  // the clock, last [ns]
+  std::uint32_t at_once_;       // iterations between looks at the clock
   Loop loop_;
 };
 

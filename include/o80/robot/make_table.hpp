@@ -50,6 +50,13 @@ void describe_driver(const D& driver, const char* name, Schema& schema) {
   schema.head.block = round_up(schema.head.block, 8);
 }
 
+template <Driver D>
+typename D::Config config_of(const OptionValue* values, std::uint32_t count) {
+  typename D::Config config;
+  for (std::uint32_t i = 0; i < count; ++i) set_option(config, values[i].name, values[i].text);
+  return config;
+}
+
 template <Driver D, class Request>
 RequestAnswer serve(D& driver, const std::byte* payload, FaultText* text) {
   if constexpr (requires {
@@ -91,14 +98,15 @@ const RobotTable* robot_table(const char* name, const char* versions = "") {
         each(context, &row);
       }
     };
-    t.create = [](const OptionValue* values, std::uint32_t count, FaultText* fault) -> void* {
-      return driving::guarded<void*>(fault, nullptr, [&]() -> void* {
-        typename D::Config config;
-        for (std::uint32_t i = 0; i < count; ++i) {
-          set_option(config, values[i].name, values[i].text);
-        }
-        return new D(config);
+    t.accepts = [](const OptionValue* values, std::uint32_t count, FaultText* fault) {
+      return driving::guarded<int>(fault, 1, [&] {
+        static_cast<void>(driving::config_of<D>(values, count));
+        return 0;
       });
+    };
+    t.create = [](const OptionValue* values, std::uint32_t count, FaultText* fault) -> void* {
+      return driving::guarded<void*>(
+          fault, nullptr, [&]() -> void* { return new D(driving::config_of<D>(values, count)); });
     };
     t.describe = [](void* robot, void* context, void (*rows)(void*, const SchemaRows*),
                     FaultText* fault) {

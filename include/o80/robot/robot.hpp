@@ -21,6 +21,9 @@ std::vector<Option> options_of(const RobotTable& table);
 /// Throws DriverError if a table was made by another version of o80.
 void check_table(const RobotTable& table, const std::string& where);
 
+/// Throws InvalidArgument if the robot has no such option, or one cannot have that text.
+void check_options(const RobotTable& table, const OptionValues& options);
+
 /// One living driver behind its table.
 ///
 /// Move-only. The driver is stopped and destroyed with it.

@@ -11,7 +11,7 @@
 
 namespace o80 {
 
-inline constexpr std::uint32_t kRobotTableVersion = 1;
+inline constexpr std::uint32_t kRobotTableVersion = 2;
 
 /// Why a call failed.
 struct FaultText {
@@ -81,6 +81,8 @@ struct RobotTable {
   const char* built_with;  // versions of o80 and of what it links
 
   void (*options)(void* context, void (*each)(void* context, const OptionRow* row));
+  /// Whether a robot can be created with these options: their names and texts are known.
+  int (*accepts)(const OptionValue* values, std::uint32_t count, FaultText* fault);
   void* (*create)(const OptionValue* values, std::uint32_t count, FaultText* fault);
   int (*describe)(void* robot, void* context, void (*rows)(void* context, const SchemaRows* rows),
                   FaultText* fault);

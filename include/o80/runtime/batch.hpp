@@ -22,14 +22,21 @@ struct Handle {
   std::string text;          // of a rejection: why, in words
 };
 
+/// What has just been sent.
+struct Sent {
+  std::shared_ptr<LaneSender> lane;
+  CommandId id = 0;
+  std::uint32_t records = 0;
+  std::uint32_t quiet = 0;  // the lane's events before
+};
+
 /// What one pulse sent: to be waited for, and asked what became of it.
 ///
 /// Copies mean the same batch. Statuses once seen as ended are kept.
 class Batch {
  public:
   Batch() = default;
-  Batch(std::shared_ptr<Link> link, std::shared_ptr<LaneSender> lane, CommandId id,
-        std::uint32_t records);
+  Batch(std::shared_ptr<Link> link, Sent sent);
 
   CommandId id() const { return id_; }
   std::size_t size() const { return records_; }
@@ -54,7 +61,6 @@ class Batch {
   friend class Burst;
   struct Kept;
   Handle ask(CommandId id) const;
-  bool rejected() const noexcept;
 
   std::shared_ptr<Link> link_;
   std::shared_ptr<LaneSender> lane_;
@@ -62,6 +68,13 @@ class Batch {
   std::uint32_t records_ = 0;
   std::shared_ptr<Kept> kept_;
 };
+
+/// Waits until the last iteration of a burst just sent, or sent before, is done; its row, or -1 if
+/// its batch was rejected. Throws TimeoutError, BackendGone, Cancelled.
+Iteration wait_for_burst(const Link& link, LaneSender& lane, CommandId id, Timeout timeout,
+                         const Check& check, std::optional<std::uint32_t> quiet = {});
+/// Copies the row that this returned.
+void read_last_row(const Link& link, Iteration row, UntypedObservation& observation);
 
 /// A burst under way.
 class Burst {

@@ -66,6 +66,12 @@ class UntypedFrontend {
                                std::span<const std::byte> states,
                                const CommandOptions& options = {.pace = iterations(1)},
                                std::span<const std::int64_t> times = {});
+  /// One for each of several actuators, all or none; `states` holds the rows of the first actuator,
+  /// then those of the second... Returns the place of the first.
+  std::uint32_t add_trajectories(std::span<const std::uint32_t> actuators, std::uint32_t rows,
+                                 std::span<const std::byte> states,
+                                 const CommandOptions& options = {.pace = iterations(1)},
+                                 std::span<const std::int64_t> times = {});
   std::uint32_t add_purge(std::uint32_t actuator = kEveryActuator);
   /// Drops only what this frontend sent.
   std::uint32_t add_purge_own();
@@ -118,10 +124,18 @@ class UntypedFrontend {
   std::shared_ptr<Link> link() const { return link_; }
 
  private:
+  CommandOptions checked_trajectory(std::uint32_t actuator, std::uint32_t rows,
+                                    std::span<const std::byte> states,
+                                    const CommandOptions& options,
+                                    std::span<const std::int64_t> times) const;
   Batch pulse(const PulseOptions& options, std::uint16_t flags);
-  Batch send(BatchBuilder& builder, const BatchRecord& record);
-  void refuse_if_full(const BatchBuilder& builder, const LaneSender& lane) const;
+  Sent send(BatchBuilder& builder, const BatchRecord& record);
+  Sent send_burst(std::int64_t iterations);
+  CommandId draw_ids(LaneSender& lane, std::uint64_t n);
+  void refuse_if_full(const BatchBuilder& builder, const BatchRecord& wanted,
+                      const LaneSender& lane) const;
   [[noreturn]] void missing(Iteration k) const;
+  SegmentError damaged() const;
 
   std::shared_ptr<Link> link_;
   std::unique_ptr<CommandCheck> check_;

@@ -11,6 +11,7 @@
 #include "o80/memory/lane_sender.hpp"
 #include "o80/memory/segment.hpp"
 #include "o80/memory/signal.hpp"
+#include "o80/runtime/ids_in_flight.hpp"
 #include "o80/runtime/observation.hpp"
 
 namespace o80 {
@@ -21,6 +22,8 @@ class InlineRunner {
   virtual ~InlineRunner() = default;
   /// Runs until the backend stands still. Throws DriverError.
   virtual void run() = 0;
+  /// Throws Error in a thread that is inside `run` (a handler of a signal, say).
+  virtual void refuse_nested() const = 0;
 };
 
 /// What a frontend, its batches and its bursts share: the attached segment and the lane.
@@ -35,6 +38,9 @@ struct Link {
   std::shared_ptr<LaneSender> lane_if_taken() const;
   /// Throws Closed or UsedAfterFork.
   void check_usable() const;
+  /// Held while something is added or sent. Throws Closed or UsedAfterFork: in a forked child a
+  /// thread that does not exist there may hold it for ever.
+  std::unique_lock<std::mutex> lock_to_send() const;
   /// The caller's check, which also ends waits on a closed frontend.
   Check guarded(const Check& check) const;
 
@@ -43,6 +49,7 @@ struct Link {
   HistoryReader history;
   RowWaiter rows;
   std::shared_ptr<InlineRunner> runner;  // guarded by `sending`, gone when closed
+  IdsInFlight ids;                       // guarded by `sending`
   mutable std::mutex sending;
   std::atomic<bool> closed{false};
 

@@ -14,7 +14,7 @@ struct ScheduledBatch {
   BlockIndex batch = kNoBlock;
   std::uint32_t lane = 0;
   bool late_now = false;
-  bool of_dead = false;  // its sender had died when it was staged
+  bool of_dead = false;  // its sender has died, whoever has the lane now
 };
 
 /// Batches sent for a later iteration, the next one first.
@@ -29,6 +29,8 @@ class Schedule {
   const ScheduledBatch& next() const noexcept { return heap_.front(); }
   void add(const ScheduledBatch& batch) noexcept;
   void drop_next() noexcept;
+  /// The sender of what this lane has sent so far is dead.
+  void disown(std::uint32_t lane) noexcept;
 
  private:
   std::vector<ScheduledBatch> heap_;

@@ -19,7 +19,7 @@ namespace o80 {
 /// Writer:   one thread.
 /// Realtime: step and publish.
 template <class R>
-class Backend : private RequestServer {
+class Backend final : private RequestServer {
  public:
   using Actuators = ActuatorsOf<R>;
   using Extended = ExtendedOf<R>;

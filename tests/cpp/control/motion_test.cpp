@@ -70,6 +70,21 @@ TEST(Motion, MinimumJerkContinuesTheVelocityOfALinearMotionItOverwrites) {
   EXPECT_LT(largest(differences(differences(speed))), 0.0004);
 }
 
+TEST(Motion, MinimumJerkContinuesTheVelocityOfATrajectoryOfOneIterationARow) {
+  Rig rig(plain_robot(1));
+  std::vector<double> rows;
+  for (int i = 1; i <= 1000; ++i) rows.push_back(i);
+  rig.add_rows(0, over(1), 1000, rows);
+  rig.pulse();
+  const auto before = rig.run(300);
+  rig.add(0, overwriting(smoothly(over(1000))), {-500.0});
+  rig.pulse();
+  const auto speed = differences(joined(before, rig.run(1000)));
+  EXPECT_EQ(speed[298], 1.0);
+  EXPECT_NEAR(speed[299], 1.0, 0.001);
+  EXPECT_LT(largest(differences(speed)), 0.02);
+}
+
 TEST(Motion, ThatContinuationDoesNotComeByItself) {
   // what the two tests above would see if the motion started at rest
   const auto speed = differences(overwritten(smoothly(over(1000)), over(1000)));

@@ -52,6 +52,18 @@ TEST(Table, RefusesWhatCannotBeUsed) {
               HasSubstr("from 2.000000 to 1.000000"));
   EXPECT_THAT(refusal([](Schema& s) { s.limits[0].speed = 0; }), HasSubstr("speed > 0"));
   EXPECT_THAT(refusal([](Schema& s) { s.limits[0].minimum = std::nan(""); }), HasSubstr("limits"));
+  for (const char* text : {"\xff", "a\x80", "\xc3", "\xc0\xaf", "\xe0\x80\xaf", "\xed\xa0\x80",
+                           "\xf4\x90\x80\x80", "\xe2\x82", "\xf5\x80\x80\x80"}) {
+    EXPECT_THAT(refusal([&](Schema& s) { s.types[0].name = NameText(text); }), HasSubstr("UTF-8"))
+        << text;
+  }
+  for (const char* text :
+       {"Gelenk", "\xc3\xa4rm", "\xe2\x82\xac", "\xf0\x9f\xa6\xbe", "\xed\x9f\xbf"}) {
+    EXPECT_EQ(refusal([&](Schema& s) { s.types[0].name = NameText(text); }), "") << text;
+  }
+  EXPECT_THAT(refusal([](Schema& s) { s.limits.push_back({0, 1, std::nan("")}); }),
+              HasSubstr("not a number"))
+      << "nor one that no actuator has: the schema would not equal itself";
   EXPECT_THAT(refusal([](Schema& s) { s.actuators[0].type = 99; }), HasSubstr("no type"));
   EXPECT_THAT(refusal([](Schema& s) { s.actuators[8].offset = 4000; }),
               HasSubstr("outside the row"));

@@ -125,7 +125,7 @@ TEST_F(KillTest, FreesTheLaneOfADeadFrontendAndKeepsWhatItCommitted) {
   ChildProcess frontend([](const ChildProcess::Ready& ready) {
     const AttachedSegment attached = attach();
     LaneSender sender(attached);
-    sender.next_ids(10);
+    sender.draw_ids(11);
     send(sender, 1, 3);
     ready();
     pause_for_ever();
@@ -137,7 +137,7 @@ TEST_F(KillTest, FreesTheLaneOfADeadFrontendAndKeepsWhatItCommitted) {
   LaneSender next(attached);
   EXPECT_EQ(next.lane(), 0U);
   EXPECT_EQ(next.incarnation(), 2U);
-  EXPECT_EQ(next.next_ids(1), 11U);
+  EXPECT_EQ(next.next_id(), 11U);
   EXPECT_EQ(lanes[0].closed(), 0U);
   send(next, 2, 5);
 

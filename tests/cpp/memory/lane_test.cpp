@@ -175,14 +175,15 @@ TEST_F(LaneTest, RefusesAFrontendThatOnlyReads) {
 TEST_F(LaneTest, GoesOnWhereItsFormerOwnerLeftOff) {
   {
     LaneSender first(attached_);
-    EXPECT_EQ(first.next_ids(5), 1U);
+    EXPECT_EQ(first.next_id(), 1U);
+    first.draw_ids(6);
     send(first, 1, 3);
   }
   const AttachedSegment other = attach();
   LaneSender second(other);
   EXPECT_EQ(second.lane(), 0U);
   EXPECT_EQ(second.incarnation(), 2U);
-  EXPECT_EQ(second.next_ids(1), 6U);
+  EXPECT_EQ(second.next_id(), 6U);
   EXPECT_EQ(second.free_blocks(), 13U);
   send(second, 2);
   EXPECT_THAT(take_all(), ElementsAre(1, 2));

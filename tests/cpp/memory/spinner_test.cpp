@@ -2,11 +2,32 @@
 
 #include <gtest/gtest.h>
 #include <sched.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
+#include <functional>
 #include <thread>
+
+namespace {
+/// What happens while a spinning thread of a test lets others run.
+thread_local std::function<void()> others;
+}  // namespace
+
+/// In the place of the C library's.
+extern "C" int sched_yield() {
+  if (!others) return static_cast<int>(syscall(SYS_sched_yield));
+  others();
+  return 0;
+}
 
 namespace o80 {
 namespace {
+
+void run_for(std::int64_t duration) {
+  const std::int64_t end = monotonic_now() + duration;
+  while (monotonic_now() < end) {
+  }
+}
 
 bool fails_once(Spinner& spinner) {
   const bool spun = spinner.worth();
@@ -63,6 +84,66 @@ TEST(Spinner, EndsAfterABoundedMoment) {
   const std::int64_t begin = monotonic_now();
   EXPECT_FALSE(spinner.spin([] { return false; }));
   EXPECT_GE(monotonic_now() - begin, Spinner::kLongest);
+}
+
+class SpinnerAmongOthers : public testing::Test {
+ protected:
+  ~SpinnerAmongOthers() override { others = nullptr; }
+
+  /// Spins once, in vain; how often it let others run, and how long before the first time [ns].
+  struct Spun {
+    int yields = 0;
+    std::int64_t first = 0;
+  };
+  static Spun spin_in_vain(Spinner& spinner, std::int64_t others_take) {
+    Spun spun;
+    const std::int64_t begin = monotonic_now();
+    others = [&] {
+      if (spun.yields++ == 0) spun.first = monotonic_now() - begin;
+      run_for(others_take);
+    };
+    EXPECT_FALSE(spinner.spin([] { return false; }));
+    spinner.ended(true);  // so that it goes on spinning
+    return spun;
+  }
+
+  Spinner spinner_{2};
+};
+
+TEST_F(SpinnerAmongOthers, LetsTheOneItWaitsForRun) {
+  bool done = false;
+  others = [&] { done = true; };
+  EXPECT_TRUE(spinner_.spin([&] { return done; }));
+}
+
+TEST_F(SpinnerAmongOthers, SpinsAloneAtFirst) {
+  EXPECT_GE(spin_in_vain(spinner_, 0).first, Spinner::kAlone);
+}
+
+TEST_F(SpinnerAmongOthers, LetsThemRunAtOnceWhileSomebodyDoes) {
+  spin_in_vain(spinner_, 2 * Spinner::kSwitched);
+  // once is enough: a slow machine may be slow now and then
+  bool at_once = false;
+  for (int i = 0; i < 100 && !at_once; ++i) {
+    at_once = spin_in_vain(spinner_, 2 * Spinner::kSwitched).first < Spinner::kAlone;
+  }
+  EXPECT_TRUE(at_once);
+}
+
+TEST_F(SpinnerAmongOthers, ProbesWithoutLettingThemRun) {
+  for (std::uint32_t i = 0; i < Spinner::kPatience; ++i) spinner_.ended(false);
+  for (std::uint32_t i = 1; i < Spinner::kProbe; ++i) EXPECT_FALSE(spinner_.worth());
+  const std::int64_t begin = monotonic_now();
+  EXPECT_EQ(spin_in_vain(spinner_, 0).yields, 0);
+  EXPECT_GE(monotonic_now() - begin, Spinner::kLongest) << "it did probe";
+}
+
+TEST_F(SpinnerAmongOthers, DoesNotForLongWhereOthersKeepTheProcessor) {
+  EXPECT_EQ(spin_in_vain(spinner_, Spinner::kTooLong + 1).yields, 1);
+  // each spin of the test ends twice
+  for (std::uint32_t i = 4; i < Spinner::kOffended; ++i) spinner_.ended(true);
+  EXPECT_EQ(spin_in_vain(spinner_, 0).yields, 0);
+  EXPECT_GT(spin_in_vain(spinner_, 0).yields, 0);
 }
 
 }  // namespace

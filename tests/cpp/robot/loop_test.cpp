@@ -57,7 +57,7 @@ class LoopFails : public LoopTest,
 TEST_P(LoopFails, OnTheWayAndSaysSoInTheSegmentAndStopsItsDriverOnce) {
   const auto [fails, why] = GetParam();
   auto loop = make({{"fails", fails}});
-  std::thread waiter([why = why] {
+  std::thread waiter([why] {
     // whoever waits to attach raises it
     const std::string text =
         message_of<BackendFailed>([] { UntypedFrontend("puppet", {.timeout = kPatience}); });

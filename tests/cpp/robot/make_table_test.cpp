@@ -87,9 +87,9 @@ TEST_F(MakeTableTest, NothingThatADriverThrowsCrossesTheTable) {
 }
 
 TEST_F(MakeTableTest, AnOptionThatIsNotThereListsThoseThatAre) {
-  EXPECT_THAT(message_of<DriverError>([] { Robot(table(), {{"gian", "2"}}); }),
+  EXPECT_THAT(message_of<InvalidArgument>([] { Robot(table(), {{"gian", "2"}}); }),
               HasSubstr("there are: fails, gain, finish_at"));
-  EXPECT_THAT(message_of<DriverError>([] { Robot(table(), {{"gain", "much"}}); }),
+  EXPECT_THAT(message_of<InvalidArgument>([] { Robot(table(), {{"gain", "much"}}); }),
               HasSubstr("'gain' cannot be 'much'"));
 }
 

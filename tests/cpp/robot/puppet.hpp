@@ -7,6 +7,8 @@
 #include <chrono>
 #include <cstdio>
 #include <functional>
+#include <iterator>
+#include <sstream>
 #include <string>
 #include <thread>
 #include <utility>
@@ -145,10 +147,18 @@ struct Outcome {
 /// A program that runs beside the test, with pipes to all of its ends.
 class Program {
  public:
-  explicit Program(std::vector<std::string> words) {
+  /// `before` is called in its process before the program begins there.
+  explicit Program(std::vector<std::string> words, const std::function<void()>& before = {}) {
     for (auto& ends : pipes_) {
       if (pipe(ends) != 0) throw Error("no pipe");
     }
+#ifdef O80_TEST_EMULATOR
+    // of another instruction set: run by what runs this test
+    if (words[0].starts_with(O80_TEST_PREFIX)) {
+      std::istringstream emulator(O80_TEST_EMULATOR);
+      words.insert(words.begin(), std::istream_iterator<std::string>(emulator), {});
+    }
+#endif
     std::vector<char*> arguments;
     for (std::string& word : words) arguments.push_back(word.data());
     arguments.push_back(nullptr);
@@ -158,7 +168,8 @@ class Program {
       dup2(pipes_[1][1], 1);
       dup2(pipes_[2][1], 2);
       for (auto& ends : pipes_) ::close(ends[0]), ::close(ends[1]);
-      execv(arguments[0], arguments.data());
+      if (before) before();
+      execvp(arguments[0], arguments.data());
       _exit(127);
     }
     ::close(std::exchange(pipes_[0][0], -1));

@@ -4,9 +4,13 @@
 #include <sched.h>
 #include <sys/resource.h>
 
+#include <memory>
 #include <thread>
 
-namespace o80 {
+#include "o80/robot/loop.hpp"
+#include "robot/puppet.hpp"
+
+namespace o80::test {
 namespace {
 
 using ::testing::AllOf;
@@ -36,6 +40,78 @@ TEST(RealTime, RunsOnTheProcessorsItIsGiven) {
   }).join();
 }
 
+TEST(RealTime, NamesTheProcessorThatIsNotThereBesideOneThatIs) {
+  std::thread([] {
+    const int here = sched_getcpu();
+    RealTimeOptions options;
+    options.processors = {1000, here};
+    EXPECT_THAT(set_up_real_time(options),
+                ElementsAre(AllOf(HasSubstr("processors 1000 were refused (the others are used)"),
+                                  HasSubstr("lscpu"))));
+    EXPECT_EQ(sched_getcpu(), here);
+  }).join();
+}
+
+/// Page faults of this thread while something runs.
+template <class Work>
+long faults_in(Work&& work) {
+  rusage before{};
+  rusage after{};
+  getrusage(RUSAGE_THREAD, &before);
+  work();
+  getrusage(RUSAGE_THREAD, &after);
+  return after.ru_minflt - before.ru_minflt + after.ru_majflt - before.ru_majflt;
+}
+
+__attribute__((noinline)) void use_stack() {
+  volatile char some[128 << 10];
+  for (std::size_t i = 0; i < sizeof some; i += 4096) some[i] = 1;
+}
+
+TEST(RealTime, TouchesTheStackBeforehand) {
+#if defined(O80_TEST_SANITIZED) || defined(O80_TEST_EMULATOR)
+  GTEST_SKIP() << "a sanitizer has stacks of its own, an emulator too";
+#endif
+  std::thread([] {
+    set_up_real_time({});
+    EXPECT_EQ(faults_in(use_stack), 0);
+  }).join();
+  std::thread([] {
+    RealTimeOptions nothing;
+    nothing.stack = 0;
+    set_up_real_time(nothing);
+    EXPECT_GT(faults_in(use_stack), 16) << "the count counts";
+  }).join();
+}
+
+class RealTimeLoop : public PuppetTest {};
+
+TEST_F(RealTimeLoop, MeetsNoPageForTheFirstTimeInAnIteration) {
+#if defined(O80_TEST_SANITIZED) || defined(O80_TEST_EMULATOR)
+  GTEST_SKIP() << "a sanitizer has pages of its own, an emulator too";
+#endif
+  Loop loop(std::make_unique<Robot>(table(), OptionValues{}),
+            {.segment = "puppet", .bursting = true, .history = 20'000});
+  loop.start();
+  UntypedFrontend frontend("puppet");
+  // a batch and a burst, so that code and data have been used once; the history and lane have not
+  send(frontend, 0, 1.0, {.pace = iterations(3)});
+  add_request(frontend, Poke{1});
+  frontend.start_burst(1);
+  loop.run_granted(kAll);
+
+  std::thread([&] {
+    set_up_real_time({});
+    frontend.start_burst(5);
+    loop.run_granted(kAll);
+    // a whole lane, the whole history
+    for (int i = 0; i < 16'000; ++i) add(frontend, i % 2, 1.0, {.pace = direct()});
+    frontend.start_burst(25'000);
+    EXPECT_EQ(faults_in([&] { loop.run_granted(kAll); }), 0);
+  }).join();
+  EXPECT_GT(frontend.oldest(), 0);
+}
+
 TEST(RealTime, SaysHowToGetWhatTheMachineRefuses) {
   RealTimeOptions elsewhere;
   elsewhere.processors = {1000};
@@ -49,4 +125,4 @@ TEST(RealTime, SaysHowToGetWhatTheMachineRefuses) {
 }
 
 }  // namespace
-}  // namespace o80
+}  // namespace o80::test

@@ -1,7 +1,15 @@
 #include "o80/robot/run.hpp"
 
+#include <linux/capability.h>
+#include <linux/securebits.h>
+#include <sched.h>
 #include <signal.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -15,6 +23,25 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+
+/// A processor that this process may use.
+int usable_processor() {
+  cpu_set_t allowed;
+  sched_getaffinity(0, sizeof allowed, &allowed);
+  int first = 0;
+  while (!CPU_ISSET(first, &allowed)) ++first;
+  return first;
+}
+
+/// Of a process [kB].
+long locked_memory(pid_t pid) {
+  std::ifstream status("/proc/" + std::to_string(pid) + "/status");
+  for (std::string word; status >> word;) {
+    long locked = 0;
+    if (word == "VmLck:" && status >> locked) return locked;
+  }
+  return -1;
+}
 
 class RunTest : public PuppetTest {
  protected:
@@ -97,7 +124,7 @@ TEST_F(RunTest, LeavesTheFaultOfAConstructorForWhoWaitsToAttach) {
   for (const auto& [fails, why] :
        {std::pair("construct", "no cable"), std::pair("describe", "no plan"),
         std::pair("start", "no power")}) {
-    std::thread waiter([why = why] {
+    std::thread waiter([why] {
       EXPECT_THAT(
           message_of<BackendFailed>([] { UntypedFrontend("puppet", {.timeout = kPatience}); }),
           HasSubstr(why));
@@ -132,6 +159,20 @@ TEST_F(RunTest, SaysWhatIsWrongWithItsFlags) {
   const Outcome outcome = program.end();
   EXPECT_EQ(outcome.code, 2);
   EXPECT_THAT(outcome.err, HasSubstr("--frequency cannot be 'never'"));
+  for (const auto& [flag, value, why] :
+       {std::array{"--frequency", "0", "from 0.001 to 1e+06"},
+        std::array{"--frequency", "1e9", "from 0.001 to 1e+06"},
+        std::array{"--policy", "idle", "other, fifo or rr"},
+        std::array{"--priority", "100", "from 1 to 99"},
+        std::array{"--cpus", "two", "a number from 0 to 1023"},
+        std::array{"--reach", "far", "robot 'two_joints': option 'reach' cannot be 'far'"}}) {
+    Program wrong(two_joints({flag, value}));
+    const Outcome refused = wrong.end();
+    EXPECT_EQ(refused.code, 2) << flag;
+    EXPECT_THAT(refused.err, AllOf(HasSubstr(why), HasSubstr(value)));
+    EXPECT_EQ(refused.out, "");
+  }
+  EXPECT_EQ(directory_.files(), 0U) << "nobody waits for a typing error";
   Program helped(two_joints({"--help"}));
   const Outcome help = helped.end();
   EXPECT_EQ(help.code, 0);
@@ -145,6 +186,64 @@ TEST_F(RunTest, ReportsWhatTheMachineRefusesAndRunsOn) {
   const Outcome outcome = program.end();
   EXPECT_EQ(outcome.code, 0);
   EXPECT_THAT(outcome.err, AllOf(HasSubstr("processors 1000 were refused"), HasSubstr("taskset")));
+}
+
+/// In a process that is about to become another program: nothing of root is left, nor of ulimit.
+void drop_privileges() {
+  const rlimit none{0, 0};
+  setrlimit(RLIMIT_RTPRIO, &none);
+  setrlimit(RLIMIT_MEMLOCK, &none);
+  prctl(PR_SET_SECUREBITS, SECBIT_NOROOT);
+  for (int capability = 0; capability < 64; ++capability) prctl(PR_CAPBSET_DROP, capability);
+  __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
+  const __user_cap_data_struct nothing[2] = {};
+  syscall(SYS_capset, &header, nothing);
+}
+
+TEST_F(RunTest, WithoutAnyPrivilegeItSaysHowToGetThemAndRunsOn) {
+#ifdef O80_TEST_SANITIZED
+  GTEST_SKIP() << "a sanitizer locks no memory";
+#endif
+  Program program(two_joints({"--policy", "fifo", "--priority", "42", "--lock-memory", "--cpus",
+                              std::to_string(usable_processor()) + ",1000"}),
+                  drop_privileges);
+  ASSERT_TRUE(program.says("runs on segment"));
+  UntypedFrontend("two_joints", {.timeout = kPatience}).wait_for(5, kPatience);
+  EXPECT_EQ(sched_getscheduler(program.pid()), SCHED_OTHER);
+  EXPECT_EQ(locked_memory(program.pid()), 0);
+  program.signal(SIGTERM);
+  const Outcome outcome = program.end();
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_THAT(outcome.err,
+              AllOf(HasSubstr("o80: real-time priority 42 was refused"), HasSubstr("ulimit -r 99"),
+                    HasSubstr("o80: locked memory was refused"), HasSubstr("ulimit -l unlimited"),
+                    HasSubstr("o80: processors 1000 were refused (the others are used)")));
+}
+
+TEST_F(RunTest, PolicyPriorityProcessorAndLockedMemoryAreWhatWasAskedFor) {
+#ifdef O80_TEST_SANITIZED
+  GTEST_SKIP() << "a sanitizer locks no memory";
+#endif
+  const int processor = usable_processor();
+  for (const auto& [name, policy] : {std::pair("fifo", SCHED_FIFO), std::pair("rr", SCHED_RR)}) {
+    Program program(two_joints({"--policy", name, "--priority", "42", "--lock-memory", "--cpus",
+                                std::to_string(processor)}));
+    ASSERT_TRUE(program.says("runs on segment"));
+    const int got = sched_getscheduler(program.pid());
+    sched_param parameter{};
+    sched_getparam(program.pid(), &parameter);
+    cpu_set_t processors;
+    sched_getaffinity(program.pid(), sizeof processors, &processors);
+    const long locked = locked_memory(program.pid());
+    program.signal(SIGTERM);
+    const Outcome outcome = program.end();
+    EXPECT_EQ(CPU_COUNT(&processors), 1);
+    EXPECT_TRUE(CPU_ISSET(processor, &processors));
+    if (!outcome.err.empty()) GTEST_SKIP() << "the machine refuses: " << outcome.err;
+    EXPECT_EQ(got, policy);
+    EXPECT_EQ(parameter.sched_priority, 42);
+    EXPECT_GT(locked, 16 << 10) << "[kB] with all of the history";
+  }
 }
 
 TEST_F(RunTest, ReportsAFaultAndEndsWithAFailure) {
@@ -167,8 +266,11 @@ std::map<std::string, int> system_calls(const std::string& log) {
 }
 
 TEST_F(RunTest, MakesOneSystemCallAnIterationTheOneThatPacesIt) {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#ifdef O80_TEST_SANITIZED
   GTEST_SKIP() << "a sanitizer makes calls of its own";
+#endif
+#if defined(O80_TEST_EMULATOR)
+  GTEST_SKIP() << "so does an emulator";
 #endif
   if (std::system("strace -o /dev/null true > /dev/null 2>&1") != 0) {  // NOLINT(cert-env33-c)
     GTEST_SKIP() << "strace is not there or may not trace";

@@ -121,6 +121,32 @@ TEST_F(BackendTest, RejectsABatchWhoseIterationHasBegunUnlessItMayBeLate) {
   EXPECT_THROW(frontend.pulse({.at = -7}), InvalidArgument);
 }
 
+TEST_F(BackendTest, NothingIsCompletedBeforeItsRowIsOut) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  const Batch batch = send(frontend, 0, 1.0);
+  station.before_publish = [&] {
+    EXPECT_FALSE(is_end(batch.handle(0).status)) << "the robot was not even asked";
+    EXPECT_FALSE(batch.ended());
+  };
+  station.run(1);
+  EXPECT_EQ(batch.handle(0).status, Status::completed);
+  EXPECT_TRUE(batch.ended());
+}
+
+TEST_F(BackendTest, WhatEndsInARowThatIsNeverMadeIsNotCompleted) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  const Batch batch = send(frontend, 0, 1.0);
+  ASSERT_EQ(station.backend.try_step(), Step::run);
+  station.backend.end(State::failed, "the arm fell off");
+  EXPECT_EQ(batch.handle(0).status, Status::purged);
+  EXPECT_EQ(batch.handle(0).reason, Reason::stopped);
+  EXPECT_THROW(batch.wait(kPatience), BackendFailed);
+}
+
 TEST_F(BackendTest, StagesALargeBatchOverSeveralIterationsAndThenTakesItWhole) {
   Station station;
   station.start();

@@ -82,6 +82,23 @@ TEST_F(BatchTest, TheEndOfAnOldCommandDisturbsNoNewOne) {
   }
 }
 
+TEST_F(BatchTest, NeverForgetsWhatStillRunsHoweverMuchIsSentMeanwhile) {
+  Station station({.segment = "pair", .lane_blocks = 16});
+  station.start();
+  UntypedFrontend frontend("pair");
+  const Batch slow = send(frontend, 0, 1.0, {.pace = iterations(500)});
+  for (int i = 0; i < 499; ++i) {
+    send(frontend, 1, i);
+    station.run(1);
+    ASSERT_EQ(slow.handle(0).status, Status::active) << "iteration " << i;
+    ASSERT_FALSE(slow.ended());
+  }
+  send(frontend, 1, 0.0);
+  station.run(1);
+  EXPECT_EQ(slow.handle(0).status, Status::completed);
+  EXPECT_EQ(slow.last_iteration(), 500);
+}
+
 TEST_F(BatchTest, WaitsUntilTheLastOfItsCommandsHasEndedAndItsRowIsThere) {
   Station station;
   station.start();

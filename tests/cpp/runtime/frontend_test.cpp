@@ -112,12 +112,12 @@ TEST_F(FrontendTest, AFullLaneIsAnErrorAndNothingIsSentAndNothingIsLost) {
   station.run(1);
   for (int tries = 0; tries < 1000; ++tries) {
     ASSERT_THAT(message_of<LaneFull>([&] { frontend.pulse(); }),
-                AllOf(HasSubstr("takes 41 blocks"), HasSubstr("of 64 are free"),
+                AllOf(HasSubstr("takes 41 blocks"), HasSubstr("of 60 are free"),
                       HasSubstr("Nothing was sent")));
   }
   EXPECT_EQ(frontend.added(), 40U);
   EXPECT_EQ(desired(frontend.latest(), 1), 0);
-  station.run(40);
+  station.run(44);
   const Batch second = frontend.pulse();
   station.run(60);
   EXPECT_EQ(desired(frontend.latest(), 1), 39);
@@ -126,13 +126,52 @@ TEST_F(FrontendTest, AFullLaneIsAnErrorAndNothingIsSentAndNothingIsLost) {
   EXPECT_EQ(second.handle(39).status, Status::completed);
 }
 
+TEST_F(FrontendTest, ALaneFullOfCommandsStillTakesAPurge) {
+  Station station({.segment = "pair", .lane_blocks = 16});
+  station.start();
+  UntypedFrontend frontend("pair");
+  Batch endless;
+  const auto fill = [&] {
+    while (true) {
+      add(frontend, 0, 1.0, {.pace = iterations(1'000'000)});
+      endless = frontend.pulse();
+    }
+  };
+  EXPECT_THROW(fill(), LaneFull);
+  frontend.forget_added();
+  frontend.add_purge(kEveryActuator);
+  frontend.pulse();
+  station.run(1);
+  EXPECT_EQ(endless.handle(0).status, Status::purged);
+  send(frontend, 0, 2.0);
+  station.run(1);
+  EXPECT_EQ(desired(frontend.latest()), 2.0);
+}
+
+TEST_F(FrontendTest, ALaneFullOfWhatIsScheduledStillTakesABurst) {
+  Station station({.segment = "pair", .bursting = true, .lane_blocks = 16});
+  station.start();
+  UntypedFrontend frontend("pair");
+  const auto fill = [&] {
+    while (true) {
+      add(frontend, 0, 3.0);
+      frontend.pulse({.at = 2});
+    }
+  };
+  EXPECT_THROW(fill(), LaneFull);
+  frontend.forget_added();
+  const Burst burst = frontend.start_burst(2);
+  while (!burst.done()) station.iterate();
+  EXPECT_EQ(desired(frontend.latest()), 3.0);
+}
+
 TEST_F(FrontendTest, ABatchLargerThanItsLaneSaysHowToSendIt) {
   Station station({.segment = "pair", .lane_blocks = 64});
   station.start();
   UntypedFrontend frontend("pair");
   for (int i = 0; i < 64; ++i) add(frontend, 0, i);
   EXPECT_THAT(message_of<LaneFull>([&] { frontend.pulse(); }),
-              AllOf(HasSubstr("has 64"), HasSubstr("in parts")));
+              AllOf(HasSubstr("has 60"), HasSubstr("in parts")));
   frontend.forget_added();
   send(frontend, 0, 1.0);
   station.run(1);

@@ -162,6 +162,31 @@ TEST_F(KillTest, PurgesTheCommandsOfADeadFrontendIfToldSo) {
   EXPECT_EQ(desired(reader.latest(), 1), 0.0);
 }
 
+TEST_F(KillTest, WhatADeadFrontendSentForLaterIsDroppedWhoeverHasItsLaneByNow) {
+  for (const bool heir_stays : {true, false}) {
+    Station station({.segment = "pair", .lanes = 1, .stale = Stale::purge});
+    station.start();
+    UntypedFrontend reader("pair");
+    ChildProcess dying([](const ChildProcess::Ready& ready) {
+      UntypedFrontend frontend("pair", {.timeout = kPatience});
+      add(frontend, 0, 1.0);
+      frontend.pulse({.at = 300});
+      ready();
+      pause_for_ever();
+    });
+    ASSERT_TRUE(dying.wait_until_ready());
+    station.run(3);  // it waits for its iteration
+    dying.kill_now();
+    std::optional<UntypedFrontend> heir("pair");
+    const Batch own = send(*heir, 1, 1.0);
+    if (!heir_stays) heir.reset();
+    station.run_until([&] { return own.ended(); });
+    while (station.last() < 310) station.iterate();
+    EXPECT_EQ(desired(reader.latest(), 0), 0.0);
+    EXPECT_EQ(desired(reader.latest(), 1), 1.0) << "what its heir sent is done";
+  }
+}
+
 TEST_F(KillTest, StopsWhenACommandingFrontendDiesIfToldSo) {
   Commander commander;
   Station station({.segment = "pair", .stale = Stale::stop});

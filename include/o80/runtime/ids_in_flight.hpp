@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <optional>
+
+#include "o80/control/record.hpp"
+
+namespace o80 {
+
+/// Gives ids to batches so that no status of a batch that has not ended is lost.
+///
+/// A lane keeps the statuses of its last `places` ids, each at the place id modulo `places`. Ids
+/// pass over the places of a batch that still runs when they come round again.
+class IdsInFlight {
+ public:
+  /// Whether the batch whose last status is that of this id has ended.
+  using HasEnded = std::function<bool(CommandId)>;
+
+  explicit IdsInFlight(std::uint64_t places) : places_(places) {}
+
+  /// The first of n ids in a row, not before `next`; none if the batches that have not ended leave
+  /// no such row.
+  std::optional<CommandId> draw(CommandId next, std::uint64_t n, const HasEnded& has_ended);
+  /// The batch with these ids was sent.
+  void sent(CommandId first, std::uint64_t n) { runs_.push_back({first, n, first + 1}); }
+
+ private:
+  struct Run {
+    std::uint64_t begin;  // where its places come round: its first id, plus revolutions
+    std::uint64_t count;
+    CommandId end_id;  // of the status that tells its end
+  };
+
+  std::uint64_t places_;
+  std::deque<Run> runs_;  // by `begin`, all within one revolution
+};
+
+}  // namespace o80

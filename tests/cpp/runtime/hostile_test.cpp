@@ -1,0 +1,410 @@
+// A frontend that writes garbage wherever it can: the loop goes on, within its limits, and others
+// are served.
+
+#include <gmock/gmock.h>
+#include <sys/mman.h>
+
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <new>
+#include <random>
+#include <thread>
+
+#include "memory/child_process.hpp"
+#include "o80/control/batch_builder.hpp"
+#include "o80/memory/lane.hpp"
+#include "runtime/station.hpp"
+
+namespace o80::test {
+namespace {
+
+using ::testing::HasSubstr;
+class HostileTest : public StationTest {};
+
+/// The pages that a frontend can write: its lane's and the bell's.
+class Liar {
+ public:
+  Liar()
+      : segment_(AttachedSegment::attach("pair", Access::read_write, Deadline(kPatience))),
+        sender_(std::make_unique<LaneSender>(segment_)) {}
+
+  const SegmentView& view() const { return segment_.view(); }
+  LaneSenderPage& page() { return view().lane(sender_->lane()); }
+  Bell& bell() { return view().bell(); }
+  LaneSender& sender() { return *sender_; }
+  /// Lets go of the lane; the pages stay writable.
+  void leave() { sender_->give_back(); }
+
+  std::uint64_t send(BatchBuilder& builder, BatchRecord batch) {
+    return sender_->send(std::as_bytes(builder.seal(batch)), offsetof(BatchRecord, ticket));
+  }
+  /// One scribble somewhere, of something that was meant to be a batch, a count, or nothing.
+  void scribble(std::mt19937_64& random) {
+    const std::uint64_t word = random() >> random() % 64;
+    LaneSenderPage& own = page();
+    switch (random() % 10) {
+      case 0:
+        own.committed = word;
+        break;
+      case 1:
+        own.committed += random() % 20;
+        break;
+      case 2:
+        own.incarnation = word;
+        break;
+      case 3:
+        own.closed = word;
+        break;
+      case 4:
+        own.next_id = word;
+        break;
+      case 5:
+        bell().tickets += word % 3;
+        break;
+      case 6:
+        bell().wanted = static_cast<std::int64_t>(word);
+        break;
+      default: {
+        // a block that looks like a batch with a command behind it, and ten more that do not
+        auto* words = reinterpret_cast<std::uint64_t*>(view().transport(sender_->lane()));
+        const std::uint64_t blocks = view().shape.lane_blocks;
+        const std::uint64_t at = own.committed % blocks;
+        write(words + 8 * at, batch_of(random));
+        for (std::uint64_t i = 1; i < 10; ++i)
+          write(words + 8 * ((at + i) % blocks), record_of(random, i));
+        own.committed += 1 + random() % 10;
+        bell().rung += 1;
+      }
+    }
+  }
+
+ private:
+  using Words = std::array<std::uint64_t, 8>;
+
+  static void write(std::uint64_t* to, const Words& words) {
+    for (std::size_t i = 0; i < words.size(); ++i)
+      std::atomic_ref(to[i]).store(words[i], std::memory_order_relaxed);
+  }
+  Words batch_of(std::mt19937_64& random) {
+    BatchRecord batch;
+    batch.records = static_cast<std::uint32_t>(random() % 10);
+    batch.blocks = static_cast<std::uint32_t>(random() % 11);
+    batch.id = sender_->next_id() + random() % 100;
+    batch.ticket = bell().tickets.fetch_add(1);
+    if (random() % 4 == 0) batch.at = static_cast<std::int64_t>(random() % 5000);
+    Words words;
+    std::memcpy(words.data(), &batch, sizeof batch);
+    // but for the flags and the burst: to burst without end is a frontend's right
+    constexpr std::size_t kSpoilt[] = {1, 2, 3, 5, 6, 7};
+    if (random() % 3 == 0) words[kSpoilt[random() % std::size(kSpoilt)]] = random();
+    return words;
+  }
+  Words record_of(std::mt19937_64& random, std::uint64_t place) {
+    RecordHead head;
+    head.kind = static_cast<RecordKind>(2 + random() % 3);  // no control, which would be its right
+    head.mode = static_cast<Mode>(random() % 3);
+    head.pace = static_cast<Pace>(random() % 6);
+    head.profile = static_cast<Profile>(random() % 3);
+    head.actuator = static_cast<std::uint16_t>(random() % 3);
+    head.id = sender_->next_id() + random() % 100 + place;
+    head.payload_bytes = random() % 2 == 0 ? 8 : static_cast<std::uint32_t>(random());
+    head.amount = static_cast<std::int64_t>(random() >> random() % 64);
+    // the requests of the station that break it are a frontend's right too
+    if (head.kind == RecordKind::request) head.kind = RecordKind::command;
+    constexpr double kTargets[] = {0.5,
+                                   -0.5,
+                                   1e300,
+                                   -1e300,
+                                   5.0,
+                                   std::numeric_limits<double>::infinity(),
+                                   std::numeric_limits<double>::quiet_NaN()};
+    const double target = kTargets[random() % std::size(kTargets)];
+    Words words{};
+    std::memcpy(words.data(), &head, sizeof head);
+    std::memcpy(words.data() + 6, &target, sizeof target);
+    return words;
+  }
+
+  AttachedSegment segment_;
+  std::unique_ptr<LaneSender> sender_;
+};
+
+/// A station whose two joints reach one radian either way, and whose desired states are watched.
+class Watched {
+ public:
+  explicit Watched(BackendOptions options)
+      : station(options, [](Schema& schema) {
+          for (std::uint32_t i = 0; i < 2; ++i)
+            schema.actuator(i).limits({.minimum = -1.0, .maximum = 1.0});
+        }) {
+    station.before_publish = [this] {
+      for (const double joint : station.now) whole = whole && std::abs(joint) <= 1.0;
+    };
+    station.start();
+  }
+
+  Station station;
+  bool whole = true;  // no state was ever outside; not a number is outside too
+};
+
+/// Shared by the processes of a test.
+struct Scene {
+  std::atomic<std::uint64_t> scribbles{0};
+  std::atomic<bool> over{false};
+};
+
+class SharedScene {
+ public:
+  SharedScene()
+      : memory_(mmap(nullptr, sizeof(Scene), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1,
+                     0)),
+        scene_(new (memory_) Scene) {}
+  SharedScene(const SharedScene&) = delete;
+  SharedScene& operator=(const SharedScene&) = delete;
+  ~SharedScene() { munmap(memory_, sizeof(Scene)); }
+  Scene* operator->() const { return scene_; }
+
+ private:
+  void* memory_;
+  Scene* scene_;
+};
+
+/// What a liar left in its lane is thrown away first.
+Batch pulse_as_soon_as_there_is_room(UntypedFrontend& frontend, Station& station) {
+  for (int i = 0; i < 10'000; ++i) {
+    try {
+      return frontend.pulse();
+    } catch (const LaneFull&) {
+      station.iterate();
+    }
+  }
+  ADD_FAILURE() << "the lane stays full";
+  return {};
+}
+
+/// Now many scribbles between two iterations, now a single one that the backend sees for itself.
+void scribble_until_over(const SharedScene& scene, std::uint64_t seed,
+                         const ChildProcess::Ready& ready) {
+  Liar own;
+  std::mt19937_64 random(seed);
+  const std::atomic<Iteration>& published = own.view().counters().published;
+  ready();
+  while (!scene->over) {
+    own.scribble(random);
+    ++scene->scribbles;
+    const Iteration now = published;
+    if (random() % 2 == 0) continue;
+    while (published == now && !scene->over) std::this_thread::yield();
+  }
+}
+
+TEST_F(HostileTest, AnotherFrontendCommandsWhileOneScribblesInItsLaneWithoutEnd) {
+  Watched watched({.segment = "pair", .lane_blocks = 64});
+  const SharedScene scene;
+  ChildProcess liar(
+      [&](const ChildProcess::Ready& ready) { scribble_until_over(scene, 1, ready); });
+  ASSERT_TRUE(liar.wait_until_ready());
+  UntypedFrontend good("pair");
+
+  // by chance the liar purges or overwrites what others sent, as any frontend may: nothing is lost
+  // without a status, and what was not touched is completed
+  int completed = 0;
+  for (int i = 0; i < 300; ++i) {
+    const double target = i % 2 == 0 ? 0.75 : -0.75;
+    const Batch batch = send(good, 1, target, {.mode = Mode::overwrite});
+    watched.station.run_until([&] { return batch.ended(); });
+    ASSERT_TRUE(batch.rejection().empty()) << batch.rejection();
+    if (batch.handle(0).status == Status::completed) ++completed;
+  }
+  EXPECT_GT(completed, 30);
+  EXPECT_TRUE(watched.whole);
+  // it did scribble, and it cannot outlive its scene
+  while (scene->scribbles < 3'000) ASSERT_EQ(watched.station.iterate(), Step::run);
+  scene->over = true;
+  EXPECT_EQ(liar.wait(), 0);
+  const std::uint64_t believed = good.link()->segment.view().feedback(0).ids;
+  EXPECT_GT(believed, 100U) << "some of it looked like batches";
+  std::printf(
+      "%llu scribbles, %llu ids believed, %d of 300 commands completed in %lld iterations\n",
+      static_cast<unsigned long long>(scene->scribbles.load()),
+      static_cast<unsigned long long>(believed), completed,
+      static_cast<long long>(watched.station.last()));
+
+  // once it is gone, all is as if it had never been; also for who gets its lane
+  good.add_purge();
+  good.pulse();
+  UntypedFrontend heir("pair");
+  add(heir, 0, 0.25);
+  pulse_as_soon_as_there_is_room(heir, watched.station);
+  const auto settles = [&](UntypedFrontend& frontend, double target) {
+    for (int attempt = 0; attempt < 100; ++attempt) {
+      const Batch batch = send(frontend, 1, target, {.mode = Mode::overwrite});
+      for (int i = 0; i < 50 && !batch.ended(); ++i) watched.station.iterate();
+      if (batch.ended() && batch.handle(0).status == Status::completed)
+        return desired(good.wait_for(batch.last_iteration(), kAtOnce), 1) == target;
+    }
+    return false;
+  };
+  EXPECT_TRUE(settles(good, 0.5));
+  EXPECT_TRUE(settles(heir, -0.5));
+}
+
+TEST_F(HostileTest, BurstsOfAnotherFrontendAreRunWhileOneScribbles) {
+  BurstingStation bursting;
+  const SharedScene scene;
+  ChildProcess liar(
+      [&](const ChildProcess::Ready& ready) { scribble_until_over(scene, 2, ready); });
+  ASSERT_TRUE(liar.wait_until_ready());
+  UntypedFrontend good("pair");
+  Iteration last = 0;
+  for (int i = 0; i < 200; ++i) {
+    const Iteration row = good.burst(2, kPatience).iteration();
+    ASSERT_GE(row, last + 2);
+    last = row;
+  }
+  scene->over = true;
+  EXPECT_EQ(liar.wait(), 0);
+}
+
+TEST_F(HostileTest, GarbageThatComesFasterThanItIsThrownAwayDoesNotKeepTheLoop) {
+  Watched watched({.segment = "pair", .lane_blocks = 64});
+  Liar liar;
+  std::atomic<bool> over{false};
+  // never a batch, always one more block than was there
+  std::thread flood([&] {
+    while (!over) {
+      liar.page().committed.fetch_add(1, std::memory_order_relaxed);
+      liar.bell().rung.fetch_add(1, std::memory_order_relaxed);
+    }
+  });
+  for (int i = 0; i < 2000; ++i) ASSERT_EQ(watched.station.iterate(), Step::run);
+  over = true;
+  flood.join();
+}
+
+TEST_F(HostileTest, GarbageOnTheBellsPageDelaysOthersAtMost) {
+  Watched watched({.segment = "pair"});
+  Liar liar;
+  UntypedFrontend good("pair");
+  send(good, 0, 0.1);
+  watched.station.run(3);
+
+  // the bell is put back as if nobody had rung: the loop looks all the same, now and then
+  const std::uint32_t silent = liar.bell().rung;
+  Batch batch = send(good, 0, 0.2);
+  liar.bell().rung = silent;
+  watched.station.run_until([&] { return batch.ended(); });
+  EXPECT_EQ(batch.handle(0).status, Status::completed);
+
+  // tickets from anywhere: their order is lost, no batch is
+  for (const std::uint64_t tickets :
+       {std::uint64_t{0}, ~std::uint64_t{0}, std::uint64_t{1} << 63}) {
+    liar.bell().tickets = tickets;
+    batch = send(good, 0, 0.3);
+    liar.bell().tickets = tickets / 2;
+    watched.station.run_until([&] { return batch.ended(); });
+    EXPECT_EQ(batch.handle(0).status, Status::completed);
+  }
+}
+
+TEST_F(HostileTest, GarbageOnTheBellsPageWakesReadersLateAndNeverNot) {
+  Watched watched({.segment = "pair"});
+  Liar liar;
+  const UntypedFrontend reader("pair");
+  for (const Iteration wanted : {std::numeric_limits<Iteration>::max(), Iteration{-1},
+                                 std::numeric_limits<Iteration>::min(), Iteration{1'000'000}}) {
+    std::atomic<bool> asleep{false};
+    const Iteration next = watched.station.last() + 1;
+    std::thread waiter([&] {
+      reader.wait_for(next, kPatience, [&] {
+        asleep = true;  // it has slept for a slice at least
+        return true;
+      });
+    });
+    while (!asleep) std::this_thread::yield();
+    liar.bell().wanted = wanted;
+    liar.bell().passed_on = static_cast<std::uint32_t>(wanted);
+    watched.station.run(1);
+    waiter.join();
+  }
+}
+
+TEST_F(HostileTest, ABackendThatStandsStillHearsOfABurstWhoseBellWasPutBack) {
+  BurstingStation bursting;
+  Liar liar;
+  UntypedFrontend good("pair");
+  ASSERT_EQ(good.burst(1, kPatience).iteration(), 1);
+  const std::uint32_t silent = liar.bell().rung;
+  std::atomic<bool> over{false};
+  std::thread silence([&] {
+    while (!over) liar.bell().rung = silent;
+  });
+  EXPECT_EQ(good.burst(1, kPatience).iteration(), 2);
+  EXPECT_EQ(good.burst(1, kPatience).iteration(), 3);
+  over = true;
+  silence.join();
+}
+
+TEST_F(HostileTest, ControlFallsWithADeadHolderWhateverItWroteAboutItself) {
+  Station station;
+  station.start();
+  ChildProcess holder([](const ChildProcess::Ready& ready) {
+    Liar own;
+    own.page().incarnation = (std::uint64_t{1} << 63) + 5;
+    BatchBuilder builder;
+    builder.take_control();
+    own.send(builder, {.id = own.sender().next_id()});
+    ready();
+    pause_for_ever();
+  });
+  ASSERT_TRUE(holder.wait_until_ready());
+  UntypedFrontend good("pair");
+  const Batch refused = send(good, 0, 1.0);
+  station.run(2);
+  EXPECT_THAT(refused.rejection(), HasSubstr("exclusive control"));
+  holder.kill_now();
+  station.run_until([&] {
+    const Batch batch = send(good, 0, 1.0);
+    station.iterate();
+    return batch.rejection().empty() && batch.ended();
+  });
+}
+
+TEST_F(HostileTest, IdsByLeapsAreRefusedAndTheNextOwnerOfTheLaneIsToldTheTruth) {
+  Station station({.segment = "pair", .lanes = 1, .lane_blocks = 64});
+  station.start();
+  {
+    Liar liar;
+    const auto send_with_id = [&](std::uint64_t id) {
+      BatchBuilder builder;
+      RecordHead head;
+      const double target = 0.5;
+      builder.command(head, std::as_bytes(std::span(&target, 1)));
+      liar.send(builder, {.id = id});
+      station.run(1);
+      return liar.sender().status(id).known == LaneSender::Known::yes;
+    };
+    EXPECT_TRUE(send_with_id(liar.sender().next_id()));
+    for (const std::uint64_t far : {~std::uint64_t{0}, std::uint64_t{1} << 40, std::uint64_t{0}})
+      EXPECT_FALSE(send_with_id(far)) << far;
+    // its last words, for the next owner
+    liar.page().next_id = ~std::uint64_t{0} - 3;
+    liar.page().committed += 12345;
+    liar.leave();
+  }
+  station.run(1);
+  for (int owner = 0; owner < 3; ++owner) {
+    UntypedFrontend next("pair");
+    add(next, 0, 0.25 * owner);
+    const Batch batch = pulse_as_soon_as_there_is_room(next, station);
+    EXPECT_FALSE(batch.ended()) << "nothing is known of what was just sent";
+    station.run_until([&] { return batch.ended(); });
+    EXPECT_EQ(batch.handle(0).status, Status::completed);
+    EXPECT_EQ(desired(next.latest()), 0.25 * owner);
+  }
+}
+
+}  // namespace
+}  // namespace o80::test

@@ -1,0 +1,110 @@
+// A new backend of a name whose owner was killed, stopped or failed: at once, and everybody who is
+// attached learns what became of the old one.
+
+#include <gmock/gmock.h>
+#include <signal.h>
+
+#include "memory/child_process.hpp"
+#include "o80/base/time.hpp"
+#include "runtime/station.hpp"
+
+namespace o80::test {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+class TakeOverTest : public StationTest {};
+
+void be_a_backend(const ChildProcess::Ready& ready) {
+  Station station;
+  station.start();
+  station.run(5);
+  ready();
+  pause_for_ever();
+}
+
+/// What the frontend says of its backend, whichever verb meets it first.
+template <class Gone>
+void expect_every_verb_says(UntypedFrontend& frontend, const std::string& what) {
+  const auto names_it = AllOf(HasSubstr("'pair'"), HasSubstr(what), HasSubstr("attach"));
+  const auto wait = [&] { frontend.wait_for(1'000'000, kPatience); };
+  EXPECT_THAT(message_of<Gone>(wait), names_it);
+  EXPECT_THAT(message_of<Gone>([&] { send(frontend, 0, 1.0); }), names_it);
+  frontend.forget_added();
+  EXPECT_NO_THROW(frontend.latest()) << "what there is can be read";
+}
+
+TEST_F(TakeOverTest, SaysWhatBecameOfTheOldBackendByNameAndPid) {
+  ChildProcess killed(be_a_backend);
+  ASSERT_TRUE(killed.wait_until_ready());
+  UntypedFrontend first("pair");
+  const std::string pid = "pid " + std::to_string(killed.pid());
+  killed.kill_now();
+  expect_every_verb_says<BackendKilled>(first, pid + ") was killed");
+
+  {
+    Station second;
+    second.start();
+    expect_every_verb_says<BackendSuperseded>(first, pid + ") is gone and a new one has its name");
+    UntypedFrontend of_second("pair");
+    second.backend.end(State::failed, "the elbow is too hot");
+    expect_every_verb_says<BackendFailed>(of_second, "failed: the elbow is too hot");
+    second.backend.end(State::stopped);
+  }
+  Station third;
+  third.start();
+  UntypedFrontend of_third("pair");
+  third.backend.end(State::stopped);
+  expect_every_verb_says<BackendStopped>(of_third, "has stopped");
+}
+
+TEST_F(TakeOverTest, LetsAFrontendAttachAgainInItsOwnPlace) {
+  ChildProcess killed(be_a_backend);
+  ASSERT_TRUE(killed.wait_until_ready());
+  UntypedFrontend arm("pair");
+  const Batch old = send(arm, 0, 5.0);
+  killed.kill_now();
+  EXPECT_THROW(old.wait(kPatience), BackendKilled);
+
+  Station next;
+  next.start();
+  EXPECT_THROW(old.wait(kPatience), BackendSuperseded);
+  arm = UntypedFrontend("pair");
+  const Batch batch = send(arm, 0, 1.0);
+  next.run(1);
+  EXPECT_EQ(batch.handle(0).status, Status::completed);
+  EXPECT_EQ(desired(arm.latest()), 1.0);
+  EXPECT_THROW(old.wait(kAtOnce), BackendSuperseded) << "a batch stays that of its backend";
+}
+
+TEST_F(TakeOverTest, WaitsForNoPeriodOfThoseWhoWatch) {
+  // what is measured is the time that this thread slept, or waited for a processor: a slice of
+  // 50 ms or a round of the helper would be in each of them
+  const auto slept = [] {
+    timespec wall, used;
+    clock_gettime(CLOCK_MONOTONIC, &wall);
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &used);
+    return static_cast<double>(wall.tv_sec - used.tv_sec) +
+           1e-9 * static_cast<double>(wall.tv_nsec - used.tv_nsec);
+  };
+  constexpr int kTimes = 20;
+  int quick = 0;
+  double shortest = 1;
+  for (int i = 0; i < kTimes; ++i) {
+    ChildProcess killed(be_a_backend);
+    ASSERT_TRUE(killed.wait_until_ready());
+    killed.kill_now();
+    const double before = slept();
+    Station next({.segment = "pair", .history = 100, .lane_blocks = 64});
+    next.start();
+    const double seconds = slept() - before;
+    shortest = std::min(shortest, seconds);
+    quick += seconds < 0.02 ? 1 : 0;
+  }
+  std::printf("%d of %d take-overs slept less than 20 ms, the shortest %.2f ms\n", quick, kTimes,
+              shortest * 1e3);
+  EXPECT_GT(quick, 0);
+}
+
+}  // namespace
+}  // namespace o80::test
