@@ -26,7 +26,7 @@ std::int64_t count_of(nb::handle value, const char* name) {
   std::int64_t number = 0;
   if (!index.is_valid() || !nb::try_cast<std::int64_t>(index, number)) {
     PyErr_Clear();
-    throw InvalidArgument(std::string(name) + " is an integer, not " +
+    throw InvalidArgument(std::string(name) + " is a whole number, not " +
                           nb::cast<std::string>(nb::repr(value)));
   }
   return number;

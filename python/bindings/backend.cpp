@@ -7,16 +7,20 @@
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <cstring>
 #include <exception>
 #include <memory>
 #include <optional>
 #include <span>
+#include <thread>
 #include <utility>
 
 #include "bindings.hpp"
 #include "o80/memory/fork.hpp"
 #include "o80/runtime/observation.hpp"
+#include "pickling.hpp"
 #include "waiting.hpp"
 
 namespace nb = nanobind;
@@ -119,7 +123,7 @@ struct SchemaBuilder {
 /// The compiled half of o80.Backend.
 ///
 /// Python fills `observed`, `extended` and `fresh_desired`, memory of its own; `publish` and a
-/// fresh start copy them into the row.
+/// fresh start copy them into the row. Its own members are guarded by the GIL.
 class Backend final : public o80::RequestServer {
  public:
   Backend(const SchemaBuilder& builder, const o80::BackendOptions& options)
@@ -144,8 +148,17 @@ class Backend final : public o80::RequestServer {
     return *backend_;
   }
 
-  void publish() {
+  /// For what may not happen inside of `step`. Throws Error as well.
+  o80::UntypedBackend& between_steps() const {
     o80::UntypedBackend& backend = checked();
+    if (!stepping_) return backend;
+    throw o80::Error("the backend of segment '" + name_ +
+                     "' is inside of step: use it in one thread, and not from the handler of a "
+                     "request (stop and close may be called from anywhere)");
+  }
+
+  void publish() {
+    o80::UntypedBackend& backend = between_steps();
     copy(observed_, backend.observed());
     copy(extended_, backend.extended());
     backend.publish();
@@ -154,11 +167,15 @@ class Backend final : public o80::RequestServer {
 
   /// True if an iteration is under way, False if the backend is to end.
   bool step(std::optional<double> timeout) {
-    o80::UntypedBackend& backend = checked();
+    between_steps();
     if (!begun_) throw InvalidArgument("publish row 0 before the first step");
-    o80::Step step = backend.try_step();
-    if (step == o80::Step::standing) step = wait(timeout);
+    const Stepping stepping(*this);
+    o80::Step step = stepping.backend->try_step();
+    if (step == o80::Step::standing) step = wait(*stepping.backend, timeout);
     if (raised_) std::rethrow_exception(std::exchange(raised_, nullptr));
+    if (!backend_) {
+      throw o80::Closed("the backend of segment '" + name_ + "' was closed while it was in step");
+    }
     return step == o80::Step::run;
   }
 
@@ -167,15 +184,60 @@ class Backend final : public o80::RequestServer {
     return backend_ && !guard_.forked() ? std::string(backend_->failure()) : "";
   }
 
-  /// Lets go of the name.
+  /// Lets go of the name; a step under way raises Closed, and does that when it is left.
   void end(bool failed, const std::string& text) {
     if (!backend_ || guard_.forked()) return;
+    last_words_ = {failed ? o80::State::failed : o80::State::stopped, text};
     const std::shared_ptr<o80::UntypedBackend> ended = std::move(backend_);
-    ended->end(failed ? o80::State::failed : o80::State::stopped, text);
-    serve_with = nb::none();
+    if (!stepping_) return finish(*ended);
+    ended->ask_to_stop();
+    if (stepping_thread_ == std::this_thread::get_id()) return;  // a handler in it
+    const o80::Deadline deadline(kPatience);
+    const Waiting waiting;
+    while (stepping_) {
+      if (deadline.over()) {
+        throw o80::TimeoutError("the backend of segment '" + name_ +
+                                "' ends when the handler of a request returns, which it has not");
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      Waiting::check();
+    }
+  }
+
+  static int traverse(PyObject* self, visitproc visit, void* arg) {
+    Py_VISIT(Py_TYPE(self));
+    if (nb::inst_ready(self)) Py_VISIT(nb::inst_ptr<Backend>(self)->serve_with.ptr());
+    return 0;
+  }
+  static int clear(PyObject* self) {
+    if (nb::inst_ready(self)) nb::inst_ptr<Backend>(self)->serve_with.reset();
+    return 0;
   }
 
  private:
+  static constexpr std::chrono::seconds kPatience{5};
+
+  /// While a step is under way; it keeps the backend.
+  struct Stepping {
+    explicit Stepping(Backend& whose) : owner(whose), backend(whose.backend_) {
+      owner.stepping_thread_ = std::this_thread::get_id();
+      owner.stepping_ = true;
+    }
+    Stepping(const Stepping&) = delete;
+    Stepping& operator=(const Stepping&) = delete;
+    ~Stepping() {
+      if (!owner.backend_) owner.finish(*backend);
+      owner.stepping_ = false;
+    }
+    Backend& owner;
+    std::shared_ptr<o80::UntypedBackend> backend;
+  };
+
+  void finish(o80::UntypedBackend& backend) {
+    backend.end(last_words_.first, last_words_.second);
+    serve_with = nb::none();
+  }
+
   static nb::bytearray zeros(std::size_t size) {
     const std::vector<std::byte> bytes(size);
     return nb::bytearray(bytes.data(), size);
@@ -185,12 +247,11 @@ class Backend final : public o80::RequestServer {
     if (from.size() > 0) std::memcpy(to, from.c_str(), from.size());
   }
 
-  o80::Step wait(std::optional<double> timeout) {
-    const std::shared_ptr<o80::UntypedBackend> backend = backend_;
+  o80::Step wait(o80::UntypedBackend& backend, std::optional<double> timeout) {
     const o80::Deadline deadline(timeout_of(timeout));
     const Waiting waiting;
     while (true) {
-      const o80::Step step = backend->step_within(deadline.left(kLook));
+      const o80::Step step = backend.step_within(deadline.left(kLook));
       if (step != o80::Step::standing) return step;
       if (deadline.over()) {
         throw o80::TimeoutError("nobody asked '" + name_ +
@@ -201,9 +262,10 @@ class Backend final : public o80::RequestServer {
   }
 
   o80::Served serve(std::uint32_t request, std::span<const std::byte> payload) noexcept override {
-    const nb::gil_scoped_acquire locked;
+    const WithGil locked;
     try {
-      const nb::object answer = serve_with(request, nb::bytes(payload.data(), payload.size()));
+      const nb::object answer = call_python(
+          [&] { return serve_with(request, nb::bytes(payload.data(), payload.size())); });
       if (answer.is_none()) return o80::Served::done();
       if (nb::isinstance<nb::str>(answer)) {
         return o80::Served::rejected(nb::cast<std::string>(answer));
@@ -221,7 +283,7 @@ class Backend final : public o80::RequestServer {
 
   /// The handler has read the robot anew.
   bool read_fresh(o80::FreshReading& reading) noexcept override {
-    const nb::gil_scoped_acquire locked;
+    const WithGil locked;
     copy(observed_, reading.observed);
     copy(extended_, reading.extended);
     copy(fresh_desired_, reading.desired);
@@ -235,7 +297,14 @@ class Backend final : public o80::RequestServer {
   o80::ForkGuard guard_;
   std::exception_ptr raised_;
   bool begun_ = false;
+  std::atomic<bool> stepping_{false};
+  std::thread::id stepping_thread_;
+  std::pair<o80::State, std::string> last_words_;
 };
+
+PyType_Slot backend_slots[] = {{Py_tp_traverse, reinterpret_cast<void*>(&Backend::traverse)},
+                               {Py_tp_clear, reinterpret_cast<void*>(&Backend::clear)},
+                               {0, nullptr}};
 
 o80::Stale stale_of(const std::string& word) {
   if (word == "hold") return o80::Stale::hold;
@@ -277,7 +346,10 @@ void bind_backend(nb::module_& m) {
            "maximum"_a, "speed"_a)
       .def_prop_ro("actuators", &SchemaBuilder::actuators);
 
-  nb::class_<Backend>(m, "Backend", "The compiled half of o80.Backend.")
+  nb::class_<Backend> bound(m, "Backend", nb::type_slots(backend_slots),
+                            "The compiled half of o80.Backend.");
+  refuse_to_pickle(bound, "a backend", "its segment's name, and open o80.Frontend(name) there");
+  bound
       .def(nb::new_(&make), "builder"_a, "segment"_a, "period"_a, "bursting"_a, "history"_a,
            "lanes"_a, "lane_blocks"_a, "permission"_a, "stale"_a, "silence"_a)
       .def_rw("serve_with", &Backend::serve_with, nb::arg().none())
@@ -301,11 +373,14 @@ void bind_backend(nb::module_& m) {
              const o80::UntypedBackend& backend = self.checked();
              return nb::bytes(backend.active(), backend.layout().mask_words * 8);
            })
+      .def("check", [](const Backend& self) { self.checked(); })
       .def("publish", &Backend::publish)
       .def("step", &Backend::step, "timeout"_a.none())
       .def(
           "interrupt",
-          [](const Backend& self, std::uint32_t actuator) { self.checked().interrupt(actuator); },
+          [](const Backend& self, std::uint32_t actuator) {
+            self.between_steps().interrupt(actuator);
+          },
           "actuator"_a)
       .def("ask_to_stop", [](const Backend& self) { self.checked().ask_to_stop(); })
       .def("end", &Backend::end, "failed"_a, "text"_a)

@@ -8,6 +8,7 @@
 
 #include "bindings.hpp"
 #include "o80/base/error.hpp"
+#include "pickling.hpp"
 #include "waiting.hpp"
 #include "words.hpp"
 
@@ -27,6 +28,13 @@ std::optional<o80::Iteration> known(o80::Iteration iteration) {
 o80::Iteration reached(o80::Iteration iteration, const char* not_yet) {
   if (iteration >= 0) return iteration;
   throw o80::Error(std::string("the batch ") + not_yet + ", or was empty: wait for it first");
+}
+
+/// A handle that was pickled.
+Handle* handle_of(o80::CommandId id, int status, int reason, o80::Iteration iteration,
+                  std::string text) {
+  return new Handle{id, static_cast<o80::Status>(status), static_cast<o80::Reason>(reason),
+                    iteration, std::move(text)};
 }
 
 std::string text_of(const Handle& handle) {
@@ -49,6 +57,17 @@ nb::list statuses_of(const Batch& batch) {
 
 void bind_batch(nb::module_& m) {
   nb::class_<Handle>(m, "Handle", "What became of one command or request, when it was asked.")
+      .def(nb::new_(&handle_of), "id"_a, "status"_a, "reason"_a, "iteration"_a, "text"_a)
+      .def(
+          "__reduce__",
+          [](nb::handle self) {
+            const auto* handle = nb::inst_ptr<Handle>(self);
+            return nb::make_tuple(
+                self.type(),
+                nb::make_tuple(handle->id, static_cast<int>(handle->status),
+                               static_cast<int>(handle->reason), handle->iteration, handle->text));
+          },
+          nb::sig("def __reduce__(self) -> tuple[typing.Any, ...]"))
       .def_ro("id", &Handle::id, "Names it within its frontend.")
       .def_prop_ro(
           "status", [](const Handle& self) { return python_word(self.status); },
@@ -65,8 +84,9 @@ void bind_batch(nb::module_& m) {
           "Whether the status changes no more.")
       .def("__repr__", &text_of);
 
-  nb::class_<Batch>(m, "Batch", "What one pulse sent. Its length is that of its records.")
-      .def("__len__", &Batch::size)
+  nb::class_<Batch> batch(m, "Batch", "What one pulse sent. Its length is that of its records.");
+  refuse_to_pickle(batch, "a batch", "its handles, its first_iteration or its last_iteration");
+  batch.def("__len__", &Batch::size)
       .def("__bool__", [](const Batch&) { return true; })
       .def_prop_ro("handles", &Batch::handles,
                    "A handle for each command, request and purge, in the order they were added.")
@@ -99,11 +119,17 @@ void bind_batch(nb::module_& m) {
 A bursting backend must be burst for that. Raises TimeoutError after `timeout` [s], which carries
 this batch, and BackendGone.)")
       .def("__repr__", [](const Batch& self) {
-        return "<o80.Batch of " + std::to_string(self.size()) +
-               (self.ended() ? ", ended>" : ", under way>");
+        const std::string what = "<o80.Batch of " + std::to_string(self.size());
+        try {
+          return what + (self.ended() ? ", ended>" : ", under way>");
+        } catch (const o80::UsedAfterFork&) {
+          return what + ", of the parent process>";
+        }
       });
 
-  nb::class_<PendingBurst>(m, "Burst", "A burst under way.")
+  nb::class_<PendingBurst> burst(m, "Burst", "A burst under way.");
+  refuse_to_pickle(burst, "a burst", "the observation that its wait returns");
+  burst
       .def_prop_ro(
           "batch", [](const PendingBurst& self) { return self.burst.batch(); },
           "What was sent with it.")

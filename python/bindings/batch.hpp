@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "errors.hpp"
+#include "interpreter.hpp"
 #include "o80/runtime/batch.hpp"
 #include "observation.hpp"
 
@@ -20,9 +21,11 @@ auto carrying(const o80::Batch& batch, Wait&& wait) {
   try {
     return wait();
   } catch (const o80::TimeoutError& error) {
-    const nanobind::object type = python_error("TimeoutError");
-    const nanobind::object raised = type(error.what(), nanobind::cast(batch));
-    PyErr_SetObject(type.ptr(), raised.ptr());
+    call_python([&] {
+      const nanobind::object type = python_error("TimeoutError");
+      const nanobind::object raised = type(error.what(), nanobind::cast(batch));
+      PyErr_SetObject(type.ptr(), raised.ptr());
+    });
     throw nanobind::python_error();
   }
 }

@@ -1,5 +1,7 @@
 #include <nanobind/nanobind.h>
 
+#include <cstring>
+
 #include "bindings.hpp"
 #include "errors.hpp"
 #include "o80/base/error.hpp"
@@ -44,7 +46,12 @@ void translate(const std::exception_ptr& thrown, void*) {
 
 nb::object python_error(const char* name) { return nb::module_::import_("o80.errors").attr(name); }
 
-void set_error(const nb::object& type, const char* text) { PyErr_SetString(type.ptr(), text); }
+void set_error(const nb::object& type, const char* text) {
+  // a text may come from memory that others write: what is no UTF-8 must not hide the error
+  const auto length = static_cast<Py_ssize_t>(std::strlen(text));
+  const nb::object decoded = nb::steal(PyUnicode_DecodeUTF8(text, length, "replace"));
+  if (decoded.is_valid()) PyErr_SetObject(type.ptr(), decoded.ptr());
+}
 
 void raise_python(const char* name, const std::string& text) {
   set_error(python_error(name), text.c_str());

@@ -1,13 +1,63 @@
 #pragma once
 
+#include <nanobind/nanobind.h>
+
+#include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "o80/robot/inline_robot.hpp"
 #include "o80/runtime/frontend.hpp"
+#include "observation.hpp"
 
 /// A frontend before Python has made a class of it: attached, or that of an inline robot.
 struct Attachment {
   std::shared_ptr<o80::UntypedFrontend> frontend;
   std::shared_ptr<o80::InlineRobot> robot;
 };
+
+/// The compiled half of o80.Frontend.
+///
+/// Its own members are guarded by the GIL. Python code may let other threads run, and `reattach`
+/// replace the core's frontend: who calls Python, or lets go of the GIL, takes a `shared()` first.
+class Frontend {
+ public:
+  Frontend(const Attachment& attachment, std::shared_ptr<Decoder> decoder);
+
+  o80::UntypedFrontend& untyped() const { return *untyped_; }
+  std::shared_ptr<o80::UntypedFrontend> shared() const { return untyped_; }
+  const std::shared_ptr<const Decoder>& decoder() const { return decoder_; }
+  bool is_inline() const { return robot_ != nullptr; }
+
+  /// From an index or a name.
+  std::uint32_t actuator(nanobind::handle named) const;
+  void add_command(nanobind::handle named, nanobind::handle target,
+                   const o80::CommandOptions& options) const;
+  std::vector<std::byte> request_bytes(std::uint32_t index, nanobind::handle fields) const;
+  Observation blank() const { return Observation(decoder_); }
+
+  /// Gives the lane back and stops an inline robot.
+  void close();
+  /// Throws Closed if that came before.
+  void reattach(const Attachment& attachment);
+
+  o80::Iteration next = -1;  // of wait_for_next; -1: not asked yet
+
+ private:
+  std::string name_of(std::uint32_t index) const;
+
+  std::shared_ptr<o80::UntypedFrontend> untyped_;
+  std::shared_ptr<o80::InlineRobot> robot_;
+  std::shared_ptr<const Decoder> decoder_;
+  nanobind::dict indices_;
+  std::vector<const o80::FieldRow*> plain_;  // of each actuator; null: a struct
+};
+
+/// Seconds, or None for ever.
+using Seconds = std::optional<double>;
+
+// what each file adds to the class
+void bind_sending(nanobind::module_& m, nanobind::class_<Frontend>& frontend);
+void bind_reading(nanobind::module_& m, nanobind::class_<Frontend>& frontend);

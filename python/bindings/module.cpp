@@ -3,6 +3,7 @@
 #include <string>
 
 #include "bindings.hpp"
+#include "interpreter.hpp"
 #include "o80/base/version.hpp"
 
 namespace nb = nanobind;
@@ -10,10 +11,12 @@ namespace nb = nanobind;
 NB_MODULE(_core, m) {
   m.doc() = "The compiled part of o80.";
   // a frontend that lives until the interpreter ends is no leak
-  nb::set_leak_warnings(false);
+  nb::set_leak_warnings(
+      PyObject_IsTrue(nb::module_::import_("sys").attr("flags").attr("dev_mode").ptr()) == 1);
   m.def(
       "version", [] { return nb::str(o80::version().data(), o80::version().size()); },
       "The version of the compiled library.");
+  bind_interpreter(m);
   bind_errors(m);
   bind_segment_list(m);
   bind_observation(m);

@@ -7,6 +7,7 @@
 #include <span>
 
 #include "bindings.hpp"
+#include "interpreter.hpp"
 #include "o80/base/error.hpp"
 #include "o80/describe/table.hpp"
 
@@ -36,7 +37,7 @@ PyType_Slot buffer_slots[] = {{Py_bf_getbuffer, reinterpret_cast<void*>(&fill_bu
                               {0, nullptr}};
 
 /// A row copied out of an array of rows.
-Observation* from_bytes(std::shared_ptr<const Decoder> decoder, nb::handle bytes) {
+Observation* from_bytes(std::shared_ptr<Decoder> decoder, nb::handle bytes, std::int64_t missed) {
   auto observation = std::make_unique<Observation>(std::move(decoder));
   Py_buffer view;
   if (PyObject_GetBuffer(bytes.ptr(), &view, PyBUF_SIMPLE) != 0) throw nb::python_error();
@@ -47,7 +48,27 @@ Observation* from_bytes(std::shared_ptr<const Decoder> decoder, nb::handle bytes
     throw o80::InvalidArgument("a row of this robot has " +
                                std::to_string(observation->row.size()) + " bytes");
   }
+  observation->missed = missed;
   return observation.release();
+}
+
+nb::object decoded(nb::handle self, nb::object Decoder::* how) {
+  const Decoder& decoder = *nb::inst_ptr<Observation>(self)->decoder;
+  return call_python([&] { return (decoder.*how)(self); });
+}
+
+nb::bytes table_of(const o80::Description& description) {
+  const auto bytes = o80::to_bytes(description.schema);
+  return nb::bytes(bytes.data(), bytes.size());
+}
+
+/// As data: how to decode it, its bytes, and what it missed.
+nb::tuple reduce(nb::handle self) {
+  const auto* observation = nb::inst_ptr<Observation>(self);
+  const nb::bytes row(observation->row.bytes(), observation->row.size());
+  return nb::make_tuple(
+      self.type(), nb::make_tuple(nb::cast(std::const_pointer_cast<Decoder>(observation->decoder)),
+                                  row, observation->missed));
 }
 
 std::shared_ptr<o80::Description> description_from(nb::bytes schema) {
@@ -64,11 +85,7 @@ void bind_observation(nb::module_& m) {
   nb::class_<o80::Description>(m, "Description", "A robot as its segment describes it.")
       .def(nb::new_(&description_from), "schema"_a)
       .def("json", [](const o80::Description& self) { return o80::to_json(self.schema); })
-      .def("table",
-           [](const o80::Description& self) {
-             const auto bytes = o80::to_bytes(self.schema);
-             return nb::bytes(bytes.data(), bytes.size());
-           })
+      .def("table", &table_of)
       .def("hash", [](const o80::Description& self) { return o80::hash(self.schema); });
 
   nb::class_<Decoder>(m, "Decoder", "How rows of one robot become arrays.")
@@ -78,7 +95,14 @@ void bind_observation(nb::module_& m) {
            "description"_a, "layout"_a)
       .def_prop_ro(
           "layout", [](const Decoder& self) { return self.layout; },
-          nb::sig("def layout(self) -> typing.Any"));
+          nb::sig("def layout(self) -> typing.Any"))
+      .def(
+          "__reduce__",
+          [](const Decoder& self) {
+            return nb::make_tuple(nb::module_::import_("o80.layout").attr("decoder_of"),
+                                  nb::make_tuple(table_of(*self.description)));
+          },
+          nb::sig("def __reduce__(self) -> tuple[typing.Any, ...]"));
 
   nb::class_<Observation>(
       m, "Observation", nb::type_slots(buffer_slots),
@@ -86,7 +110,8 @@ void bind_observation(nb::module_& m) {
 
 The arrays share the memory of this observation, which is its own: nothing that happens later
 changes them.)")
-      .def(nb::new_(&from_bytes), "decoder"_a, "row"_a)
+      .def(nb::new_(&from_bytes), "decoder"_a, "row"_a, "missed"_a = 0)
+      .def("__reduce__", &reduce, nb::sig("def __reduce__(self) -> tuple[typing.Any, ...]"))
       .def_prop_ro(
           "iteration", [](const Observation& self) { return self.row.iteration(); },
           "The iteration of this row.")
@@ -109,39 +134,34 @@ changes them.)")
               "Rows between this one and the one read before it that were overwritten unread; "
               "set by wait_for_next and stream.")
       .def_prop_ro(
-          "desired",
-          [](nb::handle self) { return nb::inst_ptr<Observation>(self)->decoder->desired(self); },
+          "desired", [](nb::handle self) { return decoded(self, &Decoder::desired); },
           nb::sig("def desired(self) -> typing.Any"),
           "The states that were asked: an array (actuators,), or a record of groups.")
       .def_prop_ro(
-          "observed",
-          [](nb::handle self) { return nb::inst_ptr<Observation>(self)->decoder->observed(self); },
+          "observed", [](nb::handle self) { return decoded(self, &Decoder::observed); },
           nb::sig("def observed(self) -> typing.Any"),
           "The states that were read: an array (actuators,), or a record of groups.")
       .def_prop_ro(
-          "extended",
-          [](nb::handle self) { return nb::inst_ptr<Observation>(self)->decoder->extended(self); },
+          "extended", [](nb::handle self) { return decoded(self, &Decoder::extended); },
           nb::sig("def extended(self) -> typing.Any"),
           "Further sensor values: a record with a value for each field.")
       .def_prop_ro(
-          "active",
-          [](nb::handle self) { return nb::inst_ptr<Observation>(self)->decoder->active(self); },
+          "active", [](nb::handle self) { return decoded(self, &Decoder::active); },
           nb::sig("def active(self) -> typing.Any"),
           "Whether a command gave the desired state: bool (actuators,).")
       .def_prop_ro(
-          "clamped",
-          [](nb::handle self) { return nb::inst_ptr<Observation>(self)->decoder->clamped(self); },
+          "clamped", [](nb::handle self) { return decoded(self, &Decoder::clamped); },
           nb::sig("def clamped(self) -> typing.Any"),
           "Whether the limits changed the desired state: bool (actuators,).")
       .def(
           "flat",
           [](nb::handle self, nb::handle dtype) {
-            return nb::inst_ptr<Observation>(self)->decoder->flat(self, dtype);
+            const auto* observation = nb::inst_ptr<Observation>(self);
+            return call_python([&] { return observation->decoder->flat(self, dtype); });
           },
           "dtype"_a = nb::none(), nb::sig("def flat(self, dtype: typing.Any = None) -> typing.Any"),
           "All observed numbers, then all extended ones, as one vector (default: float32).")
       .def(
-          "__repr__",
-          [](nb::handle self) { return nb::inst_ptr<Observation>(self)->decoder->text(self); },
+          "__repr__", [](nb::handle self) { return decoded(self, &Decoder::text); },
           nb::sig("def __repr__(self) -> str"));
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "interpreter.hpp"
 #include "o80/base/error.hpp"
 #include "o80/base/time.hpp"
 
@@ -16,13 +17,13 @@ class Waiting {
  public:
   /// Raises what a signal's handler raised, usually KeyboardInterrupt.
   static bool check() {
-    const nanobind::gil_scoped_acquire locked;
-    if (PyErr_CheckSignals() != 0) throw nanobind::python_error();
+    const WithGil locked;
+    if (call_python(PyErr_CheckSignals) != 0) throw nanobind::python_error();
     return true;
   }
 
  private:
-  nanobind::gil_scoped_release released_;
+  WithoutGil released_;
 };
 
 /// From seconds; None is for ever.

@@ -60,7 +60,8 @@ class Backend:
     lanes, lane_blocks, permission, stale, silence: as for `o80.robots.Robot.start`.
 
     Leaving a `with` block by an exception ends it as failed: frontends raise its text.
-    Used by one thread. Raises SegmentTaken, SegmentError, InvalidArgument.
+    Used by one thread; `stop` and `close` may come from any. Raises SegmentTaken, SegmentError,
+    InvalidArgument.
     """
 
     def __init__(
@@ -168,6 +169,7 @@ class Backend:
         if request not in known:
             there = ", ".join(known) or "none"
             raise InvalidArgument(f"there is no request '{request}'; there are: {there}")
+        self._open.check()
         self._handlers[request] = handler
 
     def interrupt(self, actuator: int | str) -> None:
@@ -189,13 +191,25 @@ class Backend:
         self._open.ask_to_stop()
 
     def close(self, failure: str | None = None) -> None:
-        """Ends it, as failed if there is a failure: frontends raise its text."""
+        """Ends it, as failed if there is a failure: frontends raise its text.
+
+        A `step` that waits in another thread raises Closed.
+        """
         native, self._native = self._native, None
         if native is None:
             return
         text = native.failure if failure is None else failure
         native.end(bool(text), text)
         self._handlers.clear()
+
+    def _close_at_exit(self) -> None:
+        self.close()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        raise TypeError(
+            f"a backend cannot be pickled, it belongs to this process: send its segment's name, "
+            f"and open o80.Frontend({self._segment!r}) there"
+        )
 
     @property
     def active(self) -> NDArray[np.bool_]:

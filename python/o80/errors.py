@@ -1,7 +1,7 @@
 """What o80 raises: one class a cause, with the cure in its text."""
 
 import builtins
-from typing import TYPE_CHECKING, Optional
+from typing import TYPE_CHECKING, Any, Optional
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,14 +23,21 @@ class TimeoutError(Error, builtins.TimeoutError):
     `batch` is what was waited for, if it was a batch: wait again, or ask its `handles`.
     """
 
-    def __init__(self, text: str = "", batch: Optional["Batch"] = None) -> None:
+    def __init__(
+        self, text: str = "", batch: Optional["Batch"] = None, handles: "Sequence[Handle]" = ()
+    ) -> None:
         super().__init__(text)
         self.batch = batch
+        self._handles = handles
 
     @property
     def handles(self) -> "Sequence[Handle]":
         """Of what was waited for, with their statuses; none if it was no batch."""
-        return [] if self.batch is None else self.batch.handles
+        return list(self._handles) if self.batch is None else self.batch.handles
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # in another process there is no batch to wait for, but there is what became of it
+        return type(self), (str(self), None, self.handles)
 
 
 class SegmentTaken(Error):

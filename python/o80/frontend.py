@@ -20,6 +20,7 @@ from o80.errors import (
     InvalidArgument,
     RequestRejected,
     SchemaMismatch,
+    UsedAfterFork,
 )
 from o80.history import History
 from o80.layout import Layout
@@ -37,10 +38,13 @@ class Frontend(_core.Frontend):
         "purge" drops what this frontend sent, "continue" leaves it.
     dead: attaches also to a backend that is gone, to read its history.
 
-    May be used from several threads. Raises TimeoutError, SegmentError, BackendFailed.
+    May be used from several threads: what they add is one buffer, which any pulse sends. In a
+    forked child its calls raise UsedAfterFork; pickled, it is opened again by its name.
+    Raises TimeoutError, SegmentError, BackendFailed.
     If the robot's package has a class of its own for it, that one is made.
     """
 
+    _is_set_up = False
     _attachment: _core.Attachment  # from __new__ to __init__
     _arguments: tuple[str, float | None, bool, Literal["purge", "continue"], bool] | None
 
@@ -85,7 +89,6 @@ class Frontend(_core.Frontend):
         self._arguments = None
         self._unnamed = unnamed
         self._set_up(attachment)
-        at_exit.close_later(self)
         return self
 
     def _set_up(self, attachment: _core.Attachment) -> None:
@@ -94,6 +97,8 @@ class Frontend(_core.Frontend):
         self._decoder = _core.Decoder(self._description, self._layout)
         super().__init__(attachment, self._decoder)
         self._first = self._read(self.oldest, 1) if self.published >= 0 else None
+        self._is_set_up = True
+        at_exit.close_later(self)
 
     # ------------------------------------------------------------------ commanding
 
@@ -191,7 +196,13 @@ class Frontend(_core.Frontend):
         Raises ControlTaken, naming the holder, if another frontend has it.
         """
         batch = self._take_control()
-        batch.wait(timeout)
+        try:
+            batch.wait(timeout)
+        except BaseException:
+            # it may be given yet
+            with contextlib.suppress(Error):
+                self._release_control()
+            raise
         handle = batch.handles[0]
         if handle.status != Status.COMPLETED:
             raise ControlTaken(f"no control of '{self.segment}': {handle.text}")
@@ -285,28 +296,47 @@ class Frontend(_core.Frontend):
     # ------------------------------------------------------------------ its life
 
     def close(self) -> None:
-        """Ends it: sent motion goes on, an inline robot stops. Closing twice is allowed."""
+        """Ends it: sent motion goes on, an inline robot stops. Closing twice is allowed.
+
+        Calls that wait in other threads raise Closed. In a forked child nothing of the parent's
+        is touched.
+        """
         if self.closed:
             return
-        if self.added:
+        added = 0 if self._forked else self.added
+        if added:
             warnings.warn(
-                f"{self.added} commands were added to '{self.segment}' and never pulsed",
+                f"{added} commands were added to '{self.segment}' and never pulsed",
                 ResourceWarning,
                 stacklevel=2,
             )
         self._close()
-        if self._unnamed:  # one that failed would stay, for others to read
+        if self._unnamed and not self._forked:  # one that failed would stay, for others to read
             _core.clean(self.segment)
+
+    def _close_at_exit(self) -> None:
+        """A pure reader has nothing to give back: who waits in a daemon thread is left alone."""
+        if not self.closed and (self._is_inline or self._has_lane or self.added):
+            self.close()
+
+    def __del__(self) -> None:
+        if not self._is_set_up or self.closed:
+            return
+        if self._is_inline and not self._forked:
+            warnings.warn(
+                f"the inline robot '{self.segment}' was never closed", ResourceWarning, stacklevel=2
+            )
+        self.close()
 
     def reattach(self, timeout: float | None = 5.0) -> None:
         """Attaches to the backend that now owns the name, after the former one ended.
 
-        Raises TimeoutError, and SchemaMismatch if it is described otherwise.
+        Raises TimeoutError, SchemaMismatch if it is described otherwise, and Closed.
         """
         if self._arguments is None:
             raise InvalidArgument("an inline robot that ended cannot be attached again: start it")
         segment, _, read_only, *_ = self._arguments
-        attachment = _core.attach(segment, timeout, read_only, False)
+        attachment = self._attach_again(timeout, read_only)
         difference = _core.difference(self._description, attachment.description)
         if difference:
             raise SchemaMismatch(
@@ -323,7 +353,7 @@ class Frontend(_core.Frontend):
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        if error is not None and not self.closed:
+        if error is not None and not self.closed and not self._forked:
             self.forget_added()
             if self._on_error == "purge":
                 with contextlib.suppress(Error):
@@ -339,7 +369,10 @@ class Frontend(_core.Frontend):
         return _open_again, (type(self), *self._arguments)
 
     def __repr__(self) -> str:
-        state = "closed" if self.closed else self.life
+        try:
+            state = "closed" if self.closed else self.life
+        except UsedAfterFork:
+            state = "of the parent process"
         return f"<o80.{type(self).__name__} of '{self.segment}' ({self.robot}), {state}>"
 
 

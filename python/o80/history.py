@@ -105,6 +105,9 @@ class History:
         numbers: NDArray[Any] = self._layout.many_flat(self.rows, dtype)
         return numbers
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return History, (self._decoder, self.rows)
+
     def __repr__(self) -> str:
         if not len(self):
             return "<o80.History of no observation>"

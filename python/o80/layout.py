@@ -3,7 +3,7 @@
 import json
 from collections.abc import Iterator
 from enum import IntEnum
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -266,3 +266,10 @@ class Layout:
             result[:, column : column + count] = part
             column += count
         return result
+
+
+@lru_cache(maxsize=64)
+def decoder_of(table: bytes) -> _core.Decoder:
+    """How to read rows that were pickled: a robot's description as it stands in a segment."""
+    description = _core.Description(table)
+    return _core.Decoder(description, Layout(description))

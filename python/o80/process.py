@@ -1,6 +1,8 @@
 """A robot that runs as a process of its own."""
 
 import contextlib
+import os
+import select
 import signal
 import subprocess
 import tempfile
@@ -9,9 +11,17 @@ import warnings
 from collections.abc import Sequence
 from types import TracebackType
 from typing import IO, Any, Self
+from weakref import WeakSet
 
-from o80 import _core
-from o80.errors import DriverError, Error, InvalidArgument, SegmentTaken, TimeoutError
+from o80 import _core, at_exit
+from o80.errors import (
+    DriverError,
+    Error,
+    InvalidArgument,
+    SegmentTaken,
+    TimeoutError,
+    UsedAfterFork,
+)
 from o80.frontend import Frontend
 from o80.installation import prefix
 
@@ -21,28 +31,41 @@ BAD_OPTIONS = 2  # exit code
 
 
 class Process:
-    """A robot's process. Leaving a `with` block stops it; it also ends when this process does."""
+    """A robot's process. Leaving a `with` block stops it; it also ends when this process does.
+
+    However this process ends, also killed, the robot notices and stops in order. To let it live
+    on, start it by `o80 run`. Stopped by nobody until it is collected, it is stopped with a
+    ResourceWarning. May be used from several threads; in a forked child only `frontend` may.
+    """
 
     def __init__(self, popen: subprocess.Popen[bytes], segment: str, output: IO[bytes]) -> None:
         self._popen = popen
         self._output = output
+        self._owner = os.getpid()
         self.segment = segment  #: the name to attach to
+        _started.add(self)
+        at_exit.close_later(self)
 
     @property
     def pid(self) -> int:
         """Of the process."""
-        return self._popen.pid
+        return self._own.pid
 
     @property
     def alive(self) -> bool:
         """Whether it runs."""
-        return self._popen.poll() is None
+        return self._own.poll() is None
 
     @property
     def output(self) -> str:
         """All that it printed so far."""
-        self._output.seek(0)
-        return self._output.read().decode(errors="replace")
+        self._check_process()
+        printed = self._output.fileno()
+        text = b""
+        # not by seeking: the robot writes where the file's position is
+        while part := os.pread(printed, 1 << 16, len(text)):
+            text += part
+        return text.decode(errors="replace")
 
     def frontend(self, timeout: float | None = 5.0, **options: Any) -> Frontend:
         """A frontend of it; takes what Frontend takes."""
@@ -53,23 +76,60 @@ class Process:
 
         Raises TimeoutError after `timeout` [s].
         """
-        try:
-            return self._popen.wait(timeout)
-        except subprocess.TimeoutExpired:
-            raise TimeoutError(f"the robot of '{self.segment}' still runs") from None
+        if not self._ends_within(timeout):
+            raise TimeoutError(f"the robot of '{self.segment}' still runs")
+        return self._popen.wait()
 
     def stop(self, timeout: float = GRACE) -> None:
-        """Stops it in order; after `timeout` [s] it is killed."""
-        if self._popen.stdin is not None:
+        """Stops it in order; after `timeout` [s] it is killed.
+
+        A `wait` in another thread returns.
+        """
+        popen = self._own
+        if popen.stdin is not None:
             with contextlib.suppress(OSError):
-                self._popen.stdin.close()
+                popen.stdin.close()
+        if self.alive:
+            popen.send_signal(signal.SIGTERM)
+        if not self._ends_within(timeout):
+            popen.kill()
+        popen.wait()
+
+    def _check_process(self) -> None:
+        if self._owner != os.getpid():
+            raise UsedAfterFork(
+                f"the robot of '{self.segment}' was started before this process was forked and is "
+                f"its parent's to stop; attach to it by o80.Frontend({self.segment!r})"
+            )
+
+    @property
+    def _own(self) -> subprocess.Popen[bytes]:
+        self._check_process()
+        return self._popen
+
+    def _ends_within(self, timeout: float | None) -> bool:
+        """Waits for its end; Ctrl-C ends that at once, which Popen.wait delays."""
+        if self._own.poll() is not None:
+            return True
         try:
-            if self.alive:
-                self._popen.send_signal(signal.SIGTERM)
-            self._popen.wait(timeout)
-        except subprocess.TimeoutExpired:
-            self._popen.kill()
-            self._popen.wait()
+            life = os.pidfd_open(self._popen.pid)
+        except ProcessLookupError:  # another thread has waited for it meanwhile
+            return True
+        try:
+            end = select.poll()
+            end.register(life, select.POLLIN)
+            return bool(end.poll(None if timeout is None else min(max(timeout, 0.0), 1e6) * 1e3))
+        finally:
+            os.close(life)
+
+    def _let_go(self) -> None:
+        """In a forked child: the robot ends with the parent, and is not waited for here."""
+        if self._popen.stdin is not None:
+            self._popen.stdin.close()
+        self._popen.returncode = 0
+
+    def _close_at_exit(self) -> None:
+        self.stop()
 
     def __enter__(self) -> Self:
         return self
@@ -80,19 +140,44 @@ class Process:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self.stop()
+        if self._owner == os.getpid():
+            self.stop()
 
     def __del__(self) -> None:
-        if self.alive:
+        if self._owner == os.getpid() and self.alive:
             warnings.warn(
                 f"the robot of '{self.segment}' was never stopped", ResourceWarning, stacklevel=2
             )
             self.stop()
         self._output.close()
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        raise TypeError(
+            f"a robot's process cannot be pickled: send its segment's name, and open "
+            f"o80.Frontend({self.segment!r}) there"
+        )
+
     def __repr__(self) -> str:
-        state = f"pid {self.pid}" if self.alive else f"ended with {self._popen.returncode}"
+        if self._owner != os.getpid():
+            state = "of the parent process"
+        elif self.alive:
+            state = f"pid {self.pid}"
+        else:
+            state = f"ended with {self._popen.returncode}"
         return f"<o80.robots.Process of '{self.segment}', {state}>"
+
+
+_started: WeakSet[Process] = WeakSet()
+
+
+def _let_go_of_all() -> None:
+    """A child would keep the robots of a parent that was killed."""
+    for process in list(_started):
+        process._let_go()
+    _started.clear()
+
+
+os.register_at_fork(after_in_child=_let_go_of_all)
 
 
 def start_process(
@@ -100,13 +185,17 @@ def start_process(
 ) -> Process:
     """Starts a robot library in a process and waits until it runs."""
     output = tempfile.TemporaryFile()  # noqa: SIM115, it lives as long as the process
-    popen = subprocess.Popen(
-        [prefix() / "bin" / "o80-run", library, f"--segment={segment}", "--until-eof", *flags],
-        stdin=subprocess.PIPE,
-        stdout=output,
-        stderr=subprocess.STDOUT,
-        start_new_session=True,  # Ctrl-C is for the program; it stops the robot in order
-    )
+    try:
+        popen = subprocess.Popen(
+            [prefix() / "bin" / "o80-run", library, f"--segment={segment}", "--until-eof", *flags],
+            stdin=subprocess.PIPE,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,  # Ctrl-C is for the program; it stops the robot in order
+        )
+    except BaseException:
+        output.close()
+        raise
     process = Process(popen, segment, output)
     try:
         _wait_until_running(process, timeout)

@@ -56,6 +56,9 @@ class Record:
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Record) and bool(np.array_equal(self._array, other._array))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Record, (self._array,)
+
     __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:

@@ -231,6 +231,9 @@ class Robot:
             texts.append((name, _text_of(value)))
         return texts
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return load, (os.fspath(self.path),)
+
     def __repr__(self) -> str:
         return f"<o80.robots.Robot '{self.name}' of {self.path}>"
 

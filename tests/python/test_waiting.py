@@ -1,10 +1,9 @@
-"""Every call that waits: Ctrl-C ends it, and other threads run on meanwhile."""
+"""Waits and what ends them: results, signals, deaths. Ctrl-C in each call is in test_signals."""
 
 import os
 import signal
-import subprocess
-import sys
 import threading
+import time
 from pathlib import Path
 
 import pytest
@@ -12,65 +11,6 @@ import pytest
 import o80
 
 WAIT = 30.0  # [s] longer than any wait should take
-
-# what blocks for ever, in a program that was given a frontend `arm`
-CALLS = {
-    "wait_for": "arm.wait_for(10**12)",
-    "wait_for_next": "standing.wait_for_next()",
-    "stream": "[None for _ in standing.stream()]",
-    "pulse_and_wait": "arm.add_command(0, 1.0, duration=1e6); arm.pulse_and_wait()",
-    "batch.wait": "arm.add_command(0, 1.0, duration=1e6); arm.pulse().wait()",
-    "burst": "slow.burst(10**12)",
-    "group": "o80.burst({slow: 10**12})",
-    "burst.wait": "slow.burst(10**12, wait=False).wait()",
-    "inline": "standing.burst(10**12)",
-    "attach": "o80.Frontend('nobody-has-this-name', timeout=None)",
-    "step": "backend.step()",
-    "process.wait": "process.wait()",
-}
-PROGRAM = """
-import sys, o80
-joints = o80.robots.load("two_joints")
-with (
-    joints.start("{name}-a") as process,
-    joints.start("{name}-b", bursting=True, frequency=1.0) as burster,
-    process.frontend() as arm,
-    burster.frontend() as slow,
-    joints.inline("{name}-c") as standing,
-    o80.Backend("{name}-d", ["a"], bursting=True) as backend,
-):
-    backend.publish([0.0])
-    sys.stdout.write("ready\\n")
-    sys.stdout.flush()
-    try:
-        {call}
-    except KeyboardInterrupt:
-        sys.stdout.write("interrupted\\n")
-        sys.stdout.flush()
-        raise
-"""
-
-
-@pytest.mark.parametrize("call", CALLS.values(), ids=CALLS.keys())
-def test_ctrl_c_ends_every_wait(segment: str, call: str) -> None:
-    program = subprocess.Popen(
-        [sys.executable, "-c", PROGRAM.format(name=segment, call=call)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    assert program.stdout is not None
-    assert program.stdout.readline() == "ready\n"
-
-    # the signal may come before the call begins: either way it ends by it
-    program.send_signal(signal.SIGINT)
-    output, errors = program.communicate(timeout=WAIT)
-
-    assert output in ("interrupted\n", ""), errors
-    assert "KeyboardInterrupt" in errors
-    assert program.returncode == -signal.SIGINT
-    for suffix in "acd":
-        assert not (Path("/dev/shm") / f"o80-{segment}-{suffix}").exists()
 
 
 def test_an_inline_burst_that_was_interrupted_is_not_gone_on_with(arm: o80.Frontend) -> None:
@@ -89,20 +29,6 @@ def test_an_inline_burst_that_was_interrupted_is_not_gone_on_with(arm: o80.Front
     assert arm.burst(1).iteration == reached + 1
 
 
-def test_a_signal_whose_handler_raises_nothing_does_not_end_a_wait(
-    process: o80.robots.Process,
-) -> None:
-    heard = []
-    before = signal.signal(signal.SIGALRM, lambda *_: heard.append(1))
-    try:
-        with process.frontend() as arm:
-            signal.setitimer(signal.ITIMER_REAL, 0.001)
-            while not heard:
-                arm.wait_for(arm.published + 5, timeout=WAIT)
-    finally:
-        signal.signal(signal.SIGALRM, before)
-
-
 def test_other_threads_run_while_one_waits(arm: o80.Frontend) -> None:
     rows: list[int] = []
     waiting = threading.Thread(target=lambda: rows.append(arm.wait_for(3, WAIT).iteration))
@@ -112,27 +38,6 @@ def test_other_threads_run_while_one_waits(arm: o80.Frontend) -> None:
     waiting.join(WAIT)
 
     assert rows == [3]
-
-
-def test_closing_a_frontend_ends_the_waits_of_other_threads(process: o80.robots.Process) -> None:
-    raised: list[BaseException] = []
-    arm = process.frontend()
-    begun = threading.Event()
-
-    def wait() -> None:
-        begun.set()
-        try:
-            arm.wait_for(10**12, timeout=WAIT)
-        except o80.Closed as error:
-            raised.append(error)
-
-    waiting = threading.Thread(target=wait)
-    waiting.start()
-    begun.wait(WAIT)
-    arm.close()
-    waiting.join(WAIT)
-
-    assert len(raised) == 1
 
 
 def test_many_threads_share_one_frontend(process: o80.robots.Process) -> None:
@@ -229,6 +134,53 @@ def test_a_killed_name_is_taken_over_without_cleaning(segment: str) -> None:
             o80.Frontend(segment, timeout=0.01)
         with robot.start(segment) as second, second.frontend() as arm:
             assert arm.alive
+
+
+def test_who_is_attached_learns_of_a_kill_and_goes_on_with_the_next_backend(segment: str) -> None:
+    robot = o80.robots.load("two_joints")
+    with robot.start(segment) as first:
+        arm = first.frontend()
+        arm.wait_for(3, WAIT)
+        os.kill(first.pid, signal.SIGKILL)
+        with pytest.raises(o80.BackendKilled, match=f"'{segment}'.*pid {first.pid}.* was killed"):
+            arm.wait_for(10**12, WAIT)
+    with robot.start(segment) as second:
+        with pytest.raises(o80.BackendSuperseded, match="a new one has its name: attach again"):
+            arm.wait_for(10**12, WAIT)
+        arm.reattach(WAIT)
+        arm.add_command(0, 0.5)
+        assert arm.pulse_and_wait(WAIT).desired[0] == 0.5
+        assert second.pid != first.pid
+        arm.close()
+
+
+def is_suspended(pid: int) -> bool:
+    return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "T"
+
+
+def test_a_suspended_backend_is_not_dead(process: o80.robots.Process) -> None:
+    with process.frontend() as arm:
+        arm.wait_for(3, WAIT)
+        arm.add_command(0, 1.0, duration=1000.0)
+        batch = arm.pulse()
+        os.kill(process.pid, signal.SIGSTOP)
+        try:
+            while not is_suspended(process.pid):
+                time.sleep(0.001)
+            for wait in (
+                lambda: arm.wait_for(10**12, timeout=0.1),
+                lambda: [None for _ in arm.stream(timeout=0.1)],
+                lambda: batch.wait(timeout=0.1),
+            ):
+                with pytest.raises(o80.TimeoutError):
+                    wait()
+            assert arm.life == "running"
+            with pytest.raises(o80.SegmentTaken, match=f"pid {process.pid}"):
+                o80.Backend(process.segment, ["a"])
+        finally:
+            os.kill(process.pid, signal.SIGCONT)
+        arm.wait_for(arm.published + 3, WAIT)
+        arm.purge()
 
 
 def test_dead_segments_are_listed_and_cleaned(segment: str) -> None:

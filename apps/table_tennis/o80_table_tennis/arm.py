@@ -75,13 +75,17 @@ class Arm:
         )
         return self.frontend.pulse(at=at, late="now")
 
-    def advance(self, first: int) -> None:
-        """Waits for the five rows from `first` on, or lets the arm make them, and reads them."""
+    def advance(self, first: int) -> bool:
+        """Waits for the five rows from `first` on, or lets the arm make them, and reads them.
+
+        Returns whether they were exactly these five.
+        """
         if self._bursting:
             self._compiled._burst(ITERATIONS, TIMEOUT)
         else:
             self.frontend.wait_for(first + ITERATIONS - 1, timeout=TIMEOUT)
-        self._compiled._read_rows(first, self._bytes)
+        there: tuple[int, int] = self._compiled._read_rows(first, self._bytes)
+        return there == (first, ITERATIONS)
 
     @property
     def asked(self) -> FloatArray:

@@ -160,15 +160,16 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         # action => pressures => rows of the arm
         self._asked = changed_pressures(self._asked, action, factor=self._task.factor)
         at = row + 1 + self._task.delay
-        sent = arm.send(np.rint(self._least + self._asked * self._span), at)
-        arm.advance(row + 1)
+        raw = self._least + self._asked * self._span
+        sent = arm.send(np.rint(raw, out=raw), at)
+        exact = arm.advance(row + 1)
 
         # rows of the arm => the twins
         for twin in rig.twins:
             twin.mirror(arm.motion)
         rows = rig.burst_twins(ITERATIONS)
 
-        self._count(rows[0].iteration, sent, at)
+        self._count(rows[0].iteration, sent, at, exact=exact)
         self._row = row + ITERATIONS
         self._steps += 1
         observation = self._observe(rows)
@@ -274,14 +275,14 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
             )
         return info
 
-    def _count(self, twin_row: int, sent: Any, at: int) -> None:
-        """Whether the step was exact, by the numbers of the iterations, and how late it was."""
+    def _count(self, twin_row: int, sent: Any, at: int, *, exact: bool) -> None:
+        """Whether the step was exact, by the numbers of the iterations, and how late it was.
+
+        `exact`: for the arm, it was.
+        """
         counts, arm = self._counts, self._rig.arm
-        first = self._row + 1
-        exact = arm.iterations[0] == first and arm.iterations[LAST] == first + LAST
-        exact = exact and twin_row == self._twin_row + ITERATIONS
         counts.steps += 1
-        counts.exact_steps += exact
+        counts.exact_steps += exact and twin_row == self._twin_row + ITERATIONS
         self._twin_row = twin_row
         if self._real_time:
             lateness = arm.newest - (self._row + ITERATIONS)

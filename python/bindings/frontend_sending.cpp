@@ -1,0 +1,265 @@
+// What a frontend adds to a batch, and how it sends it.
+
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/string_view.h>
+#include <nanobind/stl/vector.h>
+
+#include <cstring>
+#include <utility>
+
+#include "arguments.hpp"
+#include "batch.hpp"
+#include "buffer.hpp"
+#include "frontend.hpp"
+#include "o80/control/batch_builder.hpp"
+#include "waiting.hpp"
+#include "words.hpp"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+using o80::Batch;
+using o80::UntypedFrontend;
+
+namespace {
+
+void add_command(const Frontend& self, nb::handle actuator, nb::handle target, nb::handle duration,
+                 nb::handle speed, nb::handle until, nb::handle iterations, nb::handle mode,
+                 nb::handle profile, nb::handle start) {
+  self.add_command(actuator, target,
+                   {.pace = pace_of(duration, speed, until, iterations),
+                    .mode = mode_of(mode),
+                    .profile = profile_of(profile),
+                    .start = start_of(start)});
+}
+
+/// One trajectory for each of several actuators, all or none.
+/// `states` holds the rows of the first, then those of the second...; `times` are ends [ns].
+void add_trajectories(const Frontend& self, const std::vector<std::uint32_t>& actuators,
+                      std::uint32_t rows, nb::handle states, nb::handle times, nb::handle speed,
+                      nb::handle iterations, nb::handle mode, nb::handle profile,
+                      nb::handle start) {
+  const auto frontend = self.shared();
+  o80::CommandOptions options{.pace = pace_of(nb::none(), speed, nb::none(), iterations),
+                              .mode = mode_of(mode),
+                              .profile = profile_of(profile),
+                              .start = start_of(start)};
+  std::vector<std::int64_t> ends;
+  if (!times.is_none()) {
+    const Bytes bytes(times);
+    ends.resize(bytes.span().size() / sizeof(std::int64_t));
+    std::memcpy(ends.data(), bytes.span().data(), ends.size() * sizeof(std::int64_t));
+  }
+  const Bytes all(states);
+  frontend->add_trajectories(actuators, rows, all.span(), options, ends);
+}
+
+Batch pulse(const Frontend& self, nb::handle at, nb::handle late) {
+  const o80::PulseOptions options = pulse_options(at, late);
+  if (!self.is_inline()) return self.untyped().pulse(options);
+  const auto frontend = self.shared();
+  const Waiting waiting;
+  return frontend->pulse(options);
+}
+
+Observation pulse_and_wait(const Frontend& self, Seconds timeout, nb::handle at, nb::handle late) {
+  const o80::PulseOptions options = pulse_options(at, late);
+  const auto frontend = self.shared();
+  const auto decoder = self.decoder();
+  const Batch batch = [&] {
+    const Waiting waiting;
+    return frontend->pulse_to_end(options);
+  }();
+  return carrying(batch, [&] {
+    o80::UntypedObservation row = [&] {
+      const Waiting waiting;
+      return frontend->wait_for_end(batch, timeout_of(timeout), Waiting::check);
+    }();
+    return Observation(decoder, std::move(row));
+  });
+}
+
+/// Of a burst: any whole number.
+std::int64_t burst_length(nb::handle iterations) {
+  return count_of(iterations, "the number of iterations of a burst");
+}
+
+PendingBurst start_burst(const Frontend& self, nb::handle iterations) {
+  const std::int64_t count = burst_length(iterations);
+  const auto frontend = self.shared();
+  const auto decoder = self.decoder();
+  const Waiting waiting;
+  return {frontend->start_burst(count), decoder};
+}
+
+Observation burst(const Frontend& self, nb::handle iterations, Seconds timeout) {
+  const std::int64_t count = burst_length(iterations);
+  const auto frontend = self.shared();
+  const auto decoder = self.decoder();
+  o80::UntypedObservation row = [&] {
+    const Waiting waiting;
+    return frontend->burst(count, timeout_of(timeout), Waiting::check);
+  }();
+  return Observation(decoder, std::move(row));
+}
+
+std::vector<Observation> burst_group(const std::vector<std::pair<Frontend*, nb::object>>& members,
+                                     Seconds timeout) {
+  std::vector<std::shared_ptr<UntypedFrontend>> alive;
+  std::vector<std::pair<UntypedFrontend*, std::int64_t>> group;
+  for (const auto& [member, iterations] : members) {
+    alive.push_back(member->shared());
+    group.emplace_back(alive.back().get(), burst_length(iterations));
+  }
+  std::vector<o80::UntypedObservation> rows = [&] {
+    const Waiting waiting;
+    return o80::burst(group, timeout_of(timeout), Waiting::check);
+  }();
+  std::vector<Observation> observations;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    observations.emplace_back(members[i].first->decoder(), std::move(rows[i]));
+  }
+  return observations;
+}
+
+/// A batch of one record, sent at once.
+template <class Fill>
+Batch send_alone(const Frontend& self, Fill&& fill) {
+  o80::BatchBuilder batch;
+  fill(batch);
+  const auto frontend = self.shared();
+  const Waiting waiting;
+  return frontend->pulse(batch);
+}
+
+std::uint16_t purged(const Frontend& self, nb::handle actuator) {
+  return actuator.is_none() ? o80::kEveryActuator
+                            : static_cast<std::uint16_t>(self.actuator(actuator));
+}
+
+Batch send_request(const Frontend& self, std::string_view name, nb::handle fields) {
+  const auto frontend = self.shared();
+  const std::uint32_t index = frontend->request_index(name);
+  const std::vector<std::byte> payload = self.request_bytes(index, fields);
+  frontend->check().request(index, payload);
+  return send_alone(self, [&](o80::BatchBuilder& batch) {
+    batch.request(static_cast<std::uint16_t>(index), payload);
+  });
+}
+
+void add_request(const Frontend& self, std::string_view name, nb::handle fields) {
+  const auto frontend = self.shared();
+  const std::uint32_t index = frontend->request_index(name);
+  frontend->add_request(index, self.request_bytes(index, fields));
+}
+
+}  // namespace
+
+void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
+  frontend
+      .def("add_command", &add_command, "actuator"_a.none(), "target"_a.none(), nb::kw_only(),
+           "duration"_a = nb::none(), "speed"_a = nb::none(), "until"_a = nb::none(),
+           "iterations"_a = nb::none(), "mode"_a = "queue", "profile"_a = "linear",
+           "start"_a = "desired",
+           nb::sig(
+               "def add_command(self, actuator: typing.SupportsIndex | str, target: typing.Any, *, "
+               "duration: float | None = None, speed: float | None = None, "
+               "until: int | None = None, iterations: int | None = None, "
+               "mode: str = 'queue', profile: str = 'linear', start: str = 'desired') -> None"),
+           R"(Adds a command to what the next pulse sends.
+
+actuator: its index or its name.
+target: the state to reach, in the unit of its field: a number for a state of one number;
+    otherwise a mapping (what is missing keeps its desired value), a record, or all fields in order.
+duration: time to get there [s].
+speed: peak speed of the first number of the state [its unit/s].
+until: the iteration at which to be there.
+iterations: how many iterations to take.
+    Give one of these four, or none to be there in one iteration.
+mode: "queue" (after what is there) or "overwrite" (instead of what is there).
+profile: "linear" or "minimum_jerk".
+start: "desired" or "observed", the state to start from.
+
+Raises InvalidArgument for what the robot cannot follow.)")
+      .def("_add_trajectories", &add_trajectories, "actuators"_a, "rows"_a, "states"_a,
+           "times"_a.none(), "speed"_a.none(), "iterations"_a.none(), "mode"_a, "profile"_a,
+           "start"_a)
+      .def(
+          "add_request",
+          [](const Frontend& self, std::string_view name, const nb::kwargs& fields) {
+            add_request(self, name, fields);
+          },
+          "name"_a, "fields"_a,
+          nb::sig("def add_request(self, name: str, /, **fields: typing.Any) -> None"),
+          R"(Adds a request to what the next pulse sends.
+
+It is served in order with the commands of that pulse; fields that are not given are zero.)")
+      .def(
+          "add_purge",
+          [](const Frontend& self, nb::handle actuator) {
+            self.untyped().add_purge(purged(self, actuator));
+          },
+          "actuator"_a = nb::none(),
+          nb::sig(
+              "def add_purge(self, actuator: typing.SupportsIndex | str | None = None) -> None"),
+          "Adds a purge (of one actuator, or of all) to what the next pulse sends.")
+      .def(
+          "purge",
+          [](const Frontend& self, nb::handle actuator) {
+            const std::uint16_t which = purged(self, actuator);
+            return send_alone(self, [&](o80::BatchBuilder& batch) { batch.purge(which); });
+          },
+          "actuator"_a = nb::none(),
+          nb::sig("def purge(self, actuator: typing.SupportsIndex | str | None = None) -> Batch"),
+          R"(Drops all commands of an actuator (None: of all), whoever sent them, at once.
+
+Needs no pulse; what was added and not pulsed stays added.)")
+      .def("_purge_own",
+           [](const Frontend& self) {
+             return send_alone(
+                 self, [](o80::BatchBuilder& batch) { batch.purge_own(o80::kEveryActuator); });
+           })
+      .def("_take_control",
+           [](const Frontend& self) {
+             return send_alone(self, [](o80::BatchBuilder& batch) { batch.take_control(); });
+           })
+      .def("_release_control",
+           [](const Frontend& self) {
+             return send_alone(self, [](o80::BatchBuilder& batch) { batch.release_control(); });
+           })
+      .def("_index", &Frontend::actuator, "named"_a)
+      .def("_send_request", &send_request, "name"_a, "fields"_a)
+      .def_prop_ro(
+          "added", [](const Frontend& self) { return self.untyped().added(); },
+          "How many commands, requests and purges were added and not pulsed.")
+      .def(
+          "forget_added", [](const Frontend& self) { self.untyped().forget_added(); },
+          "Drops what was added and not pulsed.")
+      .def("pulse", &pulse, nb::kw_only(), "at"_a = nb::none(), "late"_a = "reject",
+           nb::sig("def pulse(self, *, at: int | None = None, late: str = 'reject') -> Batch"),
+           R"(Sends what was added, as one batch; does not wait.
+
+at: the iteration at which the batch is taken (None: at once).
+late: what if that iteration has begun: "reject" the batch, or take it "now".
+
+Raises LaneFull if too much is in flight (nothing is sent, all stays added), NoLane, ReadOnly,
+BackendGone.)")
+      .def("pulse_and_wait", &pulse_and_wait, "timeout"_a = nb::none(), nb::kw_only(),
+           "at"_a = nb::none(), "late"_a = "reject",
+           nb::sig("def pulse_and_wait(self, timeout: float | None = None, *, "
+                   "at: int | None = None, late: str = 'reject') -> Observation"),
+           R"(Sends what was added and waits until all of it has ended.
+
+A bursting backend runs as long as that takes. Returns the observation of the last iteration. What
+was rejected, purged or limited raises nothing: pulse and the statuses of its batch tell.
+
+Raises TimeoutError after `timeout` [s], which carries the `batch`, and what pulse raises.)")
+      .def("_burst", &burst, "iterations"_a.none(), "timeout"_a.none(),
+           nb::sig("def _burst(self, iterations: int, timeout: float | None) -> Observation"))
+      .def("_start_burst", &start_burst, "iterations"_a.none(),
+           nb::sig("def _start_burst(self, iterations: int) -> Burst"));
+
+  m.def("burst_group", &burst_group, "members"_a, "timeout"_a.none(),
+        nb::sig("def burst_group(members: collections.abc.Sequence[tuple[Frontend, int]], "
+                "timeout: float | None) -> list[Observation]"));
+}

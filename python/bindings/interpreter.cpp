@@ -1,0 +1,41 @@
+#include "interpreter.hpp"
+
+#include <unistd.h>
+
+#include <atomic>
+
+#include "o80/base/error.hpp"
+
+namespace {
+
+std::atomic<bool> ended{false};
+thread_local PyThreadState* released = nullptr;  // by this thread; null: it has the GIL
+
+void take(PyThreadState* state) noexcept {
+  if (ended.load(std::memory_order_relaxed)) stay();
+  call_python([state] { PyEval_RestoreThread(state); });
+}
+
+}  // namespace
+
+void stay() noexcept {
+  while (true) pause();
+}
+
+WithoutGil::WithoutGil() : around_(std::exchange(released, PyEval_SaveThread())) {}
+
+WithoutGil::~WithoutGil() { take(std::exchange(released, around_)); }
+
+WithGil::WithGil() : taken_(std::exchange(released, nullptr)) {
+  if (taken_ != nullptr) take(taken_);
+}
+
+WithGil::~WithGil() {
+  if (taken_ != nullptr) released = PyEval_SaveThread();
+}
+
+void bind_interpreter(nanobind::module_&) {
+  if (Py_AtExit([] { ended.store(true, std::memory_order_relaxed); }) != 0) {
+    throw o80::Error("Python cannot tell o80 when it ends");
+  }
+}

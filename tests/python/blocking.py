@@ -1,0 +1,162 @@
+"""Every call that waits, and a place where each of them waits until somebody ends it."""
+
+import contextlib
+import inspect
+import os
+import re
+import signal
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import o80
+from o80.process import start_process
+
+WAIT = 60.0  # [s] longer than any wait should take
+
+
+@dataclass(frozen=True)
+class Call:
+    """Source of a call that waits for ever, of what another thread ends it by, and how it ends."""
+
+    source: str
+    closing: str
+    raises: str = "Closed"  # what of o80 it raises then; "" for a result
+
+
+# by the name of the method; what it is called on stands in a Place
+CALLS = {
+    "Frontend": Call("o80.Frontend(late, None)", "begin(late)", ""),
+    "Frontend.wait_for": Call("silent.wait_for(10**12)", "silent.close()"),
+    "Frontend.wait_for_next": Call("silent.wait_for_next()", "silent.close()"),
+    "Frontend.stream": Call("list(silent.stream())", "silent.close()"),
+    "Frontend.stream of a reader": Call("list(reader.stream())", "reader.close()"),
+    "Frontend.pulse_and_wait": Call(
+        "(silent.add_command(0, 1.0), silent.pulse_and_wait())", "silent.close()"
+    ),
+    "Frontend.pulse_and_wait, bursting": Call(
+        "(standing.add_command(0, 1.0), standing.pulse_and_wait())", "standing.close()"
+    ),
+    "Frontend.request": Call("silent.request('home')", "silent.close()"),
+    "Frontend.control": Call("silent.control(None).__enter__()", "silent.close()"),
+    "Frontend.reattach": Call("gone.reattach(None)", "gone.close()"),
+    "Frontend.burst": Call("standing.burst(5)", "standing.close()"),
+    "Frontend.burst, inline": Call("inline.burst(10**12)", "inline.close()"),
+    "burst": Call("o80.burst({standing: 5})", "standing.close()"),
+    "Burst.wait": Call("standing.burst(5, wait=False).wait()", "standing.close()"),
+    "Batch.wait": Call("(silent.add_command(1, 1.0), silent.pulse().wait())", "silent.close()"),
+    "Backend.step": Call("stepping.step()", "stepping.close()"),
+    "Process.wait": Call("process.wait()", "process.stop()", ""),
+    "Process.stop": Call("frozen.stop(1e6)", "os.kill(frozen.pid, SIGCONT)", ""),
+    "Process.frontend": Call("unborn.frontend(None)", "begin(unborn.segment)", ""),
+    "Robot.start": Call(
+        "start_process(never, late, [], None)", "open(never, 'wb').close()", "DriverError"
+    ),
+}
+
+
+def waiting_methods() -> set[str]:
+    """All that is public and takes a timeout."""
+    found = set()
+    for name in [*o80.__all__, "robots.Robot", "robots.Process"]:
+        thing: Any = o80
+        for part in name.split("."):
+            thing = getattr(thing, part)
+        short = name.rpartition(".")[2]
+        if callable(thing) and not isinstance(thing, type) and "timeout" in signature_of(thing):
+            found.add(short)
+        if not isinstance(thing, type) or issubclass(thing, BaseException):
+            continue
+        if "timeout" in signature_of(thing):
+            found.add(short)
+        found |= {
+            f"{short}.{method}"
+            for method in dir(thing)
+            if not method.startswith("_") and "timeout" in signature_of(getattr(thing, method))
+        }
+    return found
+
+
+def signature_of(thing: Any) -> str:
+    """The names of its arguments, whether it is of Python or compiled."""
+    try:
+        return str(inspect.signature(thing))
+    except (TypeError, ValueError):
+        return re.split(r"->", getattr(thing, "__doc__", None) or "")[0]
+
+
+class Place:
+    """Backends that never iterate, a robot's processes, and frontends of all of them.
+
+    Who is called `name`s its segments. Its attributes are the names in the sources above.
+    """
+
+    def __init__(self, name: str, folder: Path, lanes: int = 32) -> None:
+        self._stack = contextlib.ExitStack()
+        joints = o80.robots.load("two_joints")
+        self.late = f"{name}-late"
+        self.never = str(folder / "never.so")
+        os.mkfifo(self.never)
+        self.silent_backend = self._enter(
+            o80.Backend(f"{name}-silent", ["a", "b"], requests={"home": None}, lanes=lanes)
+        )
+        self.silent_backend.on("home", lambda _fields: None)
+        self.standing_backend = self._enter(
+            o80.Backend(f"{name}-standing", ["a", "b"], bursting=True, lanes=lanes)
+        )
+        self.stepping = self._enter(o80.Backend(f"{name}-stepping", ["a"], bursting=True))
+        for backend in (self.silent_backend, self.standing_backend, self.stepping):
+            backend.publish([0.0] * len(backend.schema["actuators"]))
+        with o80.Backend(f"{name}-gone", ["a"]) as ended:
+            ended.publish([0.0])
+            self.gone = self._enter(o80.Frontend(f"{name}-gone"))
+        self.process = self._enter(joints.start(f"{name}-process"))
+        self.frozen = self._enter(joints.start(f"{name}-frozen"))
+        os.kill(self.frozen.pid, signal.SIGSTOP)
+        self.unborn = self._enter(joints.start(f"{name}-unborn"))
+        self.unborn.stop()
+        self.inline = self._enter(joints.inline(f"{name}-inline"))
+        self.open_frontends()
+
+    def _enter(self, owner: Any) -> Any:
+        return self._stack.enter_context(owner)
+
+    def open_frontends(self) -> None:
+        """Of its own for whoever calls it."""
+        self.silent = self._enter(o80.Frontend(self.silent_backend.segment))
+        self.reader = self._enter(o80.Frontend(self.silent_backend.segment, read_only=True))
+        self.standing = self._enter(o80.Frontend(self.standing_backend.segment))
+
+    def begin(self, segment: str) -> None:
+        """Starts the backend that somebody waits for."""
+        self._enter(o80.Backend(segment, ["a"])).publish([0.0])
+
+    def names(self) -> dict[str, Any]:
+        """For a source; frontends are those opened last."""
+        tools = {
+            "o80": o80,
+            "os": os,
+            "start_process": start_process,
+            "begin": self.begin,
+            "SIGCONT": signal.SIGCONT,
+        }
+        return {**vars(self), **tools}
+
+    def close(self) -> None:
+        with contextlib.suppress(ProcessLookupError, o80.Error):
+            os.kill(self.frozen.pid, signal.SIGCONT)
+        self._stack.close()
+        for entry in o80.segments():
+            if entry.name.startswith(self.late[: -len("late")]) and not entry.alive:
+                o80.clean(entry.name)
+
+
+@contextlib.contextmanager
+def place(name: str, folder: Path) -> Iterator[Place]:
+    """A place that is left in order."""
+    made = Place(name, folder)
+    try:
+        yield made
+    finally:
+        made.close()

@@ -1,0 +1,321 @@
+"""Whatever is closed, or belongs to the parent of a forked process, says so."""
+
+import contextlib
+import os
+import select
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+import o80
+
+WAIT = 30.0  # [s] longer than any wait should take
+
+# arguments of what needs some, by class and name; None: nothing of the segment is used
+CALLS: dict[str, dict[str, Callable[[Any], Any]]] = {
+    "Frontend": {
+        "add_command": lambda it: it.add_command(0, 0.1),
+        "add_trajectory": lambda it: it.add_trajectory([[0.1, 0.2]]),
+        "add_request": lambda it: it.add_request("reset"),
+        "request": lambda it: it.request("reset", timeout=WAIT),
+        "control": lambda it: it.control(WAIT).__enter__(),
+        "wait_for": lambda it: it.wait_for(0, WAIT),
+        "wait_for_next": lambda it: it.wait_for_next(WAIT),
+        "pulse_and_wait": lambda it: it.pulse_and_wait(WAIT),
+        "reattach": lambda it: it.reattach(WAIT),
+        "burst": lambda it: it.burst(timeout=WAIT),
+    },
+    "Backend": {
+        "publish": lambda it: it.publish([0.0]),
+        "step": lambda it: it.step(WAIT),
+        "on": lambda it: it.on("home", print),
+        "interrupt": lambda it: it.interrupt(0),
+    },
+    "Process": {"wait": lambda it: it.wait(WAIT)},
+    "Burst": {"wait": lambda it: it.wait(WAIT)},
+    "Batch": {"wait": lambda it: it.wait(WAIT)},
+    "Stream": {"__next__": next},
+}
+# what stays true: the description of the robot, and what was seen
+DATA = {
+    "Frontend": {
+        *("segment", "schema", "robot", "actuators", "requests", "enums", "period", "frequency"),
+        *("bursting", "epoch", "initial_states", "closed", "close"),
+    },
+    "Backend": {"segment", "schema", "close"},
+    "Process": {"segment", "frontend"},
+    "Burst": {"batch"},
+    "Batch": set(),
+    "Stream": {"__iter__"},
+}
+# of a closed one; a frontend's life is that of its backend
+OPEN_WHEN_CLOSED = {
+    "Frontend": {"life", "alive", "added", "forget_added"},
+    "Backend": set(),
+    "Process": set(),
+    "Burst": set(),
+    "Batch": set(),
+    "Stream": set(),
+}
+
+
+def uses_of(thing: Any) -> dict[str, Callable[[Any], Any]]:
+    """Every public method and property, found by looking: a new one cannot be forgotten."""
+    name = type(thing).__name__
+    special = {"__next__", "__iter__"} & {*dir(thing)}
+    uses: dict[str, Callable[[Any], Any]] = {}
+    for member in [*special, *(m for m in dir(type(thing)) if not m.startswith("_"))]:
+        if member in DATA[name]:
+            continue
+        if member in CALLS[name]:
+            uses[member] = CALLS[name][member]
+        elif callable(getattr(type(thing), member)):
+            uses[member] = lambda it, member=member: getattr(it, member)()
+        else:
+            uses[member] = lambda it, member=member: getattr(it, member)
+    return uses
+
+
+def not_raising(
+    thing: Any, error: type[BaseException], but: frozenset[str] | set[str] = frozenset()
+) -> list[str]:
+    """The uses that do not raise it, each with what it did instead."""
+    wrong = []
+    for member, use in uses_of(thing).items():
+        if member in but:
+            continue
+        try:
+            wrong.append(f"{member} gave {use(thing)!r}")
+        except error as raised:
+            if getattr(thing, "segment", "'") not in str(raised):
+                wrong.append(f"{member} does not name the segment: {raised}")
+        except BaseException as raised:
+            wrong.append(f"{member} raised {raised!r}")
+    return wrong
+
+
+class Things:
+    """One of each class that works on a segment."""
+
+    def __init__(self, name: str) -> None:
+        joints = o80.robots.load("two_joints")
+        with contextlib.ExitStack() as stack:
+            self.process = stack.enter_context(joints.start(f"{name}-a"))
+            self.frontend = stack.enter_context(self.process.frontend())
+            self.frontend.add_command(0, 0.1)
+            self.batch = self.frontend.pulse()
+            self.batch.wait(WAIT)
+            self.stream = self.frontend.stream()
+            self.inline = stack.enter_context(joints.inline(f"{name}-b"))
+            self.burst = self.inline.burst(3, wait=False)
+            self.backend = stack.enter_context(
+                o80.Backend(f"{name}-c", ["a"], requests={"home": None})
+            )
+            self.backend.publish([0.0])
+            self.stack = stack.pop_all()
+
+
+@pytest.fixture
+def things(segment: str) -> Iterator[Things]:
+    made = Things(segment)
+    with made.stack:
+        yield made
+
+
+# ---------------------------------------------------------------------------- closed
+
+
+@pytest.mark.parametrize("kind", ["frontend", "inline", "backend"])
+def test_every_use_of_something_closed_says_so(things: Things, kind: str) -> None:
+    closed = getattr(things, kind)
+    closed.close()
+    closed.close()
+
+    but = {*OPEN_WHEN_CLOSED[type(closed).__name__], *(["reattach"] if kind == "inline" else [])}
+    assert not_raising(closed, o80.Closed, but) == []
+    for member in DATA[type(closed).__name__] - {"close"}:
+        getattr(closed, member)
+    assert "closed" in repr(closed)
+
+
+def test_a_stream_ends_with_its_frontend(things: Things) -> None:
+    things.frontend.close()
+
+    with pytest.raises(o80.Closed):
+        next(things.stream)
+
+
+def test_a_batch_is_still_asked_when_its_frontend_is_closed(things: Things) -> None:
+    things.frontend.close()
+
+    assert things.batch.statuses == ["completed"]
+    things.batch.wait(WAIT)
+
+
+def test_a_group_with_one_that_is_closed_does_not_begin(segment: str) -> None:
+    joints = o80.robots.load("two_joints")
+    with joints.inline(f"{segment}-a") as one, joints.inline(f"{segment}-b") as other:
+        other.close()
+
+        with pytest.raises(o80.Closed, match=f"{segment}-b"):
+            o80.burst({one: 5, other: 5})
+
+        assert one.published == 0
+
+
+def test_a_burst_is_of_a_whole_number_of_iterations(arm: o80.Frontend) -> None:
+    for wrong in (1.5, "many", None):
+        with pytest.raises(o80.InvalidArgument, match="burst is a whole number"):
+            arm.burst(wrong)  # type: ignore[call-overload]
+        with pytest.raises(o80.InvalidArgument, match="burst is a whole number"):
+            o80.burst({arm: wrong})  # type: ignore[dict-item]
+    assert arm.burst(np.int32(2)).iteration == 2  # type: ignore[call-overload]
+
+
+def test_control_that_was_not_waited_for_is_given_back(segment: str) -> None:
+    with o80.Backend(segment, ["a"]) as backend:
+        backend.publish([0.0])
+        with o80.Frontend(segment) as one, o80.Frontend(segment) as other:
+            with pytest.raises(o80.TimeoutError), one.control(timeout=0.01):
+                pytest.fail("nobody granted it")
+            other.add_command(0, 1.0)
+            batch = other.pulse()
+            backend.step()
+            backend.publish([1.0])
+
+            assert batch.statuses == ["completed"]
+
+
+# ---------------------------------------------------------------------------- forked
+
+
+def in_child(work: Callable[[], object]) -> str:
+    """Runs it in a forked child; what it raised, or nothing. Ends it if it hangs."""
+    told, tell = os.pipe()
+    child = os.fork()
+    if child == 0:
+        signal.alarm(int(WAIT))
+        try:
+            work()
+        except BaseException as error:
+            os.write(tell, repr(error).encode())
+        os._exit(0)
+    os.close(tell)
+    with open(told, "rb") as pipe:
+        text = pipe.read().decode()
+    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    return text if code == 0 else f"it ended with {code}. {text}"
+
+
+@pytest.mark.parametrize(
+    "kind", ["frontend", "inline", "batch", "burst", "stream", "process", "backend"]
+)
+def test_every_use_in_a_forked_child_says_so_and_leaves_the_parent_alone(
+    things: Things, kind: str
+) -> None:
+    used = getattr(things, kind)
+
+    def use() -> None:
+        but = {"reattach"} if kind == "inline" else set()  # nothing to attach to
+        assert not_raising(used, o80.UsedAfterFork, but) == []
+        assert "parent" in repr(used) or kind not in ("frontend", "inline", "batch", "process")
+        for member in DATA[type(used).__name__] - {"close", "frontend", "__iter__"}:
+            getattr(used, member)
+        for end in ("close", "__exit__"):
+            if hasattr(used, end) and not (kind == "process" and end == "close"):
+                getattr(used, end)(*([None] * 3 if end == "__exit__" else []))
+        things.__dict__.clear()  # collected in the child
+
+    assert in_child(use) == ""
+
+    assert things.process.alive
+    assert things.inline.burst(1).iteration == 4
+    things.frontend.add_command(1, 0.2)
+    things.frontend.pulse_and_wait(WAIT)
+    assert things.batch.statuses == ["completed"]
+    assert next(things.stream).iteration > 0
+    things.backend.publish([0.5])
+
+
+def test_the_parent_of_a_fork_in_mid_burst_goes_on_and_its_child_does_not_hang(
+    arm: o80.Frontend,
+) -> None:
+    def burst() -> None:
+        with contextlib.suppress(o80.Closed):
+            arm.burst(10**12)
+
+    before = arm.published
+    threading.Thread(target=burst).start()
+    while arm.published == before:
+        pass
+
+    def leave() -> None:
+        with arm:
+            pass
+        with o80.Frontend(arm.segment, read_only=True) as again:
+            again.wait_for_next(WAIT)
+
+    for _ in range(5):
+        assert in_child(leave) == ""
+    reached = arm.published
+    arm.wait_for(reached + 1000, WAIT)
+
+
+def test_a_child_forked_while_other_threads_send_can_close_its_copy(
+    process: o80.robots.Process,
+) -> None:
+    stop = threading.Event()
+    with process.frontend() as arm:
+
+        def send() -> None:
+            while not stop.is_set():
+                with contextlib.suppress(o80.LaneFull):
+                    arm.purge()  # without the interpreter, under the lock of what is sent
+
+        threads = [threading.Thread(target=send) for _ in range(2)]
+        for thread in threads:
+            thread.start()
+        told = [in_child(arm.close) for _ in range(40)]
+        stop.set()
+        for thread in threads:
+            thread.join(WAIT)
+
+        assert told == [""] * 40
+
+
+def test_a_robot_does_not_live_on_with_a_child_of_its_killed_parent(segment: str) -> None:
+    told, tell = os.pipe()
+    starter = os.fork()
+    if starter == 0:
+        process = o80.robots.load("two_joints").start(segment)
+        orphan = os.fork()
+        if orphan == 0:
+            os.close(tell)
+            signal.pause()  # outlives its parent
+        os.write(tell, f"{process.pid} {orphan}\n".encode())
+        os.kill(os.getpid(), signal.SIGKILL)
+    os.close(tell)
+    with open(told) as pipe:
+        robot, orphan = map(int, pipe.read().split())
+    os.waitpid(starter, 0)
+
+    try:
+        end_of(robot)
+        os.kill(orphan, 0)
+    finally:
+        os.kill(orphan, signal.SIGKILL)
+
+
+def end_of(process: int) -> None:
+    """Waits until a process that is not our child has ended."""
+    try:
+        descriptor = os.pidfd_open(process)
+    except ProcessLookupError:
+        return
+    readable, _, _ = select.select([descriptor], [], [], WAIT)
+    os.close(descriptor)
+    assert readable

@@ -1,0 +1,261 @@
+"""The end of the interpreter, in every way, with everything still under way."""
+
+import os
+import select
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from blocking import CALLS
+
+import o80
+
+WAIT = 60.0  # [s] longer than any wait should take
+WORDS_OF_A_CRASH = ("Fatal", "terminate", "exception not rethrown", "Abort", "Segmentation")
+
+
+def run(program: str, *flags: str) -> subprocess.CompletedProcess[str]:
+    """A program of its own; it must end by itself."""
+    return subprocess.run(
+        [sys.executable, *flags, "-c", program],
+        capture_output=True,
+        text=True,
+        timeout=WAIT,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parent)},
+    )
+
+
+def crashes(ended: subprocess.CompletedProcess[str]) -> list[str]:
+    return [word for word in WORDS_OF_A_CRASH if word in ended.stderr]
+
+
+def end_of(process: int) -> None:
+    """Waits until a process that is not our child has ended."""
+    try:
+        descriptor = os.pidfd_open(process)
+    except ProcessLookupError:
+        return
+    readable, _, _ = select.select([descriptor], [], [], WAIT)
+    os.close(descriptor)
+    assert readable
+
+
+ENDS = {
+    "by its last line": ("", 0),
+    "by sys.exit": ("sys.exit(3)", 3),
+    "by an exception": ("raise RuntimeError('it broke')", 1),
+    "by os._exit": ("os._exit(4)", 4),
+    "by SIGTERM": ("os.kill(os.getpid(), 15); signal.pause()", -15),
+    "by SIGKILL": ("os.kill(os.getpid(), 9)", -9),
+}
+
+
+@pytest.mark.parametrize("block", [True, False], ids=["in a with block", "without one"])
+@pytest.mark.parametrize("way", ENDS)
+def test_a_robot_stops_in_order_however_the_program_that_started_it_ends(
+    segment: str, way: str, block: bool
+) -> None:
+    end, code = ENDS[way]
+    start = f"o80.robots.load('two_joints').start({segment!r})"
+    body = f"print(process.pid, flush=True); arm = process.frontend(); {end}"
+    program = "import os, signal, sys, o80\n" + (
+        f"with {start} as process:\n    {body}" if block else f"process = {start}\n{body}"
+    )
+
+    ended = run(program)
+
+    assert ended.returncode == code, ended.stderr
+    assert crashes(ended) == []
+    end_of(int(ended.stdout))
+    # stopped in order, it has taken its name along
+    assert segment not in [entry.name for entry in o80.segments()]
+
+
+DAEMONS = """
+import faulthandler, sys, threading, time
+from pathlib import Path
+from blocking import CALLS, Place
+faulthandler.enable()
+here = Place({name!r}, Path({folder!r}))
+begun = []
+def call(source, names):
+    begun.append(source)
+    try:
+        eval(source, names)
+    except Exception as error:
+        if type(error).__name__ not in ("Closed", "BackendStopped", "DriverError"):
+            raise
+for name, waiting in CALLS.items():
+    if name in {left_out!r}:
+        continue
+    here.open_frontends()
+    threading.Thread(target=call, args=(waiting.source, here.names()), daemon=True).start()
+while len(begun) < {count}:
+    time.sleep(0.001)
+counted = sum(1 for _ in range(300_000))
+{end}
+"""
+# a robot that is frozen ends when it is thawed
+LEFT_OUT = {"Process.stop", "Robot.start"}
+
+
+@pytest.mark.parametrize("end", ["", "sys.exit(3)", "raise RuntimeError('it broke')"])
+@pytest.mark.parametrize("flags", [(), ("-X", "dev")], ids=["python", "python -X dev"])
+def test_daemon_threads_in_every_wait_neither_crash_nor_keep_the_interpreter(
+    segment: str, tmp_path: Path, end: str, flags: tuple[str, ...]
+) -> None:
+    if flags and end:
+        pytest.skip("one end is enough there")
+    program = DAEMONS.format(
+        name=segment,
+        folder=str(tmp_path),
+        left_out=LEFT_OUT,
+        count=len(CALLS) - len(LEFT_OUT),
+        end="import os; os.kill(here.frozen.pid, 18)\n" + end,
+    )
+
+    ended = run(program, *flags)
+
+    assert crashes(ended) == [], ended.stderr
+    assert ended.returncode == {"": 0, "sys.exit(3)": 3}.get(end, 1), ended.stderr
+    left = [e.name for e in o80.segments() if e.name.startswith(segment) and e.alive]
+    assert left == []
+    for entry in o80.segments():
+        if entry.name.startswith(segment):
+            o80.clean(entry.name)
+
+
+HOT = """
+import threading, o80
+arm = o80.robots.load("two_joints").inline()
+backend = o80.Backend({name!r}, ["a"], bursting=True, requests={{"home": None}})
+backend.publish([0.0])
+backend.on("home", lambda fields: [None for _ in range(100)] and None)
+def iterate():
+    while (desired := backend.step()) is not None:
+        backend.publish(desired)
+def read():
+    for observation in o80.Frontend(arm.segment, read_only=True).stream():
+        observation.observed, observation.extended, observation.flat()
+def burst():
+    while True:
+        arm.burst(3).desired
+def ask():
+    with o80.Frontend({name!r}) as asking:
+        while True:
+            asking.request("home")
+            asking.burst(1).observed
+def time_out():
+    with o80.Frontend({name!r}) as waiting:
+        while True:
+            try:
+                waiting.wait_for(10**12, 0.0)
+            except o80.TimeoutError:
+                pass
+threading.excepthook = lambda _: None
+for work in (iterate, read, burst, ask, time_out):
+    threading.Thread(target=work, daemon=True).start()
+arm.wait_for(50)
+"""
+
+
+def test_daemon_threads_in_full_work_do_not_crash_the_end(segment: str) -> None:
+    for _ in range(8):
+        ended = run(HOT.format(name=segment), "-X", "faulthandler")
+        assert crashes(ended) == [], ended.stderr
+        assert ended.returncode == 0, ended.stderr
+        assert not any(e.name == segment and e.alive for e in o80.segments())
+
+
+def test_a_thread_that_is_no_daemon_ends_first(segment: str) -> None:
+    program = (
+        "import threading, o80\n"
+        f"arm = o80.robots.load('two_joints').inline({segment!r})\n"
+        "threading.Thread(target=lambda: print(arm.burst(100_000).iteration)).start()\n"
+    )
+
+    ended = run(program)
+
+    assert (ended.returncode, ended.stdout) == (0, "100000\n"), ended.stderr
+    assert segment not in [entry.name for entry in o80.segments()]
+
+
+def test_what_was_never_pulsed_is_warned_about_at_the_end(segment: str) -> None:
+    with o80.robots.load("two_joints").start(segment):
+        ended = run(
+            f"import o80\narm = o80.Frontend({segment!r})\narm.add_command(0, 1.0)\n",
+            "-W",
+            "always",
+        )
+
+    assert ended.returncode == 0
+    assert "1 commands were added" in ended.stderr
+    assert "never pulsed" in ended.stderr
+
+
+def test_frontends_are_there_for_what_is_registered_later_to_run_at_exit(segment: str) -> None:
+    program = f"""
+import atexit
+atexit.register(lambda: print("before it was imported:", arm.closed))
+import o80
+atexit.register(lambda: print("after:", arm.burst(2).iteration, process.alive))
+process = o80.robots.load("two_joints").start({segment!r})
+arm = o80.robots.load("two_joints").inline()
+"""
+
+    ended = run(program)
+
+    assert ended.returncode == 0, ended.stderr
+    assert ended.stdout.splitlines() == ["after: 2 True", "before it was imported: True"]
+
+
+def test_a_lane_is_given_back_in_order_at_the_end_even_in_a_cycle(segment: str) -> None:
+    with o80.Backend(segment, ["a"], stale="stop", lanes=1) as backend:
+        backend.publish([0.0])
+        ended = run(
+            f"import o80\narm = o80.Frontend({segment!r})\ncycle = [arm]\ncycle.append(cycle)\n"
+            "arm.add_command(0, 1.0)\nbatch = arm.pulse()\n"
+        )
+        assert ended.returncode == 0, ended.stderr
+        for _ in range(3):  # one that died would end it
+            assert backend.step() is not None
+            backend.publish([1.0])
+        with o80.Frontend(segment) as next_one:
+            next_one.add_command(0, 2.0)
+            next_one.pulse()
+        assert backend.step() == [2.0]
+
+
+def test_one_that_fails_to_close_does_not_keep_the_others_open(segment: str) -> None:
+    program = f"""
+import o80
+class Stubborn(o80.Frontend):
+    def close(self):
+        raise RuntimeError("it does not close")
+first = o80.robots.load("two_joints").inline({segment!r})
+o80.register_frontend("two_joints", Stubborn)
+second = o80.robots.load("two_joints").inline()
+"""
+
+    ended = run(program)
+
+    assert "it does not close" in ended.stderr
+    assert segment not in [entry.name for entry in o80.segments()]
+
+
+def test_signals_end_an_inline_program_too(segment: str) -> None:
+    program = f"""
+import o80, os, signal
+arm = o80.robots.load("two_joints").inline({segment!r})
+signal.setitimer(signal.ITIMER_REAL, 0.01)
+signal.signal(signal.SIGALRM, lambda *_: exit(5))
+arm.burst(10**12)
+"""
+
+    ended = run(program)
+
+    assert ended.returncode == 5, ended.stderr
+    assert segment not in [entry.name for entry in o80.segments()]
+    assert signal.getsignal(signal.SIGALRM) in (signal.SIG_DFL, None)

@@ -1,0 +1,322 @@
+"""Signals in every call that waits."""
+
+import contextlib
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from blocking import CALLS
+
+import o80
+
+WAIT = 60.0  # [s] longer than any wait should take
+
+PROGRAM = """
+import os, signal, sys, time
+from pathlib import Path
+from blocking import CALLS, Place
+here = Place({name!r}, Path({folder!r}))
+pulsed = []
+for name, call in CALLS.items():
+    here.open_frontends()
+    names = here.names()
+    code = compile(call.source, name, "eval")
+    ended = "by itself"
+    try:
+        try:
+            print("ready", flush=True)
+            # compiled before: eval of a text tells Python that nobody caught the interrupt
+            eval(code, names)
+        except KeyboardInterrupt:
+            print("interrupted", time.monotonic_ns(), name, flush=True)
+            ended = "by Ctrl-C"
+    except KeyboardInterrupt:
+        ended = "by Ctrl-C twice"
+    # all is usable as before
+    assert names["silent"].latest().iteration == 0
+    assert names["silent"].added == 0, name
+    assert names["standing"].history().iteration.tolist() == [0]
+    if name == "Frontend.burst, inline":
+        reached = here.inline.published
+        assert here.inline.burst(1).iteration == reached + 1
+    print(ended, flush=True)
+os.kill(here.frozen.pid, signal.SIGCONT)
+here.close()
+"""
+
+
+def in_a_wait(process: int) -> bool:
+    """Whether its main thread sleeps in the kernel, or computes a burst."""
+    stat = Path(f"/proc/{process}/stat").read_text()
+    return stat.rpartition(")")[2].split()[0] in "SR"
+
+
+def test_ctrl_c_ends_every_wait_and_leaves_everything_usable(
+    segment: str, tmp_path: Path, record_property: Callable[[str, object], None]
+) -> None:
+    program = subprocess.Popen(
+        [sys.executable, "-c", PROGRAM.format(name=segment, folder=str(tmp_path))],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parent)},
+    )
+    assert program.stdout is not None
+    assert program.stderr is not None
+    watch = threading.Timer(WAIT, program.kill)
+    watch.start()
+    delays = {}
+    for name in CALLS:
+        assert program.stdout.readline() == "ready\n", program.stderr.read()
+        while not in_a_wait(program.pid):
+            pass
+        sent = time.monotonic_ns()
+        program.send_signal(signal.SIGINT)
+        interrupted = program.stdout.readline().split(maxsplit=2)
+        assert interrupted[:1] == ["interrupted"], (name, program.stderr.read())
+        assert interrupted[2].strip() == name
+        delays[name] = (int(interrupted[1]) - sent) * 1e-6
+        assert program.stdout.readline() == "by Ctrl-C\n"
+    _, errors = program.communicate(timeout=WAIT)
+    watch.cancel()
+
+    assert program.returncode == 0, errors
+    # a figure for the report, no limit: the machine may be slow
+    record_property("longest delay of Ctrl-C [ms]", max(delays.values()))
+    assert all(delay < WAIT * 1e3 for delay in delays.values())
+
+
+SLICES = """
+import signal, sys, o80
+backend = o80.Backend({name!r}, ["a"], bursting=True)
+backend.publish([0.0])
+with backend, o80.Frontend({name!r}) as frontend:
+    for wait in (
+        lambda: frontend.wait_for(5, 0.3),
+        lambda: backend.step(0.3),
+        lambda: frontend.burst(5, timeout=0.3),
+    ):
+        try:
+            wait()
+        except o80.TimeoutError:
+            pass
+"""
+
+
+@pytest.mark.skipif(shutil.which("strace") is None, reason="strace is not installed")
+def test_no_wait_sleeps_longer_than_a_slice_between_looks_at_signals(segment: str) -> None:
+    traced = subprocess.run(
+        ["strace", "-qq", "-e", "trace=futex", sys.executable, "-c", SLICES.format(name=segment)],
+        capture_output=True,
+        text=True,
+        timeout=WAIT,
+    )
+
+    sleeps = [
+        int(seconds) + int(nanoseconds) * 1e-9
+        for seconds, nanoseconds in re.findall(
+            r"FUTEX_WAIT, \d+, \{tv_sec=(\d+), tv_nsec=(\d+)\}", traced.stderr
+        )
+    ]
+    assert traced.returncode == 0, traced.stderr
+    assert len(sleeps) >= 3, traced.stderr  # in three waits of 300 ms
+    assert max(sleeps) <= 0.05
+
+
+def test_a_handler_that_returns_lets_the_wait_go_on_with_its_timeout(arm: o80.Frontend) -> None:
+    heard: list[float] = []
+    before = signal.signal(signal.SIGALRM, lambda *_: heard.append(time.monotonic()))
+    begun = time.monotonic()
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.02, 0.02)
+        with pytest.raises(o80.TimeoutError):
+            arm.wait_for(10, timeout=0.4)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+
+    assert len(heard) >= 3  # one a slice at least, and the wait was not begun anew by any
+    assert time.monotonic() - begun >= 0.4
+
+
+def test_a_handler_that_raises_ends_the_wait_with_that(process: o80.robots.Process) -> None:
+    class EnoughError(Exception):
+        pass
+
+    def enough(*_: object) -> None:
+        raise EnoughError
+
+    before = signal.signal(signal.SIGALRM, enough)
+    try:
+        with process.frontend() as arm:
+            for wait in (
+                lambda: arm.wait_for(10**12, WAIT),
+                lambda: process.wait(WAIT),
+                lambda: o80.Frontend("nobody-has-this-name", WAIT),
+            ):
+                signal.setitimer(signal.ITIMER_REAL, 0.01)
+                with pytest.raises(EnoughError):
+                    wait()
+            arm.wait_for(arm.published + 2, WAIT)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def test_a_signal_in_the_wait_of_another_thread_reaches_the_main_one(arm: o80.Frontend) -> None:
+    rows: list[int] = []
+    waiting = threading.Thread(target=lambda: rows.append(arm.wait_for(3, WAIT).iteration))
+    heard = threading.Event()
+    before = signal.signal(signal.SIGUSR1, lambda *_: heard.set())
+    try:
+        waiting.start()
+        assert waiting.ident is not None
+        signal.pthread_kill(waiting.ident, signal.SIGUSR1)
+        while not heard.is_set():  # Python runs handlers in the main thread, in its waits too
+            with contextlib.suppress(o80.TimeoutError):
+                arm.wait_for(5, timeout=0.1)
+    finally:
+        signal.signal(signal.SIGUSR1, before)
+    assert waiting.is_alive()
+
+    arm.burst(3)
+    waiting.join(WAIT)
+
+    assert rows == [3]
+
+
+def test_a_handler_may_close_what_is_waited_for(arm: o80.Frontend, segment: str) -> None:
+    before = signal.signal(signal.SIGALRM, lambda *_: arm.close())
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.01)
+        with pytest.raises(o80.Closed, match=segment):
+            arm.burst(10**12)
+    finally:
+        signal.signal(signal.SIGALRM, before)
+
+    assert segment not in [entry.name for entry in o80.segments()]
+
+
+def test_a_handler_cannot_burst_within_a_burst(arm: o80.Frontend) -> None:
+    refused: list[BaseException] = []
+
+    def burst(*_: object) -> None:
+        try:
+            arm.burst(1)
+        except o80.Error as error:
+            refused.append(error)
+            arm.add_purge()
+
+    before = signal.signal(signal.SIGALRM, burst)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.01)
+        while not refused:
+            arm.burst(1_000_000)
+    finally:
+        signal.signal(signal.SIGALRM, before)
+
+    assert "in this very thread" in str(refused[0])
+    assert arm.added == 1
+    arm.forget_added()
+    reached = arm.published
+    assert arm.burst(1).iteration == reached + 1
+
+
+def test_ctrl_c_in_a_with_block_purges_what_the_frontend_sent(
+    process: o80.robots.Process,
+) -> None:
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGALRM, interrupt)
+    sent = []
+
+    def move() -> None:
+        with arm:
+            arm.add_command(0, 1.0, duration=1e6)
+            sent.append(arm.pulse())
+            arm.add_command(1, 1.0)
+            signal.setitimer(signal.ITIMER_REAL, 0.01)
+            sent[0].wait(WAIT)
+
+    try:
+        arm = process.frontend()
+        with pytest.raises(KeyboardInterrupt):
+            move()
+    finally:
+        signal.signal(signal.SIGALRM, before)
+
+    assert arm.closed
+    with process.frontend() as other:
+        while sent[0].statuses != ["purged"]:
+            other.wait_for(other.published + 1, WAIT)
+        assert not other.latest().active.any()
+
+
+def test_ctrl_c_while_control_is_awaited_gives_it_back(segment: str) -> None:
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with o80.Backend(segment, ["a"]) as backend:
+        backend.publish([0.0])
+        with o80.Frontend(segment) as one, o80.Frontend(segment) as other:
+            before = signal.signal(signal.SIGALRM, interrupt)
+            try:
+                signal.setitimer(signal.ITIMER_REAL, 0.01)
+                with pytest.raises(KeyboardInterrupt), one.control(WAIT):
+                    pass
+            finally:
+                signal.signal(signal.SIGALRM, before)
+            other.add_command(0, 1.0)
+            batch = other.pulse()
+            backend.step()
+            backend.publish([1.0])
+
+            assert batch.statuses == ["completed"]
+
+
+TWICE = """
+import os, signal, sys, o80
+with o80.robots.load("two_joints").start({name!r}) as process, process.frontend() as arm:
+    arm.add_command(0, 1.0, duration=1e6)
+    try:
+        print(process.pid, flush=True)
+        arm.pulse_and_wait()
+    except KeyboardInterrupt:
+        os.kill(process.pid, signal.SIGSTOP)  # it does not stop by itself
+        print("once", flush=True)
+        raise
+"""
+
+
+def test_ctrl_c_twice_ends_a_program_whose_robot_does_not_stop(segment: str) -> None:
+    program = subprocess.Popen(
+        [sys.executable, "-c", TWICE.format(name=segment)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert program.stdout is not None
+    robot = int(program.stdout.readline())
+    program.send_signal(signal.SIGINT)
+    assert program.stdout.readline() == "once\n"
+
+    program.send_signal(signal.SIGINT)
+    _, errors = program.communicate(timeout=WAIT)
+
+    assert program.returncode in (-signal.SIGINT, 1), errors
+    assert "KeyboardInterrupt" in errors
+    if Path(f"/proc/{robot}").exists():
+        os.kill(robot, signal.SIGCONT)  # it was told to stop before
+    while any(e.name == segment and e.alive for e in o80.segments()):
+        time.sleep(0.01)
+    if any(e.name == segment for e in o80.segments()):
+        o80.clean(segment)
