@@ -1,5 +1,5 @@
 # Everything made lies in .venv and build/. Options go through ARGS="...".
-.PHONY: demo test bench format clean distclean
+.PHONY: growth demo test model torture bench rt stress fuzz format clean distclean
 ARGS ?=
 export PYTHONDONTWRITEBYTECODE := 1
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
@@ -13,11 +13,47 @@ test:
 	@tools/setup.sh test
 	@.venv/bin/python tools/test.py $(ARGS)
 
+# processes killed and stopped until ARGS="--kills 10000" is reached
+torture:
+	@tools/setup.sh test
+	@.venv/bin/cmake --preset dev > /dev/null
+	@.venv/bin/cmake --build --preset dev --target o80-torture
+	@build/dev/bin/o80-torture --python .venv/bin/python $(ARGS)
+
 bench:
 	@tools/setup.sh bench
 	@.venv/bin/cmake --preset release > /dev/null
 	@.venv/bin/cmake --build --preset release
 	@.venv/bin/python benchmarks/run.py $(ARGS)
+
+# what tests cannot reach: every order of steps, on small cases
+model:
+	@tools/setup.sh test
+	@.venv/bin/python models/run.py $(ARGS)
+
+# jitter of the real-time loop on a machine under stress, beside cyclictest
+stress:
+	@tools/setup.sh bench
+	@.venv/bin/cmake --preset release > /dev/null
+	@.venv/bin/cmake --build --preset release
+	@.venv/bin/python benchmarks/stress.py $(ARGS)
+
+# some minutes for each fuzzer; finds go to build/fuzz/found: make fuzz ARGS="lane --minutes 60 --merge"
+fuzz:
+	@tools/setup.sh test
+	@.venv/bin/python tools/fuzz.py --minutes 3 $(ARGS)
+
+# a PREEMPT_RT kernel in a virtual machine: the core tests and a loop, beside cyclictest
+rt:
+	@tools/setup.sh test
+	@.venv/bin/cmake --preset rt > /dev/null
+	@.venv/bin/cmake --build --preset rt
+	@.venv/bin/python tools/rt.py $(ARGS)
+growth:
+	@tools/setup.sh bench
+	@.venv/bin/cmake --preset release > /dev/null
+	@.venv/bin/cmake --build --preset release --target o80-bench-growth
+	@.venv/bin/python benchmarks/growth.py $(ARGS)
 
 format:
 	@tools/setup.sh test

@@ -71,8 +71,12 @@ install_o80() {
 
 case $purpose in
   demo) ;;
-  test) need_packages g++ libgtest-dev libgmock-dev strace ;;
-  bench) need_packages g++ rt-tests ;;
+  test)
+    need_packages g++ libgtest-dev libgmock-dev googletest strace stress-ng rt-tests \
+      clang-19 libclang-rt-19-dev llvm-19 relacy-dev spin \
+      qemu-user-static g++-aarch64-linux-gnu qemu-system-x86 busybox-static cpio
+    ;;
+  bench) need_packages g++ rt-tests stress-ng ;;
   *) say "unknown purpose '$purpose'"; exit 2 ;;
 esac
 # pictures without a screen, where EGL cannot make them; refused, only the film is missing

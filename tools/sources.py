@@ -13,6 +13,7 @@ FOLDERS = (
     "examples",
     "benchmarks",
     "tests",
+    "models",
     "tools",
 )
 

@@ -20,7 +20,7 @@ LOGS = ROOT / "build" / "test"
 
 def typed_folders() -> list[str]:
     """Folders outside the package whose Python is type-checked too."""
-    folders = ("tools", "benchmarks", "examples")
+    folders = ("tools", "benchmarks", "examples", "models")
     return [folder for folder in folders if any((ROOT / folder).rglob("*.py"))]
 
 
@@ -45,9 +45,12 @@ STEPS: dict[str, list[list[str]]] = {
         *([*PYTHON, "mypy", folder] for folder in typed_folders()),
     ],
     "dev": cpp("dev"),
+    "torture": [["build/dev/bin/o80-torture", "--kills", "2000", "--python", sys.executable]],
     "tidy": [[sys.executable, "tools/tidy.py"]],
+    "models": [[sys.executable, "models/run.py"]],
     "asan": cpp("asan"),
     "tsan": cpp("tsan"),
+    "fuzz": [[sys.executable, "tools/fuzz.py"]],
     "pytest": [[*PYTHON, "pytest"]],
 }
 CLOSING_LINES = {"dev": 3, "asan": 3, "tsan": 3}
