@@ -12,7 +12,6 @@
 //
 // mutant NO_MOURNING       a burst without end of a dead frontend is not cut
 // mutant NO_SLICES         a sleep lasts until somebody wakes
-// mutant RINGS_FIRST       the bell rings before the commit
 // mutant ANSWERS_FIRST     the answer is there before the rows
 // mutant GRANTS_TWICE      a burst is granted while another runs
 // mutant NOBODY_LOOKS      who waits does not ask whether the backend lives

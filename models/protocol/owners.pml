@@ -8,6 +8,7 @@
 // safety: each batch is dealt with once and in order; a living owner's is never refused as a dead
 //         one's; what an heir sends acts on queues without commands of the dead; ids are not reused
 // ltl:    whatever was committed is dealt with, and a dead owner's commands do not go on for ever
+//         (weak fairness)
 //
 // mutant KEEPS_TWO_LANES      the lock of the lane is granted to everybody
 // mutant COUNTED_EARLY        an heir counts itself before it has left its mark
