@@ -22,6 +22,13 @@ add_library(o80::o80 ALIAS o80)
 target_link_libraries(o80 PUBLIC o80_headers Threads::Threads PRIVATE ${CMAKE_DL_LIBS} o80_warnings)
 # no fused multiply-add: machines agree on every desired state, bit for bit
 target_compile_options(o80 PRIVATE -ffp-contract=off)
+# calls inside the library are direct, and may be inlined across its files
+target_compile_options(o80 PRIVATE -fno-semantic-interposition)
+include(CheckIPOSupported)
+check_ipo_supported(RESULT o80_can_inline_across_files OUTPUT o80_why_not LANGUAGES CXX)
+if(o80_can_inline_across_files)
+  set_target_properties(o80 PROPERTIES INTERPROCEDURAL_OPTIMIZATION_RELEASE ON)
+endif()
 if(NOT O80_SANITIZE) # whose functions are in the program
   target_link_options(o80 PRIVATE -Wl,--no-undefined)
 endif()

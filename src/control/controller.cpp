@@ -104,7 +104,7 @@ class Controller::Body {
 Controller::Body::Body(const Schema& schema, BlockPool& blocks, StatusSink& sink,
                        std::uint32_t lanes)
     : pool(blocks),
-      ledger(blocks, sink, lanes),
+      ledger(blocks, sink),
       layouts_(layouts_of(schema)),
       planner(schema, pointers_to(layouts_), blocks, lanes),
       desired((schema.head.block + kBlockBytes - 1) / kBlockBytes) {
@@ -313,8 +313,5 @@ std::uint32_t Controller::words() const noexcept {
 
 bool Controller::active() const noexcept { return body_->active(); }
 bool Controller::pending() const noexcept { return body_->ledger.pending(); }
-std::uint64_t Controller::freed(std::uint32_t lane) const noexcept {
-  return body_->ledger.freed(lane);
-}
 
 }  // namespace o80

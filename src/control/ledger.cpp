@@ -94,7 +94,7 @@ void Ledger::end(BlockIndex record, Status status, Reason reason, std::uint8_t a
   const std::uint32_t lane = batch(block).lane;
   sink_.changed({lane, head.id, status, reason, aux, iteration});
   pool_.release(record, head.own[Own::kLast], blocks);
-  freed_[lane] += blocks;
+  sink_.freed(lane, blocks);
   ended(block, iteration);
 }
 
@@ -106,7 +106,7 @@ void Ledger::ended(BlockIndex block, Iteration iteration) noexcept {
   const Reason reason = taken.end == Status::rejected ? taken.reason : Reason::none;
   const std::uint8_t aux = taken.end == Status::rejected ? taken.aux : std::uint8_t{0};
   sink_.changed({taken.lane, taken.id + 1, taken.end, reason, aux, taken.last_end});
-  freed_[taken.lane] += 1 + taken.spare.blocks;
+  sink_.freed(taken.lane, 1 + taken.spare.blocks);
   pool_.release(taken.spare);
   pool_.release(block, block, 1);
 }

@@ -206,7 +206,8 @@ void CommandCheck::request(std::uint32_t index, std::span<const std::byte> paylo
   if (index >= schema_.requests.size()) {
     std::string there;
     for (const RequestRow& row : schema_.requests) {
-      there += (there.empty() ? "" : ", ") + row.name.str();
+      if (!there.empty()) there += ", ";
+      there += row.name.str();
     }
     throw InvalidArgument("there is no request " + std::to_string(index) + ": '" +
                           schema_.head.robot.str() + "' has " +

@@ -1,6 +1,7 @@
 #include "o80/memory/lane_receiver.hpp"
 
 #include <algorithm>
+#include <span>
 
 #include "o80/base/crash_point.hpp"
 #include "o80/memory/atomic_words.hpp"
@@ -51,6 +52,7 @@ void LaneReceiver::reset() noexcept {
 
 void LaneReceiver::free(std::uint32_t blocks) noexcept {
   freed_ += std::min<std::uint64_t>(blocks, in_flight());
+  has_news_ = true;
 }
 
 void LaneReceiver::set_status(std::uint64_t id, StatusWord word) noexcept {
@@ -113,6 +115,7 @@ void LaneReceiver::set_burst_done(std::uint64_t id, Iteration row) noexcept {
 }
 
 bool LaneReceiver::flush() noexcept {
+  has_news_ = false;
   if (freed_ != freed_published_) {
     freed_published_ = freed_;
     O80_CRASH_POINT("lane.before_freed");
@@ -164,6 +167,7 @@ bool LaneReceivers::look() noexcept {
   bell_seen_ = bell;
   below_ = view_.bell().tickets.load(std::memory_order_seq_cst);  // sync tickets
   pending_ = true;
+  others_wait_ = true;  // for all that is known
   return true;
 }
 
@@ -171,9 +175,11 @@ std::optional<std::uint32_t> LaneReceivers::next() noexcept {
   std::optional<std::uint32_t> first;
   std::uint64_t lowest = below_;
   bool left_over = false;
-  for (std::uint32_t i = 0; i < size(); ++i) {
-    if (lanes_[i].is_quiet() || lanes_[i].available() == 0) continue;
-    std::uint64_t ticket = lanes_[i].peek_word(ticket_offset_);
+  others_wait_ = false;
+  const std::span<LaneReceiver> lanes = lanes_;  // loads that acquire do not make it be read again
+  for (std::uint32_t i = 0; i < lanes.size(); ++i) {
+    if (lanes[i].is_quiet() || lanes[i].available() == 0) continue;
+    std::uint64_t ticket = lanes[i].peek_word(ticket_offset_);
     if (ticket >= below_) {
       if (ticket < view_.bell().tickets.load(std::memory_order_seq_cst)) {  // sync tickets
         left_over = true;
@@ -181,10 +187,12 @@ std::optional<std::uint32_t> LaneReceivers::next() noexcept {
       }
       ticket = 0;  // nobody drew it: the order is lost, the batch is not
     }
+    others_wait_ = others_wait_ || first;
     if (first && ticket >= lowest) continue;
     first = i;
     lowest = ticket;
   }
+  others_wait_ = others_wait_ || left_over;
   if (!first) pending_ = left_over;
   return first;
 }

@@ -79,7 +79,6 @@ UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, Reques
       server_(server),
       lives_(lanes.size()),
       mourned_(lanes.size()),
-      freed_(lanes.size()),
       row_(layout.size / 8),
       payload_(largest_request(schema), std::byte{0}),
       fresh_desired_(layout.block / 8),
@@ -108,7 +107,7 @@ Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
     if (schema.head.bursting == 0 || granted()) break;
     // standing still: everybody is told before anybody waits
     const bool all_told = controller.finish_pending();
-    wake(give_back(), false);
+    wake(lanes.announce(), false);
     if (staging_ || !all_told) continue;
     const std::int64_t left =
         give_up > 0 && give_up < kForEver ? give_up - monotonic_now() : give_up;
@@ -169,8 +168,6 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
     tell_of_the_row(true);
     controller.finish_pending();
     under_way_ = false;
-    // whoever spins on the line in which the end of a burst stands gets it once, all written
-    free_blocks();
     count_burst();
   }
   const bool lanes_wait = !fresh && lanes.announce();
@@ -192,7 +189,7 @@ void UntypedBackend::Body::end(State state, std::string_view text) noexcept {
   controller.purge(kEveryActuator, current, Reason::stopped);
   while (!controller.finish_pending()) {
   }
-  wake(give_back(), false);
+  wake(lanes.announce(), false);
   segment.end(state, text);
 }
 

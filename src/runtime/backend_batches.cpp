@@ -50,19 +50,8 @@ void UntypedBackend::Body::tell_of_the_row(bool published) noexcept {
   untold_.clear();
 }
 
-void UntypedBackend::Body::free_blocks() noexcept {
-  for (std::uint32_t i = 0; i < lanes.size(); ++i) {
-    if (lanes[i].in_flight() == 0) continue;
-    const std::uint64_t freed = controller.freed(i);
-    if (freed == freed_[i]) continue;
-    lanes[i].free(static_cast<std::uint32_t>(freed - freed_[i]));
-    freed_[i] = freed;
-  }
-}
-
-bool UntypedBackend::Body::give_back() noexcept {
-  free_blocks();
-  return lanes.announce();
+void UntypedBackend::Body::freed(std::uint32_t lane, std::uint32_t blocks) noexcept {
+  lanes[lane].free(blocks);
 }
 
 /// Whoever waits is woken by one system call at most.
@@ -257,7 +246,7 @@ void UntypedBackend::Body::take_batches() noexcept {
       return;
     }
   }
-  lanes.look_again_if_any();
+  lanes.look_again_after(burst_lane_);
 }
 
 }  // namespace o80

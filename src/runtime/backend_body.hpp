@@ -41,6 +41,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
 
   // StatusSink
   void changed(const StatusChange& change) noexcept override;
+  void freed(std::uint32_t lane, std::uint32_t blocks) noexcept override;
 
   std::byte* row() noexcept { return reinterpret_cast<std::byte*>(row_.data()); }
   void publish(bool fresh) noexcept;
@@ -92,17 +93,13 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   void tell(const StatusChange& change) noexcept;
   void tell_of_the_row(bool published) noexcept;
 
-  void free_blocks() noexcept;
-  /// True if somebody who waits for it is to be woken.
-  bool give_back() noexcept;
   void wake(bool lanes_wait, bool reader_waits) noexcept;
 
   ForkGuard guard_;
   RequestServer* server_;
   std::vector<LaneLife> lives_;
   std::vector<std::uint64_t> mourned_;  // last owner of each lane whose death was dealt with
-  std::vector<std::uint64_t> freed_;
-  std::vector<std::uint64_t> row_;  // 8-byte words: the row under way
+  std::vector<std::uint64_t> row_;      // 8-byte words: the row under way
   std::vector<std::byte> payload_;
   std::vector<std::uint64_t> fresh_desired_;
   Stale stale_;

@@ -20,6 +20,7 @@ namespace {
 
 struct Deaf final : StatusSink {
   void changed(const StatusChange&) noexcept override {}
+  void freed(std::uint32_t, std::uint32_t) noexcept override {}
 };
 
 /// All that is done with a schema that was let in.

@@ -73,8 +73,6 @@ class Controller {
   bool active() const noexcept;
   /// Something dropped is still to be told.
   bool pending() const noexcept;
-  /// Blocks of a lane given back to the pool since construction, those of ended batches included.
-  std::uint64_t freed(std::uint32_t lane) const noexcept;
 
  private:
   class Body;

@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <vector>
 
 #include "o80/control/pool.hpp"
 #include "o80/control/record.hpp"
@@ -23,8 +22,7 @@ struct Own {
 /// Realtime: everything but construction. Dropping is O(1); `work` tells the statuses bit by bit.
 class Ledger {
  public:
-  Ledger(BlockPool& pool, StatusSink& sink, std::uint32_t lanes)
-      : pool_(pool), sink_(sink), freed_(lanes) {}
+  Ledger(BlockPool& pool, StatusSink& sink) : pool_(pool), sink_(sink) {}
 
   /// Enters a batch as taken; it stays open until `close` and until all its records have ended.
   /// `spare` are its blocks that no record uses.
@@ -52,7 +50,6 @@ class Ledger {
   bool pending() const noexcept { return group_.record != kNoBlock || first_ != kNoBlock; }
 
   std::uint32_t lane_of(BlockIndex record) const noexcept;
-  std::uint64_t freed(std::uint32_t lane) const noexcept { return freed_[lane]; }
 
  private:
   struct TakenBatch;
@@ -71,7 +68,6 @@ class Ledger {
 
   BlockPool& pool_;
   StatusSink& sink_;
-  std::vector<std::uint64_t> freed_;
   Group group_;                  // whose ends are being told
   BlockIndex first_ = kNoBlock;  // of the groups that wait: dropped records, or a batch's missing
   BlockIndex last_ = kNoBlock;

@@ -20,6 +20,8 @@ struct StatusChange {
 class StatusSink {
  public:
   virtual void changed(const StatusChange& change) noexcept = 0;
+  /// So many blocks of a lane went back to the pool: of a record, or a batch's own.
+  virtual void freed(std::uint32_t lane, std::uint32_t blocks) noexcept = 0;
 
  protected:
   ~StatusSink() = default;

@@ -57,9 +57,9 @@ class LaneReceiver {
   void set_ended(std::uint64_t id) noexcept;
   void set_burst_done(std::uint64_t id, Iteration row) noexcept;
   /// Asks for the lane's waiters to be woken at the next flush.
-  void flag() noexcept { flagged_ = true; }
+  void flag() noexcept { flagged_ = has_news_ = true; }
   /// flush() has something to do.
-  bool has_news() const noexcept { return flagged_ || freed_ != freed_published_; }
+  bool has_news() const noexcept { return has_news_; }
   /// Publishes what was freed and moves the events, both only if there is cause; once an iteration.
   /// True if somebody sleeps until then.
   bool flush() noexcept;
@@ -87,6 +87,7 @@ class LaneReceiver {
   std::uint64_t resets_ = 0;
   std::uint64_t ids_ = 1;  // all below belong to batches that were staged
   bool flagged_ = false;
+  bool has_news_ = false;
 };
 
 /// All lanes, and the order of their batches.
@@ -107,9 +108,9 @@ class LaneReceivers {
   std::optional<std::uint32_t> next() noexcept;
   /// Makes the next look() look whatever the bell says (a lane's owner died).
   void look_again() noexcept { pending_ = true; }
-  /// The same if there is anything now; what is committed later rings.
-  void look_again_if_any() noexcept {
-    pending_ = !std::ranges::all_of(lanes_, &LaneReceiver::is_quiet);
+  /// The same if next() saw more than this lane's, or it has more; what is committed later rings.
+  void look_again_after(std::uint32_t lane) noexcept {
+    pending_ = others_wait_ || !lanes_[lane].is_quiet();
   }
   /// The bell as look() found it, for BellWaiter::wait.
   std::uint32_t bell_seen() const noexcept { return bell_seen_; }
@@ -125,6 +126,7 @@ class LaneReceivers {
   std::uint32_t bell_seen_ = 0;
   std::uint64_t below_ = 0;
   bool pending_ = true;
+  bool others_wait_ = true;  // besides the lane that next() named last
 };
 
 }  // namespace o80

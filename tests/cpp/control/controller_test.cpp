@@ -130,8 +130,8 @@ TEST(Controller, ADeadFrontendIsPurgedWhateverItShares) {
   EXPECT_EQ(rig.witness.last(3, 0).reason, Reason::dead_frontend);
   EXPECT_EQ(rig.witness.last(3, 0).iteration, 2);
   EXPECT_TRUE(rig.all_blocks_back());
-  EXPECT_EQ(rig.controller.freed(0), 6U);
-  EXPECT_EQ(rig.controller.freed(1), 2U);
+  EXPECT_EQ(rig.witness.freed_blocks[0], 6U);
+  EXPECT_EQ(rig.witness.freed_blocks[1], 2U);
 }
 
 TEST(Controller, AnInterruptEndsEverythingInItsIteration) {
@@ -172,7 +172,7 @@ TEST(Controller, AnEmptyBatchIsCompletedAtOnce) {
   EXPECT_EQ(rig.witness.status(batch), Status::active);
   EXPECT_EQ(rig.witness.status(batch + 1), Status::completed);
   EXPECT_EQ(rig.witness.last(batch + 1).iteration, 1);
-  EXPECT_EQ(rig.controller.freed(0), 1U);
+  EXPECT_EQ(rig.witness.freed_blocks[0], 1U);
   EXPECT_TRUE(rig.all_blocks_back());
 }
 
@@ -194,7 +194,7 @@ TEST(Controller, ARejectedBatchEndsWithAllItsRecords) {
     EXPECT_EQ(rig.witness.last(id, 3).aux, 5);
     EXPECT_EQ(rig.witness.last(id, 3).iteration, 7);
   }
-  EXPECT_EQ(rig.controller.freed(3), blocks);
+  EXPECT_EQ(rig.witness.freed_blocks[3], blocks);
   EXPECT_TRUE(rig.all_blocks_back());
   EXPECT_TRUE(rig.requests.empty());
 }
@@ -351,10 +351,10 @@ TEST(Controller, BlocksAreGivenBackAsSoonAsTheirRecordEnds) {
   rig.add(0, over(5), {1.0});
   rig.pulse(1);
   rig.run(20);
-  EXPECT_EQ(rig.controller.freed(1), 4U) << "48 + 160 bytes";
+  EXPECT_EQ(rig.witness.freed_blocks[1], 4U) << "48 + 160 bytes";
   rig.run(5);
-  EXPECT_EQ(rig.controller.freed(1), 6U) << "the batch's own included";
-  EXPECT_EQ(rig.controller.freed(0), 0U);
+  EXPECT_EQ(rig.witness.freed_blocks[1], 6U) << "the batch's own included";
+  EXPECT_EQ(rig.witness.freed_blocks[0], 0U);
   EXPECT_TRUE(rig.all_blocks_back());
 }
 

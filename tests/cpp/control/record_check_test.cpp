@@ -179,7 +179,7 @@ TEST(RecordCheck, ABatchWhoseHeadIsGarbageIsRejectedWhole) {
     EXPECT_EQ(rig.witness.changes.size(), 5U);
     EXPECT_EQ(rig.desired(), 0.0);
     EXPECT_TRUE(rig.all_blocks_back());
-    EXPECT_EQ(rig.controller.freed(0), 4U);
+    EXPECT_EQ(rig.witness.freed_blocks[0], 4U);
   }
 }
 
@@ -255,7 +255,7 @@ TEST(RecordCheck, GarbageDoesNoHarm) {
     rig.controller.purge(kEveryActuator, rig.next);
     rig.run(3);
     ASSERT_TRUE(rig.all_blocks_back()) << round;
-    ASSERT_EQ(rig.controller.freed(0), sent_blocks) << round;
+    ASSERT_EQ(rig.witness.freed_blocks[0], sent_blocks) << round;
     for (std::uint32_t number = 0; number < 4; ++number) {
       ASSERT_TRUE(std::isfinite(rig.desired(number))) << round;
     }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -81,6 +82,9 @@ class Witness : public StatusSink {
     if (keep) changes.push_back(change);
     if (!keep) ++told;
   }
+  void freed(std::uint32_t lane, std::uint32_t blocks) noexcept override {
+    freed_blocks[lane] += blocks;
+  }
   /// Changes of one record or batch, in order.
   std::vector<StatusChange> of(CommandId id, std::uint32_t lane = 0) const {
     std::vector<StatusChange> found;
@@ -102,6 +106,7 @@ class Witness : public StatusSink {
   Status status(CommandId id, std::uint32_t lane = 0) const { return last(id, lane).status; }
 
   std::vector<StatusChange> changes;
+  std::array<std::uint64_t, 8> freed_blocks{};  // of each lane
   bool keep = true;
   std::size_t told = 0;
 };
