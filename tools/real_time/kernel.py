@@ -26,28 +26,32 @@ def image_package() -> str:
 
 
 def obtain_kernel(folder: Path) -> Path:
-    """The kernel's file in a folder; downloaded only if it is not there."""
+    """The kernel's file in a folder; downloaded only if none is there."""
+    if kept := sorted(folder.glob("vmlinuz-*-rt-amd64")):
+        return kept[-1]
     package = image_package()
     kernel = folder / f"vmlinuz-{package.removeprefix('linux-image-')}"
-    if kernel.exists():
-        return kernel
     folder.mkdir(parents=True, exist_ok=True)
     subprocess.run(["apt-get", "download", package], cwd=folder, check=False)
     archives = sorted(folder.glob(f"{package}_*.deb"))
     if not archives:
         raise NoKernelError(
-            f"{package} could not be downloaded: run `apt-get update` as root, or give a "
-            "PREEMPT_RT kernel with --kernel"
+            f"{package} could not be downloaded: see what `apt-get download {package}` says, run "
+            "`apt-get update` as root, or give a PREEMPT_RT kernel with --kernel"
         )
     # of 70 MB only the kernel itself: all that the machine needs is built into it
-    with subprocess.Popen(
-        ["dpkg-deb", "--fsys-tarfile", archives[-1]], stdout=subprocess.PIPE
-    ) as archive:
+    part = folder / "kernel.part"
+    with (
+        part.open("wb") as output,
+        subprocess.Popen(
+            ["dpkg-deb", "--fsys-tarfile", archives[-1]], stdout=subprocess.PIPE
+        ) as archive,
+    ):
         subprocess.run(
-            ["tar", "-x", "-C", folder, "--strip-components=2", f"./boot/{kernel.name}"],
-            stdin=archive.stdout,
-            check=True,
-        )
+            ["tar", "-xO", f"./boot/{kernel.name}"],
+            stdin=archive.stdout, stdout=output, check=True,
+        )  # fmt: skip
+    part.rename(kernel)
     for each in archives:
         each.unlink()
     return kernel

@@ -1,6 +1,7 @@
 """Reads what the machine said: results for people, and what is wrong with them."""
 
 import json
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
@@ -34,12 +35,12 @@ class Findings:
     def account(self, word: str) -> dict[str, int]:
         """Of a line "word key=number key=number"."""
         pairs = (pair.partition("=") for pair in self.one(word).split())
-        return {key: int(value) for key, _, value in pairs}
+        return {key: int(value) for key, _, value in pairs if value.isdigit()}
 
     def tests(self) -> list[tuple[str, int, str]]:
         """Program, exit code, closing line."""
-        split = (line.split(maxsplit=2) for line in self.all("test"))
-        return [(words[0], int(words[1]), " ".join(words[2:])) for words in split]
+        said = (re.fullmatch(r"(\S+) (\d+) (.+)", line) for line in self.all("test"))
+        return [(each[1], int(each[2]), each[3]) for each in said if each]
 
     def lateness_of_loop(self) -> dict[int, int]:
         """Iterations by lateness [us]."""
@@ -109,7 +110,11 @@ def faults(console: Console, findings: Findings, programs: list[str]) -> Iterato
         yield "the kernel panicked"
     if "PREEMPT_RT" not in findings.one("kernel") or findings.one("realtime") != "1":
         yield "the kernel is not PREEMPT_RT"
-    passed = {program for program, code, closing in findings.tests() if code == 0 and closing}
+    passed = {
+        program
+        for program, code, closing in findings.tests()
+        if code == 0 and re.search(r"PASSED.* [1-9]\d* test", closing)
+    }
     yield from (f"{program} failed" for program in programs if program not in passed)
     ends = [each.split() for each in findings.all("ended")]
     if ends != [["loop", "0"], ["frontend", "0"]]:
