@@ -24,16 +24,20 @@ def typed_folders() -> list[str]:
     return [folder for folder in folders if any((ROOT / folder).rglob("*.py"))]
 
 
+def build(preset: str) -> list[list[str]]:
+    """Commands that build a preset."""
+    return [
+        ["cmake", "--preset", preset],
+        ["cmake", "--build", "--preset", preset, "-j", JOBS],
+    ]
+
+
 def cpp(preset: str) -> list[list[str]]:
     """Commands that build a preset and run its tests."""
     # a thread sanitizer of this age cannot stand the widest address randomisation
     random_bits = int(Path("/proc/sys/vm/mmap_rnd_bits").read_text())
     fixed_addresses = ["setarch", "-R"] if preset == "tsan" and random_bits > 28 else []
-    return [
-        ["cmake", "--preset", preset],
-        ["cmake", "--build", "--preset", preset, "-j", JOBS],
-        [*fixed_addresses, "ctest", "--preset", preset, "-j", JOBS],
-    ]
+    return [*build(preset), [*fixed_addresses, "ctest", "--preset", preset, "-j", JOBS]]
 
 
 PYTHON = [sys.executable, "-m"]
@@ -51,9 +55,11 @@ STEPS: dict[str, list[list[str]]] = {
     "asan": cpp("asan"),
     "tsan": cpp("tsan"),
     "fuzz": [[sys.executable, "tools/fuzz.py"]],
+    "arm64": cpp("arm64"),
+    "rt": [*build("rt"), [sys.executable, "tools/rt.py"]],
     "pytest": [[*PYTHON, "pytest"]],
 }
-CLOSING_LINES = {"dev": 3, "asan": 3, "tsan": 3}
+CLOSING_LINES = {"dev": 3, "asan": 3, "tsan": 3, "arm64": 3, "rt": 25}
 
 
 def run(name: str) -> bool:
