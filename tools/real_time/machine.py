@@ -24,8 +24,9 @@ def boot(kernel: Path, image: Path, words: dict[str, str], timeout: float, log: 
         ["console=ttyS0", "panic=-1", "quiet", *own, *(f"o80.{key}={words[key]}" for key in words)]
     )
     machine = subprocess.Popen(
-        ["qemu-system-x86_64", "-accel", "tcg,thread=multi", "-smp", "2", "-m", "1024",
-         "-nic", "none", "-nodefaults", "-nographic", "-serial", "stdio", "-no-reboot",
+        ["setpriv", "--pdeathsig", "KILL", "qemu-system-x86_64",
+         "-accel", "tcg,thread=multi", "-smp", "2", "-m", "1024", "-nic", "none",
+         "-nodefaults", "-nographic", "-serial", "stdio", "-no-reboot",
          "-kernel", kernel, "-initrd", image, "-append", line],
         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
     )  # fmt: skip

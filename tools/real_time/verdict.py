@@ -49,9 +49,10 @@ class Findings:
 
     def lateness_of_cyclictest(self) -> dict[int, int]:
         """Cycles by latency [us]; those beyond its histogram count as the longest."""
-        if not self.one("cyclictest"):
+        try:
+            thread = json.loads(self.one("cyclictest"))["thread"]["0"]
+        except (ValueError, KeyError):
             return {}
-        thread = json.loads(self.one("cyclictest"))["thread"]["0"]
         histogram = {int(late): int(count) for late, count in thread["histogram"].items()}
         beyond = int(thread["cycles"]) - sum(histogram.values())
         if beyond > 0:
