@@ -72,7 +72,7 @@ install_o80() {
 case $purpose in
   demo) ;;
   test)
-    need_packages g++ libgtest-dev libgmock-dev googletest strace stress-ng rt-tests \
+    need_packages g++ ccache libgtest-dev libgmock-dev googletest strace stress-ng rt-tests \
       clang-19 libclang-rt-19-dev llvm-19 relacy-dev spin \
       qemu-user-static g++-aarch64-linux-gnu qemu-system-x86 busybox-static cpio
     ;;
