@@ -62,6 +62,21 @@ o80::PaceSpec pace_of(nb::handle duration, nb::handle speed, nb::handle until,
   return pace;
 }
 
+namespace {
+
+o80::PulseOptions::Late late_of(nb::handle word) {
+  const nb::str text(word);
+  const auto is = [&](const char* known) {
+    return PyUnicode_CompareWithASCIIString(text.ptr(), known) == 0;
+  };
+  if (is("reject")) return o80::PulseOptions::Late::reject;
+  if (is("now")) return o80::PulseOptions::Late::now;
+  throw InvalidArgument("late cannot be '" + std::string(text.c_str()) +
+                        "': it is 'reject' or 'now'");
+}
+
+}  // namespace
+
 o80::PulseOptions pulse_options(nb::handle at, nb::handle late) {
   o80::PulseOptions options;
   if (!at.is_none()) {
@@ -71,10 +86,6 @@ o80::PulseOptions pulse_options(nb::handle at, nb::handle late) {
       throw InvalidArgument("a batch cannot be taken at iteration " + std::to_string(options.at));
     }
   }
-  const auto word = nb::cast<std::string>(nb::str(late));
-  if (word != "reject" && word != "now") {
-    throw InvalidArgument("late cannot be '" + word + "': it is 'reject' or 'now'");
-  }
-  options.late = word == "now" ? o80::PulseOptions::Late::now : o80::PulseOptions::Late::reject;
+  options.late = late_of(late);
   return options;
 }

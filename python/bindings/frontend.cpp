@@ -154,6 +154,7 @@ void bind_frontend(nb::module_& m) {
           "Whether it was closed.")
       .def_prop_ro("_is_inline", &Frontend::is_inline)
       .def("_close", &Frontend::close)
+      .def("_check_usable", [](const Frontend& self) { self.untyped().link()->check_usable(); })
       .def_prop_ro(
           "_forked", [](const Frontend& self) { return self.untyped().link()->segment.forked(); },
           "Whether this is a child that was forked since.")

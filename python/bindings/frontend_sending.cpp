@@ -84,21 +84,25 @@ std::int64_t burst_length(nb::handle iterations) {
   return count_of(iterations, "the number of iterations of a burst");
 }
 
-PendingBurst start_burst(const Frontend& self, nb::handle iterations) {
+PendingBurst start_burst(const Frontend& self, nb::handle iterations, nb::handle at,
+                         nb::handle late) {
   const std::int64_t count = burst_length(iterations);
+  const o80::PulseOptions options = pulse_options(at, late);
   const auto frontend = self.shared();
   const auto decoder = self.decoder();
   const Waiting waiting;
-  return {frontend->start_burst(count), decoder};
+  return {frontend->start_burst(count, options), decoder};
 }
 
-Observation burst(const Frontend& self, nb::handle iterations, Seconds timeout) {
+Observation burst(const Frontend& self, nb::handle iterations, Seconds timeout, nb::handle at,
+                  nb::handle late) {
   const std::int64_t count = burst_length(iterations);
+  const o80::PulseOptions options = pulse_options(at, late);
   const auto frontend = self.shared();
   const auto decoder = self.decoder();
   o80::UntypedObservation row = [&] {
     const Waiting waiting;
-    return frontend->burst(count, timeout_of(timeout), Waiting::check);
+    return frontend->burst(count, timeout_of(timeout), Waiting::check, options);
   }();
   return Observation(decoder, std::move(row));
 }
@@ -254,10 +258,11 @@ A bursting backend runs as long as that takes. Returns the observation of the la
 was rejected, purged or limited raises nothing: pulse and the statuses of its batch tell.
 
 Raises TimeoutError after `timeout` [s], which carries the `batch`, and what pulse raises.)")
-      .def("_burst", &burst, "iterations"_a.none(), "timeout"_a.none(),
-           nb::sig("def _burst(self, iterations: int, timeout: float | None) -> Observation"))
-      .def("_start_burst", &start_burst, "iterations"_a.none(),
-           nb::sig("def _start_burst(self, iterations: int) -> Burst"));
+      .def("_burst", &burst, "iterations"_a.none(), "timeout"_a.none(), "at"_a.none(), "late"_a,
+           nb::sig("def _burst(self, iterations: int, timeout: float | None, at: int | None, "
+                   "late: str) -> Observation"))
+      .def("_start_burst", &start_burst, "iterations"_a.none(), "at"_a.none(), "late"_a,
+           nb::sig("def _start_burst(self, iterations: int, at: int | None, late: str) -> Burst"));
 
   m.def("burst_group", &burst_group, "members"_a, "timeout"_a.none(),
         nb::sig("def burst_group(members: collections.abc.Sequence[tuple[Frontend, int]], "

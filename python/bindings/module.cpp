@@ -22,6 +22,7 @@ NB_MODULE(_core, m) {
   bind_observation(m);
   bind_batch(m);
   bind_frontend(m);
+  bind_prepared_burst(m);
   bind_backend(m);
   bind_robots(m);
 }

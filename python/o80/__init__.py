@@ -32,6 +32,7 @@ from o80.frontend import Frontend, burst
 from o80.frontend_classes import register_frontend
 from o80.history import History
 from o80.installation import prefix
+from o80.prepared_burst import PreparedBurst
 from o80.record import Record
 from o80.segment_list import Segment, clean, segments
 from o80.words import Mode, Profile, Reason, Start, Status
@@ -63,6 +64,7 @@ __all__ = [
     "NotBursting",
     "Number",
     "Observation",
+    "PreparedBurst",
     "Profile",
     "ReadOnly",
     "Reason",

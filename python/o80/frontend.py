@@ -18,13 +18,15 @@ from o80.errors import (
     ControlTaken,
     Error,
     InvalidArgument,
+    NotBursting,
     RequestRejected,
     SchemaMismatch,
     UsedAfterFork,
 )
 from o80.history import History
 from o80.layout import Layout
-from o80.trajectory import states_of, times_of
+from o80.prepared_burst import PreparedBurst, checked_count
+from o80.trajectory import common_type, states_of, times_of
 from o80.words import Status
 
 
@@ -172,22 +174,84 @@ class Frontend(_core.Frontend):
 
     @overload
     def burst(
-        self, iterations: int = 1, *, timeout: float | None = None, wait: Literal[True] = True
+        self,
+        iterations: int = 1,
+        *,
+        timeout: float | None = None,
+        wait: Literal[True] = True,
+        at: int | None = None,
+        late: str = "reject",
     ) -> _core.Observation: ...
     @overload
     def burst(
-        self, iterations: int = 1, *, timeout: float | None = None, wait: Literal[False]
+        self,
+        iterations: int = 1,
+        *,
+        timeout: float | None = None,
+        wait: Literal[False],
+        at: int | None = None,
+        late: str = "reject",
     ) -> _core.Burst: ...
     def burst(
-        self, iterations: int = 1, *, timeout: float | None = None, wait: bool = True
+        self,
+        iterations: int = 1,
+        *,
+        timeout: float | None = None,
+        wait: bool = True,
+        at: int | None = None,
+        late: str = "reject",
     ) -> _core.Observation | _core.Burst:
         """Sends what was added and lets a bursting backend run exactly so many iterations.
 
-        Returns the observation of the last one; with `wait=False` a Burst, to be waited for.
+        at: the iteration at which what was added is taken, of this burst or a later one (None: the
+            first of this burst).
+        late: what if that iteration has begun: "reject" the batch, which then does not burst, or
+            take it "now".
+
+        Returns the observation of the last iteration; with `wait=False` a Burst, to be waited for.
         Raises NotBursting, TimeoutError after `timeout` [s], BackendGone, LaneFull,
-        InvalidArgument.
+        InvalidArgument. `prepared_burst` does the same many times, faster.
         """
-        return self._burst(iterations, timeout) if wait else self._start_burst(iterations)
+        if wait:
+            return self._burst(iterations, timeout, at, late)
+        return self._start_burst(iterations, at, late)
+
+    def prepared_burst(
+        self,
+        iterations: int = 1,
+        actuators: int | str | Sequence[int | str] | None = None,
+        *,
+        steps: int = 1,
+        each: int = 1,
+        mode: str = "queue",
+        profile: str = "linear",
+        start: str = "desired",
+    ) -> PreparedBurst:
+        """A burst to be made again and again: targets in, iterations, all their rows out.
+
+        iterations: of each burst.
+        actuators: which ones get targets, by index or name (None: all).
+        steps: how many targets each of them gets for a burst.
+        each: iterations to reach each target.
+        mode, profile, start: as in add_command.
+
+        Raises NotBursting, InvalidArgument.
+        """
+        self._check_usable()
+        if not self.bursting:
+            raise NotBursting(
+                f"'{self.segment}' runs by its own clock and cannot be burst: "
+                "start it with bursting"
+            )
+        chosen, _ = self._chosen(actuators)
+        shape = len(chosen), checked_count(steps, "steps")
+        return PreparedBurst(
+            self,
+            chosen,
+            np.empty(shape, common_type(chosen, self._layout)),
+            np.zeros(checked_count(iterations, "iterations"), self._layout.row),
+            pace=(checked_count(each, "each"), mode, profile, start),
+        )
 
     @contextlib.contextmanager
     def control(self, timeout: float | None = 5.0) -> Iterator[Self]:

@@ -17,7 +17,7 @@ def states_of(
     layout: Layout,
 ) -> tuple[NDArray[np.uint8], int]:
     """Bytes of the rows of the first actuator, then of the next..., and how many rows."""
-    kind = _common_type(actuators, layout)
+    kind = common_type(actuators, layout)
     if isinstance(targets, Mapping):
         array = _from_fields(targets, kind)
     else:
@@ -35,7 +35,7 @@ def states_of(
     return np.ascontiguousarray(array.T).reshape(-1).view(np.uint8), len(array)
 
 
-def _common_type(actuators: Sequence[int], layout: Layout) -> np.dtype[Any]:
+def common_type(actuators: Sequence[int], layout: Layout) -> np.dtype[Any]:
     """The state that all of them have."""
     schema = layout.schema
     groups = {schema["actuators"][actuator]["group"] for actuator in actuators}

@@ -166,6 +166,20 @@ void UntypedFrontend::forget_added() {
 
 // ------------------------------------------------------------------------------ sending
 
+namespace {
+
+BatchRecord batch_of(const PulseOptions& options) {
+  if (options.at != kNow && options.at < 0) {
+    throw InvalidArgument("a batch cannot be taken at iteration " + std::to_string(options.at));
+  }
+  BatchRecord record;
+  record.at = options.at;
+  record.late_now = options.late == PulseOptions::Late::now ? 1 : 0;
+  return record;
+}
+
+}  // namespace
+
 /// Blocks of a lane that commands leave free.
 constexpr std::uint32_t kept_free(std::uint32_t blocks) noexcept {
   return std::clamp(blocks / 16, 2U, 16U);
@@ -241,12 +255,7 @@ Sent UntypedFrontend::send(BatchBuilder& builder, const BatchRecord& wanted) {
 }
 
 Batch UntypedFrontend::pulse(const PulseOptions& options, std::uint16_t flags) {
-  if (options.at != kNow && options.at < 0) {
-    throw InvalidArgument("a batch cannot be taken at iteration " + std::to_string(options.at));
-  }
-  BatchRecord record;
-  record.at = options.at;
-  record.late_now = options.late == PulseOptions::Late::now ? 1 : 0;
+  BatchRecord record = batch_of(options);
   record.flags = flags;
   {
     const auto lock = link_->lock_to_send();
@@ -286,7 +295,7 @@ UntypedObservation UntypedFrontend::pulse_and_wait(Timeout timeout, const PulseO
   return wait_for_end(pulse_to_end(options), timeout, check);
 }
 
-Sent UntypedFrontend::send_burst(std::int64_t iterations) {
+Sent UntypedFrontend::send_burst(std::int64_t iterations, const PulseOptions& options) {
   link_->check_usable();
   if (!bursting()) {
     throw NotBursting("'" + segment() +
@@ -296,24 +305,43 @@ Sent UntypedFrontend::send_burst(std::int64_t iterations) {
     throw InvalidArgument("a burst of " + std::to_string(iterations) +
                           " iterations: at least 1 is needed");
   }
-  BatchRecord record;
+  BatchRecord record = batch_of(options);
   record.burst = iterations;
   return send(builder_, record);
 }
 
-Burst UntypedFrontend::start_burst(std::int64_t iterations) {
-  return {link_, Batch(link_, send_burst(iterations))};
+Burst UntypedFrontend::start_burst(std::int64_t iterations, const PulseOptions& options) {
+  return {link_, Batch(link_, send_burst(iterations, options))};
 }
 
 UntypedObservation UntypedFrontend::burst(std::int64_t iterations, Timeout timeout,
-                                          const Check& check) {
+                                          const Check& check, const PulseOptions& options) {
   // as start_burst(iterations).wait(timeout, check), without what only a later question needs
-  const Sent sent = send_burst(iterations);
+  const Sent sent = send_burst(iterations, options);
   UntypedObservation observation(link_->description);  // made while the backend works
   const Iteration row = wait_for_burst(*link_, *sent.lane, sent.id, timeout, check, sent.quiet);
   if (row < 0) return Burst(link_, Batch(link_, sent)).wait(timeout, check);  // says why
   read_last_row(*link_, row, observation);
   return observation;
+}
+
+Iteration UntypedFrontend::burst_rows(std::span<std::byte> rows, Timeout timeout,
+                                      const Check& check, const PulseOptions& options) {
+  const std::size_t count = rows.size() / layout().size;
+  if (count > link_->history.rows()) {
+    throw InvalidArgument("the " + std::to_string(count) + " rows of a burst of '" + segment() +
+                          "' do not fit into its history of " +
+                          std::to_string(link_->history.rows()));
+  }
+  const Sent sent = send_burst(static_cast<std::int64_t>(count), options);
+  const Iteration last = wait_for_burst(*link_, *sent.lane, sent.id, timeout, check, sent.quiet);
+  if (last < 0) Burst(link_, Batch(link_, sent)).wait(timeout, check);  // says why
+  const Iteration first = last + 1 - static_cast<Iteration>(count);
+  if (link_->history.read_range(first, count, rows.data()).count != count) {
+    throw RowOverwritten("rows " + std::to_string(first) + " to " + std::to_string(last) + " of '" +
+                         segment() + "', those of this burst, are no longer there");
+  }
+  return last;
 }
 
 std::vector<UntypedObservation> burst(

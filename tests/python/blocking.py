@@ -45,6 +45,9 @@ CALLS = {
     "Frontend.burst, inline": Call("inline.burst(10**12)", "inline.close()"),
     "burst": Call("o80.burst({standing: 5})", "standing.close()"),
     "Burst.wait": Call("standing.burst(5, wait=False).wait()", "standing.close()"),
+    "PreparedBurst.run": Call(
+        "[(b.targets.fill(0.5), b.run()) for b in [standing.prepared_burst(5)]]", "standing.close()"
+    ),
     "Batch.wait": Call("(silent.add_command(1, 1.0), silent.pulse().wait())", "silent.close()"),
     "Backend.step": Call("stepping.step()", "stepping.close()"),
     "Process.wait": Call("process.wait()", "process.stop()", ""),

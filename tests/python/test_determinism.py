@@ -101,11 +101,9 @@ def run(rig: Rig, actions: NDArray[np.float64]) -> list[NDArray[Any]]:
     """Observed and extended bytes of all rows of arm and twins; iterations go on, they do not."""
     for action in actions:
         row = rig.arm.newest
-        rig.arm.send(action, row + 2)
-        rig.arm.advance(row + 1)
-        for twin in rig.twins:
-            twin.mirror(rig.arm.motion)
-        rig.burst_twins()
+        rig.arm.pressures[...] = action
+        rig.arm.step(row + 1, row + 2)
+        rig.step_twins()
     rows = len(actions) * ITERATIONS
     seen: list[NDArray[Any]] = [rig.arm.frontend.history(rows).flat(np.float64)]
     for twin in rig.twins:

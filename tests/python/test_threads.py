@@ -83,6 +83,10 @@ RESULTS: dict[str, tuple[str, Callable[[Any], bool]]] = {
     "burst": ("standing.burst(7).iteration", lambda row: row >= 7),
     "burst, inline": ("inline.burst(2000).iteration", lambda row: row == 2000),
     "group": ("o80.burst({standing: 9})[standing].iteration", lambda row: row >= 9),
+    "PreparedBurst.run": (
+        "[(b.targets.fill(0.5), b.run())[1] for b in [standing.prepared_burst(4)]][0]",
+        lambda row: row >= 4,
+    ),
     "Burst.wait": ("standing.burst(3, wait=False).wait().iteration", lambda row: row >= 3),
     "Batch.wait": (
         "[(b.wait(), b.statuses) for b in [(silent.add_command('b', 0.5), silent.pulse())[1]]]",

@@ -1,13 +1,12 @@
 """The arm as the environment sees it: eight pressures in, rows of joint angles out.
 
-`send` and `advance` run in every step. They use the compiled half of the frontend, which takes
-arrays of the right kind as they are, and reads rows into memory that is there.
+`step` runs thousands of times a second in an accelerated environment: a prepared burst takes the
+pressures from memory and puts the rows there.
 """
 
 from __future__ import annotations
 
 import time
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,15 +34,24 @@ LONGEST_RETURN = 4.0
 class Arm:
     """A frontend to the arm, and its last five rows.
 
-    Views that `advance` fills: `q`, `dq` (5, 4) [rad], [rad/s], both as `motion` (4, 5, 2), a joint
-    after the other; of the last row `last_motion` (8,), q then dq, and `last_pressures` (8,), raw.
+    `pressures` (8,), raw, are what the next `step` asks for. Views that it fills: `q`, `dq` (5, 4)
+    [rad], [rad/s], both as `motion` (4, 5, 2), a joint after the other; of the last row
+    `last_motion` (8,), q then dq, and `last_pressures` (8,), raw.
     """
 
     def __init__(self, frontend: o80.Frontend) -> None:
         self.frontend = frontend
-        self._compiled: Any = frontend
-        dtype = frontend.history(1).rows.dtype
-        self._rows = np.zeros(ITERATIONS, dtype)
+        self._burst = None
+        if frontend.bursting:
+            self._burst = frontend.prepared_burst(ITERATIONS, mode="overwrite")
+            self._rows = self._burst.rows
+            self.pressures: FloatArray = self._burst.targets[0]
+        else:
+            self._rows = np.zeros(ITERATIONS, frontend.history(1).rows.dtype)
+            self.pressures = np.zeros(MUSCLES)
+        self.late = False
+        """The last step's pressures were taken later than at their iteration, or not yet."""
+        dtype = self._rows.dtype
         numbers = self._rows.view(np.float64).reshape(ITERATIONS, -1)
         self.iterations: NDArray[np.int64] = self._rows["iteration"]
         q = words(dtype, "extended", "joint_positions")
@@ -54,9 +62,6 @@ class Arm:
         self.motion = motion.reshape(ITERATIONS, 2, JOINTS).transpose(2, 0, 1)
         self.last_motion = motion[-1]
         self.last_pressures = numbers[-1, words(dtype, "observed")]
-        self._bytes = self._rows.view(np.uint8)
-        self._muscles = list(range(MUSCLES))
-        self._bursting = frontend.bursting
         self._asked = numbers[:, words(dtype, "desired")]
         self.start_pressures = np.array(frontend.latest().desired)
         self.start_angles = np.array(frontend.latest().extended.joint_positions)
@@ -68,24 +73,22 @@ class Arm:
         """Iteration of the newest row."""
         return self.frontend.published
 
-    def send(self, pressures: FloatArray, at: int) -> Any:
-        """Raw pressures (8,) from iteration `at` on, or at once if it has begun."""
-        self._compiled._add_trajectories(
-            self._muscles, 1, pressures, None, None, 1, "overwrite", "linear", "desired"
-        )
-        return self.frontend.pulse(at=at, late="now")
-
-    def advance(self, first: int) -> bool:
-        """Waits for the five rows from `first` on, or lets the arm make them, and reads them.
+    def step(self, first: int, at: int) -> bool:
+        """Asks for `pressures` from iteration `at` on, or at once if it has begun, and lets the arm
+        make the five rows from `first` on, or waits for them, and reads them.
 
         Returns whether they were exactly these five.
         """
-        if self._bursting:
-            self._compiled._burst(ITERATIONS, TIMEOUT)
-        else:
-            self.frontend.wait_for(first + ITERATIONS - 1, timeout=TIMEOUT)
-        there: tuple[int, int] = self._compiled._read_rows(first, self._bytes)
-        return there == (first, ITERATIONS)
+        last = first + ITERATIONS - 1
+        if self._burst is not None:
+            return self._burst.run(TIMEOUT, at=at, late="now") == last
+        self.frontend.add_trajectory(self.pressures[np.newaxis], mode="overwrite")
+        sent = self.frontend.pulse(at=at, late="now")
+        self.frontend.wait_for(last, timeout=TIMEOUT)
+        rows = self.frontend.history(since=first, until=last).rows
+        self._rows[: len(rows)] = rows
+        self.late = not sent.taken or sent.first_iteration > at
+        return len(rows) == ITERATIONS
 
     @property
     def asked(self) -> FloatArray:

@@ -135,16 +135,17 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         self._row = rig.arm.read_newest()
         for twin, its_flights in zip(rig.twins, self._virtual.share(flights), strict=True):
             twin.begin(rig.arm.q[LAST], rig.arm.dq[LAST], its_flights)
-        rows = rig.burst_twins(1)
+        rig.burst_twins(1)
 
-        self._twin_row = self._twin_first = rows[0].iteration
+        self._twin_row = self._twin_first = self._twin.iteration
         self._asked = (rig.arm.asked - self._least) / self._span
         self._ball, self._steps = numbers[0], 0
         self._begun, self._over, self._summary = False, False, None
         self._episode += 1
         self._virtual.begin(numbers[1:])
-        observation = self._observe(rows)
-        return observation, self._info(rows, observation, End.RUNNING)
+        observation = self._observe()
+        self._watch.look(self._twin.row, observation[BALL_Y], 0)
+        return observation, self._info(observation, End.RUNNING)
 
     def step(self, action: Action) -> tuple[Float32Array, float, bool, bool, Info]:
         """Five iterations of the arm and of every twin; see the module for their order."""
@@ -157,24 +158,18 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         if self._real_time and arm.newest - row > self._task.most_late:
             return self._stall()
 
-        # action => pressures => rows of the arm
+        # action => pressures => rows of the arm => the twins
         self._asked = changed_pressures(self._asked, action, factor=self._task.factor)
-        at = row + 1 + self._task.delay
-        raw = self._least + self._asked * self._span
-        sent = arm.send(np.rint(raw, out=raw), at)
-        exact = arm.advance(row + 1)
+        np.rint(self._least + self._asked * self._span, out=arm.pressures)
+        exact = arm.step(row + 1, row + 1 + self._task.delay)
+        rig.step_twins()
 
-        # rows of the arm => the twins
-        for twin in rig.twins:
-            twin.mirror(arm.motion)
-        rows = rig.burst_twins(ITERATIONS)
-
-        self._count(rows[0].iteration, sent, at, exact=exact)
         self._row = row + ITERATIONS
+        self._count(exact=exact)
         self._steps += 1
-        observation = self._observe(rows)
-        end = self._watch.look(rows[0], self._twin_words[self._twin.played_ball][1], self._steps)
-        info = self._info(rows, observation, end)
+        observation = self._observe()
+        end = self._watch.look(self._twin.row, self._ball_y, self._steps)
+        info = self._info(observation, end)
         self._counts.seconds_stepping += time.perf_counter() - called
         if end is End.RUNNING:
             return observation, 0.0, False, False, info
@@ -198,7 +193,7 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
             "stalled": True,
             "end": "stalled",
         }
-        return self._observe(self._rows), 0.0, False, True, info
+        return self._observe(), 0.0, False, True, info
 
     def _finish(self, end: str, reward: float | None = None) -> float:
         """The episode is over: its reward, its summary, its record."""
@@ -206,7 +201,7 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         self._counts.episodes += 1
         self._counts.seconds += time.monotonic() - self._first_step_at
         if reward is None:
-            reward = self._watch.reward(self._twin_words[self._twin.played_ball][1])
+            reward = self._watch.reward(self._ball_y)
         self._summary = EpisodeSummary(
             episode=self._episode,
             ball=self._ball,
@@ -249,20 +244,16 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
 
     # ------------------------------------------------------------------ rows => what is returned
 
-    def _observe(self, rows: list[Any]) -> Float32Array:
+    def _observe(self) -> Float32Array:
         """The newest rows of the arm and of the first twin, clipped; a fresh array."""
-        arm = self._rig.arm
-        self._rows = rows
-        self._twin_words = words = np.frombuffer(rows[0])
-        observed = self._observed
+        arm, twin, observed = self._rig.arm, self._twin, self._observed
         observed[MOTION] = arm.last_motion
         observed[PRESSURES] = (arm.last_pressures - self._least) / self._span
-        observed[BALL] = words[self._twin.played_ball]
+        observed[BALL] = twin.row[twin.played_ball]
+        self._ball_y = float(observed[BALL_Y])
         return np.minimum(np.maximum(observed, self._low), self._high).astype(np.float32)
 
-    def _info(self, rows: list[Any], observation: Float32Array, end: End) -> Info:
-        if self._steps == 0:
-            self._watch.look(rows[0], observation[BALL_Y], 0)
+    def _info(self, observation: Float32Array, end: End) -> Info:
         info: Info = {
             "hit": self._watch.hit,
             "smallest_distance": self._watch.smallest_distance,
@@ -271,24 +262,24 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         }
         if self._settings.extra_balls:
             info["virtual"] = self._virtual.look(
-                rows, observation, steps=self._steps, over=end is not End.RUNNING
+                observation, steps=self._steps, over=end is not End.RUNNING
             )
         return info
 
-    def _count(self, twin_row: int, sent: Any, at: int, *, exact: bool) -> None:
+    def _count(self, *, exact: bool) -> None:
         """Whether the step was exact, by the numbers of the iterations, and how late it was.
 
         `exact`: for the arm, it was.
         """
-        counts, arm = self._counts, self._rig.arm
+        counts, arm, twin_row = self._counts, self._rig.arm, self._twin.iteration
         counts.steps += 1
         counts.exact_steps += exact and twin_row == self._twin_row + ITERATIONS
         self._twin_row = twin_row
         if self._real_time:
-            lateness = arm.newest - (self._row + ITERATIONS)
+            lateness = arm.newest - self._row
             counts.summed_lateness += lateness
             counts.largest_lateness = max(counts.largest_lateness, lateness)
-            counts.late_actions += not sent.taken or sent.first_iteration > at
+            counts.late_actions += arm.late
 
     # ------------------------------------------------------------------ beside the episode
 
@@ -318,8 +309,8 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
 
             self._scene = Scene(balls=1 + self._settings.extra_balls)
         return self._scene.draw(
-            self._twin.joint_positions(self._twin_words),
-            self._virtual.positions(self._rows),
+            self._twin.joint_positions(self._twin.row),
+            self._virtual.positions(),
             camera=self._camera,
         )
 

@@ -55,12 +55,20 @@ class Rig:
         """Ends all that was started; may be called twice."""
         self._stack.close()
 
-    def burst_twins(self, iterations: int = ITERATIONS) -> list[o80.Observation]:
-        """Lets all twins run at once; returns the last row of each."""
+    def step_twins(self) -> None:
+        """All twins mirror the arm's last rows, at the same time."""
         if len(self.twins) == 1:
-            return [self.twins[0].burst(iterations)]
+            self.twins[0].step(self.arm.motion)
+            return
+        for twin in self.twins:
+            twin.mirror(self.arm.motion)
+        self.burst_twins(ITERATIONS)
+
+    def burst_twins(self, iterations: int) -> None:
+        """All twins run at the same time."""
         rows = o80.burst({twin.frontend: iterations for twin in self.twins}, timeout=TIMEOUT)
-        return [rows[twin.frontend] for twin in self.twins]
+        for twin in self.twins:
+            twin.see(rows[twin.frontend])
 
     def _open_arm(self) -> o80.Frontend:
         settings = self.settings

@@ -28,7 +28,6 @@ class Twin:
 
     def __init__(self, frontend: o80.Frontend) -> None:
         self.frontend = frontend
-        self._compiled: Any = frontend
         dtype = frontend.history(1).rows.dtype
         contacts = words(dtype, "extended", "contacts")
         self._joints = words(dtype, "observed", "joints")
@@ -40,9 +39,14 @@ class Twin:
         """Words of a row that hold position and velocity of the first ball."""
         names = [actuator.name for actuator in frontend.actuators]
         self._joint_names, self._ball_names = names[:JOINTS], names[JOINTS:]
-        # row after row of each joint, as the compiled half of the frontend takes it
-        self._motion = np.zeros((JOINTS, ITERATIONS, 2))
-        self._joint_numbers = list(range(JOINTS))
+        self._burst = frontend.prepared_burst(ITERATIONS, self._joint_names, steps=ITERATIONS)
+        states = self._burst.targets.T.view(np.float64)
+        self._motion = states.reshape(JOINTS, ITERATIONS, 2)
+        self._last = self._burst.rows.view(np.float64).reshape(ITERATIONS, -1)[-1]
+        self.row: FloatArray = self._last
+        """The words of the newest row; the next step overwrites them."""
+        self.iteration = -1
+        """Of that row."""
         self._ball_state = np.dtype(
             [("position", np.float64, (3,)), ("velocity", np.float64, (3,))]
         )
@@ -64,25 +68,21 @@ class Twin:
             states["position"], states["velocity"] = flight.positions, flight.velocities
             self.frontend.add_trajectory(states, ball)
 
-    def mirror(self, motion: FloatArray) -> None:
-        """Adds angle and velocity of each joint in the arm's last rows (4, 5, 2), to be burst."""
+    def step(self, motion: FloatArray) -> None:
+        """Mirrors angle and velocity of each joint in the arm's last rows (4, 5, 2)."""
         self._motion[...] = motion
-        self._compiled._add_trajectories(
-            self._joint_numbers,
-            ITERATIONS,
-            self._motion,
-            None,
-            None,
-            1,
-            "queue",
-            "linear",
-            "desired",
-        )
+        self.iteration = self._burst.run(TIMEOUT)
+        self.row = self._last
 
-    def burst(self, iterations: int) -> o80.Observation:
-        """Lets this twin run alone; returns its last row."""
-        row: o80.Observation = self._compiled._burst(iterations, TIMEOUT)
-        return row
+    def mirror(self, motion: FloatArray) -> None:
+        """Adds the same, to be burst together with other twins."""
+        self._motion[...] = motion
+        self.frontend.add_trajectory(self._burst.targets, self._joint_names)
+
+    def see(self, row: o80.Observation) -> None:
+        """The newest row is this one."""
+        memory: Any = row
+        self.row, self.iteration = np.frombuffer(memory), row.iteration
 
     def all_balls(self, row: FloatArray) -> FloatArray:
         """Positions and velocities (balls, 6) in the words of a row; a view."""
@@ -92,6 +92,6 @@ class Twin:
         """(4,) [rad] in the words of a row; a view."""
         return row[self._joints][::2]
 
-    def records(self, row: Any) -> NDArray[Any]:
-        """The records (balls,) of a row, which is any buffer; a view."""
+    def records(self, row: FloatArray) -> NDArray[Any]:
+        """The records (balls,) in the words of a row; a view."""
         return np.ndarray((self.balls,), self._record_dtype, row, self._records_at)

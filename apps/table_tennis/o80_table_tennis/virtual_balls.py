@@ -34,7 +34,6 @@ class VirtualBalls:
             slice(twin.balls - rig.extra_balls_of(number), twin.balls)
             for number, twin in enumerate(twins)
         ]
-        self._rows: Sequence[Any] = ()
         self.begin()
 
     def begin(self, numbers: Sequence[int] = ()) -> None:
@@ -53,22 +52,20 @@ class VirtualBalls:
             shared.append([played] * (twin.balls - extra) + mine)
         return shared
 
-    def look(
-        self, rows: Sequence[Any], observation: Float32Array, *, steps: int, over: bool
-    ) -> dict[str, Any]:
-        """What the rows of all twins say about the extra balls, beside the observation (22,).
+    def look(self, observation: Float32Array, *, steps: int, over: bool) -> dict[str, Any]:
+        """What the twins' newest rows say about the extra balls, beside the observation (22,).
 
         A ball is paid for once: when its own episode ends, or at last when the played ball's is
         `over`. After that, `ended` says that its entries mean nothing any more.
         """
         balls = [
-            twin.all_balls(np.frombuffer(row))[extra]
-            for twin, row, extra in zip(self._twins, rows, self._extra, strict=True)
+            twin.all_balls(twin.row)[extra]
+            for twin, extra in zip(self._twins, self._extra, strict=True)
         ]
         records = np.concatenate(
             [
-                twin.records(row)[extra]
-                for twin, row, extra in zip(self._twins, rows, self._extra, strict=True)
+                twin.records(twin.row)[extra]
+                for twin, extra in zip(self._twins, self._extra, strict=True)
             ]
         )
         observations = np.empty((len(records), SIZE), np.float32)
@@ -83,11 +80,9 @@ class VirtualBalls:
             "balls": self._numbers.copy(),
         }
 
-    def positions(self, rows: Sequence[Any]) -> FloatArray:
+    def positions(self) -> FloatArray:
         """(1 + N, 3) of the played ball and the extra ones [m]."""
-        all_balls = [
-            twin.all_balls(np.frombuffer(row)) for twin, row in zip(self._twins, rows, strict=True)
-        ]
+        all_balls = [twin.all_balls(twin.row) for twin in self._twins]
         extra = [balls[its] for balls, its in zip(all_balls, self._extra, strict=True)]
         return np.concatenate([all_balls[0][:1], *extra])[:, :3]
 

@@ -95,9 +95,14 @@ class UntypedFrontend {
   /// Both at once.
   UntypedObservation pulse_and_wait(Timeout timeout, const PulseOptions& options = {},
                                     const Check& check = {});
-  /// Sends what was added and lets a bursting backend run n iterations.
-  Burst start_burst(std::int64_t iterations);
-  UntypedObservation burst(std::int64_t iterations, Timeout timeout, const Check& check = {});
+  /// Sends what was added and lets a bursting backend run n iterations, from now on also if the
+  /// batch is to be taken later: at an iteration of the burst, say.
+  Burst start_burst(std::int64_t iterations, const PulseOptions& options = {});
+  UntypedObservation burst(std::int64_t iterations, Timeout timeout, const Check& check = {},
+                           const PulseOptions& options = {});
+  /// One iteration for each row that `rows` can hold, and all these rows; that of the last one.
+  Iteration burst_rows(std::span<std::byte> rows, Timeout timeout, const Check& check = {},
+                       const PulseOptions& options = {});
 
   // observations
   /// Iteration of the newest row.
@@ -130,7 +135,7 @@ class UntypedFrontend {
                                     std::span<const std::int64_t> times) const;
   Batch pulse(const PulseOptions& options, std::uint16_t flags);
   Sent send(BatchBuilder& builder, const BatchRecord& record);
-  Sent send_burst(std::int64_t iterations);
+  Sent send_burst(std::int64_t iterations, const PulseOptions& options);
   CommandId draw_ids(LaneSender& lane, std::uint64_t n);
   void refuse_if_full(const BatchBuilder& builder, const BatchRecord& wanted,
                       const LaneSender& lane) const;

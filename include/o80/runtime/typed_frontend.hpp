@@ -70,8 +70,9 @@ class Frontend : public UntypedFrontend {
   Observation<R> pulse_and_wait(Timeout timeout = std::nullopt, const PulseOptions& options = {}) {
     return Observation<R>(UntypedFrontend::pulse_and_wait(timeout, options));
   }
-  Observation<R> burst(std::int64_t count, Timeout timeout = std::chrono::seconds(5)) {
-    return Observation<R>(UntypedFrontend::burst(count, timeout));
+  Observation<R> burst(std::int64_t count, Timeout timeout = std::chrono::seconds(5),
+                       const PulseOptions& options = {}) {
+    return Observation<R>(UntypedFrontend::burst(count, timeout, {}, options));
   }
 
  private:

@@ -38,6 +38,40 @@ TEST_F(BurstTest, WhatIsSentWithItActsFromItsFirstIteration) {
   EXPECT_EQ(desired(frontend.burst(5, kPatience)), 3.0);
 }
 
+TEST_F(BurstTest, WhatIsSentWithItMayActFromALaterIterationOfIt) {
+  BurstingStation bursting;
+  UntypedFrontend frontend("pair");
+  add(frontend, 0, 3.0);
+  frontend.burst(4, kPatience, {}, {.at = 3});
+  EXPECT_THAT(desired(frontend, 1, 4), ElementsAre(0, 0, 3, 3));
+  add(frontend, 0, 5.0);
+  EXPECT_THAT(message_of<Error>([&] { frontend.burst(4, kPatience, {}, {.at = 3}); }),
+              HasSubstr("after the iteration it was meant for"));
+  EXPECT_EQ(frontend.published(), 4) << "what is rejected does not burst";
+}
+
+TEST_F(BurstTest, GivesAllItsRowsIfAsked) {
+  BurstingStation bursting;
+  UntypedFrontend frontend("pair");
+  const std::size_t size = frontend.layout().size;
+  std::vector<std::byte> rows(3 * size);
+  frontend.burst(2, kPatience);
+  add(frontend, 0, 3.0, {.pace = iterations(3)});
+  EXPECT_EQ(frontend.burst_rows(rows, kPatience), 5);
+  const Rows expected = frontend.history(3, 5);
+  EXPECT_THAT(rows, ElementsAreArray(expected.bytes));
+}
+
+TEST_F(BurstTest, OfMoreRowsThanTheHistoryKeepsIsAnErrorAtOnce) {
+  BurstingStation bursting;
+  UntypedFrontend frontend("pair");
+  const auto kept = static_cast<std::size_t>(frontend.link()->history.rows());
+  std::vector<std::byte> rows((kept + 1) * frontend.layout().size);
+  EXPECT_THAT(message_of<InvalidArgument>([&] { frontend.burst_rows(rows, kPatience); }),
+              HasSubstr("do not fit into its history"));
+  EXPECT_EQ(frontend.published(), 0);
+}
+
 TEST_F(BurstTest, NothingSentLaterActsInIt) {
   Station station({.segment = "pair", .bursting = true});
   station.start();

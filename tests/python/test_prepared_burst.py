@@ -1,0 +1,154 @@
+"""A burst that is made again and again: targets in, iterations, all their rows out."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import o80
+
+WAIT = 30.0  # [s] longer than any wait should take
+
+
+def test_it_sends_its_targets_and_fills_its_rows(arm: o80.Frontend) -> None:
+    burst = arm.prepared_burst(3)
+    burst.targets[...] = [[0.3, -0.6]]
+    assert burst.run(WAIT) == 3
+    assert burst.rows["iteration"].tolist() == [1, 2, 3]
+    assert burst.rows["desired"].tolist() == [[0.3, -0.6]] * 3
+
+    burst.targets[0, 1] = 0.5
+    assert burst.run(WAIT) == 6
+    assert burst.rows["desired"].tolist() == [[0.3, 0.5]] * 3
+
+
+def test_its_rows_are_those_of_the_history(arm: o80.Frontend) -> None:
+    burst = arm.prepared_burst(5)
+    burst.targets[...] = 0.25
+    last = burst.run(WAIT)
+
+    np.testing.assert_array_equal(burst.rows, arm.history(since=last - 4, until=last).rows)
+
+
+def test_it_does_what_single_calls_do(segment: str) -> None:
+    targets = np.random.default_rng(1).uniform(-1, 1, (20, 2, 2))
+    robot = o80.robots.load("two_joints")
+    with robot.inline(segment) as one, robot.inline(f"{segment}-b") as other:
+        burst = one.prepared_burst(5, steps=2, each=2, profile="minimum_jerk")
+        for wanted in targets:
+            burst.targets[...] = wanted
+            burst.run()
+            other.add_trajectory(wanted, iterations=2, profile="minimum_jerk")
+            other.burst(5)
+
+        np.testing.assert_array_equal(one.history().rows, other.history().rows)
+
+
+def test_it_may_have_some_of_the_actuators(arm: o80.Frontend) -> None:
+    burst = arm.prepared_burst(1, "elbow")
+    burst.targets[...] = 0.5
+    burst.run()
+
+    assert burst.targets.shape == (1, 1)
+    assert arm.latest().desired.tolist() == [0.0, 0.5]
+
+
+def test_overwriting_drops_what_runs(arm: o80.Frontend) -> None:
+    arm.add_command(0, 1.0, iterations=100)
+    burst = arm.prepared_burst(2, 0, mode="overwrite")
+    burst.targets[...] = 0.5
+    burst.run()
+
+    assert burst.rows["desired"][:, 0].tolist() == [0.5, 0.5]
+
+
+def test_targets_may_be_taken_within_the_burst(arm: o80.Frontend) -> None:
+    burst = arm.prepared_burst(4)
+    burst.targets[...] = 0.5
+    burst.run(at=3)
+
+    assert burst.rows["desired"][:, 0].tolist() == [0.0, 0.0, 0.5, 0.5]
+
+
+def test_what_comes_late_is_rejected_or_taken_at_once(arm: o80.Frontend) -> None:
+    arm.burst(10)
+    burst = arm.prepared_burst(2)
+    burst.targets[...] = 0.5
+    with pytest.raises(o80.Error, match="after the iteration it was meant for"):
+        burst.run(at=5)
+    assert arm.latest().iteration == 10, "a rejected batch does not burst"
+
+    assert burst.run(at=5, late="now") == 12
+    assert burst.rows["desired"][:, 0].tolist() == [0.5, 0.5]
+
+
+def test_a_plain_burst_may_be_taken_later_too(arm: o80.Frontend) -> None:
+    arm.add_command(0, 0.5)
+    assert arm.burst(2, at=2).desired[0] == 0.5
+    assert arm.history(since=1, until=1).desired[0, 0] == 0.0
+    with pytest.raises(o80.InvalidArgument, match="late"):
+        arm.burst(1, at=9, late="never")
+    with pytest.raises(o80.InvalidArgument, match="iteration -5"):
+        arm.burst(1, at=-5, wait=False)
+
+
+def test_what_was_not_filled_is_refused(arm: o80.Frontend) -> None:
+    burst = arm.prepared_burst(1)
+    burst.targets[0, 0] = 0.5
+    with pytest.raises(o80.InvalidArgument, match=r"elbow.* is not a finite number"):
+        burst.run()
+
+    assert arm.latest().iteration == 0
+    assert arm.added == 0
+
+
+def test_the_limits_hold(arm: o80.Frontend) -> None:
+    burst = arm.prepared_burst(1)
+    burst.targets[...] = 4.0
+    with pytest.raises(o80.InvalidArgument, match="outside its limits"):
+        burst.run()
+
+    assert arm.added == 0
+
+
+def test_it_bursts_a_robot_in_another_process(bursting: o80.robots.Process) -> None:
+    with bursting.frontend() as arm:
+        burst = arm.prepared_burst(5)
+        burst.targets[...] = 0.5
+        assert [burst.run(WAIT) for _ in range(3)] == [5, 10, 15]
+        assert burst.rows["iteration"].tolist() == [11, 12, 13, 14, 15]
+
+
+def test_a_backend_by_the_clock_has_none(process: o80.robots.Process) -> None:
+    with process.frontend() as arm, pytest.raises(o80.NotBursting, match=process.segment):
+        arm.prepared_burst(5)
+
+
+@pytest.mark.parametrize("wrong", [{"iterations": 0}, {"steps": 0}, {"each": 0}])
+def test_it_has_at_least_one_of_everything(arm: o80.Frontend, wrong: dict[str, int]) -> None:
+    with pytest.raises(o80.InvalidArgument, match="at least 1"):
+        arm.prepared_burst(**wrong)
+
+
+def test_its_rows_must_fit_into_the_history(segment: str) -> None:
+    robot = o80.robots.load("two_joints")
+    with robot.inline(segment, history=20) as arm:
+        burst = arm.prepared_burst(21)
+        burst.targets[...] = 0.5
+        with pytest.raises(o80.InvalidArgument, match="history of 20"):
+            burst.run()
+        arm.forget_added()
+
+
+def test_of_a_closed_frontend_it_says_so(segment: str) -> None:
+    arm = o80.robots.load("two_joints").inline(segment)
+    burst = arm.prepared_burst(1)
+    burst.targets[...] = 0.5
+    arm.close()
+    with pytest.raises(o80.Closed, match=segment):
+        burst.run()
+
+
+def test_it_is_not_pickled(arm: o80.Frontend) -> None:
+    with pytest.raises(TypeError, match="cannot be pickled"):
+        pickle.dumps(arm.prepared_burst(1))
