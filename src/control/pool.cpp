@@ -44,7 +44,8 @@ BlockPool::~BlockPool() {
   if (blocks_ != nullptr) munmap(blocks_, std::size_t{size_} * kBlockBytes);
 }
 
-bool Cursor::read(void* out, std::size_t bytes) noexcept {
+/// What does not lie in one block.
+bool Cursor::read_across(void* out, std::size_t bytes) noexcept {
   auto* to = static_cast<std::byte*>(out);
   if (bytes > left_) {
     std::memset(to, 0, bytes);

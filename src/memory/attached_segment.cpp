@@ -171,25 +171,27 @@ void AttachedSegment::throw_if_gone() const {
 }
 
 void AttachedSegment::throw_gone(Life life) const {
-  const std::string backend =
-      quoted(name_) + ": its backend (pid " + std::to_string(header_.pid) + ") ";
-  const std::string cure = " Its history can still be read; start it again and attach anew.";
+  // asked in every burst: nothing is written unless it is thrown
+  const auto backend = [&] {
+    return quoted(name_) + ": its backend (pid " + std::to_string(header_.pid) + ") ";
+  };
+  constexpr const char* cure = " Its history can still be read; start it again and attach anew.";
   switch (life) {
     case Life::starting:
     case Life::running:
       return;
     case Life::stopped:
-      throw BackendStopped(backend + "has stopped." + cure);
+      throw BackendStopped(backend() + "has stopped." + cure);
     case Life::failed: {
       const std::string why = fault();
-      throw BackendFailed(backend + "failed" + (why.empty() ? "." : ": " + why + ".") + cure);
+      throw BackendFailed(backend() + "failed" + (why.empty() ? "." : ": " + why + ".") + cure);
     }
     case Life::superseded:
-      throw BackendSuperseded(backend +
+      throw BackendSuperseded(backend() +
                               "is gone and a new one has its name: attach again. The old history "
                               "can still be read.");
     case Life::killed:
-      throw BackendKilled(backend + "was killed." + cure);
+      throw BackendKilled(backend() + "was killed." + cure);
   }
 }
 

@@ -113,9 +113,17 @@ class Cursor {
   BlockIndex block() const noexcept { return block_; }
   std::uint32_t offset() const noexcept { return offset_; }
   /// Copies the next bytes; what is past the end reads as zero, and false is returned.
-  bool read(void* out, std::size_t bytes) noexcept;
+  bool read(void* out, std::size_t bytes) noexcept {
+    if (bytes > left_ || bytes > kBlockBytes - offset_) return read_across(out, bytes);
+    std::memcpy(out, pool_->bytes(block_) + offset_, bytes);
+    offset_ += static_cast<std::uint32_t>(bytes);
+    left_ -= bytes;
+    return true;
+  }
 
  private:
+  bool read_across(void* out, std::size_t bytes) noexcept;
+
   const BlockPool* pool_ = nullptr;
   BlockIndex block_ = kNoBlock;
   std::uint32_t offset_ = 0;

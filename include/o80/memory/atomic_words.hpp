@@ -14,11 +14,20 @@ namespace o80 {
 
 inline void store_words(std::byte* shared, const std::byte* from, std::size_t bytes) noexcept {
   auto* words = reinterpret_cast<std::uint64_t*>(shared);
-  for (std::size_t i = 0; i < bytes / 8; ++i) {
+  const auto copy = [&](std::size_t i) {
     std::uint64_t word;
     std::memcpy(&word, from + 8 * i, 8);
     std::atomic_ref(words[i]).store(word, std::memory_order_relaxed);
+  };
+  // compilers do not unroll a loop over atomics, and every row is copied by these
+  std::size_t i = 0;
+  for (; i + 4 <= bytes / 8; i += 4) {
+    copy(i);
+    copy(i + 1);
+    copy(i + 2);
+    copy(i + 3);
   }
+  for (std::size_t left = bytes / 8 % 4; left > 0; --left) copy(i++);
 }
 
 inline void load_words(std::byte* to, const std::byte* shared, std::size_t bytes) noexcept {
@@ -27,7 +36,7 @@ inline void load_words(std::byte* to, const std::byte* shared, std::size_t bytes
     const std::uint64_t word = std::atomic_ref(words[i]).load(std::memory_order_relaxed);
     std::memcpy(to + 8 * i, &word, 8);
   };
-  // compilers do not unroll a loop over atomics, and bulk reads live on it
+  // likewise, bulk reads live on it
   std::size_t i = 0;
   for (; i + 4 <= bytes / 8; i += 4) {
     copy(i);
