@@ -139,6 +139,7 @@ AttachedSegment& AttachedSegment::operator=(AttachedSegment&& other) noexcept {
   view_ = other.view_;
   guard_ = other.guard_;
   asked_.store(0, std::memory_order_relaxed);
+  over_.store(other.over_.load(std::memory_order_relaxed), std::memory_order_relaxed);
   return *this;
 }
 
@@ -147,7 +148,13 @@ std::span<const std::byte> AttachedSegment::schema() const noexcept {
 }
 
 Life AttachedSegment::life() const noexcept {
-  return judge_life(descriptor(), view_.counters().state);
+  const Life now = judge_life(descriptor(), view_.counters().state);
+  if (is_over(now)) {
+    over_.store(now, std::memory_order_relaxed);
+    return now;
+  }
+  const Life over = over_.load(std::memory_order_relaxed);
+  return is_over(over) ? over : now;
 }
 
 bool AttachedSegment::has_ended() const noexcept {
@@ -156,10 +163,7 @@ bool AttachedSegment::has_ended() const noexcept {
   return state != State::starting && state != State::running;
 }
 
-bool AttachedSegment::gone() const noexcept {
-  const Life now = life();
-  return now != Life::starting && now != Life::running;
-}
+bool AttachedSegment::gone() const noexcept { return is_over(life()); }
 
 std::string AttachedSegment::fault() const {
   return load_text(view_.counters().fault, std::size(view_.counters().fault));
@@ -198,7 +202,8 @@ void AttachedSegment::throw_gone(Life life) const {
 void AttachedSegment::throw_if_known_gone() const {
   const std::int64_t now = monotonic_roughly_now();
   const bool fresh = now - asked_.load(std::memory_order_relaxed) < kKnownFor;
-  if (fresh && !has_ended()) return check_process();
+  const bool ended = has_ended() || is_over(over_.load(std::memory_order_relaxed));
+  if (fresh && !ended) return check_process();
   throw_if_gone();
   asked_.store(now, std::memory_order_relaxed);
 }

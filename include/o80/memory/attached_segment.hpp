@@ -55,7 +55,8 @@ class AttachedSegment {
   std::span<const std::byte> schema() const noexcept;
   const SegmentView& view() const noexcept { return view_; }
   int descriptor() const noexcept { return file_.descriptor(); }
-  /// Asks the kernel: 2 us unless the state word says enough.
+  /// Asks the kernel: 2 us. Once over, never starting or running again, although its successor
+  /// holds the lock of the dead for a moment before it says so.
   Life life() const noexcept;
   /// Whether the backend, or its successor, has said that it is over: one load.
   bool has_ended() const noexcept;
@@ -82,6 +83,7 @@ class AttachedSegment {
   std::string name_;
   std::string path_;
   Access access_ = Access::read_only;
+  mutable std::atomic<Life> over_{Life::starting};  // how it ended, as seen so far
   SegmentHeader header_{};
   LockFile file_;  // the mapped one, holds nothing
   Mapping mapping_;

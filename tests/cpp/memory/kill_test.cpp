@@ -101,6 +101,34 @@ TEST_F(KillTest, LetsANewBackendTakeOverAtOnceWhileOldReadersReadOn) {
   EXPECT_EQ(HistoryReader(fresh.view()).published(), -1);
 }
 
+TEST_F(KillTest, IsNotForgottenWhileASuccessorHoldsTheLockOfTheDead) {
+  ChildProcess backend(be_a_backend);
+  ASSERT_TRUE(backend.wait_until_ready());
+  const AttachedSegment seen = attach();
+  AttachedSegment other = attach();
+  LaneSender sender(seen);
+  EXPECT_NO_THROW(seen.throw_if_known_gone());
+  backend.kill_now();
+  EXPECT_THROW(RowWaiter(seen).wait_for_row(1000, patient()), BackendKilled);
+  EXPECT_EQ(other.life(), Life::killed);
+
+  // as a successor does before it marks the old header
+  LockFile successor = LockFile::open(directory_.file_of("arm"), O_RDWR);
+  ASSERT_TRUE(successor.try_lock(kBackendByte));
+  const Deadline at_once(std::chrono::nanoseconds(0));
+  EXPECT_THROW(RowWaiter(seen).wait_for_row(1000, at_once), BackendKilled);
+  EXPECT_THROW(sender.wait_until([] { return false; }, at_once), BackendKilled);
+  EXPECT_THROW(seen.throw_if_gone(), BackendKilled);
+  EXPECT_THROW(seen.throw_if_known_gone(), BackendKilled);
+  const AttachedSegment moved = std::move(other);
+  EXPECT_EQ(moved.life(), Life::killed);
+
+  successor.close();
+  const OwnedSegment next = running_segment();
+  EXPECT_EQ(moved.life(), Life::superseded);
+  EXPECT_EQ(attach().life(), Life::running);
+}
+
 TEST_F(KillTest, LetsOneOfTwoProcessesTakeOver) {
   for (int round = 0; round < 10; ++round) {
     ChildProcess dead(be_a_backend);
