@@ -142,6 +142,7 @@ class Segment {
     [this](auto& f, auto& g) {
       if constexpr (requires { f.ids; }) make(f.ids);
       if constexpr (requires { g.lost; }) make(g.lost);
+      if constexpr (requires { g.first; }) make(g.first);
     }(feedback, page);
     for (std::size_t k = 0; k < kRemembered; ++k) make(feedback.recent_bursts[k]);
     for (std::size_t k = 0; k < 2 * view.shape.lane_blocks; ++k) {

@@ -18,13 +18,20 @@ LaneReceiver::LaneReceiver(const SegmentView& view, std::uint32_t lane) noexcept
 
 std::uint32_t LaneReceiver::available() noexcept {
   committed_ = page_->committed.load(std::memory_order_acquire);  // sync lane
-  const std::uint64_t blocks = mask_ + 1;
-  // an honest owner never has more in flight than the lane, nor takes anything back
-  if (committed_ - freed_ > blocks || committed_ - cursor_ > blocks) {
-    reset();
-    return 0;
-  }
+  meet_owner();
+  if (!is_possible(cursor_)) reset();
   return static_cast<std::uint32_t>(committed_ - cursor_);
+}
+
+std::uint32_t LaneReceiver::available_of_one() noexcept {
+  const std::uint32_t all = available();
+  const std::uint64_t of_another = first_ - cursor_;
+  return of_another - 1 < all ? static_cast<std::uint32_t>(of_another) : all;
+}
+
+/// An honest owner never has more in flight than the lane, nor takes anything back.
+bool LaneReceiver::is_possible(std::uint64_t cursor) const noexcept {
+  return committed_ - cursor <= mask_ + 1 - in_flight();
 }
 
 bool LaneReceiver::take(std::byte* block) noexcept {
@@ -42,12 +49,27 @@ std::uint64_t LaneReceiver::peek_word(std::size_t offset) const noexcept {
 }
 
 void LaneReceiver::reset() noexcept {
-  const std::uint64_t taken = in_flight();
+  const std::uint64_t former = owner_;
   committed_ = page_->committed.load(std::memory_order_acquire);  // sync lane
-  cursor_ = committed_;
-  freed_ = cursor_ - taken;
+  meet_owner();
+  const bool is_of_another = owner_ != former || static_cast<std::int64_t>(first_ - cursor_) > 0;
+  move_to(is_of_another && is_possible(first_) ? first_ : committed_);
   ++resets_;
   flag();
+}
+
+void LaneReceiver::meet_owner() noexcept {
+  const std::uint64_t owner = incarnation();
+  if (owner == owner_) return;
+  owner_ = owner;
+  first_ = page_->first.load(std::memory_order_relaxed);
+  if (static_cast<std::int64_t>(cursor_ - first_) > 0) move_to(first_);
+}
+
+void LaneReceiver::move_to(std::uint64_t cursor) noexcept {
+  freed_ = cursor - in_flight();
+  cursor_ = cursor;
+  has_news_ = true;
 }
 
 void LaneReceiver::free(std::uint32_t blocks) noexcept {

@@ -69,6 +69,7 @@ LaneSender::LaneSender(const AttachedSegment& segment) : segment_(&segment), vie
     page_->began.store(sent_, std::memory_order_relaxed);
     page_->lost.store(incarnation_ - 1, std::memory_order_relaxed);
   }
+  page_->first.store(sent_, std::memory_order_relaxed);
   page_->incarnation.store(incarnation_, std::memory_order_release);  // sync incarnation
   O80_CRASH_POINT("lane.after_incarnation");
 

@@ -124,7 +124,7 @@ void UntypedBackend::Body::begin_staging(std::uint32_t lane, std::uint32_t& budg
   const std::uint64_t kind = lanes[lane].peek_word(offsetof(BatchRecord, kind)) & 0xFF;
   const auto blocks =
       static_cast<std::uint32_t>(lanes[lane].peek_word(offsetof(BatchRecord, blocks)));
-  if (kind != kBatch || blocks == 0 || blocks > lanes[lane].available()) {
+  if (kind != kBatch || blocks == 0 || blocks > lanes[lane].available_of_one()) {
     // who writes garbage faster than it is thrown away must not keep the loop here
     --budget;
     lanes[lane].reset();

@@ -23,6 +23,7 @@ void UntypedBackend::Body::look_at_lives() noexcept {
   if (changes == seen_changes_) return;
   seen_changes_ = changes;
   for (std::uint32_t i = 0; i < lanes.size(); ++i) {
+    lanes[i].meet_owner();
     lives_[i] = liveness.lane(i);
     const bool died = lives_[i].state == LaneState::died;
     mourn(i, died ? lives_[i].incarnation : lanes[i].dead_predecessor());

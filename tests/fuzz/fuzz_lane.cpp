@@ -126,7 +126,7 @@ class Liar {
         page_(view_.lane(sender_->lane())) {}
 
   void write_page(Bytes& bytes) {
-    const auto which = bytes.below(7);
+    const auto which = bytes.below(8);
     const std::uint64_t word = bytes.word();
     switch (which) {
       case 0:
@@ -145,6 +145,9 @@ class Liar {
         page_.began.store(word);
         break;
       case 5:
+        page_.first.store(word);
+        break;
+      case 6:
         page_.next_id.store(word);
         break;
       default:

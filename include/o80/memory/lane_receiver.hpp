@@ -28,14 +28,20 @@ class LaneReceiver {
   bool is_quiet() const noexcept {
     return page_->committed.load(std::memory_order_acquire) == cursor_;  // sync lane
   }
-  /// Committed blocks not taken yet; resets the lane and answers 0 if that is impossible.
+  /// Committed blocks not taken yet; resets the lane if that is impossible.
   std::uint32_t available() noexcept;
+  /// The same, as far as one owner sent them: no batch is of two.
+  std::uint32_t available_of_one() noexcept;
   /// Copies the next block (64 bytes) and moves on; false if none is committed.
   bool take(std::byte* block) noexcept;
   /// 8 bytes at `offset` of the next block, to be asked only if one is available.
   std::uint64_t peek_word(std::size_t offset) const noexcept;
-  /// Forgets what is committed and not taken: after garbage. What was taken stays in flight.
+  /// Forgets what is committed and not taken: after garbage. What was taken stays in flight, and
+  /// what the present owner sent behind the garbage of another stays committed.
   void reset() noexcept;
+  /// Looks for a new owner, who may have begun behind what was taken: a former one, while it still
+  /// could, had taken back what it committed.
+  void meet_owner() noexcept;
   /// How often that happened.
   std::uint64_t resets() const noexcept { return resets_; }
 
@@ -73,6 +79,10 @@ class LaneReceiver {
   bool next_is_of_dead() const noexcept;
 
  private:
+  bool is_possible(std::uint64_t cursor) const noexcept;
+  /// What was taken stays in flight.
+  void move_to(std::uint64_t cursor) noexcept;
+
   LaneSenderPage* page_;
   LaneFeedback* feedback_;
   StatusSlot* statuses_;
@@ -85,7 +95,9 @@ class LaneReceiver {
   std::uint64_t bursts_ = 0;
   std::uint64_t messages_ = 0;
   std::uint64_t resets_ = 0;
-  std::uint64_t ids_ = 1;  // all below belong to batches that were staged
+  std::uint64_t ids_ = 1;    // all below belong to batches that were staged
+  std::uint64_t owner_ = 0;  // as last met: its incarnation,
+  std::uint64_t first_ = 0;  // and what was committed before it
   bool flagged_ = false;
   bool has_news_ = false;
 };

@@ -77,6 +77,7 @@ struct LaneSenderPage {
   std::atomic<std::uint64_t> closed;                           // last one that left in order
   std::atomic<std::uint64_t> began;  // blocks committed before the heir of `lost`
   std::atomic<std::uint64_t> lost;   // last one that its heir found dead
+  std::atomic<std::uint64_t> first;  // blocks committed before the present owner
   alignas(kLineBytes) std::atomic<std::uint64_t> next_id;
   alignas(kLineBytes) std::atomic<std::uint32_t> waiting;   // somebody sleeps until `events` moves
   alignas(kLineBytes) std::atomic<std::uint64_t> owner[8];  // text

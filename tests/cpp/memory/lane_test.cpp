@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <atomic>
+#include <optional>
 #include <thread>
 
 #include "memory/blocks.hpp"
@@ -246,6 +247,45 @@ TEST_F(LaneTest, ForgetsGarbageWhenToldTo) {
   EXPECT_EQ(sender.free_blocks(), 16U);
   send(sender, 2);
   EXPECT_THAT(take_all(), ElementsAre(2));
+}
+
+TEST_F(LaneTest, KeepsWhatAnHeirSentBehindTheGarbageOfItsPredecessor) {
+  for (const bool heir_comes_late : {false, true}) {
+    {
+      const LaneSender liar(attached_);
+      segment_.view().lane(0).committed += 3;
+    }
+    std::optional<LaneSender> heir;
+    if (heir_comes_late) EXPECT_EQ(lanes_[0].available(), 3U);
+    heir.emplace(attached_);
+    send(*heir, 7, 2);
+    if (!heir_comes_late) EXPECT_EQ(lanes_[0].available_of_one(), 3U);
+    lanes_[0].reset();
+    EXPECT_EQ(lanes_[0].available_of_one(), 2U);
+    EXPECT_THAT(take_all(), ElementsAre(7));
+    give_back(0);
+    EXPECT_EQ(heir->free_blocks(), 16U);
+  }
+}
+
+TEST_F(LaneTest, TakesWhatAnHeirSentWherePartOfALaneWasTakenBack) {
+  for (const std::size_t blocks : {2U, 3U, 4U}) {
+    {
+      LaneSender liar(attached_);
+      send(liar, 1, 4);
+      EXPECT_THAT(take_all(), ElementsAre(1));
+      give_back(0);
+      segment_.view().lane(0).committed -= 3;
+    }
+    LaneSender heir(attached_);
+    // no room until the backend has seen whose lane it is
+    lanes_[0].meet_owner();
+    lanes_.flush_events();
+    EXPECT_EQ(heir.free_blocks(), 16U);
+    send(heir, 7, blocks);
+    EXPECT_THAT(take_all(), ElementsAre(7)) << blocks;
+    give_back(0);
+  }
 }
 
 TEST_F(LaneTest, AnswersWhatBecameOfAnId) {
