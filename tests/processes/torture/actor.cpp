@@ -5,8 +5,10 @@
 #include <time.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
+#include <string_view>
 
 #include "o80/base/crash_point.hpp"
 #include "o80/memory/segment_name.hpp"
@@ -80,7 +82,31 @@ Actor::Measured::~Measured() noexcept(false) {
   }
 }
 
+std::optional<o80::UntypedFrontend> Actor::attach(std::uint32_t segment, o80::Access access) {
+  const auto timeout = some_timeout();
+  try {
+    return timed("attach", timeout, [&] {
+      return o80::UntypedFrontend(segment_name(segment), {.timeout = timeout, .access = access});
+    });
+  } catch (const o80::TimeoutError&) {
+    // nobody is there yet
+  } catch (const o80::BackendFailed& error) {
+    const auto& lives = round.lives;
+    if (std::none_of(lives.begin(), lives.end(),
+                     [](const Generation& life) { return life.failed != 0; }))
+      fail(Fault::false_death, "no backend has failed, says: %s", error.what());
+    pause(kMillisecond);
+  }
+  return std::nullopt;
+}
+
 // ------------------------------------------------------------------------------ deaths
+
+bool Actor::any_sender_doomed() const {
+  return std::any_of(round.slots.begin(), round.slots.end(), [](const Slot& other) {
+    return other.doomed_at != 0 && is_sender(other.role);
+  });
+}
 
 Generation* Actor::life_of(std::uint64_t epoch) {
   const std::uint32_t count = round.generations;
@@ -107,6 +133,11 @@ void Actor::judge_gone(Generation& life, const o80::BackendGone& error, std::int
   if (superseded && doomed == 0 && !ending)
     fail(Fault::false_death, "generation %ld lives, and was said to be superseded: %s",
          &life - round.lives.data(), error.what());
+  const bool failed = dynamic_cast<const o80::BackendFailed*>(&error) != nullptr;
+  const bool says_why = std::string_view(error.what()).find("failed: ") != std::string_view::npos;
+  if (!killed && !superseded && (failed != (life.failed != 0) || failed != says_why))
+    fail(Fault::false_death, "generation %ld %s, but: %s", &life - round.lives.data(),
+         life.failed != 0 ? "failed" : "did not fail", error.what());
   if (!killed && !superseded && !ending)
     fail(Fault::false_death, "generation %ld did not end: %s", &life - round.lives.data(),
          error.what());

@@ -5,6 +5,7 @@
 #include <cstdarg>
 #include <cstdint>
 #include <exception>
+#include <optional>
 #include <random>
 #include <string>
 
@@ -67,6 +68,11 @@ class Actor {
   void judge_gone(Generation& life, const o80::BackendGone& error, std::int64_t call_began);
   /// A wait timed out: has it overlooked a death?
   void judge_timeout(Generation& life, std::int64_t call_began, std::int64_t stopped_before);
+  /// The segment's robot, if it comes within some timeout.
+  std::optional<o80::UntypedFrontend> attach(std::uint32_t segment,
+                                             o80::Access access = o80::Access::read_write);
+  /// Whether any that sends commands was killed.
+  bool any_sender_doomed() const;
   Generation& life_of(const o80::UntypedFrontend& frontend);
   /// Null if no backend came so far as to note that epoch.
   Generation* life_of(std::uint64_t epoch);

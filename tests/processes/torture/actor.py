@@ -298,7 +298,7 @@ def act(actor: Actor, role: str) -> None:
                     robot = o80.Frontend(actor.name, timeout, on_error="continue")
                 else:
                     robot.reattach(timeout)
-        except o80.TimeoutError:
+        except (o80.TimeoutError, o80.BackendFailed):
             continue
         generation = generation_of(actor, robot)
         try:

@@ -59,6 +59,7 @@ class Auditor {
       if (frontend.bursting()) {
         burst_until_drained(kept);
       } else {
+        be_heard(frontend);
         while (!drained(frontend))
           frontend.wait_for(frontend.published() + 10, std::chrono::seconds(10));
       }
@@ -75,20 +76,45 @@ class Auditor {
     }
   }
 
+  /// The dead hold nothing for long: neither lanes nor control.
+  void be_heard(o80::UntypedFrontend& frontend) {
+    actor_.slot.call = "pulse of the auditor";
+    const std::int64_t began = o80::monotonic_now();
+    std::string refusal = "the lanes were taken";
+    while (o80::monotonic_now() - began < 10'000 * kMillisecond) {
+      try {
+        frontend.add_purge_own();
+        const o80::Batch batch = frontend.pulse();
+        batch.wait(std::chrono::seconds(10));
+        refusal = batch.rejection();
+        if (refusal.empty()) return;
+      } catch (const o80::LaneFull&) {
+        frontend.forget_added();
+      } catch (const o80::NoLane&) {
+        frontend.forget_added();
+      }
+      actor_.pause(kMillisecond);
+    }
+    actor_.fail(Fault::hang, "nobody is heard after the dead: %s", refusal.c_str());
+  }
+
   /// A lane takes a burst however full it is of what the dead have sent, unless that is bursts, and
   /// these end.
   void burst_until_drained(Kept& kept) {
     actor_.slot.call = "burst of the auditor";
-    std::int64_t full_since = 0;
+    std::int64_t refused_since = 0;
+    const auto refused = [&](const char* why) {
+      if (refused_since == 0) refused_since = o80::monotonic_now();
+      if (o80::monotonic_now() - refused_since > 10'000 * kMillisecond)
+        actor_.fail(Fault::hang, "nobody is heard after the dead: %s", why);
+      actor_.pause(kMillisecond);
+    };
     while (!drained(kept.frontend)) {
       try {
         kept.frontend.burst(100, std::chrono::seconds(10));
-        full_since = 0;
+        refused_since = 0;
       } catch (const o80::LaneFull& error) {
-        if (full_since == 0) full_since = o80::monotonic_now();
-        if (o80::monotonic_now() - full_since > 10'000 * kMillisecond)
-          actor_.fail(Fault::hang, "a lane stays full: %s", error.what());
-        actor_.pause(kMillisecond);
+        refused(error.what());
       } catch (const o80::BackendGone&) {
         throw;
       } catch (const o80::TimeoutError&) {
@@ -96,7 +122,7 @@ class Auditor {
       } catch (const o80::Error& error) {
         // the dead may hold control for a moment yet
         if (std::string(error.what()).find("exclusive") == std::string::npos) throw;
-        actor_.pause(kMillisecond);
+        refused(error.what());
       }
     }
   }

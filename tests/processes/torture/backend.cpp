@@ -16,6 +16,7 @@ struct Habits {
   std::int64_t pause;  // of an iteration [ns]
   bool interrupts;
   o80::Iteration orphan_at;  // -1: never
+  o80::Iteration fails_at;   // the same
 };
 
 Habits draw(Actor& actor, bool bursting) {
@@ -28,9 +29,14 @@ Habits draw(Actor& actor, bool bursting) {
       chance.percent(50) ? chance.between(1, 40) : chance.between(100, 3000));
   habits.options.lanes = static_cast<std::uint32_t>(chance.between(2, 8));
   habits.options.lane_blocks = 16U << chance.below(7);
-  habits.options.stale = chance.percent(30) ? o80::Stale::purge : o80::Stale::hold;
+  constexpr o80::Stale kStale[] = {o80::Stale::hold, o80::Stale::hold, o80::Stale::purge,
+                                   o80::Stale::stop};
+  habits.options.stale = kStale[chance.below(std::size(kStale))];
+  if (habits.options.stale != o80::Stale::hold && chance.percent(40))
+    habits.options.silence = chance.between(20, 200) * habits.options.period;
   habits.interrupts = chance.percent(30);
   habits.orphan_at = chance.percent(15) ? chance.between(0, 200) : -1;
+  habits.fails_at = chance.percent(10) ? chance.between(1, 400) : -1;
   return habits;
 }
 
@@ -63,6 +69,8 @@ class Machine final : private o80::RequestServer {
     o80::Schema schema;
     schema.head.robot = o80::NameText(robot);
     o80::describe_types<Robot>(schema);
+    for (std::uint32_t i = 0; i < kActuators; ++i)
+      schema.actuator(i).limits({.minimum = kLowest, .maximum = kHighest});
     return schema;
   }
   States states(const std::byte* bytes) const { return o80::unpack<States>(bytes); }
@@ -78,6 +86,7 @@ class Machine final : private o80::RequestServer {
     JournalRow& row = life_.journal[static_cast<std::size_t>(backend_.iteration())];
     row.desired = desired;
     row.active = active;
+    row.at = o80::monotonic_now();
     life_.rows = backend_.iteration() + 1;
   }
 
@@ -107,24 +116,40 @@ class Machine final : private o80::RequestServer {
   o80::UntypedBackend backend_;
 };
 
-void run(Actor& actor, const Habits& habits, Machine& machine, Generation& life) {
+/// It ended on its own: for what its policy says, and only then.
+void judge_own_end(Actor& actor, const Habits& habits, const std::string& why) {
+  const bool silent = habits.options.silence > 0 && why.find("longer than") != std::string::npos;
+  const bool died = why.find("frontend died") != std::string::npos && actor.any_sender_doomed();
+  if (habits.options.stale == o80::Stale::stop && (silent || died)) return;
+  actor.fail(Fault::false_death, "a backend ended on its own: %s", why.c_str());
+}
+
+/// Until it has failed, with the reason; or nothing, if it is to stop.
+std::string iterate(Actor& actor, const Habits& habits, Machine& machine) {
   o80::UntypedBackend& backend = machine.backend();
   machine.publish();
   while (true) {
-    if (actor.phase() == Phase::end || machine.is_full()) break;
+    if (actor.phase() == Phase::end || machine.is_full()) return "";
     const o80::Step step = backend.step_within(20 * kMillisecond);
     if (step == o80::Step::standing) continue;
-    if (step == o80::Step::ended)
-      actor.fail(Fault::false_death, "a backend ended on its own: %s",
-                 std::string(backend.failure()).c_str());
+    if (step == o80::Step::ended) {
+      judge_own_end(actor, habits, std::string(backend.failure()));
+      return std::string(backend.failure());
+    }
+    if (backend.iteration() == habits.fails_at && actor.acting()) return "the elbow is too hot";
     if (backend.iteration() == habits.orphan_at) actor.leave_an_orphan([] {});
     if (habits.interrupts && actor.chance.below(100) == 0)
       backend.interrupt(static_cast<std::uint32_t>(actor.chance.below(kActuators)));
     if (!habits.options.bursting && habits.pause > 0 && actor.acting()) actor.pause(habits.pause);
     machine.publish();
   }
+}
+
+void run(Actor& actor, const Habits& habits, Machine& machine, Generation& life) {
+  const std::string fault = iterate(actor, habits, machine);
+  life.failed = fault.empty() ? 0 : 1;
   life.ending_at = o80::monotonic_now();
-  backend.end(o80::State::stopped);
+  machine.backend().end(fault.empty() ? o80::State::stopped : o80::State::failed, fault);
 }
 
 }  // namespace
@@ -132,7 +157,7 @@ void run(Actor& actor, const Habits& habits, Machine& machine, Generation& life)
 void be_a_backend(Actor& actor, bool bursting) {
   const Habits habits = draw(actor, bursting);
   Generation& life = actor.round.lives[actor.slot.generation];
-  life.purges_stale = habits.options.stale == o80::Stale::purge ? 1 : 0;
+  life.stops_stale = habits.options.stale == o80::Stale::stop ? 1 : 0;
   life.bursting = bursting ? 1 : 0;
   try {
     Machine machine(actor, habits);

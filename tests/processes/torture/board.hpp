@@ -36,6 +36,10 @@ enum class Role : std::uint32_t {
   count
 };
 const char* name_of(Role role);
+constexpr bool is_sender(Role role) {
+  return role == Role::commander || role == Role::burster || role == Role::group_burster ||
+         role == Role::python_commander;
+}
 
 /// What went wrong, by kind.
 enum class Fault : std::uint32_t {
@@ -59,6 +63,7 @@ const char* name_of(Fault fault);
 struct JournalRow {
   std::uint64_t digest;
   std::array<double, kActuators> desired;
+  std::int64_t at;       // [ns]
   std::uint32_t active;  // a bit an actuator
   std::uint32_t reserved;
 };
@@ -81,7 +86,8 @@ struct Generation {
   std::atomic<std::int64_t> dead_at;    // the kernel has taken it down
   std::atomic<std::uint32_t> drained;   // all that was sent must have ended
   std::uint32_t bursting;
-  std::uint32_t purges_stale;  // drops what the dead have sent
+  std::uint32_t stops_stale;          // ends when a sender dies
+  std::atomic<std::uint32_t> failed;  // it ends as failed
   std::atomic<std::int64_t> rows;
   std::atomic<std::uint32_t> served;
   std::array<std::atomic<std::uint32_t>, 16> lane_owners;  // actor + 1
@@ -102,7 +108,7 @@ struct SentBatch {
   std::uint32_t commands;
   std::uint32_t until_ended;  // a burst until all has ended
   std::uint32_t late_now;
-  std::uint32_t reserved;
+  std::uint32_t attachment;  // of its actor, from 1
   std::uint64_t id;
   std::int64_t at;         // wanted iteration, -1: now
   std::int64_t burst;      // iterations asked for
@@ -110,7 +116,7 @@ struct SentBatch {
   std::int64_t burst_row;  // last row of the burst, -1: not told
 };
 
-enum class SentKind : std::uint32_t { command, mark, other };
+enum class SentKind : std::uint32_t { command, mark, other, take_control, release_control };
 
 struct SentCommand {
   std::uint64_t value;  // bits of the (last) target, or the mark of a request
@@ -135,8 +141,10 @@ struct Slot {
   std::int32_t label_signal;
   std::uint32_t passages;
   std::atomic<std::int64_t> doomed_at;
-  std::atomic<std::int64_t> stopped;     // [ns] so far, for all stops that have ended
-  std::atomic<std::int64_t> stopped_at;  // of the present stop, 0 if it runs
+  std::atomic<std::uint32_t> commanding;   // it holds a lane, or may
+  std::atomic<std::uint32_t> attachments;  // to command, so far
+  std::atomic<std::int64_t> stopped;       // [ns] so far, for all stops that have ended
+  std::atomic<std::int64_t> stopped_at;    // of the present stop, 0 if it runs
   std::atomic<std::uint32_t> label_reached;
   std::atomic<std::int64_t> call_ends;  // when the blocking call under way must be over, 0: none
   std::atomic<const char*> call;

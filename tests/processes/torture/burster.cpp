@@ -13,14 +13,9 @@ class Burster {
 
   void run() {
     while (actor_.acting()) {
-      const auto timeout = actor_.some_timeout();
-      try {
-        Sender sender(actor_, actor_.timed("attach", timeout, [&] {
-          return o80::UntypedFrontend(segment_name(actor_.slot.segment), {.timeout = timeout});
-        }));
+      if (auto frontend = actor_.attach(actor_.slot.segment)) {
+        Sender sender(actor_, std::move(*frontend));
         serve(sender);
-      } catch (const o80::TimeoutError&) {
-        // nobody is there yet
       }
       if (actor_.slot.batches + 8 >= kMostBatches || actor_.slot.commands + 128 >= kMostCommands)
         return;
@@ -76,59 +71,101 @@ class Burster {
 };
 
 /// Bursts two backends at once.
-void burst_both(Actor& actor, std::array<std::optional<o80::UntypedFrontend>, 2>& both) {
-  std::int64_t call_began = 0;
-  std::array<Generation*, 2> lives{};
-  for (std::uint32_t i = 0; i < 2; ++i) {
-    const auto timeout = actor.some_timeout();
-    both[i].emplace(actor.timed("attach", timeout, [&] {
-      return o80::UntypedFrontend(segment_name(i), {.timeout = timeout});
-    }));
-    lives[i] = &actor.life_of(*both[i]);
+class GroupBurster {
+ public:
+  explicit GroupBurster(Actor& actor) : actor_(actor) {}
+
+  void run() {
+    while (actor_.acting()) {
+      std::array both{actor_.attach(0), actor_.attach(1)};
+      if (!both[0] || !both[1]) continue;
+      Sender first(actor_, std::move(*both[0]));
+      Sender second(actor_, std::move(*both[1]));
+      serve({&first, &second});
+      if (!first.has_room()) return;
+    }
   }
-  std::array verifiers{Verifier(actor, *both[0]), Verifier(actor, *both[1])};
-  while (actor.acting()) {
-    const std::array<std::pair<o80::UntypedFrontend*, std::int64_t>, 2> wanted{
-        {{&*both[0], actor.chance.between(1, 8)}, {&*both[1], actor.chance.between(1, 8)}}};
-    const auto timeout = actor.some_timeout();
-    const std::int64_t stopped = actor.stopped();
-    call_began = o80::monotonic_now();
+
+ private:
+  using Both = std::array<Sender*, 2>;
+
+  void serve(const Both& both) {
+    std::array verifiers{Verifier(actor_, both[0]->frontend()),
+                         Verifier(actor_, both[1]->frontend())};
     try {
-      const auto rows =
-          actor.timed("burst of two", timeout, [&] { return o80::burst(wanted, timeout); });
-      for (std::size_t i = 0; i < 2; ++i) verifiers[i].verify(rows[i]);
+      while (actor_.acting() && both[0]->has_room()) burst(both, verifiers);
+    } catch (const o80::BackendGone& error) {
+      const bool second = std::string(error.what()).find(segment_name(1)) != std::string::npos;
+      actor_.judge_gone(both[second ? 1 : 0]->life(), error, call_began_);
+    }
+    for (Sender* sender : both) sender->settle_all();
+    for (Sender* sender : both) sender->close();
+  }
+
+  void burst(const Both& both, std::array<Verifier, 2>& verifiers) {
+    const std::int64_t stopped = actor_.stopped();
+    call_began_ = o80::monotonic_now();
+    try {
+      if (actor_.chance.percent(50)) {
+        burst_with_commands(both, verifiers);
+      } else {
+        burst_at_once(both, verifiers);
+      }
     } catch (const o80::TimeoutError&) {
-      for (Generation* life : lives) actor.judge_timeout(*life, call_began, stopped);
+      for (const Sender* sender : both) actor_.judge_timeout(sender->life(), call_began_, stopped);
     } catch (const o80::RowOverwritten&) {
       // others were faster
     } catch (const o80::LaneFull&) {
       // one of them stands still
-      actor.pause(kMillisecond);
+      actor_.pause(kMillisecond);
     } catch (const o80::NoLane&) {
-      actor.pause(kMillisecond);
-    } catch (const o80::BackendGone& error) {
-      const bool second = std::string(error.what()).find(segment_name(1)) != std::string::npos;
-      actor.judge_gone(*lives[second ? 1 : 0], error, call_began);
-      return;
+      actor_.pause(kMillisecond);
+    } catch (const o80::BackendGone&) {
+      throw;
     } catch (const o80::Error& error) {
       if (std::string(error.what()).find("exclusive") == std::string::npos) throw;
     }
+    for (Sender* sender : both) sender->settle();
   }
-}
+
+  void burst_at_once(const Both& both, std::array<Verifier, 2>& verifiers) {
+    const std::array<std::pair<o80::UntypedFrontend*, std::int64_t>, 2> wanted{
+        {{&both[0]->frontend(), actor_.chance.between(1, 8)},
+         {&both[1]->frontend(), actor_.chance.between(1, 8)}}};
+    const auto timeout = actor_.some_timeout();
+    const auto rows =
+        actor_.timed("burst of two", timeout, [&] { return o80::burst(wanted, timeout); });
+    for (std::size_t i = 0; i < 2; ++i) verifiers[i].verify(rows[i]);
+  }
+
+  /// Grants to both, then waits for both, all of it in the ledger.
+  void burst_with_commands(const Both& both, std::array<Verifier, 2>& verifiers) {
+    std::array<std::optional<o80::Burst>, 2> bursts;
+    for (std::size_t i = 0; i < 2; ++i) {
+      both[i]->begin();
+      if (both[i]->open_commands() < 60) both[i]->add_some();
+      bursts[i] = both[i]->burst(actor_.chance.between(1, 8));
+    }
+    for (std::size_t i = 0; i < 2; ++i) {
+      if (!bursts[i]) continue;
+      const auto timeout = actor_.some_timeout();
+      const o80::Iteration row =
+          actor_.timed("burst.wait", timeout, [&] { return bursts[i]->wait_done(timeout); });
+      if (row < 0) continue;
+      both[i]->entry().burst_row = row;
+      const o80::Rows rows = both[i]->frontend().history(row, row);
+      if (rows.count == 1) verifiers[i].verify(rows.row(0).data(), row);
+    }
+  }
+
+  Actor& actor_;
+  std::int64_t call_began_ = 0;
+};
 
 }  // namespace
 
 void be_a_burster(Actor& actor) { Burster(actor).run(); }
 
-void be_a_group_burster(Actor& actor) {
-  while (actor.acting()) {
-    std::array<std::optional<o80::UntypedFrontend>, 2> both;
-    try {
-      burst_both(actor, both);
-    } catch (const o80::TimeoutError&) {
-      // one of them is not there yet
-    }
-  }
-}
+void be_a_group_burster(Actor& actor) { GroupBurster(actor).run(); }
 
 }  // namespace torture

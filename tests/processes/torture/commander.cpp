@@ -26,14 +26,9 @@ class Commander {
 
   void run() {
     while (actor_.acting()) {
-      const auto timeout = actor_.some_timeout();
-      try {
-        Sender sender(actor_, actor_.timed("attach", timeout, [&] {
-          return o80::UntypedFrontend(segment_name(actor_.slot.segment), {.timeout = timeout});
-        }));
+      if (auto frontend = actor_.attach(actor_.slot.segment)) {
+        Sender sender(actor_, std::move(*frontend));
         serve(sender);
-      } catch (const o80::TimeoutError&) {
-        // nobody is there yet
       }
       if (actor_.slot.batches + 8 >= kMostBatches || actor_.slot.commands + 128 >= kMostCommands)
         return;

@@ -72,7 +72,12 @@ class Judge {
   std::vector<Failure> judge() {
     for (const Slot& slot : round_.slots)
       for (std::uint32_t i = 0; i < slot.batches; ++i) judge(slot, slot.sent_batches[i]);
-    for (const Slot& slot : round_.slots) judge_order(slot);
+    for (const Slot& slot : round_.slots) {
+      judge_order(slot);
+      judge_control(slot);
+      judge_stop(slot);
+    }
+    for (const Generation& life : round_.lives) judge_limits(life);
     for (auto& [generation, bursts] : bursts_) judge_bursts(generation, bursts);
     return std::move(failures_);
   }
@@ -101,8 +106,15 @@ class Judge {
   void judge(const Slot& slot, const SentBatch& batch) {
     for (std::uint32_t i = 0; i < batch.commands; ++i)
       judge(slot, batch, slot.sent_commands[batch.first_command + i]);
-    if (batch.burst > 0 && batch.burst_row >= 0)
-      bursts_[batch.generation].emplace_back(batch.burst_row - batch.burst + 1, batch.burst_row);
+    if (batch.burst > 0 && batch.burst_row >= 0) {
+      const std::int64_t begun = batch.burst_row - batch.burst + 1;
+      bursts_[batch.generation].emplace_back(begun, batch.burst_row);
+      if (batch.commands > 0 && batch.taken >= 0 && batch.taken != begun &&
+          !deeds(batch.generation).fresh_start())
+        add(Fault::falsely_told, slot, batch, slot.sent_commands[batch.first_command],
+            "its burst began at " + std::to_string(begun) + ", taken at " +
+                std::to_string(batch.taken));
+    }
     if (batch.at < 0 || batch.taken < 0 || batch.commands == 0) return;
     const SentCommand& first = slot.sent_commands[batch.first_command];
     if (static_cast<Status>(first.told) == Status::rejected) return;
@@ -115,7 +127,7 @@ class Judge {
   }
 
   void judge(const Slot& slot, const SentBatch& batch, const SentCommand& command) {
-    if (command.kind == SentKind::other) return;
+    if (command.kind != SentKind::command && command.kind != SentKind::mark) return;
     const Generation& life = round_.lives[batch.generation];
     const std::vector<Done> done = deeds(batch.generation).of(command);
     const auto sent = static_cast<Sent>(batch.sent.load());
@@ -156,7 +168,7 @@ class Judge {
       return;
     }
     if (status == Status::limited)
-      return add(Fault::falsely_told, slot, batch, command, "there are no limits");
+      return add(Fault::falsely_told, slot, batch, command, "no target was outside of the limits");
     if (!done.empty())
       add(Fault::falsely_told, slot, batch, command,
           "done at " + std::to_string(done[0].iteration) + " all the same");
@@ -181,6 +193,105 @@ class Judge {
         last[place] = command.told_at;
       }
     }
+  }
+
+  // -------------------------------------------------------------------------- control and policy
+
+  std::uint32_t number(const Slot& slot) const {
+    return static_cast<std::uint32_t>(&slot - round_.slots.data());
+  }
+  static const SentBatch* last_batch(const Slot& slot) {
+    return slot.batches == 0 ? nullptr : &slot.sent_batches[slot.batches - 1];
+  }
+  /// All that may have been sent through one attachment.
+  template <class Visit>
+  static void for_each(const Slot& slot, std::uint32_t attachment, SentKind kind, Visit&& visit) {
+    for (std::uint32_t i = 0; i < slot.batches; ++i) {
+      const SentBatch& batch = slot.sent_batches[i];
+      if (batch.attachment != attachment || batch.sent == static_cast<std::uint32_t>(Sent::refused))
+        continue;
+      for (std::uint32_t k = 0; k < batch.commands; ++k) {
+        const SentCommand& command = slot.sent_commands[batch.first_command + k];
+        if (command.kind == kind) visit(batch, command);
+      }
+    }
+  }
+  /// The iteration in which it was done; -1: it was not, `unknown` if nobody knows.
+  static std::int64_t done_at(const SentCommand& command, std::int64_t unknown) {
+    const bool told = has_ended(command.told);
+    if (!told && !has_ended(command.found)) return unknown;
+    const auto status = static_cast<Status>(told ? command.told : command.found);
+    return status == Status::completed ? (told ? command.told_at : command.found_at) : -1;
+  }
+  /// The last iteration of which it is known that the sender of a batch lived and held its lane.
+  std::int64_t lived_until(const Slot& slot, const SentBatch& sent) const {
+    std::int64_t last = -1;
+    for (std::uint32_t i = 0; i < slot.batches; ++i)
+      if (slot.sent_batches[i].attachment == sent.attachment)
+        last = std::max(last, slot.sent_batches[i].taken);
+    const bool killed = slot.doomed_at != 0 && slot.commanding != 0;
+    if (!killed || last_batch(slot)->attachment != sent.attachment) return last;
+    const Generation& life = round_.lives[sent.generation];
+    const std::int64_t rows = std::min<std::int64_t>(life.rows, kMostRows);
+    while (last + 1 < rows && life.journal[static_cast<std::size_t>(last + 1)].at < slot.doomed_at)
+      ++last;
+    return last;
+  }
+
+  /// From when it takes control until it lets go or dies, nobody else's batch is taken.
+  void judge_control(const Slot& slot) {
+    for (std::uint32_t attachment = 1; attachment <= slot.attachments; ++attachment)
+      for_each(slot, attachment, SentKind::take_control,
+               [&](const SentBatch& batch, const SentCommand& take) {
+                 const std::int64_t from = done_at(take, -1);
+                 if (from < 0) return;
+                 std::int64_t until = lived_until(slot, batch);
+                 for_each(slot, attachment, SentKind::release_control,
+                          [&](const SentBatch&, const SentCommand& release) {
+                            const std::int64_t let_go = done_at(release, from);
+                            if (let_go >= from) until = std::min(until, let_go - 1);
+                          });
+                 judge_others(slot, batch.generation, from, until);
+               });
+  }
+  void judge_others(const Slot& holder, std::uint32_t generation, std::int64_t from,
+                    std::int64_t until) {
+    for (const Slot& slot : round_.slots) {
+      if (&slot == &holder) continue;
+      for (std::uint32_t i = 0; i < slot.batches; ++i) {
+        const SentBatch& batch = slot.sent_batches[i];
+        if (batch.generation != generation || batch.commands == 0 || batch.taken <= from ||
+            batch.taken > until)
+          continue;
+        add(Fault::taken_alive, slot, batch, slot.sent_commands[batch.first_command],
+            "taken at " + std::to_string(batch.taken) + ", when actor " +
+                std::to_string(number(holder)) + " had control, from " + std::to_string(from) +
+                " to " + std::to_string(until) + " at least");
+      }
+    }
+  }
+
+  /// Whose policy is to stop does not outlive a sender.
+  void judge_stop(const Slot& slot) {
+    const SentBatch* batch = last_batch(slot);
+    if (slot.doomed_at == 0 || slot.commanding == 0 || batch == nullptr) return;
+    const Generation& life = round_.lives[batch->generation];
+    if (life.stops_stale != 0 && life.drained != 0 && batch->commands > 0 &&
+        batch->sent == static_cast<std::uint32_t>(Sent::sent))
+      add(Fault::unnoticed_death, slot, *batch, slot.sent_commands[batch->first_command],
+          "its sender died, and the backend did not stop");
+  }
+
+  /// Whatever quintics overshoot, no desired state does.
+  void judge_limits(const Generation& life) {
+    const std::int64_t rows = std::min<std::int64_t>(life.rows, kMostRows);
+    for (std::int64_t k = 0; k < rows; ++k)
+      for (const double desired : life.journal[static_cast<std::size_t>(k)].desired)
+        if (!(desired >= kLowest && desired <= kHighest))
+          return failures_.push_back(
+              {Fault::wrong_row, "row " + std::to_string(k) + " of generation " +
+                                     std::to_string(&life - round_.lives.data()) + " desires " +
+                                     std::to_string(desired) + ", outside of the limits"});
   }
 
   /// No iteration was granted twice.

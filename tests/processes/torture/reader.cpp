@@ -31,16 +31,9 @@ class Reader {
 
  private:
   std::optional<o80::UntypedFrontend> attach() {
-    const auto timeout = actor_.some_timeout();
-    o80::FrontendOptions options{.timeout = timeout};
-    if (actor_.chance.percent(30)) options.access = o80::Access::read_only;
-    try {
-      return actor_.timed("attach", timeout, [&] {
-        return o80::UntypedFrontend(segment_name(actor_.slot.segment), options);
-      });
-    } catch (const o80::TimeoutError&) {
-      return std::nullopt;
-    }
+    const bool only_reads = actor_.chance.percent(30);
+    return actor_.attach(actor_.slot.segment,
+                         only_reads ? o80::Access::read_only : o80::Access::read_write);
   }
 
   void read(const o80::UntypedFrontend& frontend, Generation& life, Verifier& verifier) {
@@ -137,8 +130,6 @@ class Reader {
                   static_cast<long>(last + 1));
     } catch (const o80::BackendGone&) {
       // as it must be
-    } catch (const o80::TimeoutError&) {
-      // a successor holds the lock of the dead one for a moment before it says so
     }
   }
 

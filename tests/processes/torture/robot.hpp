@@ -14,6 +14,9 @@ namespace torture {
 
 inline constexpr std::uint32_t kActuators = 2;
 inline constexpr std::uint32_t kFiller = 24;
+// of every desired state; quintics that overshoot are clamped there
+inline constexpr double kLowest = 0;
+inline constexpr double kHighest = 2;
 
 constexpr std::uint64_t mix(std::uint64_t a, std::uint64_t b = 0) {
   std::uint64_t z = a * 0x9E3779B97F4A7C15ULL + b + 0x632BE59BD9B4E019ULL;

@@ -18,6 +18,8 @@ std::uint64_t bits_of(double value) { return std::bit_cast<std::uint64_t>(value)
 Sender::Sender(Actor& actor, o80::UntypedFrontend frontend)
     : actor_(actor), frontend_(std::move(frontend)), life_(actor.life_of(frontend_)) {
   first_ = actor_.slot.commands;
+  actor_.slot.commanding = 1;
+  attachment_ = ++actor_.slot.attachments;
 }
 
 Sender::~Sender() = default;
@@ -43,7 +45,7 @@ void Sender::add_command() {
   const auto actuator = static_cast<std::uint32_t>(chance.below(kActuators));
   const double target = unique_target(chance.bits());
   o80::CommandOptions options;
-  switch (chance.below(6)) {
+  switch (chance.below(7)) {
     case 0:
       options.pace = o80::iterations(chance.between(1, 20));
       break;
@@ -53,6 +55,9 @@ void Sender::add_command() {
     case 2:
       options.pace =
           o80::until(std::max<o80::Iteration>(0, frontend_.published()) + chance.between(0, 30));
+      break;
+    case 3:
+      options.pace = o80::speed(static_cast<double>(chance.between(20, 2000)));
       break;
     default:
       break;
@@ -71,9 +76,27 @@ void Sender::add_trajectory() {
   std::vector<double> rows(static_cast<std::size_t>(chance.between(2, 30)));
   for (double& row : rows) row = unique_target(chance.bits());
   note(SentKind::command, bits_of(rows.back()), actuator);
-  frontend_.add_trajectory(actuator, static_cast<std::uint32_t>(rows.size()),
-                           std::as_bytes(std::span(rows)),
-                           {.pace = o80::iterations(chance.between(1, 3))});
+  const auto count = static_cast<std::uint32_t>(rows.size());
+  const auto states = std::as_bytes(std::span(rows));
+  if (chance.percent(50)) {
+    frontend_.add_trajectory(actuator, count, states,
+                             {.pace = o80::iterations(chance.between(1, 3))});
+    return;
+  }
+  std::vector<std::int64_t> times(rows.size());
+  std::int64_t time = 0;
+  for (std::int64_t& end : times) end = time += chance.between(1, 3 * kMillisecond);
+  frontend_.add_trajectory(actuator, count, states, {}, times);
+}
+
+void Sender::add_outside() {
+  const double target = actor_.chance.percent(50) ? kHighest + 1e-9 : kLowest - 1e-9;
+  try {
+    frontend_.add_command(0, bytes_of(target));
+  } catch (const o80::InvalidArgument&) {
+    return;
+  }
+  actor_.fail(Fault::bad_error, "a target outside of the limits was taken");
 }
 
 void Sender::add_some() {
@@ -84,6 +107,8 @@ void Sender::add_some() {
       add_command();
     } else if (kind < 80) {
       add_trajectory();
+    } else if (kind < 82) {
+      add_outside();
     } else if (kind < 92) {
       const Mark mark{chance.bits() >> 1};
       note(SentKind::mark, mark.id, 0);
@@ -99,10 +124,10 @@ void Sender::add_some() {
       note(SentKind::mark, again.id, 0);
       frontend_.add_request(1, bytes_of(again));
     } else if (kind < 98) {
-      note(SentKind::other, 0, 0);
+      note(SentKind::take_control, 0, 0);
       frontend_.add_take_control();
     } else {
-      note(SentKind::other, 0, 0);
+      note(SentKind::release_control, 0, 0);
       frontend_.add_release_control();
     }
   }
@@ -117,6 +142,7 @@ bool Sender::send(std::int64_t at, bool late_now, std::int64_t burst, bool until
   entry.generation = static_cast<std::uint32_t>(&life_ - actor_.round.lives.data());
   entry.first_command = first_;
   entry.commands = actor_.slot.commands - first_;
+  entry.attachment = attachment_;
   entry.at = at;
   entry.late_now = late_now ? 1 : 0;
   entry.burst = burst;
@@ -190,6 +216,7 @@ void Sender::close() {
     life_.lane_owners[lane_].compare_exchange_strong(own, 0);
   }
   frontend_.close();
+  actor_.slot.commanding = 0;
 }
 
 // ------------------------------------------------------------------------------ settling

@@ -20,9 +20,11 @@ class Sender {
   Sender& operator=(const Sender&) = delete;
 
   o80::UntypedFrontend& frontend() { return frontend_; }
-  Generation& life() { return life_; }
+  Generation& life() const { return life_; }
   bool has_room() const;
 
+  /// Before adding, where another sender of the same actor may have added since.
+  void begin() { first_ = actor_.slot.commands; }
   /// Adds one to a few records by chance.
   void add_some();
   /// Sends them; false if they were refused.
@@ -51,6 +53,7 @@ class Sender {
   SentCommand& note(SentKind kind, std::uint64_t value, std::uint32_t actuator);
   void add_command();
   void add_trajectory();
+  void add_outside();
   bool send(std::int64_t at, bool late_now, std::int64_t burst, bool until_ended,
             const std::function<o80::Batch()>& send);
   void watch_lane();
@@ -61,6 +64,7 @@ class Sender {
   Generation& life_;
   std::deque<Open> open_;
   std::uint32_t first_ = 0;  // command of the batch being made
+  std::uint32_t attachment_ = 0;
   std::uint32_t lane_ = kNoLane;
 };
 
