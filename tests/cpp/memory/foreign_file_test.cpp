@@ -89,6 +89,12 @@ TEST_F(ForeignFileTest, ThatIsALinkIsNotFollowed) {
   EXPECT_THAT(refusal(), HasSubstr(path));
   EXPECT_THROW(OwnedSegment::create(small_spec()), SegmentError);
   EXPECT_EQ(read_all(target), std::vector<char>(100'000, 'x'));
+
+  // not to a true segment either
+  std::filesystem::remove(path);
+  const OwnedSegment leg = running_segment(small_spec("leg"));
+  std::filesystem::create_symlink(directory_.file_of("leg"), path);
+  EXPECT_THAT(refusal(), AllOf(HasSubstr(path), HasSubstr("symbolic links")));
 }
 
 TEST_F(ForeignFileTest, CutAnywhereIsRefused) {
@@ -131,11 +137,14 @@ TEST_F(ForeignFileTest, OfAnotherVersionIsRefusedWithBothVersionsAndTheCure) {
 TEST_F(ForeignFileTest, OfALivingBackendOfAnotherVersionKeepsItsNameAndIsNotReadAsThisOne) {
   const OwnedSegment living = running_segment();
   const std::string path = directory_.file_of("arm");
-  poke(path, offsetof(SegmentHeader, version), std::uint32_t{77});
   poke(path, offsetof(SegmentHeader, user), std::array<char, 4>{'\x1b', '[', '7', 'm'});
-  const std::string said = message_of<SegmentTaken>([] { OwnedSegment::create(small_spec()); });
-  EXPECT_THAT(said, AllOf(HasSubstr("'arm' already has a backend"), HasSubstr("o80 stop arm")));
-  EXPECT_EQ(said.find('\x1b'), std::string::npos);
+  for (const std::uint32_t version : {kSegmentVersion, 77U}) {
+    poke(path, offsetof(SegmentHeader, version), version);
+    const std::string said = message_of<SegmentTaken>([] { OwnedSegment::create(small_spec()); });
+    EXPECT_THAT(said, AllOf(HasSubstr("'arm' already has a backend"), HasSubstr("o80 stop arm")));
+    EXPECT_EQ(said.find('\x1b'), std::string::npos);
+    EXPECT_EQ(said.find("?[7m") != std::string::npos, version == kSegmentVersion) << said;
+  }
   EXPECT_THROW(clean("arm"), SegmentTaken);
 }
 
@@ -171,7 +180,8 @@ TEST_F(ForeignFileTest, WithImpossibleCountersGivesNoRowAndKeepsNobody) {
       history.latest(to);
       history.is_damaged();
       for (const Iteration first : {kLeast, Iteration{0}, kMost})
-        EXPECT_LE(history.read_range(first, 17, to).count, 17U);
+        for (const std::size_t most : {5U, 17U})
+          EXPECT_LE(history.read_range(first, most, to).count, most);
     }
   }
 }
