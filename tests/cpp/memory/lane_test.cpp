@@ -256,10 +256,14 @@ TEST_F(LaneTest, KeepsWhatAnHeirSentBehindTheGarbageOfItsPredecessor) {
       segment_.view().lane(0).committed += 3;
     }
     std::optional<LaneSender> heir;
-    if (heir_comes_late) EXPECT_EQ(lanes_[0].available(), 3U);
+    if (heir_comes_late) {
+      EXPECT_EQ(lanes_[0].available(), 3U);
+    }
     heir.emplace(attached_);
     send(*heir, 7, 2);
-    if (!heir_comes_late) EXPECT_EQ(lanes_[0].available_of_one(), 3U);
+    if (!heir_comes_late) {
+      EXPECT_EQ(lanes_[0].available_of_one(), 3U);
+    }
     lanes_[0].reset();
     EXPECT_EQ(lanes_[0].available_of_one(), 2U);
     EXPECT_THAT(take_all(), ElementsAre(7));
