@@ -150,10 +150,10 @@ std::span<const std::byte> AttachedSegment::schema() const noexcept {
 Life AttachedSegment::life() const noexcept {
   const Life now = judge_life(descriptor(), view_.counters().state);
   if (is_over(now)) {
-    over_.store(now, std::memory_order_relaxed);
+    over_.store(static_cast<std::uint32_t>(now), std::memory_order_relaxed);
     return now;
   }
-  const Life over = over_.load(std::memory_order_relaxed);
+  const auto over = static_cast<Life>(over_.load(std::memory_order_relaxed));
   return is_over(over) ? over : now;
 }
 
@@ -202,7 +202,8 @@ void AttachedSegment::throw_gone(Life life) const {
 void AttachedSegment::throw_if_known_gone() const {
   const std::int64_t now = monotonic_roughly_now();
   const bool fresh = now - asked_.load(std::memory_order_relaxed) < kKnownFor;
-  const bool ended = has_ended() || is_over(over_.load(std::memory_order_relaxed));
+  const bool ended =
+      has_ended() || is_over(static_cast<Life>(over_.load(std::memory_order_relaxed)));
   if (fresh && !ended) return check_process();
   throw_if_gone();
   asked_.store(now, std::memory_order_relaxed);

@@ -83,7 +83,7 @@ class AttachedSegment {
   std::string name_;
   std::string path_;
   Access access_ = Access::read_only;
-  mutable std::atomic<Life> over_{Life::starting};  // how it ended, as seen so far
+  mutable std::atomic<std::uint32_t> over_{0};  // a Life: how it ended, as seen so far
   SegmentHeader header_{};
   LockFile file_;  // the mapped one, holds nothing
   Mapping mapping_;

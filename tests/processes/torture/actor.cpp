@@ -148,10 +148,20 @@ void Actor::judge_gone(Generation& life, const o80::BackendGone& error, std::int
 void Actor::judge_timeout(Generation& life, std::int64_t call_began, std::int64_t stopped_before) {
   slot.timeouts.fetch_add(1, std::memory_order_relaxed);
   const std::int64_t dead = life.dead_at;
-  if (dead == 0 || stopped() != stopped_before) return;
+  if (dead == 0 || stopped() != stopped_before || a_successor_was_stopped()) return;
   if (call_began - dead > kGrace)
-    fail(Fault::unnoticed_death, "generation %ld was dead for %.0f ms before a wait that timed out",
-         &life - round.lives.data(), static_cast<double>(call_began - dead) / 1e6);
+    fail(Fault::unnoticed_death, "generation %ld was dead for %.0f ms before a %s that timed out",
+         &life - round.lives.data(), static_cast<double>(call_began - dead) / 1e6,
+         slot.call.load());
+}
+
+/// Who is stopped while it takes over holds the lock of the dead and has not said that it is dead.
+bool Actor::a_successor_was_stopped() const {
+  return std::any_of(round.slots.begin(), round.slots.end(), [&](const Slot& other) {
+    return other.segment == slot.segment &&
+           (is_backend(other.role) || other.role == Role::usurper) &&
+           (other.stopped != 0 || other.stopped_at != 0);
+  });
 }
 
 std::uint64_t epoch_of(const std::string& segment) {

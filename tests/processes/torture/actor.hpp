@@ -68,6 +68,7 @@ class Actor {
   void judge_gone(Generation& life, const o80::BackendGone& error, std::int64_t call_began);
   /// A wait timed out: has it overlooked a death?
   void judge_timeout(Generation& life, std::int64_t call_began, std::int64_t stopped_before);
+  bool a_successor_was_stopped() const;
   /// The segment's robot, if it comes within some timeout.
   std::optional<o80::UntypedFrontend> attach(std::uint32_t segment,
                                              o80::Access access = o80::Access::read_write);

@@ -33,8 +33,6 @@ Round* map_round(const std::string& path) {
   return static_cast<Round*>(memory);
 }
 
-bool is_backend(Role role) { return role == Role::backend || role == Role::bursting_backend; }
-
 // of the process that is an actor: where it is told of its own crash point
 Round* own_round = nullptr;
 Slot* own_slot = nullptr;

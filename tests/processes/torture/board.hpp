@@ -36,6 +36,9 @@ enum class Role : std::uint32_t {
   count
 };
 const char* name_of(Role role);
+constexpr bool is_backend(Role role) {
+  return role == Role::backend || role == Role::bursting_backend;
+}
 constexpr bool is_sender(Role role) {
   return role == Role::commander || role == Role::burster || role == Role::group_burster ||
          role == Role::python_commander;
@@ -114,6 +117,7 @@ struct SentBatch {
   std::int64_t burst;      // iterations asked for
   std::int64_t taken;      // iteration, -1: not told
   std::int64_t burst_row;  // last row of the burst, -1: not told
+  std::int64_t sent_at;    // [ns], when it was out; 0: not told
 };
 
 enum class SentKind : std::uint32_t { command, mark, other, take_control, release_control };

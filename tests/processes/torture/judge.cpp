@@ -225,16 +225,16 @@ class Judge {
   }
   /// The last iteration of which it is known that the sender of a batch lived and held its lane.
   std::int64_t lived_until(const Slot& slot, const SentBatch& sent) const {
-    std::int64_t last = -1;
+    std::int64_t seen_at = 0;
     for (std::uint32_t i = 0; i < slot.batches; ++i)
       if (slot.sent_batches[i].attachment == sent.attachment)
-        last = std::max(last, slot.sent_batches[i].taken);
+        seen_at = std::max(seen_at, slot.sent_batches[i].sent_at);
     const bool killed = slot.doomed_at != 0 && slot.commanding != 0;
-    if (!killed || last_batch(slot)->attachment != sent.attachment) return last;
+    if (killed && last_batch(slot)->attachment == sent.attachment) seen_at = slot.doomed_at;
     const Generation& life = round_.lives[sent.generation];
     const std::int64_t rows = std::min<std::int64_t>(life.rows, kMostRows);
-    while (last + 1 < rows && life.journal[static_cast<std::size_t>(last + 1)].at < slot.doomed_at)
-      ++last;
+    std::int64_t last = -1;
+    while (last + 1 < rows && life.journal[static_cast<std::size_t>(last + 1)].at < seen_at) ++last;
     return last;
   }
 
