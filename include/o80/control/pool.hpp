@@ -115,6 +115,7 @@ class Cursor {
   /// Copies the next bytes; what is past the end reads as zero, and false is returned.
   bool read(void* out, std::size_t bytes) noexcept {
     if (bytes > left_ || bytes > kBlockBytes - offset_) return read_across(out, bytes);
+    if (bytes == 0) return true;  // `out` may be nothing then
     std::memcpy(out, pool_->bytes(block_) + offset_, bytes);
     offset_ += static_cast<std::uint32_t>(bytes);
     left_ -= bytes;
