@@ -1,6 +1,7 @@
 """Runs clang-tidy over the sources of a build folder, in parallel.
 
-A file that passed is not looked at again until its preprocessed text, the configuration or the
+The sources of a folder that are compiled alike are read as one, so that what they all include is
+read once. What passed is not looked at again until its preprocessed text, the configuration or the
 version of clang-tidy changes.
 """
 
@@ -11,34 +12,69 @@ import os
 import shlex
 import subprocess
 import sys
+from collections import defaultdict
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from sources import ROOT
 
 CHECKED = ("src", "robots", "simulators")
-PASSED = ROOT / "build" / "tidy"
+BUILD = ROOT / "build" / "tidy"
+# the static analyzer looks into what is included too; what it finds it finds early
+ANALYZER = [
+    word
+    for option in ("-analyzer-opt-analyze-headers", "-analyzer-config", "max-nodes=30000")
+    for word in ("-Xclang", option)
+]
 
 
-def sources_of(build: Path) -> dict[Path, dict[str, str]]:
-    """The checked files of the build folder, each with its compile command."""
+def compile_options(command: str) -> tuple[str, ...]:
+    """What decides how a file is read: directories, definitions, language."""
+    words = shlex.split(command)
+    kept = ("-I", "-D", "-std=", "-isystem")
+    options: list[str] = []
+    for word, following in zip(words, [*words[1:], ""], strict=True):
+        if word.startswith(kept):
+            options += [word, following] if word == "-isystem" else [word]
+    return tuple(options)
+
+
+def units_of(build: Path) -> dict[Path, tuple[str, ...]]:
+    """One file for each folder and way to compile it; it includes them all."""
     commands = json.loads((build / "compile_commands.json").read_text())
+    together: dict[tuple[str, tuple[str, ...]], set[Path]] = defaultdict(set)
+    for file, options in sources_of(commands).items():
+        together[str(file.parent.relative_to(ROOT)), options].add(file)
+    units: dict[Path, tuple[str, ...]] = {}
+    for (folder, options), files in sorted(together.items()):
+        unit = BUILD / f"{folder.replace('/', '-')}-{len(units)}.cpp"
+        unit.write_text("".join(f'#include "{file}"\n' for file in sorted(files)))
+        units[unit] = options
+    return units
+
+
+def sources_of(commands: list[dict[str, str]]) -> dict[Path, tuple[str, ...]]:
+    """The checked files, those inside a unity source among them, each compiled as shipped."""
+    found: dict[Path, tuple[str, ...]] = {}
     folders = tuple(f"{ROOT / folder}{os.sep}" for folder in CHECKED)
-    return {Path(c["file"]): c for c in commands if c["file"].startswith(folders)}
+    for command in commands:
+        file = Path(command["file"])
+        files = [str(file)]
+        if file.name.startswith("unity_"):
+            lines = file.read_text().splitlines()
+            files = [line.split('"')[1] for line in lines if line.startswith("#include")]
+        options = compile_options(command["command"])
+        for name in filter(lambda name: name.startswith(folders), files):
+            # test builds define more
+            found[Path(name)] = min(found.get(Path(name), options), options, key=len)
+    return found
 
 
-def digest(compilation: dict[str, str], settings: bytes) -> str:
-    """Hash of all that the verdict on a file depends on."""
-    words = shlex.split(compilation["command"])
-    if Path(words[0]).name == "ccache":
-        words = words[1:]
-    output = words.index("-o")
-    del words[output : output + 2]
-    words.remove("-c")
-    text = subprocess.run(
-        [*words, "-E", "-CC"], cwd=compilation["directory"], capture_output=True, check=True
-    ).stdout
-    return hashlib.sha256(settings + shlex.join(words).encode() + text).hexdigest()
+def digest(unit: Path, options: tuple[str, ...], settings: bytes) -> str:
+    """Hash of all that the verdict on a unit depends on."""
+    words = ["clang++-19", *options, "-E", "-CC", str(unit)]
+    text = subprocess.run(words, capture_output=True, check=True).stdout
+    return hashlib.sha256(settings + text).hexdigest()
 
 
 def main() -> int:
@@ -48,19 +84,17 @@ def main() -> int:
     arguments = parser.parse_args()
 
     version = subprocess.run(["clang-tidy", "--version"], capture_output=True, check=True).stdout
-    settings = version + (ROOT / ".clang-tidy").read_bytes()
-    PASSED.mkdir(parents=True, exist_ok=True)
+    settings = version + (ROOT / ".clang-tidy").read_bytes() + shlex.join(ANALYZER).encode()
+    BUILD.mkdir(parents=True, exist_ok=True)
 
-    def check(item: tuple[Path, dict[str, str]]) -> bool:
-        file, compilation = item
-        stamp = PASSED / digest(compilation, settings)
+    def check(item: tuple[Path, tuple[str, ...]]) -> bool:
+        unit, options = item
+        stamp = BUILD / digest(unit, options, settings)
         if stamp.exists():
             return True
-        result = subprocess.run(
-            ["clang-tidy", "-p", str(arguments.build), "--quiet", str(file)],
-            capture_output=True,
-            text=True,
-        )
+        configuration = f"--config-file={ROOT / '.clang-tidy'}"
+        command = ["clang-tidy", configuration, "--quiet", str(unit), "--", *options, *ANALYZER]
+        result = subprocess.run(command, capture_output=True, text=True)
         if result.returncode == 0:
             stamp.touch()
             return True
@@ -69,10 +103,11 @@ def main() -> int:
             print(result.stderr, flush=True)
         return False
 
-    files = sources_of(arguments.build)
+    units = units_of(arguments.build)
     with ThreadPoolExecutor(arguments.jobs) as pool:
-        verdicts = list(pool.map(check, files.items()))
-    print(f"clang-tidy: {verdicts.count(True)} files passed, {verdicts.count(False)} failed")
+        verdicts = list(pool.map(check, units.items()))
+    files = sum(unit.read_text().count("#include") for unit in units)
+    print(f"clang-tidy: {files} files in {len(units)} units; {verdicts.count(False)} units failed")
     return int(not all(verdicts))
 
 

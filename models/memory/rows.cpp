@@ -17,10 +17,10 @@
 //   - futex_wake(counters.row_wake, kEverybody);
 //   +
 // mutant reset_after_the_wake: src/memory/signal.cpp
-//   - bell.wanted.store(kNobody, std::memory_order_seq_cst);  // sync wanted
+//   - bell.wanted.store(kNoWish, std::memory_order_seq_cst);  // sync wanted
 //   +
 //   - O80_CRASH_POINT("rows.after_wake");
-//   + view_.bell().wanted.store(kNobody, std::memory_order_seq_cst);
+//   + view_.bell().wanted.store(kNoWish, std::memory_order_seq_cst);
 // mutant sleeps_on_a_later_value: src/memory/signal.cpp
 //   - futex_wait(counters.row_wake, seen, at_most)
 //   + futex_wait(counters.row_wake, counters.row_wake.load(std::memory_order_seq_cst), at_most)

@@ -7,11 +7,11 @@ namespace o80 {
 namespace {
 
 // a speed may be missed by no more than rounding
-constexpr double kRounding = 1e-12;
+constexpr double kSpeedRounding = 1e-12;
 constexpr int kMostTries = 96;
 
 std::int64_t at_least_one(double iterations) noexcept {
-  const double whole = std::ceil(iterations * (1.0 - kRounding));
+  const double whole = std::ceil(iterations * (1.0 - kSpeedRounding));
   if (!(whole < static_cast<double>(kMostIterations))) return kMostIterations;
   return std::max<std::int64_t>(1, static_cast<std::int64_t>(whole));
 }
@@ -50,7 +50,7 @@ std::int64_t minimum_jerk_iterations(double distance, const Moment& start, doubl
   if (start.velocity == 0.0 && start.acceleration == 0.0) {
     return at_least_one(kPeakFromRest * way / speed);
   }
-  const double highest = std::max(speed, std::abs(start.velocity)) * (1.0 + kRounding);
+  const double highest = std::max(speed, std::abs(start.velocity)) * (1.0 + kSpeedRounding);
   const auto peak = [&](std::int64_t n) {
     const auto count = static_cast<double>(n);
     return peak_speed(Quintic::from(distance, start, count)) / count;

@@ -12,7 +12,7 @@ namespace {
 constexpr std::uint64_t kMagic = 0x616D656863533038;  // "80Schema"
 constexpr std::uint32_t kMostRows = 1U << 20;
 constexpr std::uint32_t kMostActuators = 0xFFFF;  // a record names one, or all, in 16 bits
-constexpr std::uint32_t kMostBytes = 1U << 28;
+constexpr std::uint32_t kLargestType = 1U << 28;
 constexpr std::uint32_t kMostNested = 16;
 
 struct TableHead {
@@ -82,7 +82,7 @@ void check_field(const Schema& schema, std::uint32_t type_index, const FieldRow&
   check_text(field.help, "a help");
   const std::uint64_t elements =
       std::uint64_t{field.rows == 0 ? 1 : field.rows} * (field.columns == 0 ? 1 : field.columns);
-  if (elements > kMostBytes) refuse(name + "has too many elements");
+  if (elements > kLargestType) refuse(name + "has too many elements");
   if (field.offset + field.size * elements > type.size) refuse(name + "lies outside its struct");
   if (field.rows == 0 && field.columns != 0) refuse(name + "has columns but no rows");
   switch (field.kind) {
@@ -115,7 +115,7 @@ std::vector<std::uint64_t> check_types(const Schema& schema) {
     const TypeRow& type = schema.types[i];
     check_text(type.name, "a type's name");
     const std::string name = "type '" + type.name.str() + "' ";
-    if (type.size > kMostBytes) refuse(name + "is too large");
+    if (type.size > kLargestType) refuse(name + "is too large");
     if (type.alignment == 0 || type.alignment > 64 ||
         (type.alignment & (type.alignment - 1)) != 0) {
       refuse(name + "has no alignment");
@@ -134,7 +134,7 @@ std::vector<std::uint64_t> check_types(const Schema& schema) {
       }
       const bool nested = field.kind == Kind::structure;
       count += std::uint64_t{field.count()} * (nested ? numbers[field.type] : 1);
-      if (count > kMostBytes) refuse(name + "has too many numbers");
+      if (count > kLargestType) refuse(name + "has too many numbers");
       if (nested) depth = std::max(depth, depths[field.type] + 1);
     }
     if (depth > kMostNested) refuse(name + "nests too deep");
@@ -211,7 +211,7 @@ void check_groups(const Schema& schema) {
 void check(const Schema& schema) {
   check_text(schema.head.robot, "the robot's name");
   if (schema.head.period < 0) refuse("the period is negative");
-  if (schema.head.block > kMostBytes) refuse("the row is too large");
+  if (schema.head.block > kLargestType) refuse("the row is too large");
   if (static_cast<int>(schema.head.clock) > static_cast<int>(Clock::simulated)) {
     refuse("the clock is unknown");
   }

@@ -22,7 +22,7 @@ constexpr std::int64_t kPoll = 1'000'000;  // while a segment is awaited [ns]
 constexpr int kPollsBetweenChecks = 20;
 constexpr std::int64_t kKnownFor = 20'000'000;  // how long an answer of the kernel counts [ns]
 
-std::string quoted(std::string_view name) { return "segment '" + std::string(name) + "'"; }
+std::string segment_called(std::string_view name) { return "segment '" + std::string(name) + "'"; }
 
 std::string what_there_is() {
   std::string text;
@@ -43,17 +43,18 @@ std::optional<AttachedSegment> AttachedSegment::open(std::string_view name, Acce
   if (!segment.file_.is_open()) {
     if (errno == ENOENT) return std::nullopt;
     if ((errno == EACCES || errno == EPERM) && access == Access::read_write)
-      throw SegmentError(quoted(name) +
+      throw SegmentError(segment_called(name) +
                          " may not be written by this user: attach read-only, or let its backend "
                          "be started with group permission");
-    throw SegmentError(quoted(name) + " cannot be opened (" + segment.path_ +
+    throw SegmentError(segment_called(name) + " cannot be opened (" + segment.path_ +
                        "): " + std::strerror(errno));
   }
 
   const std::string wrong =
       inspect_segment(segment.file_.descriptor(), segment.header_, segment.view_.offsets);
   if (!wrong.empty())
-    throw SegmentError(quoted(name) + " cannot be attached (" + segment.path_ + "): " + wrong +
+    throw SegmentError(segment_called(name) + " cannot be attached (" + segment.path_ +
+                       "): " + wrong +
                        ". Start its backend anew with this o80, or remove it with `o80 clean " +
                        std::string(name) + "`.");
 
@@ -116,11 +117,11 @@ AttachedSegment AttachedSegment::attach(std::string_view name, Access access,
   for (int polls = 0;; ++polls) {
     if (search.look()) return search.found();
     if (deadline.over())
-      throw TimeoutError(quoted(name) +
+      throw TimeoutError(segment_called(name) +
                          " has no running backend within the time given: " + search.reason() +
                          ". " + what_there_is() + " Start one with `o80 run`, or check the name.");
     if (polls % kPollsBetweenChecks == 0 && options.check && !options.check())
-      throw Cancelled("the wait for " + quoted(name) + " was cancelled");
+      throw Cancelled("the wait for " + segment_called(name) + " was cancelled");
     const timespec pause{.tv_sec = 0, .tv_nsec = std::max<long>(deadline.left(kPoll), 1000)};
     nanosleep(&pause, nullptr);
   }
@@ -177,7 +178,7 @@ void AttachedSegment::throw_if_gone() const {
 void AttachedSegment::throw_gone(Life life) const {
   // asked in every burst: nothing is written unless it is thrown
   const auto backend = [&] {
-    return quoted(name_) + ": its backend (pid " + std::to_string(header_.pid) + ") ";
+    return segment_called(name_) + ": its backend (pid " + std::to_string(header_.pid) + ") ";
   };
   constexpr const char* cure = " Its history can still be read; start it again and attach anew.";
   switch (life) {
@@ -210,7 +211,7 @@ void AttachedSegment::throw_if_known_gone() const {
 }
 
 void AttachedSegment::check_process() const {
-  if (guard_.forked()) guard_.check(quoted(name_));
+  if (guard_.forked()) guard_.check(segment_called(name_));
 }
 
 LockFile AttachedSegment::open_again() const {
@@ -219,7 +220,7 @@ LockFile AttachedSegment::open_again() const {
   const std::string path = "/proc/self/fd/" + std::to_string(descriptor());
   LockFile file = LockFile::open(path, O_RDWR);
   if (!file.is_open())
-    throw SegmentError(quoted(name_) + " cannot be opened again: " + std::strerror(errno));
+    throw SegmentError(segment_called(name_) + " cannot be opened again: " + std::strerror(errno));
   return file;
 }
 

@@ -20,7 +20,7 @@ namespace {
 
 // further than any backend comes; what a damaged file says is cut to it, and never overflows
 constexpr Iteration kFarthest = Iteration{1} << 60;
-constexpr int kTries = 100;  // of a row that is overtaken without the writer moving on
+constexpr int kReadings = 100;  // of a row that is overtaken without the writer moving on
 
 }  // namespace
 
@@ -69,7 +69,7 @@ Iteration HistoryReader::begun() const noexcept {
 
 bool HistoryReader::is_damaged() const noexcept {
   // a writer is one row ahead at most; who reads both has to see it standing still
-  for (int i = 0; i < kTries; ++i) {
+  for (int i = 0; i < kReadings; ++i) {
     const Iteration before = published();
     std::atomic_thread_fence(std::memory_order_seq_cst);
     const Iteration under_way = begun();
@@ -100,7 +100,7 @@ bool HistoryReader::read(Iteration k, std::byte* to) const noexcept {
 
 Iteration HistoryReader::latest(std::byte* to) const noexcept {
   Iteration last = -1;
-  for (int tries = 0; tries < kTries;) {
+  for (int tries = 0; tries < kReadings;) {
     const Iteration k = published();
     if (k < 0) return -1;
     load_words(to, slot(k), row_bytes_);

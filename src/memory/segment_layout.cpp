@@ -5,7 +5,7 @@
 namespace o80 {
 
 namespace {
-constexpr std::uint64_t kMostBytes = 1ULL << 46;
+constexpr std::uint64_t kLargestSegment = 1ULL << 46;
 }
 
 bool SegmentOffsets::compute(const SegmentShape& shape, SegmentOffsets& offsets) noexcept {
@@ -14,7 +14,7 @@ bool SegmentOffsets::compute(const SegmentShape& shape, SegmentOffsets& offsets)
   if (shape.schema_bytes > (1ULL << 32)) return false;
   if (shape.row_bytes == 0 || shape.row_bytes % 8 != 0 || shape.row_bytes > (1ULL << 32))
     return false;
-  if (shape.slots < 2 || shape.slots > kMostBytes / shape.row_bytes) return false;
+  if (shape.slots < 2 || shape.slots > kLargestSegment / shape.row_bytes) return false;
   if (shape.lanes > kMostLanes) return false;
   if (!std::has_single_bit(shape.lane_blocks) || shape.lane_blocks > (1U << 24)) return false;
 

@@ -12,7 +12,7 @@
 namespace o80 {
 
 namespace {
-constexpr Iteration kNobody = std::numeric_limits<Iteration>::max();
+constexpr Iteration kNoWish = std::numeric_limits<Iteration>::max();
 }
 
 RowWaiter::RowWaiter(const AttachedSegment& segment, std::int64_t poll) noexcept
@@ -92,7 +92,7 @@ bool RowSignal::announce(Iteration k) noexcept {
   Bell& bell = view_.bell();
   if (bell.wanted.load(std::memory_order_seq_cst) > k) return false;  // sync wanted
   O80_CRASH_POINT("rows.before_reset");
-  bell.wanted.store(kNobody, std::memory_order_seq_cst);  // sync wanted
+  bell.wanted.store(kNoWish, std::memory_order_seq_cst);  // sync wanted
   O80_CRASH_POINT("rows.before_wake");
   // after the reset: who registered before it still has the old value and will not sleep on it
   view_.counters().row_wake.fetch_add(1, std::memory_order_seq_cst);  // sync row_wake

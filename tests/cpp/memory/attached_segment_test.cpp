@@ -9,6 +9,7 @@
 #include <future>
 #include <thread>
 
+#include "memory/file_bytes.hpp"
 #include "memory/segments.hpp"
 #include "o80/base/error.hpp"
 
@@ -18,15 +19,6 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using AttachedSegmentTest = SegmentTest;
-
-std::vector<char> read_all(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
-void write_all(const std::string& path, const std::vector<char>& bytes) {
-  std::ofstream(path, std::ios::binary).write(bytes.data(), static_cast<long>(bytes.size()));
-}
 
 TEST_F(AttachedSegmentTest, SeesSchemaAndEpochOfItsBackend) {
   const char text[] = "what the rows mean";

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "memory/child_process.hpp"
+#include "memory/file_bytes.hpp"
 #include "memory/segments.hpp"
 #include "o80/base/error.hpp"
 #include "o80/memory/history.hpp"
@@ -22,16 +23,6 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ForeignFileTest = SegmentTest;
-
-void write_all(const std::string& path, const std::vector<char>& bytes) {
-  std::ofstream file(path, std::ios::binary | std::ios::trunc);
-  file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-}
-
-std::vector<char> read_all(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 /// What attaching says, whichever way it is done: to read or to write, to the living or the dead.
 std::string refusal() {

@@ -17,29 +17,29 @@ namespace o80 {
 namespace {
 
 constexpr Iteration kRows = 20'000;
-constexpr std::size_t kWords = 8;
+constexpr std::size_t kNarrowWords = 8;
 
-using Row = std::array<std::uint64_t, kWords>;
+using NarrowRow = std::array<std::uint64_t, kNarrowWords>;
 
-Row row_of(Iteration k) {
-  Row row;
-  for (std::size_t i = 0; i < kWords; ++i) row[i] = static_cast<std::uint64_t>(k) * 100 + i;
+NarrowRow narrow_row(Iteration k) {
+  NarrowRow row;
+  for (std::size_t i = 0; i < kNarrowWords; ++i) row[i] = static_cast<std::uint64_t>(k) * 100 + i;
   return row;
 }
 
-std::byte* bytes_of(Row& row) { return reinterpret_cast<std::byte*>(row.data()); }
+std::byte* bytes_of(NarrowRow& row) { return reinterpret_cast<std::byte*>(row.data()); }
 
 class StressTest : public SegmentTest {
  protected:
   void publish(Iteration k) {
-    Row row = row_of(k);
+    NarrowRow row = narrow_row(k);
     writer_.publish(k, bytes_of(row));
     signal_.wake_readers(k);
   }
 
   OwnedSegment segment_ = running_segment({.name = "arm",
                                            .schema = {},
-                                           .row_bytes = 8 * kWords,
+                                           .row_bytes = 8 * kNarrowWords,
                                            .rows = 4,
                                            .lanes = 4,
                                            .lane_blocks = 8});
@@ -55,23 +55,23 @@ TEST_F(StressTest, ReadersAndWaitersFollowAWriter) {
       const AttachedSegment attached = attach();
       const HistoryReader reader(attached.view());
       RowWaiter waiter(attached);
-      Row row;
+      NarrowRow row;
       for (Iteration k = 0; k < kRows; k += stride) {
         ASSERT_EQ(waiter.wait_for_row(k, patient()), Waited::ready);
         if (reader.read(k, bytes_of(row))) {
-          ASSERT_EQ(row, row_of(k));
+          ASSERT_EQ(row, narrow_row(k));
         }
       }
     });
   readers.emplace_back([] {
     const AttachedSegment attached = attach("arm", Access::read_only);
     const HistoryReader reader(attached.view());
-    std::array<Row, 4> rows;
+    std::array<NarrowRow, 4> rows;
     while (reader.published() < kRows - 1) {
       const auto [first, count] =
           reader.read_range(reader.oldest(), rows.size(), bytes_of(rows.front()));
       for (std::size_t i = 0; i < count; ++i)
-        ASSERT_EQ(rows[i], row_of(first + static_cast<Iteration>(i)));
+        ASSERT_EQ(rows[i], narrow_row(first + static_cast<Iteration>(i)));
       std::this_thread::yield();
     }
   });
@@ -188,11 +188,11 @@ TEST_F(StressTest, ANameIsTakenOverWhileOthersFollowIt) {
               AttachedSegment::attach("arm", Access::read_write, soon());
           RowWaiter waiter(attached);
           const HistoryReader reader(attached.view());
-          Row row;
+          NarrowRow row;
           for (Iteration k = 0;; ++k) {
             waiter.wait_for_row(k, patient());
             if (reader.read(k, bytes_of(row))) {
-              ASSERT_EQ(row, row_of(k));
+              ASSERT_EQ(row, narrow_row(k));
             }
           }
         } catch (const BackendGone&) {
@@ -209,14 +209,14 @@ TEST_F(StressTest, ANameIsTakenOverWhileOthersFollowIt) {
         try {
           OwnedSegment own = running_segment({.name = "arm",
                                               .schema = {},
-                                              .row_bytes = 8 * kWords,
+                                              .row_bytes = 8 * kNarrowWords,
                                               .rows = 4,
                                               .lanes = 1,
                                               .lane_blocks = 8});
           HistoryWriter writer(own.view());
           RowSignal signal(own.view());
           for (Iteration k = 0; k < 20; ++k) {
-            Row row = row_of(k);
+            NarrowRow row = narrow_row(k);
             writer.publish(k, bytes_of(row));
             signal.wake_readers(k);
           }

@@ -9,7 +9,7 @@ namespace {
 
 const Air kVacuum{0, 0, 0, {0, 0, -9.81}};
 
-Air table_tennis() { return Air::of(1.18, 0.40, 1.47, 0.02, 0.0027, 0.5, {0, 0, -9.81}); }
+Air room_air() { return Air::of(1.18, 0.40, 1.47, 0.02, 0.0027, 0.5, {0, 0, -9.81}); }
 
 Ball flown_for(Ball ball, const Air& air, double duration, double step) {
   for (int i = 0; i < std::lround(duration / step); ++i) ball = flown(ball, air, step);
@@ -25,7 +25,7 @@ TEST(BallFlight, IsAParabolaInVacuum) {
 }
 
 TEST(BallFlight, SlowsDownAsDragSays) {
-  Air air = table_tennis();
+  Air air = room_air();
   air.gravity = {};
   const Ball end = flown_for({{}, {0, 10, 0}, {}}, air, 1.0, 0.002);
 
@@ -35,8 +35,8 @@ TEST(BallFlight, SlowsDownAsDragSays) {
 }
 
 TEST(BallFlight, TopSpinPullsTheBallDown) {
-  const Ball plain = flown_for({{}, {0, -5, 0}, {}}, table_tennis(), 0.3, 0.002);
-  const Ball top = flown_for({{}, {0, -5, 0}, {30, 0, 0}}, table_tennis(), 0.3, 0.002);
+  const Ball plain = flown_for({{}, {0, -5, 0}, {}}, room_air(), 0.3, 0.002);
+  const Ball top = flown_for({{}, {0, -5, 0}, {30, 0, 0}}, room_air(), 0.3, 0.002);
 
   EXPECT_LT(top.position.z, plain.position.z - 0.03);
   EXPECT_NEAR(top.spin.x, 30 * std::exp(-0.5 * 0.3), 1e-9);
@@ -44,8 +44,8 @@ TEST(BallFlight, TopSpinPullsTheBallDown) {
 
 TEST(BallFlight, DoesNotDependOnTheStep) {
   const Ball ball{{}, {1, -5, 2}, {30, 10, -5}};
-  const Ball fine = flown_for(ball, table_tennis(), 0.6, 0.0005);
-  const Ball coarse = flown_for(ball, table_tennis(), 0.6, 0.01);
+  const Ball fine = flown_for(ball, room_air(), 0.6, 0.0005);
+  const Ball coarse = flown_for(ball, room_air(), 0.6, 0.01);
 
   EXPECT_LT(length(fine.position - coarse.position), 1e-5);
 }

@@ -8,6 +8,7 @@
 #include <random>
 #include <vector>
 
+#include "mujoco/expect_near.hpp"
 #include "simulators/mujoco/ball_record.hpp"
 
 namespace o80::mujoco {
@@ -16,7 +17,7 @@ namespace {
 constexpr double kRadius = 0.02;
 constexpr double kStep = 0.002;
 constexpr double kThickness = 0.0027;  // half
-const Air kVacuum{0, 0, 0, {0, 0, 0}};
+const Air kWeightless{0, 0, 0, {0, 0, 0}};
 
 /// A racket that looks along y, on its way from one pose to another.
 Surface racket(const Pose& from, const Pose& to, const Restitution& kept = {0.78, 0.78, 0.78}) {
@@ -35,7 +36,7 @@ struct Flight {
   BallRecord record;
 };
 /// One step of free flight among surfaces.
-Flight step(const Ball& ball, std::vector<Surface> surfaces, const Air& air = kVacuum) {
+Flight step(const Ball& ball, std::vector<Surface> surfaces, const Air& air = kWeightless) {
   Flight flight;
   flight.end = flown_among(
       surfaces, ball, air, kRadius, kStep, 0,
@@ -44,12 +45,6 @@ Flight step(const Ball& ball, std::vector<Surface> surfaces, const Air& air = kV
       },
       [&](const Surface& surface, double gap) { note_gap(flight.record, surface, gap); });
   return flight;
-}
-
-void expect_near(const Vector& a, const Vector& b, double tolerance = 1e-9) {
-  EXPECT_NEAR(a.x, b.x, tolerance);
-  EXPECT_NEAR(a.y, b.y, tolerance);
-  EXPECT_NEAR(a.z, b.z, tolerance);
 }
 
 TEST(Impact, HeadOnTurnsTheNormalVelocityRoundAndFliesTheRestOfTheStep) {

@@ -8,16 +8,12 @@
 #include <numbers>
 #include <random>
 
+#include "mujoco/expect_near.hpp"
+
 namespace o80::mujoco {
 namespace {
 
 const Blade kBlade{{0.07425, 0.0027, 0.0941}, 1};
-
-void expect_near(const Vector& a, const Vector& b, double tolerance) {
-  EXPECT_NEAR(a.x, b.x, tolerance);
-  EXPECT_NEAR(a.y, b.y, tolerance);
-  EXPECT_NEAR(a.z, b.z, tolerance);
-}
 
 TEST(Blade, IsFlatInsideItsRimAndLooksAlongItsThinAxis) {
   const Near above = kBlade.near({0.03, 0.05, -0.06});

@@ -5,22 +5,22 @@
 namespace o80::test {
 namespace {
 
-struct LaunchBall {
+struct ThrowBall {
   static constexpr std::string_view kHelp = "shoot the next ball";
   double speed = 0;
 };
-O80_DESCRIBE(LaunchBall, (speed, "[m/s]"));
+O80_DESCRIBE(ThrowBall, (speed, "[m/s]"));
 
 struct Home {};
 O80_DESCRIBE(Home);
 
 struct Launcher {
   using Actuators = NoActuators;
-  using Requests = o80::Requests<LaunchBall, Home>;
+  using Requests = o80::Requests<ThrowBall, Home>;
 };
 
 TEST(RobotTypesTest, NameARequestAfterItsStruct) {
-  EXPECT_EQ(request_name<LaunchBall>(), "launch_ball");
+  EXPECT_EQ(request_name<ThrowBall>(), "throw_ball");
   EXPECT_EQ(request_name<Home>(), "home");
 }
 

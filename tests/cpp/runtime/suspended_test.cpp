@@ -97,9 +97,9 @@ TEST_F(SuspendedTest, ABackendKeepsItsName) {
 }
 
 /// A frontend in a process of its own: takes control and sends a movement of many iterations.
-class Commander {
+class SuspendedCommander {
  public:
-  explicit Commander(bool with_control)
+  explicit SuspendedCommander(bool with_control)
       : child_([=](const ChildProcess::Ready& ready) {
           UntypedFrontend frontend("pair", {.timeout = kPatience});
           if (with_control) frontend.add_take_control();
@@ -135,7 +135,7 @@ TEST_F(SuspendedTest, AFrontendKeepsItsLaneAndItsCommandsLiveOnWhateverThePolicy
     // the movement of the child begins with the first iteration after its pulse
     Station station({.segment = "pair", .lanes = 1, .stale = stale});
     station.start();
-    Commander commander(false);
+    SuspendedCommander commander(false);
     ASSERT_TRUE(commander.child().wait_until_ready());
     station.run(10);
     commander.child().stop_and_wait_until_stopped();
@@ -159,7 +159,7 @@ TEST_F(SuspendedTest, AFrontendKeepsItsLaneAndItsCommandsLiveOnWhateverThePolicy
 TEST_F(SuspendedTest, AHolderOfControlKeepsItUntilItLetsGo) {
   Station station;
   station.start();
-  Commander commander(true);
+  SuspendedCommander commander(true);
   ASSERT_TRUE(commander.child().wait_until_ready());
   station.run(10);
   commander.child().stop_and_wait_until_stopped();

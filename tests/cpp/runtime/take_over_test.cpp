@@ -15,7 +15,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 class TakeOverTest : public StationTest {};
 
-void be_a_backend(const ChildProcess::Ready& ready) {
+void run_until_killed(const ChildProcess::Ready& ready) {
   Station station;
   station.start();
   station.run(5);
@@ -35,7 +35,7 @@ void expect_every_verb_says(UntypedFrontend& frontend, const std::string& what) 
 }
 
 TEST_F(TakeOverTest, SaysWhatBecameOfTheOldBackendByNameAndPid) {
-  ChildProcess killed(be_a_backend);
+  ChildProcess killed(run_until_killed);
   ASSERT_TRUE(killed.wait_until_ready());
   UntypedFrontend first("pair");
   const std::string pid = "pid " + std::to_string(killed.pid());
@@ -59,7 +59,7 @@ TEST_F(TakeOverTest, SaysWhatBecameOfTheOldBackendByNameAndPid) {
 }
 
 TEST_F(TakeOverTest, LetsAFrontendAttachAgainInItsOwnPlace) {
-  ChildProcess killed(be_a_backend);
+  ChildProcess killed(run_until_killed);
   ASSERT_TRUE(killed.wait_until_ready());
   UntypedFrontend arm("pair");
   const Batch old = send(arm, 0, 5.0);
@@ -91,7 +91,7 @@ TEST_F(TakeOverTest, WaitsForNoPeriodOfThoseWhoWatch) {
   int quick = 0;
   double shortest = 1;
   for (int i = 0; i < kTimes; ++i) {
-    ChildProcess killed(be_a_backend);
+    ChildProcess killed(run_until_killed);
     ASSERT_TRUE(killed.wait_until_ready());
     killed.kill_now();
     const double before = slept();
