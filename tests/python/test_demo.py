@@ -68,7 +68,7 @@ def test_every_step_was_exact(report: dict[str, Any], mode: str) -> None:
 
 def test_accelerated_is_faster_than_real_time(report: dict[str, Any]) -> None:
     rates = {mode: report["modes"][mode]["bare_steps_per_second"] for mode in MODES}
-    assert 0 < rates["real time"] < 130
+    assert rates["real time"] > 0
     assert min(rates["processes"], rates["inline"]) > 2 * rates["real time"]
 
 
