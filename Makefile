@@ -1,5 +1,5 @@
 # Everything made lies in .venv and build/. Options go through ARGS="...".
-.PHONY: growth demo test model torture bench rt stress fuzz format clean distclean
+.PHONY: demo test torture model fuzz rt bench growth stress format clean distclean
 ARGS ?=
 export PYTHONDONTWRITEBYTECODE := 1
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
@@ -20,23 +20,21 @@ torture:
 	@.venv/bin/cmake --build --preset dev --target o80-torture
 	@build/dev/bin/o80-torture --python .venv/bin/python $(ARGS)
 
-bench:
-	@tools/setup.sh bench
-	@.venv/bin/cmake --preset release > /dev/null
-	@.venv/bin/cmake --build --preset release
-	@.venv/bin/python benchmarks/run.py $(ARGS)
-
 # what tests cannot reach: every order of steps, on small cases
 model:
 	@tools/setup.sh test
 	@.venv/bin/python models/run.py $(ARGS)
 
-# jitter of the real-time loop on a machine under stress, beside cyclictest
-stress:
+# bench: the budgets; growth: cost against size, as plots; stress: jitter of the real-time loop on a
+# machine under stress, beside cyclictest
+bench: script := run
+growth: script := growth
+stress: script := stress
+bench growth stress:
 	@tools/setup.sh bench
 	@.venv/bin/cmake --preset release > /dev/null
 	@.venv/bin/cmake --build --preset release
-	@.venv/bin/python benchmarks/stress.py $(ARGS)
+	@.venv/bin/python benchmarks/$(script).py $(ARGS)
 
 # some minutes for each fuzzer; finds go to build/fuzz/found: make fuzz ARGS="lane --minutes 60 --merge"
 fuzz:
@@ -49,11 +47,6 @@ rt:
 	@.venv/bin/cmake --preset rt > /dev/null
 	@.venv/bin/cmake --build --preset rt
 	@.venv/bin/python tools/rt.py $(ARGS)
-growth:
-	@tools/setup.sh bench
-	@.venv/bin/cmake --preset release > /dev/null
-	@.venv/bin/cmake --build --preset release --target o80-bench-growth
-	@.venv/bin/python benchmarks/growth.py $(ARGS)
 
 format:
 	@tools/setup.sh test

@@ -2,7 +2,6 @@
 
 import contextlib
 import os
-import select
 import signal
 import threading
 from collections.abc import Callable, Iterator
@@ -10,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from processes import end_of
 
 import o80
 
@@ -308,14 +308,3 @@ def test_a_robot_does_not_live_on_with_a_child_of_its_killed_parent(segment: str
         os.kill(orphan, 0)
     finally:
         os.kill(orphan, signal.SIGKILL)
-
-
-def end_of(process: int) -> None:
-    """Waits until a process that is not our child has ended."""
-    try:
-        descriptor = os.pidfd_open(process)
-    except ProcessLookupError:
-        return
-    readable, _, _ = select.select([descriptor], [], [], WAIT)
-    os.close(descriptor)
-    assert readable

@@ -1,7 +1,6 @@
 """The end of the interpreter, in every way, with everything still under way."""
 
 import os
-import select
 import signal
 import subprocess
 import sys
@@ -9,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from blocking import CALLS
+from processes import end_of
 
 import o80
 
@@ -29,17 +29,6 @@ def run(program: str, *flags: str) -> subprocess.CompletedProcess[str]:
 
 def crashes(ended: subprocess.CompletedProcess[str]) -> list[str]:
     return [word for word in WORDS_OF_A_CRASH if word in ended.stderr]
-
-
-def end_of(process: int) -> None:
-    """Waits until a process that is not our child has ended."""
-    try:
-        descriptor = os.pidfd_open(process)
-    except ProcessLookupError:
-        return
-    readable, _, _ = select.select([descriptor], [], [], WAIT)
-    os.close(descriptor)
-    assert readable
 
 
 ENDS = {

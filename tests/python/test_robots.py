@@ -2,7 +2,6 @@
 
 import gc
 import os
-import select
 import shutil
 import signal
 import subprocess
@@ -10,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from processes import end_of
 
 import o80
 
@@ -177,17 +177,6 @@ def test_a_process_ends_with_the_program_that_started_it(segment: str) -> None:
 
     end_of(int(starter.stdout))
     assert segment not in [entry.name for entry in o80.segments() if entry.alive]
-
-
-def end_of(process: int) -> None:
-    """Waits until a process that is not our child has ended."""
-    try:
-        descriptor = os.pidfd_open(process)
-    except ProcessLookupError:
-        return
-    readable, _, _ = select.select([descriptor], [], [], WAIT)
-    os.close(descriptor)
-    assert readable
 
 
 def test_a_process_never_stopped_is_warned_about_and_stopped(segment: str) -> None:

@@ -12,28 +12,13 @@ class Burster {
   explicit Burster(Actor& actor) : actor_(actor) {}
 
   void run() {
-    while (actor_.acting()) {
-      if (auto frontend = actor_.attach(actor_.slot.segment)) {
-        Sender sender(actor_, std::move(*frontend));
-        serve(sender);
-      }
-      if (actor_.slot.batches + 8 >= kMostBatches || actor_.slot.commands + 128 >= kMostCommands)
-        return;
-    }
+    serve_every_backend(actor_, call_began_, [&](Sender& sender) {
+      Verifier verifier(actor_, sender.frontend());
+      while (actor_.acting() && sender.has_room()) burst(sender, verifier);
+    });
   }
 
  private:
-  void serve(Sender& sender) {
-    Verifier verifier(actor_, sender.frontend());
-    try {
-      while (actor_.acting() && sender.has_room()) burst(sender, verifier);
-    } catch (const o80::BackendGone& error) {
-      actor_.judge_gone(sender.life(), error, call_began_);
-    }
-    sender.settle_all();
-    sender.close();
-  }
-
   void burst(Sender& sender, Verifier& verifier) {
     const std::int64_t stopped = actor_.stopped();
     call_began_ = o80::monotonic_now();

@@ -25,28 +25,13 @@ class Commander {
         keen_(actor.chance.percent(30)) {}
 
   void run() {
-    while (actor_.acting()) {
-      if (auto frontend = actor_.attach(actor_.slot.segment)) {
-        Sender sender(actor_, std::move(*frontend));
-        serve(sender);
-      }
-      if (actor_.slot.batches + 8 >= kMostBatches || actor_.slot.commands + 128 >= kMostCommands)
-        return;
-    }
+    serve_every_backend(actor_, call_began_, [&](Sender& sender) {
+      while (actor_.acting() && sender.has_room()) command(sender);
+      wind_up(sender);
+    });
   }
 
  private:
-  void serve(Sender& sender) {
-    try {
-      while (actor_.acting() && sender.has_room()) command(sender);
-      wind_up(sender);
-    } catch (const o80::BackendGone& error) {
-      actor_.judge_gone(sender.life(), error, call_began_);
-    }
-    sender.settle_all();
-    sender.close();
-  }
-
   void command(Sender& sender) {
     call_began_ = o80::monotonic_now();
     if (sender.open_commands() < most_open_) {

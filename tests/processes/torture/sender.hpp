@@ -68,4 +68,25 @@ class Sender {
   std::uint32_t lane_ = kNoLane;
 };
 
+/// Attaches and serves until the backend has gone, again and again.
+///
+/// `call_began`: when the last call began, for the judge of a death.
+template <class Serve>
+void serve_every_backend(Actor& actor, const std::int64_t& call_began, Serve&& serve) {
+  while (actor.acting()) {
+    if (auto frontend = actor.attach(actor.slot.segment)) {
+      Sender sender(actor, std::move(*frontend));
+      try {
+        serve(sender);
+      } catch (const o80::BackendGone& error) {
+        actor.judge_gone(sender.life(), error, call_began);
+      }
+      sender.settle_all();
+      sender.close();
+    }
+    if (actor.slot.batches + 8 >= kMostBatches || actor.slot.commands + 128 >= kMostCommands)
+      return;
+  }
+}
+
 }  // namespace torture
