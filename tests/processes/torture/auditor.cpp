@@ -157,6 +157,7 @@ class Auditor {
         view.statuses(batch.lane)[id & (2 * std::uint64_t{view.shape.lane_blocks} - 1)];
     const std::uint64_t owner = status.id.load();
     const o80::StatusWord word = o80::StatusWord::unpack(status.word.load());
+    command.found_id = owner;
     if (owner > id) {
       command.found = static_cast<std::uint32_t>(o80::Status::forgotten);
     } else if (owner == id && word.status != 0) {

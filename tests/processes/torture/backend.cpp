@@ -9,8 +9,6 @@ namespace torture {
 
 namespace {
 
-using States = std::array<double, kActuators>;
-
 struct Habits {
   o80::BackendOptions options;
   std::int64_t pause;  // of an iteration [ns]
@@ -44,8 +42,7 @@ Habits draw(Actor& actor, bool bursting) {
 class Machine final : private o80::RequestServer {
  public:
   Machine(Actor& actor, const Habits& habits)
-      : actor_(actor),
-        life_(actor.round.lives[actor.slot.generation]),
+      : life_(actor.round.lives[actor.slot.generation]),
         number_(actor.slot.generation),
         backend_(schema_of("torture"), habits.options, this) {
     life_.epoch = epoch_of(habits.options.segment);
@@ -108,7 +105,6 @@ class Machine final : private o80::RequestServer {
     return true;
   }
 
-  Actor& actor_;
   Generation& life_;
   std::uint32_t number_;
   std::uint64_t chain_ = 0;  // digest of the last row

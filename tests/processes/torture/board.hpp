@@ -130,6 +130,7 @@ struct SentCommand {
   std::uint32_t found;   // status as the auditor found it in the segment
   std::int64_t told_at;  // iteration
   std::int64_t found_at;
+  std::uint64_t found_id;  // whose status stands in its place
   std::uint32_t found_reason;
   std::uint32_t overwrite;
 };

@@ -4,6 +4,7 @@
 #include <bit>
 #include <map>
 
+#include "o80/control/record.hpp"
 #include "o80/control/status.hpp"
 
 namespace torture {
@@ -152,7 +153,26 @@ class Judge {
     if (life.drained != 0) return add(Fault::lost, slot, batch, command, "it never ended");
     if (command.found != 0 && done.size() == 1 && done[0].iteration + 1 < life.rows)
       add(Fault::falsely_told, slot, batch, command,
-          "done at " + std::to_string(done[0].iteration) + ", and nobody was told");
+          "done at " + std::to_string(done[0].iteration) + ", and nobody was told" +
+              told_of(slot, batch));
+  }
+
+  /// What became of all of a batch, for who wonders.
+  std::string told_of(const Slot& slot, const SentBatch& batch) {
+    std::string text = "; taken at " + std::to_string(batch.taken) + ", sent at " +
+                       std::to_string(batch.sent_at) + ", sender doomed at " +
+                       std::to_string(slot.doomed_at.load()) + ":";
+    for (std::uint32_t i = 0; i < batch.commands; ++i) {
+      const SentCommand& command = slot.sent_commands[batch.first_command + i];
+      text += "\n    record " + std::to_string(o80::record_id(batch.id, i)) + ", kind " +
+              std::to_string(static_cast<int>(command.kind)) + ": found " +
+              name_of(static_cast<Status>(command.found)) + " at " +
+              std::to_string(command.found_at) + ", in the place of " +
+              std::to_string(command.found_id) + "; done at";
+      for (const Done& done : deeds(batch.generation).of(command))
+        text += " " + std::to_string(done.iteration);
+    }
+    return text;
   }
 
   void judge_end(const Slot& slot, const SentBatch& batch, const SentCommand& command,

@@ -45,8 +45,10 @@ O80_DESCRIBE(Mark, id);
 O80_DESCRIBE(Again, id);
 O80_DESCRIBE(Sensors, generation, chain, digest, filler);
 
+using States = std::array<double, kActuators>;
+
 struct Robot {
-  using Actuators = std::array<double, kActuators>;
+  using Actuators = States;
   using Extended = Sensors;
   using Requests = o80::Requests<Mark, Again>;
 };

@@ -230,7 +230,9 @@ std::size_t Sender::open_commands() const {
 }
 
 void Sender::settle(const Open& open) {
-  if (open.batch.rejection().empty()) open.entry->taken = open.batch.first_iteration();
+  // asked first: of a batch that is refused in between, no iteration is known
+  const o80::Iteration first = open.batch.first_iteration();
+  if (open.batch.rejection().empty()) open.entry->taken = first;
   for (std::uint32_t i = 0; i < open.entry->commands; ++i) {
     const o80::Handle handle = open.batch.handle(i);
     SentCommand& command = actor_.slot.sent_commands[open.entry->first_command + i];

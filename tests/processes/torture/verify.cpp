@@ -6,7 +6,6 @@ Verifier::Verifier(Actor& actor, const o80::UntypedFrontend& frontend)
     : actor_(actor), life_(actor.life_of(frontend)), layout_(frontend.layout()) {}
 
 Sensors Verifier::verify(const std::byte* row, o80::Iteration k) {
-  using States = std::array<double, kActuators>;
   const auto head = o80::unpack<o80::RowHead>(row);
   const auto found = o80::unpack<Sensors>(row + layout_.extended);
   const auto number = static_cast<std::uint64_t>(&life_ - actor_.round.lives.data());
