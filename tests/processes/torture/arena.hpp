@@ -54,6 +54,8 @@ class Arena {
   void abandon();
 
  private:
+  static constexpr std::int64_t kPatience = 180'000 * kMillisecond;  // with what does not get on
+
   struct Running {
     Slot* slot;
     bool stopped = false;
