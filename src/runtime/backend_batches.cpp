@@ -106,14 +106,16 @@ Outcome UntypedBackend::Body::request(std::uint32_t lane, CommandId id, std::uin
 }
 
 Outcome UntypedBackend::Body::take_control(std::uint32_t lane) noexcept {
-  // a batch of another lane never comes here while somebody has control
+  // a batch of somebody else never comes here while somebody has control; who has left the lane
+  // meanwhile would have lost it at once
+  if (taking_owner_ == 0 || taking_owner_ != lanes[lane].incarnation()) return {};
   holder_ = lane;
-  holder_incarnation_ = lanes[lane].incarnation();
+  holder_incarnation_ = taking_owner_;
   return {};
 }
 
 Outcome UntypedBackend::Body::release_control(std::uint32_t lane) noexcept {
-  if (holder_ == lane) holder_ = kNobody;
+  if (holder_ == lane && holder_incarnation_ == taking_owner_) holder_ = kNobody;
   return {};
 }
 
@@ -135,6 +137,7 @@ void UntypedBackend::Body::begin_staging(std::uint32_t lane, std::uint32_t& budg
   staging_ = true;
   // who was mourned may have left this, and no heir come yet
   staging_incarnation_ = lanes[lane].incarnation();
+  staging_owner_ = lanes[lane].owner_of_next();
   staging_of_dead_ = lanes[lane].next_is_of_dead() ||
                      (staging_incarnation_ != 0 && staging_incarnation_ <= mourned_[lane]);
   staging_lane_ = lane;
@@ -187,6 +190,7 @@ void UntypedBackend::Body::staged() noexcept {
                             batch.ticket,
                             first,
                             lane,
+                            staging_owner_,
                             batch.late_now != 0,
                             staging_of_dead_};
   if (!admit(sent)) return;
@@ -194,8 +198,13 @@ void UntypedBackend::Body::staged() noexcept {
   if (sent.at > current) {
     schedule.add(sent);
   } else {
-    controller.take(lane, first, *this);
+    take(sent);
   }
+}
+
+void UntypedBackend::Body::take(const ScheduledBatch& sent) noexcept {
+  taking_owner_ = sent.owner;
+  controller.take(sent.lane, sent.batch, *this);
 }
 
 /// Whether a batch may be taken, now or later; else it ends as rejected.
@@ -205,7 +214,8 @@ bool UntypedBackend::Body::admit(const ScheduledBatch& sent) noexcept {
     return false;
   };
   watch_holder();
-  if (holder_ != kNobody && holder_ != sent.lane) return reject(Reason::exclusive, holder_);
+  const bool is_holders = holder_ == sent.lane && holder_incarnation_ == sent.owner;
+  if (holder_ != kNobody && !is_holders) return reject(Reason::exclusive, holder_);
   if (sent.at < current && !sent.late_now) return reject(Reason::late);
   const LaneLife& life = lives_[sent.lane];
   const bool dead = sent.of_dead || (life.state == LaneState::died &&
@@ -228,7 +238,7 @@ void UntypedBackend::Body::take_due() noexcept {
   while (!schedule.empty() && schedule.next().at <= current) {
     const ScheduledBatch due = schedule.next();
     schedule.drop_next();
-    if (admit(due)) controller.take(due.lane, due.batch, *this);
+    if (admit(due)) take(due);
   }
 }
 

@@ -77,6 +77,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   void drop_staged(std::uint32_t blocks_outside) noexcept;
   void staged() noexcept;
   bool admit(const ScheduledBatch& sent) noexcept;
+  void take(const ScheduledBatch& sent) noexcept;
   void grant(std::uint32_t lane, const BatchRecord& batch) noexcept;
   bool granted() const noexcept { return burst_left_ != 0; }
   void count_burst() noexcept;
@@ -117,11 +118,13 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   bool staging_of_dead_ = false;  // whose place another frontend has taken
   std::uint32_t staging_lane_ = 0;
   std::uint64_t staging_incarnation_ = 0;
+  std::uint64_t staging_owner_ = 0;  // 0: one that had left the lane before
   std::uint32_t staging_left_ = 0;  // blocks
   BlockChain staging_chain_;
 
   std::uint32_t holder_ = kNobody;  // lane with exclusive control
   std::uint64_t holder_incarnation_ = 0;
+  std::uint64_t taking_owner_ = 0;  // who sent the batch that is being taken
 
   std::int64_t burst_left_ = 0;  // iterations, or kUntilEnded
   std::uint32_t burst_lane_ = kNobody;

@@ -77,6 +77,11 @@ class LaneReceiver {
   std::uint64_t dead_predecessor() const noexcept;
   /// What is next was sent by that one.
   bool next_is_of_dead() const noexcept;
+  /// The owner that sent what is next: its count, or 0 if another has the lane since. To be asked
+  /// after `available`.
+  std::uint64_t owner_of_next() const noexcept {
+    return static_cast<std::int64_t>(first_ - cursor_) > 0 ? 0 : owner_;
+  }
 
  private:
   bool is_possible(std::uint64_t cursor) const noexcept;

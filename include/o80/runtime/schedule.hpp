@@ -13,6 +13,7 @@ struct ScheduledBatch {
   std::uint64_t ticket = 0;
   BlockIndex batch = kNoBlock;
   std::uint32_t lane = 0;
+  std::uint64_t owner = 0;  // incarnation of who sent it, 0: one that had left the lane before
   bool late_now = false;
   bool of_dead = false;  // its sender has died, whoever has the lane now
 };

@@ -420,6 +420,70 @@ TEST_F(BackendTest, ControlDoesNotPassToWhoGetsTheLaneNext) {
   EXPECT_EQ(of_other.handle(0).status, Status::completed);
 }
 
+/// Two lanes: one that changes hands with a batch of its former owner put off to iteration 5, and
+/// another's.
+class InheritedControl : public BackendTest {
+ protected:
+  InheritedControl() {
+    station_.start();
+    former_.emplace("pair");
+    other_.emplace("pair");
+  }
+  /// Sends what was added and leaves the lane to an heir before that is taken.
+  Batch leave_for_later() {
+    const Batch late = former_->pulse({.at = 5});
+    send(*other_, 1, 0.5);
+    station_.run(1);
+    former_.reset();
+    heir_.emplace("pair");
+    send(*heir_, 1, 0.25);
+    station_.run(1);
+    return late;
+  }
+  Batch take_control_at_once() {
+    heir_->add_take_control();
+    const Batch taken = heir_->pulse();
+    station_.run(1);
+    EXPECT_EQ(taken.handle(0).status, Status::completed);
+    return taken;
+  }
+  Status of_another_after(int iterations) {
+    station_.run(iterations);
+    const Batch batch = send(*other_, 0, 2.0);
+    station_.run(1);
+    return batch.handle(0).status;
+  }
+
+  Station station_{{.segment = "pair", .lanes = 2}};
+  std::optional<UntypedFrontend> former_;
+  std::optional<UntypedFrontend> other_;
+  std::optional<UntypedFrontend> heir_;
+};
+
+TEST_F(InheritedControl, IsNotLostByARequestOfTheFormerOwnerToLetGo) {
+  former_->add_release_control();
+  leave_for_later();
+  take_control_at_once();
+  EXPECT_EQ(of_another_after(8), Status::rejected);
+  EXPECT_EQ(send(*heir_, 0, 1.0).handle(0).status, Status::queued);
+}
+
+TEST_F(InheritedControl, IsNotTakenForTheHeirByTheFormerOwner) {
+  former_->add_take_control();
+  leave_for_later();
+  EXPECT_EQ(of_another_after(8), Status::completed);
+}
+
+TEST_F(InheritedControl, HoldsAgainstWhatTheFormerOwnerSent) {
+  const std::array<double, 1> target{3.0};
+  former_->add_command(0, std::as_bytes(std::span(target)));
+  const Batch late = leave_for_later();
+  take_control_at_once();
+  station_.run(8);
+  EXPECT_EQ(late.handle(0).status, Status::rejected);
+  EXPECT_EQ(late.handle(0).reason, Reason::exclusive);
+}
+
 // ------------------------------------------------------------------------------ silence, stopping
 
 TEST_F(BackendTest, PurgesAfterTooLongASilence) {
