@@ -1,8 +1,11 @@
 # The fuzzers of tests/fuzz: one program for each fuzz_<name>.cpp, against a library that is watched
-# while it runs. They need clang and its libFuzzer.
-if(NOT O80_SANITIZE MATCHES "fuzzer-no-link")
+# while it runs. They need clang and its libFuzzer, and a sanitizer to notice anything.
+option(O80_BUILD_FUZZERS "Build the fuzzers (needs clang)" OFF)
+if(NOT O80_BUILD_FUZZERS)
   return()
 endif()
+
+target_compile_options(o80 PRIVATE -fsanitize=fuzzer-no-link)
 
 file(GLOB fuzzer_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tests/fuzz/fuzz_*.cpp)
 add_custom_target(fuzzers)

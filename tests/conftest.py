@@ -1,5 +1,6 @@
 """What every test session promises: it leaves no process and no shared memory behind."""
 
+import contextlib
 import os
 import signal
 import time
@@ -65,6 +66,13 @@ def children() -> set[int]:
     return {child for child in found - own if lives(child)}
 
 
+def relatives() -> set[int]:
+    """Our children, and who was started for a segment of this session by one of them."""
+    own = f"test-{os.getpid()}-"
+    everybody = {int(folder.name) for folder in Path("/proc").glob("[0-9]*")}
+    return children() | {p for p in everybody if own in command_line(p) and lives(p)}
+
+
 def left_over(found: Callable[[], set[Found]], before: set[Found]) -> list[Found]:
     """What was found beyond what was there before, once the dying have died."""
     end = time.monotonic() + GRACE
@@ -77,9 +85,15 @@ def left_over(found: Callable[[], set[Found]], before: set[Found]) -> list[Found
 def nothing_left_behind() -> Iterator[None]:
     processes, files = children(), segment_files()
     yield
-    living = [command_line(child) for child in left_over(children, processes)]
-    assert not living, f"the tests left processes behind: {living}"
+    living = left_over(relatives, processes)
+    commands = [command_line(process) for process in living]
+    for process in living:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(process, signal.SIGKILL)
     abandoned = left_over(abandoned_files, files)
+    for file in abandoned:
+        file.unlink(missing_ok=True)
+    assert not commands, f"the tests left processes behind: {commands}"
     assert not abandoned, f"the tests left shared memory behind: {abandoned}"
 
 
