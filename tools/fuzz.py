@@ -17,7 +17,7 @@ BUILD = ROOT / "build" / "fuzz"
 CORPUS = ROOT / "tests" / "fuzz" / "corpus"
 LONGEST = 1500  # bytes of an input
 # how many inputs a bounded run tries: each some ten seconds on one processor
-RUNS = {"options": 15_000, "schema": 15_000, "segment": 3_000, "lane": 10_000}
+RUNS = {"options": 10_000, "schema": 8_000, "segment": 2_000, "lane": 6_000}
 JOBS = len(os.sched_getaffinity(0))
 COMMON = [
     f"-max_len={LONGEST}",
