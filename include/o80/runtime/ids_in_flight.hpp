@@ -27,6 +27,8 @@ class IdsInFlight {
   void sent(CommandId first, std::uint64_t n) { runs_.push_back({first, n, first + 1}); }
 
  private:
+  void go_back(std::size_t moved);
+
   struct Run {
     std::uint64_t begin;  // where its places come round: its first id, plus revolutions
     std::uint64_t count;

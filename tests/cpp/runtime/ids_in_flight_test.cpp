@@ -56,6 +56,14 @@ TEST(IdsInFlight, AreNoneWhenWhatRunsLeavesNoRow) {
   EXPECT_EQ(*first % kPlaces, 21U);
 }
 
+TEST(IdsInFlight, StayWhereTheyWereWhenThereAreNone) {
+  IdsInFlight ids(kPlaces);
+  ids.sent(1, 10);
+  ids.sent(11, 10);
+  for (int i = 0; i < 1000; ++i) ASSERT_EQ(ids.draw(21, 13, kNone), std::nullopt);
+  EXPECT_EQ(ids.draw(21, 12, kNone), 21U);
+}
+
 TEST(IdsInFlight, NeverMeetThePlaceOfABatchThatRuns) {
   std::mt19937 random(1);
   IdsInFlight ids(kPlaces);
