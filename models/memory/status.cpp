@@ -2,8 +2,11 @@
 // places are used again and again.
 //
 // mutant old_word_stays: src/memory/lane_receiver.cpp
-//   - slot.word.store(0, std::memory_order_relaxed);
+//   - slot.word.store(StatusWord::announcing(id), std::memory_order_relaxed);
 //   +
+// mutant nothing_announced: src/memory/lane_receiver.cpp
+//   - slot.word.store(StatusWord::announcing(id), std::memory_order_relaxed);
+//   + slot.word.store(~std::uint64_t{0} >> 16, std::memory_order_relaxed);
 // mutant id_relaxed: src/memory/lane_receiver.cpp
 //   - slot.id.store(id, std::memory_order_release);  // sync status_id
 //   + slot.id.store(id, std::memory_order_relaxed);
@@ -11,8 +14,8 @@
 //   - slot.word.store(word.packed(), std::memory_order_release);
 //   + slot.word.store(word.packed(), std::memory_order_relaxed);
 // mutant word_looked_at_once: src/memory/lane_sender.cpp
-//   - slot.word.load(std::memory_order_relaxed) == word)
-//   + true)
+//   - slot.word.load(std::memory_order_relaxed) == word) return
+//   + true) return
 // mutant burst_not_taken_back: src/memory/lane_receiver.cpp
 //   - slot.id.store(0, std::memory_order_relaxed); O80_CRASH_POINT("burst.before_row");
 //   +

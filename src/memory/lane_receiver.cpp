@@ -82,8 +82,8 @@ void LaneReceiver::set_status(std::uint64_t id, StatusWord word) noexcept {
   const std::uint64_t owner = slot.id.load(std::memory_order_relaxed);
   if (owner > id) return;  // a later command has the place: this one is forgotten already
   if (owner != id) {
-    // a reader of the new id sees no old word
-    slot.word.store(0, std::memory_order_relaxed);
+    // a reader of the new id sees no old word, nor one of the old id a word that is none
+    slot.word.store(StatusWord::announcing(id), std::memory_order_relaxed);
     O80_CRASH_POINT("status.before_id");
     slot.id.store(id, std::memory_order_release);  // sync status_id
   }

@@ -166,8 +166,12 @@ LaneSender::StatusAnswer LaneSender::status(std::uint64_t id) const noexcept {
     const std::uint64_t owner = slot.id.load(std::memory_order_acquire);   // sync status_id
     if (owner > id) return {Known::forgotten, {}};
     if (owner < id) return {Known::not_yet, {}};
-    if (word != 0 && slot.word.load(std::memory_order_relaxed) == word)
-      return {Known::yes, StatusWord::unpack(word)};
+    const StatusWord known = StatusWord::unpack(word);
+    if (known.status == 0) {
+      if (word > StatusWord::announcing(id)) return {Known::forgotten, {}};
+      continue;
+    }
+    if (slot.word.load(std::memory_order_relaxed) == word) return {Known::yes, known};
   }
   return {Known::not_yet, {}};
 }

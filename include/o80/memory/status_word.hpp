@@ -24,6 +24,11 @@ struct StatusWord {
             .aux = static_cast<std::uint8_t>(word >> 56),
             .iteration = static_cast<std::int64_t>(word << 16) >> 16};
   }
+  /// What stands in a place before the first status of an id: the id, and no status. Whoever asks
+  /// for the one before knows then that it is forgotten, though the backend die here.
+  static constexpr std::uint64_t announcing(std::uint64_t id) noexcept {
+    return id & 0xffff'ffff'ffffULL;
+  }
   friend bool operator==(const StatusWord&, const StatusWord&) = default;
 };
 

@@ -309,6 +309,18 @@ TEST_F(LaneTest, AnswersWhatBecameOfAnId) {
   EXPECT_EQ(sender.status(33).word, word);
 }
 
+TEST_F(LaneTest, ForgetsAStatusWhosePlaceWasAboutToBeAnothers) {
+  LaneSender sender(attached_);
+  const std::uint64_t later = 1 + sender.statuses();
+  lanes_[0].set_status(1, {.status = 3, .iteration = 5});
+  // what a backend leaves that dies before it names the next id
+  segment_.view().statuses(0)[1].word.store(StatusWord::announcing(later));
+  EXPECT_EQ(sender.status(1).known, Known::forgotten);
+  EXPECT_EQ(sender.status(later).known, Known::not_yet);
+  lanes_[0].set_status(later, {.status = 1, .iteration = 6});
+  EXPECT_EQ(sender.status(later).known, Known::yes);
+}
+
 TEST_F(LaneTest, NeverMixesTheStatusesOfTwoIds) {
   constexpr std::uint64_t kLast = 40'000;
   LaneSender sender(attached_);

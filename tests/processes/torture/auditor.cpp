@@ -156,9 +156,12 @@ class Auditor {
     const o80::StatusSlot& status =
         view.statuses(batch.lane)[id & (2 * std::uint64_t{view.shape.lane_blocks} - 1)];
     const std::uint64_t owner = status.id.load();
-    const o80::StatusWord word = o80::StatusWord::unpack(status.word.load());
+    const std::uint64_t packed = status.word.load();
+    const o80::StatusWord word = o80::StatusWord::unpack(packed);
+    // its backend died before the place had its next id
+    const bool announced = word.status == 0 && packed > o80::StatusWord::announcing(id);
     command.found_id = owner;
-    if (owner > id) {
+    if (owner > id || (owner == id && announced)) {
       command.found = static_cast<std::uint32_t>(o80::Status::forgotten);
     } else if (owner == id && word.status != 0) {
       command.found_at = word.iteration;
