@@ -15,7 +15,8 @@ class PreparedBurst:
     """Targets in, iterations, all their rows out; made by `Frontend.prepared_burst`.
 
     targets: (steps, actuators), to be filled before a run: numbers for states of one number, else
-        structured. What is not filled is not a number, and refused. Targets stay from run to run.
+        structured. What is not filled of floats is not a number, and refused. Targets stay from run
+        to run.
     rows: (iterations,), structured like `history().rows`: those of the last run, in the same
         memory every time. Copy what you keep.
 

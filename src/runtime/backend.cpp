@@ -75,7 +75,7 @@ UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, Reques
       liveness(segment),
       pool(lanes.size() * segment.view().shape.lane_blocks),
       controller(schema, pool, *this, lanes.size()),
-      schedule(pool.size() / 2),
+      schedule(pool.size()),
       server_(server),
       lives_(lanes.size()),
       mourned_(lanes.size()),
@@ -96,6 +96,8 @@ UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, Reques
 Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
   const std::int64_t give_up =
       at_most > 0 && at_most < kForEver ? monotonic_now() + at_most : at_most;
+  const std::uint32_t most_looks = 2 + pool.size() / kBlocksPerIteration;
+  std::uint32_t looks = 0;
   while (true) {
     look_at_lives();
     if (stop.load(std::memory_order_relaxed)) return Step::ended;
@@ -109,6 +111,8 @@ Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
     const bool all_told = controller.finish_pending();
     wake(lanes.announce(), false);
     if (staging_ || !all_told) continue;
+    // garbage may have used up a look; who sends it without end must not keep us here
+    if (lanes.has_pending() && ++looks < most_looks) continue;
     const std::int64_t left =
         give_up > 0 && give_up < kForEver ? give_up - monotonic_now() : give_up;
     if (left <= 0) return Step::standing;

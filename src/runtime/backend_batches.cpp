@@ -9,10 +9,6 @@
 
 namespace o80 {
 
-namespace {
-constexpr std::uint32_t kBlocksPerIteration = 1024;
-}
-
 // ------------------------------------------------------------------------------ statuses out
 
 void UntypedBackend::Body::tell(const StatusChange& change) noexcept {

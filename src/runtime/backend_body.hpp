@@ -22,6 +22,7 @@
 namespace o80 {
 
 inline constexpr std::uint32_t kNobody = 0xFFFFFFFF;
+inline constexpr std::uint32_t kBlocksPerIteration = 1024;  // of batches, that are taken
 inline constexpr std::int64_t kUntilEnded = -1;
 
 /// The parts of a backend, and the order in which batches reach the controller.
@@ -119,7 +120,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   std::uint32_t staging_lane_ = 0;
   std::uint64_t staging_incarnation_ = 0;
   std::uint64_t staging_owner_ = 0;  // 0: one that had left the lane before
-  std::uint32_t staging_left_ = 0;  // blocks
+  std::uint32_t staging_left_ = 0;   // blocks
   BlockChain staging_chain_;
 
   std::uint32_t holder_ = kNobody;  // lane with exclusive control

@@ -182,7 +182,7 @@ BatchRecord batch_of(const PulseOptions& options) {
 
 /// Blocks of a lane that commands leave free.
 constexpr std::uint32_t kept_free(std::uint32_t blocks) noexcept {
-  return std::clamp(blocks / 16, 2U, 16U);
+  return blocks < 8 ? 0 : std::clamp(blocks / 16, 2U, 16U);
 }
 
 /// Before anything is used up: ids that are drawn and never sent would age the statuses of others.

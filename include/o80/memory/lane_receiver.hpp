@@ -129,6 +129,8 @@ class LaneReceivers {
   void look_again_after(std::uint32_t lane) noexcept {
     pending_ = others_wait_ || !lanes_[lane].is_quiet();
   }
+  /// The last look() has left something, for all that is known.
+  bool has_pending() const noexcept { return pending_; }
   /// The bell as look() found it, for BellWaiter::wait.
   std::uint32_t bell_seen() const noexcept { return bell_seen_; }
   /// flush() on every lane; true if those who sleep on `lane_wake` are to be woken.
