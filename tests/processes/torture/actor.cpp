@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
+#include <fstream>
+#include <string>
 #include <string_view>
 
 #include "o80/base/crash_point.hpp"
@@ -49,6 +51,15 @@ std::int64_t Actor::starved() const {
   return std::sscanf(text, "%lld %lld", &ran, &waited) == 2 ? waited : 0;
 }
 
+std::int64_t stolen_time() {
+  std::ifstream machine("/proc/stat");
+  std::string word;
+  std::int64_t ticks = 0;
+  for (int column = 0; column <= 8 && machine >> word; ++column)
+    if (column == 8) ticks = std::atoll(word.c_str());
+  return ticks * (1'000'000'000 / sysconf(_SC_CLK_TCK));
+}
+
 Actor::Measured::Measured(Actor& actor, const char* what, o80::Timeout timeout)
     : actor_(actor),
       what_(what),
@@ -56,6 +67,7 @@ Actor::Measured::Measured(Actor& actor, const char* what, o80::Timeout timeout)
       began_(o80::monotonic_now()),
       stopped_(actor.stopped()),
       starved_(actor.starved()),
+      stolen_(actor.round.stolen),
       exceptions_(std::uncaught_exceptions()) {
   actor.slot.call = what;
   actor.stopped_at_call_ = stopped_;
@@ -69,13 +81,15 @@ Actor::Measured::~Measured() noexcept(false) {
   if (took <= timeout_ + kGrace) return;
   const std::int64_t stopped = actor_.stopped() - stopped_;
   const std::int64_t starved = actor_.starved() - starved_;
-  if (took - stopped - starved <= timeout_ + kGrace) return;
+  const std::int64_t stolen = stolen_time() - stolen_;
+  if (took - stopped - starved - stolen <= timeout_ + kGrace) return;
   try {
     actor_.fail(Fault::hang,
                 "%s took %.1f ms with a timeout of %.1f ms (stopped for %.1f ms, without a "
-                "processor for %.1f ms)",
+                "processor for %.1f ms, the machine for %.1f ms)",
                 what_, static_cast<double>(took) / 1e6, static_cast<double>(timeout_) / 1e6,
-                static_cast<double>(stopped) / 1e6, static_cast<double>(starved) / 1e6);
+                static_cast<double>(stopped) / 1e6, static_cast<double>(starved) / 1e6,
+                static_cast<double>(stolen) / 1e6);
   } catch (const Broken&) {
     // another error is on its way already: what was said stands
     if (std::uncaught_exceptions() == exceptions_) throw;
@@ -159,8 +173,7 @@ void Actor::judge_timeout(Generation& life, std::int64_t call_began, std::int64_
 bool Actor::a_successor_was_stopped() const {
   return std::any_of(round.slots.begin(), round.slots.end(), [&](const Slot& other) {
     return other.segment == slot.segment &&
-           (is_backend(other.role) || other.role == Role::usurper) &&
-           (other.stopped != 0 || other.stopped_at != 0);
+           (is_backend(other.role) || other.role == Role::usurper) && other.stopped != 0;
   });
 }
 

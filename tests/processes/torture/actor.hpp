@@ -39,6 +39,9 @@ struct Broken {};
 /// The process is the child of an actor, and is to live on without it.
 struct Orphan {};
 
+/// [ns] that the machine wanted a processor and its host gave it none, so far; the sum over all.
+std::int64_t stolen_time();
+
 class Actor {
  public:
   Actor(Round& the_round, Slot& the_slot, std::string directory);
@@ -78,7 +81,7 @@ class Actor {
   /// Null if no backend came so far as to note that epoch.
   Generation* life_of(std::uint64_t epoch);
   /// Time [ns] for which this process was stopped so far.
-  std::int64_t stopped() const { return slot.stopped.load(); }
+  std::int64_t stopped() const { return slot.stopped_for(o80::monotonic_now()); }
 
   /// Forks: the child throws Orphan after `misuse`, which tries what a child may not do.
   template <class Misuse>
@@ -109,6 +112,7 @@ class Actor {
     std::int64_t began_;
     std::int64_t stopped_;
     std::int64_t starved_;
+    std::int64_t stolen_;
     int exceptions_;
   };
 

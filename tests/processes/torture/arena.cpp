@@ -48,6 +48,7 @@ void Arena::begin(std::uint64_t seed, const std::string& replay) {
   std::filesystem::create_directories(directory_ + "/segments");
   round_ = map_round(directory_ + "/board");
   round_->seed = seed;
+  round_->stolen = stolen_time();
   actors_ = 0;
   worked_ = 0;
   running_.clear();
@@ -129,6 +130,10 @@ void Arena::work(std::int64_t now) {
   const std::int64_t gap = now - worked_;
   if (worked_ != 0 && gap > 100 * kMillisecond) phase_ends_ += gap;
   worked_ = now;
+  if (now - steal_looked_ > 20 * kMillisecond) {
+    steal_looked_ = now;
+    round_->stolen = stolen_time();
+  }
   adopt();
   for (std::size_t i = 0; i < to_start_.size();) {
     if (to_start_[i].at > now) {
@@ -140,7 +145,7 @@ void Arena::work(std::int64_t now) {
     start(due);
   }
   for (auto& [pid, running] : running_)
-    if (running.stopped && running.usurper == 0 && now >= running.go_on_at) go_on(running, now);
+    if (running.stopped && running.usurper == 0 && now >= running.go_on_at) go_on(running);
 
   const auto phase = static_cast<Phase>(round_->phase.load());
   if (phase == Phase::act) {

@@ -74,13 +74,13 @@ class Arena {
   /// Grows as long as any actor gets on; bounded, for journals are.
   std::uint64_t progress_so_far() const;
   bool anybody(Role first, Role last) const;
-  void start(const Start& start);
+  void start(const Start& start, std::uint32_t usurped = 0);
   void arm(Slot& slot);
   void adopt();
   [[noreturn]] void act(Slot& slot);
   void strike(std::int64_t now);
   void stop(Running& running, std::int64_t now);
-  void go_on(Running& running, std::int64_t now);
+  void go_on(Running& running);
   void kill_one(Running& running, std::int64_t now);
   void start_again(const Slot& slot, std::int64_t now);
   void watch_for_hangs(std::int64_t now);
@@ -106,6 +106,7 @@ class Arena {
   std::int64_t next_kill_ = 0;
   std::int64_t next_stop_ = 0;
   std::int64_t looked_ = 0;
+  std::int64_t steal_looked_ = 0;
 };
 
 }  // namespace torture

@@ -25,16 +25,14 @@ void before_label() {
   own_slot->label_reached = 1;
   const std::int64_t now = o80::monotonic_now();
   if (own_slot->label_signal == SIGSTOP) {
-    own_slot->stopped_at = now;
+    own_slot->stops(now);
     return;
   }
   own_slot->doomed_at = now;
   if (is_backend(own_slot->role)) own_round->lives[own_slot->generation].doomed_at = now;
 }
 
-void after_label() {
-  own_slot->stopped.fetch_add(o80::monotonic_now() - own_slot->stopped_at.exchange(0));
-}
+void after_label() { own_slot->goes_on(o80::monotonic_now()); }
 
 }  // namespace
 
@@ -47,9 +45,11 @@ void Arena::arm(Slot& slot) {
   slot.label_signal = chance_.percent(80) ? SIGKILL : SIGSTOP;
 }
 
-void Arena::start(const Start& start) {
+/// `usurped`: the generation whose name a usurper is to take.
+void Arena::start(const Start& start, std::uint32_t usurped) {
   Slot& slot = round_->slots[actors_];
   slot.role = start.role;
+  slot.generation = usurped;
   slot.segment = start.segment;
   slot.seed = mix(round_->seed, ++actors_);
   arm(slot);

@@ -38,7 +38,7 @@ void Arena::kill_one(Running& running, std::int64_t now) {
 
 void Arena::stop(Running& running, std::int64_t now) {
   running.stopped = true;
-  running.slot->stopped_at = now;
+  running.slot->stops(now);
   ::kill(running.slot->pid, SIGSTOP);
   ++tally_.stops;
   const bool long_one = chance_.percent(25);
@@ -47,21 +47,17 @@ void Arena::stop(Running& running, std::int64_t now) {
   const Slot& slot = *running.slot;
   const bool has_its_name = is_backend(slot.role) && round_->lives[slot.generation].epoch != 0;
   if (!long_one || !has_its_name || slot.label_signal == SIGKILL) return;
-  start({now, Role::usurper, slot.segment, 0});
-  Slot& usurper = round_->slots[actors_ - 1];
-  usurper.generation = slot.generation;
-  running.usurper = usurper.pid;
+  start({now, Role::usurper, slot.segment, 0}, slot.generation);
+  running.usurper = round_->slots[actors_ - 1].pid;
   ++tally_.usurpers;
 }
 
-void Arena::go_on(Running& running, std::int64_t now) {
+void Arena::go_on(Running& running) {
   running.stopped = false;
-  const std::int64_t since = running.slot->stopped_at;
-  if (running.slot->label_signal != SIGSTOP || running.slot->label_reached == 0) {
-    running.slot->stopped.fetch_add(now - since);
-    running.slot->stopped_at = 0;
-  }
   ::kill(running.slot->pid, SIGCONT);
+  // we may have been without a processor until now; who stopped itself tells it itself
+  if (running.slot->label_signal != SIGSTOP || running.slot->label_reached == 0)
+    running.slot->goes_on(o80::monotonic_now());
 }
 
 /// A call that never returns is not judged by who made it.
@@ -76,8 +72,8 @@ void Arena::watch_for_hangs(std::int64_t now) {
   for (auto& [pid, running] : running_) {
     Slot& slot = *running.slot;
     const std::int64_t ends = slot.call_ends;
-    if (ends == 0 || running.stopped || running.killed || slot.stopped_at != 0) continue;
-    if (now - ends - slot.stopped < kPatience) continue;
+    if (ends == 0 || running.stopped || running.killed || slot.is_stopped()) continue;
+    if (now - ends - slot.stopped_for(now) < kPatience) continue;
     fail(Fault::hang, std::string(name_of(slot.role)) + " (pid " + std::to_string(pid) +
                           ") is in " + (slot.call != nullptr ? slot.call.load() : "a call") +
                           " since long");

@@ -148,8 +148,8 @@ struct Slot {
   std::atomic<std::int64_t> doomed_at;
   std::atomic<std::uint32_t> commanding;   // it holds a lane, or may
   std::atomic<std::uint32_t> attachments;  // to command, so far
-  std::atomic<std::int64_t> stopped;       // [ns] so far, for all stops that have ended
-  std::atomic<std::int64_t> stopped_at;    // of the present stop, 0 if it runs
+  std::atomic<std::uint32_t> closed;       // the last of them that began to close
+  std::atomic<std::int64_t> stopped;       // [ns] so far; in a stop less its beginning: below 0
   std::atomic<std::uint32_t> label_reached;
   std::atomic<std::int64_t> call_ends;  // when the blocking call under way must be over, 0: none
   std::atomic<const char*> call;
@@ -163,6 +163,15 @@ struct Slot {
   std::atomic<std::uint32_t> commands;
   std::array<SentBatch, kMostBatches> sent_batches;
   std::array<SentCommand, kMostCommands> sent_commands;
+
+  void stops(std::int64_t now) { stopped.fetch_sub(now); }
+  void goes_on(std::int64_t now) { stopped.fetch_add(now); }
+  bool is_stopped() const { return stopped < 0; }
+  /// [ns] until now.
+  std::int64_t stopped_for(std::int64_t now) const {
+    const std::int64_t all = stopped;
+    return all < 0 ? all + now : all;
+  }
 };
 
 /// Times [ns] that many processes add to.
@@ -179,7 +188,8 @@ struct Round {
   std::atomic<std::uint32_t> phase;
   std::atomic<std::uint32_t> closing;  // orphans end
   std::uint64_t seed;
-  Samples noticed;    // kill => a waiting frontend raises
+  std::atomic<std::int64_t> stolen;  // [ns] that the machine had no processor, as last looked up
+  Samples noticed;                   // kill => a waiting frontend raises
   Samples recovered;  // kill => first row of the next backend seen by another process
   std::atomic<std::uint32_t> generations;
   std::array<Generation, kMostGenerations> lives;

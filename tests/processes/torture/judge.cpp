@@ -250,7 +250,7 @@ class Judge {
       if (slot.sent_batches[i].attachment == sent.attachment)
         seen_at = std::max(seen_at, slot.sent_batches[i].sent_at);
     const bool killed = slot.doomed_at != 0 && slot.commanding != 0;
-    if (killed && last_batch(slot)->attachment == sent.attachment) seen_at = slot.doomed_at;
+    if (killed && sent.attachment > slot.closed) seen_at = slot.doomed_at;
     const Generation& life = round_.lives[sent.generation];
     const std::int64_t rows = std::min<std::int64_t>(life.rows, kMostRows);
     std::int64_t last = -1;

@@ -47,6 +47,7 @@ void Nursery::order(const Round& round, const Slot& slot, const std::string& dir
   place("pid", slot.pid);
   place("phase", round.phase);
   place("stopped", slot.stopped);
+  place("stolen", round.stolen);
   place("call_ends", slot.call_ends);
   place("fault", slot.fault);
   place("fault_text", slot.fault_text);

@@ -217,6 +217,7 @@ void Sender::close() {
     std::uint32_t own = actor_.number() + 1;
     life_.lane_owners[lane_].compare_exchange_strong(own, 0);
   }
+  if (attachment_ > actor_.slot.closed) actor_.slot.closed = attachment_;
   frontend_.close();
   actor_.slot.commanding = 0;
 }
