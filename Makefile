@@ -8,7 +8,7 @@ demo:
 	@tools/setup.sh demo
 	@.venv/bin/python -m o80_table_tennis.demo $(ARGS)
 
-# ARGS names the steps to run, all by default: make test ARGS="dev pytest"
+# ARGS names the steps to run, all but arm64 by default: make test ARGS="dev pytest"
 test:
 	@tools/setup.sh test
 	@.venv/bin/python tools/test.py $(ARGS)
