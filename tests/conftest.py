@@ -85,9 +85,10 @@ def left_over(found: Callable[[], set[Found]], before: set[Found]) -> list[Found
 def nothing_left_behind() -> Iterator[None]:
     processes, files = children(), segment_files()
     yield
-    living = left_over(relatives, processes)
+    living = left_over(children, processes)
     commands = [command_line(process) for process in living]
-    for process in living:
+    # a robot that never starts outlives who was interrupted twice while starting it
+    for process in relatives() - processes:
         with contextlib.suppress(ProcessLookupError):
             os.kill(process, signal.SIGKILL)
     abandoned = left_over(abandoned_files, files)
