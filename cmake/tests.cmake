@@ -3,7 +3,7 @@
 include(cmake/googletest.cmake)
 include(GoogleTest)
 
-file(GLOB test_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tests/cpp/*/*_test.cpp)
+file(GLOB test_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tests/cpp/*/*.cpp)
 set(test_folders)
 foreach(source IN LISTS test_sources)
   cmake_path(GET source PARENT_PATH folder)

@@ -13,7 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 from sources import ROOT
 
-BUILD = ROOT / "build" / "fuzz"
+FOUND = ROOT / "build" / "fuzz" / "found"
 CORPUS = ROOT / "tests" / "fuzz" / "corpus"
 LONGEST = 1500  # bytes of an input
 # how many inputs a bounded run tries: each some ten seconds on one processor
@@ -42,7 +42,7 @@ def program(name: str) -> str:
 
 def fuzzer(name: str, *arguments: str) -> list[str]:
     """The command that runs one; what breaks it is kept beside its finds."""
-    found = BUILD / "found" / name
+    found = FOUND / name
     found.mkdir(parents=True, exist_ok=True)
     return [
         program(name),
@@ -69,7 +69,7 @@ def run(name: str, *arguments: str) -> int:
     )
     if result.returncode != 0:
         print(result.stderr[-20_000:])
-        raise SystemExit(f"fuzz_{name} broke: the input lies in {BUILD / 'found' / name}")
+        raise SystemExit(f"fuzz_{name} broke: the input lies in {FOUND / name}")
     return executed(result.stderr)
 
 
@@ -77,7 +77,7 @@ def merge(name: str) -> None:
     """Adds finds that reach something new to the corpus."""
     corpus = CORPUS / name
     corpus.mkdir(parents=True, exist_ok=True)
-    found = str(BUILD / "found" / name)
+    found = str(FOUND / name)
     subprocess.run([program(name), *COMMON, "-merge=1", str(corpus), found], check=True)
 
 

@@ -43,7 +43,7 @@ once() {
 
 state_of() { find "$@" -type f ! -name '*.pyc' -print0 | sort -z | xargs -0 sha256sum | sha256sum; }
 
-pip() { .venv/bin/python -m pip -q --disable-pip-version-check "$@"; }
+pip() { .venv/bin/python -m pip -qq --disable-pip-version-check "$@"; }
 
 make_environment() {
   local python

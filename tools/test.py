@@ -93,7 +93,6 @@ def main() -> int:
     os.environ["PATH"] = f"{tools}{os.pathsep}{os.environ['PATH']}"
     os.environ.setdefault("CCACHE_DIR", str(ROOT / "build" / "ccache"))
     os.environ.setdefault("CCACHE_NOHASHDIR", "1")  # presets share what they compile alike
-    os.environ.setdefault("CCACHE_DEPEND", "1")  # a first build costs no more than without it
     LOGS.mkdir(parents=True, exist_ok=True)
     failed = []
     for name in arguments.steps or [name for name in STEPS if name not in ON_DEMAND]:

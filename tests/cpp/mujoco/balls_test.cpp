@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "mujoco/inline_simulation.hpp"
+#include "mujoco/table_tennis_scene.hpp"
 
 namespace o80::mujoco {
 namespace {

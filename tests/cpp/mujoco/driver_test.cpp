@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "count_allocations.hpp"
-#include "mujoco/inline_simulation.hpp"
+#include "mujoco/table_tennis_scene.hpp"
 #include "o80/robot/library.hpp"
 
 namespace o80::mujoco {

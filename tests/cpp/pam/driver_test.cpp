@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "memory/private_directory.hpp"
-#include "o80/robot/inline_robot.hpp"
 #include "o80/robot/robot.hpp"
+#include "robot/inline_simulation.hpp"
 
 namespace o80::pam {
 namespace {
@@ -24,52 +24,25 @@ using testing::HasSubstr;
 using testing::Pointwise;
 using testing::ThrowsMessage;
 
-constexpr std::int64_t kPeriod = 2'000'000;
-using Row = std::vector<std::byte>;
+using Row = InlineSimulation::Row;
 
 /// The arm inside this process, with a frontend.
-struct InlineArm {
+struct InlineArm : InlineSimulation {
   explicit InlineArm(const OptionValues& options = {}, std::int64_t period = kPeriod)
-      : segment(unused_segment_name("pam")),
-        robot(std::make_shared<InlineRobot>(
-            std::make_unique<o80::Robot>(*robot_table<PamDriver>("pam"), options),
-            BackendOptions{.segment = segment, .period = period})),
-        frontend(segment, robot) {}
+      : InlineSimulation("pam", *robot_table<PamDriver>("pam"), options, period) {}
 
   Observation<PamDriver> latest() { return Observation<PamDriver>(frontend.latest()); }
   Observation<PamDriver> burst(std::int64_t iterations) {
-    return Observation<PamDriver>(frontend.burst(iterations, std::chrono::seconds(60)));
+    return Observation<PamDriver>(InlineSimulation::burst(iterations));
   }
   void ask(const std::string& muscle, double raw, const CommandOptions& options = {}) {
-    std::array<std::byte, 8> bytes{};
-    pack(raw, bytes.data());
-    frontend.add_command(frontend.actuator(muscle), bytes, options);
-  }
-  template <class Request>
-  void request(const Request& request) {
-    std::array<std::byte, sizeof(Request)> bytes{};
-    pack(request, bytes.data());
-    frontend.add_request(frontend.request_index(request_name<Request>()), bytes);
+    InlineSimulation::ask(muscle, raw, options);
   }
   void move() {
     ask("agonist_1", 17000, {.pace = iterations(40)});
     ask("antagonist_2", 14000, {.pace = iterations(25), .profile = Profile::minimum_jerk});
     ask("agonist_4", 9000.4);
   }
-  /// The last rows, from their desired states on: without iteration and time.
-  std::vector<Row> rows(std::size_t n) {
-    const Rows history = frontend.history(n);
-    std::vector<Row> all;
-    for (std::size_t i = 0; i < history.count; ++i) {
-      const auto row = history.row(i).subspan(sizeof(RowHead));
-      all.emplace_back(row.begin(), row.end());
-    }
-    return all;
-  }
-
-  std::string segment;
-  std::shared_ptr<InlineRobot> robot;
-  UntypedFrontend frontend;
 };
 
 class PamDriverTest : public testing::Test {

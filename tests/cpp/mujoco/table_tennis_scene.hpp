@@ -1,27 +1,25 @@
 #pragma once
 
-// Simulations inside the test, and the table-tennis scene of most of them.
+// Simulations inside the test by the names of what they show, and the scene of most of them.
 
 #include <gtest/gtest.h>
 
 #include <array>
 #include <cstdint>
 #include <fstream>
-#include <memory>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "memory/private_directory.hpp"
-#include "o80/robot/inline_robot.hpp"
+#include "robot/inline_simulation.hpp"
 #include "simulators/mujoco/driver.hpp"
 
 namespace o80::mujoco {
 
-inline constexpr std::int64_t kPeriod = 2'000'000;  // [ns]
 using Numbers = std::array<double, 3>;
-using Row = std::vector<std::byte>;
+using Row = InlineSimulation::Row;
 
 inline OptionValues table_tennis(OptionValues more = {}) {
   OptionValues options{
@@ -64,43 +62,13 @@ struct Seen {
 };
 
 /// A simulation inside this process, with a frontend.
-struct Inline {
+struct Inline : InlineSimulation {
   explicit Inline(const OptionValues& options, std::int64_t period = kPeriod)
-      : segment(unused_segment_name("mujoco")),
-        robot(std::make_shared<InlineRobot>(
-            std::make_unique<Robot>(*robot_table<MujocoDriver>("mujoco"), options),
-            BackendOptions{.segment = segment, .period = period})),
-        frontend(segment, robot) {}
+      : InlineSimulation("mujoco", *robot_table<MujocoDriver>("mujoco"), options, period) {}
 
   std::uint32_t at(std::string_view name) const { return frontend.actuator(name); }
   Seen latest() { return {frontend.latest()}; }
-  Seen burst(std::int64_t n) { return {frontend.burst(n, std::chrono::seconds(60))}; }
-  template <class State>
-  void ask(std::string_view name, const State& state, const CommandOptions& options = {}) {
-    std::array<std::byte, sizeof(State)> bytes{};
-    pack(state, bytes.data());
-    frontend.add_command(at(name), bytes, options);
-  }
-  template <class Request>
-  void request(const Request& request) {
-    std::array<std::byte, sizeof(Request)> bytes{};
-    pack(request, bytes.data());
-    frontend.add_request(frontend.request_index(request_name<Request>()), bytes);
-  }
-  /// The last rows, without their iterations and times.
-  std::vector<Row> rows(std::size_t n) {
-    const Rows history = frontend.history(n);
-    std::vector<Row> all;
-    for (std::size_t i = 0; i < history.count; ++i) {
-      const auto row = history.row(i).subspan(sizeof(RowHead));
-      all.emplace_back(row.begin(), row.end());
-    }
-    return all;
-  }
-
-  std::string segment;
-  std::shared_ptr<InlineRobot> robot;
-  UntypedFrontend frontend;
+  Seen burst(std::int64_t n) { return {InlineSimulation::burst(n)}; }
 };
 
 /// Puts the arm where its racket looks along y, 0.37 m + ... above the base.

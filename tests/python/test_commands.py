@@ -1,0 +1,136 @@
+"""Commands: targets, paces, profiles, queues."""
+
+import numpy as np
+import pytest
+
+import o80
+
+WAIT = 30.0  # [s] longer than any wait should take
+
+
+def test_actuators_go_by_index_or_name(arm: o80.Frontend) -> None:
+    arm.add_command(np.int64(0), 0.25)
+    arm.add_command("elbow", 0.5)
+
+    assert arm.burst(1).desired.tolist() == [0.25, 0.5]
+
+
+@pytest.mark.parametrize(
+    ("actuator", "text"),
+    [("wrist", "shoulder.*elbow"), (2, "shoulder.*elbow"), (-1, "elbow"), (1.5, "index or its")],
+)
+def test_an_unknown_actuator_is_refused_with_what_there_is(
+    arm: o80.Frontend, actuator: int | str, text: str
+) -> None:
+    with pytest.raises(o80.InvalidArgument, match=text):
+        arm.add_command(actuator, 0.0)
+
+
+@pytest.mark.parametrize("target", [3.1, float("nan"), float("inf"), "fast", None, [1, 2], {}])
+def test_a_target_that_cannot_be_followed_is_refused_when_it_is_added(
+    arm: o80.Frontend, target: object
+) -> None:
+    with pytest.raises(o80.InvalidArgument, match="elbow"):
+        arm.add_command("elbow", target)
+
+    assert arm.added == 0
+
+
+def test_a_refusal_is_a_value_error(arm: o80.Frontend) -> None:
+    with pytest.raises(ValueError, match="elbow"):
+        arm.add_command("elbow", 4.0)
+
+
+@pytest.mark.parametrize("target", [1, 0.5, np.float32(0.5), np.int8(1), np.array(0.5), True])
+def test_every_number_is_a_target(arm: o80.Frontend, target: float) -> None:
+    arm.add_command("elbow", target)
+
+    assert arm.burst(1).desired[1] == float(target)
+
+
+def test_a_command_has_one_pace(arm: o80.Frontend) -> None:
+    with pytest.raises(o80.InvalidArgument, match="duration, speed, until and iterations"):
+        arm.add_command(0, 0.5, duration=1.0, iterations=3)
+
+
+@pytest.mark.parametrize(
+    "pace",
+    [
+        {"duration": -1.0},
+        {"duration": float("nan")},
+        {"duration": 1e300},
+        {"duration": "1 s"},
+        {"speed": 0.0},
+        {"speed": -1.0},
+        {"until": -1},
+        {"until": 2.5},
+        {"iterations": 0},
+        {"iterations": 2**70},
+        {"mode": "replace"},
+        {"profile": "cubic"},
+        {"start": "here"},
+        {"mode": 1},
+    ],
+)
+def test_a_pace_that_cannot_be_is_refused(arm: o80.Frontend, pace: dict[str, object]) -> None:
+    with pytest.raises(o80.InvalidArgument):
+        arm.add_command(0, 0.5, **pace)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("pace", "iterations"),
+    [
+        ({}, 1),
+        ({"iterations": 4}, 4),
+        ({"duration": 0.005}, 5),
+        ({"speed": 100.0}, 5),
+        ({"until": 6}, 6),
+    ],
+)
+def test_each_pace_takes_its_iterations(
+    arm: o80.Frontend, pace: dict[str, float], iterations: int
+) -> None:
+    arm.add_command(0, 0.5, **pace)  # type: ignore[arg-type]
+
+    observation = arm.pulse_and_wait(timeout=WAIT)
+
+    assert observation.iteration == iterations
+    assert observation.desired[0] == 0.5
+
+
+def test_queue_appends_and_overwrite_replaces(arm: o80.Frontend) -> None:
+    arm.add_command(0, 1.0, iterations=10)
+    arm.add_command(0, 2.0, iterations=10)
+    arm.add_command(1, 1.0, iterations=10)
+    arm.add_command(1, 2.0, iterations=10, mode=o80.Mode.OVERWRITE)
+
+    desired = arm.burst(10).desired
+
+    assert desired.tolist() == [1.0, 2.0]
+
+
+def test_profiles_differ_between_their_ends(arm: o80.Frontend) -> None:
+    arm.add_command(0, 1.0, iterations=4, profile="linear")
+    arm.add_command(1, 1.0, iterations=4, profile=o80.Profile.MINIMUM_JERK)
+
+    arm.burst(4)
+
+    desired = arm.history(since=1, until=4).desired
+    assert desired[0, 0] == 0.25
+    assert desired[0, 1] < 0.25
+    assert desired[3].tolist() == [1.0, 1.0]
+
+
+def test_a_command_may_start_from_the_observed_state(arm: o80.Frontend) -> None:
+    arm.add_command(0, 1.0)
+    observed = arm.burst(1).observed[0]
+    arm.add_command(0, 1.0, iterations=2, start=o80.Start.OBSERVED)
+
+    assert arm.burst(1).desired[0] == pytest.approx((observed + 1.0) / 2)
+
+
+def test_initial_states_are_those_before_anything_was_asked(arm: o80.Frontend) -> None:
+    arm.add_command(0, 1.0)
+    arm.burst(10)
+
+    assert arm.initial_states.tolist() == [0.0, 0.0]
