@@ -22,6 +22,7 @@ Decoder::Decoder(std::shared_ptr<const o80::Description> what, nb::object how)
       extended(layout.attr("extended")),
       active(layout.attr("active")),
       clamped(layout.attr("clamped")),
+      braking(layout.attr("braking")),
       flat(layout.attr("flat")),
       text(layout.attr("text")) {}
 
@@ -130,6 +131,9 @@ changes them.)")
       .def_prop_ro(
           "fresh", [](const Observation& self) { return self.row.head().fresh != 0; },
           "Whether the robot started afresh in this row.")
+      .def_prop_ro(
+          "halted", [](const Observation& self) { return self.row.head().halted != 0; },
+          "Whether the backend was halted in this row.")
       .def_ro("missed", &Observation::missed,
               "Rows between this one and the one read before it that were overwritten unread; "
               "set by wait_for_next and stream.")
@@ -153,6 +157,10 @@ changes them.)")
           "clamped", [](nb::handle self) { return decoded(self, &Decoder::clamped); },
           nb::sig("def clamped(self) -> typing.Any"),
           "Whether the limits changed the desired state: bool (actuators,).")
+      .def_prop_ro(
+          "braking", [](nb::handle self) { return decoded(self, &Decoder::braking); },
+          nb::sig("def braking(self) -> typing.Any"),
+          "Whether the actuator came to rest without a command: bool (actuators,).")
       .def(
           "flat",
           [](nb::handle self, nb::handle dtype) {

@@ -12,7 +12,7 @@ struct Decoder {
   Decoder(std::shared_ptr<const o80::Description> description, nanobind::object layout);
 
   std::shared_ptr<const o80::Description> description;
-  nanobind::object layout, desired, observed, extended, active, clamped, flat, text;
+  nanobind::object layout, desired, observed, extended, active, clamped, braking, flat, text;
 };
 
 /// A row and the way to read it. Python sees its bytes as a buffer.

@@ -62,5 +62,5 @@ o80::Start start_of(nb::handle word) {
   return parse(word, std::array{desired, observed}, "start");
 }
 
-nb::object python_word(o80::Status status) { return member<o80::Status, 10>(status, "Status"); }
-nb::object python_word(o80::Reason reason) { return member<o80::Reason, 10>(reason, "Reason"); }
+nb::object python_word(o80::Status status) { return member<o80::Status, 11>(status, "Status"); }
+nb::object python_word(o80::Reason reason) { return member<o80::Reason, 11>(reason, "Reason"); }

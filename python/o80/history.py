@@ -69,6 +69,12 @@ class History:
         fresh: NDArray[np.bool_] = self._part("fresh") != 0
         return fresh
 
+    @property
+    def halted(self) -> NDArray[np.bool_]:
+        """Whether the backend was halted in that row: (T,)."""
+        halted: NDArray[np.bool_] = self._part("halted") != 0
+        return halted
+
     def _part(self, name: str) -> NDArray[Any]:
         part: NDArray[Any] = self.rows[name]
         return part
@@ -98,6 +104,12 @@ class History:
     def clamped(self) -> NDArray[np.bool_]:
         """Whether the limits changed the desired state: (T, actuators)."""
         mask: NDArray[np.bool_] = self._layout.many_masks(self.rows, "clamped")
+        return mask
+
+    @property
+    def braking(self) -> NDArray[np.bool_]:
+        """Whether the actuator came to rest without a command: (T, actuators)."""
+        mask: NDArray[np.bool_] = self._layout.many_masks(self.rows, "braking")
         return mask
 
     def flat(self, dtype: Any = None) -> NDArray[Any]:

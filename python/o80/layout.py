@@ -19,6 +19,7 @@ HEAD = (
     ("overruns", "u4"),
     ("skipped", "u4"),
     ("fresh", "u4"),
+    ("halted", "u4"),
 )
 
 
@@ -130,6 +131,7 @@ class Layout:
         self._extended_at: int = row["extended"]
         self._active_at: int = row["active"]
         self._clamped_at: int = row["clamped"]
+        self._braking_at: int = row["braking"]
         self._mask_bytes: int = row["mask_words"] * 8
         self._is_array = self.states.subdtype is not None
         self._element, self._shape = self.states.subdtype or (self.states, ())
@@ -145,6 +147,7 @@ class Layout:
                 ("observed", self.states, self._observed_at),
                 ("active", mask, self._active_at),
                 ("clamped", mask, self._clamped_at),
+                ("braking", mask, self._braking_at),
             ]
         if self.extras.itemsize:
             parts.append(("extended", self.extras, self._extended_at))
@@ -214,6 +217,9 @@ class Layout:
 
     def clamped(self, row: Any) -> NDArray[np.bool_]:
         return self._mask(row, self._clamped_at)
+
+    def braking(self, row: Any) -> NDArray[np.bool_]:
+        return self._mask(row, self._braking_at)
 
     def flat(self, row: Any, dtype: Any = None) -> NDArray[Any]:
         kind = np.dtype(np.float32 if dtype is None else dtype)

@@ -37,6 +37,7 @@ class Status(StrEnum):
     INTERRUPTED = "interrupted"
     REJECTED = "rejected"
     FORGOTTEN = "forgotten"  #: asked for too late
+    HALTED = "halted"
 
 
 class Reason(StrEnum):
@@ -52,3 +53,4 @@ class Reason(StrEnum):
     DEAD_FRONTEND = "dead_frontend"
     SILENCE = "silence"
     STOPPED = "stopped"
+    HALTED = "halted"

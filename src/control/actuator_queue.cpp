@@ -142,6 +142,7 @@ void ActuatorQueue::begin_row(Iteration iteration, const std::byte* observed) no
 std::int64_t ActuatorQueue::iterations(const RecordHead& head, Iteration iteration) noexcept {
   switch (head.pace) {
     case Pace::direct:
+    case Pace::fastest:
       return 1;
     case Pace::iterations:
       return std::max<std::int64_t>(1, head.amount);

@@ -1,5 +1,6 @@
 #include "o80/control/controller.hpp"
 
+#include <algorithm>
 #include <bit>
 #include <cstring>
 #include <limits>
@@ -92,6 +93,7 @@ class Controller::Body {
   std::vector<Block> desired;
   std::vector<std::uint64_t> active_mask;
   std::vector<std::uint64_t> clamped_mask;
+  std::vector<std::uint64_t> braking_mask;
 
  private:
   std::vector<std::uint32_t> offsets_;
@@ -112,6 +114,7 @@ Controller::Body::Body(const Schema& schema, BlockPool& blocks, StatusSink& sink
   const std::uint32_t words = mask_words(count);
   active_mask.resize(words);
   clamped_mask.resize(words);
+  braking_mask.resize(words);
   busy_.resize(words);
   follow_.resize(words);
   actuators_.reserve(count);
@@ -137,6 +140,7 @@ void Controller::Body::restart(const std::byte* observed, const std::byte* wante
   for (std::size_t word = 0; word < busy_.size(); ++word) {
     active_mask[word] = 0;
     clamped_mask[word] = 0;
+    braking_mask[word] = 0;
   }
 }
 
@@ -289,6 +293,11 @@ void Controller::purge_lane(std::uint32_t lane, std::uint32_t actuator, Iteratio
   });
 }
 
+void Controller::halt(Iteration iteration) noexcept {
+  body_->each(kEveryActuator,
+              [&](ActuatorQueue& queue) { queue.drop(Status::halted, Reason::halted, iteration); });
+}
+
 void Controller::interrupt(std::uint32_t actuator, Iteration iteration) noexcept {
   body_->each(actuator, [&](ActuatorQueue& queue) {
     queue.drop(Status::interrupted, Reason::none, iteration);
@@ -305,6 +314,14 @@ const std::uint64_t* Controller::active_mask() const noexcept { return body_->ac
 
 const std::uint64_t* Controller::clamped_mask() const noexcept {
   return body_->clamped_mask.data();
+}
+
+const std::uint64_t* Controller::braking_mask() const noexcept {
+  return body_->braking_mask.data();
+}
+
+bool Controller::braking() const noexcept {
+  return std::ranges::any_of(body_->braking_mask, [](std::uint64_t word) { return word != 0; });
 }
 
 std::uint32_t Controller::words() const noexcept {

@@ -36,6 +36,8 @@ std::string_view to_text(Pace pace) noexcept {
       return "until";
     case Pace::iterations:
       return "iterations";
+    case Pace::fastest:
+      return "fastest";
   }
   return "unknown";
 }
@@ -72,6 +74,8 @@ std::string_view to_text(Status status) noexcept {
       return "rejected";
     case Status::forgotten:
       return "forgotten";
+    case Status::halted:
+      return "halted";
   }
   return "unknown";
 }
@@ -98,6 +102,8 @@ std::string_view to_text(Reason reason) noexcept {
       return "silence";
     case Reason::stopped:
       return "stopped";
+    case Reason::halted:
+      return "halted";
   }
   return "unknown";
 }

@@ -17,6 +17,8 @@ bool sane_pace(const RecordHead& head) noexcept {
   switch (head.pace) {
     case Pace::direct:
       return true;
+    case Pace::fastest:
+      return false;
     case Pace::duration:
       return head.rows > 1 || (head.amount >= 0 && head.amount <= kLongestDuration);
     case Pace::speed:

@@ -65,7 +65,8 @@ std::string limits_of(const Schema& schema, const ActuatorRow& actuator) {
   for (std::uint32_t i = 0; i < actuator.limits; ++i) {
     const LimitRow& limit = schema.limits[actuator.first_limit + i];
     text += (i == 0 ? "" : "; ") + number(limit.minimum) + " to " + number(limit.maximum) + " at " +
-            number(limit.speed) + "/s";
+            number(limit.speed) + "/s, " + number(limit.acceleration) + "/s^2, " +
+            number(limit.jerk) + "/s^3, error " + number(limit.error);
   }
   return text;
 }

@@ -100,6 +100,10 @@ void write_field(JsonWriter& json, const Schema& schema, const FieldRow& field) 
   json.value(field.unit.view());
   json.key("help");
   json.value(field.help.view());
+  if (field.resting != 0) {
+    json.key("rest");
+    json.value(field.rest);
+  }
   if (field.kind == Kind::enumeration) {
     json.key("signed");
     json.value(field.is_signed != 0);
@@ -155,6 +159,12 @@ void write_actuator(JsonWriter& json, const Schema& schema, const ActuatorRow& a
     json.value(limit.maximum);
     json.key("speed");
     json.value(limit.speed);
+    json.key("acceleration");
+    json.value(limit.acceleration);
+    json.key("jerk");
+    json.value(limit.jerk);
+    json.key("error");
+    json.value(limit.error);
     json.close('}');
   }
   json.close(']');
@@ -174,11 +184,13 @@ void write_layout(JsonWriter& json, const RowLayout& layout) {
   put("overruns", 24);
   put("skipped", 28);
   put("fresh", 32);
+  put("halted", 36);
   put("desired", layout.desired);
   put("observed", layout.observed);
   put("extended", layout.extended);
   put("active", layout.active);
   put("clamped", layout.clamped);
+  put("braking", layout.braking);
   put("mask_words", layout.mask_words);
   put("extended_size", layout.extended_size);
   json.close('}');

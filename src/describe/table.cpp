@@ -145,11 +145,25 @@ std::vector<std::uint64_t> check_types(const Schema& schema) {
 }
 
 void check_limit(const ActuatorRow& actuator, const LimitRow& limit) {
-  if (std::isnan(limit.minimum) || std::isnan(limit.maximum) || !(limit.speed > 0) ||
-      limit.minimum > limit.maximum) {
-    refuse("the limits of actuator '" + actuator.name.str() + "' are from " +
-           std::to_string(limit.minimum) + " to " + std::to_string(limit.maximum) + " at " +
-           std::to_string(limit.speed) + "/s: minimum <= maximum and speed > 0 are needed");
+  const std::string of = "the limits of actuator '" + actuator.name.str() + "' ";
+  if (std::isnan(limit.minimum) || std::isnan(limit.maximum) || limit.minimum > limit.maximum) {
+    refuse(of + "are from " + std::to_string(limit.minimum) + " to " +
+           std::to_string(limit.maximum) + ": minimum <= maximum is needed");
+  }
+  const auto positive = [&](double value, const char* what) {
+    if (!(value > 0)) {
+      refuse(of + "have " + what + " " + std::to_string(value) + ": it must be above 0");
+    }
+  };
+  positive(limit.speed, "speed");
+  positive(limit.acceleration, "acceleration");
+  positive(limit.jerk, "jerk");
+  positive(limit.error, "error");
+  if (std::isfinite(limit.jerk) && !std::isfinite(limit.acceleration)) {
+    refuse(of + "have a jerk without an acceleration: give both");
+  }
+  if (std::isfinite(limit.acceleration) && !std::isfinite(limit.speed)) {
+    refuse(of + "have an acceleration without a speed: give both");
   }
 }
 
@@ -223,8 +237,9 @@ void check(const Schema& schema) {
   check_actuators(schema, numbers);
   // also of those that belong to no actuator: a schema equals itself
   for (const LimitRow& limit : schema.limits) {
-    if (std::isnan(limit.minimum) || std::isnan(limit.maximum) || std::isnan(limit.speed)) {
-      refuse("a limit is not a number");
+    for (const double value :
+         {limit.minimum, limit.maximum, limit.speed, limit.acceleration, limit.jerk, limit.error}) {
+      if (std::isnan(value)) refuse("a limit is not a number");
     }
   }
   check_groups(schema);

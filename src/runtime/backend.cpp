@@ -164,6 +164,7 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
   if (layout.mask_words > 0) {
     std::memcpy(row() + layout.active, controller.active_mask(), layout.mask_words * 8);
     std::memcpy(row() + layout.clamped, controller.clamped_mask(), layout.mask_words * 8);
+    std::memcpy(row() + layout.braking, controller.braking_mask(), layout.mask_words * 8);
   }
   history.publish(current, row());
 

@@ -29,6 +29,7 @@ void check_pace(const PaceSpec& pace, std::uint32_t rows) {
   switch (pace.pace) {
     case Pace::direct:
     case Pace::speed:
+    case Pace::fastest:
       return;
     case Pace::duration:
       if (pace.amount < 0) refuse("is a negative duration");

@@ -53,6 +53,8 @@ class Controller {
   /// Drops what one lane sent, to an actuator or to every one; O(lanes) an actuator.
   void purge_lane(std::uint32_t lane, std::uint32_t actuator, Iteration iteration,
                   Reason reason = Reason::none) noexcept;
+  /// Ends everything as halted; each actuator then brakes within its limits.
+  void halt(Iteration iteration) noexcept;
   /// Ends what an actuator runs and queues as interrupted.
   void interrupt(std::uint32_t actuator, Iteration iteration) noexcept;
 
@@ -66,6 +68,10 @@ class Controller {
   const std::uint64_t* active_mask() const noexcept;
   /// One bit an actuator, in whole words: the last step clamped it.
   const std::uint64_t* clamped_mask() const noexcept;
+  /// One bit an actuator, in whole words: the last step brought it to rest, without a command.
+  const std::uint64_t* braking_mask() const noexcept;
+  /// Some actuator has not come to rest.
+  bool braking() const noexcept;
   /// Words of a mask.
   std::uint32_t words() const noexcept;
 

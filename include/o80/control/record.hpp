@@ -28,7 +28,7 @@ enum class RecordKind : std::uint8_t {
   release_control
 };
 enum class Mode : std::uint8_t { queue, overwrite };
-enum class Pace : std::uint8_t { direct, duration, speed, until, iterations };
+enum class Pace : std::uint8_t { direct, duration, speed, until, iterations, fastest };
 enum class Profile : std::uint8_t { linear, minimum_jerk };
 /// Which state a command starts from.
 enum class Start : std::uint8_t { desired, observed };
@@ -43,7 +43,8 @@ enum class Status : std::uint8_t {
   purged,
   interrupted,
   rejected,
-  forgotten  // asked too late: only a frontend says so
+  forgotten,  // asked too late: only a frontend says so
+  halted
 };
 
 /// Why a status is what it is.
@@ -57,7 +58,8 @@ enum class Reason : std::uint8_t {
   fresh_start,
   dead_frontend,
   silence,
-  stopped
+  stopped,
+  halted
 };
 
 std::string_view to_text(RecordKind kind) noexcept;

@@ -15,7 +15,7 @@ struct RowHead {
   std::uint32_t overruns = 0;  // iterations so far that were not done in time
   std::uint32_t skipped = 0;   // periods so far that were left out to catch up
   std::uint32_t fresh = 0;     // 1: the robot started afresh in this row
-  std::uint32_t reserved = 0;
+  std::uint32_t halted = 0;    // 1: the backend was halted in this iteration
 };
 static_assert(sizeof(RowHead) == 40 && std::is_trivially_copyable_v<RowHead>);
 
@@ -26,6 +26,7 @@ struct RowLayout {
   std::uint32_t extended = 0;
   std::uint32_t active = 0;   // one bit an actuator, whole 8-byte words
   std::uint32_t clamped = 0;  // likewise
+  std::uint32_t braking = 0;  // likewise
   std::uint32_t size = 0;
   std::uint32_t mask_words = 0;
   std::uint32_t block = 0;
@@ -43,7 +44,8 @@ inline RowLayout row_layout(const Schema& schema) {
   layout.extended = layout.observed + layout.block;
   layout.active = layout.extended + layout.extended_size;
   layout.clamped = layout.active + layout.mask_words * 8;
-  layout.size = layout.clamped + layout.mask_words * 8;
+  layout.braking = layout.clamped + layout.mask_words * 8;
+  layout.size = layout.braking + layout.mask_words * 8;
   return layout;
 }
 

@@ -72,7 +72,9 @@ struct FieldRow {
   std::uint32_t labels = 0;
   Kind kind = Kind::float64;
   std::uint8_t is_signed = 0;  // of an enumeration
-  std::array<std::uint8_t, 2> reserved{};
+  std::uint8_t resting = 0;    // 1: goes to `rest` when no command drives it
+  std::uint8_t reserved = 0;
+  double rest = 0.0;  // in the field's unit
 
   std::uint32_t count() const { return (rows == 0 ? 1 : rows) * (columns == 0 ? 1 : columns); }
   bool operator==(const FieldRow&) const = default;
@@ -99,7 +101,10 @@ struct LabelRow {
 struct LimitRow {
   double minimum;
   double maximum;
-  double speed;  // [1/s]
+  double speed;         // [1/s]
+  double acceleration;  // [1/s^2]
+  double jerk;          // [1/s^3]
+  double error;         // between desired and observed; more of it halts
   bool operator==(const LimitRow&) const = default;
 };
 

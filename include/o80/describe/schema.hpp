@@ -17,7 +17,13 @@ namespace o80 {
 struct Limits {
   double minimum = -std::numeric_limits<double>::infinity();
   double maximum = std::numeric_limits<double>::infinity();
-  double speed = std::numeric_limits<double>::infinity();  // [1/s]
+  double speed = std::numeric_limits<double>::infinity();         // [1/s]
+  double acceleration = std::numeric_limits<double>::infinity();  // [1/s^2], needs a speed
+  double jerk = std::numeric_limits<double>::infinity();          // [1/s^3], needs an acceleration
+  /// Most that desired and observed may be apart; more than that halts the backend.
+  double error = std::numeric_limits<double>::infinity();
+
+  LimitRow row() const { return {minimum, maximum, speed, acceleration, jerk, error}; }
 };
 
 class Schema;
@@ -216,8 +222,7 @@ inline void Schema::place_group(std::string_view group, std::uint32_t type, std:
     actuator.first_limit = static_cast<std::uint32_t>(limits.size());
     actuator.limits = scalars;
     actuators.push_back(actuator);
-    const Limits none;
-    limits.insert(limits.end(), scalars, LimitRow{none.minimum, none.maximum, none.speed});
+    limits.insert(limits.end(), scalars, Limits{}.row());
   }
   groups.push_back(row);
 }
@@ -293,7 +298,7 @@ inline ActuatorDescription& ActuatorDescription::when_idle(WhenIdle when_idle) {
 inline ActuatorDescription& ActuatorDescription::limits(const Limits& limits) {
   const ActuatorRow& row = schema_.actuators[index_];
   if (row.limits > 0) {
-    schema_.limits[row.first_limit] = {limits.minimum, limits.maximum, limits.speed};
+    schema_.limits[row.first_limit] = limits.row();
   }
   return *this;
 }
@@ -311,7 +316,7 @@ inline ActuatorDescription& ActuatorDescription::limits(std::string_view field,
     const std::uint32_t numbers = inside * member.count();
     if (member.name.view() == field) {
       for (std::uint32_t n = 0; n < numbers; ++n) {
-        schema_.limits[scalar + n] = {limits.minimum, limits.maximum, limits.speed};
+        schema_.limits[scalar + n] = limits.row();
       }
       return *this;
     }

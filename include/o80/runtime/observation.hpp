@@ -42,6 +42,7 @@ class UntypedObservation {
   bool active(std::uint32_t actuator) const { return bit(layout().active, actuator); }
   /// The limits changed it.
   bool clamped(std::uint32_t actuator) const { return bit(layout().clamped, actuator); }
+  bool braking(std::uint32_t actuator) const { return bit(layout().braking, actuator); }
 
  private:
   bool bit(std::uint32_t mask, std::uint32_t actuator) const {

@@ -68,6 +68,7 @@ def _plain(row: o80.Observation) -> dict[str, Any]:
         "extended": None if row.extended is None else _values(row.extended),
         "active": [bool(value) for value in row.active],
         "clamped": [bool(value) for value in row.clamped],
+        "braking": [bool(value) for value in row.braking],
     }
 
 

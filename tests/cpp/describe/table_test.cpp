@@ -48,10 +48,15 @@ TEST(Table, RefusesWhatCannotBeUsed) {
               HasSubstr("two actuator 'joints_0'"));
   EXPECT_THAT(refusal([](Schema& s) { s.actuators[1].name = NameText(); }), HasSubstr("no name"));
   EXPECT_THAT(refusal([](Schema& s) { s.fields[0].offset = 9; }), HasSubstr("outside its struct"));
-  EXPECT_THAT(refusal([](Schema& s) { s.limits[0] = {2, 1, 1}; }),
+  EXPECT_THAT(refusal([](Schema& s) { s.limits[0] = Limits{.minimum = 2, .maximum = 1}.row(); }),
               HasSubstr("from 2.000000 to 1.000000"));
-  EXPECT_THAT(refusal([](Schema& s) { s.limits[0].speed = 0; }), HasSubstr("speed > 0"));
+  EXPECT_THAT(refusal([](Schema& s) { s.limits[0].speed = 0; }),
+              HasSubstr("speed 0.000000: it must be above 0"));
   EXPECT_THAT(refusal([](Schema& s) { s.limits[0].minimum = std::nan(""); }), HasSubstr("limits"));
+  EXPECT_THAT(refusal([](Schema& s) { s.limits[0].jerk = 1.0; }),
+              HasSubstr("jerk without an acceleration"));
+  EXPECT_THAT(refusal([](Schema& s) { s.limits[0].acceleration = 1.0; }),
+              HasSubstr("acceleration without a speed"));
   for (const char* text : {"\xff", "a\x80", "\xc3", "\xc0\xaf", "\xe0\x80\xaf", "\xed\xa0\x80",
                            "\xf4\x90\x80\x80", "\xe2\x82", "\xf5\x80\x80\x80"}) {
     EXPECT_THAT(refusal([&](Schema& s) { s.types[0].name = NameText(text); }), HasSubstr("UTF-8"))
@@ -61,7 +66,7 @@ TEST(Table, RefusesWhatCannotBeUsed) {
        {"Gelenk", "\xc3\xa4rm", "\xe2\x82\xac", "\xf0\x9f\xa6\xbe", "\xed\x9f\xbf"}) {
     EXPECT_EQ(refusal([&](Schema& s) { s.types[0].name = NameText(text); }), "") << text;
   }
-  EXPECT_THAT(refusal([](Schema& s) { s.limits.push_back({0, 1, std::nan("")}); }),
+  EXPECT_THAT(refusal([](Schema& s) { s.limits.push_back(Limits{.error = std::nan("")}.row()); }),
               HasSubstr("not a number"))
       << "nor one that no actuator has: the schema would not equal itself";
   EXPECT_THAT(refusal([](Schema& s) { s.actuators[0].type = 99; }), HasSubstr("no type"));
