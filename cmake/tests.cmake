@@ -30,6 +30,12 @@ target_compile_definitions(o80_bounded PUBLIC O80_COUNT_BLOCKS)
 target_compile_options(o80_bounded PRIVATE -ffp-contract=off)
 target_link_libraries(o80_bounded PRIVATE o80_headers o80_warnings)
 
+# the memory layer once more, with labelled points at which a process can be killed
+file(GLOB memory_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/memory/*.cpp)
+add_library(o80_killed OBJECT EXCLUDE_FROM_ALL ${memory_sources})
+target_compile_definitions(o80_killed PUBLIC O80_CRASH_POINTS)
+target_link_libraries(o80_killed PRIVATE o80_headers o80_warnings)
+
 foreach(folder IN LISTS test_folders)
   if(folder STREQUAL "mujoco" AND NOT TARGET mujoco::mujoco)
     continue()

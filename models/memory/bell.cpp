@@ -2,13 +2,13 @@
 //
 // mutant looks_before_it_rings: src/memory/signal.cpp
 //   - bell.rung.fetch_add(1, std::memory_order_seq_cst);
-//   + const bool sleeps = view.counters().sleeping.load(std::memory_order_seq_cst) != 0;
+//   + const bool sleeps = view.wakes().sleeping.load(std::memory_order_seq_cst) != 0;
 //   + bell.rung.fetch_add(1, std::memory_order_seq_cst);
-//   - if (view.counters().sleeping.load(std::memory_order_seq_cst) != 0)
+//   - if (view.wakes().sleeping.load(std::memory_order_seq_cst) != 0)
 //   + if (sleeps)
 // mutant looks_relaxed: src/memory/signal.cpp
-//   - if (view.counters().sleeping.load(std::memory_order_seq_cst) != 0)
-//   + if (view.counters().sleeping.load(std::memory_order_relaxed) != 0)
+//   - if (view.wakes().sleeping.load(std::memory_order_seq_cst) != 0)
+//   + if (view.wakes().sleeping.load(std::memory_order_relaxed) != 0)
 // mutant sleeps_in_secret: src/memory/signal.cpp
 //   - sleeping.store(1, std::memory_order_seq_cst);
 //   +

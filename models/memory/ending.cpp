@@ -12,8 +12,8 @@
 // mutant ended_after_the_wake: src/memory/segment_file.cpp
 //   - counters.state.store(static_cast<std::uint32_t>(state), std::memory_order_seq_cst);
 //   +
-//   - futex_wake(counters.row_wake, kEverybody);
-//   + futex_wake(counters.row_wake, kEverybody);
+//   - futex_wake(wakes.row_wake, kEverybody);
+//   + futex_wake(wakes.row_wake, kEverybody);
 //   + counters.state.store(static_cast<std::uint32_t>(state), std::memory_order_seq_cst);
 
 #include "kernel.hpp"

@@ -107,7 +107,8 @@ void ForkGuard::check(std::string_view) const {}
 
 // ------------------------------------------------------------------------------ the segment
 
-// names of owners are for messages
+// names of users and owners are for messages
+std::string user_name(uid_t) { return {}; }
 void store_text(rl::atomic<std::uint64_t>*, std::size_t, std::string_view) noexcept {}
 std::string load_text(const rl::atomic<std::uint64_t>*, std::size_t) { return {}; }
 
@@ -129,6 +130,6 @@ void AttachedSegment::throw_if_gone() const {
   if (has_ended()) throw BackendStopped("ended");
 }
 void AttachedSegment::check_process() const {}
-LockFile AttachedSegment::open_again() const { return LockFile::open("", 0); }
+LockFile AttachedSegment::open_commands_again() const { return LockFile::open("", 0); }
 
 }  // namespace o80

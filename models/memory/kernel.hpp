@@ -58,16 +58,17 @@ class Segment {
     if (!o80::SegmentOffsets::compute(view.shape, view.offsets)) std::abort();
     static std::byte* memory =
         static_cast<std::byte*>(std::aligned_alloc(4096, view.offsets.file_bytes));
+    static std::byte* commands =
+        static_cast<std::byte*>(std::aligned_alloc(4096, view.offsets.commands_bytes));
     view.base = memory;
+    view.commands = commands;
     current() = this;
     make(view.counters().begun, -1);
     make(view.counters().published, -1);
     make(view.counters().state, static_cast<std::uint32_t>(o80::State::running));
-    make(view.counters().row_wake);
-    make(view.counters().sleeping);
-    [this](auto& c) {
-      if constexpr (requires { c.lane_wake; }) make(c.lane_wake);
-    }(view.counters());
+    make(view.wakes().row_wake);
+    make(view.wakes().lane_wake);
+    make(view.wakes().sleeping);
     make(view.bell().rung);
     make(view.bell().tickets);
     make(view.bell().wanted, std::numeric_limits<std::int64_t>::max());

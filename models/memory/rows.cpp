@@ -2,8 +2,8 @@
 // One is woken, the first awake wakes the rest.
 //
 // mutant waiter_looks_relaxed: src/memory/signal.cpp
-//   - if (counters.published.load(std::memory_order_seq_cst) >= k) return;
-//   + if (counters.published.load(std::memory_order_relaxed) >= k) return;
+//   - if (view_.counters().published.load(std::memory_order_seq_cst) >= k) return;
+//   + if (view_.counters().published.load(std::memory_order_relaxed) >= k) return;
 // mutant published_with_release: src/memory/history.cpp
 //   - counters_->published.store(k, std::memory_order_seq_cst);
 //   + counters_->published.store(k, std::memory_order_release);
@@ -14,7 +14,7 @@
 //   - while (k < lowest &&
 //   + while (k < 0 &&
 // mutant nobody_tells_the_rest: src/memory/signal.cpp
-//   - futex_wake(counters.row_wake, kEverybody);
+//   - futex_wake(wake, kEverybody);
 //   +
 // mutant reset_after_the_wake: src/memory/signal.cpp
 //   - bell.wanted.store(kNoWish, std::memory_order_seq_cst);  // sync wanted
@@ -22,8 +22,8 @@
 //   - O80_CRASH_POINT("rows.after_wake");
 //   + view_.bell().wanted.store(kNoWish, std::memory_order_seq_cst);
 // mutant sleeps_on_a_later_value: src/memory/signal.cpp
-//   - futex_wait(counters.row_wake, seen, at_most)
-//   + futex_wait(counters.row_wake, counters.row_wake.load(std::memory_order_seq_cst), at_most)
+//   - futex_wait(wake, seen, at_most)
+//   + futex_wait(wake, wake.load(std::memory_order_seq_cst), at_most)
 
 #include "kernel.hpp"
 

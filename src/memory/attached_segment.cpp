@@ -10,6 +10,7 @@
 
 #include "o80/base/error.hpp"
 #include "o80/memory/atomic_words.hpp"
+#include "o80/memory/file_owner.hpp"
 #include "o80/memory/segment_file.hpp"
 #include "o80/memory/segment_list.hpp"
 #include "o80/memory/segment_name.hpp"
@@ -33,40 +34,77 @@ std::string what_there_is() {
 
 }  // namespace
 
-std::optional<AttachedSegment> AttachedSegment::open(std::string_view name, Access access) {
+std::optional<AttachedSegment> AttachedSegment::open(std::string_view name, Access access,
+                                                     std::string& reason) {
   AttachedSegment segment;
   segment.name_ = name;
   segment.path_ = segment_path(name);
   segment.access_ = access;
-  const int mode = access == Access::read_write ? O_RDWR : O_RDONLY;
-  segment.file_ = LockFile::open(segment.path_, mode | O_NOFOLLOW);
+  segment.file_ = LockFile::open(segment.path_, O_RDONLY | O_NOFOLLOW);
   if (!segment.file_.is_open()) {
-    if (errno == ENOENT) return std::nullopt;
-    if ((errno == EACCES || errno == EPERM) && access == Access::read_write)
-      throw SegmentError(segment_called(name) +
-                         " may not be written by this user: attach read-only, or let its backend "
-                         "be started with group permission");
-    throw SegmentError(segment_called(name) + " cannot be opened (" + segment.path_ +
-                       "): " + std::strerror(errno));
+    const int error = errno;
+    reason = "there is no such segment";
+    if (error == ENOENT) return std::nullopt;
+    throw SegmentError(segment_called(name) + " cannot be opened (" + segment.path_ + " of user " +
+                       owner_of(segment.path_) + "): " + std::strerror(error) +
+                       (error == EACCES
+                            ? ". Its backend can be started with a permission that lets this user "
+                              "read: --permission 640 for its group, 644 for everybody."
+                            : ""));
   }
 
+  const std::string untrusted = why_untrusted(segment.descriptor());
+  if (!untrusted.empty())
+    throw SegmentError(segment_called(name) + " is not attached to (" + segment.path_ +
+                       "): " + untrusted + ".");
   const std::string wrong =
-      inspect_segment(segment.file_.descriptor(), segment.header_, segment.view_.offsets);
+      inspect_segment(segment.descriptor(), segment.header_, segment.view_.offsets);
   if (!wrong.empty())
     throw SegmentError(segment_called(name) + " cannot be attached (" + segment.path_ +
                        "): " + wrong +
                        ". Start its backend anew with this o80, or remove it with `o80 clean " +
                        std::string(name) + "`.");
+  if (access == Access::read_write && !segment.open_commands(reason)) return std::nullopt;
 
-  // all of it to read; to write only where frontends may
-  segment.mapping_ = Mapping(segment.file_.descriptor(), segment.view_.offsets.file_bytes,
+  segment.mapping_ = Mapping(segment.descriptor(), segment.view_.offsets.file_bytes,
                              Mapping::Protection::read, Mapping::Faults::later);
   segment.view_.base = segment.mapping_.data();
   segment.view_.shape = segment.header_.shape;
-  if (access == Access::read_write)
-    Mapping::make_writable(segment.view_.base, segment.file_.descriptor(),
-                           segment.view_.offsets.bell, segment.header_.shape.page_bytes);
+  if (access == Access::read_write) segment.map_commands();
   return segment;
+}
+
+/// False if the file is missing: then the segment has a successor, or is being removed.
+bool AttachedSegment::open_commands(std::string& reason) {
+  const std::string path = commands_path(name_, header_.epoch);
+  commands_ = LockFile::open(path, O_RDWR | O_NOFOLLOW);
+  if (!commands_.is_open() && errno == ENOENT) {
+    reason = "its commanders' file (" + path +
+             ") is missing: its backend was replaced, or somebody removed the file";
+    return false;
+  }
+  if (!commands_.is_open() && (errno == EACCES || errno == EPERM))
+    throw ReadOnly(segment_called(name_) +
+                   " may not be commanded by this user: attach read-only to observe it, or let "
+                   "its backend be started with --permission 660, which lets its group command");
+  if (!commands_.is_open())
+    throw SegmentError("the commanders' file of " + segment_called(name_) + " cannot be opened (" +
+                       path + "): " + std::strerror(errno));
+  const std::string wrong =
+      inspect_commands(commands_.descriptor(), descriptor(), header_, view_.offsets);
+  if (!wrong.empty())
+    throw SegmentError("the commanders' file of " + segment_called(name_) + " cannot be used (" +
+                       path + "): " + wrong + ". Start its backend anew.");
+  return true;
+}
+
+/// All of it to read; to write only where frontends may.
+void AttachedSegment::map_commands() {
+  commands_mapping_ = Mapping(commands_.descriptor(), view_.offsets.commands_bytes,
+                              Mapping::Protection::read, Mapping::Faults::later);
+  view_.commands = commands_mapping_.data();
+  Mapping::make_writable(view_.commands, commands_.descriptor(), view_.offsets.bell,
+                         view_.shape.page_bytes);
 }
 
 /// The waiting side of attach: looks at what bears the name, again and again.
@@ -78,11 +116,8 @@ class SegmentSearch {
   /// True if `found` may be taken. Throws BackendFailed.
   bool look() {
     if (!found_ || !leads_to(path_, found_->descriptor()))
-      found_ = AttachedSegment::open(name_, access_);
-    if (!found_) {
-      reason_ = "there is no such segment";
-      return false;
-    }
+      found_ = AttachedSegment::open(name_, access_, reason_);
+    if (!found_) return false;
     if (found_->epoch() == options_.ignore_epoch) {
       reason_ = "its new backend has not come";
       return false;
@@ -136,7 +171,9 @@ AttachedSegment& AttachedSegment::operator=(AttachedSegment&& other) noexcept {
   access_ = other.access_;
   header_ = other.header_;
   file_ = std::move(other.file_);
+  commands_ = std::move(other.commands_);
   mapping_ = std::move(other.mapping_);
+  commands_mapping_ = std::move(other.commands_mapping_);
   view_ = other.view_;
   guard_ = other.guard_;
   asked_.store(0, std::memory_order_relaxed);
@@ -149,7 +186,9 @@ std::span<const std::byte> AttachedSegment::schema() const noexcept {
 }
 
 Life AttachedSegment::life() const noexcept {
-  const Life now = judge_life(descriptor(), view_.counters().state);
+  // the locks of the segment file are for observers, who can pile read locks on it
+  const int asked = access_ == Access::read_write ? commands_descriptor() : descriptor();
+  const Life now = judge_life(asked, view_.counters().state);
   if (is_over(now)) {
     over_.store(static_cast<std::uint32_t>(now), std::memory_order_relaxed);
     return now;
@@ -214,10 +253,10 @@ void AttachedSegment::check_process() const {
   if (guard_.forked()) guard_.check(segment_called(name_));
 }
 
-LockFile AttachedSegment::open_again() const {
+LockFile AttachedSegment::open_commands_again() const {
   check_process();
-  // through the descriptor: the name may lead to a successor by now
-  const std::string path = "/proc/self/fd/" + std::to_string(descriptor());
+  // through the descriptor: the file may have lost its name by now
+  const std::string path = "/proc/self/fd/" + std::to_string(commands_descriptor());
   LockFile file = LockFile::open(path, O_RDWR);
   if (!file.is_open())
     throw SegmentError(segment_called(name_) + " cannot be opened again: " + std::strerror(errno));

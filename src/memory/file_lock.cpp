@@ -20,7 +20,8 @@ struct flock one_byte(short type, std::uint64_t byte) noexcept {
 }  // namespace
 
 bool is_byte_locked(int descriptor, std::uint64_t byte) noexcept {
-  struct flock range = one_byte(F_WRLCK, byte);
+  // a read lock conflicts with write locks only
+  struct flock range = one_byte(F_RDLCK, byte);
   return fcntl(descriptor, F_OFD_GETLK, &range) == 0 && range.l_type != F_UNLCK;
 }
 

@@ -224,13 +224,12 @@ bool LaneReceivers::announce() noexcept {
   for (LaneReceiver& lane : lanes_)
     if (lane.has_news()) sleepers = lane.flush() || sleepers;
   // after the events: who read the old value before it raised its flag does not sleep on it
-  if (sleepers)
-    view_.counters().lane_wake.fetch_add(1, std::memory_order_seq_cst);  // sync lane_wake
+  if (sleepers) view_.wakes().lane_wake.fetch_add(1, std::memory_order_seq_cst);  // sync lane_wake
   return sleepers;
 }
 
 void LaneReceivers::flush_events() noexcept {
-  if (announce()) futex_wake(view_.counters().lane_wake, kEverybody);
+  if (announce()) futex_wake(view_.wakes().lane_wake, kEverybody);
 }
 
 }  // namespace o80

@@ -34,7 +34,7 @@ LaneSender::LaneSender(const AttachedSegment& segment) : segment_(&segment), vie
   const std::string quoted = "segment '" + segment.name() + "'";
   if (segment.access() != Access::read_write)
     throw ReadOnly(quoted + " was attached to read only: attach again without it to command");
-  lock_ = segment.open_again();
+  lock_ = segment.open_commands_again();
   const std::uint32_t lanes = view_.shape.lanes;
   while (lane_ < lanes && !lock_.try_lock(kFirstLaneByte + lane_)) ++lane_;
   if (lane_ == lanes)
@@ -44,8 +44,8 @@ LaneSender::LaneSender(const AttachedSegment& segment) : segment_(&segment), vie
 
   // ours: writable through the descriptor that bears no lock
   O80_CRASH_POINT("lane.after_lock");
-  const std::uint64_t offset = view_.offsets.lanes + lane_ * view_.offsets.lane_stride;
-  Mapping::make_writable(view_.base, segment.descriptor(), offset, view_.offsets.lane_stride);
+  Mapping::make_writable(view_.commands, segment.commands_descriptor(), view_.lane_offset(lane_),
+                         view_.offsets.lane_stride);
   page_ = &view_.lane(lane_);
   feedback_ = &view_.feedback(lane_);
   statuses_ = view_.statuses(lane_);
@@ -224,7 +224,7 @@ std::uint64_t LaneSender::ended() const noexcept {
 void LaneSender::sleep(std::uint32_t seen, std::int64_t at_most) {
   if (guard_.forked()) guard_.check("segment '" + segment_->name() + "'");
   // one word for all lanes, so that one call of the loop wakes whoever it has news for
-  const std::atomic<std::uint32_t>& wake = view_.counters().lane_wake;
+  const std::atomic<std::uint32_t>& wake = view_.wakes().lane_wake;
   const std::uint32_t now = wake.load(std::memory_order_seq_cst);  // sync lane_wake
   page_->waiting.store(1, std::memory_order_seq_cst);              // sync waiting
   O80_CRASH_POINT("lane.before_sleep");

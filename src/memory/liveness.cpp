@@ -33,7 +33,7 @@ constexpr LaneLife unpack(std::uint64_t word) noexcept {
 /// Realtime: the words may be read anywhere.
 struct LaneLiveness::Watched {
   explicit Watched(const OwnedSegment& segment)
-      : descriptor(segment.descriptor()), view(segment.view()) {
+      : descriptor(segment.commands_descriptor()), view(segment.view()) {
     for (std::uint32_t i = 0; i < view.shape.lanes; ++i) lanes.emplace_back(0);
   }
 

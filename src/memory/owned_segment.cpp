@@ -1,16 +1,9 @@
 #include "o80/memory/owned_segment.hpp"
 
-#include <fcntl.h>
-#include <sys/random.h>
-#include <sys/stat.h>
-#include <sys/statvfs.h>
 #include <time.h>
 #include <unistd.h>
 
 #include <bit>
-#include <cerrno>
-#include <cinttypes>
-#include <cstdio>
 #include <cstring>
 #include <limits>
 #include <utility>
@@ -18,34 +11,14 @@
 #include "o80/base/crash_point.hpp"
 #include "o80/base/error.hpp"
 #include "o80/memory/atomic_words.hpp"
+#include "o80/memory/named_segment.hpp"
+#include "o80/memory/segment_draft.hpp"
 #include "o80/memory/segment_file.hpp"
-#include "o80/memory/segment_list.hpp"
 #include "o80/memory/segment_name.hpp"
 
 namespace o80 {
 
 namespace {
-
-constexpr int kOpen = O_RDWR | O_NOFOLLOW;
-
-std::uint64_t random_bits() {
-  std::uint64_t bits = 0;
-  while (bits == 0)
-    if (getrandom(&bits, sizeof bits, 0) != sizeof bits) bits = 0;
-  return bits;
-}
-
-[[noreturn]] void fail(const std::string& name, const std::string& what, int error) {
-  throw SegmentError("cannot create segment '" + name + "': " + what + ": " + std::strerror(error));
-}
-
-[[noreturn]] void fail_for_space(const std::string& name, std::uint64_t bytes) {
-  throw SegmentError("cannot create segment '" + name + "': " + segment_directory() +
-                     " has no room for its " + std::to_string((bytes + (1U << 20) - 1) >> 20) +
-                     " MiB. Ask for a shorter history, remove dead segments with `o80 clean`, or "
-                     "enlarge it (`mount -o remount,size=... " +
-                     segment_directory() + "`).");
-}
 
 SegmentShape shape_of(const SegmentSpec& spec) {
   if (spec.rows == 0 || spec.rows >= std::numeric_limits<std::uint64_t>::max() / 2)
@@ -58,51 +31,6 @@ SegmentShape shape_of(const SegmentSpec& spec) {
           .slots = spec.rows + 1,
           .lanes = spec.lanes,
           .lane_blocks = std::bit_ceil(spec.lane_blocks)};
-}
-
-/// A temporary file whose byte 0 is ours; goes away again unless it was given its name.
-class Draft {
- public:
-  Draft(const std::string& name, const std::string& final_path) {
-    for (int attempt = 0; attempt < 100; ++attempt) {
-      char suffix[32];
-      std::snprintf(suffix, sizeof suffix, ".new-%016" PRIx64, random_bits());
-      path_ = final_path + suffix;
-      lock_ = LockFile::open(path_, kOpen | O_CREAT | O_EXCL, 0600);
-      if (!lock_.is_open() && errno == EEXIST) continue;
-      if (!lock_.is_open()) fail(name, "no file can be made in " + segment_directory(), errno);
-      O80_CRASH_POINT("create.before_lock");
-      // a sweeper may have found the file before it was locked: then it is gone
-      if (lock_.try_lock(kBackendByte) && leads_to(path_, lock_.descriptor())) return;
-    }
-    throw SegmentError("cannot create segment '" + name + "': its file is taken away each time");
-  }
-  Draft(const Draft&) = delete;
-  Draft& operator=(const Draft&) = delete;
-  ~Draft() {
-    if (lock_.is_open()) unlink(path_.c_str());
-  }
-
-  const std::string& path() const noexcept { return path_; }
-  int descriptor() const noexcept { return lock_.descriptor(); }
-  LockFile named() noexcept { return std::move(lock_); }
-
- private:
-  std::string path_;
-  LockFile lock_;
-};
-
-void reserve(const Draft& draft, const std::string& name, std::uint64_t bytes) {
-  struct statvfs room;
-  if (fstatvfs(draft.descriptor(), &room) == 0 && room.f_blocks > 0 &&
-      room.f_bavail < bytes / room.f_bsize)
-    fail_for_space(name, bytes);
-  int error = 0;
-  do {
-    error = posix_fallocate(draft.descriptor(), 0, static_cast<off_t>(bytes));
-  } while (error == EINTR);
-  if (error == ENOSPC || error == EFBIG || error == ENOMEM) fail_for_space(name, bytes);
-  if (error != 0) fail(name, "its memory cannot be reserved", error);
 }
 
 void copy_text(char* to, std::size_t most, const std::string& text) { text.copy(to, most - 1); }
@@ -120,58 +48,19 @@ void fill(const SegmentView& view, const SegmentSpec& spec, std::uint64_t epoch)
   copy_text(header.user, sizeof header.user, own_user());
   copy_text(header.program, sizeof header.program, own_program());
   std::memcpy(view.base, &header, sizeof header);
+  const CommandsHeader commands{.magic = kCommandsMagic,
+                                .version = kSegmentVersion,
+                                .header_bytes = sizeof commands,
+                                .file_bytes = view.offsets.commands_bytes,
+                                .epoch = epoch};
+  std::memcpy(view.commands, &commands, sizeof commands);
   if (!spec.schema.empty())
     std::memcpy(view.base + view.offsets.schema, spec.schema.data(), spec.schema.size());
 
-  // nobody else sees the file yet
+  // nobody else sees the files yet
   view.counters().begun.store(-1, std::memory_order_relaxed);
   view.counters().published.store(-1, std::memory_order_relaxed);
   view.bell().wanted.store(std::numeric_limits<std::int64_t>::max(), std::memory_order_relaxed);
-}
-
-/// Tells those attached to a dead segment that it has a successor; a file that is no segment
-/// has nobody to tell.
-void supersede(const std::string& path) {
-  const LockFile file = LockFile::open(path, kOpen);
-  SegmentHeader header;
-  SegmentView view;
-  if (!file.is_open() || !inspect_segment(file.descriptor(), header, view.offsets).empty()) return;
-  const Mapping mapping(file.descriptor(), view.offsets.file_bytes, Mapping::Protection::read_write,
-                        Mapping::Faults::later);
-  view.base = mapping.data();
-  view.shape = header.shape;
-  end_segment(view, State::superseded);
-}
-
-/// draft => the file that bears the name
-void publish(Draft& draft, const std::string& name, const std::string& path) {
-  while (true) {
-    O80_CRASH_POINT("create.before_link");
-    if (link(draft.path().c_str(), path.c_str()) == 0) {
-      O80_CRASH_POINT("create.after_link");
-      unlink(draft.path().c_str());
-      return;
-    }
-    if (errno != EEXIST) fail(name, "its file cannot be given its name", errno);
-
-    // the name is there: does anybody live behind it?
-    LockFile old = LockFile::open(path, kOpen);
-    if (!old.is_open() && errno == ENOENT) continue;
-    if (!old.is_open()) fail(name, path + " is in the way and cannot be opened", errno);
-    if (!old.try_lock(kBackendByte)) {
-      if (is_held(old.descriptor(), path)) throw SegmentTaken(taken_text(name, old.descriptor()));
-      continue;
-    }
-    if (!leads_to(path, old.descriptor())) continue;
-
-    // nobody, and nobody can come while we hold the old one
-    supersede(path);
-    O80_CRASH_POINT("create.before_rename");
-    if (rename(draft.path().c_str(), path.c_str()) != 0)
-      fail(name, path + " is in the way and cannot be replaced", errno);
-    O80_CRASH_POINT("create.after_rename");
-    return;
-  }
 }
 
 }  // namespace
@@ -186,38 +75,41 @@ OwnedSegment OwnedSegment::create(const SegmentSpec& spec) {
                           std::to_string(spec.lanes) +
                           " lanes make no segment (a row is a multiple of 8 bytes)");
   refuse_if_taken(spec.name);
-  sweep_drafts();
+  sweep_orphans();
 
-  // a complete file, held by us, that nobody can see
-  Draft draft(spec.name, path);
-  O80_CRASH_POINT("create.after_lock");
-  reserve(draft, spec.name, view.offsets.file_bytes);
+  // two complete files, held by us, that nobody can see
+  SegmentDraft draft(spec.name);
+  draft.reserve(view.offsets);
+  draft.permit(spec.permission);
+  const LockFile mapped = draft.open_segment();
   OwnedSegment segment;
-  segment.query_ = LockFile::open(draft.path(), kOpen);
-  if (!segment.query_.is_open()) fail(spec.name, "its file cannot be opened again", errno);
-  if (fchmod(draft.descriptor(), spec.permission) != 0)
-    fail(spec.name, "its permission cannot be set", errno);
-  Mapping mapping(segment.query_.descriptor(), view.offsets.file_bytes,
-                  Mapping::Protection::read_write, Mapping::Faults::now);
+  segment.query_ = draft.open_commands();
+  Mapping mapping(mapped.descriptor(), view.offsets.file_bytes, Mapping::Protection::read_write,
+                  Mapping::Faults::now);
+  Mapping commands_mapping(segment.query_.descriptor(), view.offsets.commands_bytes,
+                           Mapping::Protection::read_write, Mapping::Faults::now);
   view.base = mapping.data();
-  segment.epoch_ = random_bits();
-  fill(view, spec, segment.epoch_);
+  view.commands = commands_mapping.data();
+  fill(view, spec, draft.epoch());
 
-  publish(draft, spec.name, path);
+  draft.publish();
   segment.name_ = spec.name;
   segment.path_ = path;
+  segment.commands_path_ = draft.commands_path();
+  segment.epoch_ = draft.epoch();
   segment.view_ = view;
   segment.mapping_ = std::move(mapping);
-  segment.lock_ = draft.named();
+  segment.commands_mapping_ = std::move(commands_mapping);
+  segment.lock_ = draft.take_segment_lock();
+  segment.commands_lock_ = draft.take_commands_lock();
   return segment;
 }
 
 void OwnedSegment::refuse_if_taken(std::string_view name) {
-  const std::string path = segment_path(name);
-  // a descriptor of its own is enough to ask; who may not read it learns so when it creates
-  const LockFile file = LockFile::open(path, O_RDONLY | O_NOFOLLOW);
-  if (file.is_open() && is_held(file.descriptor(), path))
-    throw SegmentTaken(taken_text(name, file.descriptor()));
+  const NamedSegment bearer = NamedSegment::open(name);
+  if (!bearer.is_open()) return;
+  bearer.check_owner();
+  if (bearer.is_alive()) throw SegmentTaken(bearer.taken_text());
 }
 
 OwnedSegment& OwnedSegment::operator=(OwnedSegment&& other) noexcept {
@@ -225,10 +117,13 @@ OwnedSegment& OwnedSegment::operator=(OwnedSegment&& other) noexcept {
   release();
   name_ = std::move(other.name_);
   path_ = std::move(other.path_);
+  commands_path_ = std::move(other.commands_path_);
   epoch_ = other.epoch_;
   mapping_ = std::move(other.mapping_);
+  commands_mapping_ = std::move(other.commands_mapping_);
   query_ = std::move(other.query_);
   lock_ = std::move(other.lock_);
+  commands_lock_ = std::move(other.commands_lock_);
   view_ = other.view_;
   guard_ = other.guard_;
   return *this;
@@ -242,8 +137,10 @@ void OwnedSegment::release() noexcept {
     if (state() != State::failed) remove();
   }
   mapping_ = Mapping();
+  commands_mapping_ = Mapping();
   query_.close();
   lock_.close();
+  commands_lock_.close();
 }
 
 State OwnedSegment::state() const noexcept {
@@ -266,6 +163,8 @@ void OwnedSegment::remove() noexcept {
   // we hold byte 0: the name cannot change hands between the look and the unlink
   O80_CRASH_POINT("segment.before_unlink");
   if (leads_to(path_, lock_.descriptor())) unlink(path_.c_str());
+  O80_CRASH_POINT("segment.between_unlinks");
+  unlink(commands_path_.c_str());
   O80_CRASH_POINT("segment.after_unlink");
 }
 

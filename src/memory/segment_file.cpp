@@ -1,20 +1,17 @@
 #include "o80/memory/segment_file.hpp"
 
 #include <fcntl.h>
-#include <pwd.h>
-#include <signal.h>
 #include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
-#include <vector>
 
 #include "o80/base/crash_point.hpp"
 #include "o80/base/printable.hpp"
-#include "o80/base/time.hpp"
 #include "o80/memory/file_lock.hpp"
+#include "o80/memory/file_owner.hpp"
 #include "o80/memory/futex.hpp"
 
 namespace o80 {
@@ -23,21 +20,6 @@ namespace {
 
 std::string text_of(const char* chars, std::size_t most) {
   return printable({chars, strnlen(chars, most)});
-}
-
-bool read_header(int descriptor, SegmentHeader& header) noexcept {
-  return pread(descriptor, &header, sizeof header, 0) == sizeof header;
-}
-
-// how long a lock of a living process, or of one that is being torn down, may last unnoticed
-constexpr std::int64_t kPasser = 20'000'000;    // [ns]
-constexpr std::int64_t kDying = 1'000'000'000;  // [ns]
-
-std::int64_t patience(int descriptor) noexcept {
-  SegmentHeader header;
-  const bool dead = read_header(descriptor, header) && header.pid > 0 && kill(header.pid, 0) != 0 &&
-                    errno == ESRCH;
-  return dead ? kDying : kPasser;
 }
 
 }  // namespace
@@ -53,23 +35,15 @@ bool bears_the_mark(int descriptor) noexcept {
   return pread(descriptor, &magic, sizeof magic, 0) == sizeof magic && magic == kSegmentMagic;
 }
 
-bool is_held(int descriptor, const std::string& path) {
-  const std::int64_t end = monotonic_now() + patience(descriptor);
-  while (is_byte_locked(descriptor, kBackendByte)) {
-    if (monotonic_now() >= end) return leads_to(path, descriptor);
-    usleep(1000);
-  }
-  return false;
+bool read_header(int descriptor, SegmentHeader& header) noexcept {
+  return pread(descriptor, &header, sizeof header, 0) == sizeof header;
 }
 
-std::string taken_text(std::string_view name, int descriptor) {
-  SegmentHeader header{};
-  const bool known = read_header(descriptor, header) && header.magic == kSegmentMagic &&
-                     header.version == kSegmentVersion;
-  return "segment '" + std::string(name) + "' already has a backend" +
-         (known ? " (" + describe_owner(header) + ")" : std::string()) +
-         ".\nStop it first with `o80 stop " + std::string(name) +
-         "`, or give this one another name with --segment.";
+std::uint64_t epoch_of(int descriptor) noexcept {
+  SegmentHeader header;
+  const bool is_one = read_header(descriptor, header) && header.magic == kSegmentMagic &&
+                      header.version == kSegmentVersion;
+  return is_one ? header.epoch : 0;
 }
 
 std::string inspect_segment(int descriptor, SegmentHeader& header, SegmentOffsets& offsets) {
@@ -89,6 +63,32 @@ std::string inspect_segment(int descriptor, SegmentHeader& header, SegmentOffset
   if (static_cast<std::uint64_t>(status.st_size) > offsets.file_bytes)
     return "it is longer than its header says";
   return {};
+}
+
+std::string inspect_commands(int commands, int segment, const SegmentHeader& header,
+                             const SegmentOffsets& offsets) {
+  struct stat status, of_segment;
+  if (fstat(commands, &status) != 0 || fstat(segment, &of_segment) != 0)
+    return std::strerror(errno);
+  if (!S_ISREG(status.st_mode)) return "it is not a regular file";
+  if (status.st_uid != of_segment.st_uid) return "it has another owner than the segment";
+  CommandsHeader found{};
+  if (pread(commands, &found, sizeof found, 0) != sizeof found ||
+      static_cast<std::uint64_t>(status.st_size) != offsets.commands_bytes)
+    return "it does not have the size that the segment says";
+  if (found.magic != kCommandsMagic || found.version != header.version ||
+      found.header_bytes != sizeof found || found.file_bytes != offsets.commands_bytes ||
+      found.epoch != header.epoch)
+    return "its header is corrupted";
+  return {};
+}
+
+mode_t observers_mode(mode_t permission) noexcept {
+  return 0600 | (permission & 0444) | (permission & 0222) << 1;
+}
+
+mode_t commanders_mode(mode_t permission) noexcept {
+  return 0600 | (permission & 0222) | (permission & 0222) << 1;
 }
 
 const char* name_of(Life life) noexcept {
@@ -132,14 +132,16 @@ void end_segment(const SegmentView& view, State state) noexcept {
   O80_CRASH_POINT("segment.before_end");
   counters.state.store(static_cast<std::uint32_t>(state), std::memory_order_seq_cst);  // sync state
   O80_CRASH_POINT("segment.after_end");
-  counters.row_wake.fetch_add(1, std::memory_order_seq_cst);  // sync row_wake
-  futex_wake(counters.row_wake, kEverybody);
+  if (view.commands == nullptr) return;  // observers poll
+  Wakes& wakes = view.wakes();
+  wakes.row_wake.fetch_add(1, std::memory_order_seq_cst);  // sync row_wake
+  futex_wake(wakes.row_wake, kEverybody);
   for (std::uint32_t i = 0; i < view.shape.lanes; ++i) {
     LaneFeedback& feedback = view.feedback(i);
     feedback.events.fetch_add(1, std::memory_order_seq_cst);  // sync events
   }
-  counters.lane_wake.fetch_add(1, std::memory_order_seq_cst);  // sync lane_wake
-  futex_wake(counters.lane_wake, kEverybody);
+  wakes.lane_wake.fetch_add(1, std::memory_order_seq_cst);  // sync lane_wake
+  futex_wake(wakes.lane_wake, kEverybody);
 }
 
 std::string describe_owner(const SegmentHeader& header) {
@@ -156,14 +158,7 @@ std::string describe_owner(const SegmentHeader& header) {
          text_of(header.user, sizeof header.user);
 }
 
-std::string own_user() {
-  std::vector<char> buffer(16384);
-  passwd entry{};
-  passwd* found = nullptr;
-  if (getpwuid_r(geteuid(), &entry, buffer.data(), buffer.size(), &found) == 0 && found != nullptr)
-    return found->pw_name;
-  return "user " + std::to_string(geteuid());
-}
+std::string own_user() { return user_name(geteuid()); }
 
 std::string own_program() {
   char name[64] = "";

@@ -22,15 +22,18 @@ bool SegmentOffsets::compute(const SegmentShape& shape, SegmentOffsets& offsets)
   const std::uint64_t blocks = shape.lane_blocks;
   offsets.schema = pages(sizeof(SegmentHeader));
   offsets.counters = offsets.schema + pages(shape.schema_bytes);
-  offsets.bell = offsets.counters + pages(sizeof(Counters));
+  offsets.history = offsets.counters + pages(sizeof(Counters));
+  offsets.file_bytes = offsets.history + pages(shape.slots * shape.row_bytes);
+
+  offsets.wakes = pages(sizeof(CommandsHeader));
+  offsets.bell = offsets.wakes + pages(sizeof(Wakes));
   offsets.lanes = offsets.bell + pages(sizeof(Bell));
   offsets.transport = pages(sizeof(LaneSenderPage));
   offsets.lane_stride = offsets.transport + pages(blocks * kBlockSize);
   offsets.feedback = offsets.lanes + shape.lanes * offsets.lane_stride;
   offsets.statuses = pages(sizeof(LaneFeedback));
   offsets.feedback_stride = offsets.statuses + pages(2 * blocks * sizeof(StatusSlot));
-  offsets.history = offsets.feedback + shape.lanes * offsets.feedback_stride;
-  offsets.file_bytes = offsets.history + pages(shape.slots * shape.row_bytes);
+  offsets.commands_bytes = offsets.feedback + shape.lanes * offsets.feedback_stride;
   return true;
 }
 

@@ -1,17 +1,18 @@
 #include "o80/memory/segment_list.hpp"
 
-#include <dirent.h>
 #include <fcntl.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <atomic>
+#include <cerrno>
+#include <cstddef>
 #include <cstring>
 
 #include "o80/base/error.hpp"
 #include "o80/base/printable.hpp"
 #include "o80/memory/file_lock.hpp"
+#include "o80/memory/file_owner.hpp"
+#include "o80/memory/named_segment.hpp"
 #include "o80/memory/segment_file.hpp"
 #include "o80/memory/segment_name.hpp"
 
@@ -19,33 +20,21 @@ namespace o80 {
 
 namespace {
 
-constexpr std::string_view kPrefix = "o80-";
-constexpr std::string_view kDraft = ".new-";
-
-std::vector<std::string> file_names() {
-  std::vector<std::string> names;
-  DIR* directory = opendir(segment_directory().c_str());
-  if (directory == nullptr) return names;
-  while (const dirent* entry = readdir(directory))
-    if (std::string_view(entry->d_name).starts_with(kPrefix)) names.emplace_back(entry->d_name);
-  closedir(directory);
-  std::sort(names.begin(), names.end());
-  return names;
-}
-
-bool is_draft(std::string_view name) { return name.find(kDraft) != std::string_view::npos; }
-
-LockFile open_file(const std::string& path, int mode) {
-  return LockFile::open(path, mode | O_NOFOLLOW);
-}
-
 SegmentEntry describe(const std::string& name) {
   SegmentEntry entry;
   entry.name = name;
-  const LockFile file = open_file(segment_path(name), O_RDONLY);
+  const LockFile file = LockFile::open(segment_path(name), O_RDONLY | O_NOFOLLOW);
   SegmentHeader header{};
   SegmentOffsets offsets{};
-  if (!file.is_open() || !inspect_segment(file.descriptor(), header, offsets).empty()) return entry;
+  if (!file.is_open()) {
+    entry.problem = std::string("it cannot be opened: ") + std::strerror(errno);
+    entry.user = owner_of(segment_path(name));
+    return entry;
+  }
+  entry.problem = why_untrusted(file.descriptor());
+  if (!entry.problem.empty()) entry.user = owner_of(segment_path(name));
+  if (entry.problem.empty()) entry.problem = inspect_segment(file.descriptor(), header, offsets);
+  if (!entry.problem.empty()) return entry;
 
   std::uint32_t word = 0;
   const auto where = static_cast<off_t>(offsets.counters + offsetof(Counters, state));
@@ -58,67 +47,50 @@ SegmentEntry describe(const std::string& name) {
   entry.user = printable({header.user, strnlen(header.user, sizeof header.user)});
   entry.program = printable({header.program, strnlen(header.program, sizeof header.program)});
   entry.epoch = header.epoch;
-  entry.bytes = header.file_bytes;
+  entry.bytes = offsets.file_bytes + offsets.commands_bytes;
   return entry;
 }
 
-enum class Removal { none, alive, removed };
-
-/// Only who holds byte 0 of the file that bears the name may unlink it.
-Removal remove_dead(const std::string& path, bool marked_only) {
-  LockFile file = open_file(path, O_RDWR);
-  if (!file.is_open()) return Removal::none;
-  if (marked_only && !bears_the_mark(file.descriptor())) return Removal::none;
-  if (!file.try_lock(kBackendByte)) return Removal::alive;
-  if (!leads_to(path, file.descriptor())) return Removal::none;
-  return unlink(path.c_str()) == 0 ? Removal::removed : Removal::none;
+/// Removes it if its backend is dead; false if it lives, or is being replaced.
+bool remove_dead(NamedSegment& segment, bool& removed) {
+  if (!segment.try_lock()) return false;
+  removed = segment.is_current() && segment.remove();
+  return true;
 }
 
 }  // namespace
 
 std::vector<SegmentEntry> list_segments() {
   std::vector<SegmentEntry> entries;
-  for (const std::string& file : file_names()) {
-    const std::string name = file.substr(kPrefix.size());
-    if (is_draft(file) || !is_segment_name(name)) continue;
-    entries.push_back(describe(name));
-  }
+  for (const SegmentFileName& file : list_files())
+    if (file.kind == SegmentFileName::Kind::segment) entries.push_back(describe(file.name));
   return entries;
 }
 
 bool clean(std::string_view name) {
-  const std::string path = segment_path(name);
-  const LockFile file = open_file(path, O_RDONLY);
-  if (file.is_open() && is_held(file.descriptor(), path))
-    throw SegmentTaken(taken_text(name, file.descriptor()));
-  switch (remove_dead(path, false)) {
-    case Removal::alive:
-      throw SegmentTaken(taken_text(name, file.descriptor()));
-    case Removal::removed:
-      return true;
-    case Removal::none:
-      break;
-  }
-  if (access(path.c_str(), F_OK) == 0)
-    throw SegmentError("segment '" + std::string(name) + "' cannot be removed by this user (" +
-                       path + ")");
-  return false;
-}
-
-std::vector<std::string> clean_dead() {
-  sweep_drafts();
-  std::vector<std::string> removed;
-  for (const std::string& file : file_names()) {
-    if (is_draft(file)) continue;
-    const std::string path = segment_directory() + "/" + file;
-    if (remove_dead(path, true) == Removal::removed) removed.push_back(file.substr(kPrefix.size()));
-  }
+  sweep_orphans();
+  NamedSegment segment = NamedSegment::open(name);
+  bool removed = false;
+  if (segment.is_open() && segment.is_alive()) throw SegmentTaken(segment.taken_text());
+  if (segment.can_lock() && !remove_dead(segment, removed))
+    throw SegmentTaken(segment.taken_text());
+  if (!removed && access(segment_path(name).c_str(), F_OK) == 0)
+    throw SegmentError("segment '" + std::string(name) + "' cannot be removed by this user: " +
+                       segment_path(name) + " belongs to user " + owner_of(segment_path(name)));
   return removed;
 }
 
-void sweep_drafts() {
-  for (const std::string& file : file_names())
-    if (is_draft(file)) remove_dead(segment_directory() + "/" + file, false);
+std::vector<std::string> clean_dead() {
+  sweep_orphans();
+  std::vector<std::string> removed;
+  for (const SegmentFileName& file : list_files()) {
+    if (file.kind != SegmentFileName::Kind::segment) continue;
+    NamedSegment segment = NamedSegment::open(file.name);
+    bool is_removed = false;
+    if (segment.is_open() && bears_the_mark(segment.descriptor())) remove_dead(segment, is_removed);
+    if (is_removed) removed.push_back(file.name);
+  }
+  return removed;
 }
 
 }  // namespace o80

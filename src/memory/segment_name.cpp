@@ -1,11 +1,30 @@
 #include "o80/memory/segment_name.hpp"
 
+#include <dirent.h>
+
 #include <algorithm>
+#include <charconv>
+#include <cinttypes>
+#include <cstdio>
 #include <cstdlib>
 
 #include "o80/base/error.hpp"
 
 namespace o80 {
+
+namespace {
+
+constexpr std::string_view kPrefix = "o80-";
+constexpr std::string_view kCommands = ".commanders-";
+constexpr std::string_view kDraft = ".new-";
+
+std::string with_epoch(std::string path, std::string_view mark, std::uint64_t epoch) {
+  char digits[17];
+  std::snprintf(digits, sizeof digits, "%016" PRIx64, epoch);
+  return path.append(mark).append(digits);
+}
+
+}  // namespace
 
 std::string segment_directory() {
   const char* directory = std::getenv("O80_DIRECTORY");
@@ -19,7 +38,8 @@ bool is_segment_name(std::string_view name) noexcept {
   };
   return !name.empty() && name.size() <= 64 && name.front() != '.' &&
          std::all_of(name.begin(), name.end(), allowed) &&
-         name.find(".new-") == std::string_view::npos;
+         name.find(kDraft) == std::string_view::npos &&
+         name.find(kCommands) == std::string_view::npos;
 }
 
 void check_segment_name(std::string_view name) {
@@ -31,7 +51,49 @@ void check_segment_name(std::string_view name) {
 
 std::string segment_path(std::string_view name) {
   check_segment_name(name);
-  return segment_directory() + "/o80-" + std::string(name);
+  return (segment_directory() + "/").append(kPrefix).append(name);
+}
+
+std::string commands_path(std::string_view name, std::uint64_t epoch) {
+  return with_epoch(segment_path(name), kCommands, epoch);
+}
+
+std::string draft_path(std::string_view name, std::uint64_t epoch) {
+  return with_epoch(segment_path(name), kDraft, epoch);
+}
+
+std::optional<SegmentFileName> parse_file_name(std::string_view file) {
+  if (!file.starts_with(kPrefix)) return std::nullopt;
+  file.remove_prefix(kPrefix.size());
+  SegmentFileName parsed;
+  for (const auto& [mark, kind] : {std::pair(kCommands, SegmentFileName::Kind::commands),
+                                   std::pair(kDraft, SegmentFileName::Kind::draft)}) {
+    const std::size_t at = file.find(mark);
+    if (at == std::string_view::npos) continue;
+    const std::string_view digits = file.substr(at + mark.size());
+    const char* const end = digits.data() + digits.size();
+    const auto read = std::from_chars(digits.data(), end, parsed.epoch, 16);
+    if (digits.size() != 16 || read.ec != std::errc() || read.ptr != end) return std::nullopt;
+    parsed.kind = kind;
+    file = file.substr(0, at);
+    break;
+  }
+  if (!is_segment_name(file)) return std::nullopt;
+  parsed.name = file;
+  return parsed;
+}
+
+std::vector<SegmentFileName> list_files() {
+  std::vector<std::string> names;
+  DIR* directory = opendir(segment_directory().c_str());
+  if (directory == nullptr) return {};
+  while (const dirent* entry = readdir(directory)) names.emplace_back(entry->d_name);
+  closedir(directory);
+  std::sort(names.begin(), names.end());
+  std::vector<SegmentFileName> files;
+  for (const std::string& name : names)
+    if (const auto file = parse_file_name(name)) files.push_back(*file);
+  return files;
 }
 
 }  // namespace o80

@@ -52,12 +52,12 @@ Waited RowWaiter::wait_for_row(Iteration k, const Deadline& deadline, const Chec
 }
 
 void RowWaiter::sleep(Iteration k, std::int64_t at_most) noexcept {
-  Counters& counters = view_.counters();
+  std::atomic<std::uint32_t>& wake = view_.wakes().row_wake;
   Bell& bell = view_.bell();
 
   // lower the word, look again, sleep
   O80_CRASH_POINT("rows.before_register");
-  const std::uint32_t seen = counters.row_wake.load(std::memory_order_seq_cst);  // sync row_wake
+  const std::uint32_t seen = wake.load(std::memory_order_seq_cst);  // sync row_wake
   // an end is said before it wakes: who has seen that wake sees the end
   if (segment_->has_ended()) return;
   Iteration lowest = bell.wanted.load(std::memory_order_seq_cst);  // sync wanted
@@ -65,14 +65,14 @@ void RowWaiter::sleep(Iteration k, std::int64_t at_most) noexcept {
          !bell.wanted.compare_exchange_weak(lowest, k, std::memory_order_seq_cst)) {  // sync wanted
   }
   O80_CRASH_POINT("rows.before_sleep");
-  if (counters.published.load(std::memory_order_seq_cst) >= k) return;  // sync published
-  if (!futex_wait(counters.row_wake, seen, at_most)) return;
+  if (view_.counters().published.load(std::memory_order_seq_cst) >= k) return;  // sync published
+  if (!futex_wait(wake, seen, at_most)) return;
 
   // the writer woke one: the first awake after each of its wakes tells the rest
-  const std::uint32_t now = counters.row_wake.load(std::memory_order_seq_cst);  // sync row_wake
+  const std::uint32_t now = wake.load(std::memory_order_seq_cst);  // sync row_wake
   if (now == seen || bell.passed_on.exchange(now, std::memory_order_relaxed) == now) return;
   O80_CRASH_POINT("rows.before_pass_on");
-  futex_wake(counters.row_wake, kEverybody);
+  futex_wake(wake, kEverybody);
 }
 
 void RowWaiter::poll(Iteration k, std::int64_t at_most) noexcept {
@@ -95,13 +95,13 @@ bool RowSignal::announce(Iteration k) noexcept {
   bell.wanted.store(kNoWish, std::memory_order_seq_cst);  // sync wanted
   O80_CRASH_POINT("rows.before_wake");
   // after the reset: who registered before it still has the old value and will not sleep on it
-  view_.counters().row_wake.fetch_add(1, std::memory_order_seq_cst);  // sync row_wake
+  view_.wakes().row_wake.fetch_add(1, std::memory_order_seq_cst);  // sync row_wake
   return true;
 }
 
 void RowSignal::wake_readers(Iteration k) noexcept {
   if (!announce(k)) return;
-  futex_wake(view_.counters().row_wake, 1);
+  futex_wake(view_.wakes().row_wake, 1);
   O80_CRASH_POINT("rows.after_wake");
 }
 
@@ -112,7 +112,7 @@ std::uint32_t BellWaiter::value() const noexcept {
 bool BellWaiter::wait(std::uint32_t seen, std::int64_t at_most) noexcept {
   const auto rang = [&] { return value() != seen; };
   if (spinner_.spin(rang)) return true;
-  std::atomic<std::uint32_t>& sleeping = view_.counters().sleeping;
+  std::atomic<std::uint32_t>& sleeping = view_.wakes().sleeping;
   sleeping.store(1, std::memory_order_seq_cst);  // sync sleeping
   O80_CRASH_POINT("bell.before_sleep");
   const Bell& bell = view_.bell();
@@ -130,7 +130,7 @@ void ring_bell(const SegmentView& view) noexcept {
   O80_CRASH_POINT("bell.before_ring");
   bell.rung.fetch_add(1, std::memory_order_seq_cst);  // sync bell
   O80_CRASH_POINT("bell.after_ring");
-  if (view.counters().sleeping.load(std::memory_order_seq_cst) != 0)  // sync sleeping
+  if (view.wakes().sleeping.load(std::memory_order_seq_cst) != 0)  // sync sleeping
     futex_wake(bell.rung, 1);
 }
 

@@ -52,13 +52,13 @@ void UntypedBackend::Body::freed(std::uint32_t lane, std::uint32_t blocks) noexc
 
 /// Whoever waits is woken by one system call at most.
 void UntypedBackend::Body::wake(bool lanes_wait, bool reader_waits) noexcept {
-  Counters& counters = segment.view().counters();
+  Wakes& wakes = segment.view().wakes();
   if (lanes_wait && reader_waits) {
-    futex_wake_both(counters.row_wake, 1, counters.lane_wake);
+    futex_wake_both(wakes.row_wake, 1, wakes.lane_wake);
   } else if (lanes_wait) {
-    futex_wake(counters.lane_wake, kEverybody);
+    futex_wake(wakes.lane_wake, kEverybody);
   } else if (reader_waits) {
-    futex_wake(counters.row_wake, 1);
+    futex_wake(wakes.row_wake, 1);
   }
 }
 

@@ -1,16 +1,18 @@
-// A file that lies: a good segment with bytes of any part changed, cut or stretched. Whoever
-// attaches to it works or is told what is wrong, and goes on.
+// Damaged files: a good segment with bytes of any part of both its files changed, cut or
+// stretched. Whoever attaches to it works or is told what is wrong, and goes on.
 
 #include <fcntl.h>
 #include <stdlib.h>
 #include <unistd.h>
 
+#include <array>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "fuzz/bytes.hpp"
@@ -29,6 +31,14 @@ namespace {
 
 constexpr std::size_t kMostBytes = 1U << 20;  // of a file
 
+/// The segment file and the commanders' file.
+using Files = std::array<std::vector<char>, 2>;
+
+/// A part of one of them.
+struct Part {
+  std::size_t file, begin, end;
+};
+
 /// A good segment of a few rows, as its backend left it when it was killed.
 class Original {
  public:
@@ -42,47 +52,53 @@ class Original {
     backend.publish();
     UntypedFrontend frontend("robot");
     offsets_ = frontend.link()->segment.view().offsets;
+    paths_ = {segment_path("robot"), commands_path("robot", frontend.epoch())};
     const double target = 0.5;
     for (int i = 0; i < 6; ++i) {
       frontend.add_command(0, std::as_bytes(std::span(&target, 1)));
       frontend.pulse();
       if (backend.try_step() == Step::run) backend.publish();
     }
-    std::ifstream file(path_of(), std::ios::binary);
-    bytes_.assign(std::istreambuf_iterator<char>(file), {});
+    for (std::size_t i = 0; i < files_.size(); ++i) {
+      std::ifstream file(paths_[i], std::ios::binary);
+      files_[i].assign(std::istreambuf_iterator<char>(file), {});
+    }
   }
   Original(const Original&) = delete;
   Original& operator=(const Original&) = delete;
   ~Original() { std::filesystem::remove_all(directory_); }
 
-  std::string path_of() const { return directory_ + "/o80-robot"; }
-  const std::vector<char>& bytes() const { return bytes_; }
-  /// Where a part begins, and where the one after it does.
-  std::pair<std::size_t, std::size_t> part(std::uint32_t which) const {
-    const std::size_t begins[] = {0,
-                                  offsets_.schema,
-                                  offsets_.counters,
-                                  offsets_.bell,
-                                  offsets_.lanes,
-                                  offsets_.feedback,
-                                  offsets_.feedback + offsets_.statuses,
-                                  offsets_.history,
-                                  offsets_.file_bytes};
-    return {begins[which % 8], begins[which % 8 + 1]};
+  const std::string& path(std::size_t file) const { return paths_[file]; }
+  const Files& files() const { return files_; }
+  Part part(std::uint32_t which) const {
+    const SegmentOffsets& at = offsets_;
+    const Part parts[] = {{0, 0, at.schema},
+                          {0, at.schema, at.counters},
+                          {0, at.counters, at.history},
+                          {0, at.history, at.file_bytes},
+                          {1, 0, at.wakes},
+                          {1, at.wakes, at.bell},
+                          {1, at.bell, at.lanes},
+                          {1, at.lanes, at.feedback},
+                          {1, at.feedback, at.feedback + at.statuses},
+                          {1, at.feedback + at.statuses, at.commands_bytes}};
+    return parts[which % std::size(parts)];
   }
 
  private:
   std::string directory_;
   SegmentOffsets offsets_{};
-  std::vector<char> bytes_;
+  std::array<std::string, 2> paths_;
+  Files files_;
 };
 
 /// The original as the fuzzer wants it.
-std::vector<char> lie(const Original& original, Bytes& bytes) {
-  std::vector<char> file = original.bytes();
+Files lie(const Original& original, Bytes& bytes) {
+  Files files = original.files();
   while (!bytes.empty()) {
     const auto what = bytes.number<std::uint8_t>();
-    const auto [begin, end] = original.part(what >> 4);
+    const auto [which, begin, end] = original.part(what >> 4);
+    std::vector<char>& file = files[which];
     switch (what & 7) {
       case 0:
         file.resize(std::min<std::size_t>(bytes.number<std::uint32_t>(), kMostBytes));
@@ -106,7 +122,7 @@ std::vector<char> lie(const Original& original, Bytes& bytes) {
       }
     }
   }
-  return file;
+  return files;
 }
 
 constexpr Timeout kAtOnce = std::chrono::nanoseconds(0);
@@ -164,25 +180,29 @@ void attach(const FrontendOptions& options) {
 void run(Bytes bytes) {
   static const Original original;
   const bool alive = bytes.number<std::uint8_t>() % 2 == 0;
-  const std::vector<char> file = lie(original, bytes);
-  {
-    std::ofstream out(original.path_of(), std::ios::binary | std::ios::trunc);
-    out.write(file.data(), static_cast<std::streamsize>(file.size()));
+  const Files files = lie(original, bytes);
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    std::ofstream out(original.path(i), std::ios::binary | std::ios::trunc);
+    out.write(files[i].data(), static_cast<std::streamsize>(files[i].size()));
     if (!out) std::abort();
   }
   list_segments();
   if (alive) {
-    // somebody holds its byte 0: it looks like the segment of a living backend
-    LockFile backend = LockFile::open(original.path_of(), O_RDWR);
-    if (!backend.try_lock(kBackendByte)) std::abort();
+    // somebody holds both bytes 0: it looks like the segment of a living backend
+    LockFile segment = LockFile::open(original.path(0), O_RDWR);
+    LockFile commands = LockFile::open(original.path(1), O_RDWR);
+    if (!segment.try_lock(kBackendByte) || !commands.try_lock(kBackendByte)) std::abort();
     attach({.timeout = kAtOnce});
+    attach({.timeout = kAtOnce, .access = Access::read_only});
   }
   attach({.timeout = kAtOnce, .access = Access::read_only, .dead = true});
   attach({.timeout = kAtOnce, .dead = true});
   // and a new backend comes whatever it finds
   OwnedSegment::create(
       {.name = "robot", .schema = {}, .row_bytes = 64, .rows = 1, .lanes = 1, .lane_blocks = 1});
-  if (std::filesystem::exists(original.path_of())) std::abort();
+  if (std::filesystem::exists(original.path(0))) std::abort();
+  clean_dead();
+  if (std::filesystem::exists(original.path(1))) std::abort();
 }
 
 }  // namespace

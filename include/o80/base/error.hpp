@@ -31,7 +31,7 @@ O80_ERROR(RowOverwritten, Error);           // the history no longer holds that 
 O80_ERROR(LaneFull, Error);                 // too much is in flight, nothing was sent
 O80_ERROR(NoLane, Error);                   // as many frontends command as the segment has lanes
 O80_ERROR(NotBursting, Error);              // a burst was asked of a backend that runs by the clock
-O80_ERROR(ReadOnly, Error);                 // the frontend was opened to read only
+O80_ERROR(ReadOnly, Error);                 // the frontend may read only
 O80_ERROR(UsedAfterFork, Error);            // the object belongs to the parent process
 O80_ERROR(Closed, Error);                   // the object was closed
 O80_ERROR(Cancelled, Error);                // the caller's own check ended a wait

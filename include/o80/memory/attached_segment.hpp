@@ -32,15 +32,17 @@ struct AttachOptions {
 
 /// Move-only: the segment of some backend, seen from a frontend.
 ///
-/// Mapped read-only but for the bell (with Access::read_write) and the lane that a LaneSender
-/// takes. Copies its header first: what the file says later moves no bound.
+/// With Access::read_only it opens the segment file alone; with Access::read_write the commanders'
+/// file too. Mapped read-only but for the bell and the lane that a LaneSender takes. Copies the
+/// header first: what the file says later moves no bound.
 ///
 /// Writer / Readers: const calls from any thread.
 /// Realtime: view() only.
 class AttachedSegment {
  public:
   /// Waits until a segment of that name is running. Throws TimeoutError (listing what there is),
-  /// SegmentError, BackendFailed, Cancelled, InvalidArgument.
+  /// SegmentError, ReadOnly (this user may not command), BackendFailed, Cancelled,
+  /// InvalidArgument.
   static AttachedSegment attach(std::string_view name, Access access, const Deadline& deadline,
                                 const AttachOptions& options = {});
 
@@ -54,7 +56,10 @@ class AttachedSegment {
   /// The schema, from the mapping.
   std::span<const std::byte> schema() const noexcept;
   const SegmentView& view() const noexcept { return view_; }
+  /// Of the segment file.
   int descriptor() const noexcept { return file_.descriptor(); }
+  /// Of the commanders' file, which bears no lock of ours; -1 with Access::read_only.
+  int commands_descriptor() const noexcept { return commands_.descriptor(); }
   /// Asks the kernel: 2 us. Once over, never starting or running again, although its successor
   /// holds the lock of the dead for a moment before it says so.
   Life life() const noexcept;
@@ -70,23 +75,29 @@ class AttachedSegment {
   /// Throws UsedAfterFork.
   void check_process() const;
   bool forked() const noexcept { return guard_.forked(); }
-  /// Another open file of the same segment, for the lock of a lane.
-  LockFile open_again() const;
+  /// Another open file of the same commanders' file, for the lock of a lane.
+  LockFile open_commands_again() const;
 
  private:
   AttachedSegment() = default;
   friend class SegmentSearch;
   void throw_gone(Life life) const;
-  /// Nothing if no file bears the name. Throws SegmentError.
-  static std::optional<AttachedSegment> open(std::string_view name, Access access);
+  /// Nothing if it is not there, or not any more, and `reason` says so. Throws SegmentError,
+  /// ReadOnly.
+  static std::optional<AttachedSegment> open(std::string_view name, Access access,
+                                             std::string& reason);
+  bool open_commands(std::string& reason);
+  void map_commands();
 
   std::string name_;
   std::string path_;
   Access access_ = Access::read_only;
   mutable std::atomic<std::uint32_t> over_{0};  // a Life: how it ended, as seen so far
   SegmentHeader header_{};
-  LockFile file_;  // the mapped one, holds nothing
+  LockFile file_;      // mapped, holds nothing
+  LockFile commands_;  // the same; not open with Access::read_only
   Mapping mapping_;
+  Mapping commands_mapping_;
   SegmentView view_;
   ForkGuard guard_;
   mutable std::atomic<std::int64_t> asked_{0};

@@ -9,10 +9,12 @@
 
 namespace o80 {
 
-inline constexpr std::uint64_t kBackendByte = 0;
-inline constexpr std::uint64_t kFirstLaneByte = 16;
+inline constexpr std::uint64_t kBackendByte = 0;     // of the commanders' file; and, for the
+                                                     // queries of observers, of the segment file
+inline constexpr std::uint64_t kFirstLaneByte = 16;  // of the commanders' file
 
-/// True if anybody, this process included, holds that byte through another descriptor.
+/// True if anybody, this process included, holds a write lock on that byte through another
+/// descriptor. Read locks do not count: whoever may only read a file can take them.
 bool is_byte_locked(int descriptor, std::uint64_t byte) noexcept;
 
 /// Move-only: an open file that is never mapped and bears open-file-description locks.

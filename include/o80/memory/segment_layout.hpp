@@ -6,27 +6,35 @@
 
 namespace o80 {
 
-// What stands in the file of a segment. In order, each part on pages of its own:
+// A segment is two files. Each part begins on a page of its own.
+//
+// The segment file is all that observers open. It has no word that anybody sleeps on:
 //
 //   SegmentHeader   written once, before the file has a name
 //   schema          the same
 //   Counters        written by the backend
+//   history         slots of row_bytes: written by the backend
+//
+// The commanders' file belongs to one epoch of a segment. Only users who may command can open it:
+//
+//   CommandsHeader  written once, before the segment has a name
+//   Wakes           written by the backend
 //   Bell            written by every commanding frontend
 //   lanes           a LaneSenderPage and its transport blocks each: written by the lane's owner
 //   feedback        a LaneFeedback and its StatusSlots each: written by the backend
-//   history         slots of row_bytes: written by the backend
 
-inline constexpr std::uint64_t kSegmentMagic = 0x0a67'6573'2030'386fULL;  // "o80 seg\n"
-inline constexpr std::uint32_t kSegmentVersion = 1;
-inline constexpr std::size_t kLineBytes = 64;    // of a cache
-inline constexpr std::size_t kBlockSize = 64;    // of a lane [B]
-inline constexpr std::size_t kMessages = 64;     // kept for a lane
-inline constexpr std::size_t kBurstsKept = 256;  // for a lane
-inline constexpr std::uint32_t kMostLanes = 1024;
+inline constexpr std::uint64_t kSegmentMagic = 0x0a67'6573'2030'386fULL;   // "o80 seg\n"
+inline constexpr std::uint64_t kCommandsMagic = 0x0a64'6d63'2030'386fULL;  // "o80 cmd\n"
+inline constexpr std::uint32_t kSegmentVersion = 2;                        // of both files
+inline constexpr std::size_t kLineBytes = 64;                              // of a cache
+inline constexpr std::size_t kBlockSize = 64;                              // of a lane [B]
+inline constexpr std::size_t kMessages = 64;                               // kept for a lane
+inline constexpr std::size_t kBurstsKept = 256;                            // for a lane
+inline constexpr std::uint32_t kMostLanes = 256;                  // a status names a lane in 8 bits
 inline constexpr std::uint64_t kIncarnations = (1ULL << 62) - 1;  // what a lane's count is cut to
 inline constexpr std::uint64_t kLeap = 1ULL << 28;  // ids that a lane's owners may leave out
 
-/// The numbers from which every offset in the file follows.
+/// The numbers from which every offset in both files follows.
 struct SegmentShape {
   std::uint64_t page_bytes;
   std::uint64_t schema_bytes;
@@ -41,10 +49,10 @@ struct SegmentHeader {
   std::uint32_t version;
   std::uint32_t header_bytes;
   SegmentShape shape;
-  std::uint64_t file_bytes;
-  std::uint64_t epoch;      // random, never 0
-  std::int64_t started_at;  // [s] since 1970
-  std::int32_t pid;         // for messages only
+  std::uint64_t file_bytes;  // of the segment file
+  std::uint64_t epoch;       // random, never 0
+  std::int64_t started_at;   // [s] since 1970
+  std::int32_t pid;          // for messages only
   std::uint32_t reserved;
   char user[32];
   char program[64];
@@ -55,12 +63,26 @@ struct Counters {
   alignas(kLineBytes) std::atomic<std::int64_t> begun;  // row being written, or published
   std::atomic<std::int64_t> published;                  // newest row, -1 before the first
   alignas(kLineBytes) std::atomic<std::uint32_t> state;
-  std::atomic<std::uint32_t> row_wake;                        // futex of those who wait for a row
-  std::atomic<std::uint32_t> lane_wake;                       // and for something of their lane
-  alignas(kLineBytes) std::atomic<std::uint32_t> sleeping;    // the backend sleeps at the bell
   alignas(kLineBytes) std::atomic<std::uint64_t> fault[128];  // text
 };
-static_assert(sizeof(Counters) == 192 + 1024);
+static_assert(sizeof(Counters) == 2 * kLineBytes + 1024);
+
+struct CommandsHeader {
+  std::uint64_t magic;
+  std::uint32_t version;
+  std::uint32_t header_bytes;
+  std::uint64_t file_bytes;  // of the commanders' file
+  std::uint64_t epoch;       // of the segment it belongs to
+};
+static_assert(sizeof(CommandsHeader) == 32);
+
+/// What sleeping frontends and the sleeping backend need; the sleepers on `rung` are the backend's.
+struct Wakes {
+  alignas(kLineBytes) std::atomic<std::uint32_t> row_wake;  // futex of those who wait for a row
+  std::atomic<std::uint32_t> lane_wake;                     // and for something of their lane
+  alignas(kLineBytes) std::atomic<std::uint32_t> sleeping;  // the backend sleeps at the bell
+};
+static_assert(sizeof(Wakes) == 2 * kLineBytes);
 
 struct Bell {
   alignas(kLineBytes) std::atomic<std::uint32_t> rung;     // futex; changes after each commit
@@ -118,41 +140,54 @@ static_assert(sizeof(LaneFeedback) == 2 * kLineBytes + kBurstsKept * 16 + kMessa
 static_assert(std::atomic<std::uint64_t>::is_always_lock_free &&
               std::atomic<std::uint32_t>::is_always_lock_free);
 
-/// Where the parts lie, all computed from the shape: no offset in the file can lie.
+/// Where the parts lie, all computed from the shape: no offset is read from a file.
 struct SegmentOffsets {
-  std::uint64_t schema, counters, bell, lanes, lane_stride, transport, feedback, feedback_stride,
-      statuses, history, file_bytes;
+  // in the segment file
+  std::uint64_t schema, counters, history, file_bytes;
+  // in the commanders' file
+  std::uint64_t wakes, bell, lanes, lane_stride, transport, feedback, feedback_stride, statuses,
+      commands_bytes;
 
-  /// False if the shape is nonsense or does not fit 2^47 bytes.
+  /// False if the shape is nonsense or a file would not fit 2^47 bytes.
   static bool compute(const SegmentShape& shape, SegmentOffsets& offsets) noexcept;
 };
 
-/// The mapped file with names on its parts; a plain pointer, valid while the segment is mapped.
+/// Both mapped files with names on their parts; plain pointers, valid while they are mapped.
 struct SegmentView {
-  std::byte* base = nullptr;
+  std::byte* base = nullptr;      // of the segment file
+  std::byte* commands = nullptr;  // of the commanders' file; null for an observer
   SegmentShape shape{};
   SegmentOffsets offsets{};
 
-  template <class T>
-  T& at(std::uint64_t offset) const noexcept {
-    return *reinterpret_cast<T*>(base + offset);
-  }
-  const SegmentHeader& header() const noexcept { return at<SegmentHeader>(0); }
-  Counters& counters() const noexcept { return at<Counters>(offsets.counters); }
-  Bell& bell() const noexcept { return at<Bell>(offsets.bell); }
+  const SegmentHeader& header() const noexcept { return at<SegmentHeader>(base, 0); }
+  Counters& counters() const noexcept { return at<Counters>(base, offsets.counters); }
+  std::byte* history() const noexcept { return base + offsets.history; }
+
+  // only if the commanders' file is mapped
+  Wakes& wakes() const noexcept { return at<Wakes>(commands, offsets.wakes); }
+  Bell& bell() const noexcept { return at<Bell>(commands, offsets.bell); }
   LaneSenderPage& lane(std::uint32_t i) const noexcept {
-    return at<LaneSenderPage>(offsets.lanes + i * offsets.lane_stride);
+    return at<LaneSenderPage>(commands, lane_offset(i));
   }
   std::byte* transport(std::uint32_t i) const noexcept {
-    return base + offsets.lanes + i * offsets.lane_stride + offsets.transport;
+    return commands + lane_offset(i) + offsets.transport;
   }
   LaneFeedback& feedback(std::uint32_t i) const noexcept {
-    return at<LaneFeedback>(offsets.feedback + i * offsets.feedback_stride);
+    return at<LaneFeedback>(commands, offsets.feedback + i * offsets.feedback_stride);
   }
   StatusSlot* statuses(std::uint32_t i) const noexcept {
-    return &at<StatusSlot>(offsets.feedback + i * offsets.feedback_stride + offsets.statuses);
+    return &at<StatusSlot>(commands,
+                           offsets.feedback + i * offsets.feedback_stride + offsets.statuses);
   }
-  std::byte* history() const noexcept { return base + offsets.history; }
+  std::uint64_t lane_offset(std::uint32_t i) const noexcept {
+    return offsets.lanes + i * offsets.lane_stride;
+  }
+
+ private:
+  template <class T>
+  static T& at(std::byte* file, std::uint64_t offset) noexcept {
+    return *reinterpret_cast<T*>(file + offset);
+  }
 };
 
 }  // namespace o80

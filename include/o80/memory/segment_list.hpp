@@ -12,13 +12,14 @@ namespace o80 {
 struct SegmentEntry {
   std::string name;
   Life life = Life::killed;
-  bool readable = false;  // false: no segment of this version, or not ours to read
+  bool readable = false;  // false: no segment of this version, or not ours to read or to trust
   int pid = 0;
   std::int64_t started_at = 0;  // [s] since 1970
   std::string user{};
   std::string program{};
   std::uint64_t epoch = 0;
-  std::uint64_t bytes = 0;
+  std::uint64_t bytes = 0;  // of both files
+  std::string problem{};    // why it is not readable
 };
 
 /// All segments of the directory, by name.
@@ -27,10 +28,7 @@ std::vector<SegmentEntry> list_segments();
 /// Removes a dead segment; false if there is none. Throws SegmentTaken if it is alive.
 bool clean(std::string_view name);
 
-/// Removes all dead segments and the temporary files nobody holds; the names removed.
+/// Removes all dead segments and whatever killed starters and cleaners left; the names removed.
 std::vector<std::string> clean_dead();
-
-/// Removes temporary files that no starter holds any more.
-void sweep_drafts();
 
 }  // namespace o80

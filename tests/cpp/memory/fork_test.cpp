@@ -83,7 +83,7 @@ TEST_F(ForkTest, LeavesFileLockAndLaneToTheParentWhenTheChildEndsInOrder) {
             0);
   EXPECT_EQ(segment.life(), Life::running);
   EXPECT_TRUE(std::filesystem::exists(directory_.file_of("arm")));
-  EXPECT_TRUE(is_byte_locked(segment.descriptor(), kFirstLaneByte));
+  EXPECT_TRUE(is_byte_locked(segment.commands_descriptor(), kFirstLaneByte));
   EXPECT_EQ(owner.state(), State::running);
 }
 

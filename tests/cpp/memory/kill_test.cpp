@@ -10,6 +10,7 @@
 #include "memory/segments.hpp"
 #include "o80/base/error.hpp"
 #include "o80/memory/history.hpp"
+#include "o80/memory/segment_draft.hpp"
 #include "o80/memory/segment_name.hpp"
 #include "o80/memory/signal.hpp"
 
@@ -93,7 +94,7 @@ TEST_F(KillTest, LetsANewBackendTakeOverAtOnceWhileOldReadersReadOn) {
 
   const OwnedSegment next = running_segment();
 
-  EXPECT_EQ(directory_.files(), 1U);
+  EXPECT_EQ(directory_.files(), 2U);
   EXPECT_THROW(old.throw_if_gone(), BackendSuperseded);
   EXPECT_EQ(HistoryReader(old.view()).published(), 9);
   const AttachedSegment fresh = attach();
@@ -113,7 +114,7 @@ TEST_F(KillTest, IsNotForgottenWhileASuccessorHoldsTheLockOfTheDead) {
   EXPECT_EQ(other.life(), Life::killed);
 
   // as a successor does before it marks the old header
-  LockFile successor = LockFile::open(directory_.file_of("arm"), O_RDWR);
+  LockFile successor = LockFile::open(commands_path("arm", seen.epoch()), O_RDWR);
   ASSERT_TRUE(successor.try_lock(kBackendByte));
   const Deadline at_once(std::chrono::nanoseconds(0));
   EXPECT_THROW(RowWaiter(seen).wait_for_row(1000, at_once), BackendKilled);
@@ -143,7 +144,7 @@ TEST_F(KillTest, LetsOneOfTwoProcessesTakeOver) {
     ChildProcess first(start), second(start);
     const int won = (first.wait_until_ready() ? 1 : 0) + (second.wait_until_ready() ? 1 : 0);
     EXPECT_EQ(won, 1);
-    EXPECT_EQ(directory_.files(), 1U);
+    EXPECT_EQ(directory_.files(), 2U);
   }
 }
 
@@ -197,21 +198,18 @@ TEST_F(KillTest, WakesOthersWhenAWaiterIsKilledAsleep) {
 
 TEST_F(KillTest, SweepsTheDraftOfAStarterKilledHalfWay) {
   ChildProcess starter([](const ChildProcess::Ready& ready) {
-    // a draft as a starter has it before it is published
-    const std::string path = segment_directory() + "/o80-arm.new-0123456789abcdef";
-    LockFile draft = LockFile::open(path, O_RDWR | O_CREAT | O_EXCL, 0600);
-    if (!draft.try_lock(kBackendByte)) _exit(1);
+    const SegmentDraft draft("arm");
     ready();
     pause_for_ever();
   });
   ASSERT_TRUE(starter.wait_until_ready());
   {
     const OwnedSegment segment = OwnedSegment::create(small_spec("leg"));
-    EXPECT_EQ(directory_.files(), 2U);  // it lives: hands off
+    EXPECT_EQ(directory_.files(), 4U);  // it lives: hands off
   }
   starter.kill_now();
   const OwnedSegment segment = OwnedSegment::create(small_spec("leg"));
-  EXPECT_EQ(directory_.files(), 1U);
+  EXPECT_EQ(directory_.files(), 2U);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 
 #include "memory/segments.hpp"
 #include "o80/base/error.hpp"
+#include "o80/memory/segment_name.hpp"
 
 namespace o80 {
 namespace {
@@ -16,33 +17,47 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using OwnedSegmentTest = SegmentTest;
 
-TEST_F(OwnedSegmentTest, IsOneFileThatGoesWithItsOwner) {
+struct stat status_of(const std::string& path) {
+  struct stat status{};
+  EXPECT_EQ(stat(path.c_str(), &status), 0) << path;
+  return status;
+}
+
+TEST_F(OwnedSegmentTest, IsTwoFilesThatGoWithTheirOwner) {
   {
     const OwnedSegment segment = OwnedSegment::create(small_spec());
-    EXPECT_EQ(directory_.files(), 1U);
+    EXPECT_EQ(directory_.files(), 2U);
     EXPECT_TRUE(std::filesystem::exists(directory_.file_of("arm")));
+    EXPECT_TRUE(std::filesystem::exists(commands_path("arm", segment.epoch())));
   }
   EXPECT_EQ(directory_.files(), 0U);
 }
 
-TEST_F(OwnedSegmentTest, BearsThePermissionAskedForWhateverTheMask) {
-  SegmentSpec spec = small_spec();
-  spec.permission = 0660;
+TEST_F(OwnedSegmentTest, LetsThoseObserveWhoMayReadAndThoseCommandWhoMayWrite) {
+  struct Case {
+    mode_t permission, segment, commands;
+  };
   const mode_t before = umask(0077);
-  const OwnedSegment segment = OwnedSegment::create(spec);
+  for (const Case& modes : {Case{0600, 0600, 0600}, Case{0640, 0640, 0600}, Case{0644, 0644, 0600},
+                            Case{0660, 0640, 0660}, Case{0664, 0644, 0660}, Case{0666, 0644, 0666},
+                            Case{0620, 0640, 0660}, Case{0, 0600, 0600}}) {
+    SegmentSpec spec = small_spec();
+    spec.permission = modes.permission;
+    const OwnedSegment segment = OwnedSegment::create(spec);
+    EXPECT_EQ(status_of(directory_.file_of("arm")).st_mode & 0777, modes.segment);
+    EXPECT_EQ(status_of(commands_path("arm", segment.epoch())).st_mode & 0777, modes.commands);
+  }
   umask(before);
-
-  struct stat status;
-  ASSERT_EQ(stat(directory_.file_of("arm").c_str(), &status), 0);
-  EXPECT_EQ(status.st_mode & 0777, 0660U);
 }
 
 TEST_F(OwnedSegmentTest, HasItsMemoryReserved) {
   const OwnedSegment segment = OwnedSegment::create(small_spec());
 
-  struct stat status;
-  ASSERT_EQ(stat(directory_.file_of("arm").c_str(), &status), 0);
-  EXPECT_GE(status.st_blocks * 512, status.st_size);
+  for (const std::string& path :
+       {directory_.file_of("arm"), commands_path("arm", segment.epoch())}) {
+    const struct stat status = status_of(path);
+    EXPECT_GE(status.st_blocks * 512, status.st_size);
+  }
 }
 
 TEST_F(OwnedSegmentTest, RefusesASecondLivingBackendNamingTheOwnerAndTheCure) {
@@ -54,7 +69,7 @@ TEST_F(OwnedSegmentTest, RefusesASecondLivingBackendNamingTheOwnerAndTheCure) {
 
   EXPECT_THAT(message_of<SegmentTaken>([] { OwnedSegment::create(small_spec()); }), wanted);
   EXPECT_THAT(message_of<SegmentTaken>([] { OwnedSegment::refuse_if_taken("arm"); }), wanted);
-  EXPECT_EQ(directory_.files(), 1U);
+  EXPECT_EQ(directory_.files(), 2U);
 }
 
 TEST_F(OwnedSegmentTest, DoesNotRefuseANameThatNobodyHas) {
@@ -66,10 +81,10 @@ TEST_F(OwnedSegmentTest, KeepsItsFileWhenItFailedAndLetsItBeTakenOver) {
     OwnedSegment segment = running_segment();
     segment.end(State::failed, "no hardware");
   }
-  EXPECT_EQ(directory_.files(), 1U);
+  EXPECT_EQ(directory_.files(), 2U);
 
   const OwnedSegment next = OwnedSegment::create(small_spec());
-  EXPECT_EQ(directory_.files(), 1U);
+  EXPECT_EQ(directory_.files(), 2U);
   EXPECT_EQ(next.state(), State::starting);
 }
 
@@ -124,7 +139,7 @@ TEST_F(OwnedSegmentTest, SweepsAwayTheDraftsOfDeadStarters) {
 
   const OwnedSegment segment = OwnedSegment::create(small_spec());
 
-  EXPECT_EQ(directory_.files(), 1U);
+  EXPECT_EQ(directory_.files(), 2U);
 }
 
 TEST_F(OwnedSegmentTest, SaysWhenSharedMemoryIsTooSmallAndLeavesNothing) {
@@ -144,7 +159,8 @@ TEST_F(OwnedSegmentTest, SaysWhenItsDirectoryIsMissing) {
 }
 
 TEST_F(OwnedSegmentTest, RefusesNamesThatAreNoFileNames) {
-  for (const char* name : {"", ".arm", "a/b", "arm.new-1", "arm arm", "\xc3\xa4"}) {
+  for (const char* name :
+       {"", ".arm", "a/b", "arm.new-1", "arm.commanders-1", "arm arm", "\xc3\xa4"}) {
     SegmentSpec spec = small_spec(name);
     EXPECT_THROW(OwnedSegment::create(spec), InvalidArgument) << name;
   }

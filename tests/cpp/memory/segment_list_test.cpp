@@ -46,7 +46,7 @@ TEST_F(SegmentListTest, CleansTheDeadAndRefusesTheLiving) {
   EXPECT_THROW(clean("alive"), SegmentTaken);
   EXPECT_TRUE(clean("dead"));
   EXPECT_FALSE(clean("dead"));
-  EXPECT_EQ(directory_.files(), 1U);
+  EXPECT_EQ(directory_.files(), 2U);
 }
 
 TEST_F(SegmentListTest, CleansAllTheDeadButNothingForeign) {
@@ -55,9 +55,10 @@ TEST_F(SegmentListTest, CleansAllTheDeadButNothingForeign) {
   running_segment(small_spec("y")).end(State::failed);
   std::ofstream(directory_.file_of("foreign")) << "not ours";
   std::ofstream(directory_.file_of("x.new-0011223344556677")) << "a draft nobody holds";
+  std::ofstream(directory_.file_of("z.commanders-0011223344556677")) << "without its segment";
 
   EXPECT_THAT(clean_dead(), ElementsAre("x", "y"));
-  EXPECT_EQ(directory_.files(), 2U);
+  EXPECT_EQ(directory_.files(), 3U);
   EXPECT_EQ(alive.state(), State::running);
 }
 

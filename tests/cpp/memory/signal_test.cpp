@@ -153,10 +153,10 @@ TEST_F(SignalTest, WakesABackendThatSleepsAtTheBell) {
     while (!bell.wait(seen)) {
     }
   });
-  while (segment_.view().counters().sleeping.load() == 0) std::this_thread::yield();
+  while (segment_.view().wakes().sleeping.load() == 0) std::this_thread::yield();
   BellWaiter(segment_.view()).interrupt();
   backend.join();
-  EXPECT_EQ(segment_.view().counters().sleeping.load(), 0U);
+  EXPECT_EQ(segment_.view().wakes().sleeping.load(), 0U);
 }
 
 }  // namespace

@@ -64,7 +64,7 @@ class StartRaceTest : public SegmentTest {
                               HasSubstr("o80 stop arm")));
     }
     EXPECT_EQ(attach().header().pid, round.winner);
-    EXPECT_EQ(directory_.files(), 1U) << "a loser left its draft";
+    EXPECT_EQ(directory_.files(), 2U) << "a loser left a file";
   }
 
   Round* rounds_ = nullptr;

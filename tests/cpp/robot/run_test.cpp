@@ -133,7 +133,7 @@ TEST_F(RunTest, LeavesTheFaultOfAConstructorForWhoWaitsToAttach) {
     EXPECT_EQ(run_here(table(), {"--fails", fails}), 1);
     EXPECT_THAT(::testing::internal::GetCapturedStderr(), HasSubstr(why));
     waiter.join();
-    EXPECT_EQ(directory_.files(), 1U) << "it stays to be read";
+    EXPECT_EQ(directory_.files(), 2U) << "they stay to be read";
     std::filesystem::remove(directory_.file_of("puppet"));
   }
 }

@@ -1,0 +1,192 @@
+#include "o80/memory/segment_draft.hpp"
+
+#include <fcntl.h>
+#include <sys/random.h>
+#include <sys/stat.h>
+#include <sys/statvfs.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+
+#include "o80/base/crash_point.hpp"
+#include "o80/base/error.hpp"
+#include "o80/memory/file_owner.hpp"
+#include "o80/memory/mapping.hpp"
+#include "o80/memory/named_segment.hpp"
+#include "o80/memory/segment_file.hpp"
+#include "o80/memory/segment_name.hpp"
+
+namespace o80 {
+
+namespace {
+
+constexpr int kOpen = O_RDWR | O_NOFOLLOW;
+constexpr int kAttempts = 100;
+
+std::uint64_t random_bits() {
+  std::uint64_t bits = 0;
+  while (bits == 0)
+    if (getrandom(&bits, sizeof bits, 0) != sizeof bits) bits = 0;
+  return bits;
+}
+
+[[noreturn]] void fail_for_space(const std::string& name, std::uint64_t bytes) {
+  throw SegmentError("cannot create segment '" + name + "': " + segment_directory() +
+                     " has no room for its " + std::to_string((bytes + (1U << 20) - 1) >> 20) +
+                     " MiB. Ask for a shorter history, remove dead segments with `o80 clean`, or "
+                     "enlarge it (`mount -o remount,size=... " +
+                     segment_directory() + "`).");
+}
+
+Mapping map(const LockFile& file, std::uint64_t bytes) {
+  return {file.descriptor(), bytes, Mapping::Protection::read_write, Mapping::Faults::later};
+}
+
+/// Tells frontends attached to a dead segment that it has a successor. A file that is no segment,
+/// or that this user may not write, has nobody to tell.
+void supersede(const NamedSegment& former) {
+  // descriptors of their own: those of `former` bear its lock, and a lock must not be inherited
+  // with a mapping
+  const LockFile segment = LockFile::open(former.path(), kOpen);
+  SegmentHeader header;
+  SegmentView view;
+  if (!segment.is_open() || !inspect_segment(segment.descriptor(), header, view.offsets).empty())
+    return;
+  view.shape = header.shape;
+  const Mapping mapping = map(segment, view.offsets.file_bytes);
+  view.base = mapping.data();
+
+  Mapping commands_mapping;
+  const LockFile commands = LockFile::open(former.commands_path(), kOpen);
+  if (commands.is_open() &&
+      inspect_commands(commands.descriptor(), segment.descriptor(), header, view.offsets).empty()) {
+    commands_mapping = map(commands, view.offsets.commands_bytes);
+    view.commands = commands_mapping.data();
+  }
+  end_segment(view, State::superseded);
+}
+
+}  // namespace
+
+SegmentDraft::SegmentDraft(const std::string& name) : name_(name) {
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    epoch_ = random_bits();
+    commands_path_ = o80::commands_path(name, epoch_);
+    path_ = draft_path(name, epoch_);
+    if (create_commands() && create_segment()) return;
+  }
+  throw SegmentError("cannot create segment '" + name + "': its files are taken away each time");
+}
+
+/// False if a sweeper took it before it was locked.
+bool SegmentDraft::create_commands() {
+  commands_ = LockFile::open(commands_path_, kOpen | O_CREAT | O_EXCL, 0600);
+  if (!commands_.is_open() && errno == EEXIST) return false;
+  if (!commands_.is_open()) fail("no file can be made in " + segment_directory(), errno);
+  O80_CRASH_POINT("create.before_lock");
+  if (!commands_.try_lock(kBackendByte) || !leads_to(commands_path_, commands_.descriptor()))
+    return false;
+  O80_CRASH_POINT("create.after_lock");
+  return true;
+}
+
+bool SegmentDraft::create_segment() {
+  segment_ = LockFile::open(path_, kOpen | O_CREAT | O_EXCL, 0600);
+  if (!segment_.is_open()) {
+    const int error = errno;
+    unlink(commands_path_.c_str());
+    fail("no file can be made in " + segment_directory(), error);
+  }
+  O80_CRASH_POINT("create.after_draft");
+  // nobody else opens it before it is permitted to: this cannot be refused
+  return segment_.try_lock(kBackendByte);
+}
+
+SegmentDraft::~SegmentDraft() {
+  if (published_) return;
+  if (segment_.is_open()) unlink(path_.c_str());
+  if (commands_.is_open()) unlink(commands_path_.c_str());
+}
+
+void SegmentDraft::fail(const std::string& what, int error) const {
+  throw SegmentError("cannot create segment '" + name_ + "': " + what + ": " +
+                     std::strerror(error));
+}
+
+LockFile SegmentDraft::open_again(const std::string& path) const {
+  LockFile file = LockFile::open(path, kOpen);
+  if (!file.is_open()) fail("its file cannot be opened again", errno);
+  return file;
+}
+
+void SegmentDraft::reserve(const SegmentOffsets& offsets) {
+  const std::uint64_t all = offsets.file_bytes + offsets.commands_bytes;
+  struct statvfs room;
+  if (fstatvfs(segment_.descriptor(), &room) == 0 && room.f_blocks > 0 &&
+      room.f_bavail < all / room.f_bsize)
+    fail_for_space(name_, all);
+  for (const auto& [file, bytes] :
+       {std::pair(&segment_, offsets.file_bytes), std::pair(&commands_, offsets.commands_bytes)}) {
+    int error = 0;
+    do {
+      error = posix_fallocate(file->descriptor(), 0, static_cast<off_t>(bytes));
+    } while (error == EINTR);
+    if (error == ENOSPC || error == EFBIG || error == ENOMEM) fail_for_space(name_, all);
+    if (error != 0) fail("its memory cannot be reserved", error);
+  }
+}
+
+void SegmentDraft::permit(mode_t permission) {
+  if (fchmod(commands_.descriptor(), commanders_mode(permission)) != 0 ||
+      fchmod(segment_.descriptor(), observers_mode(permission)) != 0)
+    fail("its permission cannot be set", errno);
+}
+
+void SegmentDraft::publish() {
+  const std::string path = segment_path(name_);
+  while (!published_) {
+    O80_CRASH_POINT("create.before_link");
+    if (link(path_.c_str(), path.c_str()) == 0) {
+      published_ = true;
+      O80_CRASH_POINT("create.after_link");
+      unlink(path_.c_str());
+    } else if (errno == EEXIST) {
+      published_ = try_replace();
+    } else {
+      fail("its file cannot be given its name", errno);
+    }
+  }
+}
+
+/// False if whatever has the name is to be looked at again. Throws SegmentTaken, SegmentError.
+bool SegmentDraft::try_replace() {
+  NamedSegment former = NamedSegment::open(name_);
+  const std::string& path = former.path();
+  if (!former.is_open() && errno == ENOENT) return false;
+  if (!former.is_open()) {
+    const int error = errno;
+    fail(path + " of user " + owner_of(path) + " is in the way and cannot be opened", error);
+  }
+  former.check_owner();
+  if (!former.can_lock()) fail(path + " is in the way and cannot be replaced", EACCES);
+  if (!former.try_lock()) {
+    if (former.is_alive()) throw SegmentTaken(former.taken_text());
+    return false;
+  }
+  if (!former.is_current()) return false;
+
+  // its backend is dead, and nobody else can replace it while we hold its lock
+  supersede(former);
+  O80_CRASH_POINT("create.before_rename");
+  if (rename(path_.c_str(), path.c_str()) != 0)
+    fail(path + " is in the way and cannot be replaced", errno);
+  O80_CRASH_POINT("create.after_rename");
+  published_ = true;
+  former.remove_commands();
+  O80_CRASH_POINT("create.after_former");
+  return true;
+}
+
+}  // namespace o80
