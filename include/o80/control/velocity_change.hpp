@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstdint>
+
+namespace o80 {
+
+/// What one number may do in an iteration: bounds on the differences of its positions.
+///
+/// Units are those of the number and of iterations. Infinity: not limited.
+struct Rates {
+  double speed;         // of p(i) - p(i-1)
+  double acceleration;  // of the difference of two speeds
+  double jerk;          // of the difference of two accelerations
+};
+
+/// The shortest change of a speed by `change` that ends with acceleration 0, in whole iterations.
+///
+/// The plan is a sequence of accelerations a(1) ... a(steps) with a(steps) = 0 (with a jerk limit),
+/// |a(i)| <= acceleration, |a(i) - a(i-1)| <= jerk, and the sum `change`. It is a trapezoid: from
+/// a(0) down to a trough and up to 0, or the mirror image of that. The trough of fewest steps is
+/// deeper than needed, so the plan is the mean, weighted by `share_`, of that trapezoid and the next
+/// shorter one: the constraints are convex.
+///
+/// Realtime: yes. Construction and all questions take a bounded time.
+class VelocityChange {
+ public:
+  VelocityChange() = default;
+  /// `acceleration` is the present one, a(0), within its limit.
+  VelocityChange(double change, double acceleration, const Rates& rates) noexcept;
+
+  /// Iterations until the change is done; 0 if there is nothing to do.
+  std::int64_t steps() const noexcept { return steps_; }
+  /// The same without rounding up to whole iterations.
+  double time() const noexcept {
+    return static_cast<double>(steps_) - (crest_ ? 0.0 : share_);
+  }
+  /// The acceleration of iteration i, 1 to `steps()`; 0 after.
+  double acceleration(std::int64_t i) const noexcept;
+  /// How far the number gets within `steps()` beyond what the final speed alone gives: the sum over
+  /// i of v(i) - v(steps).
+  double displacement() const noexcept { return displacement_; }
+  /// How far the speed first moves away from its target before it comes to it: in the direction of
+  /// the present acceleration, signed; 0 if it does not.
+  double detour() const noexcept { return detour_; }
+  /// From a start at `speed`: how far the position moves before the speed changes sign for the
+  /// first time, if the detour takes it through zero; else 0.
+  double run_before_turn(double speed) const noexcept;
+
+ private:
+  struct Sums {
+    double change = 0.0;  // sum of a(i)
+    double moment = 0.0;  // sum of (i - 1) a(i)
+  };
+
+  void plan_without_jerk(double change) noexcept;
+  void plan_with_jerk(double change) noexcept;
+  double trough(double i, double steps) const noexcept;
+  Sums sums(double steps) const noexcept;
+
+  // mirrored such that the trough is negative
+  double sign_ = 1.0;
+  double start_ = 0.0;  // a(0)
+  double acceleration_ = 0.0;
+  double jerk_ = 0.0;
+  std::int64_t steps_ = 0;
+  std::int64_t shorter_ = 0;  // steps of the other trapezoid
+  bool crest_ = false;        // the other one is the crest of as many steps
+  double share_ = 0.0;        // of the other one
+  double displacement_ = 0.0;
+  double detour_ = 0.0;
+};
+
+}  // namespace o80

@@ -1,0 +1,241 @@
+#include "o80/control/number_limiter.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace o80 {
+namespace {
+
+constexpr double kNone = std::numeric_limits<double>::infinity();
+// what interpolation rounds is no excess
+constexpr double kRounding = 1e-9;
+constexpr int kHalvings = 24;
+
+/// The highest speed after which a number that slows down by `acceleration` an iteration stops
+/// within `room`, the iteration at that speed included.
+double speed_for(double room, double acceleration) noexcept {
+  if (room <= 0.0) return 0.0;
+  if (!std::isfinite(acceleration) || !std::isfinite(room)) return room;
+  const double k = std::floor((std::sqrt(1.0 + 8.0 * room / acceleration) - 1.0) / 2.0);
+  return (room + acceleration * k * (k + 1.0) / 2.0) / (k + 1.0);
+}
+
+}  // namespace
+
+/// A next state, and how it would stop.
+struct NumberLimiter::Candidate {
+  double position;
+  double speed;
+  double acceleration;
+  VelocityChange stop;
+};
+
+void NumberLimiter::restart(double position) noexcept {
+  position_ = wanted_ = position;
+  begin();
+  speed_ = acceleration_ = 0.0;
+  stop_ = {};
+  stopped_ = 0;
+}
+
+/// What the sums of a motion round.
+double NumberLimiter::rounding() const noexcept {
+  return 8.0 * std::numeric_limits<double>::epsilon() *
+         std::max({scale_, std::abs(position_), std::abs(wanted_)});
+}
+
+double NumberLimiter::slack() const noexcept {
+  const double finest = std::min({rates_.speed, rates_.acceleration, rates_.jerk});
+  return rounding() + (std::isfinite(finest) ? kRounding * finest : 0.0);
+}
+
+/// Within the bounds, or no further outside than `before`.
+double NumberLimiter::inside(double position, double before) const noexcept {
+  return std::clamp(position, std::min(minimum_, before), std::max(maximum_, before));
+}
+
+void NumberLimiter::move(double speed) noexcept {
+  position_ = inside(position_ + speed, position_);
+  scale_ = std::max(scale_, std::abs(position_));
+  acceleration_ = speed - speed_;
+  speed_ = speed;
+}
+
+/// A speed that is nothing but rounding is rest.
+void NumberLimiter::forget_rounding() noexcept {
+  const double nothing = slack() / 100.0 + 2.0 * rounding();
+  const bool steady = !std::isfinite(rates_.jerk) || std::abs(acceleration_) <= nothing;
+  if (steady && std::abs(speed_) <= nothing) {
+    speed_ = acceleration_ = 0.0;
+    stop_ = {};
+    stopped_ = 0;
+  }
+}
+
+Limit NumberLimiter::follow(double wanted, double most) noexcept {
+  const double step = wanted - wanted_;
+  const double lag = position_ - wanted_;
+  wanted_ = wanted;
+  return std::isfinite(rates_.jerk) ? follow_with_jerk(step, lag, most)
+                                    : follow_with_acceleration(step, lag, most);
+}
+
+Limit NumberLimiter::follow_with_acceleration(double step, double lag, double most) noexcept {
+  // what is wanted: to be there, or, further behind, to close in such that it could stop there
+  const double closing = speed_for(std::abs(lag), rates_.acceleration);
+  const bool within_reach = closing >= std::abs(lag);
+  double speed = within_reach ? wanted_ - position_ : step - std::copysign(closing, lag);
+  const double fastest = std::max(most, std::abs(speed_));
+  const bool exact = within_reach && std::abs(speed) <= fastest + slack();
+  if (!exact) speed = std::clamp(speed, -fastest, fastest);
+
+  // what is allowed
+  const double up = speed_for(std::max(0.0, maximum_ - position_), rates_.acceleration);
+  const double down = speed_for(std::max(0.0, position_ - minimum_), rates_.acceleration);
+  const double highest = std::min({speed_ + rates_.acceleration, rates_.speed, up});
+  const double lowest = std::max({speed_ - rates_.acceleration, -rates_.speed, -down});
+  if (speed <= highest + slack() && speed >= lowest - slack()) {
+    const double before = position_;
+    move(speed);
+    if (exact) position_ = inside(wanted_, before);
+    if (exact) forget_rounding();
+    return position_ == wanted_ ? Limit::none : Limit::acceleration;
+  }
+  const bool upward = speed > highest;
+  const double bound = upward ? highest : lowest;
+  move(upward ? std::max(highest, lowest) : std::min(highest, lowest));
+  if (bound == (upward ? up : -down)) return upward ? Limit::maximum : Limit::minimum;
+  return std::abs(bound) == rates_.speed ? Limit::speed : Limit::acceleration;
+}
+
+NumberLimiter::Candidate NumberLimiter::candidate(double acceleration) const noexcept {
+  const double speed = speed_ + acceleration;
+  return {position_ + speed, speed, acceleration, VelocityChange(-speed, acceleration, rates_)};
+}
+
+/// Which limit a way to rest from there would break.
+Limit NumberLimiter::violated(const Candidate& next, double most) const noexcept {
+  const double tolerance = slack();
+  const double fastest =
+      std::max(std::abs(next.speed), std::abs(next.speed + next.stop.detour()));
+  if (fastest > most + tolerance) return Limit::speed;
+  const double end = next.position + next.stop.displacement();
+  const double turn = next.position + next.stop.run_before_turn(next.speed);
+  const double rounding = this->rounding();
+  // outside the bounds it never turns outward again
+  const double highest = std::max(maximum_, std::min(next.position, turn));
+  const double lowest = std::min(minimum_, std::max(next.position, turn));
+  if (next.position > std::max(maximum_, position_) + rounding ||
+      std::max(end, turn) > std::max(highest, next.position) + rounding ||
+      (end > turn && end > highest + rounding)) {
+    return Limit::maximum;
+  }
+  if (next.position < std::min(minimum_, position_) - rounding ||
+      std::min(end, turn) < std::min(lowest, next.position) - rounding ||
+      (end < turn && end < lowest - rounding)) {
+    return Limit::minimum;
+  }
+  return Limit::none;
+}
+
+/// The acceleration that closes in on what is followed as fast as possible without overshoot, as
+/// seen by somebody who moves with it.
+double NumberLimiter::goal(double step, double lag, double low, double high) const noexcept {
+  const auto overshoot = [&](double acceleration) {
+    const double speed = speed_ + acceleration - step;
+    return lag + speed + VelocityChange(-speed, acceleration, rates_).displacement();
+  };
+  if (overshoot(low) >= 0.0) return low;
+  if (overshoot(high) <= 0.0) return high;
+  for (int i = 0; i < kHalvings; ++i) {
+    const double middle = low + (high - low) / 2.0;
+    (overshoot(middle) > 0.0 ? high : low) = middle;
+  }
+  return low;
+}
+
+void NumberLimiter::accept(const Candidate& next) noexcept {
+  move(next.speed);
+  acceleration_ = next.acceleration;
+  stop_ = next.stop;
+  stopped_ = 0;
+}
+
+Limit NumberLimiter::follow_with_jerk(double step, double lag, double most) noexcept {
+  const double tolerance = slack();
+  const double low = std::max(acceleration_ - rates_.jerk, -rates_.acceleration);
+  const double high = std::min(acceleration_ + rates_.jerk, rates_.acceleration);
+  // a motion that is faster than asked keeps the way to rest that it has
+  const double peak = std::max(std::abs(speed_), std::abs(speed_ + stop_.detour()));
+  const double fastest = std::min(rates_.speed, std::max(most, peak));
+
+  // there, and able to stay there
+  const double wanted = wanted_ - position_ - speed_;
+  const double relative = wanted_ - position_ - step;
+  const bool tracked = lag == 0.0;
+  const bool stays = tracked || (std::abs(relative) <= rates_.jerk &&
+                                 std::abs(relative + wanted) <= rates_.jerk);
+  if (stays && wanted >= low - tolerance && wanted <= high + tolerance) {
+    const Candidate exact = candidate(wanted);
+    if (violated(exact, fastest) == Limit::none) {
+      const double before = position_;
+      accept(exact);
+      position_ = inside(wanted_, before);
+      forget_rounding();
+      return position_ == wanted_ ? Limit::none : Limit::jerk;
+    }
+  }
+
+  // as near as the limits let it come; the way to rest that it has is always there
+  const double best = tracked ? std::clamp(wanted, low, high) : goal(step, lag, low, high);
+  Candidate next = candidate(best);
+  Limit reason = violated(next, fastest);
+  if (reason == Limit::none) {
+    accept(next);
+    return std::abs(best) == rates_.acceleration ? Limit::acceleration : Limit::jerk;
+  }
+  double allowed = stop_.acceleration(stopped_ + 1);
+  double refused = best;
+  bool better = false;
+  for (int i = 0; i < kHalvings; ++i) {
+    const double middle = allowed + (refused - allowed) / 2.0;
+    const Candidate tried = candidate(middle);
+    if (const Limit why = violated(tried, fastest); why != Limit::none) {
+      refused = middle;
+      reason = why;
+    } else {
+      allowed = middle;
+      next = tried;
+      better = true;
+    }
+  }
+  if (better) {
+    accept(next);
+  } else {
+    slow_down();
+  }
+  return reason;
+}
+
+void NumberLimiter::brake() noexcept {
+  slow_down();
+  wanted_ = position_;
+}
+
+void NumberLimiter::slow_down() noexcept {
+  if (!std::isfinite(rates_.jerk)) {
+    const double less =
+        std::isfinite(rates_.acceleration) ? std::abs(speed_) - rates_.acceleration : 0.0;
+    move(std::copysign(std::max(0.0, less), speed_));
+    if (speed_ == 0.0) speed_ = acceleration_ = 0.0;
+    return;
+  }
+  ++stopped_;
+  const bool last = stopped_ >= stop_.steps();
+  const double acceleration = last ? 0.0 : stop_.acceleration(stopped_);
+  move(last ? 0.0 : speed_ + acceleration);
+  acceleration_ = acceleration;
+  if (last) stop_ = {};
+}
+
+}  // namespace o80
