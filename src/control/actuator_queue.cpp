@@ -7,6 +7,15 @@
 #include "o80/control/record_check.hpp"
 
 namespace o80 {
+namespace {
+
+constexpr double kNoSpeed = std::numeric_limits<double>::infinity();
+// rows of a trajectory that are over before they began, passed in one iteration
+constexpr int kMostPassed = 256;
+// rows of an overwritten trajectory that are looked at
+constexpr std::uint32_t kMostAhead = 64;
+
+}  // namespace
 
 ActuatorQueue::ActuatorQueue(const Schema& schema, const ActuatorRow& row,
                              const StateLayout& layout, BlockPool& pool, Ledger& ledger,
@@ -16,28 +25,41 @@ ActuatorQueue::ActuatorQueue(const Schema& schema, const ActuatorRow& row,
       ledger_(&ledger),
       desired_(desired),
       motion_(layout),
-      clamp_(schema, row, layout),
+      limiter_(schema, row, layout),
       carry_(schema.head.period),
       period_(static_cast<double>(schema.head.period) / 1e9),
       when_idle_(row.when_idle),
       queue_(pool, lanes),
       mask_(mask_words(static_cast<std::uint32_t>(layout.numbers().size()))),
-      scratch_((layout.size() + 7) / 8) {}
+      scratch_((layout.size() + 7) / 8),
+      spare_((layout.size() + 7) / 8) {}
 
 void ActuatorQueue::drop(Status status, Reason reason, Iteration iteration) noexcept {
   if (status != Status::overwritten) {
-    motion_.rest();
-  } else if (running_ && clamped_) {
-    motion_.rest();
+    end_motion();
   } else if (running_) {
-    motion_.keep_moving();
+    keep_moving();
+    limiter_.keep_lagging(motion_, desired_);
   }
   carry_.reset();
   running_ = false;
+  holds_ = false;
   while (!queue_.empty()) ledger_->drop(queue_.take_any(), status, reason, iteration);
 }
 
-void ActuatorQueue::halt() noexcept {
+/// What overwrites a trajectory may go on for a while towards its further rows.
+void ActuatorQueue::keep_moving() noexcept {
+  auto* ahead = reinterpret_cast<std::byte*>(scratch_.data());
+  layout_->copy(ahead, motion_.to());
+  const std::uint32_t rows = std::min(rows_left_, kMostAhead);
+  Cursor cursor = rows_;
+  auto* row = reinterpret_cast<std::byte*>(spare_.data());
+  for (std::uint32_t i = 0; i < rows; ++i) cursor.read(row, layout_->size());
+  if (rows > 0) layout_->copy(ahead, row, mask());
+  motion_.keep_moving(ahead, rows);
+}
+
+void ActuatorQueue::end_motion() noexcept {
   motion_.rest();
   carry_.reset();
   running_ = false;
@@ -45,9 +67,21 @@ void ActuatorQueue::halt() noexcept {
 
 void ActuatorQueue::drop_lane(std::uint32_t lane, Status status, Reason reason,
                               Iteration iteration) noexcept {
-  if (running_ && queue_.front_lane() == lane) halt();
+  if (running_ && queue_.front_lane() == lane) end_motion();
+  if (holder_ == lane) holds_ = false;
   ledger_->drop(queue_.take(lane), status, reason, iteration);
-  if (queue_.empty()) halt();
+  if (queue_.empty()) end_motion();
+}
+
+void ActuatorQueue::restart(const std::byte* state) noexcept {
+  layout_->copy_finite(desired_, state);
+  limiter_.restart(desired_);
+  streams_ = false;
+}
+
+void ActuatorQueue::follow(const std::byte* observed) noexcept {
+  layout_->copy_finite(desired_, observed);
+  limiter_.restart(desired_);
 }
 
 ActuatorQueue::Moved ActuatorQueue::step(Iteration iteration, const std::byte* observed,
@@ -55,29 +89,43 @@ ActuatorQueue::Moved ActuatorQueue::step(Iteration iteration, const std::byte* o
   if (running_) {
     if (iteration > motion_.last()) begin_row(iteration, observed);
   } else if (!begin_next(iteration, observed, late_budget)) {
-    return empty() ? Moved::idle : Moved::waiting;
+    return come_to_rest(observed);
   }
-  if (clamp_.any()) {
-    auto* previous = reinterpret_cast<std::byte*>(scratch_.data());
-    layout_->copy(previous, desired_);
-    motion_.state(iteration, desired_);
-    clamped_ = clamp_.apply(desired_, previous);
-  } else {
-    motion_.state(iteration, desired_);
-  }
+  limited_ = move(iteration);
   if (iteration >= motion_.last() && rows_left_ == 0) end_running(iteration);
-  return clamped_ ? Moved::clamped : Moved::active;
+  return limited_.limit == Limit::none ? Moved::active : Moved::clamped;
+}
+
+Limited ActuatorQueue::move(Iteration iteration) noexcept {
+  motion_.state(iteration, desired_);
+  if (!limiter_.any()) return {};
+  if (pace_ == Pace::fastest) return limiter_.follow_fastest(desired_);
+  return limiter_.follow(motion_, desired_, first_number_, most_);
 }
 
 void ActuatorQueue::end_running(Iteration iteration) noexcept {
   const BlockIndex record = queue_.front();
+  holds_ = pace_ == Pace::direct;
+  holder_ = queue_.front_lane();
+  streams_ = holds_;
   running_ = false;
   queue_.pop();
-  if (clamped_) {
-    ledger_->end(record, Status::limited, Reason::limits, 0, iteration);
-  } else {
+  if (limited_.limit == Limit::none) {
     ledger_->end(record, Status::completed, Reason::none, 0, iteration);
+  } else {
+    ledger_->end(record, Status::limited, Reason::limits, limited_.packed(), iteration);
   }
+}
+
+/// No command gives a state: motion and resting fields come to rest within their limits.
+ActuatorQueue::Moved ActuatorQueue::come_to_rest(const std::byte* observed) noexcept {
+  streams_ = false;
+  if (empty()) end_motion();
+  if (follows()) {
+    follow(observed);
+    return Moved::idle;
+  }
+  return limiter_.any() && limiter_.brake(desired_, holds_) ? Moved::braking : Moved::idle;
 }
 
 bool ActuatorQueue::begin_next(Iteration iteration, const std::byte* observed,
@@ -108,78 +156,92 @@ bool ActuatorQueue::begin_next(Iteration iteration, const std::byte* observed,
     times_ = rows_;
     rows_ = rows_of_timed(*pool_, head, layout_->size());
   }
+  pace_ = head.pace;
+  first_number_ = layout_->first_commanded(mask());
+  most_ = pace_ == Pace::speed ? head.speed * period_ : kNoSpeed;
   rows_left_ = head.rows;
   first_row_ = true;
   running_ = true;
-  clamped_ = false;
+  // a stream of direct commands is one motion
+  if (pace_ != Pace::direct || !streams_) limiter_.begin();
+  streams_ = false;
   ledger_->activate(record, iteration);
   begin_row(iteration, observed);
   return true;
 }
 
-void ActuatorQueue::begin_row(Iteration iteration, const std::byte* observed) noexcept {
-  const RecordHead& head = pool_->head(queue_.front());
-  const std::uint64_t* mask = partial_ ? mask_.data() : nullptr;
-
-  // desired or observed => from
-  layout_->copy(motion_.from(), desired_);
-  if (first_row_ && head.start == Start::observed) layout_->copy(motion_.from(), observed, mask);
-
-  // the row of the command => to
+/// The next row of the command => to; false if there is none.
+bool ActuatorQueue::read_row() noexcept {
   if (partial_) {
     auto* row = reinterpret_cast<std::byte*>(scratch_.data());
     rows_.read(row, layout_->size());
     layout_->copy(motion_.to(), motion_.from());
-    layout_->copy(motion_.to(), row, mask);
+    layout_->copy(motion_.to(), row, mask_.data());
   } else {
     rows_.read(motion_.to(), layout_->size());
   }
   --rows_left_;
-  motion_.begin(iteration, iterations(head, iteration), head.profile, head.pace);
+  return true;
+}
+
+void ActuatorQueue::begin_row(Iteration iteration, const std::byte* observed) noexcept {
+  const RecordHead& head = pool_->head(queue_.front());
+
+  // desired or observed, or the row before => from
+  if (!first_row_) {
+    layout_->copy(motion_.from(), motion_.to());
+  } else {
+    layout_->copy(motion_.from(), desired_);
+    limiter_.hand_over(motion_, desired_);
+    if (head.start == Start::observed) {
+      layout_->copy_finite(motion_.from(), observed, mask());
+      motion_.start_at_from();
+    }
+  }
+  read_row();
+  const std::int64_t count = iterations(head, iteration);
+  motion_.begin(iteration, count, head.profile, head.pace);
   first_row_ = false;
 }
 
 std::int64_t ActuatorQueue::iterations(const RecordHead& head, Iteration iteration) noexcept {
   switch (head.pace) {
     case Pace::direct:
-    case Pace::fastest:
       return 1;
+    case Pace::fastest:
+      return limiter_.plan_fastest(motion_.to(), mask());
     case Pace::iterations:
       return std::max<std::int64_t>(1, head.amount);
     case Pace::until:
       carry_.reset();
       return head.amount - iteration + 1;
     case Pace::speed:
-      return iterations_at(head.speed * period_, head.profile);
-    case Pace::duration: {
-      if (!timed_) return carry_.iterations(head.amount);
-      std::int64_t end = time_;
-      times_.read(&end, sizeof end);
-      return carry_.iterations(end - std::exchange(time_, end));
-    }
+      return iterations_at(most_, head.profile);
+    case Pace::duration:
+      return timed_ ? row_of_own_time() : carry_.iterations(head.amount);
   }
   return 1;
 }
 
-std::int64_t ActuatorQueue::iterations_at(double speed, Profile profile) noexcept {
-  if (!layout_->numbers().front().moves()) return 1;
-  const double distance = layout_->number(0, motion_.to()) - layout_->number(0, motion_.from());
-  if (std::isnan(distance)) return 1;
-  if (profile == Profile::minimum_jerk) {
-    return minimum_jerk_iterations(distance, motion_.first_moment(), speed);
+/// Rows whose time is over before an iteration could show them are passed.
+std::int64_t ActuatorQueue::row_of_own_time() noexcept {
+  const auto next = [&] {
+    std::int64_t end = time_;
+    times_.read(&end, sizeof end);
+    return end - std::exchange(time_, end);
+  };
+  std::int64_t duration = next();
+  for (int i = 0; i < kMostPassed && rows_left_ > 0 && carry_.pass(duration); ++i) {
+    read_row();
+    duration = next();
   }
-  return distance == 0.0 ? 1 : linear_iterations(distance, speed);
+  return carry_.iterations(duration);
 }
 
-void ActuatorQueue::settle(const std::byte* observed) noexcept {
-  halt();
-  if (follows()) return follow(observed);
-  if (layout_->hooks().hold == nullptr) return;
-  // in an aligned place of its own, so that no padding reaches the row
-  std::byte* held = motion_.to();
-  layout_->copy(held, desired_);
-  layout_->hooks().hold(held);
-  layout_->copy(desired_, held);
+std::int64_t ActuatorQueue::iterations_at(double speed, Profile profile) noexcept {
+  if (first_number_ == StateLayout::kNoNumber) return 1;
+  if (profile == Profile::minimum_jerk) return motion_.iterations_at(first_number_, speed);
+  return linear_iterations(motion_.distance(first_number_), speed);
 }
 
 }  // namespace o80

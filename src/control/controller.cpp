@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstring>
 #include <limits>
 #include <optional>
@@ -18,6 +19,19 @@
 namespace o80 {
 namespace {
 
+/// What blends its states in its own way has no numbers that could be limited one by one.
+void refuse_limits(const Schema& schema, const ActuatorRow& actuator) {
+  for (std::uint32_t i = 0; i < actuator.limits; ++i) {
+    const LimitRow& limit = schema.limits.at(actuator.first_limit + i);
+    if (std::isfinite(limit.minimum) || std::isfinite(limit.maximum) ||
+        std::isfinite(limit.speed) || limit.resting != 0) {
+      throw InvalidArgument("actuator '" + actuator.name.str() + "' has limits, but its type '" +
+                            schema.types[actuator.type].name.str() +
+                            "' brings its own blend(): limit it in the driver");
+    }
+  }
+}
+
 std::vector<std::optional<StateLayout>> layouts_of(const Schema& schema) {
   std::vector<std::optional<StateLayout>> layouts(schema.types.size());
   for (const ActuatorRow& actuator : schema.actuators) {
@@ -28,6 +42,7 @@ std::vector<std::optional<StateLayout>> layouts_of(const Schema& schema) {
                             "' has a state without numbers: describe at least one field of '" +
                             schema.types[actuator.type].name.str() + "'");
     }
+    if (layout->hooks().blend != nullptr) refuse_limits(schema, actuator);
     if (actuator.offset + layout->size() > schema.head.block) {
       throw InvalidArgument("actuator '" + actuator.name.str() +
                             "' lies outside the robot's block of " +
@@ -67,13 +82,18 @@ class Controller::Body {
   void step(Iteration iteration, const std::byte* observed) noexcept;
   bool finish_pending() noexcept;
   bool active() const noexcept;
+  bool acts(std::uint32_t lane) const noexcept;
+  std::optional<NotFinite> not_finite(const std::byte* block) const noexcept;
 
-  /// Calls `visit(ActuatorQueue&)` for one actuator or every one.
+  /// Calls `visit(ActuatorQueue&)` for one actuator or every one, which may have to come to rest.
   template <class Visit>
   void each(std::uint32_t actuator, Visit&& visit) noexcept {
-    if (actuator < actuators_.size()) return visit(actuators_[actuator]);
-    if (actuator != kEveryActuator) return;
-    for (ActuatorQueue& queue : actuators_) visit(queue);
+    const auto last = static_cast<std::uint32_t>(actuators_.size());
+    for (std::uint32_t i = actuator == kEveryActuator ? 0 : actuator; i < last; ++i) {
+      visit(actuators_[i]);
+      busy_[i / 64] |= std::uint64_t{1} << (i % 64);
+      if (actuator != kEveryActuator) return;
+    }
   }
 
   BlockPool& pool;
@@ -97,6 +117,7 @@ class Controller::Body {
 
  private:
   std::vector<std::uint32_t> offsets_;
+  std::vector<const StateLayout*> types_;  // of each actuator
   std::vector<ActuatorQueue> actuators_;
   std::vector<std::uint64_t> busy_;    // has commands, or has just lost its last
   std::vector<std::uint64_t> follow_;  // follows when idle
@@ -122,6 +143,7 @@ Controller::Body::Body(const Schema& schema, BlockPool& blocks, StatusSink& sink
   for (std::uint32_t i = 0; i < count; ++i) {
     const ActuatorRow& row = schema.actuators[i];
     offsets_.push_back(row.offset);
+    types_.push_back(&*layouts_[row.type]);
     actuators_.emplace_back(schema, row, *layouts_[row.type], pool, ledger, block + row.offset,
                             lanes);
     busy_[i / 64] |= std::uint64_t{1} << (i % 64);
@@ -134,7 +156,7 @@ void Controller::Body::restart(const std::byte* observed, const std::byte* wante
   const std::byte* source = wanted != nullptr ? wanted : observed;
   for (std::uint32_t i = 0; i < actuators_.size(); ++i) {
     actuators_[i].drop(Status::purged, Reason::fresh_start, row);
-    actuators_[i].follow(of(i, source));
+    actuators_[i].restart(of(i, source));
     busy_[i / 64] |= std::uint64_t{1} << (i % 64);
   }
   for (std::size_t word = 0; word < busy_.size(); ++word) {
@@ -214,6 +236,7 @@ void Controller::Body::step(Iteration iteration, const std::byte* observed) noex
     const auto base = static_cast<std::uint32_t>(word * 64);
     std::uint64_t active = 0;
     std::uint64_t clamped = 0;
+    std::uint64_t braking = 0;
 
     // who had nothing to do before follows on, the others move
     each_bit(follow_[word] & ~busy_[word], base,
@@ -223,10 +246,12 @@ void Controller::Body::step(Iteration iteration, const std::byte* observed) noex
       const std::uint64_t bit = std::uint64_t{1} << (i % 64);
       switch (queue.step(iteration, of(i, observed), late_budget)) {
         case ActuatorQueue::Moved::idle:
-          queue.settle(of(i, observed));
-          busy_[word] &= ~bit;
+          // late commands in a row may have used up the iteration's share of work
+          if (queue.empty()) busy_[word] &= ~bit;
           break;
-        case ActuatorQueue::Moved::waiting:
+        case ActuatorQueue::Moved::braking:
+          braking |= bit;
+          active |= bit;
           break;
         case ActuatorQueue::Moved::clamped:
           clamped |= bit;
@@ -237,6 +262,7 @@ void Controller::Body::step(Iteration iteration, const std::byte* observed) noex
     });
     active_mask[word] = active;
     clamped_mask[word] = clamped;
+    braking_mask[word] = braking;
   }
   late_told_ = kStatusesPerIteration - late_budget;
 }
@@ -244,6 +270,19 @@ void Controller::Body::step(Iteration iteration, const std::byte* observed) noex
 bool Controller::Body::finish_pending() noexcept {
   const std::uint32_t told = std::exchange(late_told_, 0);
   return ledger.work(kStatusesPerIteration - told);
+}
+
+bool Controller::Body::acts(std::uint32_t lane) const noexcept {
+  return std::ranges::any_of(actuators_,
+                             [&](const ActuatorQueue& queue) { return queue.acts(lane); });
+}
+
+std::optional<NotFinite> Controller::Body::not_finite(const std::byte* block) const noexcept {
+  for (std::uint32_t i = 0; i < actuators_.size(); ++i) {
+    const std::uint32_t number = types_[i]->first_not_finite(of(i, block));
+    if (number != StateLayout::kNoNumber) return NotFinite{i, number};
+  }
+  return std::nullopt;
 }
 
 bool Controller::Body::active() const noexcept {
@@ -326,6 +365,12 @@ bool Controller::braking() const noexcept {
 
 std::uint32_t Controller::words() const noexcept {
   return static_cast<std::uint32_t>(body_->active_mask.size());
+}
+
+bool Controller::acts(std::uint32_t lane) const noexcept { return body_->acts(lane); }
+
+std::optional<NotFinite> Controller::not_finite(const std::byte* block) const noexcept {
+  return body_->not_finite(block);
 }
 
 bool Controller::active() const noexcept { return body_->active(); }

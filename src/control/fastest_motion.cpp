@@ -8,7 +8,7 @@ namespace o80 {
 namespace {
 
 // no iteration more for what rounds
-constexpr double kRounding = 1e-12;
+constexpr double kTimeRounding = 1e-12;
 constexpr int kMostTries = 60;
 constexpr int kMostCorrections = 8;
 
@@ -74,19 +74,19 @@ FastestMotion::FastestMotion(double position, double speed, double acceleration,
   const double fading = steps > 0.0 ? steps * size - rates_.jerk * steps * (steps + 1.0) / 2.0 : 0.0;
   const double flat = start_speed_ + std::copysign(fading, start_acceleration_);
   const double lowest = std::clamp(flat, 0.0, rates_.speed);
-  const double most = std::ceil(time_to(rates_.speed) * (1.0 - kRounding));
+  const double most = std::ceil(time_to(rates_.speed) * (1.0 - kTimeRounding));
   const double at_most = distance(rates_.speed, most) - distance_;
   if (at_most <= 0.0) {
     // at full speed for as long as it takes
     cruise_ = rates_.speed;
-    before_ = static_cast<std::int64_t>(most + std::ceil(-at_most / rates_.speed * (1.0 - kRounding)));
+    before_ = static_cast<std::int64_t>(most + std::ceil(-at_most / rates_.speed * (1.0 - kTimeRounding)));
   } else {
     // no longer than it takes to get to the cruising speed
     const auto beyond_at = [&](double cruise) {
       return distance(cruise, time_to(cruise)) - distance_;
     };
     cruise_ = root(beyond_at, lowest, rates_.speed, beyond_at(lowest), beyond_at(rates_.speed));
-    before_ = static_cast<std::int64_t>(std::ceil(time_to(cruise_) * (1.0 - kRounding)));
+    before_ = static_cast<std::int64_t>(std::ceil(time_to(cruise_) * (1.0 - kTimeRounding)));
   }
   const double at_lowest = distance(lowest, static_cast<double>(before_)) - distance_;
   if (at_lowest > 0.0) {

@@ -8,7 +8,6 @@ namespace {
 
 // a speed may be missed by no more than rounding
 constexpr double kSpeedRounding = 1e-12;
-constexpr int kMostTries = 96;
 
 std::int64_t at_least_one(double iterations) noexcept {
   const double whole = std::ceil(iterations * (1.0 - kSpeedRounding));
@@ -18,68 +17,55 @@ std::int64_t at_least_one(double iterations) noexcept {
 
 }  // namespace
 
-double peak_speed(const Quintic& quintic) noexcept {
-  const double d = quintic.distance;
-  const double v = quintic.velocity;
-  const double a = quintic.acceleration;
-  double peak = std::abs(v);
-  const auto consider = [&](double t) {
-    if (t > 0.0 && t < 1.0) {
-      peak = std::max(peak, std::abs(quintic.at(QuinticWeights::slope(t))));
-    }
-  };
+Fading Fading::of(const Moment& start, double most, double up, double down) noexcept {
+  const bool rises = start.velocity != 0.0 ? start.velocity > 0.0 : start.acceleration > 0.0;
+  const double room = rises ? up : down;
+  const double v = std::abs(start.velocity);
+  const double a = rises ? start.acceleration : -start.acceleration;
+  if ((v == 0.0 && a == 0.0) || !(room > 0.0)) return {};
 
-  // the acceleration is (1 - t) (a + b t + c t^2), being zero at the end
-  const double b = 60.0 * d - 36.0 * v - 8.0 * a;
-  const double c = -120.0 * d + 60.0 * v + 10.0 * a;
-  const double discriminant = b * b - 4.0 * a * c;
-  if (discriminant < 0.0) return peak;
-  const double q = -0.5 * (b + std::copysign(std::sqrt(discriminant), b));
-  if (c != 0.0) consider(q / c);
-  if (q != 0.0) consider(a / q);
-  return peak;
+  double time = most;
+  if (a < 0.0) time = std::min(time, 3.0 * v / -a);  // else it would turn
+  // time (v / 2 + a time / 12) <= room
+  const double discriminant = v * v / 4.0 + a * room / 3.0;
+  if (discriminant > 0.0) {
+    time = std::min(time, 2.0 * room / (v / 2.0 + std::sqrt(discriminant)));
+  }
+  if (!(time > 0.0) || !std::isfinite(time)) return {};
+  return {start.velocity, start.acceleration, time};
+}
+
+double Fading::position(double t) const noexcept {
+  if (t >= time) return distance();
+  const double s = t / time;
+  return t * (velocity * (1.0 + s * s * (-1.0 + s / 2.0)) +
+              acceleration * t * (0.5 + s * (-2.0 / 3.0 + s / 4.0)));
+}
+
+Moment Fading::at(double t) const noexcept {
+  if (t >= time) return {};
+  const double s = t / time;
+  return {(1.0 - s) * (1.0 - s) * (velocity * (1.0 + 2.0 * s) + acceleration * t),
+          -6.0 * velocity * s * (1.0 - s) / time + acceleration * (1.0 + s * (-4.0 + 3.0 * s))};
 }
 
 std::int64_t linear_iterations(double distance, double speed) noexcept {
   return at_least_one(std::abs(distance) / speed);
 }
 
-std::int64_t minimum_jerk_iterations(double distance, const Moment& start, double speed) noexcept {
+std::int64_t minimum_jerk_iterations(double distance, double speed) noexcept {
   constexpr double kPeakFromRest = 1.875;
-  const double way = std::abs(distance);
-  if (start.velocity == 0.0 && start.acceleration == 0.0) {
-    return at_least_one(kPeakFromRest * way / speed);
-  }
-  const double highest = std::max(speed, std::abs(start.velocity)) * (1.0 + kSpeedRounding);
-  const auto peak = [&](std::int64_t n) {
-    const auto count = static_cast<double>(n);
-    return peak_speed(Quintic::from(distance, start, count)) / count;
-  };
+  return at_least_one(kPeakFromRest * std::abs(distance) / speed);
+}
 
-  // up from the fewest that the mean speed allows, in growing steps
-  std::int64_t tried = at_least_one(way / highest);
-  std::int64_t failed = tried - 1;
-  std::int64_t gentlest = tried;
-  double lowest = peak(tried);
-  for (int tries = 0; tries < kMostTries && tried < kMostIterations && !(lowest <= highest);
-       ++tries) {
-    failed = tried;
-    tried = std::min(tried + 1 + tried / 8, kMostIterations);
-    const double reached = peak(tried);
-    if (reached < lowest) {
-      lowest = reached;
-      gentlest = tried;
-    }
-  }
-  if (!(lowest <= highest)) return gentlest;
-
-  // down to the fewest between the last that failed and the first that will do
-  std::int64_t fits = gentlest;
-  while (fits - failed > 1) {
-    const std::int64_t middle = failed + (fits - failed) / 2;
-    (peak(middle) <= highest ? fits : failed) = middle;
-  }
-  return fits;
+double highest_speed(double velocity, double distance, double n) noexcept {
+  const double v = std::abs(velocity);
+  const double mean = std::abs(distance) / n;
+  if (velocity * distance <= 0.0) return std::max(v, 1.875 * mean);
+  // v (1 - 3 t^2 + 2 t^3) + 30 mean t^2 (1 - t)^2 is highest where 10 mean (1 - 2 t) = v
+  if (10.0 * mean <= v) return v;
+  const double t = 0.5 * (1.0 - v / (10.0 * mean));
+  return v * (1.0 + t * t * (-3.0 + 2.0 * t)) + mean * minimum_jerk_slope(t);
 }
 
 }  // namespace o80

@@ -39,10 +39,9 @@ T to_integer(Real value) noexcept {
 
 /// Integers that a double cannot hold go their way in long double.
 template <class T>
-T moved_wide(T from, T to, double share, bool quintic, double offset) noexcept {
+T moved_wide(T from, T to, double share) noexcept {
   const auto start = static_cast<long double>(from);
   const auto target = static_cast<long double>(to);
-  if (quintic) return to_integer<T>(start + static_cast<long double>(offset));
   return to_integer<T>(start + (target - start) * static_cast<long double>(share));
 }
 
@@ -52,10 +51,12 @@ Motion::Motion(const StateLayout& layout)
     : layout_(layout),
       stride_((layout.size() + 15) / 16 * 16),
       ends_(3 * stride_ / sizeof(std::uint64_t)),
+      exact_(layout.numbers().size(), std::numeric_limits<double>::quiet_NaN()),
       starts_(layout.numbers().size()),
       targets_(layout.numbers().size()),
+      values_(layout.numbers().size()),
       ways_(layout.numbers().size()),
-      moments_(layout.numbers().size()) {}
+      kept_(layout.numbers().size()) {}
 
 void Motion::begin(Iteration first, std::int64_t iterations, Profile profile, Pace pace) noexcept {
   first_ = first;
@@ -63,10 +64,29 @@ void Motion::begin(Iteration first, std::int64_t iterations, Profile profile, Pa
   iterations_ = static_cast<double>(iterations);
   profile_ = profile;
   pace_ = pace;
-  quintic_ = moving_ && profile == Profile::minimum_jerk;
+  continues_ = moving_ && profile == Profile::minimum_jerk && pace != Pace::fastest;
   moving_ = false;
   measured_ = false;
   if (iterations > 1) measure();  // else nothing lies between
+  start_at_from();
+}
+
+void Motion::start_at_from() noexcept {
+  std::fill(exact_.begin(), exact_.end(), std::numeric_limits<double>::quiet_NaN());
+}
+
+double Motion::distance(std::size_t number) const noexcept {
+  return target_of(number) - start_of(number);
+}
+
+double Motion::target_of(std::size_t number) const noexcept {
+  const auto* from = reinterpret_cast<const std::byte*>(ends_.data());
+  return layout_.number(number, from + stride_);
+}
+
+double Motion::start_of(std::size_t number) const noexcept {
+  const auto* from = reinterpret_cast<const std::byte*>(ends_.data());
+  return std::isnan(exact_[number]) ? layout_.number(number, from) : exact_[number];
 }
 
 /// The ways of all numbers; asked for as late as possible, for most rows of one iteration need
@@ -76,11 +96,24 @@ void Motion::measure() noexcept {
   const auto& numbers = layout_.numbers();
   for (std::size_t i = 0; i < numbers.size(); ++i) {
     if (!numbers[i].moves()) continue;
-    starts_[i] = layout_.number(i, from());
-    targets_[i] = layout_.number(i, to());
-    ways_[i] =
-        Quintic::from(targets_[i] - starts_[i], quintic_ ? moments_[i] : Moment{}, iterations_);
+    starts_[i] = start_of(i);
+    targets_[i] = target_of(i);
+    if (continues_) ways_[i] = way(i, iterations_);
   }
+}
+
+/// What was kept fades within the span of the present place, the former stopping place and target,
+/// and the new target, in no more time than the old motion had left.
+Motion::Way Motion::way(std::size_t number, double iterations) const noexcept {
+  const Kept& kept = kept_[number];
+  const double start = start_of(number);
+  const double target = target_of(number);
+  Way way;
+  way.low = std::min({start, target, kept.stop, kept.target});
+  way.high = std::max({start, target, kept.stop, kept.target});
+  way.fading = Fading::of(kept.moment, std::min(left_, iterations), way.high - start,
+                          start - way.low);
+  return way;
 }
 
 void Motion::state(Iteration iteration, std::byte* out) noexcept {
@@ -90,102 +123,164 @@ void Motion::state(Iteration iteration, std::byte* out) noexcept {
     return;
   }
   const double time = static_cast<double>(iteration - first_ + 1) / iterations_;
-  const double share = share_of(time);
   if (layout_.hooks().blend != nullptr) {
     std::byte* blended = to() + stride_;
-    layout_.hooks().blend(blended, from(), to(), share);
-    layout_.copy(out, blended);
-  } else if (layout_.plain() && !quintic_) {
-    plain_state(share, out);
+    layout_.hooks().blend(blended, from(), to(), share_of(time));
+    // a hook that divides by zero gives no state
+    if (layout_.finite(blended)) layout_.copy(out, blended);
+  } else if (layout_.plain() && !continues_) {
+    plain_state(share_of(time), out);
   } else {
-    mixed_state(share, time, out);
+    mixed_state(time, out);
   }
 }
 
-void Motion::plain_state(double share, std::byte* out) const noexcept {
+double Motion::number(std::size_t number) const noexcept {
+  return arrived() ? target_of(number) : values_[number];
+}
+
+void Motion::plain_state(double share, std::byte* out) noexcept {
   for (std::size_t i = 0; i < starts_.size(); ++i) {
-    store(out + i * sizeof(double), between(starts_[i], targets_[i], ways_[i].distance, share));
+    values_[i] = between(starts_[i], targets_[i], targets_[i] - starts_[i], share);
+    store(out + i * sizeof(double), values_[i]);
   }
 }
 
-double Motion::moved(std::size_t number, double share, double time) const noexcept {
-  if (quintic_) {
-    const double value = starts_[number] + ways_[number].at(QuinticWeights::position(time));
-    if (std::isfinite(value)) return value;
+double Motion::moved(std::size_t number, double time) const noexcept {
+  const double start = starts_[number];
+  const double distance = targets_[number] - start;
+  if (continues_) {
+    const Way& way = ways_[number];
+    const double value = start + way.fading.position(time * iterations_) +
+                         (distance - way.fading.distance()) * minimum_jerk(time);
+    if (std::isfinite(value)) return std::clamp(value, way.low, way.high);
   }
-  return between(starts_[number], targets_[number], ways_[number].distance, share);
+  return between(start, targets_[number], distance, share_of(time));
 }
 
-void Motion::mixed_state(double share, double time, std::byte* out) const noexcept {
+void Motion::mixed_state(double time, std::byte* out) noexcept {
   const std::byte* begins = reinterpret_cast<const std::byte*>(ends_.data());
   const std::byte* ends = begins + stride_;
   const auto& numbers = layout_.numbers();
   for (std::size_t i = 0; i < numbers.size(); ++i) {
     const std::uint32_t offset = numbers[i].offset;
     std::byte* at = out + offset;
+    if (!numbers[i].moves()) {  // booleans and enumerations switch at the start
+      std::memcpy(at, ends + offset, numbers[i].size);
+      continue;
+    }
+    values_[i] = moved(i, time);
     const auto wide = [&]<class T>(T) {
-      const double way = quintic_ ? ways_[i].at(QuinticWeights::position(time)) : 0.0;
-      store(at, moved_wide(load<T>(begins + offset), load<T>(ends + offset), share, quintic_, way));
+      const T straight =
+          moved_wide(load<T>(begins + offset), load<T>(ends + offset), share_of(time));
+      store(at, continues_ ? to_integer<T>(static_cast<long double>(values_[i])) : straight);
     };
     switch (numbers[i].kind) {
       case Kind::float64:
-        store(at, moved(i, share, time));
+        store(at, values_[i]);
         break;
-      case Kind::float32: {
-        // a quintic may leave the span of its ends, and that of a float
-        const auto value = static_cast<float>(
-            std::clamp<double>(moved(i, share, time), std::numeric_limits<float>::lowest(),
-                               std::numeric_limits<float>::max()));
-        store(at, value);
+      case Kind::float32:
+        store(at, static_cast<float>(values_[i]));
         break;
-      }
       case Kind::int8:
-        store(at, to_integer<std::int8_t>(moved(i, share, time)));
+        store(at, to_integer<std::int8_t>(values_[i]));
         break;
       case Kind::int16:
-        store(at, to_integer<std::int16_t>(moved(i, share, time)));
+        store(at, to_integer<std::int16_t>(values_[i]));
         break;
       case Kind::int32:
-        store(at, to_integer<std::int32_t>(moved(i, share, time)));
+        store(at, to_integer<std::int32_t>(values_[i]));
         break;
       case Kind::int64:
         wide(std::int64_t{});
         break;
       case Kind::uint8:
-        store(at, to_integer<std::uint8_t>(moved(i, share, time)));
+        store(at, to_integer<std::uint8_t>(values_[i]));
         break;
       case Kind::uint16:
-        store(at, to_integer<std::uint16_t>(moved(i, share, time)));
+        store(at, to_integer<std::uint16_t>(values_[i]));
         break;
       case Kind::uint32:
-        store(at, to_integer<std::uint32_t>(moved(i, share, time)));
+        store(at, to_integer<std::uint32_t>(values_[i]));
         break;
-      case Kind::uint64:
+      default:
         wide(std::uint64_t{});
-        break;
-      default:  // booleans and enumerations switch at the start
-        std::memcpy(at, ends + offset, numbers[i].size);
     }
   }
 }
 
-void Motion::keep_moving() noexcept {
+void Motion::keep_moving(const std::byte* ahead, std::int64_t rows) noexcept {
   moving_ = pace_ != Pace::direct && layout_.hooks().blend == nullptr;
   if (!moving_) return;
   if (!measured_) measure();
-  const double time = std::min(1.0, static_cast<double>(now_ - first_ + 1) / iterations_);
-  const bool linear = profile_ == Profile::linear;
-  const QuinticWeights slope = QuinticWeights::slope(time);
-  const QuinticWeights curvature = QuinticWeights::curvature(time);
-  for (std::size_t i = 0; i < moments_.size(); ++i) {
-    Moment moment;
-    if (layout_.numbers()[i].moves()) {
-      moment.velocity = (linear ? ways_[i].distance : ways_[i].at(slope)) / iterations_;
-      moment.acceleration = linear ? 0.0 : ways_[i].at(curvature) / (iterations_ * iterations_);
+  const double done = std::min(iterations_, static_cast<double>(now_ - first_ + 1));
+  left_ = iterations_ - done + static_cast<double>(rows) * iterations_;
+  const double time = done / iterations_;
+  for (std::size_t i = 0; i < kept_.size(); ++i) {
+    Kept& kept = kept_[i];
+    if (!layout_.numbers()[i].moves()) {
+      kept = {};
+      continue;
     }
-    const bool usable = std::isfinite(moment.velocity) && std::isfinite(moment.acceleration);
-    moments_[i] = usable ? moment : Moment{};
+    kept = {{}, targets_[i], layout_.number(i, ahead)};
+    double distance = targets_[i] - starts_[i];
+    if (profile_ == Profile::linear) {
+      kept.moment.velocity = left_ > 0.0 ? distance / iterations_ : 0.0;
+    } else {
+      if (continues_) {
+        kept.moment = ways_[i].fading.at(done);
+        distance -= ways_[i].fading.distance();
+        kept.stop = starts_[i] + ways_[i].fading.distance();
+      } else {
+        kept.stop = starts_[i];
+      }
+      kept.moment.velocity += distance * minimum_jerk_slope(time) / iterations_;
+      kept.moment.acceleration +=
+          distance * minimum_jerk_curvature(time) / (iterations_ * iterations_);
+    }
+    const bool usable =
+        std::isfinite(kept.moment.velocity) && std::isfinite(kept.moment.acceleration);
+    if (!usable) kept.moment = {};
   }
+}
+
+void Motion::keep_moving(const std::byte* state, std::size_t number, const Moment& moment,
+                         double stop, std::int64_t iterations) noexcept {
+  if (!moving_) {
+    if (moment.velocity == 0.0 && moment.acceleration == 0.0) return;
+    for (std::size_t i = 0; i < kept_.size(); ++i) {
+      const double here = layout_.numbers()[i].moves() ? layout_.number(i, state) : 0.0;
+      kept_[i] = {{}, here, here};
+    }
+    left_ = 0.0;
+    moving_ = true;
+  }
+  kept_[number] = {moment, stop, stop};
+  left_ = std::max(left_, static_cast<double>(iterations));
+}
+
+std::int64_t Motion::iterations_at(std::size_t number, double speed) noexcept {
+  const double start = start_of(number);
+  const double target = target_of(number);
+  if (!moving_) return minimum_jerk_iterations(target - start, speed);
+
+  // an acceleration that would raise the speed further is dropped
+  Moment& moment = kept_[number].moment;
+  if (moment.velocity * moment.acceleration > 0.0) moment.acceleration = 0.0;
+  const double most = std::max(speed, std::abs(moment.velocity)) * (1.0 + 1e-12);
+  const auto fits = [&](std::int64_t n) {
+    const auto count = static_cast<double>(n);
+    const double rest = target - start - way(number, count).fading.distance();
+    return highest_speed(moment.velocity, rest, count) <= most;
+  };
+  std::int64_t enough = 1;
+  while (!fits(enough) && enough < kMostIterations / 2) enough *= 2;
+  std::int64_t few = enough / 2;
+  while (enough - few > 1) {
+    const std::int64_t middle = few + (enough - few) / 2;
+    (fits(middle) ? enough : few) = middle;
+  }
+  return enough;
 }
 
 }  // namespace o80

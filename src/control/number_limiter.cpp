@@ -6,9 +6,8 @@
 namespace o80 {
 namespace {
 
-constexpr double kNone = std::numeric_limits<double>::infinity();
 // what interpolation rounds is no excess
-constexpr double kRounding = 1e-9;
+constexpr double kLimitRounding = 1e-9;
 constexpr int kHalvings = 24;
 
 /// The highest speed after which a number that slows down by `acceleration` an iteration stops
@@ -46,7 +45,7 @@ double NumberLimiter::rounding() const noexcept {
 
 double NumberLimiter::slack() const noexcept {
   const double finest = std::min({rates_.speed, rates_.acceleration, rates_.jerk});
-  return rounding() + (std::isfinite(finest) ? kRounding * finest : 0.0);
+  return rounding() + (std::isfinite(finest) ? kLimitRounding * finest : 0.0);
 }
 
 /// Within the bounds, or no further outside than `before`.

@@ -8,7 +8,7 @@ namespace o80 {
 namespace {
 
 bool known_enums(const RecordHead& head) noexcept {
-  return head.mode <= Mode::overwrite && head.pace <= Pace::iterations &&
+  return head.mode <= Mode::overwrite && head.pace <= Pace::fastest &&
          head.profile <= Profile::minimum_jerk && head.start <= Start::observed &&
          head.partial <= 1;
 }
@@ -18,7 +18,7 @@ bool sane_pace(const RecordHead& head) noexcept {
     case Pace::direct:
       return true;
     case Pace::fastest:
-      return false;
+      return true;
     case Pace::duration:
       return head.rows > 1 || (head.amount >= 0 && head.amount <= kLongestDuration);
     case Pace::speed:
@@ -47,7 +47,16 @@ Cursor rows_of_timed(const BlockPool& pool, const RecordHead& head,
 RecordCheck::RecordCheck(const Schema& schema, Layouts layouts) : layouts_(std::move(layouts)) {
   std::uint32_t size = 0;
   std::size_t numbers = 0;
-  for (const ActuatorRow& actuator : schema.actuators) actuator_types_.push_back(actuator.type);
+  for (const ActuatorRow& actuator : schema.actuators) {
+    actuator_types_.push_back(actuator.type);
+    first_limits_.push_back(static_cast<std::uint32_t>(has_acceleration_.size()));
+    const StateLayout& layout = *layouts_[actuator.type];
+    for (std::uint32_t i = 0; i < actuator.limits; ++i) {
+      const bool moves = layout.numbers()[i].moves();
+      has_acceleration_.push_back(
+          !moves || std::isfinite(schema.limits.at(actuator.first_limit + i).acceleration));
+    }
+  }
   for (const RequestRow& request : schema.requests) request_types_.push_back(request.type);
   for (const StateLayout* layout : layouts_) {
     if (layout == nullptr) continue;
@@ -97,6 +106,14 @@ RecordCheck::Verdict RecordCheck::begin_command(const RecordHead& head,
   if (head.partial != 0) {
     progress.payload.read(mask_.data(), mask_bytes);
     if (numbers % 64 != 0 && mask_[numbers / 64] >> (numbers % 64) != 0) return Verdict::invalid;
+  }
+  // the fastest way needs limits of every number it leads
+  if (head.pace == Pace::fastest) {
+    const std::uint32_t first = first_limits_[head.actuator];
+    for (std::uint32_t i = 0; i < numbers; ++i) {
+      const bool commanded = masked(head.partial != 0 ? mask_.data() : nullptr, i);
+      if (commanded && !has_acceleration_[first + i]) return Verdict::invalid;
+    }
   }
   progress.times_left = timed ? head.rows : 0;
   progress.rows_left = head.rows;

@@ -48,6 +48,35 @@ void StateLayout::copy(std::byte* to, const std::byte* from,
   }
 }
 
+void StateLayout::copy_finite(std::byte* to, const std::byte* from,
+                              const std::uint64_t* mask) const noexcept {
+  for (std::size_t i = 0; i < numbers_.size(); ++i) {
+    if (!masked(mask, i) || !finite_number(i, from)) continue;
+    std::memcpy(to + numbers_[i].offset, from + numbers_[i].offset, numbers_[i].size);
+  }
+}
+
+std::uint32_t StateLayout::first_commanded(const std::uint64_t* mask) const noexcept {
+  for (std::uint32_t i = 0; i < numbers_.size(); ++i) {
+    if (masked(mask, i) && numbers_[i].moves()) return i;
+  }
+  return kNoNumber;
+}
+
+std::uint32_t StateLayout::first_not_finite(const std::byte* state) const noexcept {
+  for (std::uint32_t i = 0; i < numbers_.size(); ++i) {
+    if (!finite_number(i, state)) return i;
+  }
+  return kNoNumber;
+}
+
+bool StateLayout::finite_number(std::size_t number, const std::byte* state) const noexcept {
+  const std::byte* at = state + numbers_[number].offset;
+  if (numbers_[number].kind == Kind::float64) return std::isfinite(load<double>(at));
+  if (numbers_[number].kind == Kind::float32) return std::isfinite(load<float>(at));
+  return true;
+}
+
 bool StateLayout::proper_number(std::size_t number, const std::byte* state) const noexcept {
   const NumberPlace& place = numbers_[number];
   const std::byte* at = state + place.offset;

@@ -10,7 +10,7 @@ namespace {
 // no motion takes longer than this; keeps sums of squares within a double
 constexpr double kMostSteps = 1e12;
 // a limit may be exceeded by what rounds, rather than take an iteration more
-constexpr double kRounding = 1e-12;
+constexpr double kChangeRounding = 1e-12;
 
 double share_between(double wanted, double at_zero, double at_one) noexcept {
   const double range = at_one - at_zero;
@@ -35,7 +35,7 @@ void VelocityChange::plan_without_jerk(double change) noexcept {
   sign_ = change < 0.0 ? 1.0 : -1.0;
   const double size = std::abs(change);
   const double steps =
-      std::isfinite(acceleration_) ? std::min(std::ceil(size / acceleration_ * (1.0 - kRounding)), kMostSteps) : 1.0;
+      std::isfinite(acceleration_) ? std::min(std::ceil(size / acceleration_ * (1.0 - kChangeRounding)), kMostSteps) : 1.0;
   steps_ = static_cast<std::int64_t>(std::max(steps, 1.0));
   shorter_ = steps_ - 1;
   const double before = steps_ == 1 ? 0.0 : static_cast<double>(shorter_) * acceleration_;
@@ -83,7 +83,7 @@ VelocityChange::Sums VelocityChange::sums(double steps) const noexcept {
 
 void VelocityChange::plan_with_jerk(double change) noexcept {
   if (change == 0.0 && start_ == 0.0) return;
-  const double fewest = std::ceil(std::abs(start_) / jerk_ * (1.0 - kRounding));
+  const double fewest = std::ceil(std::abs(start_) / jerk_ * (1.0 - kChangeRounding));
 
   // which side of the straight way to acceleration 0, and its mirror image, does the change lie?
   const double lowest = sums(fewest).change;
@@ -116,7 +116,7 @@ void VelocityChange::plan_with_jerk(double change) noexcept {
                              (missing - acceleration_ * acceleration_ / jerk_) / acceleration_;
     double low = fewest;  // steps that are too few
     steps = std::clamp(std::floor(steps), fewest + 1.0, kMostSteps);
-    const double enough = change + kRounding * std::max(std::abs(change), std::abs(start_));
+    const double enough = change + kChangeRounding * std::max(std::abs(change), std::abs(start_));
     own = sums(steps);
     for (double stride = 1.0; own.change > enough && steps < kMostSteps; stride *= 2.0) {
       low = steps;

@@ -66,7 +66,8 @@ std::string limits_of(const Schema& schema, const ActuatorRow& actuator) {
     const LimitRow& limit = schema.limits[actuator.first_limit + i];
     text += (i == 0 ? "" : "; ") + number(limit.minimum) + " to " + number(limit.maximum) + " at " +
             number(limit.speed) + "/s, " + number(limit.acceleration) + "/s^2, " +
-            number(limit.jerk) + "/s^3, error " + number(limit.error);
+            number(limit.jerk) + "/s^3, error " + number(limit.error) +
+            (limit.resting != 0 ? ", rests at " + number(limit.rest) : "");
   }
   return text;
 }

@@ -165,6 +165,10 @@ void write_actuator(JsonWriter& json, const Schema& schema, const ActuatorRow& a
     json.value(limit.jerk);
     json.key("error");
     json.value(limit.error);
+    if (limit.resting != 0) {
+      json.key("rest");
+      json.value(limit.rest);
+    }
     json.close('}');
   }
   json.close(']');

@@ -85,6 +85,11 @@ void check_field(const Schema& schema, std::uint32_t type_index, const FieldRow&
   if (elements > kLargestType) refuse(name + "has too many elements");
   if (field.offset + field.size * elements > type.size) refuse(name + "lies outside its struct");
   if (field.rows == 0 && field.columns != 0) refuse(name + "has columns but no rows");
+  const bool moves = field.kind != Kind::structure && field.kind != Kind::boolean &&
+                     field.kind != Kind::enumeration;
+  if (field.resting > 1 || !std::isfinite(field.rest) || (field.resting == 1 && !moves)) {
+    refuse(name + "cannot rest: rests_at() needs a number and a finite value");
+  }
   switch (field.kind) {
     case Kind::structure:
       // a nested type stands before its owner, so there is no circle
@@ -155,6 +160,12 @@ void check_limit(const ActuatorRow& actuator, const LimitRow& limit) {
       refuse(of + "have " + what + " " + std::to_string(value) + ": it must be above 0");
     }
   };
+  if (limit.resting > 1 || !std::isfinite(limit.rest) ||
+      (limit.resting == 1 && (limit.rest < limit.minimum || limit.rest > limit.maximum))) {
+    refuse(of + "are from " + std::to_string(limit.minimum) + " to " +
+           std::to_string(limit.maximum) + ", and it rests at " + std::to_string(limit.rest) +
+           ": a place to rest lies between them");
+  }
   positive(limit.speed, "speed");
   positive(limit.acceleration, "acceleration");
   positive(limit.jerk, "jerk");
@@ -238,7 +249,7 @@ void check(const Schema& schema) {
   // also of those that belong to no actuator: a schema equals itself
   for (const LimitRow& limit : schema.limits) {
     for (const double value :
-         {limit.minimum, limit.maximum, limit.speed, limit.acceleration, limit.jerk, limit.error}) {
+         {limit.minimum, limit.maximum, limit.speed, limit.acceleration, limit.jerk, limit.error, limit.rest}) {
       if (std::isnan(value)) refuse("a limit is not a number");
     }
   }

@@ -2,12 +2,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
-#include "o80/control/clamp.hpp"
 #include "o80/control/duration.hpp"
 #include "o80/control/lane_lists.hpp"
 #include "o80/control/ledger.hpp"
+#include "o80/control/limiter.hpp"
 #include "o80/control/motion.hpp"
 #include "o80/control/pool.hpp"
 #include "o80/control/state_layout.hpp"
@@ -21,8 +22,8 @@ class ActuatorQueue {
  public:
   /// What an iteration gave the desired state.
   enum class Moved : std::uint8_t {
-    idle,     // nothing: no command is left
-    waiting,  // nothing yet: late commands in a row used up the iteration's share of work
+    idle,     // nothing: no command is left, and it rests
+    braking,  // no command: it comes to rest
     active,
     clamped
   };
@@ -37,42 +38,58 @@ class ActuatorQueue {
   }
   /// Ends everything; what overwrites it may continue its motion.
   void drop(Status status, Reason reason, Iteration iteration) noexcept;
-  /// Ends what one lane sent.
+  /// Ends what one lane sent, the direct value it gave last included.
   void drop_lane(std::uint32_t lane, Status status, Reason reason, Iteration iteration) noexcept;
   /// `late_budget` is how many late commands may still be told in this iteration.
   Moved step(Iteration iteration, const std::byte* observed, std::uint32_t& late_budget) noexcept;
   bool empty() const noexcept { return queue_.empty(); }
+  /// A command of this lane, or the direct value it gave last, still acts.
+  bool acts(std::uint32_t lane) const noexcept {
+    return queue_.has(lane) || (holds_ && holder_ == lane);
+  }
 
-  /// The state of an actuator that has just become idle.
-  void settle(const std::byte* observed) noexcept;
+  /// Begins at rest in this state; what is no finite number keeps its last desired value.
+  void restart(const std::byte* state) noexcept;
   /// The state of an actuator that follows, as long as it is idle.
-  void follow(const std::byte* observed) noexcept { layout_->copy(desired_, observed); }
+  void follow(const std::byte* observed) noexcept;
   bool follows() const noexcept { return when_idle_ == WhenIdle::follow; }
 
  private:
   bool begin_next(Iteration iteration, const std::byte* observed,
                   std::uint32_t& late_budget) noexcept;
   void begin_row(Iteration iteration, const std::byte* observed) noexcept;
+  bool read_row() noexcept;
   std::int64_t iterations(const RecordHead& head, Iteration iteration) noexcept;
   std::int64_t iterations_at(double speed, Profile profile) noexcept;
+  std::int64_t row_of_own_time() noexcept;
+  Limited move(Iteration iteration) noexcept;
   void end_running(Iteration iteration) noexcept;
-  void halt() noexcept;
+  Moved come_to_rest(const std::byte* observed) noexcept;
+  void keep_moving() noexcept;
+  void end_motion() noexcept;
+  const std::uint64_t* mask() const noexcept { return partial_ ? mask_.data() : nullptr; }
 
   const StateLayout* layout_;
   BlockPool* pool_;
   Ledger* ledger_;
   std::byte* desired_;
   Motion motion_;
-  Clamp clamp_;
+  Limiter limiter_;
   DurationCarry carry_;
   double period_;  // [s]
   WhenIdle when_idle_;
 
   LaneLists queue_;  // in front the one that runs, if one does
   bool running_ = false;
-  bool clamped_ = false;  // by the last iteration
+  Limited limited_;  // by the last iteration
+  bool holds_ = false;   // a direct value stays until something takes its place
+  std::uint32_t holder_ = 0;  // lane that gave it
+  bool streams_ = false;      // the iteration before was a direct command's
 
   // of the command that runs
+  Pace pace_ = Pace::direct;
+  double most_ = std::numeric_limits<double>::infinity();  // speed of its first number [1/iteration]
+  std::uint32_t first_number_ = 0;                         // that it commands
   std::uint32_t rows_left_ = 0;
   bool partial_ = false;
   bool timed_ = false;
@@ -82,6 +99,7 @@ class ActuatorQueue {
   Cursor rows_;
   std::vector<std::uint64_t> mask_;
   std::vector<std::uint64_t> scratch_;  // a state
+  std::vector<std::uint64_t> spare_;    // likewise
 };
 
 }  // namespace o80

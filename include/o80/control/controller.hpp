@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "o80/control/batch_handler.hpp"
 #include "o80/control/pool.hpp"
@@ -11,6 +12,12 @@
 #include "o80/describe/schema.hpp"
 
 namespace o80 {
+
+/// A number that is none, in a block of states.
+struct NotFinite {
+  std::uint32_t actuator = 0;
+  std::uint32_t number = 0;  // of its state
+};
 
 /// Turns the commands of all lanes into desired states, one iteration after the other.
 ///
@@ -77,6 +84,10 @@ class Controller {
 
   /// Something runs or is queued.
   bool active() const noexcept;
+  /// A command of this lane, or a direct value that it gave last, still acts; O(actuators).
+  bool acts(std::uint32_t lane) const noexcept;
+  /// The first number of a block of states that is infinite or NaN; O(numbers).
+  std::optional<NotFinite> not_finite(const std::byte* block) const noexcept;
   /// Something dropped is still to be told.
   bool pending() const noexcept;
 

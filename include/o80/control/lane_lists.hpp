@@ -23,6 +23,7 @@ class LaneLists {
   }
 
   bool empty() const noexcept { return front_ == kNoLane; }
+  bool has(std::uint32_t lane) const noexcept { return lists_[lane].first != kNoBlock; }
   /// The first record of all, if there is one.
   BlockIndex front() const noexcept { return front_ == kNoLane ? kNoBlock : lists_[front_].first; }
   /// Whose it is.

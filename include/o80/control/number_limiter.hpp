@@ -30,7 +30,10 @@ class NumberLimiter {
   double position() const noexcept { return position_; }
   double speed() const noexcept { return speed_; }
   double acceleration() const noexcept { return acceleration_; }
-  bool at_rest() const noexcept { return speed_ == 0.0 && acceleration_ == 0.0; }
+  /// Without an acceleration limit it rests whenever nothing moves it.
+  bool at_rest() const noexcept {
+    return (speed_ == 0.0 && acceleration_ == 0.0) || !std::isfinite(rates_.acceleration);
+  }
   /// It is where it was asked to be.
   bool tracks() const noexcept { return position_ == wanted_; }
 

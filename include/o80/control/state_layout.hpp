@@ -55,6 +55,16 @@ class StateLayout {
   /// Copies the numbers whose bits are set.
   void copy(std::byte* to, const std::byte* from, const std::uint64_t* mask) const noexcept;
 
+  /// Copies the numbers whose bits are set, but for those that are infinite or NaN.
+  void copy_finite(std::byte* to, const std::byte* from,
+                   const std::uint64_t* mask = nullptr) const noexcept;
+
+  static constexpr std::uint32_t kNoNumber = 0xFFFFFFFF;
+  /// The first number that moves, of those whose bits are set; or kNoNumber.
+  std::uint32_t first_commanded(const std::uint64_t* mask) const noexcept;
+  /// The first number that is infinite or NaN, or kNoNumber.
+  std::uint32_t first_not_finite(const std::byte* state) const noexcept;
+
   /// Each boolean is 0 or 1 and each enumeration has a label; with `mask`, only those set there.
   bool proper(const std::byte* state, const std::uint64_t* mask = nullptr) const noexcept;
   /// Proper, and neither NaN nor infinite.
@@ -64,6 +74,7 @@ class StateLayout {
   double number(std::size_t number, const std::byte* state) const noexcept;
 
  private:
+  bool finite_number(std::size_t number, const std::byte* state) const noexcept;
   void copy_numbers(std::byte* to, const std::byte* from) const noexcept;
 
   std::vector<NumberPlace> numbers_;

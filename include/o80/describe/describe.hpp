@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -11,10 +12,11 @@
 #include "o80/describe/for_each.hpp"
 #include "o80/describe/schema.hpp"
 
-/// Describes a struct: O80_DESCRIBE(Joint, (position, "[rad]"), velocity), at namespace scope.
+/// Describes a struct: O80_DESCRIBE(Joint, (position, "[rad]"), (velocity, "[rad/s]",
+/// o80::rests_at(0))), at namespace scope.
 ///
-/// A text may hold a unit in brackets and a help. Every field must be named: a forgotten one does
-/// not compile.
+/// A text may hold a unit in brackets and a help. A field of an actuator's state that rests goes
+/// there when no command drives it. Every field must be named: a forgotten one does not compile.
 #define O80_DESCRIBE(Type, ...)                                                                  \
   static_assert(std::is_aggregate_v<Type>, #Type " must be a plain struct to be described");     \
   static_assert(::o80::field_count<Type>() == (0 O80_FOR_EACH(O80_PLUS_ONE, ~, __VA_ARGS__)),    \
@@ -41,8 +43,9 @@
 #define O80_FIELD(fixed, field) O80_JOIN(O80_FIELD_, O80_IS_GROUP(field))(field)
 #define O80_FIELD_0(field) O80_FIELD_NAMED(field, "")
 #define O80_FIELD_1(field) O80_FIELD_NAMED field
-#define O80_FIELD_NAMED(field, text) \
-  o80_visit(#field, &O80Type::field, std::size_t{offsetof(O80Type, field)}, text);
+#define O80_FIELD_NAMED(field, ...)                                         \
+  o80_visit(#field, &O80Type::field, std::size_t{offsetof(O80Type, field)}, \
+            ::o80::FieldNote(__VA_ARGS__));
 #define O80_LABEL(fixed, label) o80_visit(#label, O80Type::label);
 
 namespace o80 {
@@ -50,6 +53,18 @@ namespace o80 {
 /// Carries a type to the functions that O80_DESCRIBE makes, which are found by its namespace.
 template <class T>
 struct Tag {};
+
+/// What O80_DESCRIBE says about a field: a text, and where it rests.
+struct FieldNote {
+  std::string_view text;
+  std::optional<RestsAt> rest;
+
+  constexpr FieldNote(std::string_view said) : text(said) {}  // NOLINT(google-explicit-constructor)
+  constexpr FieldNote(const char* said) : text(said) {}       // NOLINT(google-explicit-constructor)
+  constexpr FieldNote(std::string_view said, RestsAt where) : text(said), rest(where) {}
+  constexpr FieldNote(RestsAt where) : rest(where) {}  // NOLINT(google-explicit-constructor)
+  constexpr operator std::string_view() const { return text; }  // NOLINT(google-explicit-constructor)
+};
 
 namespace describing {
 
@@ -103,11 +118,6 @@ concept Shareable =
 template <class T>
 concept Blending = requires(const T& state, double share) {
   { T::blend(state, state, share) } -> std::same_as<T>;
-};
-/// A state type with its own way to rest: `T hold() const`.
-template <class T>
-concept Holding = requires(const T& state) {
-  { state.hold() } -> std::same_as<T>;
 };
 
 namespace describing {
@@ -182,8 +192,10 @@ std::uint32_t type_of(Schema& schema) {
   if constexpr (DescribedStruct<T>) {
     name = o80_type_name(Tag<T>{});
     o80_describe(Tag<T>{}, [&]<class Field>(std::string_view field, Field T::*, std::size_t offset,
-                                            std::string_view text) {
-      members.push_back(field_row<Field>(schema, field, offset, text));
+                                            const FieldNote& note) {
+      members.push_back(field_row<Field>(schema, field, offset, note.text));
+      members.back().resting = note.rest ? 1 : 0;
+      if (note.rest) members.back().rest = note.rest->value;
     });
   } else {
     members.push_back(field_row<T>(schema, "", 0, ""));
@@ -206,14 +218,6 @@ std::uint32_t type_of(Schema& schema) {
       std::memcpy(&b, to, sizeof(T));
       const T blended = T::blend(a, b, share);
       std::memcpy(out, &blended, sizeof(T));
-    };
-  }
-  if constexpr (Holding<T>) {
-    hooks.hold = [](void* state) {
-      T last;
-      std::memcpy(&last, state, sizeof(T));
-      const T held = last.hold();
-      std::memcpy(state, &held, sizeof(T));
     };
   }
   schema.hooks.push_back(hooks);

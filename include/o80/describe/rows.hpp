@@ -97,7 +97,7 @@ struct LabelRow {
   bool operator==(const LabelRow&) const = default;
 };
 
-/// Limits of one number of an actuator's state, in the unit of its field.
+/// Limits and rest of one number of an actuator's state, in the unit of its field.
 struct LimitRow {
   double minimum;
   double maximum;
@@ -105,6 +105,8 @@ struct LimitRow {
   double acceleration;  // [1/s^2]
   double jerk;          // [1/s^3]
   double error;         // between desired and observed; more of it halts
+  double rest;          // where the number goes when no command drives it ...
+  std::uint64_t resting;  // ... if this is 1
   bool operator==(const LimitRow&) const = default;
 };
 

@@ -23,8 +23,16 @@ struct Limits {
   /// Most that desired and observed may be apart; more than that halts the backend.
   double error = std::numeric_limits<double>::infinity();
 
-  LimitRow row() const { return {minimum, maximum, speed, acceleration, jerk, error}; }
+  LimitRow row(double rest = 0.0, bool resting = false) const {
+    return {minimum, maximum, speed, acceleration, jerk, error, rest, resting ? 1U : 0U};
+  }
 };
+
+/// A field that goes to `value` when no command drives it: a velocity to 0, say.
+struct RestsAt {
+  double value;
+};
+constexpr RestsAt rests_at(double value) { return {value}; }
 
 class Schema;
 
@@ -39,8 +47,14 @@ class ActuatorDescription {
   ActuatorDescription& limits(const Limits& limits);
   /// Limits of a named field of the state (of every element of an array field).
   ActuatorDescription& limits(std::string_view field, const Limits& limits);
+  /// Where a named field of this actuator rests (every element of an array field).
+  ActuatorDescription& rests_at(std::string_view field, double value);
 
  private:
+  /// Calls `visit(LimitRow&)` for every number of a named field.
+  template <class Visit>
+  void each_number(std::string_view field, Visit&& visit);
+
   Schema& schema_;
   std::uint32_t index_;
 };
@@ -222,7 +236,9 @@ inline void Schema::place_group(std::string_view group, std::uint32_t type, std:
     actuator.first_limit = static_cast<std::uint32_t>(limits.size());
     actuator.limits = scalars;
     actuators.push_back(actuator);
-    limits.insert(limits.end(), scalars, Limits{}.row());
+    each_scalar(type, [&](std::uint32_t, const FieldRow& field) {
+      limits.push_back(Limits{}.row(field.rest, field.resting != 0));
+    });
   }
   groups.push_back(row);
 }
@@ -298,13 +314,14 @@ inline ActuatorDescription& ActuatorDescription::when_idle(WhenIdle when_idle) {
 inline ActuatorDescription& ActuatorDescription::limits(const Limits& limits) {
   const ActuatorRow& row = schema_.actuators[index_];
   if (row.limits > 0) {
-    schema_.limits[row.first_limit] = limits.row();
+    LimitRow& first = schema_.limits[row.first_limit];
+    first = limits.row(first.rest, first.resting != 0);
   }
   return *this;
 }
 
-inline ActuatorDescription& ActuatorDescription::limits(std::string_view field,
-                                                        const Limits& limits) {
+template <class Visit>
+void ActuatorDescription::each_number(std::string_view field, Visit&& visit) {
   const ActuatorRow& row = schema_.actuators[index_];
   const TypeRow& type = schema_.types.at(row.type);
   std::uint32_t scalar = row.first_limit;
@@ -315,16 +332,28 @@ inline ActuatorDescription& ActuatorDescription::limits(std::string_view field,
         member.kind == Kind::structure ? schema_.scalar_count(member.type) : 1;
     const std::uint32_t numbers = inside * member.count();
     if (member.name.view() == field) {
-      for (std::uint32_t n = 0; n < numbers; ++n) {
-        schema_.limits[scalar + n] = limits.row();
-      }
-      return *this;
+      for (std::uint32_t n = 0; n < numbers; ++n) visit(schema_.limits[scalar + n]);
+      return;
     }
     there += (i == 0 ? "" : ", ") + member.name.str();
     scalar += numbers;
   }
   throw InvalidArgument("'" + type.name.str() + "' has no field '" + std::string(field) +
                         "'; there are: " + there);
+}
+
+inline ActuatorDescription& ActuatorDescription::limits(std::string_view field,
+                                                        const Limits& limits) {
+  each_number(field, [&](LimitRow& row) { row = limits.row(row.rest, row.resting != 0); });
+  return *this;
+}
+
+inline ActuatorDescription& ActuatorDescription::rests_at(std::string_view field, double value) {
+  each_number(field, [&](LimitRow& row) {
+    row.rest = value;
+    row.resting = 1;
+  });
+  return *this;
 }
 
 }  // namespace o80

@@ -275,13 +275,30 @@ TEST(ActuatorQueue, ATrajectoryWithTimesOfItsOwnHitsEachRowAtItsRoundedTime) {
   Rig rig(plain_robot(1));
   rig.add_rows(0, during(0), 4, {1.0, 2.0, 3.0, 4.0}, {1'600'000, 2'400'000, 5'000'000, 6'500'000});
   const CommandId batch = rig.pulse();
-  // the rows end after 2, 2 (at least one iteration: 3), then 2.6 and 1.5 more
+  // the second row would end when the first one does: it is passed
   const auto desired = rig.run(9);
   EXPECT_EQ(desired[1], 1.0);
-  EXPECT_EQ(desired[2], 2.0);
-  EXPECT_EQ(desired[5], 3.0);
-  EXPECT_EQ(desired[6], 4.0) << "1.5 less the 0.4 that the row before took too much";
+  EXPECT_EQ(desired[2], 1.0 + 2.0 / 3.0);
+  EXPECT_EQ(desired[4], 3.0);
+  EXPECT_EQ(desired[6], 4.0);
   EXPECT_EQ(rig.witness.last(batch + 2).iteration, 7);
+}
+
+TEST(ActuatorQueue, ATrajectoryWithManyShortTimesEndsInTime) {
+  // 199 rows over one second, some of them several in an iteration: 1099 iterations before
+  Rig rig(plain_robot(1), 8000);
+  std::vector<std::int64_t> times;
+  std::vector<double> rows;
+  for (std::int64_t i = 1; i <= 199; ++i) {
+    times.push_back(i <= 100 ? i * 1000 : (i - 99) * 10 * kMillisecond);
+    rows.push_back(static_cast<double>(i));
+  }
+  rig.add_rows(0, during(0), 199, rows, times);
+  const CommandId batch = rig.pulse();
+  rig.run(1100);
+  EXPECT_EQ(rig.witness.last(batch + 2).status, Status::completed);
+  EXPECT_EQ(rig.witness.last(batch + 2).iteration, 1000);
+  EXPECT_EQ(rig.desired(), 199.0);
 }
 
 TEST(ActuatorQueue, TimesOfATrajectoryDoNotDrift) {
@@ -360,26 +377,9 @@ TEST(ActuatorQueue, AnIdleActuatorThatFollowsLetsTheNextCommandStartFromWhereItI
   EXPECT_THAT(rig.run(1), ElementsAre(3.0));
 }
 
-void stand_still(void* state) {
-  static_cast<double*>(state)[1] = 0.0;  // the velocity
-}
-
-TEST(ActuatorQueue, AStateTypeMayBringItsOwnHold) {
-  Schema schema = plain_robot(1, 2);
-  schema.hooks[0].hold = stand_still;
-  Rig rig(schema);
-  rig.add(0, over(2), {1.0, 2.0});
-  rig.pulse();
-  rig.run(2);
-  EXPECT_EQ(rig.desired(1), 2.0) << "the target is hit";
-  rig.step();
-  EXPECT_EQ(rig.desired(0), 1.0);
-  EXPECT_EQ(rig.desired(1), 0.0);
-}
-
 TEST(ActuatorQueue, ARobotThatMovedWhenItStartedIsHeldAtRest) {
   Schema schema = plain_robot(1, 2);
-  schema.hooks[0].hold = stand_still;
+  schema.actuator(0).rests_at("x1", 0.0);
   Rig rig(schema);
   rig.observe(0, 1.0);
   rig.observe(8, 2.0);
@@ -388,6 +388,23 @@ TEST(ActuatorQueue, ARobotThatMovedWhenItStartedIsHeldAtRest) {
   rig.step();
   EXPECT_EQ(rig.desired(0), 1.0);
   EXPECT_EQ(rig.desired(1), 0.0);
+}
+
+TEST(ActuatorQueue, WhatIsNoNumberIsNeverFollowed) {
+  Schema schema = plain_robot(2);
+  schema.actuator(0).when_idle(WhenIdle::follow);
+  Rig rig(schema);
+  rig.observe(0, 2.0);
+  rig.step();
+  for (const double none : {std::nan(""), std::numeric_limits<double>::infinity()}) {
+    rig.observe(0, none);
+    rig.observe(8, none);
+    EXPECT_EQ(rig.run(1)[0], 2.0);
+    rig.controller.restart(rig.observed.data(), nullptr, rig.next);
+    EXPECT_EQ(rig.run(1)[0], 2.0) << "nor taken as a start";
+    EXPECT_EQ(rig.desired(1), 0.0);
+    ASSERT_TRUE(rig.controller.not_finite(rig.observed.data()).has_value());
+  }
 }
 
 TEST(ActuatorQueue, ManyActuatorsEachHaveTheirOwnQueue) {

@@ -15,11 +15,19 @@ TEST(DurationCarry, RoundsToNearestHalvesUp) {
   EXPECT_EQ(DurationCarry(7).iterations(11), 2);
 }
 
-TEST(DurationCarry, TakesAtLeastOneIterationAndThenForgets) {
+TEST(DurationCarry, TakesAtLeastOneIterationAndMakesUpForItLater) {
   DurationCarry carry(10);
   EXPECT_EQ(carry.iterations(0), 1);
-  EXPECT_EQ(carry.iterations(4), 1);
-  EXPECT_EQ(carry.iterations(14), 1) << "nothing was carried";
+  EXPECT_EQ(carry.iterations(4), 1) << "16 too many by now";
+  EXPECT_EQ(carry.iterations(36), 2) << "the exact end is 40";
+  EXPECT_EQ(carry.iterations(10), 1);
+}
+
+TEST(DurationCarry, PassesWhatIsOverBeforeTheNextIteration) {
+  DurationCarry carry(10);
+  EXPECT_TRUE(carry.pass(4));
+  EXPECT_FALSE(carry.pass(2)) << "6 is nearer to the first iteration than to none";
+  EXPECT_EQ(carry.iterations(16), 2) << "the exact end is 20";
 }
 
 TEST(DurationCarry, ItsSumIsTheRoundedSumOfAllDurations) {

@@ -11,8 +11,6 @@
 namespace o80 {
 namespace {
 
-constexpr double kNone = std::numeric_limits<double>::infinity();
-
 class FastestMotionTest : public testing::Test {
  protected:
   double real(double low, double high) {
@@ -20,7 +18,7 @@ class FastestMotionTest : public testing::Test {
   }
   double magnitude(double low, double high) { return std::pow(10.0, real(low, high)); }
   Rates any_rates() {
-    Rates rates{magnitude(-3, 0), kNone, kNone};
+    Rates rates{magnitude(-3, 0), std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
     rates.acceleration = rates.speed * magnitude(-2, 0.5);
     if (real(0, 1) < 0.7) rates.jerk = rates.acceleration * magnitude(-1.5, 0.5);
     return rates;
@@ -32,7 +30,7 @@ TEST_F(FastestMotionTest, IsFollowedByALimiterThatNeverHoldsItBackFromWhereverIt
   std::int64_t longest = 0;
   for (int round = 0; round < 20'000; ++round) {
     const Rates rates = any_rates();
-    NumberLimiter limiter(-kNone, kNone, rates);
+    NumberLimiter limiter(-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity(), rates);
     limiter.restart(real(-1, 1));
     for (int part = 0; part < 4; ++part) {
       const double target = real(0, 1) < 0.1 ? limiter.position() : real(-1, 1) * magnitude(-3, 0.5);
@@ -64,7 +62,7 @@ TEST_F(FastestMotionTest, IsFollowedByALimiterThatNeverHoldsItBackFromWhereverIt
 
 TEST_F(FastestMotionTest, FromRestToRestTakesTheKnownTime) {
   // 100 iterations up to full speed, 900 at it, 100 down
-  const Rates rates{0.1, 0.001, kNone};
+  const Rates rates{0.1, 0.001, std::numeric_limits<double>::infinity()};
   EXPECT_EQ(FastestMotion(0.0, 0.0, 0.0, 100.0, rates).iterations(), 1100);
   // acceleration, no cruise: 2 sqrt(d / a)
   EXPECT_EQ(FastestMotion(0.0, 0.0, 0.0, 2.5, rates).iterations(), 100);
@@ -77,7 +75,7 @@ TEST_F(FastestMotionTest, StretchesToEndWithASlowerOne) {
   int exact = 0;
   for (int round = 0; round < 3000; ++round) {
     const Rates rates = any_rates();
-    NumberLimiter limiter(-kNone, kNone, rates);
+    NumberLimiter limiter(-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity(), rates);
     limiter.restart(0.0);
     FastestMotion first(0.0, 0.0, 0.0, real(-1, 1), rates);
     limiter.begin();

@@ -82,7 +82,7 @@ TEST(Motion, MinimumJerkContinuesTheVelocityOfATrajectoryOfOneIterationARow) {
   const auto speed = differences(joined(before, rig.run(1000)));
   EXPECT_EQ(speed[298], 1.0);
   EXPECT_NEAR(speed[299], 1.0, 0.001);
-  EXPECT_LT(largest(differences(speed)), 0.02);
+  EXPECT_LT(largest(differences(speed)), 0.03) << "within the rows that are looked at ahead";
 }
 
 TEST(Motion, ThatContinuationDoesNotComeByItself) {
@@ -302,25 +302,6 @@ TEST(Motion, NoPaddingOfAnyoneReachesTheDesiredBlock) {
   EXPECT_EQ(rig.witness.status(batch + 2), Status::completed);
 }
 
-TEST(Motion, AnOvershootingIntegerStaysWithinItsType) {
-  Rig rig(mixed_robot());
-  Mixed target{};
-  target.gripper = 5;
-  target.i8 = 127;
-  rig.batch.command(over(10), bytes_of_one(target));
-  rig.pulse();
-  rig.run(9);
-  rig.batch.command(overwriting(smoothly(over(50))), bytes_of_one(target));
-  rig.pulse();
-  std::int8_t highest = 0;
-  for (int i = 0; i < 50; ++i) {
-    rig.step();
-    EXPECT_GT(rig.desired_as<Mixed>(0).i8, 100);
-    highest = std::max(highest, rig.desired_as<Mixed>(0).i8);
-  }
-  EXPECT_EQ(highest, 127);
-}
-
 TEST(Motion, TheWidestWayDoesNotOverflow) {
   Rig rig(plain_robot(1));
   constexpr double kLargest = std::numeric_limits<double>::max();
@@ -332,17 +313,44 @@ TEST(Motion, TheWidestWayDoesNotOverflow) {
   EXPECT_EQ(rig.desired(), -kLargest);
 }
 
-TEST(Motion, FromAnObservedThatIsNoNumberItGoesToTheTarget) {
-  Rig rig(plain_robot(1));
-  rig.observe(0, std::nan(""));
-  for (const RecordHead& head : {over(3), smoothly(over(3)), at_speed(1.0)}) {
-    rig.add(0, from_observed(head), {5.0});
+TEST(Motion, FromAnObservedThatIsNoNumberItStartsFromTheDesiredOne) {
+  for (const double none : {std::nan(""), std::numeric_limits<double>::infinity()}) {
+    Rig rig(plain_robot(1));
+    rig.observe(0, none);
+    rig.add(0, from_observed(over(4)), {8.0});
     rig.pulse();
-    rig.step();
-    EXPECT_EQ(rig.desired(), 5.0);
-    rig.run(3);
-    EXPECT_FALSE(rig.controller.active());
+    EXPECT_THAT(rig.run(4), ElementsAre(2.0, 4.0, 6.0, 8.0));
   }
+}
+
+// findings of 2026-11: the highest and lowest place of a minimum jerk cut by another one
+struct Reach {
+  double low;
+  double high;
+};
+
+Reach reach_of(double first, const RecordHead& how, int cut, double second,
+               const RecordHead& then) {
+  Rig rig(plain_robot(1));
+  rig.add(0, smoothly(how), {first});
+  rig.pulse();
+  auto desired = rig.run(cut);
+  rig.add(0, overwriting(smoothly(then)), {second});
+  const CommandId batch = rig.pulse();
+  while (rig.controller.active()) desired.push_back(rig.run(1)[0]);
+  EXPECT_EQ(rig.witness.status(batch + 2), Status::completed);
+  EXPECT_EQ(rig.desired(), second);
+  const auto [low, high] = std::minmax_element(desired.begin(), desired.end());
+  return {*low, *high};
+}
+
+TEST(Motion, AnOverwritingMinimumJerkStaysBetweenWhereItWasAndItsTargets) {
+  EXPECT_LE(reach_of(1.0, over(500), 100, 2.0, over(5000)).high, 2.0) << "12.09 before";
+  EXPECT_LE(reach_of(1.0, over(300), 100, 0.5, over(3000)).high, 1.0) << "10.8 before";
+  EXPECT_GE(reach_of(1.0, over(500), 400, 0.0, over(5000)).low, 0.0) << "-7.9 before";
+  const Reach far = reach_of(-4.0, over(230), 221, 4.33, at_speed(1.5));
+  EXPECT_LE(far.high, 4.33) << "81.7 before";
+  EXPECT_GE(far.low, -4.0);
 }
 
 void turn(void* out, const void* from, const void* to, double share) {

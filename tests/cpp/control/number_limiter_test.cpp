@@ -8,8 +8,6 @@
 namespace o80 {
 namespace {
 
-constexpr double kNone = std::numeric_limits<double>::infinity();
-
 class NumberLimiterTest : public testing::Test {
  protected:
   double real(double low, double high) {
@@ -18,7 +16,7 @@ class NumberLimiterTest : public testing::Test {
   double magnitude(double low, double high) { return std::pow(10.0, real(low, high)); }
   bool one_in(int n) { return std::uniform_int_distribution<int>(1, n)(random_) == 1; }
   Rates any_rates() {
-    Rates rates{magnitude(-3, 0), kNone, kNone};
+    Rates rates{magnitude(-3, 0), std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
     if (!one_in(4)) rates.acceleration = rates.speed * magnitude(-2, 0.5);
     if (std::isfinite(rates.acceleration) && !one_in(3)) {
       rates.jerk = rates.acceleration * magnitude(-1.5, 0.5);
@@ -55,8 +53,8 @@ struct Witness {
 
 TEST_F(NumberLimiterTest, KeepsItsLimitsWhateverItIsAskedToFollow) {
   for (int round = 0; round < 3000; ++round) {
-    const double minimum = one_in(4) ? -kNone : real(-1, 0);
-    const double maximum = one_in(4) ? kNone : real(0, 1);
+    const double minimum = one_in(4) ? -std::numeric_limits<double>::infinity() : real(-1, 0);
+    const double maximum = one_in(4) ? std::numeric_limits<double>::infinity() : real(0, 1);
     NumberLimiter limiter(minimum, maximum, any_rates());
     limiter.restart(one_in(5) ? real(-2, 2) : std::clamp(real(-1, 1), minimum, maximum));
     Witness witness{limiter};
@@ -108,7 +106,7 @@ TEST_F(NumberLimiterTest, FollowsExactlyWhatLiesWithinItsLimits) {
 TEST_F(NumberLimiterTest, CatchesUpWithAMotionItLostAndStaysWithIt) {
   for (int round = 0; round < 300; ++round) {
     Rates rates = any_rates();
-    NumberLimiter limiter(-kNone, kNone, rates);
+    NumberLimiter limiter(-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity(), rates);
     limiter.restart(0.0);
     const double speed = rates.speed * real(-0.9, 0.9);
     double wanted = std::isfinite(rates.acceleration) ? real(-3, 3) * rates.speed : 0.0;
@@ -126,7 +124,7 @@ TEST_F(NumberLimiterTest, CatchesUpWithAMotionItLostAndStaysWithIt) {
 }
 
 TEST_F(NumberLimiterTest, OutsideItsBoundsMovesOnlyInward) {
-  NumberLimiter limiter(-1, 1, {0.1, kNone, kNone});
+  NumberLimiter limiter(-1, 1, {0.1, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()});
   limiter.restart(1.2);
   limiter.begin();
   EXPECT_EQ(limiter.follow(1.199), Limit::none) << "also to a place that is still outside";
@@ -137,11 +135,11 @@ TEST_F(NumberLimiterTest, OutsideItsBoundsMovesOnlyInward) {
 }
 
 TEST_F(NumberLimiterTest, SaysWhichLimitHeldItBack) {
-  NumberLimiter limiter(-1, 1, {0.02, 0.01, kNone});
+  NumberLimiter limiter(-1, 1, {0.02, 0.01, std::numeric_limits<double>::infinity()});
   limiter.restart(0.0);
   EXPECT_EQ(limiter.follow(1.0), Limit::acceleration);
   EXPECT_EQ(limiter.follow(1.0), Limit::speed);
-  NumberLimiter bounded(-1, 1, {kNone, kNone, kNone});
+  NumberLimiter bounded(-1, 1, {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()});
   bounded.restart(0.0);
   EXPECT_EQ(bounded.follow(2.0), Limit::maximum);
   EXPECT_EQ(bounded.follow(-2.0), Limit::minimum);

@@ -190,6 +190,9 @@ class Rig : public BatchHandler {
   bool clamped(std::uint32_t actuator = 0) const {
     return (controller.clamped_mask()[actuator / 64] >> (actuator % 64) & 1) != 0;
   }
+  bool braking(std::uint32_t actuator = 0) const {
+    return (controller.braking_mask()[actuator / 64] >> (actuator % 64) & 1) != 0;
+  }
   bool all_blocks_back() const { return pool.available() == pool.size(); }
 
   // what a backend does of a batch's requests

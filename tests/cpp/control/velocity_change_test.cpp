@@ -9,8 +9,6 @@
 namespace o80 {
 namespace {
 
-constexpr double kNone = std::numeric_limits<double>::infinity();
-
 class VelocityChangeTest : public testing::Test {
  protected:
   double real(double low, double high) {
@@ -23,7 +21,7 @@ class VelocityChangeTest : public testing::Test {
 
 TEST_F(VelocityChangeTest, EndsAtRestWithinItsLimitsAndKnowsHowFarItGets) {
   for (int round = 0; round < 200'000; ++round) {
-    Rates rates{kNone, magnitude(-4, 2), kNone};
+    Rates rates{std::numeric_limits<double>::infinity(), magnitude(-4, 2), std::numeric_limits<double>::infinity()};
     const bool jerk = real(0, 1) < 0.7;
     if (jerk) rates.jerk = rates.acceleration * magnitude(-2.5, 1);
     double start = jerk ? real(-1, 1) * rates.acceleration : 0.0;
@@ -77,7 +75,7 @@ TEST_F(VelocityChangeTest, EndsAtRestWithinItsLimitsAndKnowsHowFarItGets) {
 TEST_F(VelocityChangeTest, TakesTheFewestIterations) {
   for (int round = 0; round < 20'000; ++round) {
     const double acceleration = magnitude(-2, 2);
-    const Rates rates{kNone, acceleration, acceleration * magnitude(-1.5, 0.5)};
+    const Rates rates{std::numeric_limits<double>::infinity(), acceleration, acceleration * magnitude(-1.5, 0.5)};
     const double start = real(-1, 1) * acceleration;
     const double change = real(-1, 1) * acceleration * magnitude(-2, 1.5);
     const VelocityChange plan(change, start, rates);
@@ -96,11 +94,11 @@ TEST_F(VelocityChangeTest, TakesTheFewestIterations) {
 }
 
 TEST_F(VelocityChangeTest, WithoutAccelerationLimitIsDoneAtOnce) {
-  const VelocityChange plan(-3.0, 0.0, {kNone, kNone, kNone});
+  const VelocityChange plan(-3.0, 0.0, {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()});
   EXPECT_EQ(plan.steps(), 1);
   EXPECT_EQ(plan.acceleration(1), -3.0);
   EXPECT_EQ(plan.displacement(), 0.0);
-  EXPECT_EQ(VelocityChange(0.0, 0.0, {kNone, 1.0, 1.0}).steps(), 0);
+  EXPECT_EQ(VelocityChange(0.0, 0.0, {std::numeric_limits<double>::infinity(), 1.0, 1.0}).steps(), 0);
 }
 
 }  // namespace

@@ -1,0 +1,79 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "o80/control/fastest_motion.hpp"
+#include "o80/control/motion.hpp"
+#include "o80/control/number_limiter.hpp"
+#include "o80/control/state_layout.hpp"
+
+namespace o80 {
+
+/// What a limit did to a state.
+struct Limited {
+  Limit limit = Limit::none;
+  std::uint32_t number = 0;  // of the state, the first one that was held back
+
+  /// As a status carries it.
+  std::uint8_t packed() const noexcept {
+    return static_cast<std::uint8_t>(static_cast<std::uint32_t>(limit) |
+                                     (number < 31 ? number : 31) << 3);
+  }
+};
+
+/// Keeps the desired state of one actuator within its limits, last of all, and brings it to rest.
+///
+/// Its numbers keep position, speed and acceleration of their own; the published state is their
+/// rounding, inward at the bounds.
+///
+/// Realtime: everything but construction.
+class Limiter {
+ public:
+  Limiter(const Schema& schema, const ActuatorRow& actuator, const StateLayout& layout);
+
+  /// Something is limited or rests.
+  bool any() const noexcept { return !numbers_.empty(); }
+  /// At rest in this state.
+  void restart(const std::byte* state) noexcept;
+  /// A motion begins where the state is now.
+  void begin() noexcept;
+
+  /// What a motion asks for => what the limits admit, for one iteration. The commanded number is
+  /// never faster than `most`, or than it was.
+  Limited follow(const Motion& motion, std::byte* state, std::uint32_t commanded,
+                 double most) noexcept;
+  /// One iteration towards rest; resting numbers go where they rest, or, with `hold`, stay. True
+  /// while anything moves.
+  bool brake(std::byte* state, bool hold) noexcept;
+  /// Tells a motion how the numbers move that lag behind it ...
+  void keep_lagging(Motion& motion, const std::byte* state) const noexcept;
+  /// ... or that move without any motion, and where all of them are.
+  void hand_over(Motion& motion, const std::byte* state) const noexcept;
+
+  /// Plans the fastest motion to `target` for the numbers of `mask` (null: all), ending together;
+  /// its iterations.
+  std::int64_t plan_fastest(const std::byte* target, const std::uint64_t* mask) noexcept;
+  /// The same, taking so many instead.
+  void stretch_fastest(std::int64_t iterations) noexcept;
+  /// One iteration of it.
+  Limited follow_fastest(std::byte* state) noexcept;
+
+ private:
+  struct Number {
+    std::uint32_t number;
+    NumberLimiter limiter;
+    std::optional<double> rest;
+    FastestMotion fastest;
+    bool planned = false;  // part of the fastest motion
+  };
+  void publish(const Number& number, std::byte* state) const noexcept;
+  void keep_moving(Motion& motion, const std::byte* state, const Number& number) const noexcept;
+
+  const StateLayout& layout_;
+  std::vector<Number> numbers_;
+};
+
+}  // namespace o80

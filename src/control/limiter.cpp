@@ -1,0 +1,194 @@
+#include "o80/control/limiter.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+namespace o80 {
+namespace {
+
+constexpr double kUnlimited = std::numeric_limits<double>::infinity();
+
+template <class T>
+void store_integer(std::byte* at, double value) noexcept {
+  using Range = std::numeric_limits<T>;
+  const T whole = value <= static_cast<double>(Range::min())   ? Range::min()
+                  : value >= static_cast<double>(Range::max()) ? Range::max()
+                                                               : static_cast<T>(value);
+  std::memcpy(at, &whole, sizeof whole);
+}
+
+/// The nearest value of a kind that is not beyond `low` or `high`.
+float nearest_float(double value, double low, double high) noexcept {
+  auto narrow = static_cast<float>(value);
+  if (narrow > high) narrow = std::nextafter(narrow, -HUGE_VALF);
+  if (narrow < low) narrow = std::nextafter(narrow, HUGE_VALF);
+  return narrow;
+}
+
+double nearest_whole(double value, double low, double high) noexcept {
+  double whole = std::round(value);
+  if (whole > high) whole = std::floor(value);
+  if (whole < low) whole = std::ceil(value);
+  return whole;
+}
+
+}  // namespace
+
+Limiter::Limiter(const Schema& schema, const ActuatorRow& actuator, const StateLayout& layout)
+    : layout_(layout) {
+  const double period = static_cast<double>(schema.head.period) / 1e9;
+  for (std::uint32_t i = 0; i < layout.numbers().size() && i < actuator.limits; ++i) {
+    const LimitRow& row = schema.limits.at(actuator.first_limit + i);
+    const Rates rates{row.speed * period, row.acceleration * period * period,
+                      row.jerk * period * period * period};
+    const bool limited = row.minimum > -kUnlimited || row.maximum < kUnlimited || rates.speed < kUnlimited;
+    if (!layout.numbers()[i].moves() || !(limited || row.resting != 0)) continue;
+    numbers_.push_back({i,
+                        NumberLimiter(row.minimum, row.maximum, rates),
+                        row.resting != 0 ? std::optional(row.rest) : std::nullopt,
+                        {}});
+  }
+}
+
+void Limiter::restart(const std::byte* state) noexcept {
+  for (Number& each : numbers_) each.limiter.restart(layout_.number(each.number, state));
+}
+
+void Limiter::begin() noexcept {
+  for (Number& each : numbers_) each.limiter.begin();
+}
+
+/// The state of one number, rounded to its kind.
+void Limiter::publish(const Number& number, std::byte* state) const noexcept {
+  const NumberPlace& place = layout_.numbers()[number.number];
+  std::byte* at = state + place.offset;
+  const double value = number.limiter.position();
+  // a number outside its bounds stays there until it moves inward
+  const double low = std::min(number.limiter.minimum(), value);
+  const double high = std::max(number.limiter.maximum(), value);
+  switch (place.kind) {
+    case Kind::float64:
+      std::memcpy(at, &value, sizeof value);
+      return;
+    case Kind::float32: {
+      const float narrow = nearest_float(value, low, high);
+      std::memcpy(at, &narrow, sizeof narrow);
+      return;
+    }
+    default:
+      break;
+  }
+  const double whole = nearest_whole(value, low, high);
+  switch (place.kind) {
+    case Kind::int8:
+      return store_integer<std::int8_t>(at, whole);
+    case Kind::int16:
+      return store_integer<std::int16_t>(at, whole);
+    case Kind::int32:
+      return store_integer<std::int32_t>(at, whole);
+    case Kind::int64:
+      return store_integer<std::int64_t>(at, whole);
+    case Kind::uint8:
+      return store_integer<std::uint8_t>(at, whole);
+    case Kind::uint16:
+      return store_integer<std::uint16_t>(at, whole);
+    case Kind::uint32:
+      return store_integer<std::uint32_t>(at, whole);
+    default:
+      return store_integer<std::uint64_t>(at, whole);
+  }
+}
+
+Limited Limiter::follow(const Motion& motion, std::byte* state, std::uint32_t commanded,
+                        double most) noexcept {
+  Limited result;
+  const bool arrived = motion.arrived();
+  for (Number& each : numbers_) {
+    const double speed = each.number == commanded ? most : kUnlimited;
+    const Limit limit = each.limiter.follow(motion.number(each.number), speed);
+    // the target itself stands there, bit for bit
+    if (limit == Limit::none && arrived) continue;
+    publish(each, state);
+    if (limit != Limit::none && result.limit == Limit::none) result = {limit, each.number};
+  }
+  return result;
+}
+
+bool Limiter::brake(std::byte* state, bool hold) noexcept {
+  bool moves = false;
+  for (Number& each : numbers_) {
+    NumberLimiter& limiter = each.limiter;
+    const double before = limiter.position();
+    const bool rests = each.rest.has_value() && !hold;
+    if (rests && (before != *each.rest || !limiter.at_rest())) {
+      limiter.follow(*each.rest);
+    } else if (!limiter.at_rest()) {
+      limiter.brake();
+    }
+    moves = moves || limiter.position() != before || !limiter.at_rest();
+    if (limiter.position() != before) publish(each, state);
+  }
+  return moves;
+}
+
+void Limiter::keep_moving(Motion& motion, const std::byte* state,
+                          const Number& number) const noexcept {
+  const NumberLimiter& limiter = number.limiter;
+  if (!std::isfinite(limiter.rates().acceleration)) {
+    return motion.keep_moving(state, number.number, {}, limiter.position(), 0);
+  }
+  // a cubic speed fades to rest within the limits in twice the time that the limits would need
+  const VelocityChange stop(-limiter.speed(), limiter.acceleration(), limiter.rates());
+  const double place = std::clamp(limiter.position() + 2.0 * stop.displacement(),
+                                  std::min(limiter.minimum(), limiter.position()),
+                                  std::max(limiter.maximum(), limiter.position()));
+  motion.keep_moving(state, number.number, {limiter.speed(), limiter.acceleration()}, place,
+                     2 * stop.steps());
+}
+
+void Limiter::keep_lagging(Motion& motion, const std::byte* state) const noexcept {
+  for (const Number& each : numbers_) {
+    if (!each.limiter.tracks() || each.planned) keep_moving(motion, state, each);
+  }
+}
+
+void Limiter::hand_over(Motion& motion, const std::byte* state) const noexcept {
+  for (const Number& each : numbers_) {
+    motion.start_at(each.number, each.limiter.position());
+    if (!each.limiter.at_rest()) keep_moving(motion, state, each);
+  }
+}
+
+std::int64_t Limiter::plan_fastest(const std::byte* target, const std::uint64_t* mask) noexcept {
+  std::int64_t longest = 1;
+  for (Number& each : numbers_) {
+    const NumberLimiter& limiter = each.limiter;
+    each.planned = masked(mask, each.number) && std::isfinite(limiter.rates().acceleration);
+    if (!each.planned) continue;
+    each.fastest = FastestMotion(limiter.position(), limiter.speed(), limiter.acceleration(),
+                                 layout_.number(each.number, target), limiter.rates());
+    longest = std::max(longest, each.fastest.iterations());
+  }
+  stretch_fastest(longest);
+  return longest;
+}
+
+void Limiter::stretch_fastest(std::int64_t iterations) noexcept {
+  for (Number& each : numbers_) {
+    if (each.planned) each.fastest.stretch(iterations);
+  }
+}
+
+Limited Limiter::follow_fastest(std::byte* state) noexcept {
+  Limited result;
+  for (Number& each : numbers_) {
+    if (!each.planned) continue;
+    const Limit limit = each.limiter.follow(each.fastest.next());
+    publish(each, state);
+    if (limit != Limit::none && result.limit == Limit::none) result = {limit, each.number};
+  }
+  return result;
+}
+
+}  // namespace o80
