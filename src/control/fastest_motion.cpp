@@ -52,8 +52,8 @@ FastestMotion::FastestMotion(double position, double speed, double acceleration,
       target_(target),
       position_(position) {
   const VelocityChange stop(-start_speed_, start_acceleration_, rates_);
-  const double rounding = 4.0 * std::numeric_limits<double>::epsilon() *
-                          std::max(std::abs(position), std::abs(target));
+  const double rounding =
+      4.0 * std::numeric_limits<double>::epsilon() * std::max(std::abs(position), std::abs(target));
   const double beyond = distance_ - stop.displacement();
   if (std::abs(beyond) <= rounding) {
     to_rest_ = stop;
@@ -71,7 +71,8 @@ FastestMotion::FastestMotion(double position, double speed, double acceleration,
   // the speed once the present acceleration has gone: below it, it would slow down and go on
   const double size = std::abs(start_acceleration_);
   const double steps = size > 0.0 ? std::floor(size / rates_.jerk) : 0.0;
-  const double fading = steps > 0.0 ? steps * size - rates_.jerk * steps * (steps + 1.0) / 2.0 : 0.0;
+  const double fading =
+      steps > 0.0 ? steps * size - rates_.jerk * steps * (steps + 1.0) / 2.0 : 0.0;
   const double flat = start_speed_ + std::copysign(fading, start_acceleration_);
   const double lowest = std::clamp(flat, 0.0, rates_.speed);
   const double most = std::ceil(time_to(rates_.speed) * (1.0 - kTimeRounding));
@@ -79,7 +80,8 @@ FastestMotion::FastestMotion(double position, double speed, double acceleration,
   if (at_most <= 0.0) {
     // at full speed for as long as it takes
     cruise_ = rates_.speed;
-    before_ = static_cast<std::int64_t>(most + std::ceil(-at_most / rates_.speed * (1.0 - kTimeRounding)));
+    before_ = static_cast<std::int64_t>(most +
+                                        std::ceil(-at_most / rates_.speed * (1.0 - kTimeRounding)));
   } else {
     // no longer than it takes to get to the cruising speed
     const auto beyond_at = [&](double cruise) {
@@ -144,8 +146,8 @@ void FastestMotion::stretch(std::int64_t iterations) noexcept {
 double FastestMotion::next() noexcept {
   ++done_;
   if (done_ >= iterations_) return target_;
-  double acceleration = done_ <= before_ ? to_cruise_.acceleration(done_)
-                                         : to_rest_.acceleration(done_ - before_);
+  double acceleration =
+      done_ <= before_ ? to_cruise_.acceleration(done_) : to_rest_.acceleration(done_ - before_);
   if (share_ > 0.0) {
     acceleration = (1.0 - share_) * acceleration + share_ * stop_.acceleration(done_);
   }

@@ -42,7 +42,8 @@ Limiter::Limiter(const Schema& schema, const ActuatorRow& actuator, const StateL
     const LimitRow& row = schema.limits.at(actuator.first_limit + i);
     const Rates rates{row.speed * period, row.acceleration * period * period,
                       row.jerk * period * period * period};
-    const bool limited = row.minimum > -kUnlimited || row.maximum < kUnlimited || rates.speed < kUnlimited;
+    const bool limited =
+        row.minimum > -kUnlimited || row.maximum < kUnlimited || rates.speed < kUnlimited;
     if (!layout.numbers()[i].moves() || !(limited || row.resting != 0)) continue;
     numbers_.push_back({i,
                         NumberLimiter(row.minimum, row.maximum, rates),

@@ -111,8 +111,8 @@ Motion::Way Motion::way(std::size_t number, double iterations) const noexcept {
   Way way;
   way.low = std::min({start, target, kept.stop, kept.target});
   way.high = std::max({start, target, kept.stop, kept.target});
-  way.fading = Fading::of(kept.moment, std::min(left_, iterations), way.high - start,
-                          start - way.low);
+  way.fading =
+      Fading::of(kept.moment, std::min(left_, iterations), way.high - start, start - way.low);
   return way;
 }
 

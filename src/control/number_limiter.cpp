@@ -115,8 +115,7 @@ NumberLimiter::Candidate NumberLimiter::candidate(double acceleration) const noe
 /// Which limit a way to rest from there would break.
 Limit NumberLimiter::violated(const Candidate& next, double most) const noexcept {
   const double tolerance = slack();
-  const double fastest =
-      std::max(std::abs(next.speed), std::abs(next.speed + next.stop.detour()));
+  const double fastest = std::max(std::abs(next.speed), std::abs(next.speed + next.stop.detour()));
   if (fastest > most + tolerance) return Limit::speed;
   const double end = next.position + next.stop.displacement();
   const double turn = next.position + next.stop.run_before_turn(next.speed);
@@ -172,8 +171,8 @@ Limit NumberLimiter::follow_with_jerk(double step, double lag, double most) noex
   const double wanted = wanted_ - position_ - speed_;
   const double relative = wanted_ - position_ - step;
   const bool tracked = lag == 0.0;
-  const bool stays = tracked || (std::abs(relative) <= rates_.jerk &&
-                                 std::abs(relative + wanted) <= rates_.jerk);
+  const bool stays =
+      tracked || (std::abs(relative) <= rates_.jerk && std::abs(relative + wanted) <= rates_.jerk);
   if (stays && wanted >= low - tolerance && wanted <= high + tolerance) {
     const Candidate exact = candidate(wanted);
     if (violated(exact, fastest) == Limit::none) {

@@ -35,7 +35,9 @@ void VelocityChange::plan_without_jerk(double change) noexcept {
   sign_ = change < 0.0 ? 1.0 : -1.0;
   const double size = std::abs(change);
   const double steps =
-      std::isfinite(acceleration_) ? std::min(std::ceil(size / acceleration_ * (1.0 - kChangeRounding)), kMostSteps) : 1.0;
+      std::isfinite(acceleration_)
+          ? std::min(std::ceil(size / acceleration_ * (1.0 - kChangeRounding)), kMostSteps)
+          : 1.0;
   steps_ = static_cast<std::int64_t>(std::max(steps, 1.0));
   shorter_ = steps_ - 1;
   const double before = steps_ == 1 ? 0.0 : static_cast<double>(shorter_) * acceleration_;
@@ -125,7 +127,8 @@ void VelocityChange::plan_with_jerk(double change) noexcept {
     }
     bool first = true;  // the estimate is seldom off by more than one
     while (steps - low > 1.0) {
-      const double tried = std::exchange(first, false) ? steps - 1.0 : std::floor((low + steps) / 2.0);
+      const double tried =
+          std::exchange(first, false) ? steps - 1.0 : std::floor((low + steps) / 2.0);
       const Sums there = sums(tried);
       if (there.change > enough) {
         low = tried;
@@ -172,9 +175,10 @@ double VelocityChange::run_before_turn(double speed) const noexcept {
   const double b = start_ - jerk_ / 2.0;
   const double discriminant = b * b + 2.0 * jerk_ * v;
   const double most = std::floor(start_ / jerk_);
-  const double steps = discriminant <= 0.0 || b <= 0.0
-                           ? most
-                           : std::clamp(std::floor((b - std::sqrt(discriminant)) / jerk_), 0.0, most);
+  const double steps =
+      discriminant <= 0.0 || b <= 0.0
+          ? most
+          : std::clamp(std::floor((b - std::sqrt(discriminant)) / jerk_), 0.0, most);
   return sign_ * (steps * v + start_ * steps * (steps + 1.0) / 2.0 -
                   jerk_ * steps * (steps + 1.0) * (steps + 2.0) / 6.0);
 }

@@ -248,8 +248,8 @@ void check(const Schema& schema) {
   check_actuators(schema, numbers);
   // also of those that belong to no actuator: a schema equals itself
   for (const LimitRow& limit : schema.limits) {
-    for (const double value :
-         {limit.minimum, limit.maximum, limit.speed, limit.acceleration, limit.jerk, limit.error, limit.rest}) {
+    for (const double value : {limit.minimum, limit.maximum, limit.speed, limit.acceleration,
+                               limit.jerk, limit.error, limit.rest}) {
       if (std::isnan(value)) refuse("a limit is not a number");
     }
   }

@@ -81,15 +81,16 @@ class ActuatorQueue {
 
   LaneLists queue_;  // in front the one that runs, if one does
   bool running_ = false;
-  Limited limited_;  // by the last iteration
-  bool holds_ = false;   // a direct value stays until something takes its place
+  Limited limited_;           // by the last iteration
+  bool holds_ = false;        // a direct value stays until something takes its place
   std::uint32_t holder_ = 0;  // lane that gave it
   bool streams_ = false;      // the iteration before was a direct command's
 
   // of the command that runs
   Pace pace_ = Pace::direct;
-  double most_ = std::numeric_limits<double>::infinity();  // speed of its first number [1/iteration]
-  std::uint32_t first_number_ = 0;                         // that it commands
+  double most_ =
+      std::numeric_limits<double>::infinity();  // speed of its first number [1/iteration]
+  std::uint32_t first_number_ = 0;              // that it commands
   std::uint32_t rows_left_ = 0;
   bool partial_ = false;
   bool timed_ = false;

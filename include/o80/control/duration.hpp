@@ -19,7 +19,8 @@ class DurationCarry {
     carry_ += duration - std::max<std::int64_t>(1, rounded) * period_;
     return std::max<std::int64_t>(1, rounded);
   }
-  /// A duration that is over before the next iteration would be; then it is counted, and takes none.
+  /// A duration that is over before the next iteration would be; then it is counted, and takes
+  /// none.
   bool pass(std::int64_t duration) noexcept {
     if (whole(duration) >= 1) return false;
     carry_ += duration;

@@ -8,9 +8,9 @@ namespace o80 {
 
 /// The time-optimal motion of one number from the motion under way to rest at a target.
 ///
-/// It changes its speed to a cruising speed, cruises, and slows down to rest at the target, in whole
-/// iterations. Where even the way to rest overshoots the target, it comes back. Compare Kroeger,
-/// "On-Line Trajectory Generation in Robotic Systems" (2010), type III.
+/// It changes its speed to a cruising speed, cruises, and slows down to rest at the target, in
+/// whole iterations. Where even the way to rest overshoots the target, it comes back. Compare
+/// Kroeger, "On-Line Trajectory Generation in Robotic Systems" (2010), type III.
 ///
 /// Realtime: yes, bounded time.
 class FastestMotion {

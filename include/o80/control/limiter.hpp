@@ -19,8 +19,8 @@ struct Limited {
 
   /// As a status carries it.
   std::uint8_t packed() const noexcept {
-    return static_cast<std::uint8_t>(static_cast<std::uint32_t>(limit) |
-                                     (number < 31 ? number : 31) << 3);
+    return static_cast<std::uint8_t>(static_cast<std::uint32_t>(limit) | (number < 31 ? number : 31)
+                                                                             << 3);
   }
 };
 

@@ -37,8 +37,8 @@ class Motion {
   /// The state just given is the target.
   bool arrived() const noexcept { return now_ >= last_; }
 
-  /// Remembers how the state just given moves, for what overwrites it. It would have gone on through
-  /// so many rows more, to the one `ahead` (or to its target).
+  /// Remembers how the state just given moves, for what overwrites it. It would have gone on
+  /// through so many rows more, to the one `ahead` (or to its target).
   void keep_moving(const std::byte* ahead, std::int64_t rows) noexcept;
   /// The same for one number of `state` that did not go its way: how it moves, where it would stop,
   /// and in how many iterations.

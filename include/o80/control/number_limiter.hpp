@@ -45,7 +45,8 @@ class NumberLimiter {
     scale_ = std::abs(position_);
   }
 
-  /// One iteration towards `wanted`, never faster than `most` unless it was; says what held it back.
+  /// One iteration towards `wanted`, never faster than `most` unless it was; says what held it
+  /// back.
   Limit follow(double wanted, double most = std::numeric_limits<double>::infinity()) noexcept;
   /// One iteration towards rest, as fast as the limits allow.
   void brake() noexcept;
@@ -72,9 +73,9 @@ class NumberLimiter {
   double position_ = 0.0;
   double speed_ = 0.0;
   double acceleration_ = 0.0;
-  double wanted_ = 0.0;   // what it was asked for last
-  double scale_ = 0.0;    // how far from 0 it was since the motion began
-  VelocityChange stop_;   // with a jerk limit: how it can stop from here
+  double wanted_ = 0.0;       // what it was asked for last
+  double scale_ = 0.0;        // how far from 0 it was since the motion began
+  VelocityChange stop_;       // with a jerk limit: how it can stop from here
   std::int64_t stopped_ = 0;  // iterations of that which are done
 };
 

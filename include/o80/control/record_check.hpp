@@ -52,7 +52,7 @@ class RecordCheck {
 
   Layouts layouts_;
   std::vector<std::uint32_t> actuator_types_;
-  std::vector<std::uint32_t> first_limits_;   // of each actuator, in what follows
+  std::vector<std::uint32_t> first_limits_;     // of each actuator, in what follows
   std::vector<std::uint8_t> has_acceleration_;  // one for each number; 1 also if it does not move
   std::vector<std::uint32_t> request_types_;
   std::vector<std::uint64_t> state_;

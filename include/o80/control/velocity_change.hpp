@@ -18,8 +18,8 @@ struct Rates {
 /// The plan is a sequence of accelerations a(1) ... a(steps) with a(steps) = 0 (with a jerk limit),
 /// |a(i)| <= acceleration, |a(i) - a(i-1)| <= jerk, and the sum `change`. It is a trapezoid: from
 /// a(0) down to a trough and up to 0, or the mirror image of that. The trough of fewest steps is
-/// deeper than needed, so the plan is the mean, weighted by `share_`, of that trapezoid and the next
-/// shorter one: the constraints are convex.
+/// deeper than needed, so the plan is the mean, weighted by `share_`, of that trapezoid and the
+/// next shorter one: the constraints are convex.
 ///
 /// Realtime: yes. Construction and all questions take a bounded time.
 class VelocityChange {
@@ -31,9 +31,7 @@ class VelocityChange {
   /// Iterations until the change is done; 0 if there is nothing to do.
   std::int64_t steps() const noexcept { return steps_; }
   /// The same without rounding up to whole iterations.
-  double time() const noexcept {
-    return static_cast<double>(steps_) - (crest_ ? 0.0 : share_);
-  }
+  double time() const noexcept { return static_cast<double>(steps_) - (crest_ ? 0.0 : share_); }
   /// The acceleration of iteration i, 1 to `steps()`; 0 after.
   double acceleration(std::int64_t i) const noexcept;
   /// How far the number gets within `steps()` beyond what the final speed alone gives: the sum over

@@ -101,11 +101,11 @@ struct LabelRow {
 struct LimitRow {
   double minimum;
   double maximum;
-  double speed;         // [1/s]
-  double acceleration;  // [1/s^2]
-  double jerk;          // [1/s^3]
-  double error;         // between desired and observed; more of it halts
-  double rest;          // where the number goes when no command drives it ...
+  double speed;           // [1/s]
+  double acceleration;    // [1/s^2]
+  double jerk;            // [1/s^3]
+  double error;           // between desired and observed; more of it halts
+  double rest;            // where the number goes when no command drives it ...
   std::uint64_t resting;  // ... if this is 1
   bool operator==(const LimitRow&) const = default;
 };

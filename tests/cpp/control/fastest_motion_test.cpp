@@ -18,7 +18,8 @@ class FastestMotionTest : public testing::Test {
   }
   double magnitude(double low, double high) { return std::pow(10.0, real(low, high)); }
   Rates any_rates() {
-    Rates rates{magnitude(-3, 0), std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
+    Rates rates{magnitude(-3, 0), std::numeric_limits<double>::infinity(),
+                std::numeric_limits<double>::infinity()};
     rates.acceleration = rates.speed * magnitude(-2, 0.5);
     if (real(0, 1) < 0.7) rates.jerk = rates.acceleration * magnitude(-1.5, 0.5);
     return rates;
@@ -30,17 +31,20 @@ TEST_F(FastestMotionTest, IsFollowedByALimiterThatNeverHoldsItBackFromWhereverIt
   std::int64_t longest = 0;
   for (int round = 0; round < 20'000; ++round) {
     const Rates rates = any_rates();
-    NumberLimiter limiter(-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity(), rates);
+    NumberLimiter limiter(-std::numeric_limits<double>::infinity(),
+                          std::numeric_limits<double>::infinity(), rates);
     limiter.restart(real(-1, 1));
     for (int part = 0; part < 4; ++part) {
-      const double target = real(0, 1) < 0.1 ? limiter.position() : real(-1, 1) * magnitude(-3, 0.5);
+      const double target =
+          real(0, 1) < 0.1 ? limiter.position() : real(-1, 1) * magnitude(-3, 0.5);
       FastestMotion motion(limiter.position(), limiter.speed(), limiter.acceleration(), target,
                            rates);
       limiter.begin();
       const auto n = motion.iterations();
       longest = std::max(longest, n);
       ASSERT_LT(n, 3 + 4e3 * 3.3 / rates.speed) << round;
-      const auto cut = part == 3 ? n : static_cast<std::int64_t>(real(0, 1.2) * static_cast<double>(n)) + 1;
+      const auto cut =
+          part == 3 ? n : static_cast<std::int64_t>(real(0, 1.2) * static_cast<double>(n)) + 1;
       for (std::int64_t i = 1; i <= cut; ++i) {
         const double wanted = motion.next();
         ASSERT_EQ(limiter.follow(wanted), Limit::none)
@@ -52,7 +56,7 @@ TEST_F(FastestMotionTest, IsFollowedByALimiterThatNeverHoldsItBackFromWhereverIt
         ASSERT_EQ(limiter.position(), target);
 
         limiter.brake();
-        ASSERT_EQ(limiter.position(), target) << "it rests there" ;
+        ASSERT_EQ(limiter.position(), target) << "it rests there";
         ASSERT_TRUE(limiter.at_rest());
       }
     }
@@ -75,14 +79,19 @@ TEST_F(FastestMotionTest, StretchesToEndWithASlowerOne) {
   int exact = 0;
   for (int round = 0; round < 3000; ++round) {
     const Rates rates = any_rates();
-    NumberLimiter limiter(-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity(), rates);
+    NumberLimiter limiter(-std::numeric_limits<double>::infinity(),
+                          std::numeric_limits<double>::infinity(), rates);
     limiter.restart(0.0);
     FastestMotion first(0.0, 0.0, 0.0, real(-1, 1), rates);
     limiter.begin();
-    for (auto i = static_cast<std::int64_t>(real(0, 1) * static_cast<double>(first.iterations())); i > 0; --i) limiter.follow(first.next());
+    for (auto i = static_cast<std::int64_t>(real(0, 1) * static_cast<double>(first.iterations()));
+         i > 0; --i)
+      limiter.follow(first.next());
     const double target = real(-1, 1);
-    FastestMotion motion(limiter.position(), limiter.speed(), limiter.acceleration(), target, rates);
-    const auto n = static_cast<std::int64_t>(static_cast<double>(motion.iterations()) * real(1, 3)) + 1;
+    FastestMotion motion(limiter.position(), limiter.speed(), limiter.acceleration(), target,
+                         rates);
+    const auto n =
+        static_cast<std::int64_t>(static_cast<double>(motion.iterations()) * real(1, 3)) + 1;
     motion.stretch(n);
     ASSERT_LE(motion.iterations(), n);
     exact += motion.iterations() == n ? 1 : 0;

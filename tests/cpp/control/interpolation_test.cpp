@@ -58,7 +58,8 @@ TEST(Interpolation, TheHighestSpeedOfAFadingMotionAndAMinimumJerkIsABound) {
     double peak = 0.0;
     for (int i = 0; i <= 500; ++i) {
       const double t = i / 500.0;
-      peak = std::max(peak, std::abs(fading.at(t * n).velocity + distance * minimum_jerk_slope(t) / n));
+      peak = std::max(peak,
+                      std::abs(fading.at(t * n).velocity + distance * minimum_jerk_slope(t) / n));
     }
     const double bound = highest_speed(velocity, distance, n);
     ASSERT_LE(peak, bound * (1 + 1e-9));

@@ -16,7 +16,8 @@ class NumberLimiterTest : public testing::Test {
   double magnitude(double low, double high) { return std::pow(10.0, real(low, high)); }
   bool one_in(int n) { return std::uniform_int_distribution<int>(1, n)(random_) == 1; }
   Rates any_rates() {
-    Rates rates{magnitude(-3, 0), std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
+    Rates rates{magnitude(-3, 0), std::numeric_limits<double>::infinity(),
+                std::numeric_limits<double>::infinity()};
     if (!one_in(4)) rates.acceleration = rates.speed * magnitude(-2, 0.5);
     if (std::isfinite(rates.acceleration) && !one_in(3)) {
       rates.jerk = rates.acceleration * magnitude(-1.5, 0.5);
@@ -77,8 +78,8 @@ TEST_F(NumberLimiterTest, KeepsItsLimitsWhateverItIsAskedToFollow) {
         } else {
           limiter.brake();
         }
-        ASSERT_NO_FATAL_FAILURE(witness.look()) << "round " << round << " part " << part << " kind "
-                                                << kind << " at " << i;
+        ASSERT_NO_FATAL_FAILURE(witness.look())
+            << "round " << round << " part " << part << " kind " << kind << " at " << i;
       }
     }
     for (int i = 0; i < 100'000 && !limiter.at_rest(); ++i) {
@@ -106,7 +107,8 @@ TEST_F(NumberLimiterTest, FollowsExactlyWhatLiesWithinItsLimits) {
 TEST_F(NumberLimiterTest, CatchesUpWithAMotionItLostAndStaysWithIt) {
   for (int round = 0; round < 300; ++round) {
     Rates rates = any_rates();
-    NumberLimiter limiter(-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity(), rates);
+    NumberLimiter limiter(-std::numeric_limits<double>::infinity(),
+                          std::numeric_limits<double>::infinity(), rates);
     limiter.restart(0.0);
     const double speed = rates.speed * real(-0.9, 0.9);
     double wanted = std::isfinite(rates.acceleration) ? real(-3, 3) * rates.speed : 0.0;
@@ -124,7 +126,9 @@ TEST_F(NumberLimiterTest, CatchesUpWithAMotionItLostAndStaysWithIt) {
 }
 
 TEST_F(NumberLimiterTest, OutsideItsBoundsMovesOnlyInward) {
-  NumberLimiter limiter(-1, 1, {0.1, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()});
+  NumberLimiter limiter(
+      -1, 1,
+      {0.1, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()});
   limiter.restart(1.2);
   limiter.begin();
   EXPECT_EQ(limiter.follow(1.199), Limit::none) << "also to a place that is still outside";
@@ -139,7 +143,10 @@ TEST_F(NumberLimiterTest, SaysWhichLimitHeldItBack) {
   limiter.restart(0.0);
   EXPECT_EQ(limiter.follow(1.0), Limit::acceleration);
   EXPECT_EQ(limiter.follow(1.0), Limit::speed);
-  NumberLimiter bounded(-1, 1, {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()});
+  NumberLimiter bounded(
+      -1, 1,
+      {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity(),
+       std::numeric_limits<double>::infinity()});
   bounded.restart(0.0);
   EXPECT_EQ(bounded.follow(2.0), Limit::maximum);
   EXPECT_EQ(bounded.follow(-2.0), Limit::minimum);

@@ -21,7 +21,8 @@ class VelocityChangeTest : public testing::Test {
 
 TEST_F(VelocityChangeTest, EndsAtRestWithinItsLimitsAndKnowsHowFarItGets) {
   for (int round = 0; round < 200'000; ++round) {
-    Rates rates{std::numeric_limits<double>::infinity(), magnitude(-4, 2), std::numeric_limits<double>::infinity()};
+    Rates rates{std::numeric_limits<double>::infinity(), magnitude(-4, 2),
+                std::numeric_limits<double>::infinity()};
     const bool jerk = real(0, 1) < 0.7;
     if (jerk) rates.jerk = rates.acceleration * magnitude(-2.5, 1);
     double start = jerk ? real(-1, 1) * rates.acceleration : 0.0;
@@ -75,7 +76,8 @@ TEST_F(VelocityChangeTest, EndsAtRestWithinItsLimitsAndKnowsHowFarItGets) {
 TEST_F(VelocityChangeTest, TakesTheFewestIterations) {
   for (int round = 0; round < 20'000; ++round) {
     const double acceleration = magnitude(-2, 2);
-    const Rates rates{std::numeric_limits<double>::infinity(), acceleration, acceleration * magnitude(-1.5, 0.5)};
+    const Rates rates{std::numeric_limits<double>::infinity(), acceleration,
+                      acceleration * magnitude(-1.5, 0.5)};
     const double start = real(-1, 1) * acceleration;
     const double change = real(-1, 1) * acceleration * magnitude(-2, 1.5);
     const VelocityChange plan(change, start, rates);
@@ -94,11 +96,15 @@ TEST_F(VelocityChangeTest, TakesTheFewestIterations) {
 }
 
 TEST_F(VelocityChangeTest, WithoutAccelerationLimitIsDoneAtOnce) {
-  const VelocityChange plan(-3.0, 0.0, {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()});
+  const VelocityChange plan(
+      -3.0, 0.0,
+      {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity(),
+       std::numeric_limits<double>::infinity()});
   EXPECT_EQ(plan.steps(), 1);
   EXPECT_EQ(plan.acceleration(1), -3.0);
   EXPECT_EQ(plan.displacement(), 0.0);
-  EXPECT_EQ(VelocityChange(0.0, 0.0, {std::numeric_limits<double>::infinity(), 1.0, 1.0}).steps(), 0);
+  EXPECT_EQ(VelocityChange(0.0, 0.0, {std::numeric_limits<double>::infinity(), 1.0, 1.0}).steps(),
+            0);
 }
 
 }  // namespace
