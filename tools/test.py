@@ -54,6 +54,11 @@ STEPS: dict[str, list[list[str]]] = {
     "asan": cpp("asan"),
     "tsan": cpp("tsan"),
     "fuzz": [[sys.executable, "tools/fuzz.py"]],
+    "rt": [
+        ["cmake", "--preset", "rt"],
+        ["cmake", "--build", "--preset", "rt", "-j", JOBS],
+        [sys.executable, "tools/rt.py", "--short"],
+    ],
     "arm64": cpp("arm64"),
     "pytest": [[*PYTHON, "pytest"]],
 }

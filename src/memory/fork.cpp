@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -32,7 +33,7 @@ void after_fork_in_child() {
   for (const int file : lock_files()) ::close(file);
   lock_files().clear();
   generation.fetch_add(1, std::memory_order_relaxed);
-  fork_mutex().unlock();
+  fork_mutex().unlock_in_child();
 }
 
 void watch_forks() noexcept {
@@ -45,9 +46,10 @@ void watch_forks() noexcept {
 
 std::uint64_t process_generation() noexcept { return generation.load(std::memory_order_relaxed); }
 
-std::mutex& fork_mutex() noexcept {
-  static std::mutex mutex;
-  return mutex;
+InheritingMutex& fork_mutex() noexcept {
+  // leaked: the same objects may still lock it at exit
+  static auto* mutex = new InheritingMutex;
+  return *mutex;
 }
 
 ForkGuard::ForkGuard() noexcept : generation_(process_generation()) { watch_forks(); }

@@ -1,15 +1,16 @@
 #include "o80/memory/liveness.hpp"
 
 #include <pthread.h>
-#include <sched.h>
 #include <signal.h>
 
 #include <algorithm>
 #include <atomic>
 #include <deque>
+#include <mutex>
 #include <thread>
 #include <utility>
 
+#include "helper_scheduling.hpp"
 #include "o80/memory/futex.hpp"
 
 namespace o80 {
@@ -83,10 +84,10 @@ class LivenessThread {
   static void add(LaneLiveness::Watched* watched) {
     const std::lock_guard lock(fork_mutex());
     Registry& all = registry();
-    // a thread does not survive a fork; its handle is left behind
-    if (all.guard.forked()) all = Registry{};
     watched->ask();
-    if (all.helper == nullptr) all.helper = new LivenessThread;
+    all.scheduling.run_above(real_time_priority());
+    if (all.helper == nullptr) all.helper = new LivenessThread(all.scheduling);
+    all.scheduling.apply(all.helper->thread_.native_handle());
     all.watched.push_back(watched);
   }
 
@@ -95,69 +96,60 @@ class LivenessThread {
     {
       const std::lock_guard lock(fork_mutex());
       Registry& all = registry();
-      if (all.guard.forked()) return;
-      std::erase(all.watched, watched);
-      if (all.watched.empty()) idle = std::exchange(all.helper, nullptr);
+      if (std::erase(all.watched, watched) > 0 && all.watched.empty())
+        idle = std::exchange(all.helper, nullptr);
     }
     delete idle;
   }
 
   static void avoid(const std::vector<int>& processors) {
     const std::lock_guard lock(fork_mutex());
-    Registry& all = registry();
-    all.avoided = processors;
-    if (!all.guard.forked() && all.helper != nullptr) all.helper->settle();
+    registry().scheduling.avoid(processors);
+    reschedule();
+  }
+
+  static int run_above(int priority) {
+    const std::lock_guard lock(fork_mutex());
+    registry().scheduling.run_above(priority);
+    return reschedule();
   }
 
  private:
   struct Registry {
     std::vector<LaneLiveness::Watched*> watched;
-    std::vector<int> avoided;
+    HelperScheduling scheduling;
     LivenessThread* helper = nullptr;
     ForkGuard guard;
   };
 
   static Registry& registry() {
     static auto* all = new Registry;
+    // a thread does not survive a fork; its handle is left behind
+    if (all->guard.forked()) *all = Registry{};
     return *all;
   }
 
-  LivenessThread() {
-    if (sched_getaffinity(0, sizeof allowed_, &allowed_) != 0) CPU_ZERO(&allowed_);
+  /// Returns 0, or why a priority was refused; with no helper yet, why it will be.
+  static int reschedule() {
+    const Registry& all = registry();
+    if (all.helper == nullptr) return all.scheduling.apply_to_trial();
+    return all.scheduling.apply(all.helper->thread_.native_handle());
+  }
+
+  explicit LivenessThread(HelperScheduling& scheduling) {
+    scheduling.start_from_caller();
     // signals are for the program's own threads
     sigset_t every, before;
     sigfillset(&every);
     pthread_sigmask(SIG_BLOCK, &every, &before);
     thread_ = std::thread([this] { run(); });
     pthread_sigmask(SIG_SETMASK, &before, nullptr);
-    // it may have been started by a real-time thread
-    const sched_param ordinary{};
-    pthread_setschedparam(thread_.native_handle(), SCHED_OTHER, &ordinary);
-    settle();
   }
 
   ~LivenessThread() {
     stop_.store(1, std::memory_order_seq_cst);
     futex_wake(stop_, kEverybody);
     thread_.join();
-  }
-
-  /// Off the avoided processors: on what its starter could use, else on any other.
-  void settle() {
-    cpu_set_t any;
-    CPU_ZERO(&any);
-    for (int i = 0; i < CPU_SETSIZE; ++i) CPU_SET(i, &any);
-    cpu_set_t wanted = allowed_;
-    for (const int processor : registry().avoided)
-      if (processor >= 0 && processor < CPU_SETSIZE) {
-        CPU_CLR(processor, &wanted);
-        CPU_CLR(processor, &any);
-      }
-    const pthread_t thread = thread_.native_handle();
-    if (CPU_COUNT(&wanted) > 0 && pthread_setaffinity_np(thread, sizeof wanted, &wanted) == 0)
-      return;
-    if (pthread_setaffinity_np(thread, sizeof any, &any) == 0) return;
-    pthread_setaffinity_np(thread, sizeof allowed_, &allowed_);
   }
 
   void run() noexcept {
@@ -172,7 +164,6 @@ class LivenessThread {
     }
   }
 
-  cpu_set_t allowed_;
   std::atomic<std::uint32_t> stop_{0};
   std::thread thread_;
 };
@@ -208,5 +199,7 @@ void LaneLiveness::refresh() noexcept {
 void LaneLiveness::avoid_processors(const std::vector<int>& processors) {
   LivenessThread::avoid(processors);
 }
+
+int LaneLiveness::run_above(int priority) { return LivenessThread::run_above(priority); }
 
 }  // namespace o80

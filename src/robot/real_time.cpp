@@ -15,6 +15,9 @@ namespace o80 {
 namespace {
 
 constexpr int kPage = 4096;
+constexpr const char* kAllowPriority =
+    "Allow it with `ulimit -r 99`, for good with a line `@robot - rtprio 99` in "
+    "/etc/security/limits.conf";
 
 /// Touches so much of the stack that the loop never meets a page for the first time.
 __attribute__((noinline)) void touch_stack(std::size_t bytes) {
@@ -34,11 +37,20 @@ void set_policy(const RealTimeOptions& options, std::vector<std::string>& refuse
   const int policy = options.policy == RealTimeOptions::Policy::fifo ? SCHED_FIFO : SCHED_RR;
   sched_param parameter{};
   parameter.sched_priority = options.priority;
-  if (sched_setscheduler(0, policy, &parameter) == 0) return;
-  refused.push_back("real-time priority " + std::to_string(options.priority) + " was refused (" +
-                    std::strerror(errno) +
-                    "). Allow it with `ulimit -r 99` (limits.conf: rtprio), "
-                    "or `sudo setcap cap_sys_nice+ep` on the program");
+  if (sched_setscheduler(0, policy, &parameter) != 0) {
+    refused.push_back("real-time priority " + std::to_string(options.priority) + " was refused (" +
+                      std::strerror(errno) + "). " + kAllowPriority);
+    return;
+  }
+  // what a loop rests on may not wait for it, nor for another one like it
+  const int why = LaneLiveness::run_above(options.priority);
+  if (why == 0) return;
+  refused.push_back("real-time priority " + std::to_string(options.priority + 1) +
+                    " was refused to the helper thread that notices dead frontends (" +
+                    std::strerror(why) +
+                    "): while real-time threads leave no processor free, "
+                    "deaths are noticed late. " +
+                    kAllowPriority);
 }
 
 bool is_in(int processor, const cpu_set_t& set) {

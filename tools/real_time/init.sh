@@ -1,6 +1,7 @@
 #!/bin/sh
 # First process of the machine. Lines that begin with "rt:" are read by tools/rt.py; options come
-# as words of the kernel's command line: o80.frequency=, o80.iterations=, o80.left_out=
+# as words of the kernel's command line: o80.frequency=, o80.iterations=, o80.tests= (a filter of
+# GoogleTest), o80.limit= (of one suite [s])
 /bin/busybox --install -s /bin
 mount -t devtmpfs none /dev
 mkdir -p /dev/shm
@@ -24,18 +25,59 @@ echo "rt: realtime $(cat /sys/kernel/realtime 2> /dev/null)"
 # for them, and their softirq, an ordinary thread on this kernel, never runs
 head -c 1 /dev/random > /dev/null
 
-# at SCHED_FIFO; those in turns (SCHED_RR) of which some spin with more threads than there are
-# processors: at SCHED_FIFO the thread they wait for would never run
+# those of the list that belong to a suite, as a filter
+tests_of() {
+  awk -v suite="$1" '
+    /^[^ ]/ { here = $1 == suite }
+    here && /^  / { printf ":%s%s", suite, $1 }' /tmp/tests
+}
+
+# how many tests of the last run ended so
+count() {
+  sed -n "s/^\[  $1 *\] \([0-9]*\) tests\{0,1\}[.,].*/\1/p" /tmp/said | grep . || echo 0
+}
+
+uptime_s() { read -r up _ < /proc/uptime && echo "$up"; }
+
+# Each suite is a process of its own at SCHED_FIFO, or in turns (SCHED_RR) in those programs of which
+# some spin with more threads than there are processors: at SCHED_FIFO the thread they wait for
+# would never run. This script goes before them, and ends one that hangs. Ordinary threads get no
+# share of a second of their own: what may not wait must not be one.
+chrt -f -p 95 $$
+echo -1 > /proc/sys/kernel/sched_rt_runtime_us
 echo 4 > /proc/sys/kernel/sched_rr_timeslice_ms
 cd /o80 || exit 1
-for test in o80_test_*; do
-  case $test in
+for program in o80_test_*; do
+  case $program in
     *_memory | *_runtime | *_robot) class=-r ;;
     *) class=-f ;;
   esac
-  { chrt $class 10 ./"$test" "--gtest_filter=-$left_out" 2>&1; echo $? > /tmp/code; } | tee /tmp/test
-  echo "rt: test $test $(cat /tmp/code) $(grep -e '  PASSED  ' /tmp/test)"
+  passed=0
+  skipped=0
+  ./"$program" --gtest_list_tests "--gtest_filter=$tests" > /tmp/tests
+  awk '/^[^ ]/ { print $1 }' /tmp/tests > /tmp/suites
+  while read -r suite; do
+    begin=$(uptime_s)
+    timeout -s KILL "$limit" chrt $class 10 ./"$program" "--gtest_filter=$(tests_of "$suite")" \
+      > /tmp/said 2>&1
+    code=$?
+    echo "rt: took $begin $(uptime_s) $suite"
+    passed=$((passed + $(count PASSED)))
+    skipped=$((skipped + $(count SKIPPED)))
+    [ $code -eq 0 ] && continue
+    killall -q -9 "$program"
+    if [ $code -eq 137 ]; then
+      echo "rt: wrong $(sed -n 's/^\[ RUN  *\] //p' /tmp/said | tail -n 1) did not end in $limit s"
+    else
+      sed -n 's/^\[  FAILED  \] \([^ ]*\) (.*/rt: wrong \1 failed/p' /tmp/said
+      echo "rt: wrong $suite ended with $code"
+    fi
+    cat /tmp/said
+  done < /tmp/suites
+  echo "rt: test $program $passed $skipped $(grep -c '^  ' /tmp/tests)"
 done
+echo 950000 > /proc/sys/kernel/sched_rt_runtime_us
+chrt -o -p 0 $$
 
 # the loop, a frontend that commands it, and cyclictest at the same priority on its processor
 ./o80-rt-loop --iterations "$iterations" --frequency "$frequency" --policy fifo --priority 80 \

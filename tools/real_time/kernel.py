@@ -26,32 +26,49 @@ def image_package() -> str:
 
 
 def obtain_kernel(folder: Path) -> Path:
-    """The kernel's file in a folder; downloaded only if none is there."""
-    if kept := sorted(folder.glob("vmlinuz-*-rt-amd64")):
-        return kept[-1]
-    package = image_package()
-    kernel = folder / f"vmlinuz-{package.removeprefix('linux-image-')}"
+    """The file of the newest kernel that apt knows, downloaded to a folder if it is not there.
+
+    Without a way to download it, the newest that is there.
+    """
     folder.mkdir(parents=True, exist_ok=True)
-    subprocess.run(["apt-get", "download", package], cwd=folder, check=False)
-    archives = sorted(folder.glob(f"{package}_*.deb"))
-    if not archives:
-        raise NoKernelError(
-            f"{package} could not be downloaded: see what `apt-get download {package}` says, run "
-            "`apt-get update` as root, or give a PREEMPT_RT kernel with --kernel"
-        )
-    # of 70 MB only the kernel itself: all that the machine needs is built into it
-    part = folder / "kernel.part"
+    try:
+        package = image_package()
+        kernel = folder / f"vmlinuz-{package.removeprefix('linux-image-')}"
+        if not kernel.exists():
+            unpack_kernel(download(package, folder), kernel)
+        return kernel
+    except NoKernelError as error:
+        kept = sorted(folder.glob("vmlinuz-*-rt-amd64"), key=lambda file: file.stat().st_mtime)
+        if not kept:
+            raise
+        print(f"{error}. Taken is the kernel of an earlier run: {kept[-1].name}")
+        return kept[-1]
+
+
+def download(package: str, folder: Path) -> Path:
+    """Downloads the archive of a package; apt's lists are renewed if they are too old for that."""
+    for command in (None, ["apt-get", "update", "-qq"]):
+        if command is not None:
+            subprocess.run(command, check=False)
+        subprocess.run(["apt-get", "download", package], cwd=folder, check=False)
+        if archives := sorted(folder.glob(f"{package}_*.deb")):
+            return archives[-1]
+    raise NoKernelError(
+        f"{package} could not be downloaded: see what `apt-get download {package}` says, run "
+        "`apt-get update` as root, or give a PREEMPT_RT kernel with --kernel"
+    )
+
+
+def unpack_kernel(archive: Path, kernel: Path) -> None:
+    """Of 70 MB only the kernel itself: all that the machine needs is built into it."""
+    part = kernel.with_name("kernel.part")
     with (
         part.open("wb") as output,
-        subprocess.Popen(
-            ["dpkg-deb", "--fsys-tarfile", archives[-1]], stdout=subprocess.PIPE
-        ) as archive,
+        subprocess.Popen(["dpkg-deb", "--fsys-tarfile", archive], stdout=subprocess.PIPE) as all_of,
     ):
         subprocess.run(
             ["tar", "-xO", f"./boot/{kernel.name}"],
-            stdin=archive.stdout, stdout=output, check=True,
+            stdin=all_of.stdout, stdout=output, check=True,
         )  # fmt: skip
     part.rename(kernel)
-    for each in archives:
-        each.unlink()
-    return kernel
+    archive.unlink()

@@ -15,6 +15,14 @@ class Console:
     text: str
     powered_off: bool
 
+    def without_findings(self) -> str:
+        """What people read: failed tests, and what the kernel printed."""
+        return "\n".join(
+            line
+            for line in self.text.splitlines()
+            if not line.startswith("rt: ") or line.startswith("rt: wrong")
+        )
+
 
 def boot(kernel: Path, image: Path, words: dict[str, str], timeout: float, log: Path) -> Console:
     """Runs the machine until it powers off; it is ended after so many seconds."""

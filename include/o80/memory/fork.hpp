@@ -3,8 +3,9 @@
 #include <sys/types.h>
 
 #include <cstdint>
-#include <mutex>
 #include <string_view>
+
+#include "o80/memory/inheriting_mutex.hpp"
 
 namespace o80 {
 
@@ -12,7 +13,7 @@ namespace o80 {
 std::uint64_t process_generation() noexcept;
 
 /// Locked around every fork: registries of the process are whole in the child.
-std::mutex& fork_mutex() noexcept;
+InheritingMutex& fork_mutex() noexcept;
 
 /// open(2) of a file that the child of every fork closes at once; no fork falls in between.
 int open_for_this_process(const char* path, int flags, mode_t permission);

@@ -18,8 +18,10 @@ struct LaneLife {
 
 /// Move-only: knows for each lane of a segment whether its owner lives.
 ///
-/// One helper thread a process asks the kernel for all segments every 20 ms, in ordinary
-/// scheduling, off the processors that `avoid_processors` names.
+/// One helper thread a process asks the kernel for all segments every 20 ms, off the processors
+/// that `avoid_processors` names. Ordinary scheduling, unless a real-time thread made a
+/// LaneLiveness or called `run_above`: then one priority above it, so that no busy loop keeps
+/// deaths unnoticed.
 ///
 /// Writer:   the helper thread.
 /// Readers:  the backend's thread.
@@ -42,6 +44,9 @@ class LaneLiveness {
 
   /// Takes the helper off these processors, if others remain.
   static void avoid_processors(const std::vector<int>& processors);
+  /// Puts the helper above real-time threads of this priority. Returns 0, or the error number with
+  /// which the machine refused: the helper then has that priority itself, or none.
+  static int run_above(int priority);
 
  private:
   friend class LivenessThread;

@@ -7,6 +7,7 @@
 #include <memory>
 #include <thread>
 
+#include "memory/child_process.hpp"
 #include "o80/robot/loop.hpp"
 #include "robot/puppet.hpp"
 
@@ -122,6 +123,26 @@ TEST(RealTime, SaysHowToGetWhatTheMachineRefuses) {
   options.priority = 1000;  // which no machine grants
   EXPECT_THAT(set_up(options), ElementsAre(AllOf(HasSubstr("real-time priority 1000 was refused"),
                                                  HasSubstr("ulimit -r 99"))));
+}
+
+TEST(RealTime, SaysThatNoHigherPriorityThanTheLoopsIsLeftForTheHelper) {
+  RealTimeOptions options;
+  options.policy = RealTimeOptions::Policy::fifo;
+  options.priority = 20;
+  ChildProcess child([&](const ChildProcess::Ready&) {
+    const rlimit limit{20, 20};
+    if (setrlimit(RLIMIT_RTPRIO, &limit) != 0 || setuid(65534) != 0) _exit(77);
+    const std::vector<std::string> refused = set_up_real_time(options);
+    if (sched_getscheduler(0) != SCHED_FIFO) _exit(77);
+    const bool said =
+        refused.size() == 1 &&
+        refused[0].find("real-time priority 21 was refused to the helper thread") == 0 &&
+        refused[0].find("rtprio") != std::string::npos;
+    _exit(said ? 0 : 1);
+  });
+  const int code = child.wait();
+  if (code == 77) GTEST_SKIP() << "no user may be given a real-time priority here";
+  EXPECT_EQ(code, 0);
 }
 
 }  // namespace
