@@ -130,7 +130,9 @@ class Segment {
     make(page.committed);
     make(page.incarnation);
     make(page.closed);
-    make(page.began);
+    make(page.dead_incarnation);
+    make(page.successor_begin);
+    make(page.owner_begin);
     make(page.next_id);
     make(page.waiting);
     o80::LaneFeedback& feedback = view.feedback(i);
@@ -140,11 +142,8 @@ class Segment {
     make(feedback.bursts);
     make(feedback.events);
     make(feedback.staged);
-    [this](auto& f, auto& g) {
-      if constexpr (requires { f.ids; }) make(f.ids);
-      if constexpr (requires { g.lost; }) make(g.lost);
-      if constexpr (requires { g.first; }) make(g.first);
-    }(feedback, page);
+    make(feedback.ids);
+    make(feedback.incarnation);
     for (std::size_t k = 0; k < kRemembered; ++k) make(feedback.recent_bursts[k]);
     for (std::size_t k = 0; k < 2 * view.shape.lane_blocks; ++k) {
       make(view.statuses(i)[k].id);

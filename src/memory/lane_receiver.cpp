@@ -62,7 +62,8 @@ void LaneReceiver::meet_owner() noexcept {
   const std::uint64_t owner = incarnation();
   if (owner == owner_) return;
   owner_ = owner;
-  first_ = page_->first.load(std::memory_order_relaxed);
+  feedback_->incarnation.store(owner, std::memory_order_release);  // sync met
+  first_ = page_->owner_begin.load(std::memory_order_relaxed);
   if (static_cast<std::int64_t>(cursor_ - first_) > 0) move_to(first_);
 }
 
@@ -82,7 +83,7 @@ void LaneReceiver::set_status(std::uint64_t id, StatusWord word) noexcept {
   const std::uint64_t owner = slot.id.load(std::memory_order_relaxed);
   if (owner > id) return;  // a later command has the place: this one is forgotten already
   if (owner != id) {
-    // a reader of the new id sees no old word, nor one of the old id a word that is none
+    // so that a reader never sees the new id with the old word
     slot.word.store(StatusWord::announcing(id), std::memory_order_relaxed);
     O80_CRASH_POINT("status.before_id");
     slot.id.store(id, std::memory_order_release);  // sync status_id
@@ -158,23 +159,25 @@ bool LaneReceiver::flush() noexcept {
 }
 
 std::uint64_t LaneReceiver::incarnation() const noexcept {
-  return page_->incarnation.load(std::memory_order_acquire) & kIncarnations;  // sync incarnation
+  return possible_incarnation(
+      page_->incarnation.load(std::memory_order_acquire),  // sync incarnation
+      owner_);
 }
 
 std::uint64_t LaneReceiver::closed() const noexcept {
-  return page_->closed.load(std::memory_order_acquire) & kIncarnations;  // sync closed
+  return page_->closed.load(std::memory_order_acquire);  // sync closed
 }
 
-std::uint64_t LaneReceiver::dead_predecessor() const noexcept {
-  const std::uint64_t present = incarnation();
-  const std::uint64_t lost = page_->lost.load(std::memory_order_relaxed) & kIncarnations;
-  return lost < present ? lost : 0;
+std::uint64_t LaneReceiver::dead_predecessor() noexcept {
+  meet_owner();
+  const std::uint64_t dead = page_->dead_incarnation.load(std::memory_order_relaxed);
+  return dead < owner_ ? dead : 0;
 }
 
-bool LaneReceiver::next_is_of_dead() const noexcept {
-  // what the heir of the last dead one found committed is not its own, nor of those after it
-  return dead_predecessor() != 0 &&
-         static_cast<std::int64_t>(cursor_ - page_->began.load(std::memory_order_relaxed)) < 0;
+bool LaneReceiver::next_is_of_dead() noexcept {
+  // blocks before the begin of the dead owner's successor are not the successor's
+  const std::uint64_t begin = page_->successor_begin.load(std::memory_order_relaxed);
+  return dead_predecessor() != 0 && static_cast<std::int64_t>(cursor_ - begin) < 0;
 }
 
 LaneReceivers::LaneReceivers(const SegmentView& view, std::size_t ticket_offset)

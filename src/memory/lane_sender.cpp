@@ -56,25 +56,41 @@ LaneSender::LaneSender(const AttachedSegment& segment) : segment_(&segment), vie
   // its ids too, unless it wrote nonsense there
   const std::uint64_t taken =
       std::max<std::uint64_t>(1, feedback_->ids.load(std::memory_order_relaxed));
-  if (page_->next_id.load(std::memory_order_relaxed) - taken > kLeap / 2)
+  if (page_->next_id.load(std::memory_order_relaxed) - taken > kMostSkippedIds / 2)
     page_->next_id.store(taken, std::memory_order_relaxed);
   next_id_ = page_->next_id.load(std::memory_order_relaxed);
   store_text(page_->owner, std::size(page_->owner),
              "pid " + std::to_string(getpid()) + " (" + own_program() + ")");
   O80_CRASH_POINT("lane.before_incarnation");
-  incarnation_ = page_->incarnation.load(std::memory_order_relaxed) + 1;
-  // whoever held the lane before and did not close it is dead: this one may be gone before anybody
-  // asks, so it says so for good
-  if (page_->closed.load(std::memory_order_relaxed) < incarnation_ - 1) {
-    page_->began.store(sent_, std::memory_order_relaxed);
-    page_->lost.store(incarnation_ - 1, std::memory_order_relaxed);
-  }
-  page_->first.store(sent_, std::memory_order_relaxed);
-  page_->incarnation.store(incarnation_, std::memory_order_release);  // sync incarnation
+  count_in();
   O80_CRASH_POINT("lane.after_incarnation");
 
   // the last owner may have died between its commit and the bell
   ring_bell(view_);
+}
+
+/// Becomes the owner after the last one. Words of the last one that cannot be are corrected.
+void LaneSender::count_in() {
+  const std::uint64_t met = feedback_->incarnation.load(std::memory_order_relaxed);
+  std::uint64_t last =
+      possible_incarnation(page_->incarnation.load(std::memory_order_relaxed), met);
+  if (last - met == kMostUnmetOwners) last = met;  // one more would not be possible
+  incarnation_ = last + 1;
+
+  const std::uint64_t closed = page_->closed.load(std::memory_order_relaxed);
+  const std::uint64_t dead = page_->dead_incarnation.load(std::memory_order_relaxed);
+  const std::uint64_t begin = page_->successor_begin.load(std::memory_order_relaxed);
+  // the last owner held the lane: unless it closed it, it is dead. The present one may be gone
+  // before anybody asks, so it leaves a mark
+  const bool died = closed != last;
+  if (died || static_cast<std::int64_t>(begin - sent_) > 0)
+    page_->successor_begin.store(sent_, std::memory_order_relaxed);
+  O80_CRASH_POINT("lane.before_dead");
+  if (died || dead >= last)
+    page_->dead_incarnation.store(died ? last : 0, std::memory_order_relaxed);
+  if (closed > last) page_->closed.store(0, std::memory_order_relaxed);
+  page_->owner_begin.store(sent_, std::memory_order_relaxed);
+  page_->incarnation.store(incarnation_, std::memory_order_release);  // sync incarnation
 }
 
 LaneSender::LaneSender(LaneSender&& other) noexcept

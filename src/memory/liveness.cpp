@@ -51,24 +51,26 @@ struct LaneLiveness::Watched {
     rounds.fetch_add(1, std::memory_order_relaxed);
   }
 
-  LaneLife ask_lane(std::uint32_t i, LaneLife last) const noexcept {
-    const LaneSenderPage& page = view.lane(i);
-    // whoever has counted itself has held the lock: if it is not held now, that one is gone
-    const std::uint64_t before =
-        page.incarnation.load(std::memory_order_acquire) & kIncarnations;  // sync incarnation
-    const bool held = is_byte_locked(descriptor, kFirstLaneByte + i);
-    if (!held) {
-      if (before == 0) return {};
+  std::uint64_t owner_of(std::uint32_t i) const noexcept {
+    const std::uint64_t met =
+        view.feedback(i).incarnation.load(std::memory_order_acquire);  // sync met
+    const std::uint64_t written =
+        view.lane(i).incarnation.load(std::memory_order_acquire);  // sync incarnation
+    return possible_incarnation(written, met);
+  }
+
+  LaneLife ask_lane(std::uint32_t i, LaneLife last) noexcept {
+    // an owner counts itself once it holds the lock. So if it is not held now, this one is gone
+    const std::uint64_t before = owner_of(i);
+    // never owned, or nobody has come since the last owner was seen gone: no need to ask the kernel
+    if (last.state != LaneState::alive && before == last.incarnation) return last;
+    queries.fetch_add(1, std::memory_order_relaxed);
+    if (!is_byte_locked(descriptor, kFirstLaneByte + i)) {
       const bool in_order =
-          (page.closed.load(std::memory_order_acquire) & kIncarnations) == before;  // sync closed
+          view.lane(i).closed.load(std::memory_order_acquire) == before;  // sync closed
       return {in_order ? LaneState::closed : LaneState::died, before};
     }
-    const std::uint64_t now =
-        page.incarnation.load(std::memory_order_acquire) & kIncarnations;  // sync incarnation
-    // held, but the new owner has not counted itself yet
-    const bool ended = last.state == LaneState::died || last.state == LaneState::closed;
-    if (now == 0 || (ended && now == last.incarnation)) return last;
-    return {LaneState::alive, now};
+    return {LaneState::alive, owner_of(i)};
   }
 
   int descriptor;
@@ -76,6 +78,7 @@ struct LaneLiveness::Watched {
   std::deque<std::atomic<std::uint64_t>> lanes;
   std::atomic<std::uint32_t> changes{0};
   std::atomic<std::uint32_t> rounds{0};
+  std::atomic<std::uint64_t> queries{0};
 };
 
 /// The helper of a process; everything in it is guarded by fork_mutex().
@@ -185,6 +188,10 @@ std::uint32_t LaneLiveness::changes() const noexcept {
 
 std::uint32_t LaneLiveness::rounds() const noexcept {
   return watched_->rounds.load(std::memory_order_relaxed);
+}
+
+std::uint64_t LaneLiveness::queries() const noexcept {
+  return watched_->queries.load(std::memory_order_relaxed);
 }
 
 LaneLife LaneLiveness::lane(std::uint32_t i) const noexcept {

@@ -36,15 +36,15 @@ std::int64_t Spinner::let_others_run(std::int64_t now) noexcept {
   sched_yield();
   const std::int64_t after = monotonic_now();
   const std::int64_t away = after - now;
-  if (away > kTooLong) offended_.store(kOffended, relaxed);
+  if (away > kTooLong) yield_holdoff_.store(kYieldHoldoff, relaxed);
   quiet_.store(away < kSwitched ? std::min(kQuiet, quiet_.load(relaxed) + 1) : 0, relaxed);
   return after;
 }
 
 void Spinner::ended(bool success) noexcept {
   const auto relaxed = std::memory_order_relaxed;
-  if (const std::uint32_t left = offended_.load(relaxed); left > 0) {
-    offended_.store(left - 1, relaxed);
+  if (const std::uint32_t left = yield_holdoff_.load(relaxed); left > 0) {
+    yield_holdoff_.store(left - 1, relaxed);
   }
   failures_.store(success ? 0 : failures_.load(relaxed) + 1, relaxed);
 }

@@ -126,7 +126,7 @@ class Liar {
         page_(view_.lane(sender_->lane())) {}
 
   void write_page(Bytes& bytes) {
-    const auto which = bytes.below(8);
+    const auto which = bytes.below(9);
     const std::uint64_t word = bytes.word();
     switch (which) {
       case 0:
@@ -142,13 +142,16 @@ class Liar {
         page_.closed.store(word);
         break;
       case 4:
-        page_.began.store(word);
+        page_.successor_begin.store(word);
         break;
       case 5:
-        page_.first.store(word);
+        page_.owner_begin.store(word);
         break;
       case 6:
         page_.next_id.store(word);
+        break;
+      case 7:
+        page_.dead_incarnation.store(word);
         break;
       default:
         page_.owner[word % 8].store(bytes.word());

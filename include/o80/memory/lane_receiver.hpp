@@ -39,8 +39,8 @@ class LaneReceiver {
   /// Forgets what is committed and not taken: after garbage. What was taken stays in flight, and
   /// what the present owner sent behind the garbage of another stays committed.
   void reset() noexcept;
-  /// Looks for a new owner, who may have begun behind what was taken: a former one, while it still
-  /// could, had taken back what it committed.
+  /// Looks for a new owner. Its first batch may lie before the cursor, if a former owner took back
+  /// what it had committed.
   void meet_owner() noexcept;
   /// How often that happened.
   std::uint64_t resets() const noexcept { return resets_; }
@@ -54,9 +54,9 @@ class LaneReceiver {
   void set_status(std::uint64_t id, StatusWord word) noexcept;
   /// A text for an id, cut to 247 bytes; to be written before the status that it explains.
   void set_message(std::uint64_t id, std::string_view text) noexcept;
-  /// Whether a batch may have this id: they grow, and not by leaps. Who could choose any id could
-  /// spoil the statuses of all who own the lane after him.
-  bool expects(std::uint64_t id) const noexcept { return id - ids_ <= kLeap; }
+  /// Whether a batch may have this id: ids grow, by limited steps. An owner that could choose any
+  /// id could make the statuses of later owners unreadable.
+  bool expects(std::uint64_t id) const noexcept { return id - ids_ <= kMostSkippedIds; }
   /// Its ids end before `ids_end`.
   void set_staged(std::uint64_t id, std::uint64_t ids_end) noexcept;
   /// Both flag.
@@ -73,10 +73,10 @@ class LaneReceiver {
   /// Owner of the lane as its page has it: a count, 0 if never taken; and the last that closed.
   std::uint64_t incarnation() const noexcept;
   std::uint64_t closed() const noexcept;
-  /// The last owner that died and has an heir: its count, else 0.
-  std::uint64_t dead_predecessor() const noexcept;
-  /// What is next was sent by that one.
-  bool next_is_of_dead() const noexcept;
+  /// The last owner that died and has a successor: its count, else 0. Meets the owner.
+  std::uint64_t dead_predecessor() noexcept;
+  /// The next batch was sent by that one.
+  bool next_is_of_dead() noexcept;
   /// The owner that sent what is next: its count, or 0 if another has the lane since. To be asked
   /// after `available`.
   std::uint64_t owner_of_next() const noexcept {

@@ -74,17 +74,18 @@ class LaneSender {
   std::uint32_t events() const noexcept {
     return feedback_->events.load(std::memory_order_acquire);  // sync events
   }
-  /// Until `done()`, which is asked again whenever the backend has flagged the lane. `quiet` are
-  /// the events before that was sent which is waited for: nothing is asked while they stand there.
+  /// Until `done()`, which is asked again whenever the backend has flagged the lane.
+  /// `events_before_send` is the event count before the awaited batch was sent: `done` is not asked
+  /// while the count stands there.
   /// Throws BackendGone (any of it) and Cancelled.
   template <class Done>
   Waited wait_until(Done&& done, const Deadline& deadline, const Check& check = {},
-                    std::optional<std::uint32_t> quiet = {}) {
+                    std::optional<std::uint32_t> events_before_send = {}) {
     std::int64_t look_at = 0;
     std::int64_t nap = kSlice;  // what is left until then
     while (true) {
       const std::uint32_t seen = events();
-      if (seen != quiet && done()) return Waited::ready;
+      if (seen != events_before_send && done()) return Waited::ready;
       if (spinner_.spin([&] { return events() != seen; }) && done()) return Waited::ready;
       if (deadline.over()) {
         // a wait too short to look around learns of the end all the same
@@ -107,6 +108,7 @@ class LaneSender {
   }
 
  private:
+  void count_in();
   /// So long [ns] at most.
   void sleep(std::uint32_t seen, std::int64_t at_most);
   /// True if the backend is gone. Throws Cancelled.

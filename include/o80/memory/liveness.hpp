@@ -36,9 +36,11 @@ class LaneLiveness {
   /// Counts changes: nothing to look at while it stands still.
   std::uint32_t changes() const noexcept;
   LaneLife lane(std::uint32_t i) const noexcept;
-  /// Counts how often the helper has asked: whoever waits for a signal that anybody could spoil
-  /// looks for himself when it has moved.
+  /// Counts how often the helper has looked. Signals that any frontend could spoil are checked
+  /// when it has moved.
   std::uint32_t rounds() const noexcept;
+  /// Counts the questions to the kernel, a system call each: none about a lane without an owner.
+  std::uint64_t queries() const noexcept;
   /// Asks now, in the calling thread. Not for the loop.
   void refresh() noexcept;
 

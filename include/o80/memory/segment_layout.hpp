@@ -30,9 +30,9 @@ inline constexpr std::size_t kLineBytes = 64;                              // of
 inline constexpr std::size_t kBlockSize = 64;                              // of a lane [B]
 inline constexpr std::size_t kMessages = 64;                               // kept for a lane
 inline constexpr std::size_t kBurstsKept = 256;                            // for a lane
-inline constexpr std::uint32_t kMostLanes = 256;                  // a status names a lane in 8 bits
-inline constexpr std::uint64_t kIncarnations = (1ULL << 62) - 1;  // what a lane's count is cut to
-inline constexpr std::uint64_t kLeap = 1ULL << 28;  // ids that a lane's owners may leave out
+inline constexpr std::uint32_t kMostLanes = 256;               // a status names a lane in 8 bits
+inline constexpr std::uint64_t kMostSkippedIds = 1ULL << 28;   // by the owners of a lane
+inline constexpr std::uint64_t kMostUnmetOwners = 1ULL << 20;  // of a lane, between two looks at it
 
 /// The numbers from which every offset in both files follows.
 struct SegmentShape {
@@ -97,9 +97,9 @@ struct LaneSenderPage {
   alignas(kLineBytes) std::atomic<std::uint64_t> committed;    // blocks, ever
   alignas(kLineBytes) std::atomic<std::uint64_t> incarnation;  // owners so far; 0: never owned
   std::atomic<std::uint64_t> closed;                           // last one that left in order
-  std::atomic<std::uint64_t> began;  // blocks committed before the heir of `lost`
-  std::atomic<std::uint64_t> lost;   // last one that its heir found dead
-  std::atomic<std::uint64_t> first;  // blocks committed before the present owner
+  std::atomic<std::uint64_t> dead_incarnation;  // last one that its successor found dead
+  std::atomic<std::uint64_t> successor_begin;   // blocks committed before that successor
+  std::atomic<std::uint64_t> owner_begin;       // blocks committed before the present owner
   alignas(kLineBytes) std::atomic<std::uint64_t> next_id;
   alignas(kLineBytes) std::atomic<std::uint32_t> waiting;   // somebody sleeps until `events` moves
   alignas(kLineBytes) std::atomic<std::uint64_t> owner[8];  // text
@@ -133,12 +133,20 @@ struct LaneFeedback {
   std::atomic<std::uint32_t> events;                      // changes at each flush
   alignas(kLineBytes) std::atomic<std::uint64_t> staged;  // last batch staged whole
   std::atomic<std::uint64_t> ids;                         // all below belong to batches taken
+  std::atomic<std::uint64_t> incarnation;                 // the last owner that the backend met
   alignas(kLineBytes) BurstSlot recent_bursts[kBurstsKept];
   MessageSlot messages[kMessages];
 };
 static_assert(sizeof(LaneFeedback) == 2 * kLineBytes + kBurstsKept * 16 + kMessages * 256);
 static_assert(std::atomic<std::uint64_t>::is_always_lock_free &&
               std::atomic<std::uint32_t>::is_always_lock_free);
+
+/// What an owner of a lane wrote about itself, if that can be: owners are counted one by one, and
+/// the backend meets them now and then. Anything else is as if it had written nothing. So no owner
+/// can use up the count, or turn it back, for the owners after it.
+constexpr std::uint64_t possible_incarnation(std::uint64_t written, std::uint64_t met) noexcept {
+  return written - met <= kMostUnmetOwners ? written : met;
+}
 
 /// Where the parts lie, all computed from the shape: no offset is read from a file.
 struct SegmentOffsets {

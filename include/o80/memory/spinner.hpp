@@ -29,14 +29,14 @@ inline void pause_processor() noexcept {
 /// Realtime: yes, up to `kLongest` a spin.
 class Spinner {
  public:
-  static constexpr std::int64_t kLongest = 50'000;     // [ns]
-  static constexpr std::uint32_t kPatience = 8;        // spins
-  static constexpr std::uint32_t kProbe = 64;          // waits
-  static constexpr std::int64_t kAlone = 4'000;        // spun before others may run [ns]
-  static constexpr std::int64_t kSwitched = 900;       // letting nobody run takes less [ns]
-  static constexpr std::uint32_t kQuiet = 64;          // yields to nobody: it is alone
-  static constexpr std::int64_t kTooLong = 1'000'000;  // away in a yield [ns]
-  static constexpr std::uint32_t kOffended = 1024;     // waits without a yield, after that
+  static constexpr std::int64_t kLongest = 50'000;      // [ns]
+  static constexpr std::uint32_t kPatience = 8;         // spins
+  static constexpr std::uint32_t kProbe = 64;           // waits
+  static constexpr std::int64_t kAlone = 4'000;         // spun before others may run [ns]
+  static constexpr std::int64_t kSwitched = 900;        // letting nobody run takes less [ns]
+  static constexpr std::uint32_t kQuiet = 64;           // yields to nobody: it is alone
+  static constexpr std::int64_t kTooLong = 1'000'000;   // away in a yield [ns]
+  static constexpr std::uint32_t kYieldHoldoff = 1024;  // waits without a yield, after that
 
   Spinner() noexcept;
   /// With a given number of processors, for tests.
@@ -73,15 +73,16 @@ class Spinner {
   /// How long to spin before others may run [ns].
   std::int64_t patience() const noexcept {
     const bool hopeful = failures_.load(std::memory_order_relaxed) < kPatience;
-    if (!hopeful || offended_.load(std::memory_order_relaxed) > 0) return 2 * kLongest;  // never
+    if (!hopeful || yield_holdoff_.load(std::memory_order_relaxed) > 0)
+      return 2 * kLongest;  // never
     return quiet_.load(std::memory_order_relaxed) < kQuiet ? 0 : kAlone;
   }
   /// Returns the time after it.
   std::int64_t let_others_run(std::int64_t now) noexcept;
 
   int processors_;
-  std::atomic<std::uint32_t> quiet_{kQuiet};  // yields in a row to nobody
-  std::atomic<std::uint32_t> offended_{0};    // waits that are left without a yield
+  std::atomic<std::uint32_t> quiet_{kQuiet};     // yields in a row to nobody
+  std::atomic<std::uint32_t> yield_holdoff_{0};  // waits that are left without a yield
   std::atomic<std::uint32_t> failures_{0};
   std::atomic<std::uint32_t> refused_{0};
 };

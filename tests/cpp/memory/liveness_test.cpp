@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
 #include <thread>
 
 #include "memory/child_process.hpp"
@@ -28,6 +29,28 @@ TEST_F(LivenessTest, KnowsWhetherALaneWasTakenAndClosedInOrder) {
   liveness.refresh();
   EXPECT_EQ(liveness.lane(0), (LaneLife{LaneState::closed, 1}));
   EXPECT_EQ(liveness.changes(), 2U);
+}
+
+TEST_F(LivenessTest, AsksTheKernelOnlyAboutLanesThatHaveAnOwner) {
+  SegmentSpec spec = small_spec();
+  spec.lanes = 8;
+  const OwnedSegment segment = running_segment(spec);
+  LaneLiveness liveness(segment);
+  const std::uint32_t rounds = liveness.rounds();
+  while (liveness.rounds() < rounds + 3) std::this_thread::yield();
+  EXPECT_EQ(liveness.queries(), 0U) << "nobody ever owned a lane";
+
+  // while there is an owner, about its lane in each round; once more when it is gone
+  const AttachedSegment attached = attach();
+  std::optional<LaneSender> sender(attached);
+  while (liveness.lane(0).state != LaneState::alive) std::this_thread::yield();
+  EXPECT_LE(liveness.queries(), liveness.rounds());
+  sender.reset();
+  while (liveness.lane(0).state != LaneState::closed) std::this_thread::yield();
+  const std::uint64_t asked = liveness.queries();
+  const std::uint32_t closed = liveness.rounds();
+  while (liveness.rounds() < closed + 3) std::this_thread::yield();
+  EXPECT_EQ(liveness.queries(), asked) << "nobody owns a lane any more";
 }
 
 TEST_F(LivenessTest, NoticesByItself) {

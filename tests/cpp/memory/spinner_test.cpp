@@ -146,7 +146,7 @@ TEST_F(SpinnerAmongOthers, ProbesWithoutLettingThemRun) {
 TEST_F(SpinnerAmongOthers, DoesNotForLongWhereOthersKeepTheProcessor) {
   EXPECT_EQ(spin_in_vain(spinner_, Spinner::kTooLong + 1).yields, 1);
   // each spin of the test ends twice
-  for (std::uint32_t i = 4; i < Spinner::kOffended; ++i) spinner_.ended(true);
+  for (std::uint32_t i = 4; i < Spinner::kYieldHoldoff; ++i) spinner_.ended(true);
   EXPECT_EQ(spin_in_vain(spinner_, 0).yields, 0);
   EXPECT_GT(spin_in_vain(spinner_, 0).yields, 0);
 }

@@ -54,11 +54,11 @@ constexpr Label kBursting[] = {
     {"sweep.after_draft", 1},    {"segment.between_unlinks", 1}};
 
 constexpr Label kSender[] = {
-    {"lane.after_lock", 1},    {"lane.before_incarnation", 1}, {"lane.after_incarnation", 1},
-    {"lane.before_copy", 20},  {"lane.before_ticket", 20},     {"lane.before_commit", 20},
-    {"lane.after_commit", 20}, {"bell.before_ring", 20},       {"bell.after_ring", 20},
-    {"lane.before_close", 1},  {"lane.after_close", 1},        {"lane.before_ids", 20},
-    {"lane.before_sleep", 10}, {"lane.after_sleep", 10}};
+    {"lane.after_lock", 1},        {"lane.before_dead", 1},   {"lane.before_incarnation", 1},
+    {"lane.after_incarnation", 1}, {"lane.before_copy", 20},  {"lane.before_ticket", 20},
+    {"lane.before_commit", 20},    {"lane.after_commit", 20}, {"bell.before_ring", 20},
+    {"bell.after_ring", 20},       {"lane.before_close", 1},  {"lane.after_close", 1},
+    {"lane.before_ids", 20},       {"lane.before_sleep", 10}, {"lane.after_sleep", 10}};
 
 constexpr Label kReader[] = {
     {"rows.before_register", 10}, {"rows.before_sleep", 10}, {"rows.before_pass_on", 5}};

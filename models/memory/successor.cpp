@@ -1,13 +1,13 @@
-// A lane whose owners die anywhere in taking it and sending: the heir's positions go on, what was
-// committed is taken once, and the backend can tell whose it was.
+// A lane whose owners die anywhere in taking it and sending: their successor's positions go on,
+// each batch is taken once, and the backend can tell who sent it.
 //
-// mutant heir_begins_anew: src/memory/lane_sender.cpp
+// mutant successor_begins_anew: src/memory/lane_sender.cpp
 //   - sent_ = page_->committed.load(std::memory_order_relaxed);
 //   + sent_ = 0;
-// mutant heir_leaves_no_mark: src/memory/lane_sender.cpp
-//   - page_->began.store(sent_, std::memory_order_relaxed);
+// mutant successor_leaves_no_mark: src/memory/lane_sender.cpp
+//   - page_->successor_begin.store(sent_, std::memory_order_relaxed);
 //   +
-// mutant heir_counts_relaxed: src/memory/lane_sender.cpp
+// mutant successor_counts_relaxed: src/memory/lane_sender.cpp
 //   - page_->incarnation.store(incarnation_, std::memory_order_release);
 //   + page_->incarnation.store(incarnation_, std::memory_order_relaxed);
 // mutant commit_before_the_copy: src/memory/lane_sender.cpp
@@ -19,7 +19,8 @@
 
 namespace {
 
-constexpr std::array<const char*, 7> kDeaths = {"",
+constexpr std::array<const char*, 8> kDeaths = {"",
+                                                "lane.before_dead",
                                                 "lane.before_incarnation",
                                                 "lane.after_incarnation",
                                                 "lane.before_copy",
@@ -28,7 +29,7 @@ constexpr std::array<const char*, 7> kDeaths = {"",
                                                 "lane.after_commit"};
 
 /// Two owners, in either order, each killed somewhere or after its send, never closing.
-struct Heirs : rl::test_suite<Heirs, 3> {
+struct Successors : rl::test_suite<Successors, 3> {
   model::Segment segment{1, 2, 1, 2};
   std::vector<std::uint64_t> committed;
   std::atomic<int> finished{0};
@@ -75,8 +76,10 @@ struct Heirs : rl::test_suite<Heirs, 3> {
         const bool of_dead = lanes[0].next_is_of_dead();
         taken.push_back(model::take(lanes[0]));
         const std::uint64_t owner = taken.back() / 10;
-        model::check(!of_dead || owner == 1, "the living one's batch passes for a dead one's");
-        model::check(of_dead || owner >= owners, "a dead one's batch passes for its heir's");
+        model::check(!of_dead || owner == 1,
+                     "the batch of a living owner passes for that of a dead one");
+        model::check(of_dead || owner >= owners,
+                     "the batch of a dead owner passes for its successor's");
         lanes[0].free(2);
       }
       lanes.flush_events();
@@ -90,4 +93,4 @@ struct Heirs : rl::test_suite<Heirs, 3> {
 
 }  // namespace
 
-int main(int count, char** arguments) { return model::explore<Heirs>(count, arguments); }
+int main(int count, char** arguments) { return model::explore<Successors>(count, arguments); }
