@@ -43,7 +43,7 @@ std::chrono::nanoseconds nanoseconds_of(nb::handle value, const char* name) {
 }
 
 o80::PaceSpec pace_of(nb::handle duration, nb::handle speed, nb::handle until,
-                      nb::handle iterations) {
+                      nb::handle iterations, bool fastest) {
   o80::PaceSpec pace = o80::direct();
   int given = 0;
   if (!duration.is_none() && ++given == 1) {
@@ -54,10 +54,11 @@ o80::PaceSpec pace_of(nb::handle duration, nb::handle speed, nb::handle until,
   if (!iterations.is_none() && ++given == 1) {
     pace = o80::iterations(count_of(iterations, "iterations"));
   }
+  if (fastest && ++given == 1) pace = o80::fastest();
   if (given > 1) {
     throw InvalidArgument(
-        "a command has one pace: give one of duration, speed, until and iterations (or none, to "
-        "be there in one iteration)");
+        "a command has one pace: give one of duration, speed, until, iterations and fastest (or "
+        "none, to be there in one iteration)");
   }
   return pace;
 }

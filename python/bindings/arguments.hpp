@@ -18,7 +18,7 @@ std::chrono::nanoseconds nanoseconds_of(nanobind::handle value, const char* name
 
 /// At most one of the paces may be given.
 o80::PaceSpec pace_of(nanobind::handle duration, nanobind::handle speed, nanobind::handle until,
-                      nanobind::handle iterations);
+                      nanobind::handle iterations, bool fastest = false);
 
 /// `at`: an iteration or None; `late`: "reject" or "now".
 o80::PulseOptions pulse_options(nanobind::handle at, nanobind::handle late);

@@ -1,6 +1,7 @@
 #include "o80/runtime/backend.hpp"
 
 #include <nanobind/nanobind.h>
+#include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
@@ -69,15 +70,19 @@ struct SchemaBuilder {
     return names;
   }
 
-  /// Of a field, or of the first number if it is empty.
-  void set_limits(std::uint32_t actuator, const std::string& field, double minimum, double maximum,
-                  double speed) {
-    const o80::Limits limits{minimum, maximum, speed};
+  /// Of a field, or of the first number if it is empty: as o80::Limits has them, in its order.
+  void set_limits(std::uint32_t actuator, const std::string& field,
+                  const std::array<double, 6>& given) {
+    const o80::Limits limits{given[0], given[1], given[2], given[3], given[4], given[5]};
     if (field.empty()) {
       schema.actuator(actuator).limits(limits);
     } else {
       schema.actuator(actuator).limits(field, limits);
     }
+  }
+
+  void rests_at(std::uint32_t actuator, const std::string& field, double value) {
+    schema.actuator(actuator).rests_at(field, value);
   }
 
  private:
@@ -342,8 +347,8 @@ void bind_backend(nb::module_& m) {
       .def("add_request", &SchemaBuilder::add_request, "name"_a, "type"_a, "help"_a)
       .def("name_actuator", &SchemaBuilder::name_actuator, "actuator"_a, "name"_a)
       .def("set_follow", &SchemaBuilder::set_follow, "actuator"_a)
-      .def("set_limits", &SchemaBuilder::set_limits, "actuator"_a, "field"_a, "minimum"_a,
-           "maximum"_a, "speed"_a)
+      .def("set_limits", &SchemaBuilder::set_limits, "actuator"_a, "field"_a, "limits"_a)
+      .def("rests_at", &SchemaBuilder::rests_at, "actuator"_a, "field"_a, "value"_a)
       .def_prop_ro("actuators", &SchemaBuilder::actuators);
 
   nb::class_<Backend> bound(m, "Backend", nb::type_slots(backend_slots),

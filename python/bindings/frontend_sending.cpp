@@ -24,13 +24,14 @@ using o80::UntypedFrontend;
 namespace {
 
 void add_command(const Frontend& self, nb::handle actuator, nb::handle target, nb::handle duration,
-                 nb::handle speed, nb::handle until, nb::handle iterations, nb::handle mode,
-                 nb::handle profile, nb::handle start) {
-  self.add_command(actuator, target,
-                   {.pace = pace_of(duration, speed, until, iterations),
-                    .mode = mode_of(mode),
-                    .profile = profile_of(profile),
-                    .start = start_of(start)});
+                 nb::handle speed, nb::handle until, nb::handle iterations, bool fastest,
+                 nb::handle mode, nb::handle profile, nb::handle start, nb::handle on_limit) {
+  o80::CommandOptions options{.pace = pace_of(duration, speed, until, iterations, fastest),
+                              .mode = mode_of(mode),
+                              .start = start_of(start),
+                              .on_limit = on_limit_of(on_limit)};
+  if (!profile.is_none()) options.profile = profile_of(profile);
+  self.add_command(actuator, target, options);
 }
 
 /// One trajectory for each of several actuators, all or none.
@@ -163,26 +164,31 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
   frontend
       .def("add_command", &add_command, "actuator"_a.none(), "target"_a.none(), nb::kw_only(),
            "duration"_a = nb::none(), "speed"_a = nb::none(), "until"_a = nb::none(),
-           "iterations"_a = nb::none(), "mode"_a = "queue", "profile"_a = "linear",
-           "start"_a = "desired",
+           "iterations"_a = nb::none(), "fastest"_a = false, "mode"_a = "queue",
+           "profile"_a = nb::none(), "start"_a = "desired", "on_limit"_a = "end",
            nb::sig(
                "def add_command(self, actuator: typing.SupportsIndex | str, target: typing.Any, *, "
                "duration: float | None = None, speed: float | None = None, "
-               "until: int | None = None, iterations: int | None = None, "
-               "mode: str = 'queue', profile: str = 'linear', start: str = 'desired') -> None"),
+               "until: int | None = None, iterations: int | None = None, fastest: bool = False, "
+               "mode: str = 'queue', profile: str | None = None, start: str = 'desired', "
+               "on_limit: str = 'end') -> None"),
            R"(Adds a command to what the next pulse sends.
 
 actuator: its index or its name.
 target: the state to reach, in the unit of its field: a number for a state of one number;
     otherwise a mapping (what is missing keeps its desired value), a record, or all fields in order.
 duration: time to get there [s].
-speed: peak speed of the first number of the state [its unit/s].
+speed: peak speed of the first number that is given [its unit/s].
 until: the iteration at which to be there.
 iterations: how many iterations to take.
-    Give one of these four, or none to be there in one iteration.
+fastest: as fast as the limits of speed, acceleration and jerk allow, at rest at the end.
+    Give one of these five, or none to be there in one iteration.
 mode: "queue" (after what is there) or "overwrite" (instead of what is there).
-profile: "linear" or "minimum_jerk".
+profile: "linear" or "minimum_jerk" (None: linear, or minimum_jerk where the actuator has
+    acceleration limits).
 start: "desired" or "observed", the state to start from.
+on_limit: of a command without a pace that the limits do not let arrive in its iteration: "end" (as
+    limited, and the actuator comes to rest) or "go_on" (to the target, as fast as they allow).
 
 Raises InvalidArgument for what the robot cannot follow.)")
       .def("_add_trajectories", &add_trajectories, "actuators"_a, "rows"_a, "states"_a,

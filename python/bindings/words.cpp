@@ -62,5 +62,10 @@ o80::Start start_of(nb::handle word) {
   return parse(word, std::array{desired, observed}, "start");
 }
 
+o80::OnLimit on_limit_of(nb::handle word) {
+  using enum o80::OnLimit;
+  return parse(word, std::array{end, go_on}, "on_limit");
+}
+
 nb::object python_word(o80::Status status) { return member<o80::Status, 11>(status, "Status"); }
 nb::object python_word(o80::Reason reason) { return member<o80::Reason, 11>(reason, "Reason"); }

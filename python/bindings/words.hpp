@@ -3,12 +3,14 @@
 #include <nanobind/nanobind.h>
 
 #include "o80/control/record.hpp"
+#include "o80/runtime/command.hpp"
 
 // Words of a few letters: enums that are strings in Python (o80.words).
 
 o80::Mode mode_of(nanobind::handle word);
 o80::Profile profile_of(nanobind::handle word);
 o80::Start start_of(nanobind::handle word);
+o80::OnLimit on_limit_of(nanobind::handle word);
 
 /// Members of o80.Status and o80.Reason.
 nanobind::object python_word(o80::Status status);

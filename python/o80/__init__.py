@@ -32,6 +32,7 @@ from o80.frontend import Frontend, burst
 from o80.frontend_classes import register_frontend
 from o80.history import History
 from o80.installation import prefix
+from o80.limits import Limits
 from o80.prepared_burst import PreparedBurst
 from o80.record import Record
 from o80.segment_list import Segment, clean, segments
@@ -59,6 +60,7 @@ __all__ = [
     "History",
     "InvalidArgument",
     "LaneFull",
+    "Limits",
     "Mode",
     "NoLane",
     "NotBursting",

@@ -1,10 +1,14 @@
 """The things that can be commanded, as a robot describes them."""
 
 import itertools
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from dataclasses import fields as fields_of
 from typing import Any
+
+from o80.limits import Limits
+
+LIMITS = tuple(field.name for field in fields_of(Limits))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -14,9 +18,23 @@ class Number:
     name: str  #: path of fields, empty for a plain number
     unit: str
     help: str
-    minimum: float  #: -inf: not limited
-    maximum: float  #: inf: not limited
-    speed: float  #: largest one [unit/s]; inf: not limited
+    limits: Limits
+    rest: float | None  #: where it goes when no command drives it
+
+    @property
+    def minimum(self) -> float:
+        """The least value; -inf: not limited."""
+        return self.limits.minimum
+
+    @property
+    def maximum(self) -> float:
+        """The largest value; inf: not limited."""
+        return self.limits.maximum
+
+    @property
+    def speed(self) -> float:
+        """The largest speed [unit/s]; inf: not limited."""
+        return self.limits.speed
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,6 +46,11 @@ class Actuator:
     group: str  #: empty if the robot is one array of actuators
     when_idle: str  #: "hold" or "follow"
     numbers: tuple[Number, ...]  #: of its state, in order
+
+    @property
+    def limits(self) -> Limits:
+        """Those of the first number."""
+        return self.numbers[0].limits
 
     @property
     def unit(self) -> str:
@@ -72,9 +95,8 @@ def actuators_of(schema: dict[str, Any]) -> list[Actuator]:
                 name=name,
                 unit=unit,
                 help=text,
-                minimum=-math.inf if limit["minimum"] is None else limit["minimum"],
-                maximum=math.inf if limit["maximum"] is None else limit["maximum"],
-                speed=math.inf if limit["speed"] is None else limit["speed"],
+                limits=Limits(**{key: limit[key] for key in LIMITS if limit[key] is not None}),
+                rest=limit.get("rest"),
             )
             for (name, unit, text), limit in zip(
                 names_of(group["type"]), row["limits"], strict=True

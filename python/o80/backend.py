@@ -48,8 +48,10 @@ class Backend:
         an IntEnum, or a mapping from field names to these.
     extended: dtype (or mapping) of further sensor values.
     requests: names of the requests it serves, each with the dtype of its fields, or None; see `on`.
-    limits: of actuators: (minimum, maximum) or (minimum, maximum, speed [1/s]) of the first number
-        of the state, or a mapping from fields to these; None is no limit.
+    limits: of actuators: o80.Limits, or (minimum, maximum, speed, ...), of the first number of the
+        state, or a mapping from fields to these; None is no limit.
+    rests_at: of actuators: a mapping from fields to the values to which they go when no command
+        drives them (a velocity to 0).
     when_idle: "hold" or "follow", for all actuators or a mapping from each.
     units: of fields, by their name or by "group.field".
     frequency: iterations a second [1/s]. The program keeps the pace itself; bursting, it is that
@@ -73,6 +75,7 @@ class Backend:
         extended: Described | None = None,
         requests: Mapping[str, Described | None] | None = None,
         limits: Mapping[Any, Limit | Mapping[str, Limit]] | None = None,
+        rests_at: Mapping[Any, Mapping[str, float]] | None = None,
         when_idle: str | Mapping[Any, str] = "hold",
         units: Mapping[str, str] | None = None,
         frequency: float = 1000.0,
@@ -93,6 +96,7 @@ class Backend:
             writer.set_extended(extended)
         writer.add_requests(requests or {})
         writer.set_limits(limits or {})
+        writer.set_rests(rests_at or {})
         writer.set_idle(when_idle)
         self._native: _core.Backend | None = None
         native = _core.Backend(

@@ -8,10 +8,11 @@ import numpy as np
 
 from o80 import _core
 from o80.errors import InvalidArgument
+from o80.limits import Limits
 
 # a dtype, a number type, an IntEnum, or a mapping from field names to any of these
 Described = Any
-Limit = Sequence[float | None]
+Limit = Limits | Sequence[float | None]
 FieldRow = tuple[str, str, list[int], str, dict[str, int] | None, int]
 
 
@@ -67,18 +68,17 @@ class SchemaWriter:
             self.builder.add_request(name, self._type(name, {} if fields is None else fields), "")
 
     def set_limits(self, limits: Mapping[Any, Limit | Mapping[str, Limit]]) -> None:
-        """(minimum, maximum) or (minimum, maximum, speed) of actuators, or of their fields."""
+        """Limits of the first number of actuators, or of their fields."""
         for named, given in limits.items():
             actuator = self._index(named)
             for field, limit in given.items() if isinstance(given, Mapping) else [("", given)]:
-                low, high, speed = (*limit, None, None, None)[:3]
-                self.builder.set_limits(
-                    actuator,
-                    field,
-                    -np.inf if low is None else low,
-                    np.inf if high is None else high,
-                    np.inf if speed is None else speed,
-                )
+                self.builder.set_limits(actuator, field, list(Limits.of(limit).numbers()))
+
+    def set_rests(self, rests: Mapping[Any, Mapping[str, float]]) -> None:
+        """Where fields of actuators go when no command drives them."""
+        for named, fields in rests.items():
+            for field, value in fields.items():
+                self.builder.rests_at(self._index(named), field, value)
 
     def set_idle(self, when_idle: str | Mapping[Any, str]) -> None:
         """ "hold" or "follow", for all actuators or for each."""

@@ -184,22 +184,49 @@ void CommandCheck::refuse(std::uint32_t actuator, const std::byte* state,
   throw InvalidArgument("the target of " + of_actuator(schema_, actuator) + " cannot be used");
 }
 
-void CommandCheck::speed(std::uint32_t index, double speed) const {
+void CommandCheck::speed(std::uint32_t index, double speed,
+                         std::span<const std::uint64_t> mask) const {
   const std::uint32_t known = actuator(std::int64_t{index});
   const ActuatorRow& row = schema_.actuators[known];
   const StateLayout& layout = *layouts_[row.type];
   if (row.limits == 0) return;
-  const double highest = schema_.limits[row.first_limit].speed;
+  const std::uint32_t first = layout.first_commanded(mask.empty() ? nullptr : mask.data());
+  const std::uint32_t number = first == StateLayout::kNoNumber ? 0 : first;
+  const double highest = schema_.limits[row.first_limit + number].speed;
   const bool positive = std::isfinite(speed) && speed > 0.0;
   if (positive && !(speed > highest)) return;
 
-  const NumberName name = name_at(schema_, row.type, layout.numbers()[0].offset);
+  const NumberName name = name_at(schema_, row.type, layout.numbers()[number].offset);
   const std::string of_field = name.field != nullptr ? name.field->unit.str() : "";
   const std::string unit = " [" + (of_field.empty() ? "1" : of_field) + "/s]";
   const std::string what =
       "speed " + text_of(speed) + unit + " for " + of_number(schema_, known, name);
   if (!positive) throw InvalidArgument(what + " is not a positive, finite number");
   throw InvalidArgument(what + " is above its maximum: " + text_of(highest) + unit);
+}
+
+void CommandCheck::fastest(std::uint32_t index, std::span<const std::uint64_t> mask) const {
+  const std::uint32_t known = actuator(std::int64_t{index});
+  const ActuatorRow& row = schema_.actuators[known];
+  const StateLayout& layout = *layouts_[row.type];
+  for (std::uint32_t i = 0; i < row.limits; ++i) {
+    if (!masked(mask.empty() ? nullptr : mask.data(), i) || !layout.numbers()[i].moves()) continue;
+    if (std::isfinite(schema_.limits[row.first_limit + i].acceleration)) continue;
+    const NumberName name = name_at(schema_, row.type, layout.numbers()[i].offset);
+    throw InvalidArgument("no fastest way is known for " + of_number(schema_, known, name) +
+                          ": its driver gives it no limits of speed and acceleration. Give a "
+                          "duration or a speed instead, or leave that field out.");
+  }
+}
+
+Profile CommandCheck::profile(std::uint32_t index) const {
+  const ActuatorRow& row = schema_.actuators[actuator(std::int64_t{index})];
+  for (std::uint32_t i = 0; i < row.limits; ++i) {
+    if (std::isfinite(schema_.limits[row.first_limit + i].acceleration)) {
+      return Profile::minimum_jerk;
+    }
+  }
+  return Profile::linear;
 }
 
 void CommandCheck::request(std::uint32_t index, std::span<const std::byte> payload) const {

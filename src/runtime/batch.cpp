@@ -38,6 +38,18 @@ bool is_rejected(const LaneSender& lane, CommandId batch) noexcept {
          static_cast<Status>(answer.word.status) == Status::rejected;
 }
 
+/// Which limit kept a command from its target; as Limited::packed() has it.
+std::string limited_by(std::uint8_t packed) {
+  constexpr const char* kLimits[] = {
+      "a limit",       "its minimum", "its maximum", "its speed limit", "its acceleration limit",
+      "its jerk limit"};
+  const std::size_t limit = packed & 7U;
+  const unsigned number = packed >> 3U;
+  const std::string text = kLimits[limit < std::size(kLimits) ? limit : 0];
+  return text + " kept it from its target" +
+         (number == 0 ? "" : " (number " + std::to_string(number) + " of its state)");
+}
+
 std::string words_for(const Link& link, const Handle& handle, std::uint8_t aux) {
   switch (handle.reason) {
     case Reason::late:
@@ -47,7 +59,7 @@ std::string words_for(const Link& link, const Handle& handle, std::uint8_t aux) 
     case Reason::invalid:
       return "the backend could not read it";
     case Reason::limits:
-      return "it lies outside the limits";
+      return limited_by(aux);
     case Reason::fresh_start:
       return "the robot started afresh";
     case Reason::dead_frontend:

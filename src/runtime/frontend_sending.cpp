@@ -9,11 +9,11 @@ namespace o80 {
 
 namespace {
 
-RecordHead head_of(std::uint32_t actuator, const CommandOptions& options) {
+RecordHead head_of(std::uint32_t actuator, const CommandOptions& options, Profile otherwise) {
   RecordHead head;
   head.actuator = static_cast<std::uint16_t>(actuator);
   head.mode = options.mode;
-  head.profile = options.profile;
+  head.profile = options.profile.value_or(otherwise);
   head.start = options.start;
   head.pace = options.pace.pace;
   if (options.pace.pace == Pace::speed) {
@@ -71,10 +71,13 @@ std::uint32_t UntypedFrontend::add_command(std::uint32_t actuator, std::span<con
                                            std::span<const std::uint64_t> mask) {
   const std::uint32_t index = check_->actuator(std::int64_t{actuator});
   check_->targets(index, state, mask);
-  check_pace(options.pace, 1);
-  if (options.pace.pace == Pace::speed) check_->speed(index, options.pace.per_second);
+  CommandOptions paced = options;
+  if (paced.pace.pace == Pace::direct && paced.on_limit == OnLimit::go_on) paced.pace = fastest();
+  check_pace(paced.pace, 1);
+  if (paced.pace.pace == Pace::speed) check_->speed(index, paced.pace.per_second, mask);
+  if (paced.pace.pace == Pace::fastest) check_->fastest(index, mask);
   const auto lock = link_->lock_to_send();
-  return builder_.command(head_of(index, options), mask, {}, 1, state);
+  return builder_.command(head_of(index, paced, check_->profile(index)), mask, {}, 1, state);
 }
 
 /// Checks a trajectory; its options, with the pace that follows from its times.
@@ -94,6 +97,7 @@ CommandOptions UntypedFrontend::checked_trajectory(std::uint32_t actuator, std::
   }
   check_pace(paced.pace, rows);
   if (paced.pace.pace == Pace::speed) check_->speed(index, paced.pace.per_second);
+  if (paced.pace.pace == Pace::fastest) check_->fastest(index);
   return paced;
 }
 
@@ -118,7 +122,7 @@ std::uint32_t UntypedFrontend::add_trajectories(std::span<const std::uint32_t> a
   const auto lock = link_->lock_to_send();
   const std::uint32_t first = builder_.records();
   for (std::size_t i = 0; i < actuators.size(); ++i) {
-    builder_.command(head_of(actuators[i], paced), {},
+    builder_.command(head_of(actuators[i], paced, Profile::linear), {},
                      rows > 1 ? times : std::span<const std::int64_t>{}, rows,
                      states.subspan(i * each, each));
   }

@@ -49,7 +49,7 @@ def test_every_number_is_a_target(arm: o80.Frontend, target: float) -> None:
 
 
 def test_a_command_has_one_pace(arm: o80.Frontend) -> None:
-    with pytest.raises(o80.InvalidArgument, match="duration, speed, until and iterations"):
+    with pytest.raises(o80.InvalidArgument, match="duration, speed, until, iterations and fastest"):
         arm.add_command(0, 0.5, duration=1.0, iterations=3)
 
 

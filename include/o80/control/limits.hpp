@@ -28,8 +28,12 @@ class CommandCheck {
   /// Targets, one state after the other.
   void targets(std::uint32_t actuator, std::span<const std::byte> states,
                std::span<const std::uint64_t> mask = {}) const;
-  /// A pace of so much of the first number of the state [1/s].
-  void speed(std::uint32_t actuator, double speed) const;
+  /// A pace of so much of the first number that is commanded [1/s].
+  void speed(std::uint32_t actuator, double speed, std::span<const std::uint64_t> mask = {}) const;
+  /// The fastest way: what is commanded has limits of speed and acceleration.
+  void fastest(std::uint32_t actuator, std::span<const std::uint64_t> mask = {}) const;
+  /// That of a command that names none.
+  Profile profile(std::uint32_t actuator) const;
   /// A request's struct: its booleans and enumerations are ones.
   void request(std::uint32_t index, std::span<const std::byte> payload) const;
 

@@ -2,12 +2,15 @@
 
 #include <chrono>
 #include <cstdint>
+#include <optional>
+#include <string_view>
 
 #include "o80/control/record.hpp"
 
 namespace o80 {
 
-/// How to get to a target: made by direct(), duration(), speed(), until() or iterations().
+/// How to get to a target: made by direct(), duration(), speed(), until(), iterations() or
+/// fastest().
 struct PaceSpec {
   Pace pace = Pace::direct;
   std::int64_t amount = 0;
@@ -26,12 +29,26 @@ constexpr PaceSpec until(Iteration iteration) { return {Pace::until, iteration, 
 /// So many iterations (of a trajectory: for each of its rows).
 constexpr PaceSpec iterations(std::int64_t count) { return {Pace::iterations, count, 0}; }
 
+/// As fast as the limits allow, at rest at the end: the numbers that are commanded need limits of
+/// speed and acceleration.
+constexpr PaceSpec fastest() { return {Pace::fastest, 0, 0}; }
+
+/// What a direct command does that the limits do not let arrive in its iteration.
+enum class OnLimit : std::uint8_t {
+  end,   // it ends as limited, and its actuator comes to rest
+  go_on  // it goes on to its target, as fast as the limits allow
+};
+
+constexpr std::string_view to_text(OnLimit what) { return what == OnLimit::end ? "end" : "go_on"; }
+
 /// Everything about a command but its actuator and its target.
 struct CommandOptions {
   PaceSpec pace = {};
   Mode mode = Mode::queue;
-  Profile profile = Profile::linear;
+  /// By default linear; minimum_jerk for a command of an actuator that has acceleration limits.
+  std::optional<Profile> profile = {};
   Start start = Start::desired;
+  OnLimit on_limit = OnLimit::end;
 };
 
 /// When a batch is to be taken, and what if that moment has passed.

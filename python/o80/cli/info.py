@@ -64,11 +64,19 @@ def _field(field: dict[str, Any]) -> str:
 
 
 def _limit(limit: dict[str, Any]) -> str:
-    low, high, speed = limit["minimum"], limit["maximum"], limit["speed"]
-    if low is None and high is None and speed is None:
-        return "-"
-    text = f"{'-inf' if low is None else f'{low:g}'} to {'inf' if high is None else f'{high:g}'}"
-    return text if speed is None else f"{text}, {speed:g}/s"
+    low, high = limit["minimum"], limit["maximum"]
+    parts = []
+    if low is not None or high is not None:
+        ends = "-inf" if low is None else f"{low:g}", "inf" if high is None else f"{high:g}"
+        parts.append(" to ".join(ends))
+    for name, unit in (("speed", "/s"), ("acceleration", "/s²"), ("jerk", "/s³")):
+        if limit[name] is not None:
+            parts.append(f"{limit[name]:g}{unit}")
+    if limit["error"] is not None:
+        parts.append(f"error {limit['error']:g}")
+    if "rest" in limit:
+        parts.append(f"rests at {limit['rest']:g}")
+    return ", ".join(parts) or "-"
 
 
 def _fields(described: dict[str, Any], prefix: str) -> list[str]:

@@ -1,0 +1,148 @@
+"""Limits, fields that rest, and the fastest way, as Python sees them."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import o80
+
+JOINT = {"position": float, "velocity": float}
+
+
+class Loop:
+    """A robot of one joint whose loop the test itself runs, with a frontend."""
+
+    def __init__(self, segment: str, **options: Any) -> None:
+        self.backend = o80.Backend(segment, ["joint"], JOINT, frequency=1000.0, **options)
+        self.backend.publish({"position": 0.0, "velocity": 0.0})
+        self.frontend = o80.Frontend(segment)
+
+    def run(self, iterations: int) -> o80.History:
+        for _ in range(iterations):
+            desired = self.backend.step()
+            assert desired is not None
+            self.backend.publish(desired)
+        return self.frontend.history(iterations)
+
+    def close(self) -> None:
+        self.frontend.forget_added()
+        self.frontend.close()
+        self.backend.close()
+
+
+@pytest.fixture
+def loop(segment: str) -> Iterator[Loop]:
+    limits = o80.Limits(minimum=-1.0, maximum=1.0, speed=2.0, acceleration=20.0, jerk=2000.0)
+    loop = Loop(
+        segment,
+        limits={"joint": {"position": limits}},
+        rests_at={"joint": {"velocity": 0.0}},
+    )
+    yield loop
+    loop.close()
+
+
+def test_a_frontend_knows_all_limits(loop: Loop) -> None:
+    joint = loop.frontend.actuators[0]
+
+    assert joint.limits == o80.Limits(
+        minimum=-1.0, maximum=1.0, speed=2.0, acceleration=20.0, jerk=2000.0
+    )
+    assert joint.numbers[1].rest == 0.0
+    assert joint.numbers[0].rest is None
+
+
+def test_the_fastest_way_keeps_every_limit_and_ends_on_its_target(loop: Loop) -> None:
+    loop.frontend.add_command("joint", {"position": 0.9}, fastest=True)
+    batch = loop.frontend.pulse()
+
+    history = loop.run(700)
+
+    assert batch.statuses == [o80.Status.COMPLETED]
+    position = np.concatenate([[0.0] * 3, history.desired["position"][:, 0]])
+    assert position[-1] == 0.9
+    speed = np.diff(position) * 1e3
+    acceleration = np.diff(speed) * 1e3
+    jerk = np.diff(acceleration) * 1e3
+    assert np.abs(speed).max() == pytest.approx(2.0, rel=1e-6)
+    assert np.abs(acceleration).max() <= 20.0 * (1 + 1e-6)
+    assert np.abs(jerk).max() <= 2000.0 * (1 + 1e-3)
+
+
+def test_a_purged_motion_brakes(loop: Loop) -> None:
+    loop.frontend.add_command("joint", {"position": 0.9}, duration=0.8)
+    loop.frontend.pulse()
+    loop.run(400)
+    loop.frontend.purge()
+
+    history = loop.run(300)
+
+    assert history.braking[0, 0]
+    assert not history.braking[-1, 0]
+    position = history.desired["position"][:, 0]
+    assert np.abs(np.diff(position, 2)).max() * 1e6 <= 20.0 * (1 + 1e-6)
+    assert position[-1] == position[-2]
+
+
+def test_with_acceleration_limits_a_motion_is_smooth_by_default(loop: Loop) -> None:
+    loop.frontend.add_command("joint", {"position": 0.5}, duration=0.7)
+    batch = loop.frontend.pulse()
+
+    history = loop.run(700)
+
+    assert batch.statuses == [o80.Status.COMPLETED]
+    assert not history.clamped.any()
+
+
+def test_a_direct_command_out_of_reach_is_limited_or_goes_on(loop: Loop) -> None:
+    loop.frontend.add_command("joint", {"position": 0.5})
+    batch = loop.frontend.pulse()
+    loop.run(100)
+    handle = batch.handles[0]
+    assert handle.status == o80.Status.LIMITED
+    assert "jerk limit" in handle.text
+    assert loop.frontend.latest().desired["position"][0] < 0.01
+
+    loop.frontend.add_command("joint", {"position": 0.5}, on_limit="go_on")
+    batch = loop.frontend.pulse()
+    loop.run(600)
+
+    assert batch.statuses == [o80.Status.COMPLETED]
+    assert loop.frontend.latest().desired["position"][0] == 0.5
+
+
+def test_a_velocity_rests_when_its_motion_is_over(loop: Loop) -> None:
+    loop.frontend.add_command("joint", {"velocity": 0.3}, iterations=10)
+    loop.frontend.pulse()
+
+    history = loop.run(12)
+
+    assert history.desired["velocity"][9, 0] == 0.3
+    assert history.desired["velocity"][10, 0] == 0.0
+    assert history.braking[10, 0]
+
+
+def test_the_fastest_way_needs_limits(loop: Loop) -> None:
+    with pytest.raises(o80.InvalidArgument, match=r"velocity.*no limits of speed and acceleration"):
+        loop.frontend.add_command("joint", {"position": 0.5, "velocity": 0.0}, fastest=True)
+    with pytest.raises(o80.InvalidArgument, match="one pace"):
+        loop.frontend.add_command("joint", {"position": 0.5}, fastest=True, duration=1.0)
+
+
+@pytest.mark.parametrize(
+    ("limits", "text"),
+    [
+        (o80.Limits(acceleration=1.0), "without a speed"),
+        (o80.Limits(speed=1.0, jerk=1.0), "without an acceleration"),
+        (o80.Limits(minimum=1.0, maximum=-1.0), "minimum <= maximum"),
+        (o80.Limits(speed=0.0), "speed"),
+    ],
+)
+def test_limits_that_make_no_sense_are_refused(
+    segment: str, limits: o80.Limits, text: str, tmp_path: Path
+) -> None:
+    with pytest.raises(o80.InvalidArgument, match=text):
+        o80.Backend(segment, ["joint"], limits={"joint": limits})
