@@ -27,7 +27,7 @@ class Limits:
         if isinstance(given, Limits):
             return given
         names = ("minimum", "maximum", "speed", "acceleration", "jerk", "error")
-        if not isinstance(given, Sequence) or isinstance(given, str) or len(given) > len(names):
+        if not isinstance(given, (tuple, list)) or len(given) > len(names):
             raise InvalidArgument(
                 f"limits cannot be {given!r}: give o80.Limits({', '.join(n + '=' for n in names)})"
             )
