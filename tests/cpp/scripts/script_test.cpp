@@ -1,0 +1,61 @@
+// Random scripts: whatever a robot is asked, and whatever it reads, its promises hold in every
+// iteration. CONTRIBUTING.md says how to play more of them and how to replay one.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <string>
+
+#include "scripts/script_generator.hpp"
+#include "scripts/script_player.hpp"
+
+namespace o80::test {
+namespace {
+
+constexpr std::uint64_t kScriptsOfEachRun = 1500;
+constexpr std::size_t kMostShown = 6;
+
+std::uint64_t from_environment(const char* name, std::uint64_t otherwise) {
+  const char* text = std::getenv(name);
+  return text == nullptr ? otherwise : std::stoull(text);
+}
+
+TEST(Script, ReadsBackWhatItPrints) {
+  for (std::uint64_t seed = 0; seed < 200; ++seed) {
+    const std::string text = random_script(seed).text();
+    ASSERT_EQ(Script::parse(text).text(), text) << "seed " << seed;
+  }
+}
+
+TEST(Script, KeepsEveryPromise) {
+  const std::uint64_t scripts = from_environment("O80_SCRIPTS", kScriptsOfEachRun);
+  const std::uint64_t first = from_environment("O80_SCRIPT_SEED", 0);
+  // one of each kind is shown whole, the others are counted
+  std::map<std::string, std::uint64_t> failures;
+  for (std::uint64_t seed = first; seed < first + scripts; ++seed) {
+    const Script script = random_script(seed);
+    const auto failure = play(script);
+    if (!failure) continue;
+    if (failures[failure->property]++ > 0 || failures.size() > kMostShown) continue;
+    const Script shortest = shrunk(script, *failure);
+    ADD_FAILURE() << "seed " << seed << ", " << report(shortest, *play(shortest));
+  }
+  for (const auto& [property, count] : failures) {
+    ADD_FAILURE() << count << " of " << scripts << " scripts break '" << property << "'";
+  }
+}
+
+TEST(Script, ReplaysAFile) {
+  const char* path = std::getenv("O80_SCRIPT");
+  if (path == nullptr) GTEST_SKIP() << "O80_SCRIPT names no file";
+  std::ifstream file(path);
+  ASSERT_TRUE(file) << path;
+  const Script script = Script::parse(std::string(std::istreambuf_iterator<char>(file), {}));
+  const auto failure = play(script);
+  if (failure) ADD_FAILURE() << report(script, *failure);
+}
+
+}  // namespace
+}  // namespace o80::test

@@ -1,0 +1,217 @@
+#include "scripts/script_world.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace o80::test {
+namespace {
+
+bool bit_of(const std::uint64_t* mask, std::size_t actuator) {
+  return (mask[actuator / 64] >> (actuator % 64) & 1) != 0;
+}
+
+}  // namespace
+
+ScriptWorld::ScriptWorld(const Script& played) : script(played), rig(played.schema(), 1 << 13) {
+  actuators.resize(script.actuators.size());
+  running_.resize(script.actuators.size());
+  for (std::size_t a = 0; a < actuators.size(); ++a) {
+    const ActuatorRow& row = rig.schema.actuators[a];
+    rig.schema.each_scalar(
+        row.type,
+        [&](std::uint32_t offset, const FieldRow&) {
+          actuators[a].numbers.push_back({.offset = offset, .reading = {}});
+        },
+        row.offset);
+  }
+  for (std::size_t a = 0; a < actuators.size(); ++a) {
+    for (std::size_t n = 0; n < actuators[a].numbers.size(); ++n) {
+      const NumberSpec& spec = script.actuators[a].numbers[n];
+      store_as(spec.kind, spec.start, rig.observed.data() + actuators[a].numbers[n].offset);
+    }
+  }
+  rig.next = 0;
+  restart(nullptr);
+}
+
+void ScriptWorld::observe() {
+  for (std::size_t a = 0; a < actuators.size(); ++a) {
+    for (std::size_t n = 0; n < actuators[a].numbers.size(); ++n) {
+      const NumberTrack& track = actuators[a].numbers[n];
+      const Kind kind = script.actuators[a].numbers[n].kind;
+      std::byte* at = rig.observed.data() + track.offset;
+      if (track.reading) {
+        store_as(kind, *track.reading, at);
+      } else {
+        std::copy_n(rig.controller.desired() + track.offset, bytes_of_kind(kind), at);
+      }
+    }
+  }
+}
+
+void ScriptWorld::look() {
+  for (std::size_t a = 0; a < actuators.size(); ++a) {
+    ActuatorTrack& actuator = actuators[a];
+    for (std::size_t n = 0; n < actuator.numbers.size(); ++n) {
+      NumberTrack& track = actuator.numbers[n];
+      track.before = track.now;
+      track.now =
+          load_as(script.actuators[a].numbers[n].kind, rig.controller.desired() + track.offset);
+    }
+    actuator.active = bit_of(rig.controller.active_mask(), a);
+    actuator.clamped = bit_of(rig.controller.clamped_mask(), a);
+    actuator.braking = bit_of(rig.controller.braking_mask(), a);
+  }
+}
+
+void ScriptWorld::add(const ScriptStep& step, std::size_t place) {
+  const ActuatorSpec& spec = script.actuators.at(step.actuator);
+  const auto& numbers = actuators[step.actuator].numbers;
+  const ActuatorRow& row = rig.schema.actuators[step.actuator];
+  const std::uint32_t size = rig.schema.types[row.type].size;
+  const std::size_t rows = step.values.size() / numbers.size();
+
+  std::vector<std::byte> states(rows * size);
+  for (std::size_t i = 0; i < rows * numbers.size(); ++i) {
+    const std::size_t number = i % numbers.size();
+    store_as(spec.numbers[number].kind, step.values[i],
+             states.data() + i / numbers.size() * size + (numbers[number].offset - row.offset));
+  }
+  RecordHead head = step.head;
+  head.actuator = step.actuator;
+  std::vector<std::uint64_t> mask;
+  if (step.mask != 0) mask.push_back(step.mask);
+  LaneBatch& batch = batches_[step.lane];
+  const std::uint32_t at =
+      batch.builder.command(head, mask, step.times, static_cast<std::uint32_t>(rows), states);
+  batch.commands.push_back({place, at});
+}
+
+void ScriptWorld::pulse(std::uint32_t lane) {
+  LaneBatch& batch = batches_[lane];
+  BatchRecord record;
+  CommandId& used = rig.used_ids[lane];
+  record.id = used + 1;
+  used += 2 + batch.builder.records();
+  blocks_sent += batch.builder.blocks();
+  for (const Pending& pending : batch.commands) {
+    const CommandId id = record_id(record.id, pending.place);
+    SentCommand& command = commands_[{lane, id}];
+    command.step = pending.step;
+    command.lane = lane;
+    command.id = id;
+    sent.push_back(&command);
+  }
+  const BlockIndex first = rig.place(batch.builder.seal(record));
+  rig.controller.take(lane, first, rig);
+  batch.builder.clear();
+  batch.commands.clear();
+}
+
+void ScriptWorld::restart(const std::vector<double>* desired) {
+  std::vector<std::byte> states;
+  if (rig.next > 0) observe();
+  if (desired != nullptr) {
+    states.resize(rig.observed.size());
+    std::size_t i = 0;
+    for (std::size_t a = 0; a < actuators.size(); ++a) {
+      for (std::size_t n = 0; n < actuators[a].numbers.size(); ++n, ++i) {
+        const double value = i < desired->size() ? (*desired)[i] : 0.0;
+        store_as(script.actuators[a].numbers[n].kind, value,
+                 states.data() + actuators[a].numbers[n].offset);
+      }
+    }
+  }
+  rig.controller.restart(rig.observed.data(), desired != nullptr ? states.data() : nullptr,
+                         rig.next);
+  iteration = rig.next++;
+  note_drop(kEveryActuator);
+  look();
+  for (ActuatorTrack& actuator : actuators) {
+    actuator.driver = actuator.previous = actuator.last = nullptr;
+    for (NumberTrack& track : actuator.numbers) track.before = track.now;
+  }
+}
+
+void ScriptWorld::note_drop(std::uint16_t actuator, bool surely) {
+  for (std::size_t a = 0; a < actuators.size(); ++a) {
+    if (actuator != kEveryActuator && actuator != a) continue;
+    (surely ? actuators[a].dropped_at : actuators[a].maybe_dropped_at) = rig.next;
+  }
+}
+
+std::optional<Failure> ScriptWorld::step() {
+  observe();
+  iteration = rig.next;
+  rig.step();
+  look();
+  if (auto failure = hear()) return failure;
+  return find_drivers();
+}
+
+/// Statuses told since the last iteration => commands.
+std::optional<Failure> ScriptWorld::hear() {
+  ended.clear();
+  const auto& changes = rig.witness.changes;
+  for (; heard_ < changes.size(); ++heard_) {
+    const StatusChange& change = changes[heard_];
+    const auto found = commands_.find({change.lane, change.id});
+    if (found == commands_.end()) continue;  // a batch
+    SentCommand& command = found->second;
+    if (command.ended_at != kNever) {
+      return Failure{"one end", "a command ended twice: " + std::to_string(command.id)};
+    }
+    command.status = change.status;
+    if (change.status == Status::active) {
+      if (change.iteration != iteration || command.active_since != kNever) {
+        return Failure{"activation", "a command became active at another iteration or twice"};
+      }
+      command.active_since = change.iteration;
+      running_[step_of(command).actuator].push_back(&command);
+    } else if (is_end(change.status)) {
+      command.ended_at = change.iteration;
+      ended.push_back(&command);
+    }
+  }
+  return std::nullopt;
+}
+
+std::optional<Failure> ScriptWorld::find_drivers() {
+  for (std::size_t a = 0; a < actuators.size(); ++a) {
+    ActuatorTrack& actuator = actuators[a];
+    actuator.previous = actuator.driver;
+    actuator.driver = nullptr;
+    for (const SentCommand* command : running_[a]) {
+      if (!command->drove(iteration)) continue;
+      if (actuator.driver != nullptr) {
+        return Failure{"one driver", "two commands gave one desired state of actuator " +
+                                         std::to_string(a)};
+      }
+      actuator.driver = command;
+    }
+    std::erase_if(running_[a], [](const SentCommand* each) { return each->ended_at != kNever; });
+    if (actuator.driver != nullptr) actuator.last = actuator.driver;
+  }
+  return std::nullopt;
+}
+
+std::size_t ScriptWorld::rows_of(const SentCommand& command) const {
+  const ScriptStep& step = step_of(command);
+  return step.values.size() / script.actuators[step.actuator].numbers.size();
+}
+
+long double ScriptWorld::target(const SentCommand& command, std::size_t row,
+                                std::size_t number) const {
+  const ScriptStep& step = step_of(command);
+  const auto& numbers = script.actuators[step.actuator].numbers;
+  std::byte bytes[8] = {};
+  store_as(numbers[number].kind, step.values[row * numbers.size() + number], bytes);
+  return load_as(numbers[number].kind, bytes);
+}
+
+std::string ScriptWorld::where(std::size_t actuator, std::size_t number) const {
+  return "iteration " + std::to_string(iteration) + ", actuator " + std::to_string(actuator) +
+         ", number " + std::to_string(number) + ": ";
+}
+
+}  // namespace o80::test

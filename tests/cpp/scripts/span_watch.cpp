@@ -1,0 +1,168 @@
+#include "scripts/span_watch.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <string>
+
+#include "scripts/limit_watch.hpp"
+
+namespace o80::test {
+namespace {
+
+constexpr long double kPeriod = 1e-3L;
+
+/// The number whose speed a command asks for: the first it names that moves.
+std::optional<std::size_t> paced_number(const ScriptWorld& world, const SentCommand& command) {
+  const auto& numbers = world.script.actuators[world.step_of(command).actuator].numbers;
+  for (std::size_t n = 0; n < numbers.size(); ++n) {
+    if (world.names(command, n) && numbers[n].moves()) return n;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+void SpanWatch::Span::include(long double place) {
+  low = std::min(low, place);
+  high = std::max(high, place);
+}
+
+void SpanWatch::Span::include(const Span& other) {
+  include(other.low);
+  include(other.high);
+}
+
+SpanWatch::SpanWatch(const ScriptWorld& world) {
+  for (const ActuatorTrack& actuator : world.actuators) {
+    numbers_.emplace_back(actuator.numbers.size());
+  }
+  restart(world);
+}
+
+void SpanWatch::restart(const ScriptWorld& world) {
+  for (std::size_t a = 0; a < numbers_.size(); ++a) {
+    for (std::size_t n = 0; n < numbers_[a].size(); ++n) {
+      const long double place = world.actuators[a].numbers[n].now;
+      numbers_[a][n] = {};
+      numbers_[a][n].span = {place, place};
+    }
+  }
+}
+
+/// Places where a motion may come to rest: its velocity falls to zero as a cubic, within its span.
+SpanWatch::Span SpanWatch::stops(const Number& number, long double place) const {
+  // a cubic from (v, a) to (0, 0) over r covers r v / 2 + r^2 a / 12, and changes no sign
+  Span found{place, place};
+  const long double speed =
+      std::fabs(number.first) + std::fabs(number.second) + std::fabs(number.third);
+  if (speed == 0.0L) return found;
+  const long double doubt = std::fabs(number.second) + std::fabs(number.third);
+  if (number.first + doubt > 0.0L) found.include(number.span.high);
+  if (number.first - doubt < 0.0L) found.include(number.span.low);
+  return found;
+}
+
+void SpanWatch::begin(const ScriptWorld& world, std::size_t actuator, bool taken_over) {
+  const SentCommand& command = *world.actuators[actuator].driver;
+  const ScriptStep& step = world.step_of(command);
+  const auto paced = paced_number(world, command);
+  for (std::size_t n = 0; n < numbers_[actuator].size(); ++n) {
+    Number& number = numbers_[actuator][n];
+    const NumberTrack& track = world.actuators[actuator].numbers[n];
+    const long double place = track.before;
+    Span span{place, place};
+    if (step.head.start == Start::observed && track.reading && world.names(command, n) &&
+        std::isfinite(*track.reading)) {
+      std::array<std::byte, 8> bytes{};
+      const Kind kind = world.script.actuators[actuator].numbers[n].kind;
+      store_as(kind, *track.reading, bytes.data());
+      span.include(load_as(kind, bytes.data()));
+    }
+    if (taken_over) {
+      span.include(stops(number, place));
+      span.include(number.targets);
+    }
+    Span targets{place, place};
+    if (world.names(command, n)) {
+      targets = {world.target(command, 0, n), world.target(command, 0, n)};
+      for (std::size_t row = 1; row < world.rows_of(command); ++row) {
+        targets.include(world.target(command, row, n));
+      }
+    }
+    span.include(targets);
+    number.span = span;
+    number.targets = targets;
+
+    number.fastest = 0.0L;
+    if (step.head.pace == Pace::speed && paced == n && step.head.start == Start::desired) {
+      long double seam = 0.0L;
+      if (world.actuators[actuator].previous != nullptr || world.actuators[actuator].braking ||
+          taken_over || number.first != 0.0L) {
+        seam = std::fabs(number.first) + std::fabs(number.second) + std::fabs(number.third);
+      }
+      const NumberSpec& spec = world.script.actuators[actuator].numbers[n];
+      if (std::isfinite(spec.limits.jerk)) {
+        const long double jerk = spec.limits.jerk * kPeriod * kPeriod * kPeriod;
+        seam += number.second * number.second / (2.0L * jerk) + std::fabs(number.second);
+      }
+      number.fastest = std::max<long double>(step.head.speed * kPeriod, seam);
+    }
+  }
+}
+
+std::optional<Failure> SpanWatch::check(const ScriptWorld& world, std::size_t actuator,
+                                        std::size_t n) const {
+  const NumberSpec& spec = world.script.actuators[actuator].numbers[n];
+  const NumberTrack& track = world.actuators[actuator].numbers[n];
+  const Number& number = numbers_[actuator][n];
+  const long double rounding =
+      std::max(rounding_of(spec, track.now), rounding_of(spec, track.before));
+  std::array<char, 160> text{};
+  if (!spec.limited() && !world.script.actuators[actuator].blend) {
+    const long double slack =
+        rounding + 1e-12L * std::max(std::fabs(number.span.low), std::fabs(number.span.high));
+    if (track.now < number.span.low - slack || track.now > number.span.high + slack) {
+      std::snprintf(text.data(), text.size(), "at %.12Lg, outside the span %.12Lg to %.12Lg",
+                    track.now, number.span.low, number.span.high);
+      return Failure{"span", world.where(actuator, n) + text.data()};
+    }
+  }
+  const long double covered = std::fabs(track.now - track.before);
+  if (number.fastest > 0.0L && !world.script.actuators[actuator].blend &&
+      covered > number.fastest * (1.0L + 1e-9L) + 2.0L * rounding) {
+    std::snprintf(text.data(), text.size(), "a step of %.12Lg where its pace allows %.12Lg",
+                  covered, number.fastest);
+    return Failure{"pace", world.where(actuator, n) + text.data()};
+  }
+  return std::nullopt;
+}
+
+std::optional<Failure> SpanWatch::step(const ScriptWorld& world) {
+  for (std::size_t a = 0; a < numbers_.size(); ++a) {
+    const ActuatorTrack& actuator = world.actuators[a];
+    const bool begun = actuator.driver != nullptr && actuator.driver != actuator.previous;
+    if (begun) {
+      const bool taken_over =
+          actuator.previous != nullptr && actuator.previous->status == Status::overwritten;
+      begin(world, a, taken_over);
+    }
+    for (std::size_t n = 0; n < numbers_[a].size(); ++n) {
+      Number& number = numbers_[a][n];
+      const NumberTrack& track = actuator.numbers[n];
+      if (actuator.driver != nullptr) {
+        if (!world.script.actuators[a].numbers[n].moves()) continue;
+        if (auto failure = check(world, a, n)) return failure;
+      }
+      const long double first = track.now - track.before;
+      const long double second = first - number.first;
+      number.third = second - number.second;
+      number.second = second;
+      number.first = first;
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace o80::test

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "scripts/script_world.hpp"
+
+namespace o80::test {
+
+/// Where a motion without limits may be (rule 7), and how fast a speed pace may go (rule 5).
+///
+/// The span of a motion is that of its present place, its targets, and, if it overwrote another
+/// motion, of the former target and of every place where the former motion could have come to
+/// stop: those that a braking velocity can reach from the present place without leaving the former
+/// span.
+class SpanWatch {
+ public:
+  explicit SpanWatch(const ScriptWorld& world);
+
+  void restart(const ScriptWorld& world);
+  std::optional<Failure> step(const ScriptWorld& world);
+
+ private:
+  struct Span {
+    long double low = 0.0L;
+    long double high = 0.0L;
+
+    void include(long double place);
+    void include(const Span& other);
+  };
+  struct Number {
+    Span span;        // of the motion under way
+    Span targets;     // of its command
+    long double first = 0.0L;   // difference of the last two positions
+    long double second = 0.0L;  // of the last two differences
+    long double third = 0.0L;
+    long double fastest = 0.0L;  // step allowed by a speed pace; 0: any
+  };
+
+  void begin(const ScriptWorld& world, std::size_t actuator, bool taken_over);
+  Span stops(const Number& number, long double place) const;
+  std::optional<Failure> check(const ScriptWorld& world, std::size_t actuator,
+                               std::size_t number) const;
+
+  std::vector<std::vector<Number>> numbers_;
+};
+
+}  // namespace o80::test

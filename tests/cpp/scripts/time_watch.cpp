@@ -1,0 +1,94 @@
+#include "scripts/time_watch.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <string>
+
+namespace o80::test {
+namespace {
+
+constexpr std::int64_t kPeriodNs = 1'000'000;
+
+}  // namespace
+
+TimeWatch::TimeWatch(const ScriptWorld& world) { restart(world); }
+
+void TimeWatch::restart(const ScriptWorld& world) { clocks_.assign(world.actuators.size(), {}); }
+
+std::optional<Failure> TimeWatch::step(const ScriptWorld& world) {
+  for (const SentCommand* command : world.ended) {
+    const ScriptStep& step = world.step_of(*command);
+    if (step.head.pace == Pace::until && command->status == Status::rejected) {
+      clocks_[step.actuator].known = false;
+    }
+  }
+  for (std::size_t a = 0; a < clocks_.size(); ++a) {
+    const ActuatorTrack& actuator = world.actuators[a];
+    if (actuator.driver == nullptr) continue;
+    if (actuator.driver != actuator.previous) begin(world, a);
+    if (actuator.driver->ended_at == world.iteration) {
+      if (auto failure = end(world, a)) return failure;
+    }
+  }
+  return std::nullopt;
+}
+
+void TimeWatch::begin(const ScriptWorld& world, std::size_t actuator) {
+  const SentCommand* previous = world.actuators[actuator].previous;
+  const bool unbroken =
+      previous != nullptr && previous->ended_at == world.iteration - 1 &&
+      (previous->status == Status::completed || previous->status == Status::limited) &&
+      world.actuators[actuator].dropped_at != world.iteration &&
+      world.step_of(*world.actuators[actuator].driver).head.mode == Mode::queue;
+  if (!unbroken) clocks_[actuator] = {(world.iteration - 1) * kPeriodNs, true};
+  if (world.actuators[actuator].maybe_dropped_at == world.iteration) {
+    clocks_[actuator].known = false;
+  }
+}
+
+std::optional<Failure> TimeWatch::end(const ScriptWorld& world, std::size_t actuator) {
+  const SentCommand& command = *world.actuators[actuator].driver;
+  const ScriptStep& step = world.step_of(command);
+  Clock& clock = clocks_[actuator];
+  const Iteration took = command.ended_at - command.active_since + 1;
+  const auto rows = static_cast<std::int64_t>(world.rows_of(command));
+  const bool whole = command.status == Status::completed || command.status == Status::limited;
+  if (!whole) return std::nullopt;
+
+  Iteration expected = command.ended_at;
+  Iteration tolerance = 0;
+  switch (step.head.pace) {
+    case Pace::direct:
+      clock.exact += rows * kPeriodNs;
+      expected = command.active_since + rows - 1;
+      break;
+    case Pace::iterations:
+      clock.exact += rows * std::max<std::int64_t>(1, step.head.amount) * kPeriodNs;
+      expected = command.active_since + rows * std::max<std::int64_t>(1, step.head.amount) - 1;
+      break;
+    case Pace::until:
+      clock = {step.head.amount * kPeriodNs, true};
+      expected = step.head.amount;
+      break;
+    case Pace::duration: {
+      clock.exact += step.times.empty() ? step.head.amount : step.times.back();
+      if (!clock.known) return std::nullopt;
+      expected = std::max(command.active_since, (clock.exact + kPeriodNs / 2) / kPeriodNs);
+      tolerance = 1;
+      break;
+    }
+    default:
+      clock.exact += took * kPeriodNs;
+  }
+  if (command.ended_at < expected - tolerance || command.ended_at > expected + tolerance) {
+    std::array<char, 160> text{};
+    std::snprintf(text.data(), text.size(), "a command of %lld rows ended at %lld, not at %lld",
+                  static_cast<long long>(rows), static_cast<long long>(command.ended_at),
+                  static_cast<long long>(expected));
+    return Failure{"timing", world.where(actuator, 0) + text.data()};
+  }
+  return std::nullopt;
+}
+
+}  // namespace o80::test
