@@ -101,8 +101,8 @@ std::optional<Failure> EndWatch::idle(const ScriptWorld& world, std::size_t actu
           world.step_of(*track.last).head.pace == Pace::direct &&
           (track.last->status == Status::limited || track.maybe_dropped_at > track.last->ended_at);
       if (place.now != rest && !unsaid) {
-        return Failure{"resting", world.where(actuator, n) + "it rests at " +
-                                      positions(place.now, rest)};
+        return Failure{"resting",
+                       world.where(actuator, n) + "it rests at " + positions(place.now, rest)};
       }
       continue;
     }

@@ -34,8 +34,8 @@ long double rounding_of(const NumberSpec& number, long double position) {
       return size * std::numeric_limits<float>::epsilon() + 2e-45L;
     default: {
       // to nearest, but inwards at the bounds
-      const bool at_bound = position + 1.0L >= number.limits.maximum ||
-                            position - 1.0L <= number.limits.minimum;
+      const bool at_bound =
+          position + 1.0L >= number.limits.maximum || position - 1.0L <= number.limits.minimum;
       return (at_bound ? 1.0L : 0.5L) + size * std::numeric_limits<double>::epsilon();
     }
   }
@@ -49,7 +49,8 @@ void LimitWatch::Past::add(long double position) {
 }
 
 LimitWatch::LimitWatch(const ScriptWorld& world) {
-  for (const ActuatorTrack& actuator : world.actuators) pasts_.emplace_back(actuator.numbers.size());
+  for (const ActuatorTrack& actuator : world.actuators)
+    pasts_.emplace_back(actuator.numbers.size());
   restart(world);
 }
 
@@ -112,9 +113,8 @@ std::optional<Failure> LimitWatch::rates(const ScriptWorld& world, std::size_t a
     const long double p1 = past.back(lag);
     const long double p2 = past.back(2 * lag);
     const long double p3 = past.back(3 * lag);
-    const long double rounding =
-        std::max({rounding_of(spec, p0), rounding_of(spec, p1), rounding_of(spec, p2),
-                  rounding_of(spec, p3)});
+    const long double rounding = std::max({rounding_of(spec, p0), rounding_of(spec, p1),
+                                           rounding_of(spec, p2), rounding_of(spec, p3)});
     const auto exceeds = [&](long double value, long double allowed, int roundings) {
       return std::fabs(value) > allowed * (1.0L + 1e-9L) + roundings * rounding;
     };

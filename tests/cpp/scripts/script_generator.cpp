@@ -10,8 +10,8 @@ namespace {
 
 constexpr double kSecond = 1000.0;  // [iterations]
 constexpr std::int64_t kLongestScript = 900;
-constexpr std::array kNumericKinds{Kind::float64, Kind::float32, Kind::int8,   Kind::int16,
-                                   Kind::int32,   Kind::int64,   Kind::uint8,  Kind::uint16,
+constexpr std::array kNumericKinds{Kind::float64, Kind::float32, Kind::int8,    Kind::int16,
+                                   Kind::int32,   Kind::int64,   Kind::uint8,   Kind::uint16,
                                    Kind::uint32,  Kind::uint64,  Kind::boolean, Kind::enumeration};
 
 /// Values around which a field of this kind moves.

@@ -184,8 +184,8 @@ std::optional<Failure> ScriptWorld::find_drivers() {
     for (const SentCommand* command : running_[a]) {
       if (!command->drove(iteration)) continue;
       if (actuator.driver != nullptr) {
-        return Failure{"one driver", "two commands gave one desired state of actuator " +
-                                         std::to_string(a)};
+        return Failure{"one driver",
+                       "two commands gave one desired state of actuator " + std::to_string(a)};
       }
       actuator.driver = command;
     }

@@ -33,8 +33,8 @@ struct SentCommand {
   bool drove(Iteration iteration) const {
     if (active_since == kNever || active_since > iteration) return false;
     if (ended_at == kNever) return true;
-    const bool until_its_end = status == Status::completed || status == Status::limited ||
-                               status == Status::interrupted;
+    const bool until_its_end =
+        status == Status::completed || status == Status::limited || status == Status::interrupted;
     return until_its_end ? iteration <= ended_at : iteration < ended_at;
   }
 };
@@ -43,7 +43,7 @@ struct SentCommand {
 struct NumberTrack {
   std::uint32_t offset = 0;  // in the block [bytes]
   long double now = 0.0L;
-  long double before = 0.0L;  // desired in the iteration before
+  long double before = 0.0L;      // desired in the iteration before
   std::optional<double> reading;  // observed there; else where it is desired
 };
 
@@ -52,8 +52,8 @@ struct ActuatorTrack {
   const SentCommand* driver = nullptr;    // gave the desired state of this iteration
   const SentCommand* previous = nullptr;  // of the iteration before
   const SentCommand* last = nullptr;      // the last that did, since the last fresh start
-  Iteration dropped_at = kNever;        // all its commands were dropped before this iteration
-  Iteration maybe_dropped_at = kNever;  // some of them, or none
+  Iteration dropped_at = kNever;          // all its commands were dropped before this iteration
+  Iteration maybe_dropped_at = kNever;    // some of them, or none
   bool active = false;
   bool clamped = false;
   bool braking = false;
@@ -72,9 +72,7 @@ class ScriptWorld {
   /// One iteration; the failure is of what was told, not of motion.
   std::optional<Failure> step();
 
-  const ScriptStep& step_of(const SentCommand& command) const {
-    return script.steps[command.step];
-  }
+  const ScriptStep& step_of(const SentCommand& command) const { return script.steps[command.step]; }
   /// Whether a command names this number.
   bool names(const SentCommand& command, std::size_t number) const {
     const std::uint64_t mask = step_of(command).mask;
@@ -88,7 +86,7 @@ class ScriptWorld {
   const Script& script;
   Rig rig;
   std::vector<ActuatorTrack> actuators;
-  std::vector<SentCommand*> sent;  // in order; of all lanes
+  std::vector<SentCommand*> sent;         // in order; of all lanes
   std::vector<const SentCommand*> ended;  // in this iteration
   Iteration iteration = 0;                // of the last row
   std::uint64_t blocks_sent = 0;

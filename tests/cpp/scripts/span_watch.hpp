@@ -29,8 +29,8 @@ class SpanWatch {
     void include(const Span& other);
   };
   struct Number {
-    Span span;        // of the motion under way
-    Span targets;     // of its command
+    Span span;                  // of the motion under way
+    Span targets;               // of its command
     long double first = 0.0L;   // difference of the last two positions
     long double second = 0.0L;  // of the last two differences
     long double third = 0.0L;
