@@ -50,7 +50,7 @@ Range range_of_kind(Kind kind) {
 
 class Generator {
  public:
-  explicit Generator(std::uint64_t seed) : dice_(seed) {}
+  Generator(std::uint64_t seed, bool linear) : dice_(seed), linear_(linear) {}
 
   Script script() {
     const std::int64_t count = dice_.one_in(2) ? 1 : dice_.whole(1, 3);
@@ -97,6 +97,7 @@ class Generator {
   std::uint64_t any_mask(std::uint16_t actuator);
 
   Dice dice_;
+  bool linear_;  // and not limited
   Script script_;
   std::vector<std::vector<Range>> ranges_;
   std::int64_t played_ = 0;
@@ -106,8 +107,8 @@ void Generator::add_actuator() {
   ActuatorSpec spec;
   std::vector<Range> ranges;
   spec.follow = dice_.one_in(5);
-  spec.blend = dice_.one_in(10);
-  const bool limited = !spec.blend && dice_.one_in(2);
+  spec.blend = dice_.one_in(10) && !linear_;
+  const bool limited = !spec.blend && !linear_ && dice_.one_in(2);
   const bool mixed = !spec.blend && dice_.one_in(3);
   const std::int64_t numbers = spec.blend ? 2 : dice_.one_in(2) ? 1 : dice_.whole(1, 4);
   for (std::int64_t n = 0; n < numbers; ++n) {
@@ -135,7 +136,7 @@ NumberSpec Generator::any_number(Kind kind, const Range& range, bool limited) {
   NumberSpec number;
   number.kind = kind;
   if (number.moves() && limited) add_limits(number, range);
-  if (number.moves() && dice_.one_in(5)) {
+  if (number.moves() && !linear_ && dice_.one_in(5)) {
     number.resting = true;
     const double low = std::max(range.low, number.limits.minimum);
     const double high = std::min(range.high, number.limits.maximum);
@@ -198,7 +199,7 @@ void Generator::add_round() {
     case 8:
       add(Action::halt);
       run(dice_.whole(0, 30));
-      if (!dice_.one_in(4)) add(Action::resume);
+      if (!linear_ && !dice_.one_in(4)) add(Action::resume);
       break;
     case 9:
       if (dice_.one_in(3)) add_restart();
@@ -224,7 +225,7 @@ void Generator::add_chain() {
   const std::uint16_t actuator = any_actuator();
   const std::int64_t longest = dice_.whole(0, 12);
   const std::int64_t links = static_cast<std::int64_t>(dice_.magnitude(2.0, 60.0));
-  const bool smooth = dice_.one_in(2);
+  const bool smooth = !linear_ && dice_.one_in(2);
   for (std::int64_t i = 0; i < links; ++i) {
     add_command(actuator, 0);
     RecordHead& head = script_.steps.back().head;
@@ -260,7 +261,7 @@ void Generator::add_reading() {
   const Range& range = ranges_[actuator][step.number];
   double value = dice_.real(range.low, range.high);
   if (dice_.one_in(3)) value += range.size() * dice_.real(-3.0, 3.0);
-  if (dice_.one_in(4)) {
+  if (dice_.one_in(4) && !linear_) {
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
     const std::array odd{std::nan(""), kInfinity, -kInfinity};
     value = odd[static_cast<std::size_t>(dice_.whole(0, 2))];
@@ -347,7 +348,7 @@ RecordHead Generator::any_head(std::uint16_t actuator) {
       head.pace = Pace::iterations;
       head.amount = static_cast<std::int64_t>(dice_.magnitude(1.0, 200.0)) - 1;
   }
-  if (dice_.one_in(2)) head.profile = Profile::minimum_jerk;
+  if (!linear_ && dice_.one_in(2)) head.profile = Profile::minimum_jerk;
   if (dice_.one_in(3)) head.mode = Mode::overwrite;
   if (dice_.one_in(8)) head.start = Start::observed;
   return head;
@@ -391,6 +392,7 @@ double Dice::magnitude(double low, double high) {
   return low * std::exp(real(0.0, 1.0) * std::log(high / low));
 }
 
-Script random_script(std::uint64_t seed) { return Generator(seed).script(); }
+Script random_script(std::uint64_t seed) { return Generator(seed, false).script(); }
+Script linear_script(std::uint64_t seed) { return Generator(seed, true).script(); }
 
 }  // namespace o80::test

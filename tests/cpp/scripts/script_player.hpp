@@ -9,10 +9,6 @@ namespace o80::test {
 /// Plays a script and gives the first promise that it breaks.
 std::optional<Failure> play(const Script& script);
 
-/// The shortest script found that breaks the same promise: steps, rows, limits and iterations are
-/// left out as long as it still does.
-Script shrunk(Script script, const Failure& failure);
-
 /// A failure and the script that shows it, as one reads it in a test's output.
 std::string report(const Script& script, const Failure& failure);
 

@@ -1,9 +1,9 @@
+#include "scripts/script_shrink.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
-
-#include "scripts/script_player.hpp"
 
 namespace o80::test {
 namespace {
@@ -12,8 +12,8 @@ constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 
 class Shrinker {
  public:
-  Shrinker(Script script, std::string property)
-      : script_(std::move(script)), property_(std::move(property)) {}
+  Shrinker(Script script, const std::function<bool(const Script&)>& fails)
+      : script_(std::move(script)), fails_(fails) {}
 
   Script shrink() {
     for (bool smaller = true; smaller;) {
@@ -28,10 +28,9 @@ class Shrinker {
   }
 
  private:
-  /// Keeps the change if the script still breaks the same promise.
+  /// Keeps the change if the script still fails.
   bool accept(Script changed) {
-    const auto failure = play(changed);
-    if (!failure || failure->property != property_) return false;
+    if (!fails_(changed)) return false;
     script_ = std::move(changed);
     return true;
   }
@@ -156,13 +155,13 @@ class Shrinker {
   }
 
   Script script_;
-  std::string property_;
+  const std::function<bool(const Script&)>& fails_;
 };
 
 }  // namespace
 
-Script shrunk(Script script, const Failure& failure) {
-  return Shrinker(std::move(script), failure.property).shrink();
+Script shrunk(Script script, const std::function<bool(const Script&)>& fails) {
+  return Shrinker(std::move(script), fails).shrink();
 }
 
 }  // namespace o80::test

@@ -68,6 +68,7 @@ std::string digits(double value) {
   std::array<char, 40> text{};
   std::snprintf(text.data(), text.size(), "%.17g", value);
   // the shortest that reads back as the same
+  if (value == std::round(value)) return text.data();
   for (int precision = 1; precision < 17; ++precision) {
     std::array<char, 40> shorter{};
     std::snprintf(shorter.data(), shorter.size(), "%.*g", precision, value);

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <vector>
+
+#include "scripts/script.hpp"
+
+namespace o80::test {
+
+/// What commands with the linear profile mean on a robot without limits, written from the rules
+/// (docs/commands.md) a second time, as plainly as can be: it shares no code with the controller.
+class LinearReference {
+ public:
+  /// How a command of the script stands.
+  struct Outcome {
+    Status status = Status::none;
+    Iteration iteration = 0;
+    bool operator==(const Outcome&) const = default;
+  };
+
+  explicit LinearReference(const Script& script);
+
+  /// Any step but run.
+  void act(const ScriptStep& step, std::size_t place);
+  /// One iteration.
+  void step();
+
+  /// Desired, as the field holds it, of every actuator and number.
+  const std::vector<std::vector<long double>>& desired() const { return desired_; }
+  /// Of the commands that were pulsed, by their place in the script.
+  const std::map<std::size_t, Outcome>& outcomes() const { return outcomes_; }
+  Iteration iteration() const { return next_ - 1; }
+
+ private:
+  struct Queued {
+    std::size_t place;
+    const ScriptStep* step;
+  };
+  struct Actuator {
+    std::deque<Queued> queue;  // the running one first
+    bool running = false;
+    std::size_t row = 0;
+    Iteration first = 0;  // of the row
+    Iteration last = 0;
+    std::vector<long double> from;
+    std::vector<long double> to;
+    std::int64_t exact = 0;    // end of the queue so far [ns]
+    bool unbroken = false;     // the queue goes on from the iteration before
+    std::int64_t started = 0;  // exact time at which the running command began [ns]
+  };
+
+  void restart(const std::vector<double>* states);
+  void drop(std::uint16_t actuator, Status status, Iteration iteration);
+  void drop_lane(std::uint16_t actuator, std::uint32_t lane);
+  void step(std::size_t a);
+  bool begin_command(std::size_t a);
+  void begin_row(std::size_t a);
+  Iteration end_of_row(std::size_t a);
+  long double observed(std::size_t a, std::size_t n) const;
+  long double between(std::size_t a, std::size_t n) const;
+
+  const Script& script_;
+  std::vector<Actuator> actuators_;
+  std::vector<std::vector<long double>> desired_;
+  std::vector<std::vector<const double*>> readings_;  // null: where it is desired
+  std::map<std::uint32_t, std::vector<Queued>> batches_;
+  std::map<std::size_t, Outcome> outcomes_;
+  Iteration next_ = 0;
+};
+
+}  // namespace o80::test

@@ -1,0 +1,126 @@
+// The controller beside a second implementation of the rules, on random scripts, bit for bit.
+#include "scripts/linear_reference.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <string>
+
+#include "scripts/script_generator.hpp"
+#include "scripts/script_shrink.hpp"
+#include "scripts/script_world.hpp"
+
+namespace o80::test {
+namespace {
+
+constexpr std::int64_t kIterationsOfEachRun = 120'000;
+
+/// Both play a script side by side; says where they differ first, or nothing.
+class Comparison {
+ public:
+  explicit Comparison(const Script& script) : script_(script), world_(script), reference_(script) {}
+
+  std::string run() {
+    for (std::size_t i = 0; i < script_.steps.size(); ++i) {
+      const ScriptStep& step = script_.steps[i];
+      if (step.action == Action::run) {
+        for (std::int64_t n = 0; n < step.count; ++n) {
+          if (std::string found = iterate(); !found.empty()) return found;
+        }
+      } else {
+        reference_.act(step, i);
+        act(step, i);
+      }
+    }
+    for (int n = 0; n < 3; ++n) {
+      if (std::string found = iterate(); !found.empty()) return found;
+    }
+    return statuses();
+  }
+  std::int64_t iterations() const { return reference_.iteration(); }
+
+ private:
+  void act(const ScriptStep& step, std::size_t place) {
+    Controller& controller = world_.rig.controller;
+    switch (step.action) {
+      case Action::command:
+        return world_.add(step, place);
+      case Action::pulse:
+        return world_.pulse(step.lane);
+      case Action::purge:
+        return controller.purge(step.actuator, world_.rig.next);
+      case Action::purge_own:
+        return controller.purge_lane(step.lane, step.actuator, world_.rig.next);
+      case Action::interrupt:
+        return controller.interrupt(step.actuator, world_.iteration);
+      case Action::halt:
+        return controller.halt(world_.rig.next);
+      case Action::restart:
+        return world_.restart(nullptr);
+      case Action::restart_with:
+        return world_.restart(&step.values);
+      case Action::read:
+        world_.actuators[step.actuator].numbers[step.number].reading = step.values[0];
+        return;
+      case Action::track:
+        for (ActuatorTrack& actuator : world_.actuators) {
+          for (NumberTrack& number : actuator.numbers) number.reading.reset();
+        }
+        return;
+      default:
+        return;
+    }
+  }
+
+  std::string iterate() {
+    if (const auto failure = world_.step()) return failure->text;
+    reference_.step();
+    for (std::size_t a = 0; a < world_.actuators.size(); ++a) {
+      for (std::size_t n = 0; n < world_.actuators[a].numbers.size(); ++n) {
+        const long double desired = world_.actuators[a].numbers[n].now;
+        const long double expected = reference_.desired()[a][n];
+        if (desired == expected) continue;
+        return world_.where(a, n) + std::to_string(desired) + ", not " + std::to_string(expected);
+      }
+    }
+    return {};
+  }
+
+  std::string statuses() const {
+    for (const SentCommand* command : world_.sent) {
+      const LinearReference::Outcome& expected = reference_.outcomes().at(command->step);
+      const LinearReference::Outcome found =
+          is_end(command->status) ? LinearReference::Outcome{command->status, command->ended_at}
+                                  : LinearReference::Outcome{};
+      if (found == expected) continue;
+      return "the command of step " + std::to_string(command->step) + " is " +
+             std::string(to_text(found.status)) + " at " + std::to_string(found.iteration) +
+             ", not " + std::string(to_text(expected.status)) + " at " +
+             std::to_string(expected.iteration);
+    }
+    return {};
+  }
+
+  const Script& script_;
+  ScriptWorld world_;
+  LinearReference reference_;
+};
+
+TEST(LinearReference, AgreesWithTheControllerBitForBit) {
+  const char* wanted = std::getenv("O80_REFERENCE_ITERATIONS");
+  const std::int64_t most = wanted == nullptr ? kIterationsOfEachRun : std::stoll(wanted);
+  std::int64_t played = 0;
+  for (std::uint64_t seed = 0; played < most; ++seed) {
+    const Script script = linear_script(seed);
+    Comparison comparison(script);
+    const bool differs = !comparison.run().empty();
+    played += comparison.iterations();
+    if (!differs) continue;
+    const Script shortest =
+        shrunk(script, [](const Script& shorter) { return !Comparison(shorter).run().empty(); });
+    FAIL() << "seed " << seed << ", " << Comparison(shortest).run() << '\n' << shortest.text();
+  }
+}
+
+}  // namespace
+}  // namespace o80::test
