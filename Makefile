@@ -1,5 +1,5 @@
 # Everything made lies in .venv and build/. Options go through ARGS="...".
-.PHONY: demo test torture model fuzz rt bench growth stress format clean distclean
+.PHONY: demo test scripts torture model fuzz rt bench growth stress format clean distclean
 ARGS ?=
 export PYTHONDONTWRITEBYTECODE := 1
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
@@ -12,6 +12,13 @@ demo:
 test:
 	@tools/setup.sh test
 	@.venv/bin/python tools/test.py $(ARGS)
+
+# random scripts of motion, 100 000 by default: ARGS="--count 1000000" or ARGS="--replay FILE"
+scripts:
+	@tools/setup.sh test
+	@.venv/bin/cmake --preset dev > /dev/null
+	@.venv/bin/cmake --build --preset dev --target o80_test_scripts
+	@.venv/bin/python tools/scripts.py $(ARGS)
 
 # processes killed and stopped until ARGS="--kills 10000" is reached
 torture:

@@ -89,6 +89,23 @@ TEST(Pace, ATrajectoryWithTimesOfItsOwnDoesNotDrift) {
   EXPECT_EQ(end_of_trajectory(999, kSecond), 1000);
 }
 
+TEST(Pace, RowsCloserThanAnIterationAreNoDebtOfThoseThatFollow) {
+  // 199 rows over 1 s: every 10 ms one, and another one 0.1 ms later
+  Rig rig(plain_robot(1));
+  std::vector<double> targets;
+  std::vector<std::int64_t> times;
+  for (std::int64_t i = 1; i <= 100; ++i) {
+    for (std::int64_t late = 0; late < (i < 100 ? 2 : 1); ++late) {
+      targets.push_back(static_cast<double>(i));
+      times.push_back(10 * i * kMillisecond + late * kMillisecond / 10);
+    }
+  }
+  rig.add_rows(0, during(0), 199, targets, times);
+  const CommandId batch = rig.pulse();
+  rig.run(1200);
+  EXPECT_EQ(rig.witness.last(batch + 2).iteration, 1000);
+}
+
 TEST(Pace, ATrajectoryWithRowsDenserThanIterationsEndsInTime) {
   EXPECT_NEAR(static_cast<double>(end_of_trajectory(2000, 1000 * kMillisecond)), 1000.0, 1.0);
   EXPECT_NEAR(static_cast<double>(end_of_trajectory(100, 10 * kMillisecond)), 10.0, 1.0);
