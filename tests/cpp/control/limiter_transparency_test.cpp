@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <random>
+#include <string>
 
 #include "control/rig.hpp"
 
@@ -123,11 +126,12 @@ TEST_P(LimiterTransparency, WhatAsksForALittleMoreIsHeldBackAndSaysSo) {
   EXPECT_TRUE(clamped);
 }
 
-INSTANTIATE_TEST_SUITE_P(Rates, LimiterTransparency, testing::Values(0, 1, 2),
-                         [](const testing::TestParamInfo<int>& info) {
-                           return std::array{"Speed", "Acceleration", "Jerk"}.at(
-                               static_cast<std::size_t>(info.param));
-                         });
+std::string name_of_rates(const testing::TestParamInfo<int>& limited) {
+  constexpr std::array kNames{"Speed", "Acceleration", "Jerk"};
+  return kNames.at(static_cast<std::size_t>(limited.param));
+}
+
+INSTANTIATE_TEST_SUITE_P(Rates, LimiterTransparency, testing::Values(0, 1, 2), name_of_rates);
 
 }  // namespace
 }  // namespace o80::test
