@@ -41,6 +41,12 @@ Limits limits_of(const std::vector<double>& positions, bool acceleration, bool j
   constexpr double kNone = std::numeric_limits<double>::infinity();
   if (!acceleration) found.acceleration = kNone;
   if (!acceleration || !jerk) found.jerk = kNone;
+  if (acceleration && jerk) {
+    // how a number would stop is planned in whole iterations: near a bound that costs up to half of
+    // what an iteration can cover
+    found.minimum -= 0.5 * found.speed * 1e-3;
+    found.maximum += 0.5 * found.speed * 1e-3;
+  }
   return found;
 }
 

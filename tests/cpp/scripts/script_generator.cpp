@@ -159,8 +159,10 @@ void Generator::add_limits(NumberSpec& number, const Range& range) {
   if (dice_.one_in(2)) {
     const double low = range.low + dice_.real(0.0, 0.4) * range.size();
     const double high = range.high - dice_.real(0.0, 0.4) * range.size();
-    if (!dice_.one_in(5)) limits.minimum = low;
-    if (!dice_.one_in(5)) limits.maximum = high;
+    // not always whole numbers, but some of those lie between them
+    const double room = number.is_float() ? 0.0 : 1.0;
+    if (!dice_.one_in(5)) limits.minimum = low - room;
+    if (!dice_.one_in(5)) limits.maximum = high + room;
   }
   if (dice_.one_in(4)) return;
   // so fast that the whole range takes 4 to 2000 iterations; speed, then acceleration, come in 1

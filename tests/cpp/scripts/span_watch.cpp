@@ -52,13 +52,12 @@ void SpanWatch::restart(const ScriptWorld& world) {
 }
 
 /// Places where a motion may come to rest: its velocity falls to zero as a cubic, within its span.
-SpanWatch::Span SpanWatch::stops(const Number& number, long double place) const {
-  // a cubic from (v, a) to (0, 0) over r covers r v / 2 + r^2 a / 12, and changes no sign
+SpanWatch::Span SpanWatch::stops(const Number& number, long double place, long double rounding) {
   Span found{place, place};
-  const long double speed =
-      std::fabs(number.first) + std::fabs(number.second) + std::fabs(number.third);
-  if (speed == 0.0L) return found;
-  const long double doubt = std::fabs(number.second) + std::fabs(number.third);
+  // the speed now, from differences that lie back by half an iteration and more, and are rounded
+  const long double doubt =
+      std::fabs(number.second) + std::fabs(number.third) + (rounding > 1e-3L ? 1.0L : 0.0L);
+  if (number.first == 0.0L && doubt == 0.0L) return found;
   if (number.first + doubt > 0.0L) found.include(number.span.high);
   if (number.first - doubt < 0.0L) found.include(number.span.low);
   return found;
@@ -81,7 +80,8 @@ void SpanWatch::begin(const ScriptWorld& world, std::size_t actuator, bool taken
       span.include(load_as(kind, bytes.data()));
     }
     if (taken_over) {
-      span.include(stops(number, place));
+      span.include(
+          stops(number, place, rounding_of(world.script.actuators[actuator].numbers[n], place)));
       span.include(number.targets);
     }
     Span targets{place, place};

@@ -38,7 +38,7 @@ class SpanWatch {
   };
 
   void begin(const ScriptWorld& world, std::size_t actuator, bool taken_over);
-  Span stops(const Number& number, long double place) const;
+  static Span stops(const Number& number, long double place, long double rounding);
   std::optional<Failure> check(const ScriptWorld& world, std::size_t actuator,
                                std::size_t number) const;
 
