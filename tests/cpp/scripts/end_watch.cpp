@@ -1,5 +1,6 @@
 #include "scripts/end_watch.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -21,6 +22,7 @@ std::string positions(long double is, long double expected) {
 
 std::optional<Failure> EndWatch::step(const ScriptWorld& world) const {
   for (const SentCommand* command : world.ended) {
+    if (auto failure = says_whether_limited(world, *command)) return failure;
     if (command->status != Status::completed) continue;
     if (command->ended_at != world.iteration) {
       return Failure{"completion", "a command completed at another iteration than the present"};
@@ -33,6 +35,19 @@ std::optional<Failure> EndWatch::step(const ScriptWorld& world) const {
     if (auto failure = idle(world, a)) return failure;
   }
   return std::nullopt;
+}
+
+/// `limited` if and only if a limit changed the last row, and the row says so.
+std::optional<Failure> EndWatch::says_whether_limited(const ScriptWorld& world,
+                                                      const SentCommand& command) const {
+  if (command.status != Status::completed && command.status != Status::limited) {
+    return std::nullopt;
+  }
+  const std::size_t actuator = world.step_of(command).actuator;
+  const bool limited = command.status == Status::limited;
+  if (world.actuators[actuator].clamped == limited) return std::nullopt;
+  return Failure{"clamped", world.where(actuator, 0) +
+                                (limited ? "limited, but not clamped" : "completed, but clamped")};
 }
 
 std::optional<Failure> EndWatch::on_target(const ScriptWorld& world,
@@ -61,6 +76,10 @@ std::optional<Failure> EndWatch::masks(const ScriptWorld& world, std::size_t act
   const bool driven = track.driver != nullptr;
   if (driven && track.braking) {
     return Failure{"masks", world.where(actuator, 0) + "braking though a command runs"};
+  }
+  const auto& numbers = world.script.actuators[actuator].numbers;
+  if (track.clamped && std::ranges::none_of(numbers, &NumberSpec::limited)) {
+    return Failure{"masks", world.where(actuator, 0) + "clamped without a limit"};
   }
   if (track.active != (driven || track.braking)) {
     return Failure{"masks", world.where(actuator, 0) +

@@ -15,7 +15,7 @@
 namespace o80::test {
 namespace {
 
-constexpr std::uint64_t kScriptsOfEachRun = 1500;
+constexpr std::uint64_t kScriptsOfEachRun = 1000;
 constexpr std::size_t kMostShown = 6;
 
 std::uint64_t from_environment(const char* name, std::uint64_t otherwise) {
@@ -24,7 +24,7 @@ std::uint64_t from_environment(const char* name, std::uint64_t otherwise) {
 }
 
 TEST(Script, ReadsBackWhatItPrints) {
-  for (std::uint64_t seed = 0; seed < 200; ++seed) {
+  for (std::uint64_t seed = 0; seed < 50; ++seed) {
     const std::string text = random_script(seed).text();
     ASSERT_EQ(Script::parse(text).text(), text) << "seed " << seed;
   }

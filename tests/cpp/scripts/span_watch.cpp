@@ -97,12 +97,14 @@ void SpanWatch::begin(const ScriptWorld& world, std::size_t actuator, bool taken
 
     number.fastest = 0.0L;
     if (step.head.pace == Pace::speed && paced == n && step.head.start == Start::desired) {
+      const NumberSpec& spec = world.script.actuators[actuator].numbers[n];
       long double seam = 0.0L;
       if (world.actuators[actuator].previous != nullptr || world.actuators[actuator].braking ||
           taken_over || number.first != 0.0L) {
-        seam = std::fabs(number.first) + std::fabs(number.second) + std::fabs(number.third);
+        // differences lie back, and those of integers are rounded
+        seam = std::fabs(number.first) + std::fabs(number.second) + std::fabs(number.third) +
+               (spec.is_float() ? 0.0L : 7.0L);
       }
-      const NumberSpec& spec = world.script.actuators[actuator].numbers[n];
       if (std::isfinite(spec.limits.jerk)) {
         const long double jerk = spec.limits.jerk * kPeriod * kPeriod * kPeriod;
         seam += number.second * number.second / (2.0L * jerk) + std::fabs(number.second);
