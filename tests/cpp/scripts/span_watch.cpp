@@ -71,13 +71,15 @@ void SpanWatch::begin(const ScriptWorld& world, std::size_t actuator, bool taken
     Number& number = numbers_[actuator][n];
     const NumberTrack& track = world.actuators[actuator].numbers[n];
     const long double place = track.before;
+    number.from = place;
     Span span{place, place};
     if (step.head.start == Start::observed && track.reading && world.names(command, n) &&
         std::isfinite(*track.reading)) {
       std::array<std::byte, 8> bytes{};
       const Kind kind = world.script.actuators[actuator].numbers[n].kind;
       store_as(kind, *track.reading, bytes.data());
-      span.include(load_as(kind, bytes.data()));
+      number.from = load_as(kind, bytes.data());
+      span.include(number.from);
     }
     if (taken_over) {
       span.include(
@@ -157,7 +159,8 @@ std::optional<Failure> SpanWatch::step(const ScriptWorld& world) {
         if (!world.script.actuators[a].numbers[n].moves()) continue;
         if (auto failure = check(world, a, n)) return failure;
       }
-      const long double first = track.now - track.before;
+      // a jump to the observed state is no speed
+      const long double first = track.now - (begun ? number.from : track.before);
       const long double second = first - number.first;
       number.third = second - number.second;
       number.second = second;

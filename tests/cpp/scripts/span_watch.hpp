@@ -31,6 +31,7 @@ class SpanWatch {
   struct Number {
     Span span;                  // of the motion under way
     Span targets;               // of its command
+    long double from = 0.0L;    // where it began
     long double first = 0.0L;   // difference of the last two positions
     long double second = 0.0L;  // of the last two differences
     long double third = 0.0L;
