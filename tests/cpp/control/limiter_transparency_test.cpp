@@ -42,10 +42,10 @@ Limits limits_of(const std::vector<double>& positions, bool acceleration, bool j
   if (!acceleration) found.acceleration = kNone;
   if (!acceleration || !jerk) found.jerk = kNone;
   if (acceleration && jerk) {
-    // how a number would stop is planned in whole iterations: near a bound that costs up to half of
-    // what an iteration can cover
-    found.minimum -= 0.5 * found.speed * 1e-3;
-    found.maximum += 0.5 * found.speed * 1e-3;
+    // how a number would stop is planned in whole iterations: near a bound that costs up to what an
+    // iteration can cover
+    found.minimum -= found.speed * 1e-3;
+    found.maximum += found.speed * 1e-3;
   }
   return found;
 }
