@@ -23,9 +23,11 @@ else()
   set(test_options -O0 -g1)
 endif()
 
-# the control layer once more, with each look at a block counted
-file(GLOB control_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/control/*.cpp)
-add_library(o80_bounded OBJECT EXCLUDE_FROM_ALL ${control_sources})
+# the layers that do the work of an iteration once more, with that work counted
+file(GLOB counted_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/control/*.cpp
+     ${PROJECT_SOURCE_DIR}/src/runtime/*.cpp
+)
+add_library(o80_bounded OBJECT EXCLUDE_FROM_ALL ${counted_sources})
 target_compile_definitions(o80_bounded PUBLIC O80_COUNT_BLOCKS)
 target_compile_options(o80_bounded PRIVATE -ffp-contract=off)
 target_link_libraries(o80_bounded PRIVATE o80_headers o80_warnings)

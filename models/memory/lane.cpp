@@ -14,7 +14,7 @@
 //   - O80_CRASH_POINT("lane.before_copy");
 //   + page_->committed.store(sent_ + count, std::memory_order_release);
 // mutant tickets_not_looked_at_first: src/memory/lane_receiver.cpp
-//   - below_ = view_.bell().tickets.load(std::memory_order_seq_cst);
+//   - below_ = drawn;
 //   + below_ = ~std::uint64_t{0};
 // mutant ticket_drawn_relaxed: src/memory/lane_sender.cpp
 //   - view_.bell().tickets.fetch_add(1, std::memory_order_seq_cst);

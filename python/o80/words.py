@@ -54,3 +54,4 @@ class Reason(StrEnum):
     SILENCE = "silence"
     STOPPED = "stopped"
     HALTED = "halted"
+    FULL = "full"  #: more batches wait for later iterations than one frontend may have

@@ -35,6 +35,20 @@ std::byte* BatchBuilder::open(const RecordHead& head, std::uint64_t payload_byte
   std::byte* bytes = blocks_[first].bytes.data();
   std::memcpy(bytes, &written, sizeof written);
   ++records_;
+  switch (head.kind) {
+    case RecordKind::command:
+      ++commands_;
+      break;
+    case RecordKind::request:
+      ++requests_;
+      break;
+    case RecordKind::take_control:
+    case RecordKind::release_control:
+      ++control_orders_;
+      break;
+    default:
+      break;
+  }
   return bytes + sizeof written;
 }
 
@@ -44,7 +58,6 @@ std::uint32_t BatchBuilder::command(const RecordHead& head, std::span<const std:
   assert(times.empty() || (times.size() == rows && head.pace == Pace::duration));
   RecordHead written = head;
   written.kind = RecordKind::command;
-  has_commands_ = true;
   written.partial = mask.empty() ? 0 : 1;
   written.rows = rows;
   std::byte* bytes = open(written, mask.size_bytes() + times.size_bytes() + states.size_bytes());
@@ -86,6 +99,7 @@ std::span<const Block> BatchBuilder::seal(const BatchRecord& batch) {
   written.kind = RecordKind::batch;
   written.records = records_;
   written.blocks = static_cast<std::uint32_t>(blocks_.size());
+  if (is_express(batch)) written.flags |= kExpress;
   std::memcpy(blocks_.front().bytes.data(), &written, sizeof written);
 
   // the ids follow the batch's
@@ -101,14 +115,18 @@ std::span<const Block> BatchBuilder::seal(const BatchRecord& batch) {
   return blocks_;
 }
 
+bool BatchBuilder::is_express(const BatchRecord& batch) const noexcept {
+  return commands_ == 0 && requests_ == 0 && records_ > 0 && records_ <= kMostExpressRecords &&
+         batch.at == kNow && batch.burst == 0 && (batch.flags & kBurstUntilEnded) == 0;
+}
+
 void BatchBuilder::set_ticket(std::uint64_t ticket) noexcept {
   std::memcpy(blocks_.front().bytes.data() + offsetof(BatchRecord, ticket), &ticket, sizeof ticket);
 }
 
 void BatchBuilder::clear() {
   blocks_.resize(1);
-  records_ = 0;
-  has_commands_ = false;
+  records_ = commands_ = requests_ = control_orders_ = 0;
 }
 
 }  // namespace o80

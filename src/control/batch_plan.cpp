@@ -1,20 +1,33 @@
 #include "o80/control/batch_plan.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace o80 {
 namespace {
 
-/// What a plan writes into `BatchRecord::own`.
+// what a plan writes into `BatchRecord::own`; its work takes the place of `blocks`, which the pool
+// knows too
 constexpr std::size_t kSteps = 0;
 constexpr std::size_t kMissingFrom = 1;
 constexpr std::size_t kSpareFirst = 2;
-constexpr std::size_t kSpareLast = 3;
+constexpr std::size_t kTraits = 3;
 constexpr std::size_t kSpareBlocks = 4;
+
+// traits: the number of requests, and these
+constexpr std::uint32_t kIsExpress = 1U << 16;
+constexpr std::uint32_t kReleases = 1U << 17;
+
+// what steps take of an iteration, next to copying a block: 1
+constexpr std::uint32_t kBatchWork = 6;
+constexpr std::uint32_t kStepWork = 2;
+constexpr std::uint32_t kRequestWork = 16;  // and one for each actuator: it may start afresh
 
 BatchRecord& record_of(BlockPool& pool, BlockIndex batch) noexcept {
   return *reinterpret_cast<BatchRecord*>(pool.bytes(batch));
 }
+
+void spend(std::uint32_t& budget, std::uint32_t work) noexcept { budget -= std::min(budget, work); }
 
 }  // namespace
 
@@ -24,7 +37,8 @@ BatchPlanner::BatchPlanner(const Schema& schema, RecordCheck::Layouts layouts, B
       check_(schema, std::move(layouts)),
       actuators_(static_cast<std::uint32_t>(schema.actuators.size())),
       lanes_(lanes),
-      open_(std::size_t{lanes} * actuators_),
+      targets_(std::size_t{lanes} * actuators_),
+      listed_(std::size_t{lanes} * actuators_),
       tails_(pool.size(), kNoBlock),
       known_(pool.size(), Known::nothing) {}
 
@@ -33,39 +47,46 @@ void BatchPlanner::begin(Lane& lane, BlockIndex batch) noexcept {
   lane.cursor = pool_.next(batch);
   lane.begun = false;
   lane.last_step = kNoBlock;
-  lane.invalid = kNoBlock;
   lane.place = 0;
   lane.blocks = 1;
-  ++lane.epoch;
-  record_of(pool_, batch).own = {kNoBlock, 0, kNoBlock, kNoBlock, 0};
+  lane.effort = {.work = kBatchWork, .express = true};
+  lane.control_orders = 0;
+  begin_part(lane);
+  record_of(pool_, batch).own = {kNoBlock, 0, kNoBlock, 0, 0};
 }
 
 bool BatchPlanner::check(std::uint32_t lane_index, BlockIndex batch,
-                         std::uint32_t budget) noexcept {
+                         std::uint32_t& budget) noexcept {
   if (known_[batch] != Known::nothing) return true;
   Lane& lane = lanes_[lane_index];
-  if (lane.batch != batch) begin(lane, batch);
   const BatchRecord& record = pool_.batch(batch);
-  if (record.kind != RecordKind::batch || record.records >= record.blocks ||
-      record.blocks != pool_.chain(batch).blocks) {
-    lane.batch = kNoBlock;
-    known_[batch] = Known::garbage;
-    return true;
+  if (lane.batch != batch) {
+    if (record.kind != RecordKind::batch || record.records >= record.blocks ||
+        record.blocks != pool_.chain(batch).blocks) {
+      known_[batch] = Known::garbage;
+      return true;
+    }
+    begin(lane, batch);
   }
   while (lane.place < record.records && lane.cursor != kNoBlock) {
     if (budget == 0 || !check_record(lane_index, budget)) return false;
   }
-  complete(lane);
+  complete(lane_index, budget);
   return true;
 }
 
-void BatchPlanner::complete(Lane& lane) noexcept {
+void BatchPlanner::complete(std::uint32_t lane_index, std::uint32_t& budget) noexcept {
+  end_part(lane_index, budget);
+  Lane& lane = lanes_[lane_index];
   const BlockChain chain = pool_.chain(lane.batch);
   BatchRecord& record = record_of(pool_, lane.batch);
+  const bool is_express = lane.effort.express && lane.place == record.records;
   record.own[kMissingFrom] = lane.place;
   record.own[kSpareFirst] = lane.cursor;
-  record.own[kSpareLast] = chain.last;
+  record.own[kTraits] =
+      lane.effort.requests | (is_express ? kIsExpress : 0) | (lane.effort.releases ? kReleases : 0);
   record.own[kSpareBlocks] = chain.blocks - lane.blocks;
+  record.blocks = lane.effort.work;
   known_[lane.batch] = Known::plan;
   lane.batch = kNoBlock;
 }
@@ -122,15 +143,18 @@ bool BatchPlanner::check_record(std::uint32_t lane_index, std::uint32_t& budget)
     lane.last = pool_.next(lane.last);
   }
   RecordHead& head = pool_.head(lane.cursor);
+  if (lane.verdict == Verdict::valid && is_one_too_many(lane, head)) {
+    lane.verdict = Verdict::invalid;
+  }
   if (lane.verdict == Verdict::invalid) {
-    head.kind = kInvalidRecord;
+    head.kind = RecordKind::invalid_list;
     head.id = record_id(pool_.batch(lane.batch).id, lane.place);
     head.payload_bytes =
         static_cast<std::uint32_t>(lane.record_blocks * kBlockBytes - sizeof(RecordHead));
   }
   if (is_timed(head)) note_rows(head, lane.progress.rows);
   head.own = {kNoBlock, lane.batch, lane.last, kNoBlock};
-  add(lane_index, lane.cursor);
+  add(lane_index, lane.cursor, budget);
   lane.cursor = pool_.next(lane.last);
   lane.begun = false;
   lane.blocks += lane.record_blocks;
@@ -138,26 +162,152 @@ bool BatchPlanner::check_record(std::uint32_t lane_index, std::uint32_t& budget)
   return true;
 }
 
-void BatchPlanner::add(std::uint32_t lane_index, BlockIndex record) noexcept {
-  Lane& lane = lanes_[lane_index];
-  const RecordHead& head = pool_.head(record);
-  if (head.kind == kInvalidRecord) {
-    if (lane.invalid != kNoBlock) return join(lane.invalid, record);
-    lane.invalid = record;
-  } else if (head.kind == RecordKind::command) {
-    OpenList& list = open(lane_index, head.actuator);
-    if (head.mode == Mode::queue && list.epoch == lane.epoch) return join(list.first, record);
-    list = {record, lane.epoch};
-  } else if (head.kind == RecordKind::purge && head.actuator != kEveryActuator) {
-    open(lane_index, head.actuator).epoch = 0;
-  } else {
-    ++lane.epoch;  // nothing that comes later may be taken before it
+/// Whoever writes into its lane itself may have passed over what `pulse` refuses.
+bool BatchPlanner::is_one_too_many(Lane& lane, const RecordHead& head) const noexcept {
+  switch (head.kind) {
+    case RecordKind::request:
+      return lane.effort.requests >= kMostRequests;
+    case RecordKind::take_control:
+    case RecordKind::release_control:
+      return ++lane.control_orders > kMostControlOrders;
+    default:
+      return false;
   }
-  add_step(lane, record);
 }
 
-void BatchPlanner::add_step(Lane& lane, BlockIndex record) noexcept {
+// ------------------------------------------------------------------------------ steps
+
+void BatchPlanner::add(std::uint32_t lane_index, BlockIndex record,
+                       std::uint32_t& budget) noexcept {
+  Lane& lane = lanes_[lane_index];
   tails_[record] = record;
+  switch (pool_.head(record).kind) {
+    case RecordKind::command:
+      lane.effort.express = false;
+      return add_command(lane_index, record);
+    case RecordKind::purge:
+      return add_purge(lane_index, record, budget);
+    case RecordKind::request:
+      lane.effort.express = false;
+      ++lane.effort.requests;
+      end_part(lane_index, budget);
+      return add_step(lane, record, kRequestWork + actuators_);
+    case RecordKind::release_control:
+      lane.effort.releases = true;
+      [[fallthrough]];
+    case RecordKind::take_control:
+      return add_step(lane, record, kStepWork);
+    default:
+      lane.effort.express = false;
+      add_to_end(lane, End::invalid, record);
+  }
+}
+
+void BatchPlanner::add_command(std::uint32_t lane_index, BlockIndex record) noexcept {
+  Lane& lane = lanes_[lane_index];
+  const RecordHead& head = pool_.head(record);
+  Target& to = target(lane_index, head.actuator);
+  list(lane_index, head.actuator);
+  if (head.mode == Mode::queue) {
+    if (to.list != kNoBlock) return join(to.list, record, record);
+    to.list = record;
+    to.list_is_step = false;
+    return;
+  }
+  drop_list(lane, to, End::overwritten);
+  to.list = record;
+  to.list_is_step = !to.done.empty;
+  if (to.list_is_step) add_step(lane, record, kStepWork);
+  to.done.empty = to.done.empty_own = true;
+}
+
+void BatchPlanner::add_purge(std::uint32_t lane_index, BlockIndex record,
+                             std::uint32_t& budget) noexcept {
+  const RecordHead& head = pool_.head(record);
+  const bool own = head.partial != 0;
+  const bool all = head.actuator == kEveryActuator;
+  const bool does_something =
+      all ? purge_all(lane_index, own, budget) : purge_one(lane_index, head.actuator, own);
+  Lane& lane = lanes_[lane_index];
+  if (!does_something) return add_to_end(lane, End::completed, record);
+  add_step(lane, record, kStepWork + (all ? actuators_ : 0));
+}
+
+/// True if it does something to the queue, beside dropping what this part would append.
+bool BatchPlanner::purge_one(std::uint32_t lane_index, std::uint32_t actuator, bool own) noexcept {
+  Target& to = target(lane_index, actuator);
+  drop_list(lanes_[lane_index], to, End::purged);
+  const Done before = to.done;
+  if (!own) {
+    to.done = {.empty = true, .empty_own = true, .at_rest = true, .purged = true};
+    return !before.purged;
+  }
+  to.done.empty_own = true;
+  to.done.at_rest = before.at_rest || before.empty;
+  return !before.empty_own || (before.empty && !before.at_rest);
+}
+
+bool BatchPlanner::purge_all(std::uint32_t lane_index, bool own, std::uint32_t& budget) noexcept {
+  Lane& lane = lanes_[lane_index];
+  bool does_something = own ? !lane.all.empty_own : !lane.all.purged;
+  for (const std::uint16_t actuator : listed(lane_index)) {
+    does_something = purge_one(lane_index, actuator, own) || does_something;
+    target(lane_index, actuator).listed = false;
+    spend(budget, 1);
+  }
+  lane.listed = 0;
+  lane.all.empty_own = true;
+  if (!own) {
+    lane.all = {.empty = true, .empty_own = true, .at_rest = true, .purged = true};
+    ++lane.epoch;  // the same holds for each of them
+  }
+  return does_something;
+}
+
+/// What has not been dropped is appended.
+void BatchPlanner::end_part(std::uint32_t lane_index, std::uint32_t& budget) noexcept {
+  Lane& lane = lanes_[lane_index];
+  for (const std::uint16_t actuator : listed(lane_index)) {
+    const Target& to = target(lane_index, actuator);
+    spend(budget, 1);
+    if (to.list == kNoBlock || to.list_is_step) continue;
+    pool_.head(to.list).mode = Mode::queue;  // there is nothing to overwrite
+    add_step(lane, to.list, kStepWork);
+  }
+  begin_part(lane);
+}
+
+void BatchPlanner::begin_part(Lane& lane) noexcept {
+  ++lane.epoch;
+  lane.listed = 0;
+  lane.all = {};
+  lane.ends.fill(kNoBlock);
+}
+
+void BatchPlanner::drop_list(Lane& lane, Target& to, End end) noexcept {
+  if (to.list == kNoBlock) return;
+  if (to.list_is_step) {
+    pool_.head(to.list).kind = end == End::overwritten ? RecordKind::overwriter_overwritten
+                                                       : RecordKind::overwriter_purged;
+  } else {
+    add_to_end(lane, end, to.list);
+  }
+  to.list = kNoBlock;
+}
+
+void BatchPlanner::add_to_end(Lane& lane, End end, BlockIndex list) noexcept {
+  constexpr std::array<RecordKind, 4> kKinds = {
+      RecordKind::invalid_list, RecordKind::overwritten_list, RecordKind::purged_list,
+      RecordKind::completed_list};
+  BlockIndex& first = lane.ends[static_cast<std::size_t>(end)];
+  if (first != kNoBlock) return join(first, list, tails_[list]);
+  first = list;
+  pool_.head(list).kind = kKinds[static_cast<std::size_t>(end)];
+  add_step(lane, list, kStepWork);
+}
+
+void BatchPlanner::add_step(Lane& lane, BlockIndex record, std::uint32_t work) noexcept {
+  lane.effort.work += work;
   if (lane.last_step == kNoBlock) {
     record_of(pool_, lane.batch).own[kSteps] = record;
   } else {
@@ -166,17 +316,43 @@ void BatchPlanner::add_step(Lane& lane, BlockIndex record) noexcept {
   lane.last_step = record;
 }
 
-void BatchPlanner::join(BlockIndex list, BlockIndex record) noexcept {
-  pool_.head(tails_[list]).own[Own::kNext] = record;
-  tails_[list] = record;
+void BatchPlanner::join(BlockIndex list, BlockIndex first, BlockIndex last) noexcept {
+  pool_.head(tails_[list]).own[Own::kNext] = first;
+  tails_[list] = last;
+}
+
+BatchPlanner::Target& BatchPlanner::target(std::uint32_t lane_index,
+                                           std::uint32_t actuator) noexcept {
+  const Lane& lane = lanes_[lane_index];
+  Target& to = targets_[std::size_t{lane_index} * actuators_ + actuator];
+  if (to.epoch != lane.epoch) to = {.epoch = lane.epoch, .done = lane.all};
+  return to;
+}
+
+void BatchPlanner::list(std::uint32_t lane_index, std::uint32_t actuator) noexcept {
+  Target& to = target(lane_index, actuator);
+  if (to.listed) return;
+  to.listed = true;
+  Lane& lane = lanes_[lane_index];
+  listed_[std::size_t{lane_index} * actuators_ + lane.listed++] =
+      static_cast<std::uint16_t>(actuator);
+}
+
+// ------------------------------------------------------------------------------ what was planned
+
+Effort BatchPlanner::effort(BlockIndex batch) const noexcept {
+  if (known_[batch] != Known::plan) return {.work = kBatchWork};
+  const BatchRecord& record = pool_.batch(batch);
+  const std::uint32_t traits = record.own[kTraits];
+  return {record.blocks, traits & 0xFFFF, (traits & kIsExpress) != 0, (traits & kReleases) != 0};
 }
 
 std::optional<Plan> BatchPlanner::plan(BlockIndex batch) noexcept {
   const Known known = std::exchange(known_[batch], Known::nothing);
   if (known != Known::plan) return std::nullopt;
   const auto& own = pool_.batch(batch).own;
-  return Plan{
-      own[kSteps], own[kMissingFrom], {own[kSpareFirst], own[kSpareLast], own[kSpareBlocks]}};
+  const BlockIndex last = pool_.chain(batch).last;
+  return Plan{own[kSteps], own[kMissingFrom], {own[kSpareFirst], last, own[kSpareBlocks]}};
 }
 
 void BatchPlanner::forget(std::uint32_t lane, BlockIndex batch) noexcept {

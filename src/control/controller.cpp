@@ -14,6 +14,7 @@
 #include "o80/control/actuator_queue.hpp"
 #include "o80/control/batch_plan.hpp"
 #include "o80/control/ledger.hpp"
+#include "o80/control/purge_tickets.hpp"
 #include "o80/control/state_layout.hpp"
 
 namespace o80 {
@@ -90,6 +91,7 @@ class Controller::Body {
   void each(std::uint32_t actuator, Visit&& visit) noexcept {
     const auto last = static_cast<std::uint32_t>(actuators_.size());
     for (std::uint32_t i = actuator == kEveryActuator ? 0 : actuator; i < last; ++i) {
+      O80_COUNT(queue_dropped);
       visit(actuators_[i]);
       busy_[i / 64] |= std::uint64_t{1} << (i % 64);
       if (actuator != kEveryActuator) return;
@@ -100,8 +102,14 @@ class Controller::Body {
   Ledger ledger;
 
  private:
-  void take_step(std::uint32_t lane, BlockIndex record, BatchHandler& handler) noexcept;
-  void purge(std::uint32_t lane, const RecordHead& head, Iteration iteration) noexcept;
+  /// The batch that is being taken.
+  struct Taking {
+    std::uint32_t lane;
+    std::uint64_t ticket;
+  };
+  void take_step(const Taking& from, BlockIndex record, BatchHandler& handler) noexcept;
+  void take_commands(const Taking& from, BlockIndex first, Iteration iteration) noexcept;
+  void purge(const Taking& from, const RecordHead& head, Iteration iteration) noexcept;
   const std::byte* of(std::uint32_t actuator, const std::byte* block) const noexcept {
     return block + offsets_[actuator];
   }
@@ -110,6 +118,7 @@ class Controller::Body {
 
  public:
   BatchPlanner planner;
+  PurgeTickets purge_tickets;
   std::vector<Block> desired;
   std::vector<std::uint64_t> active_mask;
   std::vector<std::uint64_t> clamped_mask;
@@ -130,6 +139,7 @@ Controller::Body::Body(const Schema& schema, BlockPool& blocks, StatusSink& sink
       ledger(blocks, sink),
       layouts_(layouts_of(schema)),
       planner(schema, pointers_to(layouts_), blocks, lanes),
+      purge_tickets(lanes, static_cast<std::uint32_t>(schema.actuators.size())),
       desired((schema.head.block + kBlockBytes - 1) / kBlockBytes) {
   const auto count = static_cast<std::uint32_t>(schema.actuators.size());
   const std::uint32_t words = mask_words(count);
@@ -155,6 +165,7 @@ void Controller::Body::restart(const std::byte* observed, const std::byte* wante
                                Iteration row) noexcept {
   const std::byte* source = wanted != nullptr ? wanted : observed;
   for (std::uint32_t i = 0; i < actuators_.size(); ++i) {
+    O80_COUNT(queue_dropped);
     actuators_[i].drop(Status::purged, Reason::fresh_start, row);
     actuators_[i].restart(of(i, source));
     busy_[i / 64] |= std::uint64_t{1} << (i % 64);
@@ -167,22 +178,24 @@ void Controller::Body::restart(const std::byte* observed, const std::byte* wante
 }
 
 void Controller::Body::take(std::uint32_t lane, BlockIndex batch, BatchHandler& handler) noexcept {
-  planner.check(lane, batch, std::numeric_limits<std::uint32_t>::max());
+  std::uint32_t budget = std::numeric_limits<std::uint32_t>::max();
+  planner.check(lane, batch, budget);
   const std::optional<Plan> plan = planner.plan(batch);
   if (!plan) return ledger.reject(lane, batch, Reason::invalid, 0, handler.iteration());
 
   const Iteration taken_at = handler.iteration();
+  const Taking from{lane, pool.batch(batch).ticket};
   ledger.enter(lane, batch, plan->spare, taken_at);
   ledger.reject_from(batch, plan->missing_from, Reason::invalid, 0, taken_at);
   for (BlockIndex step = plan->steps; step != kNoBlock;) {
     const BlockIndex record = step;
     step = pool.head(record).own[Own::kOther];
-    take_step(lane, record, handler);
+    take_step(from, record, handler);
   }
   ledger.close(batch, taken_at);
 }
 
-void Controller::Body::take_step(std::uint32_t lane, BlockIndex record,
+void Controller::Body::take_step(const Taking& from, BlockIndex record,
                                  BatchHandler& handler) noexcept {
   const RecordHead& head = pool.head(record);
   // a fresh start moves the count on: the request bears the iteration of the fresh row
@@ -191,39 +204,64 @@ void Controller::Body::take_step(std::uint32_t lane, BlockIndex record,
     ledger.end(record, outcome.status, outcome.reason, outcome.aux, now);
   };
   switch (head.kind) {
-    case RecordKind::command: {
-      ActuatorQueue& queue = actuators_[head.actuator];
-      if (head.mode == Mode::overwrite) {
-        queue.drop(Status::overwritten, Reason::none, now);
-      }
-      queue.append(record, planner.tail(record), lane);
-      busy_[head.actuator / 64] |= std::uint64_t{1} << (head.actuator % 64);
-      break;
-    }
+    case RecordKind::command:
+    case RecordKind::overwriter_overwritten:
+    case RecordKind::overwriter_purged:
+      return take_commands(from, record, now);
     case RecordKind::purge:
-      purge(lane, head, now);
-      end({});
-      break;
+      purge(from, head, now);
+      return end({});
     case RecordKind::request:
-      end(handler.request(lane, head.id, head.actuator,
-                          Cursor(pool, record, sizeof(RecordHead), head.payload_bytes)));
-      break;
+      return end(handler.request(from.lane, head.id, head.actuator,
+                                 Cursor(pool, record, sizeof(RecordHead), head.payload_bytes)));
     case RecordKind::take_control:
-      end(handler.take_control(lane));
-      break;
+      return end(handler.take_control(from.lane));
     case RecordKind::release_control:
-      end(handler.release_control(lane));
-      break;
+      return end(handler.release_control(from.lane));
+    case RecordKind::overwritten_list:
+      return ledger.drop(record, Status::overwritten, Reason::none, now);
+    case RecordKind::purged_list:
+      return ledger.drop(record, Status::purged, Reason::none, now);
+    case RecordKind::completed_list:
+      return ledger.drop(record, Status::completed, Reason::none, now);
     default:
       ledger.drop(record, Status::rejected, Reason::invalid, now);
   }
 }
 
-void Controller::Body::purge(std::uint32_t lane, const RecordHead& head,
+/// Appends a list of commands, unless something has ended them before they came to be taken.
+void Controller::Body::take_commands(const Taking& from, BlockIndex first,
+                                     Iteration iteration) noexcept {
+  const RecordHead& head = pool.head(first);
+  if (purge_tickets.cover(from.lane, head.actuator, from.ticket)) {
+    // what was sent after that purge is not theirs to overwrite
+    return ledger.drop(first, Status::purged, Reason::none, iteration);
+  }
+  ActuatorQueue& queue = actuators_[head.actuator];
+  if (head.mode == Mode::overwrite) {
+    O80_COUNT(queue_dropped);
+    queue.drop(Status::overwritten, Reason::none, iteration);
+  }
+  if (head.kind != RecordKind::command) {
+    const bool overwritten = head.kind == RecordKind::overwriter_overwritten;
+    return ledger.drop(first, overwritten ? Status::overwritten : Status::purged, Reason::none,
+                       iteration);
+  }
+  queue.append(first, planner.tail(first), from.lane);
+  busy_[head.actuator / 64] |= std::uint64_t{1} << (head.actuator % 64);
+}
+
+void Controller::Body::purge(const Taking& from, const RecordHead& head,
                              Iteration iteration) noexcept {
+  const bool own = head.partial != 0;
+  if (own) {
+    purge_tickets.raise_own(from.lane, head.actuator, from.ticket);
+  } else {
+    purge_tickets.raise(head.actuator, from.ticket);
+  }
   each(head.actuator, [&](ActuatorQueue& queue) {
-    if (head.partial != 0) {
-      queue.drop_lane(lane, Status::purged, Reason::none, iteration);
+    if (own) {
+      queue.drop_lane(from.lane, Status::purged, Reason::none, iteration);
     } else {
       queue.drop(Status::purged, Reason::none, iteration);
     }
@@ -302,9 +340,11 @@ void Controller::restart(const std::byte* observed, const std::byte* desired,
   body_->restart(observed, desired, row);
 }
 
-bool Controller::check(std::uint32_t lane, BlockIndex batch, std::uint32_t budget) noexcept {
+bool Controller::check(std::uint32_t lane, BlockIndex batch, std::uint32_t& budget) noexcept {
   return body_->planner.check(lane, batch, budget);
 }
+
+Effort Controller::effort(BlockIndex batch) const noexcept { return body_->planner.effort(batch); }
 
 void Controller::take(std::uint32_t lane, BlockIndex batch, BatchHandler& handler) noexcept {
   body_->take(lane, batch, handler);
@@ -331,6 +371,8 @@ void Controller::purge_lane(std::uint32_t lane, std::uint32_t actuator, Iteratio
     queue.drop_lane(lane, Status::purged, reason, iteration);
   });
 }
+
+void Controller::forget_tickets() noexcept { body_->purge_tickets.forget(); }
 
 void Controller::halt(Iteration iteration) noexcept {
   body_->each(kEveryActuator,

@@ -16,8 +16,9 @@ std::string_view to_text(RecordKind kind) noexcept {
       return "take_control";
     case RecordKind::release_control:
       return "release_control";
+    default:
+      return "unknown";
   }
-  return "unknown";
 }
 
 std::string_view to_text(Mode mode) noexcept {
@@ -104,6 +105,8 @@ std::string_view to_text(Reason reason) noexcept {
       return "stopped";
     case Reason::halted:
       return "halted";
+    case Reason::full:
+      return "full";
   }
   return "unknown";
 }

@@ -131,7 +131,9 @@ RecordCheck::Verdict RecordCheck::go_on(const BlockPool& pool, BlockIndex block,
     Cursor(pool, block, sizeof(RecordHead), head.payload_bytes).read(mask_.data(), mask_bytes);
     mask = mask_.data();
   }
-  auto bytes_left = static_cast<std::int64_t>(std::uint64_t{budget} * kBlockBytes);
+  // what lies in the block of the head costs no more than the head
+  constexpr std::int64_t kWithHead = kBlockBytes - sizeof(RecordHead);
+  auto bytes_left = static_cast<std::int64_t>(std::uint64_t{budget} * kBlockBytes) + kWithHead;
 
   // times never run backwards
   for (; progress.times_left > 0 && bytes_left > 0; --progress.times_left) {
@@ -148,7 +150,8 @@ RecordCheck::Verdict RecordCheck::go_on(const BlockPool& pool, BlockIndex block,
     if (!layout.finite(state, mask)) return Verdict::invalid;
     bytes_left -= layout.size();
   }
-  budget = static_cast<std::uint32_t>(std::max<std::int64_t>(bytes_left, 0) / kBlockBytes);
+  budget = std::min(
+      budget, static_cast<std::uint32_t>(std::max<std::int64_t>(bytes_left, 0) / kBlockBytes));
   return progress.rows_left > 0 ? Verdict::unfinished : Verdict::valid;
 }
 

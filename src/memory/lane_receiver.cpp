@@ -1,7 +1,6 @@
 #include "o80/memory/lane_receiver.hpp"
 
 #include <algorithm>
-#include <span>
 
 #include "o80/base/crash_point.hpp"
 #include "o80/memory/atomic_words.hpp"
@@ -190,27 +189,37 @@ bool LaneReceivers::look() noexcept {
   const std::uint32_t bell = view_.bell().rung.load(std::memory_order_acquire);  // sync bell
   if (bell == bell_seen_ && !pending_) return false;
   bell_seen_ = bell;
-  below_ = view_.bell().tickets.load(std::memory_order_seq_cst);  // sync tickets
+  const std::uint64_t drawn = tickets_drawn();
+  put_back_ = put_back_ || drawn < below_;
+  below_ = drawn;
   pending_ = true;
   others_wait_ = true;  // for all that is known
   return true;
 }
 
-std::optional<std::uint32_t> LaneReceivers::next() noexcept {
+std::uint64_t LaneReceivers::tickets_drawn() const noexcept {
+  return view_.bell().tickets.load(std::memory_order_seq_cst);  // sync tickets
+}
+
+std::uint64_t LaneReceivers::ticket_of(std::uint32_t lane) noexcept {
+  if (lanes_[lane].is_quiet() || lanes_[lane].available() == 0) return kNoTicket;
+  const std::uint64_t ticket = lanes_[lane].peek_word(ticket_offset_);
+  // nobody drew it: the order is lost, the batch is not
+  return ticket < below_ || ticket < tickets_drawn() ? ticket : 0;
+}
+
+std::optional<std::uint32_t> LaneReceivers::next(std::span<const std::uint64_t> begun) noexcept {
   std::optional<std::uint32_t> first;
   std::uint64_t lowest = below_;
   bool left_over = false;
   others_wait_ = false;
-  const std::span<LaneReceiver> lanes = lanes_;  // loads that acquire do not make it be read again
-  for (std::uint32_t i = 0; i < lanes.size(); ++i) {
-    if (lanes[i].is_quiet() || lanes[i].available() == 0) continue;
-    std::uint64_t ticket = lanes[i].peek_word(ticket_offset_);
-    if (ticket >= below_) {
-      if (ticket < view_.bell().tickets.load(std::memory_order_seq_cst)) {  // sync tickets
-        left_over = true;
-        continue;
-      }
-      ticket = 0;  // nobody drew it: the order is lost, the batch is not
+  for (std::uint32_t i = 0; i < size(); ++i) {
+    const bool is_begun = !begun.empty() && begun[i] != kNoTicket;
+    const std::uint64_t ticket = is_begun ? begun[i] : ticket_of(i);
+    if (ticket == kNoTicket) continue;
+    if (!is_begun && !is_seen(ticket)) {
+      left_over = true;
+      continue;
     }
     others_wait_ = others_wait_ || first;
     if (first && ticket >= lowest) continue;

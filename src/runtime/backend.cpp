@@ -75,7 +75,8 @@ UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, Reques
       liveness(segment),
       pool(lanes.size() * segment.view().shape.lane_blocks),
       controller(schema, pool, *this, lanes.size()),
-      schedule(pool.size()),
+      staging(lanes, pool, controller),
+      schedule(lanes.size()),
       server_(server),
       lives_(lanes.size()),
       mourned_(lanes.size()),
@@ -87,6 +88,7 @@ UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, Reques
                                     : std::max<std::int64_t>(1, options.silence / options.period)) {
   // completed and late commands, and their batches
   untold_.reserve(2 * (schema.actuators.size() + Controller::kStatusesPerIteration));
+  express_lanes_.reserve(lanes.size());
   for (std::uint32_t i = 0; i < lanes.size(); ++i) lives_[i] = liveness.lane(i);
 }
 
@@ -96,11 +98,12 @@ UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, Reques
 Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
   const std::int64_t give_up =
       at_most > 0 && at_most < kForEver ? monotonic_now() + at_most : at_most;
-  const std::uint32_t most_looks = 2 + pool.size() / kBlocksPerIteration;
+  const std::uint32_t most_looks = 2 + pool.size() / kWorkPerIteration;
   std::uint32_t looks = 0;
   while (true) {
     look_at_lives();
     if (stop.load(std::memory_order_relaxed)) return Step::ended;
+    share_ = {};
     if (!granted()) {
       take_due();
       take_batches();
@@ -110,7 +113,7 @@ Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
     // standing still: everybody is told before anybody waits
     const bool all_told = controller.finish_pending();
     wake(lanes.announce(), false);
-    if (staging_ || !all_told) continue;
+    if (staging.busy() || !all_told) continue;
     // garbage may have used up a look; who sends it without end must not keep us here
     if (lanes.has_pending() && ++looks < most_looks) continue;
     const std::int64_t left =
@@ -119,7 +122,10 @@ Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
     bell.wait(lanes.bell_seen(), std::min(left, kSlice));
   }
   O80_CRASH_POINT("backend.after_take");
-  if (granted()) take_due();
+  if (granted()) {
+    share_ = {};
+    take_due();
+  }
   watch_silence();
   under_way_ = true;
   stepping_ = true;
@@ -187,9 +193,7 @@ void UntypedBackend::Body::end(State state, std::string_view text) noexcept {
   if (segment.state() != State::starting && segment.state() != State::running) return;
   // the burst under way has no last row: whoever waits for it learns that the backend is gone
   burst_left_ = 0;
-  for (; !schedule.empty(); schedule.drop_next()) {
-    controller.reject(schedule.next().lane, schedule.next().batch, Reason::stopped, 0, current);
-  }
+  reject_all(Reason::stopped);
   tell_of_the_row(false);
   controller.purge(kEveryActuator, current, Reason::stopped);
   while (!controller.finish_pending()) {

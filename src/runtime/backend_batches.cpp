@@ -12,6 +12,7 @@ namespace o80 {
 // ------------------------------------------------------------------------------ statuses out
 
 void UntypedBackend::Body::tell(const StatusChange& change) noexcept {
+  O80_COUNT(status_told);
   LaneReceiver& lane = lanes[change.lane];
   lane.set_status(change.id,
                   {static_cast<std::uint8_t>(change.status),
@@ -117,107 +118,170 @@ Outcome UntypedBackend::Body::release_control(std::uint32_t lane) noexcept {
 
 // ------------------------------------------------------------------------------ batches in
 
-void UntypedBackend::Body::begin_staging(std::uint32_t lane, std::uint32_t& budget) noexcept {
-  constexpr auto kBatch = static_cast<std::uint64_t>(RecordKind::batch);
-  const std::uint64_t kind = lanes[lane].peek_word(offsetof(BatchRecord, kind)) & 0xFF;
-  const auto blocks =
-      static_cast<std::uint32_t>(lanes[lane].peek_word(offsetof(BatchRecord, blocks)));
-  if (kind != kBatch || blocks == 0 || blocks > lanes[lane].available_of_one()) {
-    // who writes garbage faster than it is thrown away must not keep the loop here
-    --budget;
-    lanes[lane].reset();
-    return;
+/// Batches sent for this iteration, or for one that a fresh start jumped over.
+void UntypedBackend::Body::take_due() noexcept {
+  while (!schedule.empty() && schedule.next().at <= current) {
+    const StagedBatch due = schedule.next();
+    const Effort effort = controller.effort(due.batch);
+    if (!affords(effort)) return;  // the next iteration rejects it as late, unless it may be late
+    spend(effort);
+    schedule.drop_next();
+    if (admit(due)) take(due);
   }
-  // an heir's first batch finds the house in order
-  mourn(lane, lanes[lane].dead_predecessor());
-  staging_ = true;
-  // who was mourned may have left this, and no heir come yet
-  staging_incarnation_ = lanes[lane].incarnation();
-  staging_owner_ = lanes[lane].owner_of_next();
-  staging_of_dead_ = lanes[lane].next_is_of_dead() ||
-                     (staging_incarnation_ != 0 && staging_incarnation_ <= mourned_[lane]);
-  staging_lane_ = lane;
-  staging_left_ = blocks;
-  staging_chain_ = {};
 }
 
-/// Goes on with the batch that is being staged; false if the budget ended before it.
-bool UntypedBackend::Body::stage(std::uint32_t& budget) noexcept {
-  LaneReceiver& lane = lanes[staging_lane_];
-  Block block{};
-  while (staging_left_ > 0 && budget > 0) {
-    const bool taken = lane.take(block.bytes.data());
-    BatchRecord first;
-    std::memcpy(&first, block.bytes.data(), sizeof first);
-    const bool expected = staging_chain_.blocks > 0 || lane.expects(first.id);
-    if (!taken || !expected || !pool.append(staging_chain_, &block)) {
-      drop_staged(taken ? 1 : 0);
-      --budget;
-      return true;
-    }
-    --staging_left_;
-    --budget;
+/// What the lanes hold, as far as the work of one iteration may go.
+void UntypedBackend::Body::take_batches() noexcept {
+  if (!lanes.look()) return;
+  if (lanes.tickets_were_put_back()) controller.forget_tickets();
+  const bool all_taken = take_in_order();
+  if (granted()) {
+    lanes.look_again_after(burst_lane_);
+    if (staging.busy()) lanes.look_again();
+  } else if (!all_taken) {
+    stage_ahead();
+    take_express();
   }
-  if (staging_left_ > 0 || budget == 0) return false;
-  // what the copies left of the budget goes into a look at the records
-  if (!controller.check(staging_lane_, staging_chain_.first, budget)) return false;
-  staging_ = false;
-  staged();
+}
+
+/// Batches in the order of their tickets; false if the share of this iteration ended before them.
+bool UntypedBackend::Body::take_in_order() noexcept {
+  // nothing sent after a burst acts in it
+  while (!granted()) {
+    const std::optional<std::uint32_t> lane = lanes.next(staging.tickets());
+    if (!lane) return true;
+    if (!staging.has_staged(*lane) && !stage(*lane, share_.work)) return false;
+    if (staging.has_staged(*lane) && !take_staged(*lane)) return false;
+  }
   return true;
 }
 
-/// What there is of the batch is garbage, or the lane was reset under us.
-void UntypedBackend::Body::drop_staged(std::uint32_t blocks_outside) noexcept {
-  LaneReceiver& lane = lanes[staging_lane_];
-  lane.free(staging_chain_.blocks + blocks_outside);
-  lane.reset();
-  pool.release(staging_chain_);
-  staging_ = false;
-}
-
-/// The staged batch is complete: take it, put it off to its iteration, or refuse it.
-void UntypedBackend::Body::staged() noexcept {
-  const std::uint32_t lane = staging_lane_;
-  const BlockIndex first = staging_chain_.first;
-  const BatchRecord batch = pool.batch(first);
-  lanes[lane].set_staged(batch.id, record_id(batch.id, std::min(batch.records, batch.blocks)));
-  last_batch_ = current;
-  const ScheduledBatch sent{batch.at < 0 ? current : batch.at,
-                            batch.ticket,
-                            first,
-                            lane,
-                            staging_owner_,
-                            batch.late_now != 0,
-                            staging_of_dead_};
-  if (!admit(sent)) return;
-  if (!staging_of_dead_) grant(lane, batch);
-  if (sent.at > current) {
-    schedule.add(sent);
-  } else {
-    take(sent);
+/// A little of what lies in each lane, whosever turn it is, so that purges behind it are found.
+void UntypedBackend::Body::stage_ahead() noexcept {
+  std::uint32_t left = kWorkAheadOfAll;
+  for (std::uint32_t i = 0; i < lanes.size() && left > 0; ++i) {
+    const std::uint32_t lane = ahead_from_ = (ahead_from_ + 1) % lanes.size();
+    const std::uint32_t share = std::min(kWorkAhead, left);
+    std::uint32_t budget = share;
+    while (!staging.is_between_batches(lane) ||
+           (lanes.has_batch(lane) && !staging.next_is_express(lane))) {
+      if (!stage(lane, budget)) break;
+    }
+    left -= share - budget;
   }
 }
 
-void UntypedBackend::Body::take(const ScheduledBatch& sent) noexcept {
-  taking_owner_ = sent.owner;
+/// Purges and control orders that would wait for other lanes' batches.
+void UntypedBackend::Body::take_express() noexcept {
+  std::uint32_t work = 0;
+  do {
+    express_lanes_.clear();
+    for (std::uint32_t i = 0; i < lanes.size(); ++i) {
+      if (staging.is_between_batches(i) && lanes.has_batch(i) && staging.next_is_express(i)) {
+        express_lanes_.push_back(i);
+      }
+    }
+    std::ranges::sort(express_lanes_, {}, [&](std::uint32_t i) {
+      return lanes[i].peek_word(offsetof(BatchRecord, ticket));
+    });
+    for (const std::uint32_t lane : express_lanes_) {
+      mourn(lane, lanes[lane].dead_predecessor());
+      const std::optional<StagedBatch> batch = staging.express(lane);
+      work += kMostExpressRecords;
+      if (!batch) continue;
+      work += controller.effort(batch->batch).work;
+      accept(*batch);
+    }
+  } while (!express_lanes_.empty() && work < kExpressWork);
+}
+
+/// Goes on with a lane's next batch; false if the budget ended before it was complete.
+bool UntypedBackend::Body::stage(std::uint32_t lane, std::uint32_t& budget) noexcept {
+  // a dead owner is dealt with before the first batch of its successor
+  if (staging.is_between_batches(lane)) mourn(lane, lanes[lane].dead_predecessor());
+  return staging.go_on(lane, budget);
+}
+
+bool UntypedBackend::Body::take_staged(std::uint32_t lane) noexcept {
+  const StagedBatch next = staging.front(lane);
+  const Effort effort = controller.effort(next.batch);
+  if (!affords(effort)) return false;
+  spend(effort);
+  staging.pop(lane);
+  accept(next);
+  return true;
+}
+
+bool UntypedBackend::Body::affords(const Effort& effort) const noexcept {
+  return share_.work > 0 && effort.requests <= share_.requests;
+}
+
+void UntypedBackend::Body::spend(const Effort& effort) noexcept {
+  share_.work -= std::min(share_.work, effort.work);
+  share_.requests -= effort.requests;
+}
+
+/// A batch whose turn it is: takes it, puts it off to its iteration, or rejects it.
+void UntypedBackend::Body::accept(const StagedBatch& sent) noexcept {
+  last_batch_ = current;
+  const BatchRecord batch = pool.batch(sent.batch);
+  const bool bursts = batch.burst > 0 || (batch.flags & kBurstUntilEnded) != 0;
+  const bool is_for_later = sent.at > current;
+  StagedBatch due = sent;
+  if (due.at < 0) due.at = current;
+  // who may command is decided when a batch acts; its burst acts now
+  if (!is_for_later || bursts) {
+    if (!admit(due)) return;
+  } else if (stale_ == Stale::purge && is_of_dead(due)) {
+    reject(due, Reason::dead_frontend);
+    return;
+  }
+  if (is_for_later && !schedule.has_room(due.lane, due.at)) {
+    reject(due, Reason::full);
+    return;
+  }
+  if (!is_of_dead(due)) grant(due.lane, batch);
+  if (is_for_later) {
+    schedule.add(due);
+  } else {
+    take(due);
+  }
+}
+
+void UntypedBackend::Body::take(const StagedBatch& sent) noexcept {
+  O80_COUNT(batch_taken);
+  taking_owner_ = sent.had_left ? 0 : sent.incarnation;
   controller.take(sent.lane, sent.batch, *this);
 }
 
-/// Whether a batch may be taken, now or later; else it ends as rejected.
-bool UntypedBackend::Body::admit(const ScheduledBatch& sent) noexcept {
-  const auto reject = [&](Reason reason, std::uint32_t aux = 0) {
-    controller.reject(sent.lane, sent.batch, reason, static_cast<std::uint8_t>(aux), current);
-    return false;
-  };
+/// Whether a batch may be taken in this iteration; else it ends as rejected.
+bool UntypedBackend::Body::admit(const StagedBatch& sent) noexcept {
   watch_holder();
-  const bool is_holders = holder_ == sent.lane && holder_incarnation_ == sent.owner;
-  if (holder_ != kNobody && !is_holders) return reject(Reason::exclusive, holder_);
-  if (sent.at < current && !sent.late_now) return reject(Reason::late);
-  const LaneLife& life = lives_[sent.lane];
-  const bool dead = sent.of_dead || (life.state == LaneState::died &&
-                                     life.incarnation == lanes[sent.lane].incarnation());
-  if (dead && stale_ == Stale::purge) return reject(Reason::dead_frontend);
+  const std::uint64_t sender = sent.had_left ? 0 : sent.incarnation;
+  const bool is_holders = holder_ == sent.lane && holder_incarnation_ == sender;
+  if (holder_ != kNobody && !is_holders) return reject(sent, Reason::exclusive, holder_);
+  if (sent.at < current && !sent.late_now) return reject(sent, Reason::late);
+  if (stale_ == Stale::purge && is_of_dead(sent)) return reject(sent, Reason::dead_frontend);
   return true;
+}
+
+bool UntypedBackend::Body::is_of_dead(const StagedBatch& sent) noexcept {
+  const LaneLife& life = lives_[sent.lane];
+  return sent.of_dead || (sent.incarnation != 0 && sent.incarnation <= mourned_[sent.lane]) ||
+         (life.state == LaneState::died && life.incarnation == lanes[sent.lane].incarnation());
+}
+
+bool UntypedBackend::Body::reject(const StagedBatch& sent, Reason reason,
+                                  std::uint32_t aux) noexcept {
+  controller.reject(sent.lane, sent.batch, reason, static_cast<std::uint8_t>(aux), current);
+  return false;
+}
+
+void UntypedBackend::Body::reject_all(Reason reason) noexcept {
+  for (; !schedule.empty(); schedule.drop_next()) reject(schedule.next(), reason);
+  for (std::uint32_t lane = 0; lane < lanes.size(); ++lane) {
+    for (; staging.has_staged(lane); staging.pop(lane)) reject(staging.front(lane), reason);
+  }
 }
 
 void UntypedBackend::Body::grant(std::uint32_t lane, const BatchRecord& batch) noexcept {
@@ -227,32 +291,6 @@ void UntypedBackend::Body::grant(std::uint32_t lane, const BatchRecord& batch) n
   burst_lane_ = lane;
   burst_id_ = batch.id;
   burst_incarnation_ = lanes[lane].incarnation();
-}
-
-/// Batches sent for this iteration, or for one that a fresh start jumped over.
-void UntypedBackend::Body::take_due() noexcept {
-  while (!schedule.empty() && schedule.next().at <= current) {
-    const ScheduledBatch due = schedule.next();
-    schedule.drop_next();
-    if (admit(due)) take(due);
-  }
-}
-
-/// Batches in the order of their tickets, as far as the work of one iteration may go.
-void UntypedBackend::Body::take_batches() noexcept {
-  std::uint32_t budget = kBlocksPerIteration;
-  const bool news = lanes.look();
-  // nothing sent after a burst acts in it
-  while (!granted()) {
-    if (!staging_) {
-      const auto lane = news ? lanes.next() : std::nullopt;
-      if (!lane || budget == 0) return;
-      begin_staging(*lane, budget);
-    } else if (!stage(budget)) {
-      return;
-    }
-  }
-  lanes.look_again_after(burst_lane_);
 }
 
 }  // namespace o80

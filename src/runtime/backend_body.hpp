@@ -18,11 +18,19 @@
 #include "o80/memory/signal.hpp"
 #include "o80/runtime/backend.hpp"
 #include "o80/runtime/schedule.hpp"
+#include "staging.hpp"
 
 namespace o80 {
 
 inline constexpr std::uint32_t kNobody = 0xFFFFFFFF;
-inline constexpr std::uint32_t kBlocksPerIteration = 1024;  // of batches, that are taken
+/// What an iteration spends on batches: one for each block copied or checked, more for each step of
+/// taking a batch. The last batch taken may go beyond.
+inline constexpr std::uint32_t kWorkPerIteration = 1024;
+// of the lanes whose turn it is not, so that their purges are reached; for each lane, for all
+inline constexpr std::uint32_t kWorkAhead = 64;
+inline constexpr std::uint32_t kWorkAheadOfAll = 512;
+/// Express batches: one of each lane is taken in an iteration, further ones up to this work.
+inline constexpr std::uint32_t kExpressWork = 512;
 inline constexpr std::int64_t kUntilEnded = -1;
 
 /// The parts of a backend, and the order in which batches reach the controller.
@@ -63,6 +71,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   LaneLiveness liveness;
   BlockPool pool;
   Controller controller;
+  Staging staging;
   Schedule schedule;
   Timing timing;
   std::atomic<bool> stop{false};
@@ -71,14 +80,21 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
 
  private:
   // batches => controller
-  void take_batches() noexcept;
   void take_due() noexcept;
-  void begin_staging(std::uint32_t lane, std::uint32_t& budget) noexcept;
-  bool stage(std::uint32_t& budget) noexcept;
-  void drop_staged(std::uint32_t blocks_outside) noexcept;
-  void staged() noexcept;
-  bool admit(const ScheduledBatch& sent) noexcept;
-  void take(const ScheduledBatch& sent) noexcept;
+  void take_batches() noexcept;
+  bool take_in_order() noexcept;
+  void take_express() noexcept;
+  void stage_ahead() noexcept;
+  bool stage(std::uint32_t lane, std::uint32_t& budget) noexcept;
+  bool take_staged(std::uint32_t lane) noexcept;
+  void accept(const StagedBatch& sent) noexcept;
+  bool admit(const StagedBatch& sent) noexcept;
+  bool is_of_dead(const StagedBatch& sent) noexcept;
+  bool affords(const Effort& effort) const noexcept;
+  void spend(const Effort& effort) noexcept;
+  void take(const StagedBatch& sent) noexcept;
+  bool reject(const StagedBatch& sent, Reason reason, std::uint32_t aux = 0) noexcept;
+  void reject_all(Reason reason) noexcept;
   void grant(std::uint32_t lane, const BatchRecord& batch) noexcept;
   bool granted() const noexcept { return burst_left_ != 0; }
   void count_burst() noexcept;
@@ -114,14 +130,14 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   bool stepping_ = false;   // what the controller says now is told when the row is out
   std::vector<StatusChange> untold_;
 
-  // the batch being copied from its lane
-  bool staging_ = false;
-  bool staging_of_dead_ = false;  // whose place another frontend has taken
-  std::uint32_t staging_lane_ = 0;
-  std::uint64_t staging_incarnation_ = 0;
-  std::uint64_t staging_owner_ = 0;  // 0: one that had left the lane before
-  std::uint32_t staging_left_ = 0;   // blocks
-  BlockChain staging_chain_;
+  // what is left of this iteration's share of work
+  struct Share {
+    std::uint32_t work = kWorkPerIteration;
+    std::uint32_t requests = kMostRequests;
+  };
+  Share share_;
+  std::uint32_t ahead_from_ = 0;              // lane that is staged ahead first
+  std::vector<std::uint32_t> express_lanes_;  // in the order of their tickets
 
   std::uint32_t holder_ = kNobody;  // lane with exclusive control
   std::uint64_t holder_incarnation_ = 0;

@@ -35,9 +35,6 @@ void UntypedBackend::Body::mourn(std::uint32_t lane, std::uint64_t incarnation) 
   if (incarnation <= mourned_[lane]) return;
   mourned_[lane] = incarnation;
   stale(lane, Reason::dead_frontend);
-  schedule.disown(lane);
-  if (staging_ && staging_lane_ == lane && staging_incarnation_ <= incarnation)
-    staging_of_dead_ = true;
   // nobody waits for the end of its burst
   if (granted() && burst_lane_ == lane && burst_incarnation_ <= incarnation) burst_left_ = 1;
   // it may have died before it rang

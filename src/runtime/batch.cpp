@@ -68,6 +68,8 @@ std::string words_for(const Link& link, const Handle& handle, std::uint8_t aux) 
       return "no frontend sent anything for too long";
     case Reason::stopped:
       return "the backend stopped";
+    case Reason::full:
+      return "too many batches of its lane wait for later iterations";
     default:
       return "";
   }

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "o80/runtime/frontend.hpp"
+#include "o80/runtime/schedule.hpp"
 
 namespace o80 {
 
@@ -183,11 +184,47 @@ BatchRecord batch_of(const PulseOptions& options) {
   return record;
 }
 
+/// Whether a batch may stay in the lane for long.
+bool does_stay(const BatchBuilder& builder, const BatchRecord& wanted) {
+  return builder.has_commands() || wanted.at != kNow;
+}
+
+/// Whether a batch was taken, or rejected.
+bool has_begun(const LaneSender& lane, CommandId batch) {
+  return lane.status(batch).known != LaneSender::Known::not_yet;
+}
+
 }  // namespace
 
-/// Blocks of a lane that commands leave free.
-constexpr std::uint32_t kept_free(std::uint32_t blocks) noexcept {
-  return blocks < 8 ? 0 : std::clamp(blocks / 16, 2U, 16U);
+/// What one batch may hold, so that an iteration that takes it stays short.
+void UntypedFrontend::refuse_if_too_much(const BatchBuilder& builder) const {
+  const auto refuse = [&](std::uint32_t count, std::uint32_t most, const char* what) {
+    if (count <= most) return;
+    throw InvalidArgument("a batch may have " + std::to_string(most) + " " + what +
+                          ", this one has " + std::to_string(count) +
+                          ": send them in several pulses. Nothing was sent, all stays added "
+                          "(forget_added() drops it)");
+  };
+  refuse(builder.requests(), kMostRequests, "requests");
+  refuse(builder.control_orders(), kMostControlOrders, "orders to take or release control");
+}
+
+/// What may wait for later iterations.
+void UntypedFrontend::refuse_if_too_many_wait(Iteration at, const LaneSender& lane) {
+  if (at == kNow) return;
+  std::erase_if(link_->scheduled, [&](const Link::Scheduled& sent) {
+    return sent.at <= link_->history.published() || has_begun(lane, sent.id);
+  });
+  const auto refuse = [&](std::size_t there, std::uint32_t most, const std::string& of) {
+    if (there < most) return;
+    throw LaneFull("at most " + std::to_string(most) + " batches of a frontend may wait for " + of +
+                   ", and so many wait in '" + segment() +
+                   "'. Nothing was sent, all stays added: put several commands into one batch, or "
+                   "pulse again later");
+  };
+  const auto same = std::ranges::count(link_->scheduled, at, &Link::Scheduled::at);
+  refuse(static_cast<std::size_t>(same), kMostScheduledAt, "iteration " + std::to_string(at));
+  refuse(link_->scheduled.size(), kMostScheduled, "later iterations");
 }
 
 /// Before anything is used up: ids that are drawn and never sent would age the statuses of others.
@@ -195,7 +232,7 @@ void UntypedFrontend::refuse_if_full(const BatchBuilder& builder, const BatchRec
                                      const LaneSender& lane) const {
   const std::uint64_t needed = builder.blocks();
   // what stays in the lane leaves room for what lets it go on: a burst, a purge, a request
-  const bool stays = builder.has_commands() || wanted.at != kNow;
+  const bool stays = does_stay(builder, wanted);
   const std::uint32_t most = lane.blocks() - (stays ? kept_free(lane.blocks()) : 0);
   const std::uint32_t sent = lane.blocks() - lane.free_blocks();
   const auto takes = [&] {
@@ -214,14 +251,15 @@ void UntypedFrontend::refuse_if_full(const BatchBuilder& builder, const BatchRec
 }
 
 /// Passes over the statuses of batches that still run.
-CommandId UntypedFrontend::draw_ids(LaneSender& lane, std::uint64_t n) {
+CommandId UntypedFrontend::draw_ids(LaneSender& lane, std::uint64_t n, bool stays) {
   const auto has_ended = [&](CommandId id) {
     const LaneSender::StatusAnswer answer = lane.status(id);
     return answer.known == LaneSender::Known::forgotten ||
            (answer.known == LaneSender::Known::yes &&
             is_end(static_cast<Status>(answer.word.status)));
   };
-  const std::optional<CommandId> first = link_->ids.draw(lane.next_id(), n, has_ended);
+  const std::optional<CommandId> first = stays ? link_->ids.draw(lane.next_id(), n, has_ended)
+                                               : link_->ids.draw_kept(lane.next_id(), n, has_ended);
   if (!first) {
     throw LaneFull("the batches in the lane of '" + segment() +
                    "' that have not ended leave no room for the statuses of " +
@@ -244,14 +282,17 @@ Sent UntypedFrontend::send(BatchBuilder& builder, const BatchRecord& wanted) {
     sent.lane = link_->lane();
     LaneSender* const lane = sent.lane.get();
     link_->segment.throw_if_known_gone();
+    refuse_if_too_much(builder);
+    refuse_if_too_many_wait(wanted.at, *lane);
     refuse_if_full(builder, wanted, *lane);
     BatchRecord record = wanted;
     const std::uint32_t records = builder.records();
     sent.quiet = lane->events();
-    record.id = draw_ids(*lane, std::uint64_t{records} + 2);
+    record.id = draw_ids(*lane, std::uint64_t{records} + 2, does_stay(builder, wanted));
     lane->send(std::as_bytes(builder.seal(record)), offsetof(BatchRecord, ticket));
     builder.clear();
     if (records > 0) link_->ids.sent(record.id, std::uint64_t{records} + 2);
+    if (record.at != kNow) link_->scheduled.push_back({record.at, record.id});
     sent.id = record.id;
     sent.records = records;
   }

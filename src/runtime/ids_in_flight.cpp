@@ -6,9 +6,33 @@ namespace o80 {
 
 std::optional<CommandId> IdsInFlight::draw(CommandId next, std::uint64_t n,
                                            const HasEnded& has_ended) {
+  return draw_up_to(next, n, places_ - kept_, has_ended);
+}
+
+std::optional<CommandId> IdsInFlight::draw_kept(CommandId next, std::uint64_t n,
+                                                const HasEnded& has_ended) {
+  if (const auto first = draw_up_to(next, n, places_, has_ended)) return first;
+  // ids are left out up to the places kept
+  const std::uint64_t begin = places_ - kept_;
+  const CommandId first = next + (begin + places_ - next % places_) % places_;
+  return draw_up_to(first, n, places_, has_ended, From::exactly_here);
+}
+
+/// Moves on to the next revolution if n ids from `first` on reach beyond its places.
+CommandId IdsInFlight::fit(CommandId first, std::uint64_t n,
+                           std::uint64_t places_end) const noexcept {
+  if (places_end == places_ || first % places_ + n <= places_end) return first;
+  return first + places_ - first % places_;
+}
+
+/// Uses only the places before `places_end`; a batch for all of them may go on over their end.
+std::optional<CommandId> IdsInFlight::draw_up_to(CommandId next, std::uint64_t n,
+                                                 std::uint64_t places_end,
+                                                 const HasEnded& has_ended, From from) {
   CommandId first = next;
   if (!runs_.empty()) first = std::max(first, runs_.back().begin + runs_.back().count);
   const CommandId revolution = first + places_;
+  first = fit(first, n, places_end);
   std::size_t moved = 0;
   // the places of the oldest come round first
   while (!runs_.empty() && runs_.front().begin + places_ < first + n) {
@@ -16,10 +40,10 @@ std::optional<CommandId> IdsInFlight::draw(CommandId next, std::uint64_t n,
     runs_.pop_front();
     if (has_ended(run.end_id)) continue;
     run.begin += places_;
-    first = std::max(first, run.begin + run.count);
+    first = fit(std::max(first, run.begin + run.count), n, places_end);
     runs_.push_back(run);
     ++moved;
-    if (first > revolution) {
+    if (first > revolution || (from == From::exactly_here && first != next)) {
       go_back(moved);
       return std::nullopt;
     }

@@ -25,7 +25,9 @@ Link::Link(AttachedSegment attached, std::shared_ptr<InlineRunner> inline_runner
       history(segment.view()),
       rows(segment),
       runner(std::move(inline_runner)),
-      ids(2 * std::uint64_t{segment.view().shape.lane_blocks}) {}
+      // two statuses a block: of those, too, commands leave as many as of the blocks
+      ids(2 * std::uint64_t{segment.view().shape.lane_blocks},
+          2 * std::uint64_t{kept_free(segment.view().shape.lane_blocks)}) {}
 
 std::shared_ptr<LaneSender> Link::lane() {
   check_usable();

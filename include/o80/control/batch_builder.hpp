@@ -32,7 +32,8 @@ class BatchBuilder {
   std::uint32_t take_control();
   std::uint32_t release_control();
 
-  /// Completes the batch: `batch` says id, ticket, at, late_now, burst and flags.
+  /// Completes the batch: `batch` says id, ticket, at, late_now, burst and flags. One of a few
+  /// purges and control orders, for now and without a burst, is marked as express.
   std::span<const Block> seal(const BatchRecord& batch);
   /// Sets the ticket of a sealed batch, drawn just before its commit.
   void set_ticket(std::uint64_t ticket) noexcept;
@@ -40,16 +41,21 @@ class BatchBuilder {
   void clear();
   bool empty() const noexcept { return records_ == 0; }
   std::uint32_t records() const noexcept { return records_; }
-  bool has_commands() const noexcept { return has_commands_; }
+  bool has_commands() const noexcept { return commands_ > 0; }
+  std::uint32_t requests() const noexcept { return requests_; }
+  std::uint32_t control_orders() const noexcept { return control_orders_; }
   /// Blocks that the batch takes in its lane.
   std::uint64_t blocks() const noexcept { return blocks_.size(); }
 
  private:
   std::byte* open(const RecordHead& head, std::uint64_t payload_bytes);
+  bool is_express(const BatchRecord& batch) const noexcept;
 
   std::vector<Block> blocks_;  // the batch's own block first
   std::uint32_t records_ = 0;
-  bool has_commands_ = false;
+  std::uint32_t commands_ = 0;
+  std::uint32_t requests_ = 0;
+  std::uint32_t control_orders_ = 0;
 };
 
 }  // namespace o80

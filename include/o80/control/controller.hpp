@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "o80/control/batch_handler.hpp"
+#include "o80/control/batch_plan.hpp"
 #include "o80/control/pool.hpp"
 #include "o80/control/record.hpp"
 #include "o80/control/status.hpp"
@@ -42,11 +43,14 @@ class Controller {
   void restart(const std::byte* observed, const std::byte* desired, Iteration row) noexcept;
 
   /// Checks the records of a batch that is complete in the pool but not yet due, about `budget`
-  /// blocks a call; true when all are. Batches of one lane are checked one after the other. `take`
-  /// does what is left of it.
-  bool check(std::uint32_t lane, BlockIndex batch, std::uint32_t budget) noexcept;
+  /// blocks a call, which it takes off; true when all are. Batches of one lane are checked one
+  /// after the other. `take` does what is left of it.
+  bool check(std::uint32_t lane, BlockIndex batch, std::uint32_t& budget) noexcept;
+  /// What taking a checked batch takes of an iteration.
+  Effort effort(BlockIndex batch) const noexcept;
   /// Takes a whole batch at `handler.iteration()`. The batch record in the pool is the
-  /// controller's from here on: copy `burst` and `flags` before.
+  /// controller's from here on: copy `burst` and `flags` before. A purge also ends commands with
+  /// tickets below the batch's that are taken later.
   void take(std::uint32_t lane, BlockIndex batch, BatchHandler& handler) noexcept;
   /// Ends a whole batch, never taken, as rejected; its records follow in `finish_pending`.
   void reject(std::uint32_t lane, BlockIndex batch, Reason reason, std::uint8_t aux,
@@ -60,6 +64,8 @@ class Controller {
   /// Drops what one lane sent, to an actuator or to every one; O(lanes) an actuator.
   void purge_lane(std::uint32_t lane, std::uint32_t actuator, Iteration iteration,
                   Reason reason = Reason::none) noexcept;
+  /// Purges that were taken no longer end what is taken later: tickets begin anew.
+  void forget_tickets() noexcept;
   /// Ends everything as halted; each actuator then brakes within its limits.
   void halt(Iteration iteration) noexcept;
   /// Ends what an actuator runs and queues as interrupted.

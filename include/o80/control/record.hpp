@@ -25,7 +25,14 @@ enum class RecordKind : std::uint8_t {
   purge,
   request,
   take_control,
-  release_control
+  release_control,
+  // what a plan makes of the kinds of some records; sent by a frontend, they are garbage
+  overwritten_list = 0x80,  // the first of a list of records with this end, known to no queue
+  purged_list,
+  completed_list,
+  invalid_list,
+  overwriter_overwritten,  // overwrites a queue, and is then overwritten by its own batch
+  overwriter_purged
 };
 enum class Mode : std::uint8_t { queue, overwrite };
 enum class Pace : std::uint8_t { direct, duration, speed, until, iterations, fastest };
@@ -59,7 +66,8 @@ enum class Reason : std::uint8_t {
   dead_frontend,
   silence,
   stopped,
-  halted
+  halted,
+  full  // more of its kind wait already than one lane may have
 };
 
 std::string_view to_text(RecordKind kind) noexcept;
@@ -106,7 +114,16 @@ struct RecordHead {
 static_assert(sizeof(RecordHead) == 48 && std::is_trivially_copyable_v<RecordHead> &&
               std::is_standard_layout_v<RecordHead>);
 
-inline constexpr std::uint16_t kBurstUntilEnded = 1;  // flag of a batch: burst until it has ended
+// flags of a batch
+inline constexpr std::uint16_t kBurstUntilEnded = 1;
+/// It holds nothing but purges and control orders: it does not wait for other lanes' batches.
+inline constexpr std::uint16_t kExpress = 2;
+
+// what one batch may hold; `pulse` refuses more, and the backend rejects the records beyond
+inline constexpr std::uint32_t kMostRequests = 8;
+inline constexpr std::uint32_t kMostControlOrders = 8;
+/// A batch of more records is not express.
+inline constexpr std::uint32_t kMostExpressRecords = 32;
 
 /// The first block of a batch.
 ///

@@ -2,14 +2,23 @@
 
 #include <cstdint>
 
-/// A look at a block of the pool, counted by tests that prove how few an iteration needs.
+/// Work that tests count, to prove how little an iteration does: looks at blocks of the pool, and
+/// what stands in Work.
 ///
-/// Compiles to nothing unless O80_COUNT_BLOCKS is defined; then the test defines the function.
+/// Compiles to nothing unless O80_COUNT_BLOCKS is defined; then the test defines the functions.
 #ifdef O80_COUNT_BLOCKS
 namespace o80 {
+enum class Work : std::uint8_t {
+  batch_taken,
+  status_told,
+  queue_dropped  // of one actuator
+};
 void visit_block(std::uint32_t block) noexcept;
-}
+void count(Work work) noexcept;
+}  // namespace o80
 #define O80_VISIT_BLOCK(block) ::o80::visit_block(block)
+#define O80_COUNT(work) ::o80::count(::o80::Work::work)
 #else
 #define O80_VISIT_BLOCK(block) static_cast<void>(0)
+#define O80_COUNT(work) static_cast<void>(0)
 #endif

@@ -4,7 +4,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "o80/memory/segment_layout.hpp"
@@ -107,6 +109,9 @@ class LaneReceiver {
   bool has_news_ = false;
 };
 
+/// What no batch bears as its ticket.
+inline constexpr std::uint64_t kNoTicket = ~std::uint64_t{0};
+
 /// All lanes, and the order of their batches.
 ///
 /// Writer / Readers / Realtime: as LaneReceiver.
@@ -120,9 +125,19 @@ class LaneReceivers {
 
   /// Begins to look for batches: remembers bell and tickets. False if nothing can be there.
   bool look() noexcept;
-  /// The lane whose next batch is the next of all below the remembered ticket; it is to be taken
-  /// whole (or the lane reset) before the next call. Empty when there is no more.
-  std::optional<std::uint32_t> next() noexcept;
+  /// The lane whose next batch is the next of all below the remembered ticket. Empty when there is
+  /// no more. `begun` has a ticket for each lane whose next batch was taken from it at least in
+  /// part; without it, the batch is to be taken whole (or the lane reset) before the next call.
+  std::optional<std::uint32_t> next(std::span<const std::uint64_t> begun = {}) noexcept;
+  /// Whether a lane has a batch below the remembered ticket, to be asked between batches.
+  bool has_batch(std::uint32_t lane) noexcept {
+    const std::uint64_t ticket = ticket_of(lane);
+    return ticket != kNoTicket && is_seen(ticket);
+  }
+  /// The next ticket that will be drawn.
+  std::uint64_t tickets_drawn() const noexcept;
+  /// Whether somebody has put back the count of tickets since this was last asked.
+  bool tickets_were_put_back() noexcept { return std::exchange(put_back_, false); }
   /// Makes the next look() look whatever the bell says (a lane's owner died).
   void look_again() noexcept { pending_ = true; }
   /// The same if next() saw more than this lane's, or it has more; what is committed later rings.
@@ -139,11 +154,17 @@ class LaneReceivers {
   void flush_events() noexcept;
 
  private:
+  /// 0 stands for one that nobody drew.
+  bool is_seen(std::uint64_t ticket) const noexcept { return ticket < below_ || ticket == 0; }
+  /// Of the lane's next batch; kNoTicket if there is none.
+  std::uint64_t ticket_of(std::uint32_t lane) noexcept;
+
   SegmentView view_;
   std::size_t ticket_offset_;
   std::vector<LaneReceiver> lanes_;
   std::uint32_t bell_seen_ = 0;
   std::uint64_t below_ = 0;
+  bool put_back_ = false;
   bool pending_ = true;
   bool others_wait_ = true;  // besides the lane that next() named last
 };

@@ -136,7 +136,9 @@ class UntypedFrontend {
   Batch pulse(const PulseOptions& options, std::uint16_t flags);
   Sent send(BatchBuilder& builder, const BatchRecord& record);
   Sent send_burst(std::int64_t iterations, const PulseOptions& options);
-  CommandId draw_ids(LaneSender& lane, std::uint64_t n);
+  CommandId draw_ids(LaneSender& lane, std::uint64_t n, bool stays);
+  void refuse_if_too_much(const BatchBuilder& builder) const;
+  void refuse_if_too_many_wait(Iteration at, const LaneSender& lane);
   void refuse_if_full(const BatchBuilder& builder, const BatchRecord& wanted,
                       const LaneSender& lane) const;
   [[noreturn]] void missing(Iteration k) const;

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <atomic>
+#include <deque>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -26,6 +28,12 @@ class InlineRunner {
   virtual void refuse_nested() const = 0;
 };
 
+/// Blocks of a lane that commands leave free, so that there is room for a burst, a purge, a
+/// request.
+constexpr std::uint32_t kept_free(std::uint32_t blocks) noexcept {
+  return blocks < 8 ? 0 : std::clamp(blocks / 16, 2U, 16U);
+}
+
 /// What a frontend, its batches and its bursts share: the attached segment and the lane.
 ///
 /// Writer / Readers: any threads; `sending` guards what is sent.
@@ -50,6 +58,12 @@ struct Link {
   RowWaiter rows;
   std::shared_ptr<InlineRunner> runner;  // guarded by `sending`, gone when closed
   IdsInFlight ids;                       // guarded by `sending`
+  /// A batch sent for a later iteration.
+  struct Scheduled {
+    Iteration at;
+    CommandId id;
+  };
+  std::deque<Scheduled> scheduled;  // guarded by `sending`; some of them may have been taken
   mutable std::mutex sending;
   std::atomic<bool> closed{false};
 

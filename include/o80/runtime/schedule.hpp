@@ -1,40 +1,53 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "o80/control/pool.hpp"
 
 namespace o80 {
 
-/// A batch that waits in the pool for its iteration.
-struct ScheduledBatch {
-  Iteration at = 0;
+// batches that one lane may have waiting for later iterations; `pulse` refuses more
+inline constexpr std::uint32_t kMostScheduled = 256;
+inline constexpr std::uint32_t kMostScheduledAt = 16;  // for the same iteration
+
+/// A batch that is complete in the pool.
+struct StagedBatch {
+  Iteration at = kNow;
   std::uint64_t ticket = 0;
   BlockIndex batch = kNoBlock;
   std::uint32_t lane = 0;
-  std::uint64_t owner = 0;  // incarnation of who sent it, 0: one that had left the lane before
+  std::uint64_t incarnation = 0;  // of the lane when its staging began
+  bool had_left = false;          // its sender no longer had the lane then
+  bool of_dead = false;           // and was known to be dead
   bool late_now = false;
-  bool of_dead = false;  // its sender has died, whoever has the lane now
 };
 
 /// Batches sent for a later iteration, the next one first.
 ///
 /// Writer:   the backend's thread.
-/// Realtime: yes: a heap in memory reserved for as many as the lanes can hold.
+/// Realtime: yes: a heap in memory reserved for as many as all lanes may have.
 class Schedule {
  public:
-  explicit Schedule(std::size_t most) { heap_.reserve(most); }
+  explicit Schedule(std::uint32_t lanes);
 
   bool empty() const noexcept { return heap_.empty(); }
-  const ScheduledBatch& next() const noexcept { return heap_.front(); }
-  void add(const ScheduledBatch& batch) noexcept;
+  const StagedBatch& next() const noexcept { return heap_.front(); }
+  /// Whether a lane may have one more for this iteration.
+  bool has_room(std::uint32_t lane, Iteration at) const noexcept;
+  /// To be asked only if there is room.
+  void add(const StagedBatch& batch) noexcept;
   void drop_next() noexcept;
-  /// The sender of what this lane has sent so far is dead.
-  void disown(std::uint32_t lane) noexcept;
 
  private:
-  std::vector<ScheduledBatch> heap_;
+  std::span<const Iteration> of(std::uint32_t lane) const noexcept {
+    return {iterations_.data() + std::size_t{lane} * kMostScheduled, counts_[lane]};
+  }
+
+  std::vector<StagedBatch> heap_;
+  std::vector<Iteration> iterations_;  // of each lane's batches, in no order
+  std::vector<std::uint32_t> counts_;  // of each lane
 };
 
 }  // namespace o80

@@ -9,29 +9,10 @@
 #include <utility>
 #include <vector>
 
+#include "bounded/counted_work.hpp"
 #include "control/rig.hpp"
 
-namespace {
-
-std::vector<std::uint32_t> visited_in(1U << 18);  // the iteration in which a block was last seen
-std::uint32_t iteration = 0;
-std::uint32_t visited = 0;
-
-/// Forgets what was seen; gives how many blocks that were.
-std::uint32_t next_iteration() {
-  ++iteration;
-  return std::exchange(visited, 0);
-}
-
-}  // namespace
-
-namespace o80 {
-
-void visit_block(std::uint32_t block) noexcept {
-  if (std::exchange(visited_in[block], iteration) != iteration) ++visited;
-}
-
-namespace test {
+namespace o80::test {
 namespace {
 
 constexpr std::uint32_t kLane = 16'384;  // blocks
@@ -46,6 +27,8 @@ class BoundedTest : public ::testing::Test {
     rig.witness.keep = false;
     next_iteration();
   }
+  /// Forgets what was seen; gives how many blocks that were.
+  static std::uint32_t next_iteration() { return work_since_last_asked().blocks; }
 
   /// What one iteration has looked at since the last.
   void expect_a_share(const std::string& what) {
@@ -65,7 +48,7 @@ class BoundedTest : public ::testing::Test {
   /// Has a batch checked as it is in the backend, and taken.
   void check_and_take(std::uint32_t lane, BlockIndex batch) {
     next_iteration();
-    while (!rig.controller.check(lane, batch, kBudget)) expect_a_share("checking");
+    while (!rig.check(lane, batch, kBudget)) expect_a_share("checking");
     expect_a_share("checking");
     rig.controller.take(lane, batch, rig);
     expect_a_share("taking");
@@ -155,7 +138,7 @@ TEST_F(BoundedTest, RejectingAFullLaneAndEndingItsLateCommands) {
   for (std::uint32_t i = 0; i < kLane - 1; ++i) rig.add(i % 4, over(1), {1.0});
   const BlockIndex batch = rig.send();
   next_iteration();
-  while (!rig.controller.check(0, batch, kBudget)) expect_a_share("checking");
+  while (!rig.check(0, batch, kBudget)) expect_a_share("checking");
   next_iteration();
   rig.controller.reject(0, batch, Reason::late, 0, rig.next);
   expect_a_share("rejecting");
@@ -197,5 +180,4 @@ TEST_F(BoundedTest, CheckingGarbage) {
 }
 
 }  // namespace
-}  // namespace test
-}  // namespace o80
+}  // namespace o80::test

@@ -203,12 +203,12 @@ TEST(Controller, ABatchMayBeRejectedAfterItWasChecked) {
   Rig rig(plain_robot(1));
   for (int i = 0; i < 10; ++i) rig.add(0, over(5), {1.0});
   const BlockIndex half = rig.send();
-  EXPECT_FALSE(rig.controller.check(0, half, 3));
+  EXPECT_FALSE(rig.check(0, half, 3));
   rig.controller.reject(0, half, Reason::late, 0, 7);
   rig.controller.finish_pending();
   for (int i = 0; i < 10; ++i) rig.add(0, over(5), {1.0});
   const BlockIndex whole = rig.send();
-  EXPECT_TRUE(rig.controller.check(0, whole, 100));
+  EXPECT_TRUE(rig.check(0, whole, 100));
   rig.controller.reject(0, whole, Reason::late, 0, 7);
   rig.controller.finish_pending();
   EXPECT_TRUE(rig.all_blocks_back());
@@ -221,7 +221,7 @@ TEST(Controller, ABatchCheckedBitByBitIsTakenAsIfAtOnce) {
   for (int i = 0; i < 10; ++i) rig.add(1, direct(), {2.0 + i});
   const BlockIndex batch = rig.send();
   int calls = 1;
-  while (!rig.controller.check(0, batch, 3)) ++calls;
+  while (!rig.check(0, batch, 3)) ++calls;
   EXPECT_GE(calls, 6);
   EXPECT_LE(calls, 20);
   EXPECT_TRUE(rig.witness.changes.empty()) << "nothing has happened yet";
@@ -239,7 +239,7 @@ TEST(Controller, TheRowsOfOneLongTrajectoryAreCheckedBitByBitToo) {
     rig.add_rows(0, during(0), 5'000, rows, times, {0b10});
     const BlockIndex batch = rig.send();
     int calls = 1;
-    while (!rig.controller.check(0, batch, 100)) ++calls;
+    while (!rig.check(0, batch, 100)) ++calls;
     EXPECT_NEAR(calls, 19, 1) << "8 + 16 bytes a row, 6400 bytes a call";
     rig.controller.take(0, batch, rig);
     rig.step();

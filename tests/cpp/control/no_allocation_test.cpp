@@ -36,7 +36,7 @@ TEST(Controller, AllocatesNothingOnceItIsMade) {
   const BlockIndex third = rig.send(1);
 
   const std::size_t before = allocations;
-  while (!rig.controller.check(0, first, 1024)) {
+  while (!rig.check(0, first, 1024)) {
   }
   rig.controller.take(0, first, rig);
   for (int i = 0; i < 100; ++i) rig.step();

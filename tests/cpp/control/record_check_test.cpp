@@ -248,7 +248,7 @@ TEST(RecordCheck, GarbageDoesNoHarm) {
       rig.batch.clear();
       if (blocks.empty()) continue;
       const BlockIndex batch = rig.place(blocks);
-      if (any(0, 1) == 0) rig.controller.check(0, batch, static_cast<std::uint32_t>(any(0, 9)));
+      if (any(0, 1) == 0) rig.check(0, batch, static_cast<std::uint32_t>(any(0, 9)));
       rig.controller.take(0, batch, rig);
       for (std::uint64_t i = any(0, 3); i > 0; --i) rig.step();
     }

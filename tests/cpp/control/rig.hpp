@@ -159,6 +159,11 @@ class Rig : public BatchHandler {
     return id;
   }
 
+  /// Goes on checking a batch, for about so many blocks.
+  bool check(std::uint32_t lane, BlockIndex first, std::uint32_t blocks) {
+    return controller.check(lane, first, blocks);
+  }
+
   void step() {
     controller.step(next, observed.data());
     controller.finish_pending();

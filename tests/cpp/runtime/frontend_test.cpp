@@ -242,7 +242,7 @@ TEST_F(FrontendTest, SeveralThreadsMayPulseThroughOne) {
   }
   while (ready < 2) station.iterate();
   for (std::thread& thread : threads) thread.join();
-  station.run(kEach);
+  station.run(kEach + 10);  // so many batches are taken in several iterations
   EXPECT_EQ(desired(frontend.latest(), 0), kEach);
   EXPECT_EQ(desired(frontend.latest(), 1), kEach);
 }
