@@ -100,7 +100,7 @@ Limited ActuatorQueue::move(Iteration iteration) noexcept {
   motion_.state(iteration, desired_);
   if (!limiter_.any()) return {};
   if (pace_ == Pace::fastest) return limiter_.follow_fastest(desired_);
-  return limiter_.follow(motion_, desired_, first_number_, most_);
+  return limiter_.follow(motion_, desired_, mask(), first_number_, most_);
 }
 
 void ActuatorQueue::end_running(Iteration iteration) noexcept {
@@ -199,6 +199,7 @@ void ActuatorQueue::begin_row(Iteration iteration, const std::byte* observed) no
     }
   }
   read_row();
+  if (partial_) motion_.leave_out(mask());
   const std::int64_t count = iterations(head, iteration);
   motion_.begin(iteration, count, head.profile, head.pace);
   first_row_ = false;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 namespace o80 {
 namespace {
@@ -16,6 +17,38 @@ void store_integer(std::byte* at, double value) noexcept {
                   : value >= static_cast<double>(Range::max()) ? Range::max()
                                                                : static_cast<T>(value);
   std::memcpy(at, &whole, sizeof whole);
+}
+
+template <class T>
+std::pair<double, double> range_as() noexcept {
+  using Range = std::numeric_limits<T>;
+  return {static_cast<double>(Range::lowest()), static_cast<double>(Range::max())};
+}
+
+/// What numbers of a kind can be: nothing else may be asked of them on the way to rest either.
+std::pair<double, double> range_of(Kind kind) noexcept {
+  switch (kind) {
+    case Kind::int8:
+      return range_as<std::int8_t>();
+    case Kind::int16:
+      return range_as<std::int16_t>();
+    case Kind::int32:
+      return range_as<std::int32_t>();
+    case Kind::int64:
+      return range_as<std::int64_t>();
+    case Kind::uint8:
+      return range_as<std::uint8_t>();
+    case Kind::uint16:
+      return range_as<std::uint16_t>();
+    case Kind::uint32:
+      return range_as<std::uint32_t>();
+    case Kind::uint64:
+      return range_as<std::uint64_t>();
+    case Kind::float32:
+      return range_as<float>();
+    default:
+      return range_as<double>();
+  }
 }
 
 /// The nearest value of a kind that is not beyond `low` or `high`.
@@ -45,10 +78,12 @@ Limiter::Limiter(const Schema& schema, const ActuatorRow& actuator, const StateL
     const bool limited =
         row.minimum > -kUnlimited || row.maximum < kUnlimited || rates.speed < kUnlimited;
     if (!layout.numbers()[i].moves() || !(limited || row.resting != 0)) continue;
-    numbers_.push_back({i,
-                        NumberLimiter(row.minimum, row.maximum, rates),
-                        row.resting != 0 ? std::optional(row.rest) : std::nullopt,
-                        {}});
+    const auto [lowest, highest] = range_of(layout.numbers()[i].kind);
+    numbers_.push_back(
+        {i,
+         NumberLimiter(std::max(row.minimum, lowest), std::min(row.maximum, highest), rates),
+         row.resting != 0 ? std::optional(row.rest) : std::nullopt,
+         {}});
   }
 }
 
@@ -101,12 +136,22 @@ void Limiter::publish(const Number& number, std::byte* state) const noexcept {
   }
 }
 
-Limited Limiter::follow(const Motion& motion, std::byte* state, std::uint32_t commanded,
-                        double most) noexcept {
+/// A number that no command moves any more comes to rest, wherever that is.
+void Limiter::leave_out(Number& number, std::byte* state) noexcept {
+  if (!number.limiter.at_rest()) number.limiter.brake();
+  publish(number, state);
+}
+
+Limited Limiter::follow(const Motion& motion, std::byte* state, const std::uint64_t* mask,
+                        std::uint32_t one, double most) noexcept {
   Limited result;
   const bool arrived = motion.arrived();
   for (Number& each : numbers_) {
-    const double speed = each.number == commanded ? most : kUnlimited;
+    if (!masked(mask, each.number)) {
+      leave_out(each, state);
+      continue;
+    }
+    const double speed = each.number == one ? most : kUnlimited;
     const Limit limit = each.limiter.follow(motion.number(each.number), speed);
     // the target itself stands there, bit for bit
     if (limit == Limit::none && arrived) continue;
@@ -184,7 +229,10 @@ void Limiter::stretch_fastest(std::int64_t iterations) noexcept {
 Limited Limiter::follow_fastest(std::byte* state) noexcept {
   Limited result;
   for (Number& each : numbers_) {
-    if (!each.planned) continue;
+    if (!each.planned) {
+      leave_out(each, state);
+      continue;
+    }
     const Limit limit = each.limiter.follow(each.fastest.next());
     publish(each, state);
     if (limit != Limit::none && result.limit == Limit::none) result = {limit, each.number};

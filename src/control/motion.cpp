@@ -222,7 +222,7 @@ void Motion::keep_moving(const std::byte* ahead, std::int64_t rows) noexcept {
       kept = {};
       continue;
     }
-    kept = {{}, targets_[i], layout_.number(i, ahead)};
+    kept = {{}, 0.0, targets_[i], layout_.number(i, ahead)};
     double distance = targets_[i] - starts_[i];
     if (profile_ == Profile::linear) {
       kept.moment.velocity = left_ > 0.0 ? distance / iterations_ : 0.0;
@@ -238,6 +238,7 @@ void Motion::keep_moving(const std::byte* ahead, std::int64_t rows) noexcept {
       kept.moment.acceleration +=
           distance * minimum_jerk_curvature(time) / (iterations_ * iterations_);
     }
+    kept.step = moved(i, time) - moved(i, std::max(0.0, done - 1.0) / iterations_);
     const bool usable =
         std::isfinite(kept.moment.velocity) && std::isfinite(kept.moment.acceleration);
     if (!usable) kept.moment = {};
@@ -250,13 +251,19 @@ void Motion::keep_moving(const std::byte* state, std::size_t number, const Momen
     if (moment.velocity == 0.0 && moment.acceleration == 0.0) return;
     for (std::size_t i = 0; i < kept_.size(); ++i) {
       const double here = layout_.numbers()[i].moves() ? layout_.number(i, state) : 0.0;
-      kept_[i] = {{}, here, here};
+      kept_[i] = {{}, 0.0, here, here};
     }
     left_ = 0.0;
     moving_ = true;
   }
-  kept_[number] = {moment, stop, stop};
+  kept_[number] = {moment, moment.velocity, stop, stop};
   left_ = std::max(left_, static_cast<double>(iterations));
+}
+
+void Motion::leave_out(const std::uint64_t* mask) noexcept {
+  for (std::size_t i = 0; moving_ && i < kept_.size(); ++i) {
+    if (!masked(mask, i)) kept_[i].moment = {};
+  }
 }
 
 std::int64_t Motion::iterations_at(std::size_t number, double speed) noexcept {
@@ -265,8 +272,14 @@ std::int64_t Motion::iterations_at(std::size_t number, double speed) noexcept {
   if (!moving_) return minimum_jerk_iterations(target - start, speed);
 
   // an acceleration that would raise the speed further is dropped
-  Moment& moment = kept_[number].moment;
-  if (moment.velocity * moment.acceleration > 0.0) moment.acceleration = 0.0;
+  Kept& kept = kept_[number];
+  Moment& moment = kept.moment;
+  if (moment.velocity * moment.acceleration > 0.0 && std::abs(moment.velocity) > speed) {
+    const double size = std::min(std::abs(moment.velocity), std::max(speed, std::abs(kept.step)));
+    moment = {std::copysign(size, moment.velocity), 0.0};
+  } else if (moment.velocity * moment.acceleration > 0.0) {
+    moment.acceleration = 0.0;
+  }
   const double most = std::max(speed, std::abs(moment.velocity)) * (1.0 + 1e-12);
   const auto fits = [&](std::int64_t n) {
     const auto count = static_cast<double>(n);

@@ -32,7 +32,7 @@ struct NumberLimiter::Candidate {
 void NumberLimiter::restart(double position) noexcept {
   position_ = wanted_ = position;
   begin();
-  speed_ = acceleration_ = 0.0;
+  speed_ = acceleration_ = peak_ = 0.0;
   stop_ = {};
   stopped_ = 0;
 }
@@ -65,7 +65,7 @@ void NumberLimiter::forget_rounding() noexcept {
   const double nothing = slack() / 100.0 + 2.0 * rounding();
   const bool steady = !std::isfinite(rates_.jerk) || std::abs(acceleration_) <= nothing;
   if (steady && std::abs(speed_) <= nothing) {
-    speed_ = acceleration_ = 0.0;
+    speed_ = acceleration_ = peak_ = 0.0;
     stop_ = {};
     stopped_ = 0;
   }
@@ -84,7 +84,9 @@ Limit NumberLimiter::follow_with_acceleration(double step, double lag, double mo
   const double closing = speed_for(std::abs(lag), rates_.acceleration);
   const bool within_reach = closing >= std::abs(lag);
   double speed = within_reach ? wanted_ - position_ : step - std::copysign(closing, lag);
-  const double fastest = std::max(most, std::abs(speed_));
+  // without an acceleration limit it never has to catch up
+  const double fastest =
+      std::isfinite(rates_.acceleration) ? std::max(most, std::abs(speed_)) : rates_.acceleration;
   const bool exact = within_reach && std::abs(speed) <= fastest + slack();
   if (!exact) speed = std::clamp(speed, -fastest, fastest);
 
@@ -157,6 +159,7 @@ void NumberLimiter::accept(const Candidate& next) noexcept {
   acceleration_ = next.acceleration;
   stop_ = next.stop;
   stopped_ = 0;
+  peak_ = std::max(std::abs(next.speed), std::abs(next.speed + next.stop.detour()));
 }
 
 Limit NumberLimiter::follow_with_jerk(double step, double lag, double most) noexcept {
@@ -164,8 +167,7 @@ Limit NumberLimiter::follow_with_jerk(double step, double lag, double most) noex
   const double low = std::max(acceleration_ - rates_.jerk, -rates_.acceleration);
   const double high = std::min(acceleration_ + rates_.jerk, rates_.acceleration);
   // a motion that is faster than asked keeps the way to rest that it has
-  const double peak = std::max(std::abs(speed_), std::abs(speed_ + stop_.detour()));
-  const double fastest = std::min(rates_.speed, std::max(most, peak));
+  const double fastest = std::min(rates_.speed, std::max(most, peak_));
 
   // there, and able to stay there
   const double wanted = wanted_ - position_ - speed_;
@@ -233,7 +235,10 @@ void NumberLimiter::slow_down() noexcept {
   const double acceleration = last ? 0.0 : stop_.acceleration(stopped_);
   move(last ? 0.0 : speed_ + acceleration);
   acceleration_ = acceleration;
-  if (last) stop_ = {};
+  if (last) {
+    stop_ = {};
+    peak_ = 0.0;
+  }
 }
 
 }  // namespace o80

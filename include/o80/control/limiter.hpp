@@ -41,10 +41,10 @@ class Limiter {
   /// A motion begins where the state is now.
   void begin() noexcept;
 
-  /// What a motion asks for => what the limits admit, for one iteration. The commanded number is
-  /// never faster than `most`, or than it was.
-  Limited follow(const Motion& motion, std::byte* state, std::uint32_t commanded,
-                 double most) noexcept;
+  /// What a motion asks of the numbers of `mask` (null: all) => what the limits admit, for one
+  /// iteration; the others come to rest. One number catches up no faster than `most`.
+  Limited follow(const Motion& motion, std::byte* state, const std::uint64_t* mask,
+                 std::uint32_t one, double most) noexcept;
   /// One iteration towards rest; resting numbers go where they rest, or, with `hold`, stay. True
   /// while anything moves.
   bool brake(std::byte* state, bool hold) noexcept;
@@ -70,6 +70,7 @@ class Limiter {
     bool planned = false;  // part of the fastest motion
   };
   void publish(const Number& number, std::byte* state) const noexcept;
+  void leave_out(Number& number, std::byte* state) noexcept;
   void keep_moving(Motion& motion, const std::byte* state, const Number& number) const noexcept;
 
   const StateLayout& layout_;

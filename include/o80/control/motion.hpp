@@ -44,6 +44,8 @@ class Motion {
   /// and in how many iterations.
   void keep_moving(const std::byte* state, std::size_t number, const Moment& moment, double stop,
                    std::int64_t iterations) noexcept;
+  /// The numbers whose bits are not set do not move on.
+  void leave_out(const std::uint64_t* mask) noexcept;
   /// What comes next starts at rest.
   void rest() noexcept { moving_ = false; }
 
@@ -55,6 +57,7 @@ class Motion {
   /// How one number was moving when it was overwritten.
   struct Kept {
     Moment moment;
+    double step = 0.0;    // what it went in the last iteration
     double stop = 0.0;    // where it would have come to rest ...
     double target = 0.0;  // ... before it had gone on to its target
   };

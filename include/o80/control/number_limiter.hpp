@@ -45,8 +45,8 @@ class NumberLimiter {
     scale_ = std::abs(position_);
   }
 
-  /// One iteration towards `wanted`, never faster than `most` unless it was; says what held it
-  /// back.
+  /// One iteration towards `wanted`; says what held it back. It catches up no faster than `most`,
+  /// or than it was.
   Limit follow(double wanted, double most = std::numeric_limits<double>::infinity()) noexcept;
   /// One iteration towards rest, as fast as the limits allow.
   void brake() noexcept;
@@ -77,6 +77,7 @@ class NumberLimiter {
   double scale_ = 0.0;        // how far from 0 it was since the motion began
   VelocityChange stop_;       // with a jerk limit: how it can stop from here
   std::int64_t stopped_ = 0;  // iterations of that which are done
+  double peak_ = 0.0;         // the highest speed on that way
 };
 
 }  // namespace o80
