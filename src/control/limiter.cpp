@@ -166,13 +166,13 @@ bool Limiter::brake(std::byte* state, bool hold) noexcept {
   for (Number& each : numbers_) {
     NumberLimiter& limiter = each.limiter;
     const double before = limiter.position();
-    const bool rests = each.rest.has_value() && !hold;
-    if (rests && (before != *each.rest || !limiter.at_rest())) {
+    const bool away = each.rest.has_value() && !hold && before != *each.rest;
+    if (away) {
       limiter.follow(*each.rest);
     } else if (!limiter.at_rest()) {
       limiter.brake();
     }
-    moves = moves || limiter.position() != before || !limiter.at_rest();
+    moves = moves || away || limiter.position() != before || !limiter.at_rest();
     if (limiter.position() != before) publish(each, state);
   }
   return moves;

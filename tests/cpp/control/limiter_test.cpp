@@ -189,6 +189,22 @@ TEST(Limiter, ARestingNumberGoesToRestWithinItsLimits) {
   EXPECT_FALSE(rig.braking());
 }
 
+TEST(Limiter, ARestingNumberThatStandsForAMomentGoesOnToItsRest) {
+  Schema schema = plain_robot(1);
+  schema.actuator(0)
+      .limits({.speed = 1500.0, .acceleration = 20'000.0, .jerk = 2e7})
+      .rests_at("", 0.0);
+  Rig rig(schema);
+  rig.observe(0, -2000.0);
+  rig.controller.restart(rig.observed.data(), nullptr, 0);
+  rig.observe(0, 250.0);  // far ahead: for an instant the limiter slows down for it
+  rig.add(0, from_observed(smoothly(at_speed(200'000.0))), {0.0});
+  rig.pulse();
+  rig.run(5000);
+  EXPECT_EQ(rig.desired(), 0.0);
+  EXPECT_FALSE(rig.braking());
+}
+
 TEST(Limiter, ADirectValueOfARestingNumberStaysUntilSomethingTakesItsPlace) {
   Schema schema = plain_robot(1, 2);
   schema.actuator(0).rests_at("x1", 0.5);
