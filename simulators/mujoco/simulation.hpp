@@ -15,7 +15,7 @@ struct JointState {
   double position = 0;
   double velocity = 0;
 };
-O80_DESCRIBE(JointState, (position, "[rad or m]"), (velocity, "[rad/s or m/s]"));
+O80_DESCRIBE(JointState, (position, "[rad or m]"), (velocity, "[rad/s or m/s]", o80::rests_at(0)));
 
 /// Where a ball is and how fast.
 struct BallState {
