@@ -1,23 +1,25 @@
 // A lane and its owners, who are killed anywhere: hand-over, what the backend makes of the batches
 // of the dead (policy: purge), and whose batch is whose.
 //
-// Transcribed from src/memory/lane_sender.cpp (LaneSender, send, give_back), lane_receiver.cpp
-// (dead_predecessor, next_is_of_dead), liveness.cpp (ask_lane) and src/runtime/backend_lives.cpp,
-// backend_batches.cpp (look_at_lives, mourn, begin_staging, admit).
+// Transcribed from src/memory/lane_sender.cpp (LaneSender, count_in, send, give_back),
+// lane_receiver.cpp (dead_predecessor, next_is_of_dead), liveness.cpp (ask_lane) and
+// src/runtime/backend_lives.cpp, backend_batches.cpp (look_at_lives, mourn, begin_staging, admit).
 //
 // safety: each batch is dealt with once and in order; a living owner's is never refused as a dead
-//         one's; what an heir sends acts on queues without commands of the dead; ids are not reused
+//         one's; what a successor sends acts on queues without commands of the dead; ids are not
+//         reused
 // ltl:    whatever was committed is dealt with, and a dead owner's commands do not go on for ever
 //         (weak fairness)
 //
 // mutant KEEPS_TWO_LANES      the lock of the lane is granted to everybody
-// mutant COUNTED_EARLY        an heir counts itself before it has left its mark
-// mutant WITHOUT_THE_MARK     an heir does not say where it began
-// mutant HEIR_FINDS_A_MESS    the dead is not mourned before the heir's first batch
-// mutant DEAD_MAN_TALKS       who was mourned is listened to until an heir comes
+// mutant COUNTED_EARLY        a successor counts itself before it has left its mark
+// mutant WITHOUT_THE_MARK     a successor does not say where it began
+// mutant DEATH_IGNORED        the dead is not dealt with before its successor's first batch
+// mutant DEAD_MAN_TALKS       who was mourned is listened to until a successor comes
 // mutant NOBODY_ASKS          no helper thread asks who lives
-// mutant IDS_BEGIN_ANEW       an heir counts its ids from 1
-// mutant COMMITTED_TWICE      an heir begins where the backend is, not where the last owner was
+// mutant ASKS_ONCE            who was seen alive is not asked about again
+// mutant IDS_BEGIN_ANEW       a successor counts its ids from 1
+// mutant COMMITTED_TWICE      a successor begins where the backend is, not where the last owner was
 
 #ifdef LONG
 #define OWNERS 3
@@ -34,8 +36,8 @@ byte committed = 0;             // batches, ever
 byte next_id = 1;
 byte incarnation = 0;
 byte closed = 0;
-byte lost = 0;
-byte began = 0;
+byte dead_incarnation = 0;
+byte successor_begin = 0;
 byte lock = NOBODY;             // of the lane, as the kernel sees it
 byte sender[BATCHES + 1];       // of each batch: the owner's count
 byte id[BATCHES + 1];
@@ -52,6 +54,7 @@ byte cursor = 0;
 byte mourned = 0;
 byte acting = 0;                // whose command is in the queue
 byte refused = 0;
+bool settled = false;           // all owners are gone, and it knows how
 
 #define MAY_DIE if :: true :: atomic { mortal -> if :: me != 0 && incarnation >= me && closed < me -> killed[me] = true :: else fi; goto dying } fi
 
@@ -81,12 +84,12 @@ proctype Owner(byte name; bool mortal; byte batches) {
   me = incarnation + 1;
 #endif
   if
-  :: closed < me - 1 ->
+  :: closed != me - 1 ->
 #ifndef WITHOUT_THE_MARK
-     began = sent;
+     successor_begin = sent;
 #endif
      MAY_DIE;
-     lost = me - 1
+     dead_incarnation = me - 1
   :: else
   fi;
   MAY_DIE;
@@ -116,16 +119,24 @@ finished:
 
 // ask_lane
 proctype Helper() {
-  byte before;
-  bool in_order;
+  byte before, known;
+  bool in_order, gone = true;
   do
   :: before = incarnation;
      if
-     :: lock != NOBODY
-     :: lock == NOBODY && before != 0 ->
-        in_order = (closed == before);
-        if :: !in_order && died < before -> died = before :: else fi
-     :: else
+#ifdef ASKS_ONCE
+     :: before == known -> skip
+#else
+     :: before == known && gone -> skip   // never owned, or gone already: the kernel is not asked
+#endif
+     :: else ->
+        if
+        :: lock != NOBODY -> known = incarnation; gone = false
+        :: lock == NOBODY ->
+           in_order = (closed == before);
+           known = before; gone = true;
+           if :: !in_order && died < before -> died = before :: else fi
+        fi
      fi;
      if
      :: over == OWNERS && (died == incarnation || closed == incarnation) -> break
@@ -149,13 +160,19 @@ proctype Backend() {
   do
   :: cursor < committed ->
      // begin_staging
-     if :: lost < incarnation -> predecessor = lost :: else -> predecessor = 0 fi;
-#ifndef HEIR_FINDS_A_MESS
+     if
+     :: dead_incarnation < incarnation -> predecessor = dead_incarnation
+     :: else -> predecessor = 0
+     fi;
+#ifndef DEATH_IGNORED
      mourn(predecessor);
 #endif
      present = incarnation;
-     if :: lost < incarnation -> predecessor = lost :: else -> predecessor = 0 fi;
-     of_dead = predecessor != 0 && cursor < began;
+     if
+     :: dead_incarnation < incarnation -> predecessor = dead_incarnation
+     :: else -> predecessor = 0
+     fi;
+     of_dead = predecessor != 0 && cursor < successor_begin;
 #ifndef DEAD_MAN_TALKS
      of_dead = of_dead || present <= mourned;
 #endif
@@ -171,7 +188,8 @@ proctype Backend() {
        if
        :: of_dead -> refused++; assert(killed[owner] || closed >= owner)
        :: else ->
-          assert(acting == 0 || acting >= owner || !killed[acting] || killed[owner] || lost < acting);
+          assert(acting == 0 || acting >= owner || !killed[acting] || killed[owner] ||
+                 dead_incarnation < acting);
           acting = owner
        fi
      }
@@ -179,7 +197,8 @@ proctype Backend() {
   :: over == OWNERS && cursor == committed && (died <= mourned) &&
      (died == incarnation || closed == incarnation || incarnation == 0) -> break
   od;
-  assert(acting == 0 || !killed[acting])
+  assert(acting == 0 || !killed[acting]);
+  settled = true
 }
 
 init {
@@ -195,3 +214,4 @@ init {
 }
 
 ltl all_is_dealt_with { [] <> (cursor == committed) }
+ltl no_death_is_missed { <> settled }

@@ -1,20 +1,28 @@
 // Taking a name: two starters and a cleaner at once, each killed between any two system calls, over
-// nothing, over what a dead backend left, or over a living one that may stop or be killed.
+// nothing, over what a dead backend left, over a file without a commanders' file, or over a living
+// backend that may stop or be killed.
 //
-// Transcribed from src/memory: owned_segment.cpp (Draft, publish, create, release, remove) and
-// segment_list.cpp (remove_dead, sweep_drafts, clean). One step is one system call. A dead process
-// keeps its locks until the kernel has torn it down, at any later time.
+// Transcribed from src/memory: segment_draft.cpp, named_segment.cpp, owned_segment.cpp (release,
+// remove) and segment_list.cpp (clean). One step is one system call. A dead process keeps its locks
+// until the kernel has torn it down, at any later time. A segment file and the commanders' file of
+// its epoch have the same number here.
 //
-// safety: a living segment is never renamed over or unlinked; one backend at a time has the name
+// safety: a living segment is never renamed over or unlinked; one backend at a time has the name; a
+//         segment made by o80 that bears the name has its commanders' file; the last starter leaves
+//         no file of the dead behind
 // ltl:    everybody comes to an end, and who starts last, with nobody else there, wins
 //
-// mutant STEAL_LOCK           the lock is granted to everybody
-// mutant NO_LOOK_BEHIND_LOCK  whether the name still leads there is not asked once the lock is ours
-// mutant RENAME_AT_ONCE       the name is taken by rename instead of link
-// mutant CLEAN_WITHOUT_LOCK   a cleaner unlinks what seemed dead
-// mutant DRAFT_WITHOUT_LOCK   a draft is locked only when it has its name
-// mutant DRAFT_NOT_LOOKED_AT  a swept draft is linked
-// mutant LOCK_BY_RENAME       the winner's lock is let go with its draft's name
+// mutant STEAL_LOCK            the lock is granted to everybody
+// mutant NO_LOOK_BEHIND_LOCK   whether the name still leads there is not asked once the lock is ours
+// mutant RENAME_AT_ONCE        the name is taken by rename instead of link
+// mutant CLEAN_WITHOUT_LOCK    a cleaner unlinks what seemed dead
+// mutant LOCKED_LATE           a commanders' file is locked only when its segment has its name
+// mutant NOT_LOOKED_AT         a commanders' file that was swept before it was locked is used
+// mutant UNLOCKED_AFTER_LINK   the winner's lock is let go when its segment has its name
+// mutant MADE_LATE             the commanders' file is made only when its segment has its name
+// mutant COMMANDS_GO_FIRST     who removes a segment unlinks the commanders' file before the name
+// mutant SWEPT_BY_AGE          a sweeper does not ask which epoch has the name
+// mutant FORMER_STAYS          who renames over a segment leaves its commanders' file
 
 #define NONE 15
 #define OLD 0
@@ -23,100 +31,156 @@
 #else
 #define STARTERS 2
 #endif
-#define HEIR (STARTERS + 1)     // starts when all others have come to an end
+#define LAST (STARTERS + 1)     // starts when all others have come to an end
 #define CLEANER (STARTERS + 2)
 #define FORMER (STARTERS + 3)   // the backend that was there before
 #define PROCESSES (STARTERS + 4)
-#define INODES (2 * HEIR + 1)   // OLD, and two attempts of each starter
+#ifdef LONG
+#define INODES (2 * LAST + 1)   // OLD, and two attempts of each starter
+#define FIRST_INODE (1 + 2 * (me - 1))
+#define ATTEMPTS 2
+#else
+#define INODES (LAST + 1)       // OLD, and one attempt of each starter
+#define FIRST_INODE me
+#define ATTEMPTS 1
+#endif
 
-byte name = NONE;               // the inode that bears the segment's name
-bool draft[INODES];             // the inode's temporary name exists
-byte holder[INODES] = NONE;     // of byte 0, as the kernel sees it
+byte name = NONE;               // the segment file that bears the segment's name
+bool foreign = false;           // OLD never had a commanders' file
+bool draft[INODES];             // the segment file's temporary name exists
+bool commands[INODES];          // the commanders' file has its name
+byte holder[INODES] = NONE;     // of byte 0 of the commanders' file, as the kernel sees it
+byte observed[INODES] = NONE;   // of byte 0 of the segment file
 bool runs[PROCESSES];           // as a backend that has won and not begun to end
 byte segment_of[PROCESSES] = NONE;
 byte ended = 0;                 // processes
-bool heir_won = false;
+bool last_won = false;
 
-// each backend that runs has the name
+// each backend that runs has the name, and who commands finds its file
 inline look_around() {
   for (other : 1 .. FORMER) {
-    assert(!runs[other] || name == segment_of[other])
+    assert(!runs[other] || (name == segment_of[other] && commands[name]))
   }
-  other = 0
+  other = 0;
+  assert(name == NONE || commands[name] || (name == OLD && foreign))
 }
 
 #define MAY_DIE if :: true :: mortal -> goto dying fi
 
 #ifdef STEAL_LOCK
-#define GRANTED(inode) true
+#define GRANTED(lock) true
 #else
-#define GRANTED(inode) (holder[inode] == NONE)
+#define GRANTED(lock) (lock == NONE)
 #endif
 
 // sync try_lock: F_OFD_SETLK
-#define TRY_LOCK(inode, granted) \
-  d_step { granted = GRANTED(inode); if :: granted -> holder[inode] = me :: else fi }
-#define RELEASE(inode) d_step { if :: holder[inode] == me -> holder[inode] = NONE :: else fi }
+#define TRY_LOCK(lock, granted) \
+  d_step { granted = GRANTED(lock); if :: granted -> lock = me :: else fi }
+#define RELEASE(lock) d_step { if :: lock == me -> lock = NONE :: else fi }
 
 // the kernel's teardown
 inline tear_down() {
   d_step {
     runs[me] = false;
-    for (i : 0 .. INODES - 1) { if :: holder[i] == me -> holder[i] = NONE :: else fi }
+    for (i : 0 .. INODES - 1) {
+      if :: holder[i] == me -> holder[i] = NONE :: else fi;
+      if :: observed[i] == me -> observed[i] = NONE :: else fi
+    }
     i = 0
   }
 }
 
-// remove_dead(draft path): once for each temporary file
+// sweep: once for each epoch of which there is a temporary name or a commanders' file
 inline sweep() {
   i = 0;
   do
   :: i == INODES -> break
-  :: i < INODES && !draft[i] -> i++
-  :: i < INODES && draft[i] ->
+  :: i < INODES && !draft[i] && !commands[i] -> i++
+  :: i < INODES && (draft[i] || commands[i]) ->
      MAY_DIE;
-     TRY_LOCK(i, granted);
+     has = commands[i];                               // open
      if
-     :: granted -> MAY_DIE; draft[i] = false; MAY_DIE; RELEASE(i)
+     :: has ->
+        TRY_LOCK(holder[i], granted);
+        MAY_DIE;
+        granted = granted && commands[i]
+     :: else -> granted = true
+     fi;
+     if
+     :: granted ->
+        draft[i] = false;
+        MAY_DIE;
+#ifdef SWEPT_BY_AGE
+        commands[i] = false;
+#else
+        // one look, then the unlink: in between nobody else may give this epoch the name
+        seen = name;
+        if :: has && seen != i -> commands[i] = false :: else fi;
+#endif
+        MAY_DIE
      :: else
      fi;
-     i++
+     d_step {
+       if :: holder[i] == me -> holder[i] = NONE :: else fi;
+       i++; has = false; granted = false; seen = 0
+     }
   od;
   i = 0
 }
 
-proctype Starter(byte me; bool mortal) {
-  byte i, other, old, mine, attempt;
-  bool granted;
+// NamedSegment::open, after its segment file: by its commanders' file, or else by itself
+#define DECIDING (has -> holder[old] : observed[old])
+inline try_lock_named() {
+  if
+  :: has -> TRY_LOCK(holder[old], granted)
+  :: else -> TRY_LOCK(observed[old], granted)
+  fi
+}
+inline release_named() {
+  if
+  :: has -> RELEASE(holder[old])
+  :: else -> RELEASE(observed[old])
+  fi
+}
 
-  if :: me == HEIR -> ended == STARTERS + 2 :: else fi;   // all but itself
+proctype Starter(byte me; bool mortal) {
+  byte i, other, old, mine, attempt, seen;
+  bool granted, has;
+
+  if :: me == LAST -> ended == STARTERS + 2 :: else fi;   // all but itself
   sweep();
 
-  // Draft: a temporary file whose byte 0 is ours
+  // SegmentDraft: a commanders' file whose byte 0 is ours, then a temporary segment file
   do
-  :: attempt == 2 -> goto finished                    // its file is taken away each time
+  :: attempt == ATTEMPTS -> goto finished                    // its files are taken away each time
   :: else ->
-     mine = 1 + 2 * (me - 1) + attempt;
+     mine = FIRST_INODE + attempt;
      attempt++;
      MAY_DIE;
-     draft[mine] = true;
+#ifdef MADE_LATE
+     granted = true;
+     break;
+#endif
+     commands[mine] = true;
      MAY_DIE;
-#ifdef DRAFT_WITHOUT_LOCK
+#ifdef LOCKED_LATE
      granted = true;
 #else
-     TRY_LOCK(mine, granted);
+     TRY_LOCK(holder[mine], granted);
 #endif
      if
-#ifdef DRAFT_NOT_LOOKED_AT
+#ifdef NOT_LOOKED_AT
      :: granted -> break
 #else
-     :: granted && draft[mine] -> break
+     :: granted && commands[mine] -> granted = false; break
 #endif
-     :: else -> RELEASE(mine); draft[mine] = false
+     :: else -> RELEASE(holder[mine])
      fi
   od;
+  MAY_DIE;
+  atomic { draft[mine] = true; observed[mine] = me }
 
-  // publish: draft => the file that bears the name
+  // publish
 again:
   MAY_DIE;
 #ifdef RENAME_AT_ONCE
@@ -131,13 +195,14 @@ again:
     fi
   }
   MAY_DIE;
-  TRY_LOCK(old, granted);
+  has = commands[old];
+  try_lock_named();
   if
-  :: granted
-  :: !granted ->
-     // is_held: whoever holds it in passing is waited for, a moment
+  :: granted -> granted = false
+  :: else ->
+     // is_alive: whoever holds it in passing is waited for, a moment
      if
-     :: holder[old] == NONE -> goto again
+     :: DECIDING == NONE -> goto again
      :: name == old -> goto refused                   // SegmentTaken
      :: name != old -> goto again
      fi
@@ -145,7 +210,7 @@ again:
   MAY_DIE;
 #ifndef NO_LOOK_BEHIND_LOCK
   if
-  :: name != old -> RELEASE(old); goto again
+  :: name != old -> release_named(); goto again
   :: name == old
   fi;
 #endif
@@ -161,28 +226,46 @@ won:
     segment_of[me] = mine; runs[me] = true; look_around()
   }
   MAY_DIE;
-  RELEASE(old);
+#ifndef FORMER_STAYS
+  if :: has -> commands[old] = false :: else fi;
+#endif
+  MAY_DIE;
+  release_named();
+  old = 0; has = false;
   goto running;
 
 linked:
   MAY_DIE;
   draft[mine] = false;
-#ifdef LOCK_BY_RENAME
-  RELEASE(mine);
+#ifdef UNLOCKED_AFTER_LINK
+  RELEASE(holder[mine]);
 #endif
 
 running:
-  skip;
-#ifdef DRAFT_WITHOUT_LOCK
-  TRY_LOCK(mine, granted);
+  attempt = 0;
+#ifdef LOCKED_LATE
+  TRY_LOCK(holder[mine], granted);
+#endif
+#ifdef MADE_LATE
+  commands[mine] = true; holder[mine] = me;
 #endif
   if
-  :: me == HEIR -> heir_won = true; goto finished
+  :: me == LAST ->
+     d_step {
+       for (i : 0 .. INODES - 1) { assert(!draft[i] && (!commands[i] || i == name)) }
+       i = 0;
+       last_won = true
+     }
+     goto finished
   :: else
   fi;
   MAY_DIE;
   runs[me] = false;                                   // end: stopped
   MAY_DIE;
+#ifdef COMMANDS_GO_FIRST
+  commands[mine] = false;
+  MAY_DIE;
+#endif
   if
   :: name == mine -> MAY_DIE;
      // remove: nobody else may touch the name while we hold it
@@ -190,33 +273,38 @@ running:
   :: else
   fi;
   MAY_DIE;
+  commands[mine] = false;
+  MAY_DIE;
   goto finished;
 
 refused:
-  // ~Draft: its file goes with it
+  // ~SegmentDraft: its files go with it
   MAY_DIE;
   draft[mine] = false;
+  MAY_DIE;
+  commands[mine] = false;
   MAY_DIE;
   goto finished;
 
 dying:
 finished:
-  atomic { if :: me != HEIR -> tear_down() :: else fi; ended++ }
+  atomic { if :: me != LAST -> tear_down() :: else fi; ended++ }
 }
 
 proctype Cleaner(byte me) {
-  byte i, old;
-  bool granted, mortal = true;
+  byte i, old, seen;
+  bool granted, has, mortal = true;
 
   sweep();
-  // clean: remove_dead(the segment's own path)
+  // clean
   old = name;
   if :: old == NONE -> goto finished :: else fi;
   MAY_DIE;
+  has = commands[old];
 #ifdef CLEAN_WITHOUT_LOCK
-  if :: holder[old] != NONE -> goto finished :: else fi;
+  if :: DECIDING != NONE -> goto finished :: else fi;
 #else
-  TRY_LOCK(old, granted);
+  try_lock_named();
   if :: !granted -> goto finished :: else fi;
 #endif
   MAY_DIE;
@@ -231,6 +319,8 @@ proctype Cleaner(byte me) {
     name = NONE
   }
   MAY_DIE;
+  if :: has -> commands[old] = false :: else fi;
+  MAY_DIE;
 
 dying:
 finished:
@@ -242,7 +332,11 @@ proctype Former(byte me) {
   byte i;
   if
   :: atomic { runs[me] -> runs[me] = false };         // it stops
-     if :: true :: atomic { assert(name == OLD); name = NONE } fi
+     if
+     :: true
+     :: atomic { assert(name == OLD); name = NONE };
+        if :: true :: commands[OLD] = false fi
+     fi
   :: runs[me] -> skip                                 // it is killed
   :: !runs[me] -> skip
   fi;
@@ -254,15 +348,17 @@ init {
   atomic {
     if
     :: true
-    :: name = OLD; segment_of[FORMER] = OLD           // dead
-    :: name = OLD; segment_of[FORMER] = OLD; holder[OLD] = FORMER; runs[FORMER] = true
+    :: name = OLD; segment_of[FORMER] = OLD; commands[OLD] = true   // dead
+    :: name = OLD; segment_of[FORMER] = OLD; foreign = true         // it has no commanders' file
+    :: name = OLD; segment_of[FORMER] = OLD; commands[OLD] = true;
+       holder[OLD] = FORMER; observed[OLD] = FORMER; runs[FORMER] = true
     fi;
     run Former(FORMER);
     for (i : 1 .. STARTERS) { run Starter(i, true) }
-    run Starter(HEIR, false);
+    run Starter(LAST, false);
     run Cleaner(CLEANER);
     i = 0
   }
 }
 
-ltl last_one_wins { <> heir_won }
+ltl last_one_wins { <> last_won }

@@ -21,7 +21,8 @@ void bind_segment_list(nb::module_& m) {
       .def_ro("user", &SegmentEntry::user)
       .def_ro("program", &SegmentEntry::program)
       .def_ro("epoch", &SegmentEntry::epoch)
-      .def_ro("size", &SegmentEntry::bytes);
+      .def_ro("size", &SegmentEntry::bytes)
+      .def_ro("problem", &SegmentEntry::problem, "Why it is not readable.");
   m.def("list_segments", [] {
     const Waiting waiting;
     return o80::list_segments();

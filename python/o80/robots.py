@@ -149,7 +149,7 @@ class Robot:
         history: observations kept (None: as many as 16 MiB hold, 100000 at most).
         lanes, lane_blocks: frontends that may command at once, and blocks of 64 bytes that each
             may have in flight.
-        permission: of the segment's file.
+        permission: read bits say who may observe, write bits who may command.
         stale: what happens to the commands of a frontend that dies, or is silent for longer than
             `silence` [s]: they are carried out, dropped, or the robot stops.
         policy, priority, cpus, lock_memory: real-time scheduling; what the machine refuses is

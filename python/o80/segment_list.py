@@ -11,13 +11,14 @@ class Segment:
 
     name: str
     life: str  #: starting, running, stopped, failed, superseded or killed
-    readable: bool  #: False: made by another version, or not ours to read
+    readable: bool  #: False: made by another version, or not ours to read or to trust
     pid: int
     user: str
     program: str
     started_at: int  #: [s] since 1970
     bytes: int
     epoch: int  #: names this run of the backend
+    problem: str = ""  #: why it is not readable
 
     @property
     def alive(self) -> bool:
@@ -38,6 +39,7 @@ def segments() -> list[Segment]:
             started_at=entry.started_at,
             bytes=entry.size,
             epoch=entry.epoch,
+            problem=entry.problem,
         )
         for entry in _core.list_segments()
     ]

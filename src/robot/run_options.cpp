@@ -22,7 +22,7 @@ constexpr RunFlag kFlags[] = {
     {"history", "ROWS", "rows kept (default: as many as 16 MiB hold, at most 100000)"},
     {"lanes", "N", "frontends that may command at once (default: 8)"},
     {"lane-blocks", "N", "blocks of 64 bytes each of them may have in flight (default: 16384)"},
-    {"permission", "OCTAL", "of the segment's file (default: 600; 660 lets the group command)"},
+    {"permission", "OCTAL", "read: may observe, write: may command (default: 600; 640, 660, 644)"},
     {"stale", "POLICY", "commands of a dead frontend: hold, purge or stop (default: hold)"},
     {"silence", "SECONDS", "longest time without a command before they are purged or all stops"},
     {"policy", "CLASS", "scheduling: other, fifo or rr (default: other)"},

@@ -2,6 +2,7 @@
 
 import json
 import os
+import pwd
 import signal
 import subprocess
 import sys
@@ -131,6 +132,21 @@ def test_a_killed_robot_is_shown_read_and_cleaned(
     assert "shoulder" in o80(folder, "info", "two_joints")
     assert "removed two_joints" in o80(folder, "clean")
     assert "Nothing to remove" in o80(folder, "clean")
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root may give files away")
+def test_a_file_of_another_user_is_listed_under_its_owner_and_not_believed(
+    folder: Path, robot: "subprocess.Popen[str]"
+) -> None:
+    os.chown(folder / "o80-two_joints", 65534, 65534)
+    owner = pwd.getpwuid(65534).pw_name
+    listed = " ".join(o80(folder, "list").split())
+    assert "unreadable" in listed
+    assert f"belongs to user {owner}" in listed
+    assert f"O80_TRUST={owner}" in listed
+    assert f"belongs to user {owner}" in " ".join(
+        o80(folder, "info", "two_joints", fails=True).split()
+    )
 
 
 def test_a_living_robot_is_not_cleaned(folder: Path, robot: "subprocess.Popen[str]") -> None:

@@ -31,7 +31,7 @@ struct BackendOptions {
   std::uint64_t history = 0;          // rows kept; 0: as many as 16 MiB hold, 1e5 at most
   std::uint32_t lanes = 8;            // frontends that may command at once
   std::uint32_t lane_blocks = 16384;  // of 64 bytes, that one of them may have in flight
-  mode_t permission = 0600;           // of the segment
+  mode_t permission = 0600;           // read: may observe; write: may command
   Stale stale = Stale::hold;
   std::int64_t silence = 0;  // longest time without a batch [ns]; 0: no limit
 };

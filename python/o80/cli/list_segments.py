@@ -6,6 +6,7 @@ import time
 from typing import Annotated, Any
 
 import typer
+from rich.markup import escape
 from rich.table import Table
 
 import o80
@@ -38,6 +39,9 @@ def list_segments(
             _up(row["started_at"]) if row["state"] == "running" else "",
         )
     out.print(table)
+    for row in rows:
+        if row["problem"]:
+            out.print(f"[yellow]{row['segment']}[/]: {escape(row['problem'])}")
     if any(row["state"] in ("killed", "failed", "stopped") for row in rows):
         out.print("[dim]Dead ones can still be read; [bold]o80 clean[/bold] removes them.[/dim]")
 
@@ -45,7 +49,8 @@ def list_segments(
 def _row(entry: o80.Segment) -> dict[str, Any]:
     row: dict[str, Any] = {
         "segment": entry.name,
-        "state": entry.life,
+        "state": entry.life if entry.readable else "unreadable",
+        "problem": entry.problem,
         "pid": entry.pid,
         "user": entry.user,
         "program": entry.program,
