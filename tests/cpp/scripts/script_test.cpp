@@ -31,8 +31,6 @@ TEST(Script, ReadsBackWhatItPrints) {
 }
 
 TEST(Script, KeepsEveryPromise) {
-  // until the faults that they have found are mended
-  if (std::getenv("O80_SCRIPTS") == nullptr) GTEST_SKIP() << "played on demand: make scripts";
   const std::uint64_t scripts = from_environment("O80_SCRIPTS", kScriptsOfEachRun);
   const std::uint64_t first = from_environment("O80_SCRIPT_SEED", 0);
   // one of each kind is shown whole, the others are counted
