@@ -138,7 +138,7 @@ void LinearReference::step(std::size_t a) {
   }
   if (next_ > actuator.last) {
     ++actuator.row;
-    begin_row(a);
+    begin_row(a, false);
   }
   for (std::size_t n = 0; n < desired_[a].size(); ++n) desired_[a][n] = between(a, n);
 
@@ -166,11 +166,11 @@ bool LinearReference::begin_command(std::size_t a) {
   actuator.running = true;
   actuator.started = actuator.exact;
   actuator.row = 0;
-  begin_row(a);
+  begin_row(a, true);
   return true;
 }
 
-void LinearReference::begin_row(std::size_t a) {
+void LinearReference::begin_row(std::size_t a, bool begins_command) {
   Actuator& actuator = actuators_[a];
   const ScriptStep& step = *actuator.queue.front().step;
   const std::size_t numbers = desired_[a].size();
@@ -190,7 +190,7 @@ void LinearReference::begin_row(std::size_t a) {
     const bool named = step.mask == 0 || (step.mask >> n & 1) != 0;
     if (!named) continue;
     const Kind kind = script_.actuators[a].numbers[n].kind;
-    if (actuator.row == 0 && step.head.start == Start::observed) actuator.from[n] = observed(a, n);
+    if (begins_command && step.head.start == Start::observed) actuator.from[n] = observed(a, n);
     actuator.to[n] = as_stored(kind, step.values[actuator.row * numbers + n]);
   }
   actuator.last = std::max(next_, end_of_row(a));

@@ -56,7 +56,7 @@ class LinearReference {
   void drop_lane(std::uint16_t actuator, std::uint32_t lane);
   void step(std::size_t a);
   bool begin_command(std::size_t a);
-  void begin_row(std::size_t a);
+  void begin_row(std::size_t a, bool begins_command);
   Iteration end_of_row(std::size_t a);
   long double observed(std::size_t a, std::size_t n) const;
   long double between(std::size_t a, std::size_t n) const;

@@ -12,6 +12,7 @@ namespace o80::test {
 namespace {
 
 constexpr long double kPeriod = 1e-3L;
+constexpr Iteration kSmoothAfter = 5;
 
 /// The number whose speed a command asks for: the first it names that moves.
 std::optional<std::size_t> paced_number(const ScriptWorld& world, const SentCommand& command) {
@@ -63,6 +64,21 @@ SpanWatch::Span SpanWatch::stops(const Number& number, long double place, long d
   return found;
 }
 
+/// The most that a motion may have moved on within an iteration when it was taken over.
+long double SpanWatch::seam_speed(const ScriptWorld& world, std::size_t actuator,
+                                  const Number& number, const NumberSpec& spec) {
+  // differences lie back, and those of integers are rounded
+  long double seam = std::fabs(number.first) + std::fabs(number.second) + std::fabs(number.third) +
+                     (spec.is_float() ? 0.0L : 7.0L);
+  // in a row of few iterations a minimum jerk is up to 3 times as fast as within the last one
+  const SentCommand* previous = world.actuators[actuator].previous;
+  if (previous != nullptr &&
+      (world.rows_of(*previous) > 1 || world.iteration - previous->active_since < kSmoothAfter)) {
+    seam = std::max(seam, 3.0L * std::fabs(number.first));
+  }
+  return seam;
+}
+
 void SpanWatch::begin(const ScriptWorld& world, std::size_t actuator, bool taken_over) {
   const SentCommand& command = *world.actuators[actuator].driver;
   const ScriptStep& step = world.step_of(command);
@@ -100,13 +116,7 @@ void SpanWatch::begin(const ScriptWorld& world, std::size_t actuator, bool taken
     number.fastest = 0.0L;
     if (step.head.pace == Pace::speed && paced == n && step.head.start == Start::desired) {
       const NumberSpec& spec = world.script.actuators[actuator].numbers[n];
-      long double seam = 0.0L;
-      if (world.actuators[actuator].previous != nullptr || world.actuators[actuator].braking ||
-          taken_over || number.first != 0.0L) {
-        // differences lie back, and those of integers are rounded
-        seam = std::fabs(number.first) + std::fabs(number.second) + std::fabs(number.third) +
-               (spec.is_float() ? 0.0L : 7.0L);
-      }
+      long double seam = seam_speed(world, actuator, number, spec);
       if (std::isfinite(spec.limits.jerk)) {
         const long double jerk = spec.limits.jerk * kPeriod * kPeriod * kPeriod;
         seam += number.second * number.second / (2.0L * jerk) + std::fabs(number.second);

@@ -38,6 +38,8 @@ class SpanWatch {
     long double fastest = 0.0L;  // step allowed by a speed pace; 0: any
   };
 
+  static long double seam_speed(const ScriptWorld& world, std::size_t actuator,
+                                const Number& number, const NumberSpec& spec);
   void begin(const ScriptWorld& world, std::size_t actuator, bool taken_over);
   static Span stops(const Number& number, long double place, long double rounding);
   std::optional<Failure> check(const ScriptWorld& world, std::size_t actuator,
