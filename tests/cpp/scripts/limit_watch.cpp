@@ -29,7 +29,8 @@ long double rounding_of(const NumberSpec& number, long double position) {
   const long double size = std::fabs(position);
   switch (number.kind) {
     case Kind::float64:
-      return size * std::numeric_limits<double>::epsilon();
+      // of sums that it took to get there
+      return 4.0L * size * std::numeric_limits<double>::epsilon();
     case Kind::float32:
       return size * std::numeric_limits<float>::epsilon() + 2e-45L;
     default: {

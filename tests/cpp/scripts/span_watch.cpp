@@ -121,7 +121,9 @@ void SpanWatch::begin(const ScriptWorld& world, std::size_t actuator, bool taken
         const long double jerk = spec.limits.jerk * kPeriod * kPeriod * kPeriod;
         seam += number.second * number.second / (2.0L * jerk) + std::fabs(number.second);
       }
-      number.fastest = std::max<long double>(step.head.speed * kPeriod, seam);
+      // no pace reaches further than this
+      const long double slowest = (span.high - span.low) / kMostIterations;
+      number.fastest = std::max<long double>({step.head.speed * kPeriod, seam, slowest});
     }
   }
 }
