@@ -156,6 +156,7 @@ bool ActuatorQueue::begin_next(Iteration iteration, const std::byte* observed,
     times_ = rows_;
     rows_ = rows_of_timed(*pool_, head, layout_->size());
   }
+  holds_ = false;
   pace_ = head.pace;
   first_number_ = layout_->first_commanded(mask());
   most_ = pace_ == Pace::speed ? head.speed * period_ : kNoSpeed;

@@ -100,6 +100,20 @@ TEST(Resting, ASuccessorGoesOnFromWhatADirectCommandAsked) {
   EXPECT_EQ(rig.desired(kVelocity), 5.0);
 }
 
+TEST(Resting, ASuccessorThatIsPurgedEndsWhatADirectCommandAsked) {
+  Rig rig(joint(0.5));
+  rig.add(0, direct(), {0.0, 4.0});
+  rig.pulse(1);
+  rig.run(3);
+  rig.add(0, over(4), {0.0, 8.0});
+  rig.pulse(0);
+  rig.run(2);
+  // only what the second lane sent
+  rig.controller.purge_lane(0, kEveryActuator, rig.next);
+  rig.step();
+  EXPECT_EQ(rig.desired(kVelocity), 0.5);
+}
+
 TEST(Resting, KeepsTheLimitsOnTheWay) {
   // a rest that takes 20 iterations at 100/s
   Rig rig(joint(0.0, {.speed = 100.0}));

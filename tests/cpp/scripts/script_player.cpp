@@ -119,7 +119,9 @@ std::int64_t Player::braking_time() const {
       double time = std::isfinite(acceleration) ? speed / acceleration : 0.0;
       if (std::isfinite(jerk)) time += 2.0 * acceleration / jerk + std::sqrt(speed / jerk);
       const auto place = static_cast<double>(world_.actuators[a].numbers[n].now);
-      if (spec.resting) time += std::fabs(place - spec.rest) / speed;
+      // an integer may be anywhere within one of what is published
+      const double hidden = spec.is_float() ? 0.0 : 1.0;
+      if (spec.resting) time += (std::fabs(place - spec.rest) + hidden) / speed;
       longest = std::fmax(longest, time);
     }
   }

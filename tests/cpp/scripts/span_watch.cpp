@@ -94,8 +94,11 @@ void SpanWatch::begin(const ScriptWorld& world, std::size_t actuator, bool taken
       std::array<std::byte, 8> bytes{};
       const Kind kind = world.script.actuators[actuator].numbers[n].kind;
       store_as(kind, *track.reading, bytes.data());
-      number.from = load_as(kind, bytes.data());
-      span.include(number.from);
+      span.include(load_as(kind, bytes.data()));
+      // limits count from the last desired state
+      if (!world.script.actuators[actuator].numbers[n].limited()) {
+        number.from = load_as(kind, bytes.data());
+      }
     }
     if (taken_over) {
       span.include(
