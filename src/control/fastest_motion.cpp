@@ -12,11 +12,13 @@ constexpr double kTimeRounding = 1e-12;
 constexpr int kMostTries = 60;
 constexpr int kMostCorrections = 8;
 
-/// Where a function that grows from below 0 at `low` to 0 or more at `high` crosses 0; by the
-/// Illinois method, with halvings where that is slow.
+/// Where a function that grows from below 0 at `low` to 0 or more at `high` crosses 0, or comes as
+/// near as `tolerance`; by the Illinois method, with halvings where that is slow.
 template <class Function>
-double root(Function&& function, double low, double high, double at_low, double at_high) noexcept {
+double root(Function&& function, double low, double high, double tolerance) noexcept {
+  double at_low = function(low);
   if (at_low >= 0.0) return low;
+  double at_high = function(high);
   if (at_high <= 0.0) return high;
   int side = 0;
   for (int i = 0; i < kMostTries; ++i) {
@@ -25,7 +27,7 @@ double root(Function&& function, double low, double high, double at_low, double 
     double tried = i % 4 == 3 ? low + width / 2.0 : high - at_high * width / (at_high - at_low);
     if (!(tried > low && tried < high)) tried = low + width / 2.0;
     const double value = function(tried);
-    if (value == 0.0) return tried;
+    if (std::abs(value) <= tolerance) return tried;
     if (value < 0.0) {
       low = tried;
       at_low = value;
@@ -87,7 +89,7 @@ FastestMotion::FastestMotion(double position, double speed, double acceleration,
     const auto beyond_at = [&](double cruise) {
       return distance(cruise, time_to(cruise)) - distance_;
     };
-    cruise_ = root(beyond_at, lowest, rates_.speed, beyond_at(lowest), beyond_at(rates_.speed));
+    cruise_ = root(beyond_at, lowest, rates_.speed, 1e-13 * distance_);
     before_ = static_cast<std::int64_t>(std::ceil(time_to(cruise_) * (1.0 - kTimeRounding)));
   }
   const double at_lowest = distance(lowest, static_cast<double>(before_)) - distance_;
@@ -118,7 +120,7 @@ double FastestMotion::distance(double cruise, double before) const noexcept {
 
 double FastestMotion::cruise_for(double before, double low, double high) const noexcept {
   const auto beyond = [&](double cruise) { return distance(cruise, before) - distance_; };
-  return root(beyond, low, high, beyond(low), beyond(high));
+  return root(beyond, low, high, 1e-16 * distance_);
 }
 
 void FastestMotion::settle() noexcept {

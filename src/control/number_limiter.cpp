@@ -8,7 +8,7 @@ namespace {
 
 // what interpolation rounds is no excess
 constexpr double kLimitRounding = 1e-9;
-constexpr int kHalvings = 24;
+constexpr int kHalvings = 16;
 
 /// The highest speed after which a number that slows down by `acceleration` an iteration stops
 /// within `room`, the iteration at that speed included.

@@ -88,61 +88,59 @@ void VelocityChange::plan_with_jerk(double change) noexcept {
   const double fewest = std::ceil(std::abs(start_) / jerk_ * (1.0 - kChangeRounding));
 
   // which side of the straight way to acceleration 0, and its mirror image, does the change lie?
-  const double lowest = sums(fewest).change;
-  start_ = -start_;
-  const double highest = -sums(fewest).change;
-  start_ = -start_;
-  if (change > highest) {
+  Sums straight = sums(fewest);
+  if (change >= straight.change) {
+    start_ = -start_;
+    const Sums crest = sums(fewest);
+    if (change <= -crest.change) {
+      // neither: between the two ways of fewest steps
+      start_ = -start_;
+      steps_ = shorter_ = static_cast<std::int64_t>(fewest);
+      crest_ = true;
+      share_ = share_between(change, straight.change, -crest.change);
+      displacement_ = -((1.0 - share_) * straight.moment - share_ * crest.moment);
+      return;
+    }
     sign_ = -1.0;
-    start_ = -start_;
     change = -change;
+    straight = crest;
   }
-  Sums other;
-  Sums own;
-  if (sign_ > 0.0 && change >= lowest) {
-    // neither: between the two ways of fewest steps
-    steps_ = shorter_ = static_cast<std::int64_t>(fewest);
-    crest_ = true;
-    own = sums(fewest);
-    start_ = -start_;
-    other = sums(fewest);
-    start_ = -start_;
-    other = {-other.change, -other.moment};
-  } else {
-    // the fewest steps whose trough is deep enough: by a continuous estimate, then exactly
-    const double missing = start_ * start_ / (2.0 * jerk_) - change;
-    const double depth = std::sqrt(std::max(0.0, missing * jerk_));
-    double steps = depth <= acceleration_
-                       ? (start_ + 2.0 * depth) / jerk_
-                       : (start_ + 2.0 * acceleration_) / jerk_ +
-                             (missing - acceleration_ * acceleration_ / jerk_) / acceleration_;
-    double low = fewest;  // steps that are too few
-    steps = std::clamp(std::floor(steps), fewest + 1.0, kMostSteps);
-    const double enough = change + kChangeRounding * std::max(std::abs(change), std::abs(start_));
+
+  // the fewest steps whose trough is deep enough: by a continuous estimate, then exactly
+  const double missing = start_ * start_ / (2.0 * jerk_) - change;
+  const double depth = std::sqrt(std::max(0.0, missing * jerk_));
+  double steps = depth <= acceleration_
+                     ? (start_ + 2.0 * depth) / jerk_
+                     : (start_ + 2.0 * acceleration_) / jerk_ +
+                           (missing - acceleration_ * acceleration_ / jerk_) / acceleration_;
+  const double enough = change + kChangeRounding * std::max(std::abs(change), std::abs(start_));
+  double low = fewest;  // steps that are too few
+  Sums other = straight;
+  steps = std::clamp(std::floor(steps), fewest + 1.0, kMostSteps);
+  Sums own = sums(steps);
+  for (double stride = 1.0; own.change > enough && steps < kMostSteps; stride *= 2.0) {
+    low = steps;
+    other = own;
+    steps = std::min(steps + stride, kMostSteps);
     own = sums(steps);
-    for (double stride = 1.0; own.change > enough && steps < kMostSteps; stride *= 2.0) {
-      low = steps;
-      steps = std::min(steps + stride, kMostSteps);
-      own = sums(steps);
-    }
-    bool first = true;  // the estimate is seldom off by more than one
-    while (steps - low > 1.0) {
-      const double tried =
-          std::exchange(first, false) ? steps - 1.0 : std::floor((low + steps) / 2.0);
-      const Sums there = sums(tried);
-      if (there.change > enough) {
-        low = tried;
-      } else {
-        steps = tried;
-        own = there;
-      }
-    }
-    steps_ = static_cast<std::int64_t>(steps);
-    shorter_ = steps_ - 1;
-    other = sums(steps - 1.0);
-    const double rising = start_ > 0.0 ? std::floor(start_ / jerk_) : 0.0;
-    detour_ = sign_ * (rising * start_ - jerk_ * rising * (rising + 1.0) / 2.0);
   }
+  bool first = true;  // the estimate is seldom off by more than one
+  while (steps - low > 1.0) {
+    const double tried =
+        std::exchange(first, false) ? steps - 1.0 : std::floor((low + steps) / 2.0);
+    const Sums there = sums(tried);
+    if (there.change > enough) {
+      low = tried;
+      other = there;
+    } else {
+      steps = tried;
+      own = there;
+    }
+  }
+  steps_ = static_cast<std::int64_t>(steps);
+  shorter_ = steps_ - 1;
+  const double rising = start_ > 0.0 ? std::floor(start_ / jerk_) : 0.0;
+  detour_ = sign_ * (rising * start_ - jerk_ * rising * (rising + 1.0) / 2.0);
   share_ = share_between(change, own.change, other.change);
   displacement_ = -sign_ * ((1.0 - share_) * own.moment + share_ * other.moment);
 }
