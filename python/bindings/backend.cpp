@@ -311,11 +311,9 @@ PyType_Slot backend_slots[] = {{Py_tp_traverse, reinterpret_cast<void*>(&Backend
                                {Py_tp_clear, reinterpret_cast<void*>(&Backend::clear)},
                                {0, nullptr}};
 
-o80::Stale stale_of(const std::string& word) {
-  if (word == "hold") return o80::Stale::hold;
-  if (word == "purge") return o80::Stale::purge;
-  if (word == "stop") return o80::Stale::stop;
-  throw InvalidArgument("stale cannot be '" + word + "': it is 'hold', 'purge' or 'stop'");
+o80::Stale stale_called(const std::string& name) {
+  if (const auto stale = o80::stale_of(name)) return *stale;
+  throw InvalidArgument("stale must be 'hold', 'purge', 'halt' or 'stop', got '" + name + "'");
 }
 
 Backend* make(const SchemaBuilder& builder, const std::string& segment, std::int64_t period,
@@ -329,7 +327,7 @@ Backend* make(const SchemaBuilder& builder, const std::string& segment, std::int
   options.lanes = lanes;
   options.lane_blocks = lane_blocks;
   options.permission = permission;
-  options.stale = stale_of(stale);
+  options.stale = stale_called(stale);
   options.silence = silence;
   return new Backend(builder, options);
 }

@@ -85,8 +85,8 @@ class Backend:
         lanes: int = 8,
         lane_blocks: int = 16384,
         permission: int = 0o600,
-        stale: Literal["hold", "purge", "stop"] = "hold",
-        silence: float | None = None,
+        stale: Literal["hold", "purge", "halt", "stop"] = "hold",
+        silence: int | None = None,
     ) -> None:
         if not (math.isfinite(frequency) and frequency > 0):
             raise InvalidArgument(f"a frequency of {frequency} cannot be: it is above 0 [1/s]")
@@ -109,7 +109,7 @@ class Backend:
             lane_blocks,
             permission,
             stale,
-            0 if silence is None else round(silence * 1e9),
+            0 if silence is None else silence,
         )
         self._layout = Layout(native.description)
         self._segment = segment

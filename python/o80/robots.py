@@ -132,8 +132,10 @@ class Robot:
         lanes: int | None = None,
         lane_blocks: int | None = None,
         permission: int = 0o600,
-        stale: Literal["hold", "purge", "stop"] = "hold",
-        silence: float | None = None,
+        stale: Literal["hold", "purge", "halt", "stop"] = "hold",
+        silence: int | None = None,
+        max_overruns: int | None = None,
+        resume: bool = False,
         policy: Literal["other", "fifo", "rr"] = "other",
         priority: int | None = None,
         cpus: Sequence[int] = (),
@@ -150,8 +152,11 @@ class Robot:
         lanes, lane_blocks: frontends that may command at once, and blocks of 64 bytes that each
             may have in flight.
         permission: read bits say who may observe, write bits who may command.
-        stale: what happens to the commands of a frontend that dies, or is silent for longer than
-            `silence` [s]: they are carried out, dropped, or the robot stops.
+        stale: what follows when a frontend dies, or shows no life for `silence` iterations while
+            something of its acts: nothing, its commands are dropped, the robot halts, or it stops.
+            A pulse, a wait for its own batch and `keep_alive` are signs of life, reading is none.
+        max_overruns: halt when so many iterations within a second are late.
+        resume: run although the process before was halted, or died while commands acted.
         policy, priority, cpus, lock_memory: real-time scheduling; what the machine refuses is
             warned about.
         timeout: for the robot to be running [s].
@@ -169,6 +174,8 @@ class Robot:
             "permission": f"{permission:o}",
             "stale": stale,
             "silence": silence,
+            "max-overruns": max_overruns,
+            "resume": resume,
             "policy": policy,
             "priority": priority,
             "cpus": ",".join(map(str, cpus)) or None,

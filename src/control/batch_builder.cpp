@@ -94,6 +94,13 @@ std::uint32_t BatchBuilder::release_control() {
   return records_ - 1;
 }
 
+std::uint32_t BatchBuilder::resume(std::uint64_t number) {
+  RecordHead head = head_of(RecordKind::resume);
+  head.amount = static_cast<std::int64_t>(number);
+  open(head, 0);
+  return records_ - 1;
+}
+
 std::span<const Block> BatchBuilder::seal(const BatchRecord& batch) {
   BatchRecord written = batch;
   written.kind = RecordKind::batch;

@@ -17,6 +17,7 @@ constexpr std::size_t kSpareBlocks = 4;
 // traits: the number of requests, and these
 constexpr std::uint32_t kIsExpress = 1U << 16;
 constexpr std::uint32_t kReleases = 1U << 17;
+constexpr std::uint32_t kMoves = 1U << 18;
 
 // what steps take of an iteration, next to copying a block: 1
 constexpr std::uint32_t kBatchWork = 6;
@@ -40,7 +41,10 @@ BatchPlanner::BatchPlanner(const Schema& schema, RecordCheck::Layouts layouts, B
       targets_(std::size_t{lanes} * actuators_),
       listed_(std::size_t{lanes} * actuators_),
       tails_(pool.size(), kNoBlock),
-      known_(pool.size(), Known::nothing) {}
+      known_(pool.size(), Known::nothing) {
+  for (const RequestRow& request : schema.requests)
+    while_halted_.push_back(request.while_halted != 0);
+}
 
 void BatchPlanner::begin(Lane& lane, BlockIndex batch) noexcept {
   lane.batch = batch;
@@ -84,7 +88,8 @@ void BatchPlanner::complete(std::uint32_t lane_index, std::uint32_t& budget) noe
   record.own[kMissingFrom] = lane.place;
   record.own[kSpareFirst] = lane.cursor;
   record.own[kTraits] =
-      lane.effort.requests | (is_express ? kIsExpress : 0) | (lane.effort.releases ? kReleases : 0);
+      lane.effort.requests | (is_express ? kIsExpress : 0) |
+      (lane.effort.releases ? kReleases : 0) | (lane.effort.moves ? kMoves : 0);
   record.own[kSpareBlocks] = chain.blocks - lane.blocks;
   record.blocks = lane.effort.work;
   known_[lane.batch] = Known::plan;
@@ -166,6 +171,7 @@ bool BatchPlanner::check_record(std::uint32_t lane_index, std::uint32_t& budget)
 bool BatchPlanner::is_one_too_many(Lane& lane, const RecordHead& head) const noexcept {
   switch (head.kind) {
     case RecordKind::request:
+    case RecordKind::resume:
       return lane.effort.requests >= kMostRequests;
     case RecordKind::take_control:
     case RecordKind::release_control:
@@ -184,10 +190,14 @@ void BatchPlanner::add(std::uint32_t lane_index, BlockIndex record,
   switch (pool_.head(record).kind) {
     case RecordKind::command:
       lane.effort.express = false;
+      lane.effort.moves = true;
       return add_command(lane_index, record);
     case RecordKind::purge:
       return add_purge(lane_index, record, budget);
     case RecordKind::request:
+      if (!while_halted_[pool_.head(record).actuator]) lane.effort.moves = true;
+      [[fallthrough]];
+    case RecordKind::resume:  // may start afresh too
       lane.effort.express = false;
       ++lane.effort.requests;
       end_part(lane_index, budget);
@@ -344,7 +354,8 @@ Effort BatchPlanner::effort(BlockIndex batch) const noexcept {
   if (known_[batch] != Known::plan) return {.work = kBatchWork};
   const BatchRecord& record = pool_.batch(batch);
   const std::uint32_t traits = record.own[kTraits];
-  return {record.blocks, traits & 0xFFFF, (traits & kIsExpress) != 0, (traits & kReleases) != 0};
+  return {record.blocks, traits & 0xFFFF, (traits & kIsExpress) != 0, (traits & kReleases) != 0,
+          (traits & kMoves) != 0};
 }
 
 std::optional<Plan> BatchPlanner::plan(BlockIndex batch) noexcept {

@@ -84,6 +84,10 @@ class Controller::Body {
   bool finish_pending() noexcept;
   bool active() const noexcept;
   bool acts(std::uint32_t lane) const noexcept;
+  bool holds() const noexcept {
+    return std::ranges::any_of(actuators_,
+                               [](const ActuatorQueue& queue) { return queue.holds(); });
+  }
   std::optional<NotFinite> not_finite(const std::byte* block) const noexcept;
 
   /// Calls `visit(ActuatorQueue&)` for one actuator or every one, which may have to come to rest.
@@ -218,6 +222,9 @@ void Controller::Body::take_step(const Taking& from, BlockIndex record,
       return end(handler.take_control(from.lane));
     case RecordKind::release_control:
       return end(handler.release_control(from.lane));
+    case RecordKind::resume:
+      return end(
+          handler.resume(from.lane, head.id, static_cast<std::uint64_t>(head.amount)));
     case RecordKind::overwritten_list:
       return ledger.drop(record, Status::overwritten, Reason::none, now);
     case RecordKind::purged_list:
@@ -351,9 +358,9 @@ void Controller::take(std::uint32_t lane, BlockIndex batch, BatchHandler& handle
 }
 
 void Controller::reject(std::uint32_t lane, BlockIndex batch, Reason reason, std::uint8_t aux,
-                        Iteration iteration) noexcept {
+                        Iteration iteration, Status status) noexcept {
   body_->planner.forget(lane, batch);
-  body_->ledger.reject(lane, batch, reason, aux, iteration);
+  body_->ledger.reject(lane, batch, reason, aux, iteration, status);
 }
 
 void Controller::step(Iteration iteration, const std::byte* observed) noexcept {
@@ -409,6 +416,7 @@ std::uint32_t Controller::words() const noexcept {
   return static_cast<std::uint32_t>(body_->active_mask.size());
 }
 
+bool Controller::holds() const noexcept { return body_->holds(); }
 bool Controller::acts(std::uint32_t lane) const noexcept { return body_->acts(lane); }
 
 std::optional<NotFinite> Controller::not_finite(const std::byte* block) const noexcept {

@@ -20,6 +20,7 @@ struct Ledger::TakenBatch {
   BlockIndex next_group = kNoBlock;
   std::uint32_t lane = 0;
   BlockChain spare;
+  Status told_as = Status::rejected;  // of the records without blocks
 };
 
 Ledger::TakenBatch& Ledger::batch(BlockIndex block) noexcept {
@@ -59,7 +60,7 @@ void Ledger::reject_from(BlockIndex block, std::uint32_t place, Reason reason, s
 }
 
 void Ledger::reject(std::uint32_t lane, BlockIndex block, Reason reason, std::uint8_t aux,
-                    Iteration iteration) noexcept {
+                    Iteration iteration, Status status) noexcept {
   // how many blocks there really are decides how many records there can be
   BlockChain spare = pool_.chain(block);
   spare.first = pool_.next(block);
@@ -75,6 +76,7 @@ void Ledger::reject(std::uint32_t lane, BlockIndex block, Reason reason, std::ui
   taken.open = taken.records + 1;
   taken.lane = lane;
   taken.spare = spare;
+  taken.told_as = status;
   new (pool_.bytes(block)) TakenBatch(taken);
   sink_.changed({lane, taken.id, Status::rejected, reason, aux, iteration});
   reject_from(block, 0, reason, aux, iteration);
@@ -134,7 +136,7 @@ void Ledger::drop(BlockIndex first, Status status, Reason reason, Iteration iter
 bool Ledger::tell_rejected(BlockIndex block, std::uint32_t& budget) noexcept {
   TakenBatch& taken = batch(block);
   while (taken.told < taken.records && budget > 0) {
-    sink_.changed({taken.lane, record_id(taken.id, taken.told), Status::rejected, taken.reason,
+    sink_.changed({taken.lane, record_id(taken.id, taken.told), taken.told_as, taken.reason,
                    taken.aux, taken.rejected_at});
     ++taken.told;
     --taken.open;

@@ -5,6 +5,9 @@
 #include <limits>
 #include <string>
 
+#include "o80/base/short_text.hpp"
+#include "o80/control/number_name.hpp"
+
 namespace o80 {
 namespace {
 
@@ -182,6 +185,25 @@ void CommandCheck::refuse(std::uint32_t actuator, const std::byte* state,
     }
   }
   throw InvalidArgument("the target of " + of_actuator(schema_, actuator) + " cannot be used");
+}
+
+void CommandCheck::direct(std::uint32_t actuator, std::span<const std::byte> state,
+                          std::span<const std::uint64_t> mask) const {
+  if (schema_.head.bursting != 0 || schema_.head.silence > 0) return;
+  const ActuatorRow& row = schema_.actuators[actuator];
+  const StateLayout& layout = *layouts_[row.type];
+  for (std::uint32_t i = 0; i < row.limits; ++i) {
+    const LimitRow& limit = schema_.limits[row.first_limit + i];
+    const bool given = mask.empty() || (mask[i / 64] >> (i % 64) & 1) != 0;
+    if (limit.resting == 0 || !given || layout.number(i, state.data()) == limit.rest) continue;
+    ShortText<200> name;
+    name_number(schema_, actuator, i, name);
+    throw InvalidArgument(
+        "a direct target of " + text_of(layout.number(i, state.data())) + " for the " +
+        std::string(name.view()) +
+        " would stay if this program hung: start the backend with a watchdog (--silence N, with "
+        "--stale purge, halt or stop), or give the command a duration, a speed or iterations");
+  }
 }
 
 void CommandCheck::speed(std::uint32_t index, double speed,

@@ -16,6 +16,8 @@ std::string_view to_text(RecordKind kind) noexcept {
       return "take_control";
     case RecordKind::release_control:
       return "release_control";
+    case RecordKind::resume:
+      return "resume";
     default:
       return "unknown";
   }

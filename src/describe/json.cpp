@@ -213,6 +213,10 @@ std::string to_json(const Schema& schema) {
   json.value(std::string_view(schema.head.clock == Clock::simulated ? "simulated" : "monotonic"));
   json.key("bursting");
   json.value(schema.head.bursting != 0);
+  json.key("silence");
+  json.value(schema.head.silence);
+  json.key("stale");
+  json.value(name_of(schema.head.stale));
   json.key("row");
   write_layout(json, row_layout(schema));
   json.key("groups");
@@ -252,6 +256,8 @@ std::string to_json(const Schema& schema) {
     json.value(request.help.view());
     json.key("type");
     write_type(json, schema, request.type);
+    json.key("while_halted");
+    json.value(request.while_halted != 0);
     json.close('}');
   }
   json.close(']');

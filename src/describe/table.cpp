@@ -240,6 +240,9 @@ void check(const Schema& schema) {
   if (static_cast<int>(schema.head.clock) > static_cast<int>(Clock::simulated)) {
     refuse("the clock is unknown");
   }
+  if (schema.head.stale > Stale::halt || schema.head.silence < 0) {
+    refuse("the policy for silent frontends is unknown");
+  }
   const std::vector<std::uint64_t> numbers = check_types(schema);
   if (schema.head.extended != kNoType && schema.head.extended >= schema.types.size()) {
     refuse("the extended type is not there");

@@ -124,6 +124,7 @@ class SegmentSearch {
     }
     const Life life = found_->life();
     if (life == Life::running) return true;
+    if (life == Life::starting && options_.starting) return true;
     if (life == Life::starting) {
       reason_ = "its backend is still starting";
       return false;

@@ -126,7 +126,8 @@ void write_burst(BurstSlot& slot, std::uint64_t id, Iteration row) noexcept {
 
 }  // namespace
 
-void LaneReceiver::set_burst_done(std::uint64_t id, Iteration row) noexcept {
+void LaneReceiver::set_burst_done(std::uint64_t id, Iteration row, BurstEnd end) noexcept {
+  if (end == BurstEnd::cut) row += kCutBurst;
   O80_CRASH_POINT("burst.before");
   write_burst(feedback_->recent_bursts[bursts_ % kBurstsKept], id, row);
   O80_CRASH_POINT("burst.before_newest");

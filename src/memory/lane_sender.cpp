@@ -1,7 +1,5 @@
 #include "o80/memory/lane_sender.hpp"
 
-#include <unistd.h>
-
 #include <algorithm>
 
 #include "o80/base/crash_point.hpp"
@@ -59,8 +57,7 @@ LaneSender::LaneSender(const AttachedSegment& segment) : segment_(&segment), vie
   if (page_->next_id.load(std::memory_order_relaxed) - taken > kMostSkippedIds / 2)
     page_->next_id.store(taken, std::memory_order_relaxed);
   next_id_ = page_->next_id.load(std::memory_order_relaxed);
-  store_text(page_->owner, std::size(page_->owner),
-             "pid " + std::to_string(getpid()) + " (" + own_program() + ")");
+  store_text(page_->owner, std::size(page_->owner), own_process());
   O80_CRASH_POINT("lane.before_incarnation");
   count_in();
   O80_CRASH_POINT("lane.after_incarnation");
@@ -106,6 +103,8 @@ LaneSender::LaneSender(LaneSender&& other) noexcept
       sent_(other.sent_),
       next_id_(other.next_id_),
       draws_(other.draws_),
+      slice_(other.slice_),
+      watched_(other.watched_),
       guard_(other.guard_) {}
 
 LaneSender::~LaneSender() { give_back(); }
@@ -212,8 +211,12 @@ bool read_burst(const BurstSlot& slot, std::uint64_t id, Iteration& row) noexcep
 }  // namespace
 
 LaneSender::BurstAnswer LaneSender::burst(std::uint64_t id) const noexcept {
+  const auto answer = [](Iteration word) {
+    if (word < kCutBurst) return BurstAnswer{Known::yes, word, BurstEnd::done};
+    return BurstAnswer{Known::yes, word - kCutBurst, BurstEnd::cut};
+  };
   Iteration row = -1;
-  if (read_burst(feedback_->burst, id, row)) return {Known::yes, row};
+  if (read_burst(feedback_->burst, id, row)) return answer(row);
   // bursts of a lane are done in the order of their ids
   const std::uint64_t newest = feedback_->burst.id.load(std::memory_order_acquire);  // sync burst
   if (newest != 0 && newest < id) return {Known::not_yet, -1};
@@ -223,7 +226,7 @@ LaneSender::BurstAnswer LaneSender::burst(std::uint64_t id) const noexcept {
   const std::uint64_t kept = std::min<std::uint64_t>(done, kBurstsKept);
   for (std::uint64_t back = 1; back <= kept; ++back)
     if (read_burst(feedback_->recent_bursts[(done - back) % kBurstsKept], id, row))
-      return {Known::yes, row};
+      return answer(row);
   const std::uint64_t oldest = feedback_->recent_bursts[done % kBurstsKept].id.load(
       std::memory_order_acquire);  // sync burst
   return {oldest > id ? Known::forgotten : Known::not_yet, -1};

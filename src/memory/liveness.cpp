@@ -11,7 +11,9 @@
 #include <utility>
 
 #include "helper_scheduling.hpp"
+#include "o80/base/time.hpp"
 #include "o80/memory/futex.hpp"
+#include "o80/memory/verb_word.hpp"
 
 namespace o80 {
 
@@ -48,6 +50,7 @@ struct LaneLiveness::Watched {
       changed = true;
     }
     if (changed) changes.fetch_add(1, std::memory_order_release);  // sync changes
+    note_slow_verb(view, monotonic_now());
     rounds.fetch_add(1, std::memory_order_relaxed);
   }
 

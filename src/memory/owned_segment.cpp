@@ -11,6 +11,7 @@
 #include "o80/base/crash_point.hpp"
 #include "o80/base/error.hpp"
 #include "o80/memory/atomic_words.hpp"
+#include "o80/memory/halt_word.hpp"
 #include "o80/memory/named_segment.hpp"
 #include "o80/memory/segment_draft.hpp"
 #include "o80/memory/segment_file.hpp"
@@ -92,7 +93,12 @@ OwnedSegment OwnedSegment::create(const SegmentSpec& spec) {
   view.commands = commands_mapping.data();
   fill(view, spec, draft.epoch());
 
-  draft.publish();
+  draft.publish([&](const Predecessor& former) {
+    if (!spec.inherits_halt || !(former.was_halted || former.died_acting)) return;
+    ask_for_halt(view, HaltCause::predecessor, {},
+                 former.was_halted ? "the backend before was halted and never resumed"
+                                   : "the backend before was killed while commands acted");
+  });
   segment.name_ = spec.name;
   segment.path_ = path;
   segment.commands_path_ = draft.commands_path();

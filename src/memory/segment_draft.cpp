@@ -44,16 +44,30 @@ Mapping map(const LockFile& file, std::uint64_t bytes) {
   return {file.descriptor(), bytes, Mapping::Protection::read_write, Mapping::Faults::later};
 }
 
+/// The view's backend is dead; another starter may have marked it as superseded before it died too.
+Predecessor judge_predecessor(const SegmentView& view) {
+  const Counters& counters = view.counters();
+  Predecessor predecessor;
+  predecessor.was_halted = counters.halted.load(std::memory_order_acquire) != 0;  // sync halted
+  if (view.commands != nullptr)
+    predecessor.was_halted |= view.bell().halts.load(std::memory_order_seq_cst) !=  // sync halts
+                              counters.cleared.load(std::memory_order_acquire);     // sync cleared
+  const auto state = static_cast<State>(counters.state.load(std::memory_order_acquire));
+  predecessor.died_acting = counters.acts.load(std::memory_order_relaxed) != 0 &&
+                            state != State::stopped && state != State::failed;
+  return predecessor;
+}
+
 /// Tells frontends attached to a dead segment that it has a successor. A file that is no segment,
 /// or that this user may not write, has nobody to tell.
-void supersede(const NamedSegment& former) {
+Predecessor supersede(const NamedSegment& former) {
   // descriptors of their own: those of `former` bear its lock, and a lock must not be inherited
   // with a mapping
   const LockFile segment = LockFile::open(former.path(), kOpen);
   SegmentHeader header;
   SegmentView view;
   if (!segment.is_open() || !inspect_segment(segment.descriptor(), header, view.offsets).empty())
-    return;
+    return {};
   view.shape = header.shape;
   const Mapping mapping = map(segment, view.offsets.file_bytes);
   view.base = mapping.data();
@@ -65,7 +79,9 @@ void supersede(const NamedSegment& former) {
     commands_mapping = map(commands, view.offsets.commands_bytes);
     view.commands = commands_mapping.data();
   }
+  const Predecessor predecessor = judge_predecessor(view);
   end_segment(view, State::superseded);
+  return predecessor;
 }
 
 }  // namespace
@@ -144,7 +160,7 @@ void SegmentDraft::permit(mode_t permission) {
     fail("its permission cannot be set", errno);
 }
 
-void SegmentDraft::publish() {
+void SegmentDraft::publish(const std::function<void(const Predecessor&)>& inherit) {
   const std::string path = segment_path(name_);
   while (!published_) {
     O80_CRASH_POINT("create.before_link");
@@ -153,7 +169,7 @@ void SegmentDraft::publish() {
       O80_CRASH_POINT("create.after_link");
       unlink(path_.c_str());
     } else if (errno == EEXIST) {
-      published_ = try_replace();
+      published_ = try_replace(inherit);
     } else {
       fail("its file cannot be given its name", errno);
     }
@@ -161,7 +177,7 @@ void SegmentDraft::publish() {
 }
 
 /// False if whatever has the name is to be looked at again. Throws SegmentTaken, SegmentError.
-bool SegmentDraft::try_replace() {
+bool SegmentDraft::try_replace(const std::function<void(const Predecessor&)>& inherit) {
   NamedSegment former = NamedSegment::open(name_);
   const std::string& path = former.path();
   if (!former.is_open() && errno == ENOENT) return false;
@@ -178,7 +194,7 @@ bool SegmentDraft::try_replace() {
   if (!former.is_current()) return false;
 
   // its backend is dead, and nobody else can replace it while we hold its lock
-  supersede(former);
+  inherit(supersede(former));
   O80_CRASH_POINT("create.before_rename");
   if (rename(path_.c_str(), path.c_str()) != 0)
     fail(path + " is in the way and cannot be replaced", errno);

@@ -9,6 +9,10 @@
 
 namespace o80 {
 
+namespace {
+constexpr std::int64_t kLongestBraking = 1'000'000'000;  // [ns]
+}
+
 Loop::Loop(std::unique_ptr<Robot> robot, const BackendOptions& options)
     : robot_(std::move(robot)),
       backend_(robot_->describe(), options, this),
@@ -27,7 +31,8 @@ Loop::~Loop() {
 }
 
 void Loop::start() {
-  if (!robot_->start() || !read()) {
+  const bool started = calls(Verb::start, [&] { return robot_->start(); });
+  if (!started || !read() || !is_finite(backend_.observed())) {
     if (fault_.empty()) failed("start");
     const std::string why = fault_;
     stop();
@@ -42,7 +47,19 @@ Ended Loop::run() noexcept {
   while (!finished_ && backend_.step() == Step::run) {
     if (!iterate()) break;
   }
+  brake();
   return stop();
+}
+
+/// An end in order in real time: the actuators come to rest first, within a second at most. Only a
+/// failed verb, or a robot that says itself that it is done, leaves no time for that.
+void Loop::brake() noexcept {
+  if (!paced_ || finished_ || !fault_.empty()) return;
+  const std::int64_t end = monotonic_now() + kLongestBraking;
+  braking_ = true;
+  while (monotonic_now() < end && backend_.brake() == Step::run) {
+    if (!iterate()) return;
+  }
 }
 
 Step Loop::run_granted(std::uint32_t most) noexcept {
@@ -63,7 +80,7 @@ bool Loop::iterate() noexcept {
 bool Loop::write() noexcept {
   const DesiredView view{backend_.desired(), backend_.active(), backend_.iteration(),
                          backend_.time(), backend_.schema().head.period};
-  return robot_->write(view) || failed("write");
+  return calls(Verb::write, [&] { return robot_->write(view); }) || failed("write");
 }
 
 /// Real time waits here, for the clock or for the robot's own tick.
@@ -71,13 +88,15 @@ bool Loop::pace() noexcept {
   if (!paced_) return true;
   const bool in_time = pacer_.in_time(monotonic_now());
   if (robot_->table().paces_itself != 0) {
-    if (!robot_->wait(pacer_.due())) return failed("wait");
+    if (!calls(Verb::wait, [&] { return robot_->wait(pacer_.due()); })) return failed("wait");
     backend_.set_timing(pacer_.tick(monotonic_now()));
     return true;
   }
-  // a signal may come just before the sleep, and wake nobody: a long one is cut into slices
+  // a signal may come just before the sleep, and wake nobody: a long one is cut into slices. A
+  // motion is not hurried by a stop: the robot would be asked to do the step in less time
   bool over = !in_time;
-  while (!over && !backend_.stop_asked()) {
+  const bool moves = backend_.acts() && backend_.schema().head.period <= kLongestBraking;
+  while (!over && (moves || braking_ || !backend_.stop_asked())) {
     const std::int64_t slice = std::min(pacer_.due(), monotonic_now() + kSlice);
     over = sleep_until(slice) && slice == pacer_.due();
   }
@@ -93,8 +112,9 @@ bool Loop::read() noexcept {
   view.interrupted = interrupted_.data();
   view.iteration = backend_.iteration();
   view.time = backend_.time();
-  if (!robot_->read(view)) return failed("read");
+  if (!calls(Verb::read, [&] { return robot_->read(view); })) return failed("read");
   finished_ = finished_ || view.finished != 0;
+  note_halt(view);
   for (std::uint32_t word = 0; word < interrupted_.size(); ++word) {
     for (std::uint64_t bits = interrupted_[word]; bits != 0; bits &= bits - 1) {
       const auto actuator = word * 64 + static_cast<std::uint32_t>(std::countr_zero(bits));
@@ -115,7 +135,8 @@ bool Loop::failed(const char* verb) noexcept {
 }
 
 Served Loop::serve(std::uint32_t request, std::span<const std::byte> payload) noexcept {
-  const Served served = robot_->request(request, payload.data());
+  const Served served =
+      calls(Verb::request, [&] { return robot_->request(request, payload.data()); });
   if (served.kind == Served::Kind::failed) {
     failed(backend_.schema().requests[request].name.chars.data());
   }
@@ -130,16 +151,47 @@ bool Loop::read_fresh(FreshReading& reading) noexcept {
   view.interrupted = interrupted_.data();
   view.iteration = backend_.iteration();
   view.time = backend_.time();
-  if (!robot_->read(view)) return failed("read");
+  if (!calls(Verb::read, [&] { return robot_->read(view); })) return failed("read");
   finished_ = finished_ || view.finished != 0;
+  note_halt(view);
   reading.has_desired = view.has_desired != 0;
-  return true;
+  return is_finite(reading.observed) && (!reading.has_desired || is_finite(reading.desired));
+}
+
+void Loop::note_halt(const ReadingView& view) noexcept {
+  if (view.halted == 0) return;
+  const std::size_t size = strnlen(view.halt_text.text, sizeof view.halt_text.text);
+  backend_.halt(HaltCause::driver, {view.halt_text.text, size});
+}
+
+/// What a robot begins with has to be numbers: nothing could be commanded from there.
+bool Loop::is_finite(const std::byte* block) noexcept {
+  ShortText<200> text;
+  if (!backend_.first_not_finite(block, text)) return true;
+  fault_ = "'";
+  fault_ += robot_->table().name;
+  fault_ += "' begins with a reading that is no number: ";
+  fault_ += text.view();
+  return false;
+}
+
+bool Loop::halt() noexcept {
+  return calls(Verb::halt, [&] { return robot_->halt(); }) || failed("halt");
+}
+
+Served Loop::resume() noexcept {
+  const Served served = calls(Verb::resume, [&] { return robot_->resume(); });
+  if (served.kind == Served::Kind::failed) failed("resume");
+  return served;
 }
 
 Ended Loop::stop() noexcept {
   if (!ended_) {
     ended_ = true;
-    robot_->stop();
+    calls(Verb::stop, [&] {
+      robot_->stop();
+      return true;
+    });
     if (fault_.empty()) fault_ = backend_.failure();
     backend_.end(fault_.empty() ? State::stopped : State::failed, fault_);
   }

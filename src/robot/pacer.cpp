@@ -26,7 +26,9 @@ const Timing& Pacer::tick(std::int64_t now) noexcept {
   timing_.lateness = now - due_;
   // the robot's clock is its own: a tick counts as the one that was nearest
   if (timing_.lateness > 0) {
-    timing_.skipped += static_cast<std::uint32_t>((timing_.lateness + period_ / 2) / period_);
+    const auto missed = static_cast<std::uint32_t>((timing_.lateness + period_ / 2) / period_);
+    timing_.skipped += missed;
+    if (missed > 0 && !overrun_) ++timing_.overruns;
   }
   due_ = now + period_;
   return timing_;

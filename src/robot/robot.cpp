@@ -95,9 +95,8 @@ bool Robot::read(ReadingView& reading) noexcept {
   return table_.read(driver_, &reading, &fault_) == 0;
 }
 
-Served Robot::request(std::uint32_t index, const std::byte* payload) noexcept {
-  FaultText text{};
-  switch (table_.request(driver_, index, payload, &text)) {
+Served Robot::served(RequestAnswer answer, const FaultText& text) noexcept {
+  switch (answer) {
     case RequestAnswer::done:
       return Served::done();
     case RequestAnswer::rejected:
@@ -108,6 +107,19 @@ Served Robot::request(std::uint32_t index, const std::byte* payload) noexcept {
       std::copy_n(text.text, sizeof text.text, fault_.text);
       return Served::failed(text.text);
   }
+}
+
+Served Robot::request(std::uint32_t index, const std::byte* payload) noexcept {
+  FaultText text{};
+  return served(table_.request(driver_, index, payload, &text), text);
+}
+
+bool Robot::halt() noexcept { return table_.halt == nullptr || table_.halt(driver_, &fault_) == 0; }
+
+Served Robot::resume() noexcept {
+  if (table_.resume == nullptr) return Served::done();
+  FaultText text{};
+  return served(table_.resume(driver_, &text), text);
 }
 
 void Robot::stop() noexcept {

@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 #include <iomanip>
+#include <optional>
 #include <sstream>
 #include <vector>
 
@@ -23,8 +24,10 @@ constexpr RunFlag kFlags[] = {
     {"lanes", "N", "frontends that may command at once (default: 8)"},
     {"lane-blocks", "N", "blocks of 64 bytes each of them may have in flight (default: 16384)"},
     {"permission", "OCTAL", "read: may observe, write: may command (default: 600; 640, 660, 644)"},
-    {"stale", "POLICY", "commands of a dead frontend: hold, purge or stop (default: hold)"},
-    {"silence", "SECONDS", "longest time without a command before they are purged or all stops"},
+    {"stale", "POLICY", "when a frontend dies or is silent: hold, purge, halt or stop (hold)"},
+    {"silence", "N", "iterations a commander may show no life before that applies (default: ever)"},
+    {"max-overruns", "N", "halt when so many iterations within a second are late (default: never)"},
+    {"resume", nullptr, "run although the process before was halted or died while commands acted"},
     {"policy", "CLASS", "scheduling: other, fifo or rr (default: other)"},
     {"priority", "N", "1 to 99, with fifo and rr (default: 80)"},
     {"cpus", "LIST", "processors of the loop, for example 2,3"},
@@ -91,12 +94,15 @@ void set_flag(RunOptions& options, std::string_view flag, const char* text) {
   }
   if (flag == "permission") backend.permission = permission(text);
   if (flag == "stale") {
-    if (value != "hold" && value != "purge" && value != "stop") {
-      refuse(flag, text, "hold, purge or stop");
-    }
-    backend.stale = value == "hold" ? Stale::hold : value == "purge" ? Stale::purge : Stale::stop;
+    const std::optional<Stale> stale = stale_of(value);
+    if (!stale) refuse(flag, text, "hold, purge, halt or stop");
+    backend.stale = *stale;
   }
-  if (flag == "silence") backend.silence = std::llround(number(flag, text, 1e-6, 1e6) * 1e9);
+  if (flag == "silence") backend.silence = static_cast<std::int64_t>(whole(flag, text, 1, 1e15));
+  if (flag == "max-overruns") {
+    options.backend.max_overruns = static_cast<std::uint32_t>(whole(flag, text, 1, 1e5));
+  }
+  if (flag == "resume") backend.resume = true;
   if (flag == "policy") {
     using Policy = RealTimeOptions::Policy;
     if (value != "other" && value != "fifo" && value != "rr")

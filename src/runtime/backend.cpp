@@ -8,6 +8,7 @@
 
 #include "backend_body.hpp"
 #include "o80/base/crash_point.hpp"
+#include "o80/control/number_name.hpp"
 #include "o80/describe/table.hpp"
 
 namespace o80 {
@@ -25,11 +26,17 @@ Schema prepared(Schema schema, const BackendOptions& options) {
   }
   if (options.silence > 0 && options.stale == Stale::hold) {
     throw InvalidArgument(
-        "a longest silence needs to know what follows it: set the stale policy to purge or stop");
+        "the watchdog (silence) needs a policy: set stale to purge, halt or stop, not to hold");
+  }
+  if (options.silence < 0) {
+    throw InvalidArgument("silence must be 0 (no watchdog) or a number of iterations, got " +
+                          std::to_string(options.silence));
   }
   schema.head.period = options.period;
   schema.head.bursting = options.bursting ? 1 : 0;
   schema.head.clock = options.bursting ? Clock::simulated : Clock::monotonic;
+  schema.head.stale = options.stale;
+  schema.head.silence = options.silence;
   schema.head.block = round_up(schema.head.block, 8);
   check(schema);
   return schema;
@@ -51,6 +58,7 @@ OwnedSegment segment_of(const Schema& schema, const BackendOptions& options) {
   spec.lanes = options.lanes;
   spec.lane_blocks = options.lane_blocks;
   spec.permission = options.permission;
+  spec.inherits_halt = !options.bursting && !options.resume;
   return OwnedSegment::create(spec);
 }
 
@@ -77,6 +85,8 @@ UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, Reques
       controller(schema, pool, *this, lanes.size()),
       staging(lanes, pool, controller),
       schedule(lanes.size()),
+      halts(segment.view()),
+      verbs(segment.view()),
       server_(server),
       lives_(lanes.size()),
       mourned_(lanes.size()),
@@ -84,8 +94,9 @@ UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, Reques
       payload_(largest_request(schema), std::byte{0}),
       fresh_desired_(layout.block / 8),
       stale_(options.stale),
-      silence_(options.silence <= 0 ? 0
-                                    : std::max<std::int64_t>(1, options.silence / options.period)) {
+      silence_(options.silence),
+      last_life_(lanes.size()),
+      overruns_(options.max_overruns) {
   // completed and late commands, and their batches
   untold_.reserve(2 * (schema.actuators.size() + Controller::kStatusesPerIteration));
   express_lanes_.reserve(lanes.size());
@@ -102,6 +113,7 @@ Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
   std::uint32_t looks = 0;
   while (true) {
     look_at_lives();
+    watch_halt();
     if (stop.load(std::memory_order_relaxed)) return Step::ended;
     share_ = {};
     if (!granted()) {
@@ -109,7 +121,12 @@ Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
       take_batches();
     }
     if (stop.load(std::memory_order_relaxed)) return Step::ended;
-    if (schema.head.bursting == 0 || granted()) break;
+    if (schema.head.bursting == 0 || granted()) {
+      // a pulse that came in this step is a sign of life; a halt may end the burst
+      watch_silence();
+      watch_halt();
+      if (schema.head.bursting == 0 || granted()) break;
+    }
     // standing still: everybody is told before anybody waits
     const bool all_told = controller.finish_pending();
     wake(lanes.announce(), false);
@@ -126,12 +143,12 @@ Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
     share_ = {};
     take_due();
   }
-  watch_silence();
   under_way_ = true;
   stepping_ = true;
   if (burst_left_ == 1) history.expect(current);
   controller.step(current, row() + layout.observed);
   stepping_ = false;
+  show_acts();
   O80_CRASH_POINT("backend.after_step");
   return Step::run;
 }
@@ -142,20 +159,23 @@ void UntypedBackend::Body::count_burst() noexcept {
   if (burst_left_ == 0) end_burst(current);
 }
 
-void UntypedBackend::Body::end_burst(Iteration row) noexcept {
-  lanes[burst_lane_].set_burst_done(burst_id_, row);
+void UntypedBackend::Body::end_burst(Iteration row, BurstEnd end) noexcept {
+  lanes[burst_lane_].set_burst_done(burst_id_, row, end);
   burst_lane_ = kNobody;
 }
 
-void UntypedBackend::Body::cut_burst() noexcept {
+void UntypedBackend::Body::cut_burst(BurstEnd end) noexcept {
   if (!granted()) return;
   burst_left_ = 0;
-  end_burst(current - 1);
+  end_burst(current - 1, end);
   lanes.look_again();
 }
 
 void UntypedBackend::Body::publish(bool fresh) noexcept {
-  if (!begun_) controller.restart(row() + layout.observed, nullptr, 0);
+  if (!begun_) {
+    controller.restart(row() + layout.observed, nullptr, 0);
+    watch_halt();
+  }
 
   // head, desired and masks join observed and extended, which are there
   RowHead head;
@@ -165,6 +185,7 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
   head.overruns = timing.overruns;
   head.skipped = timing.skipped;
   head.fresh = fresh ? 1 : 0;
+  head.halted = halts.acts() ? 1 : 0;
   std::memcpy(row(), &head, sizeof head);
   if (layout.block > 0) std::memcpy(row() + layout.desired, controller.desired(), layout.block);
   if (layout.mask_words > 0) {
@@ -199,6 +220,7 @@ void UntypedBackend::Body::end(State state, std::string_view text) noexcept {
   while (!controller.finish_pending()) {
   }
   wake(lanes.announce(), false);
+  segment.view().counters().acts.store(0, std::memory_order_relaxed);
   segment.end(state, text);
 }
 
@@ -224,17 +246,34 @@ Step UntypedBackend::try_step() noexcept { return body_->step(0); }
 Step UntypedBackend::step_within(std::int64_t at_most) noexcept {
   return body_->step(std::max<std::int64_t>(at_most, 0));
 }
-void UntypedBackend::cut_burst() noexcept { body_->cut_burst(); }
+void UntypedBackend::cut_burst() noexcept { body_->cut_burst(BurstEnd::done); }
 const std::byte* UntypedBackend::desired() const noexcept { return body_->controller.desired(); }
 const std::uint64_t* UntypedBackend::active() const noexcept {
   return body_->controller.active_mask();
 }
 Iteration UntypedBackend::iteration() const noexcept { return body_->current; }
 std::int64_t UntypedBackend::time() const noexcept { return body_->time(); }
-void UntypedBackend::set_timing(const Timing& timing) noexcept { body_->timing = timing; }
+void UntypedBackend::set_timing(const Timing& timing) noexcept { body_->set_timing(timing); }
+Step UntypedBackend::brake() noexcept { return body_->brake(); }
+bool UntypedBackend::acts() const noexcept { return body_->acts(); }
+void UntypedBackend::enter(Verb verb) noexcept { body_->verbs.enter(verb); }
+void UntypedBackend::leave() noexcept { body_->verbs.leave(); }
+
+void UntypedBackend::halt(HaltCause cause, std::string_view text) noexcept {
+  body_->ask_to_halt(cause, text);
+}
+const Halt& UntypedBackend::halted() const noexcept { return body_->halts.halt(); }
 
 void UntypedBackend::interrupt(std::uint32_t actuator) noexcept {
   body_->controller.interrupt(actuator, body_->current);
+}
+
+bool UntypedBackend::first_not_finite(const std::byte* block,
+                                      ShortText<200>& text) const noexcept {
+  const std::optional<NotFinite> found = body_->controller.not_finite(block);
+  if (!found) return false;
+  name_number(schema(), found->actuator, found->number, text);
+  return true;
 }
 
 void UntypedBackend::ask_to_stop() noexcept {

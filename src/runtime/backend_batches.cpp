@@ -89,13 +89,18 @@ Outcome UntypedBackend::Body::request(std::uint32_t lane, CommandId id, std::uin
     fail(served.why());
     return reject(served.why());
   }
-  // a fresh start has a row of its own
+  return start_afresh(lane, id);
+}
+
+/// Reads the robot anew and publishes a row of its own.
+Outcome UntypedBackend::Body::start_afresh(std::uint32_t lane, CommandId id) noexcept {
   auto* desired = reinterpret_cast<std::byte*>(fresh_desired_.data());
   FreshReading reading{row() + layout.observed, row() + layout.extended, desired};
   if (!server_->read_fresh(reading)) {
     constexpr std::string_view kWhy = "the robot could not be read after a fresh start";
     fail(kWhy);
-    return reject(kWhy);
+    lanes[lane].set_message(id, kWhy);
+    return {Status::rejected, Reason::driver, 0};
   }
   controller.restart(reading.observed, reading.has_desired ? reading.desired : nullptr, current);
   publish(true);
@@ -133,7 +138,10 @@ void UntypedBackend::Body::take_due() noexcept {
 /// What the lanes hold, as far as the work of one iteration may go.
 void UntypedBackend::Body::take_batches() noexcept {
   if (!lanes.look()) return;
-  if (lanes.tickets_were_put_back()) controller.forget_tickets();
+  if (lanes.tickets_were_put_back()) {
+    controller.forget_tickets();
+    halted_below_ = 0;
+  }
   const bool all_taken = take_in_order();
   if (granted()) {
     lanes.look_again_after(burst_lane_);
@@ -223,7 +231,8 @@ void UntypedBackend::Body::spend(const Effort& effort) noexcept {
 
 /// A batch whose turn it is: takes it, puts it off to its iteration, or rejects it.
 void UntypedBackend::Body::accept(const StagedBatch& sent) noexcept {
-  last_batch_ = current;
+  break_silence(sent.lane);
+  if (!suits_halt(sent)) return;
   const BatchRecord batch = pool.batch(sent.batch);
   const bool bursts = batch.burst > 0 || (batch.flags & kBurstUntilEnded) != 0;
   const bool is_for_later = sent.at > current;
@@ -251,11 +260,13 @@ void UntypedBackend::Body::accept(const StagedBatch& sent) noexcept {
 void UntypedBackend::Body::take(const StagedBatch& sent) noexcept {
   O80_COUNT(batch_taken);
   taking_owner_ = sent.had_left ? 0 : sent.incarnation;
+  taking_ticket_ = sent.ticket;
   controller.take(sent.lane, sent.batch, *this);
 }
 
 /// Whether a batch may be taken in this iteration; else it ends as rejected.
 bool UntypedBackend::Body::admit(const StagedBatch& sent) noexcept {
+  if (!suits_halt(sent)) return false;
   watch_holder();
   const std::uint64_t sender = sent.had_left ? 0 : sent.incarnation;
   const bool is_holders = holder_ == sent.lane && holder_incarnation_ == sender;
@@ -279,6 +290,7 @@ bool UntypedBackend::Body::reject(const StagedBatch& sent, Reason reason,
 
 void UntypedBackend::Body::reject_all(Reason reason) noexcept {
   for (; !schedule.empty(); schedule.drop_next()) reject(schedule.next(), reason);
+  while (schedule.has_aside()) reject(schedule.take_aside(), reason);
   for (std::uint32_t lane = 0; lane < lanes.size(); ++lane) {
     for (; staging.has_staged(lane); staging.pop(lane)) reject(staging.front(lane), reason);
   }

@@ -12,11 +12,13 @@
 #include "o80/base/time.hpp"
 #include "o80/control/controller.hpp"
 #include "o80/memory/fork.hpp"
+#include "o80/memory/halt_word.hpp"
 #include "o80/memory/history.hpp"
 #include "o80/memory/lane.hpp"
 #include "o80/memory/liveness.hpp"
 #include "o80/memory/signal.hpp"
 #include "o80/runtime/backend.hpp"
+#include "o80/runtime/overrun_limit.hpp"
 #include "o80/runtime/schedule.hpp"
 #include "staging.hpp"
 
@@ -47,6 +49,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
                   Cursor payload) noexcept override;
   Outcome take_control(std::uint32_t lane) noexcept override;
   Outcome release_control(std::uint32_t lane) noexcept override;
+  Outcome resume(std::uint32_t lane, CommandId id, std::uint64_t number) noexcept override;
 
   // StatusSink
   void changed(const StatusChange& change) noexcept override;
@@ -55,8 +58,12 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   std::byte* row() noexcept { return reinterpret_cast<std::byte*>(row_.data()); }
   void publish(bool fresh) noexcept;
   Step step(std::int64_t at_most) noexcept;
-  void cut_burst() noexcept;
+  void cut_burst(BurstEnd end) noexcept;
   void end(State state, std::string_view text) noexcept;
+  void ask_to_halt(HaltCause cause, std::string_view text) noexcept;
+  Step brake() noexcept;
+  bool acts() const noexcept { return shown_acts_ != 0 || controller.active(); }
+  void set_timing(const Timing& now) noexcept;
   std::int64_t time() const noexcept {
     return schema.head.bursting != 0 ? current * schema.head.period : monotonic_now();
   }
@@ -73,6 +80,8 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   Controller controller;
   Staging staging;
   Schedule schedule;
+  HaltLatch halts;
+  VerbWord verbs;
   Timing timing;
   std::atomic<bool> stop{false};
   std::array<char, 248> failure{};
@@ -98,13 +107,22 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   void grant(std::uint32_t lane, const BatchRecord& batch) noexcept;
   bool granted() const noexcept { return burst_left_ != 0; }
   void count_burst() noexcept;
-  void end_burst(Iteration row) noexcept;
+  void end_burst(Iteration row, BurstEnd end = BurstEnd::done) noexcept;
+
+  // halts
+  void watch_halt() noexcept;
+  void show_acts() noexcept;
+  void begin_halt() noexcept;
+  void end_scheduled_before_halt() noexcept;
+  bool suits_halt(const StagedBatch& sent) noexcept;
+  Outcome start_afresh(std::uint32_t lane, CommandId id) noexcept;
 
   // what the helper thread saw
   void look_at_lives() noexcept;
   void mourn(std::uint32_t lane, std::uint64_t incarnation) noexcept;
   void watch_holder() noexcept;
   void watch_silence() noexcept;
+  void break_silence(std::uint32_t lane) noexcept;
   void stale(std::uint32_t lane, Reason reason) noexcept;
   void fail(std::string_view text) noexcept;
 
@@ -121,8 +139,8 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   std::vector<std::byte> payload_;
   std::vector<std::uint64_t> fresh_desired_;
   Stale stale_;
-  std::int64_t silence_;  // [iterations], 0: no limit
-  Iteration last_batch_ = 0;
+  std::int64_t silence_;             // [iterations], 0: no watchdog
+  std::vector<Iteration> last_life_;  // of each lane
   std::uint32_t seen_changes_ = 0;
   std::uint32_t seen_rounds_ = 0;
   bool begun_ = false;      // row 0 is out
@@ -141,7 +159,16 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
 
   std::uint32_t holder_ = kNobody;  // lane with exclusive control
   std::uint64_t holder_incarnation_ = 0;
-  std::uint64_t taking_owner_ = 0;  // who sent the batch that is being taken
+  std::uint64_t taking_owner_ = 0;   // who sent the batch that is being taken
+  std::uint64_t taking_ticket_ = 0;  // and its ticket
+
+  std::atomic<std::uint32_t> own_causes_{0};  // of halts that this process asked for, a bit each
+  std::uint64_t halted_below_ = 0;            // tickets: what was sent before the last halt
+  std::uint32_t shown_acts_ = 0;
+  bool reason_missing_ = false;               // of the halt that acts: its asker has not written it
+  OverrunLimit overruns_;
+  bool stopping_ = false;       // brakes before its end
+  bool driver_halted_ = false;                // the driver was told that a halt begins
 
   std::int64_t burst_left_ = 0;  // iterations, or kUntilEnded
   std::uint32_t burst_lane_ = kNobody;

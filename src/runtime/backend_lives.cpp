@@ -1,14 +1,28 @@
 // What a backend does about frontends that die or fall silent.
 
+#include <array>
+#include <iterator>
+
 #include "backend_body.hpp"
+#include "o80/base/short_text.hpp"
+#include "o80/memory/atomic_words.hpp"
 
 namespace o80 {
 
 void UntypedBackend::Body::stale(std::uint32_t lane, Reason reason) noexcept {
   if (stale_ == Stale::purge) controller.purge_lane(lane, kEveryActuator, current, reason);
-  if (stale_ == Stale::stop) {
-    fail(reason == Reason::silence ? "no frontend sent anything for longer than is allowed"
-                                   : "a commanding frontend died");
+  const bool silent = reason == Reason::silence;
+  const std::string_view why = silent ? "a commanding frontend showed no life for longer than is "
+                                        "allowed: see silence and stale"
+                                      : "a commanding frontend died";
+  if (stale_ == Stale::stop) fail(why);
+  if (stale_ == Stale::halt) {
+    ShortText<248> text;
+    std::array<char, 64> owner{};
+    load_text(segment.view().lane(lane).owner, std::size(segment.view().lane(lane).owner),
+              owner.data());
+    text.add(why).add(" (").add(owner.data()).add(")");
+    ask_to_halt(silent ? HaltCause::silence : HaltCause::dead_frontend, text.view());
   }
 }
 
@@ -52,10 +66,30 @@ void UntypedBackend::Body::watch_holder() noexcept {
   }
 }
 
+/// The owner of a lane has sent something.
+void UntypedBackend::Body::break_silence(std::uint32_t lane) noexcept {
+  last_life_[lane] = current;
+}
+
+/// The watchdog: applies the policy to commanders that showed no life for too long while something
+/// of theirs acts.
 void UntypedBackend::Body::watch_silence() noexcept {
-  if (silence_ == 0 || current - last_batch_ <= silence_ || !controller.active()) return;
-  if (stale_ == Stale::hold) return;
-  for (std::uint32_t i = 0; i < lanes.size(); ++i) stale(i, Reason::silence);
+  if (silence_ == 0 || halts.acts()) return;
+  for (std::uint32_t i = 0; i < lanes.size(); ++i) {
+    if (current - last_life_[i] <= silence_) continue;
+    // it may have shown life without a batch; nobody lives in the future
+    last_life_[i] = std::max(last_life_[i], std::min(lanes[i].life(), current - 1));
+    if (current - last_life_[i] <= silence_) continue;
+    const bool bursts = granted() && burst_lane_ == i;
+    const bool acts = holder_ == i || controller.acts(i);
+    if (bursts || !acts) {
+      last_life_[i] = current;
+      continue;
+    }
+    stale(i, Reason::silence);
+    if (holder_ == i) holder_ = kNobody;
+    last_life_[i] = current;
+  }
 }
 
 }  // namespace o80

@@ -65,11 +65,15 @@ std::string words_for(const Link& link, const Handle& handle, std::uint8_t aux) 
     case Reason::dead_frontend:
       return "its frontend died";
     case Reason::silence:
-      return "no frontend sent anything for too long";
+      return "its frontend showed no life for longer than the watchdog (silence) allows";
     case Reason::stopped:
       return "the backend stopped";
     case Reason::full:
       return "too many batches of its lane wait for later iterations";
+    case Reason::halted: {
+      const std::string halt = link.halt_text();
+      return halt.empty() ? "the backend was halted" : halt;
+    }
     default:
       return "";
   }
@@ -99,8 +103,9 @@ Handle Batch::ask(CommandId id) const {
   handle.reason = static_cast<Reason>(answer.word.reason);
   handle.iteration = answer.word.iteration;
   if (!is_end(handle.status)) return handle;
-  handle.text = handle.reason == Reason::driver ? lane_->message(id).value_or("")
-                                                : words_for(*link_, handle, answer.word.aux);
+  const bool has_message = handle.reason == Reason::driver || handle.reason == Reason::halted;
+  if (has_message) handle.text = lane_->message(id).value_or("");
+  if (handle.text.empty()) handle.text = words_for(*link_, handle, answer.word.aux);
   const std::scoped_lock lock(kept_->mutex);
   kept_->ended.emplace(id, handle);
   return handle;
@@ -132,6 +137,12 @@ Iteration Batch::last_iteration() const {
   if (id_ == 0) return -1;
   const Handle handle = ask(id_ + 1);
   return is_end(handle.status) ? handle.iteration : -1;
+}
+
+Reason Batch::rejected_by() const {
+  if (id_ == 0) return Reason::none;
+  const Handle handle = ask(id_);
+  return handle.status == Status::rejected ? handle.reason : Reason::none;
 }
 
 std::string Batch::rejection() const {
@@ -183,7 +194,31 @@ Iteration wait_for_burst(const Link& link, LaneSender& lane, CommandId id, Timeo
     throw RowOverwritten("this burst of '" + link.segment.name() +
                          "' is no longer remembered: wait for a burst before sending many more");
   }
-  return answer.known == LaneSender::Known::yes ? answer.row : -1;
+  if (answer.known != LaneSender::Known::yes) return -1;
+  if (answer.end == BurstEnd::cut) {
+    const std::string halt = link.halt_text();
+    throw BackendHalted("the burst of '" + link.segment.name() + "' ended in iteration " +
+                        std::to_string(answer.row) + ": " +
+                        (halt.empty() ? "it was cut" : halt));
+  }
+  return answer.row;
+}
+
+void throw_if_halted(const Link& link, const Batch& batch) {
+  // who was never halted is not asked for each handle
+  if (link.segment.view().counters().halt.number.load(std::memory_order_relaxed) == 0) return;
+  for (const Handle& handle : batch.handles()) {
+    if (handle.status != Status::halted) continue;
+    throw BackendHalted("a command sent to '" + link.segment.name() + "' ended as halted: " +
+                        handle.text);
+  }
+}
+
+void throw_rejected(const Link& link, const char* what, const Batch& batch) {
+  const std::string text = "the " + std::string(what) + " sent to '" + link.segment.name() +
+                           "' was rejected: " + batch.rejection();
+  if (batch.rejected_by() == Reason::halted) throw BackendHalted(text);
+  throw Error(text);
 }
 
 Iteration Burst::wait_done(Timeout timeout, const Check& check) const {
@@ -200,9 +235,7 @@ void read_last_row(const Link& link, Iteration row, UntypedObservation& observat
 UntypedObservation Burst::wait(Timeout timeout, const Check& check) const {
   UntypedObservation observation(link_->description);  // made while the backend works
   const Iteration row = wait_done(timeout, check);
-  if (row < 0) {
-    throw Error("the burst of '" + link_->segment.name() + "' was rejected: " + batch_.rejection());
-  }
+  if (row < 0) throw_rejected(*link_, "burst", batch_);
   read_last_row(*link_, row, observation);
   return observation;
 }

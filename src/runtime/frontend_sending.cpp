@@ -77,6 +77,7 @@ std::uint32_t UntypedFrontend::add_command(std::uint32_t actuator, std::span<con
   check_pace(paced.pace, 1);
   if (paced.pace.pace == Pace::speed) check_->speed(index, paced.pace.per_second, mask);
   if (paced.pace.pace == Pace::fastest) check_->fastest(index, mask);
+  if (paced.pace.pace == Pace::direct) check_->direct(index, state, mask);
   const auto lock = link_->lock_to_send();
   return builder_.command(head_of(index, paced, check_->profile(index)), mask, {}, 1, state);
 }
@@ -329,9 +330,8 @@ UntypedObservation UntypedFrontend::wait_for_end(const Batch& batch, Timeout tim
     batch.wait(timeout, check);
     last = batch.last_iteration();
   }
-  if (const std::string why = batch.rejection(); !why.empty()) {
-    throw Error("the batch sent to '" + segment() + "' was rejected: " + why);
-  }
+  if (!batch.rejection().empty()) throw_rejected(*link_, "batch", batch);
+  throw_if_halted(*link_, batch);
   if (last < 0 || !link_->history.read(last, observation.bytes())) latest(observation.bytes());
   return observation;
 }

@@ -1,5 +1,8 @@
 #include "o80/runtime/link.hpp"
 
+#include <algorithm>
+
+#include "o80/base/printable.hpp"
 #include "o80/describe/table.hpp"
 
 namespace o80 {
@@ -34,6 +37,10 @@ std::shared_ptr<LaneSender> Link::lane() {
   if (!lane_) {
     segment.throw_if_gone();
     lane_ = std::make_shared<LaneSender>(segment);
+    // a quarter, so that a wait that is delayed three times still shows life in time
+    const SchemaHead& head = description->schema.head;
+    const std::int64_t most = kSlice * 4 / std::max<std::int64_t>(1, head.period);
+    if (head.silence > 0) lane_->show_life_every(std::min(head.silence, most) * head.period / 4);
   }
   return lane_;
 }
@@ -56,6 +63,24 @@ std::unique_lock<std::mutex> Link::lock_to_send() const {
   std::unique_lock lock(sending);
   check_usable();
   return lock;
+}
+
+std::optional<Halt> Link::halt() const {
+  const bool maps_bell = segment.access() == Access::read_write;
+  return maps_bell ? asked_halt(segment.view()) : shown_halt(segment.view());
+}
+
+std::string Link::halt_text() const {
+  const std::optional<Halt> acting = halt();
+  if (!acting) return "";
+  std::string text = "it is halted";
+  if (acting->iteration >= 0) text += " since iteration " + std::to_string(acting->iteration);
+  text += " (halt " + std::to_string(acting->number) + ", cause " +
+          std::string(to_text(acting->cause));
+  if (!acting->who_text().empty()) text += ", asked for by " + printable(acting->who_text());
+  text += ")";
+  if (!acting->reason().empty()) text += ": " + printable(acting->reason());
+  return text;
 }
 
 Check Link::guarded(const Check& check) const {

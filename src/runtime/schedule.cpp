@@ -1,6 +1,7 @@
 #include "o80/runtime/schedule.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace o80 {
 
@@ -14,6 +15,7 @@ bool later(const StagedBatch& a, const StagedBatch& b) noexcept {
 Schedule::Schedule(std::uint32_t lanes)
     : iterations_(std::size_t{lanes} * kMostScheduled), counts_(lanes) {
   heap_.reserve(iterations_.size());
+  aside_.reserve(iterations_.size());
 }
 
 bool Schedule::has_room(std::uint32_t lane, Iteration at) const noexcept {
@@ -34,6 +36,18 @@ void Schedule::drop_next() noexcept {
   --counts_[lane];
   std::pop_heap(heap_.begin(), heap_.end(), later);
   heap_.pop_back();
+}
+
+void Schedule::set_aside() noexcept {
+  if (has_aside()) return;
+  std::swap(heap_, aside_);
+  std::ranges::fill(counts_, 0);
+}
+
+StagedBatch Schedule::take_aside() noexcept {
+  const StagedBatch batch = aside_.back();
+  aside_.pop_back();
+  return batch;
 }
 
 }  // namespace o80

@@ -125,7 +125,7 @@ def test_options_and_flags_reach_the_robot(segment: str) -> None:
         lane_blocks=64,
         permission=0o640,
         stale="purge",
-        silence=1.0,
+        silence=1000,
         reach=1.5,
         gain=1e-9,
     ) as process:

@@ -27,6 +27,7 @@ O80_ERROR(BackendStopped, BackendGone);     // it ended in order
 O80_ERROR(BackendFailed, BackendGone);      // its driver reported a fault
 O80_ERROR(BackendKilled, BackendGone);      // its process died
 O80_ERROR(BackendSuperseded, BackendGone);  // a new backend took its name
+O80_ERROR(BackendHalted, Error);            // commands end or are refused until it is resumed
 O80_ERROR(RowOverwritten, Error);           // the history no longer holds that iteration
 O80_ERROR(LaneFull, Error);                 // too much is in flight, nothing was sent
 O80_ERROR(NoLane, Error);                   // as many frontends command as the segment has lanes

@@ -43,9 +43,11 @@ class ActuatorQueue {
   /// `late_budget` is how many late commands may still be told in this iteration.
   Moved step(Iteration iteration, const std::byte* observed, std::uint32_t& late_budget) noexcept;
   bool empty() const noexcept { return queue_.empty(); }
+  /// A direct value keeps a resting number away from its rest until something takes its place.
+  bool holds() const noexcept { return holds_ && limiter_.away_from_rest(); }
   /// A command of this lane, or the direct value it gave last, still acts.
   bool acts(std::uint32_t lane) const noexcept {
-    return queue_.has(lane) || (holds_ && holder_ == lane);
+    return queue_.has(lane) || (holder_ == lane && holds());
   }
 
   /// Begins at rest in this state; what is no finite number keeps its last desired value.

@@ -31,6 +31,8 @@ class BatchBuilder {
   std::uint32_t request(std::uint16_t index, std::span<const std::byte> payload);
   std::uint32_t take_control();
   std::uint32_t release_control();
+  /// Clears halts up to this number.
+  std::uint32_t resume(std::uint64_t number);
 
   /// Completes the batch: `batch` says id, ticket, at, late_now, burst and flags. One of a few
   /// purges and control orders, for now and without a burst, is marked as express.

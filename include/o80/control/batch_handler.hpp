@@ -25,6 +25,11 @@ class BatchHandler {
                           Cursor payload) noexcept = 0;
   virtual Outcome take_control(std::uint32_t lane) noexcept = 0;
   virtual Outcome release_control(std::uint32_t lane) noexcept = 0;
+  /// Clears halts up to this number; may call `Controller::restart`, as a request may.
+  virtual Outcome resume(std::uint32_t /*lane*/, CommandId /*id*/,
+                         std::uint64_t /*number*/) noexcept {
+    return {};
+  }
 
  protected:
   ~BatchHandler() = default;

@@ -26,6 +26,7 @@ struct Effort {
   std::uint32_t requests = 0;  // that the driver will serve
   bool express = false;        // nothing but purges and control orders
   bool releases = false;       // some of which let go of control
+  bool moves = false;  // has what a halt refuses: a command, a request not marked `while_halted`
 };
 
 /// Turns a batch in the pool into the few steps that take it, checking each of its records.
@@ -130,6 +131,7 @@ class BatchPlanner {
   std::vector<std::uint16_t> listed_;  // the same
   std::vector<BlockIndex> tails_;      // one for each block
   std::vector<Known> known_;           // one for each block
+  std::vector<bool> while_halted_;     // one for each request
 };
 
 }  // namespace o80

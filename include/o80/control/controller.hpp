@@ -52,9 +52,10 @@ class Controller {
   /// controller's from here on: copy `burst` and `flags` before. A purge also ends commands with
   /// tickets below the batch's that are taken later.
   void take(std::uint32_t lane, BlockIndex batch, BatchHandler& handler) noexcept;
-  /// Ends a whole batch, never taken, as rejected; its records follow in `finish_pending`.
+  /// Ends a whole batch, never taken, as rejected; its records follow in `finish_pending`, with
+  /// this status.
   void reject(std::uint32_t lane, BlockIndex batch, Reason reason, std::uint8_t aux,
-              Iteration iteration) noexcept;
+              Iteration iteration, Status status = Status::rejected) noexcept;
 
   /// Commands => desired. `observed` is the last row's.
   void step(Iteration iteration, const std::byte* observed) noexcept;
@@ -90,6 +91,8 @@ class Controller {
 
   /// Something runs or is queued.
   bool active() const noexcept;
+  /// Some direct value stays until something takes its place; O(actuators).
+  bool holds() const noexcept;
   /// A command of this lane, or a direct value that it gave last, still acts; O(actuators).
   bool acts(std::uint32_t lane) const noexcept;
   /// The first number of a block of states that is infinite or NaN; O(numbers).

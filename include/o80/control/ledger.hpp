@@ -33,9 +33,9 @@ class Ledger {
                    Iteration iteration) noexcept;
   /// The batch gets no more records.
   void close(BlockIndex batch, Iteration iteration) noexcept { ended(batch, iteration); }
-  /// Ends a whole batch that was never taken; its records are told in `work`.
+  /// Ends a whole batch that was never taken; its records are told in `work`, as `status`.
   void reject(std::uint32_t lane, BlockIndex batch, Reason reason, std::uint8_t aux,
-              Iteration iteration) noexcept;
+              Iteration iteration, Status status = Status::rejected) noexcept;
 
   /// A command has begun.
   void activate(BlockIndex record, Iteration iteration) noexcept;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -48,6 +49,12 @@ class Limiter {
   /// One iteration towards rest; resting numbers go where they rest, or, with `hold`, stay. True
   /// while anything moves.
   bool brake(std::byte* state, bool hold) noexcept;
+  /// Some resting number is not where it rests.
+  bool away_from_rest() const noexcept {
+    return std::ranges::any_of(numbers_, [](const Number& each) {
+      return each.rest.has_value() && each.limiter.position() != *each.rest;
+    });
+  }
   /// Tells a motion how the numbers move that lag behind it ...
   void keep_lagging(Motion& motion, const std::byte* state) const noexcept;
   /// ... or that move without any motion, and where all of them are.

@@ -28,6 +28,9 @@ class CommandCheck {
   /// Targets, one state after the other.
   void targets(std::uint32_t actuator, std::span<const std::byte> states,
                std::span<const std::uint64_t> mask = {}) const;
+  /// A direct target: in real time, without a watchdog, no number may be kept away from its rest.
+  void direct(std::uint32_t actuator, std::span<const std::byte> state,
+              std::span<const std::uint64_t> mask = {}) const;
   /// A pace of so much of the first number that is commanded [1/s].
   void speed(std::uint32_t actuator, double speed, std::span<const std::uint64_t> mask = {}) const;
   /// The fastest way: what is commanded has limits of speed and acceleration.

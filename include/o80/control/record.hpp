@@ -26,6 +26,7 @@ enum class RecordKind : std::uint8_t {
   request,
   take_control,
   release_control,
+  resume,  // clears halts up to the number in `amount`
   // what a plan makes of the kinds of some records; sent by a frontend, they are garbage
   overwritten_list = 0x80,  // the first of a list of records with this end, known to no queue
   purged_list,

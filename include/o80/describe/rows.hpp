@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -139,12 +140,32 @@ struct RequestRow {
   NameText name;
   HelpText help;
   std::uint32_t type = kNoType;
-  std::uint32_t reserved = 0;
+  std::uint32_t while_halted = 0;  // 1: served also while the backend is halted
   bool operator==(const RequestRow&) const = default;
 };
 
 /// Which clock the times of a history come from.
 enum class Clock : std::uint8_t { monotonic, simulated };
+
+/// What happens to the commands of a frontend that dies or falls silent.
+enum class Stale : std::uint8_t {
+  hold,   // they are carried out
+  purge,  // they are dropped
+  stop,   // the backend stops
+  halt    // the backend halts
+};
+constexpr std::string_view name_of(Stale stale) {
+  constexpr std::string_view kNames[] = {"hold", "purge", "stop", "halt"};
+  return kNames[static_cast<std::size_t>(stale)];
+}
+
+/// The policy of that name, if there is one.
+constexpr std::optional<Stale> stale_of(std::string_view name) {
+  for (const Stale stale : {Stale::hold, Stale::purge, Stale::stop, Stale::halt}) {
+    if (name_of(stale) == name) return stale;
+  }
+  return std::nullopt;
+}
 
 /// What holds for a whole robot.
 struct SchemaHead {
@@ -154,7 +175,9 @@ struct SchemaHead {
   std::uint32_t block = 0;           // size of the desired and of the observed block [bytes]
   Clock clock = Clock::monotonic;
   std::uint8_t bursting = 0;
-  std::array<std::uint8_t, 6> reserved{};
+  Stale stale = Stale::hold;
+  std::array<std::uint8_t, 5> reserved{};
+  std::int64_t silence = 0;  // iterations without life until `stale` is applied; 0: no watchdog
   bool operator==(const SchemaHead&) const = default;
 };
 

@@ -87,7 +87,9 @@ class Schema {
                               bool is_array = true);
   /// Adds a sensor value to the extended type; gives its offset in the extended block [bytes].
   std::uint32_t add_sensor(FieldRow sensor);
-  std::uint32_t add_request(std::string_view name, std::uint32_t type, std::string_view help);
+  /// `while_halted`: the request moves nothing, and is served also while the backend is halted.
+  std::uint32_t add_request(std::string_view name, std::uint32_t type, std::string_view help,
+                            bool while_halted = false);
 
   /// Calls `visit(offset, const FieldRow&)` for every number of a type, nested ones included.
   template <class Visit>
@@ -275,11 +277,12 @@ inline std::uint32_t Schema::add_sensor(FieldRow sensor) {
 }
 
 inline std::uint32_t Schema::add_request(std::string_view name, std::uint32_t type,
-                                         std::string_view help) {
+                                         std::string_view help, bool while_halted) {
   RequestRow row;
   row.name = NameText(name);
   row.help = HelpText(help);
   row.type = type;
+  row.while_halted = while_halted ? 1 : 0;
   requests.push_back(row);
   return static_cast<std::uint32_t>(requests.size() - 1);
 }

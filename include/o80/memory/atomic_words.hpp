@@ -54,4 +54,7 @@ void store_text(std::atomic<std::uint64_t>* words, std::size_t count,
 /// Reads a text up to its zero; may be of mixed age, never out of bounds.
 std::string load_text(const std::atomic<std::uint64_t>* words, std::size_t count);
 
+/// The same into 8 * count bytes, which end in a zero.
+void load_text(const std::atomic<std::uint64_t>* words, std::size_t count, char* to) noexcept;
+
 }  // namespace o80

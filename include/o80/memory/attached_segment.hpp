@@ -26,6 +26,7 @@ enum class Access { read_only, read_write };
 struct AttachOptions {
   enum class Dead { wait, accept };
   Dead dead = Dead::wait;          // accept: also a stopped, failed or killed one, to read it
+  bool starting = false;           // also one that has not published row 0 yet
   std::uint64_t ignore_epoch = 0;  // a segment of this epoch counts as not there
   Check check = {};
 };

@@ -63,7 +63,7 @@ class LaneReceiver {
   void set_staged(std::uint64_t id, std::uint64_t ids_end) noexcept;
   /// Both flag.
   void set_ended(std::uint64_t id) noexcept;
-  void set_burst_done(std::uint64_t id, Iteration row) noexcept;
+  void set_burst_done(std::uint64_t id, Iteration row, BurstEnd end = BurstEnd::done) noexcept;
   /// Asks for the lane's waiters to be woken at the next flush.
   void flag() noexcept { flagged_ = has_news_ = true; }
   /// flush() has something to do.
@@ -72,6 +72,8 @@ class LaneReceiver {
   /// True if somebody sleeps until then.
   bool flush() noexcept;
 
+  /// Newest row that the owner knew when it last showed life, as it says itself.
+  Iteration life() const noexcept { return page_->life.load(std::memory_order_relaxed); }
   /// Owner of the lane as its page has it: a count, 0 if never taken; and the last that closed.
   std::uint64_t incarnation() const noexcept;
   std::uint64_t closed() const noexcept;

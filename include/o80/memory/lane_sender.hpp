@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -12,6 +13,8 @@
 #include "o80/memory/status_word.hpp"
 
 namespace o80 {
+
+inline constexpr std::int64_t kShortestSlice = 100'000;  // of a wait that shows life [ns]
 
 /// Move-only: a lane taken by a frontend; given back by the destructor, or by the kernel.
 ///
@@ -32,6 +35,7 @@ class LaneSender {
   struct BurstAnswer {
     Known known;
     Iteration row;  // of its last iteration, if known == yes
+    BurstEnd end = BurstEnd::done;
   };
 
   /// Takes the first free lane of a segment attached with Access::read_write, which must outlive
@@ -70,6 +74,19 @@ class LaneSender {
   std::uint64_t staged() const noexcept;
   std::uint64_t ended() const noexcept;
 
+  /// Tells the backend's watchdog that this frontend lives.
+  void show_life() noexcept {
+    // after it was given back the lane may be another's, the page is still writable
+    if (!lock_.is_open()) return;
+    page_->life.store(view_.counters().published.load(std::memory_order_relaxed),
+                      std::memory_order_relaxed);
+  }
+  /// The backend has a watchdog: waits show life, at least this often [ns].
+  void show_life_every(std::int64_t slice) noexcept {
+    slice_ = std::clamp<std::int64_t>(slice, kShortestSlice, kSlice);
+    watched_ = true;
+  }
+
   /// Changes whenever the backend has news for this lane.
   std::uint32_t events() const noexcept {
     return feedback_->events.load(std::memory_order_acquire);  // sync events
@@ -82,8 +99,9 @@ class LaneSender {
   Waited wait_until(Done&& done, const Deadline& deadline, const Check& check = {},
                     std::optional<std::uint32_t> events_before_send = {}) {
     std::int64_t look_at = 0;
-    std::int64_t nap = kSlice;  // what is left until then
+    std::int64_t nap = slice_;  // what is left until then
     while (true) {
+      if (watched_) show_life();
       const std::uint32_t seen = events();
       if (seen != events_before_send && done()) return Waited::ready;
       if (spinner_.spin([&] { return events() != seen; }) && done()) return Waited::ready;
@@ -94,12 +112,12 @@ class LaneSender {
         if (gone) segment_->throw_if_gone();
         return Waited::timed_out;
       }
-      if (look_at == 0) look_at = monotonic_now() + kSlice;
+      if (look_at == 0) look_at = monotonic_now() + slice_;
       sleep(seen, deadline.left(nap));
       nap = look_at - monotonic_now();
       if (nap > 0 && !segment_->has_ended()) continue;
-      look_at = monotonic_now() + kSlice;
-      nap = kSlice;
+      look_at = monotonic_now() + slice_;
+      nap = slice_;
       // what is done is done, whatever became of the backend
       const bool gone = look_around(check);
       if (done()) return Waited::ready;
@@ -126,6 +144,8 @@ class LaneSender {
   std::uint64_t sent_ = 0;
   std::uint64_t next_id_ = 1;
   std::uint32_t draws_ = 0;
+  std::int64_t slice_ = kSlice;
+  bool watched_ = false;
   Spinner spinner_;
   ForkGuard guard_;
 };

@@ -3,12 +3,19 @@
 #include <sys/types.h>
 
 #include <cstdint>
+#include <functional>
 #include <string>
 
 #include "o80/memory/file_lock.hpp"
 #include "o80/memory/segment_layout.hpp"
 
 namespace o80 {
+
+/// What the backend that had the name before left behind.
+struct Predecessor {
+  bool was_halted = false;  // or a halt was asked for that it never saw
+  bool died_acting = false;  // it was killed while commands, control or a motion acted
+};
 
 /// The two files of a segment that has no name yet: the commanders' file, locked and called after
 /// its epoch, and the segment file, locked and called a draft.
@@ -31,9 +38,10 @@ class SegmentDraft {
   /// Opens one of them again, for a mapping: the locks stay on descriptors that are never mapped.
   LockFile open_segment() const { return open_again(path_); }
   LockFile open_commands() const { return open_again(commands_path_); }
-  /// Gives it its name, when complete; the segment of a dead backend is taken over.
+  /// Gives it its name, when complete; the segment of a dead backend is taken over, and `inherit` is
+  /// called before the name changes hands: a successor that is killed just after has inherited too.
   /// Throws SegmentTaken, SegmentError.
-  void publish();
+  void publish(const std::function<void(const Predecessor&)>& inherit);
 
   // what the owner of the published segment keeps
   const std::string& commands_path() const noexcept { return commands_path_; }
@@ -44,7 +52,7 @@ class SegmentDraft {
   bool create_commands();
   bool create_segment();
   LockFile open_again(const std::string& path) const;
-  bool try_replace();
+  bool try_replace(const std::function<void(const Predecessor&)>& inherit);
   [[noreturn]] void fail(const std::string& what, int error) const;
 
   std::string name_;

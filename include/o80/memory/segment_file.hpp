@@ -49,5 +49,7 @@ std::string describe_owner(const SegmentHeader& header);
 /// The name of this user and of this program, cut to what fits.
 std::string own_user();
 std::string own_program();
+/// "pid 4711 (python)".
+std::string own_process();
 
 }  // namespace o80

@@ -30,6 +30,7 @@ inline constexpr std::size_t kLineBytes = 64;                              // of
 inline constexpr std::size_t kBlockSize = 64;                              // of a lane [B]
 inline constexpr std::size_t kMessages = 64;                               // kept for a lane
 inline constexpr std::size_t kBurstsKept = 256;                            // for a lane
+inline constexpr std::size_t kHaltsKept = 8;                              // whose reasons are kept
 inline constexpr std::uint32_t kMostLanes = 256;               // a status names a lane in 8 bits
 inline constexpr std::uint64_t kMostSkippedIds = 1ULL << 28;   // by the owners of a lane
 inline constexpr std::uint64_t kMostUnmetOwners = 1ULL << 20;  // of a lane, between two looks at it
@@ -59,13 +60,30 @@ struct SegmentHeader {
 };
 static_assert(sizeof(SegmentHeader) == 184);
 
+/// Who asked for a halt, and why.
+struct HaltSlot {
+  alignas(kLineBytes) std::atomic<std::uint64_t> number;  // 0: unused, or being written
+  std::atomic<std::int64_t> iteration;                    // in which it began to act
+  std::atomic<std::uint32_t> cause;                       // a HaltCause
+  std::atomic<std::uint64_t> who[8];                      // text
+  std::atomic<std::uint64_t> text[31];
+};
+
 struct Counters {
   alignas(kLineBytes) std::atomic<std::int64_t> begun;  // row being written, or published
   std::atomic<std::int64_t> published;                  // newest row, -1 before the first
   alignas(kLineBytes) std::atomic<std::uint32_t> state;
   alignas(kLineBytes) std::atomic<std::uint64_t> fault[128];  // text
+  alignas(kLineBytes) std::atomic<std::uint64_t> halted;      // number of the halt that acts, or 0
+  std::atomic<std::uint64_t> cleared;     // halts asked for when the last one was cleared
+  std::atomic<std::uint32_t> acts;        // 1: commands, control or a motion act at the moment
+  std::atomic<std::uint64_t> verb;        // calls of driver verbs << 8 | the one under way, or 0
+  std::atomic<std::uint64_t> slow_verb;   // `verb` as the helper thread has seen it before
+  std::atomic<std::int64_t> slow_since;   // and since when [ns]
+  HaltSlot halt;                          // the halt that acts
 };
-static_assert(sizeof(Counters) == 2 * kLineBytes + 1024);
+static_assert(sizeof(HaltSlot) == 6 * kLineBytes);
+static_assert(sizeof(Counters) == 3 * kLineBytes + 1024 + sizeof(HaltSlot));
 
 struct CommandsHeader {
   std::uint64_t magic;
@@ -89,8 +107,10 @@ struct Bell {
   alignas(kLineBytes) std::atomic<std::uint64_t> tickets;  // next to be drawn
   alignas(kLineBytes) std::atomic<std::int64_t> wanted;    // lowest row anybody waits for
   std::atomic<std::uint32_t> passed_on;                    // last row_wake told to the rest
+  alignas(kLineBytes) std::atomic<std::uint64_t> halts;    // asked for so far: each has its number
+  HaltSlot reasons[kHaltsKept];                            // of halt n in slot n modulo their count
 };
-static_assert(sizeof(Bell) == 3 * kLineBytes);
+static_assert(sizeof(Bell) == 4 * kLineBytes + kHaltsKept * sizeof(HaltSlot));
 
 /// What the owner of a lane writes; its transport blocks begin on the next page.
 struct LaneSenderPage {
@@ -101,6 +121,7 @@ struct LaneSenderPage {
   std::atomic<std::uint64_t> successor_begin;   // blocks committed before that successor
   std::atomic<std::uint64_t> owner_begin;       // blocks committed before the present owner
   alignas(kLineBytes) std::atomic<std::uint64_t> next_id;
+  std::atomic<std::int64_t> life;  // newest row that the owner knew when it last showed life
   alignas(kLineBytes) std::atomic<std::uint32_t> waiting;   // somebody sleeps until `events` moves
   alignas(kLineBytes) std::atomic<std::uint64_t> owner[8];  // text
 };
@@ -108,8 +129,12 @@ static_assert(sizeof(LaneSenderPage) == 5 * kLineBytes);
 
 struct BurstSlot {
   std::atomic<std::uint64_t> id;
-  std::atomic<std::int64_t> row;
+  std::atomic<std::int64_t> row;  // of its last iteration, plus kCutBurst if it was cut
 };
+
+/// Whether a burst ran all of its iterations.
+enum class BurstEnd : std::uint8_t { done, cut };
+inline constexpr std::int64_t kCutBurst = std::int64_t{1} << 62;
 
 struct MessageSlot {
   std::atomic<std::uint64_t> id;

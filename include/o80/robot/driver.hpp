@@ -93,6 +93,15 @@ class Reading {
     fault_.text[size] = 0;
     faulty_ = true;
   }
+  /// Nothing may move until somebody resumes: the backend halts, in the next iteration. May be
+  /// repeated with each reading; while it acts that changes nothing.
+  void halt(std::string_view why) {
+    const std::size_t size =
+        why.size() < sizeof view_.halt_text.text ? why.size() : sizeof view_.halt_text.text - 1;
+    if (size > 0) std::memcpy(view_.halt_text.text, why.data(), size);
+    view_.halt_text.text[size] = 0;
+    view_.halted = 1;
+  }
   /// The robot is done: the loop ends in order after this row.
   void finish() { view_.finished = 1; }
   /// The commands of this actuator end as interrupted, in this iteration.
@@ -132,7 +141,8 @@ class Reading {
 /// The class an engineer writes; there is no base class.
 ///
 /// Its constructor touches no hardware. Optional: `describe(Schema&) const`, `Extended`,
-/// `Requests` with `on(const Each&)` (returning void or Served), `wait(std::int64_t due)`.
+/// `Requests` with `on(const Each&)` (returning void or Served), `wait(std::int64_t due)`, `halt()`
+/// (a halt begins), `resume()` (one is to be cleared; returning void or Served, which may refuse).
 template <class D>
 concept Driver = requires(D& driver, const Desired<D>& desired, Reading<D>& reading) {
   typename D::Config;

@@ -23,6 +23,9 @@ class InlineRobot final : public InlineRunner {
   /// Threads run one after the other. Throws DriverError, Closed if `stop` cut it.
   void run() override;
   void refuse_nested() const override;
+  bool runs_here() const noexcept override {
+    return runner_.load(std::memory_order_relaxed) == std::this_thread::get_id();
+  }
   /// Stops the robot, at the next iteration of a burst that runs; its frontends see a backend that
   /// stopped. From any thread, also from within `check`; does nothing in a forked child.
   void stop() noexcept;
@@ -30,9 +33,6 @@ class InlineRobot final : public InlineRunner {
 
  private:
   class Turn;
-  bool runs_here() const noexcept {
-    return runner_.load(std::memory_order_relaxed) == std::this_thread::get_id();
-  }
   void look_around();
 
   std::atomic<std::uint32_t> turn_{0};     // taken by Turn: 0 free, 1 taken, 2 taken and waited for

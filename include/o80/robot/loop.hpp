@@ -50,11 +50,24 @@ class Loop final : public RequestServer {
  private:
   Served serve(std::uint32_t request, std::span<const std::byte> payload) noexcept override;
   bool read_fresh(FreshReading& reading) noexcept override;
+  bool halt() noexcept override;
+  Served resume() noexcept override;
 
   bool write() noexcept;
   bool read() noexcept;
   bool pace() noexcept;
   bool iterate() noexcept;
+  void brake() noexcept;
+  void note_halt(const ReadingView& view) noexcept;
+  bool is_finite(const std::byte* block) noexcept;
+  /// Calls into the driver; observers see which verb has not returned.
+  template <class Call>
+  auto calls(Verb verb, Call&& call) noexcept {
+    backend_.enter(verb);
+    const auto result = call();
+    backend_.leave();
+    return result;
+  }
   bool failed(const char* verb) noexcept;
 
   std::unique_ptr<Robot> robot_;
@@ -62,6 +75,7 @@ class Loop final : public RequestServer {
   UntypedBackend backend_;
   Pacer pacer_;
   bool paced_;             // by the clock
+  bool braking_ = false;   // before the end
   bool finished_ = false;  // the driver said so
   bool ended_ = false;
   std::string fault_;  // reserved before the loop runs

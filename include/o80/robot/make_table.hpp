@@ -179,6 +179,31 @@ const RobotTable* robot_table(const char* name, const char* versions = "") {
         return answer;
       });
     };
+    if constexpr (requires(D& driver) { driver.halt(); }) {
+      t.halt = [](void* robot, FaultText* fault) {
+        return driving::guarded<int>(fault, 1, [&] {
+          static_cast<D*>(robot)->halt();
+          return 0;
+        });
+      };
+    }
+    if constexpr (requires(D& driver) { driver.resume(); }) {
+      t.resume = [](void* robot, FaultText* text) {
+        return driving::guarded<RequestAnswer>(text, RequestAnswer::failed, [&] {
+          D& driver = *static_cast<D*>(robot);
+          if constexpr (requires {
+                          { driver.resume() } -> std::same_as<Served>;
+                        }) {
+            const Served served = driver.resume();
+            driving::set_fault(text, served.text.data());
+            return static_cast<RequestAnswer>(served.kind);
+          } else {
+            driver.resume();
+            return RequestAnswer::done;
+          }
+        });
+      };
+    }
     t.stop = [](void* robot) { static_cast<D*>(robot)->stop(); };
     t.destroy = [](void* robot) { delete static_cast<D*>(robot); };
     return t;

@@ -45,11 +45,15 @@ class Robot {
   bool write(const DesiredView& desired) noexcept;
   bool read(ReadingView& reading) noexcept;
   Served request(std::uint32_t index, const std::byte* payload) noexcept;
+  bool halt() noexcept;
+  Served resume() noexcept;
   /// Once, and only if a start was tried.
   void stop() noexcept;
   const char* fault() const noexcept { return fault_.text; }
 
  private:
+  Served served(RequestAnswer answer, const FaultText& text) noexcept;
+
   const RobotTable& table_;
   void* driver_ = nullptr;
   FaultText fault_{};

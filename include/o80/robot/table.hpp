@@ -11,7 +11,7 @@
 
 namespace o80 {
 
-inline constexpr std::uint32_t kRobotTableVersion = 2;
+inline constexpr std::uint32_t kRobotTableVersion = 3;
 
 /// Why a call failed.
 struct FaultText {
@@ -66,6 +66,8 @@ struct ReadingView {
   std::int64_t time;          // [ns]
   std::uint32_t finished;     // set it to end the loop in order
   std::uint32_t has_desired;  // set it if `desired` was filled
+  std::uint32_t halted;       // set it to halt the backend
+  FaultText halt_text;        // and say why
 };
 
 /// How a request ended.
@@ -92,6 +94,10 @@ struct RobotTable {
   int (*read)(void* robot, ReadingView* reading, FaultText* fault);
   RequestAnswer (*request)(void* robot, std::uint32_t index, const std::byte* payload,
                            FaultText* text);
+  /// A halt begins; null if the driver has no such verb.
+  int (*halt)(void* robot, FaultText* fault);
+  /// A halt is to be cleared: done, rejected (the text says why) or failed; null likewise.
+  RequestAnswer (*resume)(void* robot, FaultText* text);
   void (*stop)(void* robot);
   void (*destroy)(void* robot);
 };

@@ -9,19 +9,15 @@
 #include <string>
 #include <string_view>
 
+#include "o80/base/short_text.hpp"
 #include "o80/describe/layout.hpp"
 #include "o80/describe/schema.hpp"
+#include "o80/memory/halt_word.hpp"
 #include "o80/memory/segment.hpp"
+#include "o80/memory/verb_word.hpp"
 #include "o80/runtime/request_server.hpp"
 
 namespace o80 {
-
-/// What happens to the commands of a frontend that dies, or when all fall silent for too long.
-enum class Stale : std::uint8_t {
-  hold,   // they are carried out
-  purge,  // they are dropped
-  stop    // the backend stops
-};
 
 /// Everything about a backend that is not its robot.
 struct BackendOptions {
@@ -33,7 +29,12 @@ struct BackendOptions {
   std::uint32_t lane_blocks = 16384;  // of 64 bytes, that one of them may have in flight
   mode_t permission = 0600;           // read: may observe; write: may command
   Stale stale = Stale::hold;
-  std::int64_t silence = 0;  // longest time without a batch [ns]; 0: no limit
+  /// Watchdog: iterations that a commander may show no life while something of it acts; 0: none.
+  std::int64_t silence = 0;
+  /// Late iterations within a second that halt; 0: any number.
+  std::uint32_t max_overruns = 0;
+  /// Runs although the backend before was halted, or died while commands acted (real time only).
+  bool resume = false;
 };
 
 /// How the last period went; written by whoever paces the loop.
@@ -82,6 +83,11 @@ class UntypedBackend {
   Step step_within(std::int64_t at_most) noexcept;
   /// Between two iterations: what is left of the burst under way is not run.
   void cut_burst() noexcept;
+  /// Before an end in order, instead of `step`: all commands end, the actuators brake. `run` while an
+  /// iteration is to be written and published, `ended` when nothing moves any more.
+  Step brake() noexcept;
+  /// Commands, exclusive control or a motion act. For the thread of the loop.
+  bool acts() const noexcept;
   const std::byte* desired() const noexcept;
   /// One bit an actuator: a command gave its desired state.
   const std::uint64_t* active() const noexcept;
@@ -90,9 +96,22 @@ class UntypedBackend {
   /// Time of the iteration under way, on the schema's clock [ns].
   std::int64_t time() const noexcept;
   void set_timing(const Timing& timing) noexcept;
+  /// Around each call into the driver: observers see one that does not return.
+  void enter(Verb verb) noexcept;
+  void leave() noexcept;
+
+  /// Halts: commands end, every actuator brakes, and nothing moves again until a frontend resumes.
+  /// Acts in the first step begun after it. While a halt of this cause acts, another changes
+  /// nothing. From any thread or signal handler.
+  void halt(HaltCause cause, std::string_view text) noexcept;
+  /// The halt that acts; number 0 if none does. For the thread of the loop.
+  const Halt& halted() const noexcept;
 
   /// Ends the commands of an actuator as interrupted, in the iteration under way.
   void interrupt(std::uint32_t actuator) noexcept;
+
+  /// Names the first number of a block of states that is infinite or NaN; false if there is none.
+  bool first_not_finite(const std::byte* block, ShortText<200>& text) const noexcept;
 
   /// Makes `step` end. From any thread or signal handler.
   void ask_to_stop() noexcept;

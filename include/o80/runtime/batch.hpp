@@ -52,6 +52,7 @@ class Batch {
   Iteration last_iteration() const;
   /// Why the batch as a whole was rejected, in words; empty if it was not.
   std::string rejection() const;
+  Reason rejected_by() const;
   /// Waits until every record has an end status and, in real time, the row of that iteration is
   /// there (a bursting backend may stand still before it).
   /// Throws TimeoutError, BackendGone, Cancelled.
@@ -70,9 +71,13 @@ class Batch {
 };
 
 /// Waits until the last iteration of a burst just sent, or sent before, is done; its row, or -1 if
-/// its batch was rejected. Throws TimeoutError, BackendGone, Cancelled.
+/// its batch was rejected. Throws TimeoutError, BackendGone, BackendHalted if it was cut, Cancelled.
 Iteration wait_for_burst(const Link& link, LaneSender& lane, CommandId id, Timeout timeout,
                          const Check& check, std::optional<std::uint32_t> quiet = {});
+/// Throws BackendHalted if a halt ended some command of a batch that has ended.
+void throw_if_halted(const Link& link, const Batch& batch);
+/// Throws Error, or BackendHalted, with the reason why a batch was rejected.
+[[noreturn]] void throw_rejected(const Link& link, const char* what, const Batch& batch);
 /// Copies the row that this returned.
 void read_last_row(const Link& link, Iteration row, UntypedObservation& observation);
 

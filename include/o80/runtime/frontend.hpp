@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "o80/control/limits.hpp"
+#include "o80/memory/halt_word.hpp"
 #include "o80/runtime/batch.hpp"
 #include "o80/runtime/command.hpp"
 #include "o80/runtime/link.hpp"
@@ -104,6 +105,19 @@ class UntypedFrontend {
   Iteration burst_rows(std::span<std::byte> rows, Timeout timeout, const Check& check = {},
                        const PulseOptions& options = {});
 
+  // halts
+  /// Halts the backend, whoever has control and whatever its lanes are doing; the number of the
+  /// halt. Acts in the first iteration begun after it. Throws ReadOnly, BackendGone.
+  std::uint64_t halt(std::string_view reason);
+  /// The halt that acts, or was asked for last (`iteration` is -1 until it acts); nothing if none.
+  std::optional<Halt> halted() const;
+  /// Clears halts up to this number: the robot starts afresh from where it is, in a row of its own.
+  /// Throws BackendHalted if it is refused (another halt came after it, the robot still brakes or
+  /// refuses), TimeoutError, BackendGone.
+  void resume(std::uint64_t number, Timeout timeout, const Check& check = {});
+  /// Tells the backend's watchdog that this frontend lives, as a pulse or a wait for a batch does.
+  void keep_alive();
+
   // observations
   /// Iteration of the newest row.
   Iteration published() const;
@@ -148,6 +162,10 @@ class UntypedFrontend {
   std::unique_ptr<CommandCheck> check_;
   BatchBuilder builder_;  // guarded by link_->sending
 };
+
+/// Halts the backend of a segment, also one that is still starting; the number of the halt.
+/// Throws TimeoutError if there is none in time, SegmentError, BackendGone.
+std::uint64_t halt(const std::string& segment, std::string_view reason, Timeout timeout = std::chrono::seconds(0));
 
 /// Bursts several backends at once: grants to all, then waits for all.
 std::vector<UntypedObservation> burst(

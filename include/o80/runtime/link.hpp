@@ -9,6 +9,7 @@
 #include <string>
 
 #include "o80/control/batch_builder.hpp"
+#include "o80/memory/halt_word.hpp"
 #include "o80/memory/history.hpp"
 #include "o80/memory/lane_sender.hpp"
 #include "o80/memory/segment.hpp"
@@ -26,6 +27,8 @@ class InlineRunner {
   virtual void run() = 0;
   /// Throws Error in a thread that is inside `run` (a handler of a signal, say).
   virtual void refuse_nested() const = 0;
+  /// This thread is inside `run`.
+  virtual bool runs_here() const noexcept = 0;
 };
 
 /// Blocks of a lane that commands leave free, so that there is room for a burst, a purge, a
@@ -49,6 +52,10 @@ struct Link {
   /// Held while something is added or sent. Throws Closed or UsedAfterFork: in a forked child a
   /// thread that does not exist there may hold it for ever.
   std::unique_lock<std::mutex> lock_to_send() const;
+  /// The halt that acts; if this frontend may write, also one that was asked for and does not yet.
+  std::optional<Halt> halt() const;
+  /// "it is halted since iteration 7 (halt 3, asked for by pid 5 (python): "why")", or nothing.
+  std::string halt_text() const;
   /// The caller's check, which also ends waits on a closed frontend.
   Check guarded(const Check& check) const;
 

@@ -51,6 +51,10 @@ class RequestServer {
   virtual Served serve(std::uint32_t request, std::span<const std::byte> payload) noexcept = 0;
   /// Reads the robot anew after `start_afresh`; false if it failed.
   virtual bool read_fresh(FreshReading& reading) noexcept = 0;
+  /// A halt begins: commands have ended, the actuators brake. False if the robot failed.
+  virtual bool halt() noexcept { return true; }
+  /// A halt is to be cleared; `rejected` keeps it, and its sender reads why.
+  virtual Served resume() noexcept { return Served::done(); }
 
  protected:
   ~RequestServer() = default;

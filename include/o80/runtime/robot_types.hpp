@@ -74,6 +74,17 @@ constexpr std::string_view request_help() {
   }
 }
 
+/// Whether a request is served while the backend is halted: `static constexpr bool kWhileHalted` of
+/// its struct, if it has one.
+template <Shareable Request>
+constexpr bool request_while_halted() {
+  if constexpr (requires { bool{Request::kWhileHalted}; }) {
+    return Request::kWhileHalted;
+  } else {
+    return false;
+  }
+}
+
 /// Describes what the types of a robot say: actuators, sensor values, requests.
 template <class R>
 void describe_types(Schema& schema) {
@@ -81,7 +92,7 @@ void describe_types(Schema& schema) {
   describe_extended<ExtendedOf<R>>(schema);
   [&]<class... Each>(Requests<Each...>) {
     (schema.add_request(request_name<Each>(), describing::type_of<Each>(schema),
-                        request_help<Each>()),
+                        request_help<Each>(), request_while_halted<Each>()),
      ...);
   }(RequestsOf<R>{});
 }

@@ -40,12 +40,19 @@ class Schedule {
   void add(const StagedBatch& batch) noexcept;
   void drop_next() noexcept;
 
+  /// All that is there is no longer scheduled, but waits to be judged one by one (after a halt).
+  /// Does nothing while some of an earlier halt are left.
+  void set_aside() noexcept;
+  bool has_aside() const noexcept { return !aside_.empty(); }
+  StagedBatch take_aside() noexcept;
+
  private:
   std::span<const Iteration> of(std::uint32_t lane) const noexcept {
     return {iterations_.data() + std::size_t{lane} * kMostScheduled, counts_[lane]};
   }
 
   std::vector<StagedBatch> heap_;
+  std::vector<StagedBatch> aside_;
   std::vector<Iteration> iterations_;  // of each lane's batches, in no order
   std::vector<std::uint32_t> counts_;  // of each lane
 };

@@ -28,7 +28,8 @@ O80_DESCRIBE(Poke, how);
 
 /// How often a puppet's parts were called.
 struct PuppetCalls {
-  int constructed = 0, started = 0, written = 0, read = 0, stopped = 0, destroyed = 0;
+  int constructed = 0, started = 0, written = 0, read = 0, stopped = 0, destroyed = 0, halted = 0,
+      resumed = 0;
 };
 
 /// A driver whose every step can be made to fail; it counts what is called.
@@ -43,7 +44,8 @@ class Puppet {
     write,
     read,
     fault,
-    odd
+    odd,
+    halt
   };
   struct Config {
     Fails fails = Fails::never;
@@ -60,6 +62,8 @@ class Puppet {
   static inline PuppetCalls calls;
   static inline std::function<void(const Desired<Puppet>&)> on_write;
   static inline std::function<void(Reading<Puppet>&)> on_read;
+  static inline std::function<Served()> on_resume;
+  static inline Limits limits;
 
   explicit Puppet(const Config& config) : config_(config) {
     if (config.fails == Fails::construct) throw std::runtime_error("no cable");
@@ -71,6 +75,7 @@ class Puppet {
     if (config_.fails == Fails::describe) throw std::runtime_error("no plan");
     schema.actuator(0).name("left");
     schema.actuator(1).name("right");
+    schema.actuator(0).limits(limits);
   }
   void start() {
     ++calls.started;
@@ -112,6 +117,15 @@ class Puppet {
         throw std::runtime_error("ouch");
     }
   }
+  void halt() {
+    ++calls.halted;
+    if (config_.fails == Fails::halt) throw std::runtime_error("no brake");
+  }
+  Served resume() {
+    ++calls.resumed;
+    if (on_resume) return on_resume();
+    return Served::done();
+  }
   void stop() noexcept { ++calls.stopped; }
 
  private:
@@ -119,7 +133,7 @@ class Puppet {
   std::array<double, 2> now_{};
 };
 O80_DESCRIBE_ENUM(Puppet::Fails, never, construct, describe, start, first_read, write, read, fault,
-                  odd);
+                  odd, halt);
 O80_DESCRIBE(Puppet::Config, (fails, "when"), (gain, "of nothing [1/s]"), finish_at);
 O80_DESCRIBE(Puppet::Sensors, seen);
 
@@ -133,6 +147,8 @@ class PuppetTest : public StationTest {
     Puppet::calls = {};
     Puppet::on_write = {};
     Puppet::on_read = {};
+    Puppet::on_resume = {};
+    Puppet::limits = {};
   }
   static const RobotTable& table() { return *robot_table<Puppet>("puppet"); }
 };

@@ -48,7 +48,7 @@ TEST_F(RunOptionsTest, AreReadFromFlags) {
                                     "--stale",
                                     "purge",
                                     "--silence",
-                                    "0.5",
+                                    "50",
                                     "--policy",
                                     "fifo",
                                     "--priority",
@@ -71,7 +71,7 @@ TEST_F(RunOptionsTest, AreReadFromFlags) {
   EXPECT_EQ(options.backend.lane_blocks, 64U);
   EXPECT_EQ(options.backend.permission, 0660U);
   EXPECT_EQ(options.backend.stale, Stale::purge);
-  EXPECT_EQ(options.backend.silence, 500'000'000);
+  EXPECT_EQ(options.backend.silence, 50);
   EXPECT_EQ(options.real_time.policy, RealTimeOptions::Policy::fifo);
   EXPECT_EQ(options.real_time.priority, 50);
   EXPECT_THAT(options.real_time.processors, ElementsAre(1, 2));
@@ -87,7 +87,7 @@ TEST_F(RunOptionsTest, RefuseWhatIsNotAllowedNamingTheFlag) {
   EXPECT_THAT(refusal({"--frequency", "nan"}), HasSubstr("'nan'"));
   EXPECT_THAT(refusal({"--lanes", "1.5"}), HasSubstr("it is a count"));
   EXPECT_THAT(refusal({"--permission", "999"}), HasSubstr("octal"));
-  EXPECT_THAT(refusal({"--stale", "never"}), HasSubstr("hold, purge or stop"));
+  EXPECT_THAT(refusal({"--stale", "never"}), HasSubstr("hold, purge, halt or stop"));
   EXPECT_THAT(refusal({"--policy", "idle"}), HasSubstr("other, fifo or rr"));
   EXPECT_THAT(refusal({"--cpus", ""}), HasSubstr("2,3"));
   EXPECT_THAT(refusal({"--gain"}), HasSubstr("needs a value"));

@@ -233,7 +233,7 @@ TEST_F(BackendTest, RefusesOptionsThatCannotBe) {
               HasSubstr("above 0"));
   EXPECT_THAT(message_of<InvalidArgument>(
                   [] { Station({.segment = "pair", .stale = Stale::hold, .silence = 1000}); }),
-              HasSubstr("purge or stop"));
+              HasSubstr("purge, halt or stop"));
   EXPECT_EQ(directory_.files(), 0U);
 }
 
@@ -349,31 +349,7 @@ TEST_F(BackendTest, EndsAsFailedWhenARequestBreaksIt) {
               HasSubstr("the arm fell off"));
 }
 
-// ------------------------------------------------------------------------------ silence, stopping
-
-TEST_F(BackendTest, PurgesAfterTooLongASilence) {
-  Station station(
-      {.segment = "pair", .period = 1'000'000, .stale = Stale::purge, .silence = 5'000'000});
-  station.start();
-  UntypedFrontend frontend("pair");
-  const Batch batch = send(frontend, 0, 100.0, {.pace = iterations(100)});
-  station.run(6);
-  EXPECT_EQ(batch.handle(0).status, Status::active);
-  station.run(2);
-  EXPECT_EQ(batch.handle(0).status, Status::purged);
-  EXPECT_EQ(batch.handle(0).reason, Reason::silence);
-  EXPECT_EQ(desired(frontend.latest()), 6.0) << "five iterations after the batch";
-}
-
-TEST_F(BackendTest, StopsAfterTooLongASilenceIfToldSo) {
-  Station station({.segment = "pair", .stale = Stale::stop, .silence = 5'000'000});
-  station.start();
-  UntypedFrontend frontend("pair");
-  send(frontend, 0, 100.0, {.pace = iterations(100)});
-  EXPECT_EQ(station.drive(), Step::ended);
-  EXPECT_THAT(std::string(station.backend.failure()), HasSubstr("longer than is allowed"));
-  EXPECT_LE(station.last(), 8);
-}
+// ------------------------------------------------------------------------------ stopping
 
 TEST_F(BackendTest, EndsEveryCommandWhenItStops) {
   Station station;

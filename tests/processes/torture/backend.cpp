@@ -31,7 +31,7 @@ Habits draw(Actor& actor, bool bursting) {
                                    o80::Stale::stop};
   habits.options.stale = kStale[chance.below(std::size(kStale))];
   if (habits.options.stale != o80::Stale::hold && chance.percent(40))
-    habits.options.silence = chance.between(20, 200) * habits.options.period;
+    habits.options.silence = chance.between(20, 200);
   habits.interrupts = chance.percent(30);
   habits.orphan_at = chance.percent(15) ? chance.between(0, 200) : -1;
   habits.fails_at = chance.percent(10) ? chance.between(1, 400) : -1;

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <concepts>
+#include <cstddef>
+#include <cstring>
+#include <string_view>
+
+namespace o80 {
+
+/// A text that is put together where nothing may be allocated; what does not fit is cut.
+///
+/// Realtime: yes.
+template <std::size_t Size>
+class ShortText {
+ public:
+  ShortText& add(std::string_view text) noexcept {
+    const std::size_t count = std::min(text.size(), Size - 1 - size_);
+    if (count > 0) std::memcpy(chars_.data() + size_, text.data(), count);
+    size_ += count;
+    return *this;
+  }
+  /// The shortest text that is read back as the same number.
+  template <class Number>
+    requires std::integral<Number> || std::floating_point<Number>
+  ShortText& add(Number number) noexcept {
+    std::array<char, 32> digits{};
+    const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), number).ptr;
+    return add(std::string_view(digits.data(), static_cast<std::size_t>(end - digits.data())));
+  }
+  std::string_view view() const noexcept { return {chars_.data(), size_}; }
+
+ private:
+  std::array<char, Size> chars_{};
+  std::size_t size_ = 0;
+};
+
+}  // namespace o80

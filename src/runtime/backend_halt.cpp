@@ -1,0 +1,147 @@
+// How a backend halts and resumes. A halt is a word in shared memory (memory/halt_word.hpp) that the
+// loop looks at in each step; here is what follows from it.
+
+#include <algorithm>
+
+#include "backend_body.hpp"
+#include "o80/base/short_text.hpp"
+
+namespace o80 {
+
+namespace {
+constexpr std::uint32_t kScheduledPerIteration = 256;  // batches that a halt ends
+}
+
+/// Asks for a halt in the backend's own name. While one of this cause acts, another is the same one:
+/// a driver may repeat it with each reading, and `resume` still names a number.
+void UntypedBackend::Body::ask_to_halt(HaltCause cause, std::string_view text) noexcept {
+  const std::uint32_t bit = 1U << static_cast<std::uint32_t>(cause);
+  if ((own_causes_.fetch_or(bit, std::memory_order_relaxed) & bit) != 0) return;
+  ask_for_halt(segment.view(), cause, {}, text);
+}
+
+void UntypedBackend::Body::watch_halt() noexcept {
+  if (halts.look()) {
+    begin_halt();
+  } else if (reason_missing_) {
+    reason_missing_ = !halts.show(halts.halt().iteration);
+  }
+  end_scheduled_before_halt();
+}
+
+/// What a successor must know if this backend is killed now; before the desired states are written.
+void UntypedBackend::Body::show_acts() noexcept {
+  if (schema.head.bursting != 0) return;
+  const std::uint64_t* active = controller.active_mask();
+  const bool moves = std::any_of(active, active + layout.mask_words,
+                                 [](std::uint64_t word) { return word != 0; });
+  const bool stays = moves || holder_ != kNobody || (shown_acts_ != 0 && controller.holds());
+  const std::uint32_t acts = stays ? 1 : 0;
+  if (acts == shown_acts_) return;
+  shown_acts_ = acts;
+  segment.view().counters().acts.store(acts, std::memory_order_relaxed);
+}
+
+/// An end in order: every command ends, every actuator brakes.
+Step UntypedBackend::Body::brake() noexcept {
+  if (!stopping_) {
+    stopping_ = true;
+    const bool acted = acts();
+    controller.purge(kEveryActuator, current, Reason::stopped);
+    if (!acted) return Step::ended;
+  } else if (!controller.braking()) {
+    return Step::ended;
+  }
+  under_way_ = true;
+  stepping_ = true;
+  controller.step(current, row() + layout.observed);
+  stepping_ = false;
+  return Step::run;
+}
+
+void UntypedBackend::Body::set_timing(const Timing& now) noexcept {
+  const std::uint32_t late = now.overruns - timing.overruns;
+  timing = now;
+  if (late == 0 || !overruns_.exceeded(monotonic_now())) return;
+  ShortText<120> text;
+  text.add(overruns_.most()).add(" iterations within a second were late: --max-overruns");
+  ask_to_halt(HaltCause::overruns, text.view());
+}
+
+/// All that was sent until now ends, every actuator brakes.
+void UntypedBackend::Body::begin_halt() noexcept {
+  reason_missing_ = !halts.show(current);
+  // what has drawn its ticket and not been committed yet ends when it comes
+  halted_below_ = segment.view().bell().tickets.load(std::memory_order_seq_cst);  // sync tickets
+  schedule.set_aside();
+  controller.halt(current);
+  cut_burst(BurstEnd::cut);
+  if (!driver_halted_ && server_ != nullptr && !server_->halt()) {
+    fail("the robot failed when it was told that a halt begins");
+  }
+  driver_halted_ = true;
+}
+
+/// Batches that wait for a later iteration end now: a bounded number in each iteration.
+void UntypedBackend::Body::end_scheduled_before_halt() noexcept {
+  for (std::uint32_t i = 0; i < kScheduledPerIteration && schedule.has_aside(); ++i) {
+    const StagedBatch sent = schedule.take_aside();
+    if (!suits_halt(sent)) continue;
+    if (schedule.has_room(sent.lane, sent.at)) {
+      schedule.add(sent);
+    } else {
+      reject(sent, Reason::full);
+    }
+  }
+}
+
+/// Whether a batch may be taken for all that halts say; else it ends. Batches that were sent before
+/// a halt end as halted, whenever they are seen; those that come while it acts are rejected.
+bool UntypedBackend::Body::suits_halt(const StagedBatch& sent) noexcept {
+  const bool before = sent.ticket < halted_below_;
+  if ((!before && !halts.acts()) || !controller.effort(sent.batch).moves) return true;
+  controller.reject(sent.lane, sent.batch, Reason::halted, 0, current,
+                    before ? Status::halted : Status::rejected);
+  return false;
+}
+
+Outcome UntypedBackend::Body::resume(std::uint32_t lane, CommandId id,
+                                     std::uint64_t number) noexcept {
+  if (!halts.acts()) return {};
+  const auto refuse = [&](std::string_view why, Reason reason = Reason::halted) {
+    lanes[lane].set_message(id, why);
+    return Outcome{Status::rejected, reason, 0};
+  };
+  ShortText<200> why;
+  const std::uint64_t acting = halts.halt().number;
+  if (taking_ticket_ < halted_below_ || number < acting) {
+    why.add("halt ").add(acting).add(" came after it: look at it, then resume that one");
+    return refuse(why.view());
+  }
+  if (number > acting) {
+    why.add("there is no halt ").add(number).add(": halt ").add(acting).add(" acts");
+    return refuse(why.view());
+  }
+  if (controller.braking() || schedule.has_aside()) {
+    return refuse("the robot still brakes: resume when it has come to rest");
+  }
+
+  // the robot may refuse; a halt that comes meanwhile wins
+  if (server_ != nullptr) {
+    const Served served = server_->resume();
+    if (served.kind == Served::Kind::failed) fail(served.why());
+    if (served.kind == Served::Kind::failed || served.kind == Served::Kind::rejected) {
+      return refuse(served.why(), Reason::driver);
+    }
+  }
+  driver_halted_ = false;
+  if (!halts.clear()) return refuse("another halt came at the same moment");
+  own_causes_.store(0, std::memory_order_relaxed);
+  reason_missing_ = false;
+  if (server_ != nullptr) return start_afresh(lane, id);
+  controller.restart(row() + layout.observed, nullptr, current);
+  publish(true);
+  return {};
+}
+
+}  // namespace o80

@@ -1,0 +1,300 @@
+// The watchdog: a commander that shows no life while something of it acts, counted in iterations.
+
+#include <gmock/gmock.h>
+
+#include "memory/child_process.hpp"
+#include "o80/base/error.hpp"
+#include "runtime/liar.hpp"
+#include "runtime/station.hpp"
+
+namespace o80::test {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using SilenceTest = StationTest;
+
+BackendOptions watched(Stale stale, std::int64_t silence = 5) {
+  return {.segment = "pair", .stale = stale, .silence = silence};
+}
+
+TEST_F(SilenceTest, PurgesTheCommandsOfASilentCommander) {
+  Station station(watched(Stale::purge));
+  station.start();
+  UntypedFrontend frontend("pair");
+  const Batch batch = send(frontend, 0, 100.0, {.pace = iterations(100)});
+  station.run(6);
+  EXPECT_EQ(batch.handle(0).status, Status::active);
+  station.run(2);
+  EXPECT_EQ(batch.handle(0).status, Status::purged);
+  EXPECT_EQ(batch.handle(0).reason, Reason::silence);
+  EXPECT_EQ(desired(frontend.latest()), 6.0) << "five iterations after the batch";
+}
+
+TEST_F(SilenceTest, StopsIfToldSo) {
+  Station station(watched(Stale::stop));
+  station.start();
+  UntypedFrontend frontend("pair");
+  send(frontend, 0, 100.0, {.pace = iterations(100)});
+  for (int i = 0; i < 20 && station.iterate() == Step::run; ++i) {
+  }
+  EXPECT_THAT(std::string(station.backend.failure()), HasSubstr("longer than is allowed"));
+  EXPECT_LE(station.last(), 8);
+}
+
+TEST_F(SilenceTest, HaltsIfToldSo) {
+  Station station(watched(Stale::halt));
+  station.start();
+  UntypedFrontend frontend("pair");
+  const Batch batch = send(frontend, 0, 100.0, {.pace = iterations(100)});
+  station.run(7);
+  EXPECT_EQ(batch.handle(0).status, Status::halted);
+  EXPECT_EQ(batch.handle(0).iteration, 7) << "in the very iteration in which it was noticed";
+  ASSERT_TRUE(frontend.halted());
+  EXPECT_EQ(frontend.halted()->cause, HaltCause::silence);
+  EXPECT_THAT(std::string(frontend.halted()->reason()), HasSubstr("pid "));
+}
+
+TEST_F(SilenceTest, BatchesOfAnotherFrontendAreNoLife) {
+  Station station(watched(Stale::purge));
+  station.start();
+  UntypedFrontend silent("pair");
+  UntypedFrontend lively("pair");
+  const Batch batch = send(silent, 0, 100.0, {.pace = iterations(100)});
+  for (int i = 0; i < 8; ++i) {
+    send(lively, 1, i);
+    station.run(1);
+  }
+  EXPECT_EQ(batch.handle(0).status, Status::purged);
+  EXPECT_EQ(desired(lively.latest(), 1), 7.0) << "those of the other go on";
+}
+
+TEST_F(SilenceTest, RejectedBatchesAreLifeOfTheirSenderOnly) {
+  Station station(watched(Stale::purge));
+  station.start();
+  UntypedFrontend holder("pair");
+  UntypedFrontend other("pair");
+  holder.add_take_control();
+  add(holder, 0, 100.0, {.pace = iterations(100)});
+  const Batch batch = holder.pulse();
+  for (int i = 0; i < 8; ++i) {
+    send(other, 1, i);
+    station.run(1);
+  }
+  EXPECT_EQ(batch.handle(1).status, Status::purged);
+}
+
+TEST_F(SilenceTest, ControlIsSomethingThatActsAndEnds) {
+  Station station(watched(Stale::purge));
+  station.start();
+  UntypedFrontend holder("pair");
+  UntypedFrontend other("pair");
+  holder.add_take_control();
+  holder.pulse();
+  station.run(3);
+  const Batch refused = send(other, 0, 1.0);
+  station.run(1);
+  EXPECT_EQ(refused.handle(0).reason, Reason::exclusive);
+  station.run(4);
+  const Batch taken = send(other, 0, 1.0);
+  station.run(1);
+  EXPECT_EQ(taken.handle(0).status, Status::completed);
+}
+
+TEST_F(SilenceTest, KeepAliveAndPulsesAreLife) {
+  Station station(watched(Stale::purge));
+  station.start();
+  UntypedFrontend frontend("pair");
+  const Batch batch = send(frontend, 0, 100.0, {.pace = iterations(100)});
+  for (int i = 0; i < 5; ++i) {
+    station.run(5);
+    frontend.keep_alive();
+  }
+  EXPECT_EQ(batch.handle(0).status, Status::active);
+  for (int i = 0; i < 5; ++i) {
+    station.run(5);
+    send(frontend, 1, i);
+  }
+  EXPECT_EQ(batch.handle(0).status, Status::active);
+}
+
+TEST_F(SilenceTest, LifeCountsFromWhenItWasShown) {
+  Station station(watched(Stale::purge, 10));
+  station.start();
+  UntypedFrontend frontend("pair");
+  const Batch batch = send(frontend, 0, 100.0, {.pace = iterations(100)});
+  station.run(4);
+  frontend.keep_alive();  // it knows row 4
+  station.run(10);
+  EXPECT_EQ(batch.handle(0).status, Status::active);
+  station.run(1);
+  EXPECT_EQ(batch.handle(0).status, Status::purged);
+  EXPECT_EQ(batch.handle(0).iteration, 15);
+}
+
+TEST_F(SilenceTest, ReadingIsNoLife) {
+  Station station(watched(Stale::purge));
+  station.start();
+  UntypedFrontend frontend("pair");
+  const Batch batch = send(frontend, 0, 100.0, {.pace = iterations(100)});
+  for (int i = 0; i < 8; ++i) {
+    station.run(1);
+    frontend.latest();
+    frontend.wait_for(station.last(), kPatience);
+    frontend.halted();
+    batch.handle(0);
+  }
+  EXPECT_EQ(batch.handle(0).status, Status::purged);
+}
+
+TEST_F(SilenceTest, AWaitForOnesOwnBatchIsLife) {
+  Station station(watched(Stale::purge, 3));
+  station.start();
+  UntypedFrontend frontend("pair");
+  const Batch batch = send(frontend, 0, 20.0, {.pace = iterations(20)});
+  // each look of a wait that does not wait
+  while (!batch.ended()) {
+    station.run(1);
+    EXPECT_THROW(batch.wait(kAtOnce), TimeoutError);
+    if (station.last() > 18) break;
+  }
+  EXPECT_EQ(batch.handle(0).status, Status::active);
+}
+
+TEST_F(SilenceTest, NothingThatActsNoSilence) {
+  Station station(watched(Stale::stop));
+  station.start();
+  UntypedFrontend frontend("pair");
+  send(frontend, 0, 1.0);
+  station.run(50);
+  const Batch batch = send(frontend, 0, 100.0, {.pace = iterations(100)});
+  station.run(5);
+  EXPECT_EQ(batch.handle(0).status, Status::active) << "nor is the time before counted";
+}
+
+TEST_F(SilenceTest, ABurstIsItsSendersLifeAndStandingStillCountsNone) {
+  BackendOptions options = watched(Stale::purge);
+  options.bursting = true;
+  Station station(options);
+  station.start();
+  UntypedFrontend frontend("pair");
+  add(frontend, 0, 100.0, {.pace = iterations(100)});
+  const Burst burst = frontend.start_burst(50);
+  EXPECT_EQ(station.drive(), Step::standing);
+  EXPECT_EQ(burst.batch().handle(0).status, Status::active);
+  EXPECT_EQ(station.drive(), Step::standing);
+  frontend.start_burst(10);
+  EXPECT_EQ(station.drive(), Step::standing);
+  EXPECT_EQ(burst.batch().handle(0).status, Status::active);
+}
+
+TEST_F(SilenceTest, AnothersBurstIsNot) {
+  BackendOptions options = watched(Stale::purge);
+  options.bursting = true;
+  Station station(options);
+  station.start();
+  UntypedFrontend silent("pair");
+  UntypedFrontend other("pair");
+  const Batch batch = send(silent, 0, 100.0, {.pace = iterations(100)});
+  other.start_burst(20);
+  EXPECT_EQ(station.drive(), Step::standing);
+  EXPECT_EQ(batch.handle(0).status, Status::purged);
+}
+
+TEST_F(SilenceTest, LifeFromTheFutureIsThatOfNow) {
+  Station station(watched(Stale::purge));
+  station.start();
+  Liar liar;
+  BatchBuilder builder;
+  RecordHead head;
+  head.pace = Pace::iterations;
+  head.amount = 1000;
+  const double target = 1000.0;
+  builder.command(head, std::as_bytes(std::span(&target, 1)));
+  BatchRecord batch;
+  batch.id = liar.sender().next_id();
+  liar.sender().draw_ids(batch.id + 3);
+  liar.send(builder, batch);
+  liar.page().life = std::numeric_limits<std::int64_t>::max();
+  station.run(10);
+  EXPECT_TRUE(UntypedFrontend("pair").latest().active(0)) << "it may say what it likes";
+  liar.page().life = std::numeric_limits<std::int64_t>::min();
+  station.run(10);
+  EXPECT_FALSE(UntypedFrontend("pair").latest().active(0)) << "but has to go on saying it";
+}
+
+/// As a driver would with `o80::rests_at(0)`: what is commanded are velocities.
+void rest_at_zero(Schema& schema) {
+  schema.limits.at(schema.actuators.at(0).first_limit).resting = 1;
+}
+
+TEST_F(SilenceTest, ADirectValueThatStillActsCountsAlthoughNothingIsQueued) {
+  Station station(watched(Stale::purge), rest_at_zero);
+  station.start();
+  UntypedFrontend frontend("pair");
+  const Batch batch = send(frontend, 0, 3.0);
+  station.run(6);
+  EXPECT_EQ(batch.handle(0).status, Status::completed);
+  EXPECT_EQ(desired(frontend.latest()), 3.0) << "a streamed velocity stays until the next one";
+  station.run(1);
+  EXPECT_EQ(desired(frontend.latest()), 0.0) << "but not when its sender hangs";
+}
+
+TEST_F(SilenceTest, WithoutAWatchdogADirectValueThatDoesNotRestIsRefused) {
+  Station station({.segment = "pair"}, rest_at_zero);
+  station.start();
+  UntypedFrontend frontend("pair");
+  EXPECT_THAT(message_of<InvalidArgument>([&] { add(frontend, 0, 3.0); }),
+              AllOf(HasSubstr("actuator 'shoulder'"), HasSubstr("--silence")));
+  add(frontend, 0, 0.0);
+  add(frontend, 0, 3.0, {.pace = iterations(5)});
+  add(frontend, 1, 3.0);
+  EXPECT_EQ(frontend.added(), 3U) << "its rest, another pace, an actuator that has no rest";
+}
+
+TEST_F(SilenceTest, ASimulationNeedsNoWatchdog) {
+  Station station({.segment = "pair", .bursting = true}, rest_at_zero);
+  station.start();
+  UntypedFrontend frontend("pair");
+  add(frontend, 0, 3.0);
+  EXPECT_EQ(frontend.added(), 1U);
+}
+
+TEST_F(SilenceTest, AStreamOfDirectValuesIsLife) {
+  Station station(watched(Stale::purge), rest_at_zero);
+  station.start();
+  UntypedFrontend frontend("pair");
+  for (int i = 1; i < 10; ++i) {
+    send(frontend, 0, i);
+    station.run(5);
+    EXPECT_EQ(desired(frontend.latest()), i);
+  }
+}
+
+TEST_F(SilenceTest, TheSchemaTellsFrontends) {
+  Station station(watched(Stale::halt, 7));
+  station.start();
+  const UntypedFrontend frontend("pair");
+  EXPECT_EQ(frontend.schema().head.silence, 7);
+  EXPECT_EQ(frontend.schema().head.stale, Stale::halt);
+}
+
+TEST_F(SilenceTest, ADeadCommanderHaltsIfToldSo) {
+  Station station({.segment = "pair", .stale = Stale::halt});
+  station.start();
+  ChildProcess child([](const ChildProcess::Ready& ready) {
+    UntypedFrontend frontend("pair");
+    send(frontend, 0, 1e6, {.pace = iterations(1'000'000)});
+    ready();
+    pause_for_ever();
+  });
+  ASSERT_TRUE(child.wait_until_ready());
+  station.run(2);
+  child.kill_now();
+  UntypedFrontend frontend("pair");
+  station.run_until([&] { return frontend.halted().has_value(); });
+  EXPECT_EQ(frontend.halted()->cause, HaltCause::dead_frontend);
+}
+
+}  // namespace
+}  // namespace o80::test
