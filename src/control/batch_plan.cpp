@@ -87,9 +87,8 @@ void BatchPlanner::complete(std::uint32_t lane_index, std::uint32_t& budget) noe
   const bool is_express = lane.effort.express && lane.place == record.records;
   record.own[kMissingFrom] = lane.place;
   record.own[kSpareFirst] = lane.cursor;
-  record.own[kTraits] =
-      lane.effort.requests | (is_express ? kIsExpress : 0) |
-      (lane.effort.releases ? kReleases : 0) | (lane.effort.moves ? kMoves : 0);
+  record.own[kTraits] = lane.effort.requests | (is_express ? kIsExpress : 0) |
+                        (lane.effort.releases ? kReleases : 0) | (lane.effort.moves ? kMoves : 0);
   record.own[kSpareBlocks] = chain.blocks - lane.blocks;
   record.blocks = lane.effort.work;
   known_[lane.batch] = Known::plan;

@@ -223,8 +223,7 @@ void Controller::Body::take_step(const Taking& from, BlockIndex record,
     case RecordKind::release_control:
       return end(handler.release_control(from.lane));
     case RecordKind::resume:
-      return end(
-          handler.resume(from.lane, head.id, static_cast<std::uint64_t>(head.amount)));
+      return end(handler.resume(from.lane, head.id, static_cast<std::uint64_t>(head.amount)));
     case RecordKind::overwritten_list:
       return ledger.drop(record, Status::overwritten, Reason::none, now);
     case RecordKind::purged_list:

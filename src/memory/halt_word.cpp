@@ -13,11 +13,12 @@ namespace {
 constexpr int kReasonReadings = 1000;  // of a slot that is being written
 
 void write_halt(HaltSlot& slot, std::uint64_t number, HaltCause cause, Iteration iteration,
-           std::string_view who, std::string_view text) noexcept {
+                std::string_view who, std::string_view text) noexcept {
   slot.number.store(0, std::memory_order_relaxed);
   O80_CRASH_POINT("halt.before_reason");
-  slot.cause.store(static_cast<std::uint32_t>(cause), std::memory_order_release);  // sync halt_words
-  slot.iteration.store(iteration, std::memory_order_release);                      // sync halt_words
+  slot.cause.store(static_cast<std::uint32_t>(cause),
+                   std::memory_order_release);                 // sync halt_words
+  slot.iteration.store(iteration, std::memory_order_release);  // sync halt_words
   store_text(slot.who, std::size(slot.who), who);
   store_text(slot.text, std::size(slot.text), text);
   O80_CRASH_POINT("halt.before_number");
@@ -26,8 +27,8 @@ void write_halt(HaltSlot& slot, std::uint64_t number, HaltCause cause, Iteration
 
 /// False if the slot is another halt's, or is being written.
 bool read_halt(const HaltSlot& slot, std::uint64_t number, Halt& halt) noexcept {
-  if (slot.number.load(std::memory_order_acquire) != number) return false;  // sync halt_number
-  const std::uint32_t cause = slot.cause.load(std::memory_order_acquire);   // sync halt_words
+  if (slot.number.load(std::memory_order_acquire) != number) return false;     // sync halt_number
+  const std::uint32_t cause = slot.cause.load(std::memory_order_acquire);      // sync halt_words
   const Iteration iteration = slot.iteration.load(std::memory_order_acquire);  // sync halt_words
   Halt whole;
   load_text(slot.who, std::size(slot.who), whole.who.data());
@@ -109,7 +110,8 @@ std::optional<Halt> asked_halt(const SegmentView& view) noexcept {
   const std::uint64_t asked = view.bell().halts.load(std::memory_order_seq_cst);  // sync halts
   const std::optional<Halt> shown = shown_halt(view);
   if (shown && shown->number == asked) return shown;
-  if (asked == view.counters().cleared.load(std::memory_order_acquire)) return shown;  // sync cleared
+  if (asked == view.counters().cleared.load(std::memory_order_acquire))
+    return shown;  // sync cleared
   Halt halt;
   halt.number = std::max<std::uint64_t>(asked, 1);
   read_halt(view.bell().reasons[halt.number % kHaltsKept], halt.number, halt);

@@ -171,8 +171,6 @@ std::string own_program() {
   return program;
 }
 
-std::string own_process() {
-  return "pid " + std::to_string(getpid()) + " (" + own_program() + ")";
-}
+std::string own_process() { return "pid " + std::to_string(getpid()) + " (" + own_program() + ")"; }
 
 }  // namespace o80

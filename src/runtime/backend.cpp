@@ -268,8 +268,7 @@ void UntypedBackend::interrupt(std::uint32_t actuator) noexcept {
   body_->controller.interrupt(actuator, body_->current);
 }
 
-bool UntypedBackend::first_not_finite(const std::byte* block,
-                                      ShortText<200>& text) const noexcept {
+bool UntypedBackend::first_not_finite(const std::byte* block, ShortText<200>& text) const noexcept {
   const std::optional<NotFinite> found = body_->controller.not_finite(block);
   if (!found) return false;
   name_number(schema(), found->actuator, found->number, text);

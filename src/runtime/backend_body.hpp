@@ -139,7 +139,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   std::vector<std::byte> payload_;
   std::vector<std::uint64_t> fresh_desired_;
   Stale stale_;
-  std::int64_t silence_;             // [iterations], 0: no watchdog
+  std::int64_t silence_;              // [iterations], 0: no watchdog
   std::vector<Iteration> last_life_;  // of each lane
   std::uint32_t seen_changes_ = 0;
   std::uint32_t seen_rounds_ = 0;
@@ -165,10 +165,10 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   std::atomic<std::uint32_t> own_causes_{0};  // of halts that this process asked for, a bit each
   std::uint64_t halted_below_ = 0;            // tickets: what was sent before the last halt
   std::uint32_t shown_acts_ = 0;
-  bool reason_missing_ = false;               // of the halt that acts: its asker has not written it
+  bool reason_missing_ = false;  // of the halt that acts: its asker has not written it
   OverrunLimit overruns_;
   bool stopping_ = false;       // brakes before its end
-  bool driver_halted_ = false;                // the driver was told that a halt begins
+  bool driver_halted_ = false;  // the driver was told that a halt begins
 
   std::int64_t burst_left_ = 0;  // iterations, or kUntilEnded
   std::uint32_t burst_lane_ = kNobody;

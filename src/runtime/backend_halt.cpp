@@ -1,5 +1,5 @@
-// How a backend halts and resumes. A halt is a word in shared memory (memory/halt_word.hpp) that the
-// loop looks at in each step; here is what follows from it.
+// How a backend halts and resumes. A halt is a word in shared memory (memory/halt_word.hpp) that
+// the loop looks at in each step; here is what follows from it.
 
 #include <algorithm>
 
@@ -12,8 +12,8 @@ namespace {
 constexpr std::uint32_t kScheduledPerIteration = 256;  // batches that a halt ends
 }
 
-/// Asks for a halt in the backend's own name. While one of this cause acts, another is the same one:
-/// a driver may repeat it with each reading, and `resume` still names a number.
+/// Asks for a halt in the backend's own name. While one of this cause acts, another is the same
+/// one: a driver may repeat it with each reading, and `resume` still names a number.
 void UntypedBackend::Body::ask_to_halt(HaltCause cause, std::string_view text) noexcept {
   const std::uint32_t bit = 1U << static_cast<std::uint32_t>(cause);
   if ((own_causes_.fetch_or(bit, std::memory_order_relaxed) & bit) != 0) return;
@@ -33,8 +33,8 @@ void UntypedBackend::Body::watch_halt() noexcept {
 void UntypedBackend::Body::show_acts() noexcept {
   if (schema.head.bursting != 0) return;
   const std::uint64_t* active = controller.active_mask();
-  const bool moves = std::any_of(active, active + layout.mask_words,
-                                 [](std::uint64_t word) { return word != 0; });
+  const bool moves =
+      std::any_of(active, active + layout.mask_words, [](std::uint64_t word) { return word != 0; });
   const bool stays = moves || holder_ != kNobody || (shown_acts_ != 0 && controller.holds());
   const std::uint32_t acts = stays ? 1 : 0;
   if (acts == shown_acts_) return;

@@ -198,8 +198,7 @@ Iteration wait_for_burst(const Link& link, LaneSender& lane, CommandId id, Timeo
   if (answer.end == BurstEnd::cut) {
     const std::string halt = link.halt_text();
     throw BackendHalted("the burst of '" + link.segment.name() + "' ended in iteration " +
-                        std::to_string(answer.row) + ": " +
-                        (halt.empty() ? "it was cut" : halt));
+                        std::to_string(answer.row) + ": " + (halt.empty() ? "it was cut" : halt));
   }
   return answer.row;
 }
@@ -209,8 +208,8 @@ void throw_if_halted(const Link& link, const Batch& batch) {
   if (link.segment.view().counters().halt.number.load(std::memory_order_relaxed) == 0) return;
   for (const Handle& handle : batch.handles()) {
     if (handle.status != Status::halted) continue;
-    throw BackendHalted("a command sent to '" + link.segment.name() + "' ended as halted: " +
-                        handle.text);
+    throw BackendHalted("a command sent to '" + link.segment.name() +
+                        "' ended as halted: " + handle.text);
   }
 }
 

@@ -8,7 +8,8 @@ namespace o80 {
 std::uint64_t UntypedFrontend::halt(std::string_view reason) {
   link_->check_usable();
   if (link_->segment.access() != Access::read_write) {
-    throw ReadOnly("'" + segment() + "' was attached to read only: attach again without it to halt");
+    throw ReadOnly("'" + segment() +
+                   "' was attached to read only: attach again without it to halt");
   }
   link_->segment.throw_if_gone();
   const std::uint64_t number =

@@ -75,8 +75,8 @@ std::string Link::halt_text() const {
   if (!acting) return "";
   std::string text = "it is halted";
   if (acting->iteration >= 0) text += " since iteration " + std::to_string(acting->iteration);
-  text += " (halt " + std::to_string(acting->number) + ", cause " +
-          std::string(to_text(acting->cause));
+  text +=
+      " (halt " + std::to_string(acting->number) + ", cause " + std::string(to_text(acting->cause));
   if (!acting->who_text().empty()) text += ", asked for by " + printable(acting->who_text());
   text += ")";
   if (!acting->reason().empty()) text += ": " + printable(acting->reason());

@@ -30,9 +30,9 @@ std::string_view to_text(HaltCause cause) noexcept;
 struct Halt {
   std::uint64_t number = 0;  // from 1; 0: none
   HaltCause cause = HaltCause::none;
-  Iteration iteration = -1;       // in which it began to act, -1 before
-  std::array<char, 64> who{};     // asked: a process, or nothing if it was the backend
-  std::array<char, 248> text{};   // the reason in words
+  Iteration iteration = -1;      // in which it began to act, -1 before
+  std::array<char, 64> who{};    // asked: a process, or nothing if it was the backend
+  std::array<char, 248> text{};  // the reason in words
 
   std::string_view who_text() const noexcept { return who.data(); }
   std::string_view reason() const noexcept { return text.data(); }

@@ -24,7 +24,8 @@ struct SegmentSpec {
   std::uint32_t lanes = 8;            // commanding frontends at once
   std::uint32_t lane_blocks = 16384;  // of 64 bytes, rounded up to a power of two
   mode_t permission = 0600;           // read: may observe; write: may command
-  /// Begins halted if it replaces a segment that was, or one whose backend died while commands acted.
+  /// Begins halted if it replaces a segment that was, or one whose backend died while commands
+  /// acted.
   bool inherits_halt = false;
 };
 

@@ -13,7 +13,7 @@ namespace o80 {
 
 /// What the backend that had the name before left behind.
 struct Predecessor {
-  bool was_halted = false;  // or a halt was asked for that it never saw
+  bool was_halted = false;   // or a halt was asked for that it never saw
   bool died_acting = false;  // it was killed while commands, control or a motion acted
 };
 
@@ -38,9 +38,9 @@ class SegmentDraft {
   /// Opens one of them again, for a mapping: the locks stay on descriptors that are never mapped.
   LockFile open_segment() const { return open_again(path_); }
   LockFile open_commands() const { return open_again(commands_path_); }
-  /// Gives it its name, when complete; the segment of a dead backend is taken over, and `inherit` is
-  /// called before the name changes hands: a successor that is killed just after has inherited too.
-  /// Throws SegmentTaken, SegmentError.
+  /// Gives it its name, when complete; the segment of a dead backend is taken over, and `inherit`
+  /// is called before the name changes hands: a successor that is killed just after has inherited
+  /// too. Throws SegmentTaken, SegmentError.
   void publish(const std::function<void(const Predecessor&)>& inherit);
 
   // what the owner of the published segment keeps

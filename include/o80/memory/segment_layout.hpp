@@ -30,7 +30,7 @@ inline constexpr std::size_t kLineBytes = 64;                              // of
 inline constexpr std::size_t kBlockSize = 64;                              // of a lane [B]
 inline constexpr std::size_t kMessages = 64;                               // kept for a lane
 inline constexpr std::size_t kBurstsKept = 256;                            // for a lane
-inline constexpr std::size_t kHaltsKept = 8;                              // whose reasons are kept
+inline constexpr std::size_t kHaltsKept = 8;                               // whose reasons are kept
 inline constexpr std::uint32_t kMostLanes = 256;               // a status names a lane in 8 bits
 inline constexpr std::uint64_t kMostSkippedIds = 1ULL << 28;   // by the owners of a lane
 inline constexpr std::uint64_t kMostUnmetOwners = 1ULL << 20;  // of a lane, between two looks at it
@@ -75,12 +75,12 @@ struct Counters {
   alignas(kLineBytes) std::atomic<std::uint32_t> state;
   alignas(kLineBytes) std::atomic<std::uint64_t> fault[128];  // text
   alignas(kLineBytes) std::atomic<std::uint64_t> halted;      // number of the halt that acts, or 0
-  std::atomic<std::uint64_t> cleared;     // halts asked for when the last one was cleared
-  std::atomic<std::uint32_t> acts;        // 1: commands, control or a motion act at the moment
-  std::atomic<std::uint64_t> verb;        // calls of driver verbs << 8 | the one under way, or 0
-  std::atomic<std::uint64_t> slow_verb;   // `verb` as the helper thread has seen it before
-  std::atomic<std::int64_t> slow_since;   // and since when [ns]
-  HaltSlot halt;                          // the halt that acts
+  std::atomic<std::uint64_t> cleared;    // halts asked for when the last one was cleared
+  std::atomic<std::uint32_t> acts;       // 1: commands, control or a motion act at the moment
+  std::atomic<std::uint64_t> verb;       // calls of driver verbs << 8 | the one under way, or 0
+  std::atomic<std::uint64_t> slow_verb;  // `verb` as the helper thread has seen it before
+  std::atomic<std::int64_t> slow_since;  // and since when [ns]
+  HaltSlot halt;                         // the halt that acts
 };
 static_assert(sizeof(HaltSlot) == 6 * kLineBytes);
 static_assert(sizeof(Counters) == 3 * kLineBytes + 1024 + sizeof(HaltSlot));

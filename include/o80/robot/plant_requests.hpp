@@ -7,8 +7,8 @@
 
 namespace o80 {
 
-/// What every simulator and simulated plant serves, also while it is halted: nothing real moves, and
-/// the halt stands until it is resumed.
+/// What every simulator and simulated plant serves, also while it is halted: nothing real moves,
+/// and the halt stands until it is resumed.
 struct Reset {
   static constexpr std::string_view kHelp = "back to the start";
   static constexpr bool kWhileHalted = true;

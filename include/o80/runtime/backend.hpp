@@ -83,8 +83,8 @@ class UntypedBackend {
   Step step_within(std::int64_t at_most) noexcept;
   /// Between two iterations: what is left of the burst under way is not run.
   void cut_burst() noexcept;
-  /// Before an end in order, instead of `step`: all commands end, the actuators brake. `run` while an
-  /// iteration is to be written and published, `ended` when nothing moves any more.
+  /// Before an end in order, instead of `step`: all commands end, the actuators brake. `run` while
+  /// an iteration is to be written and published, `ended` when nothing moves any more.
   Step brake() noexcept;
   /// Commands, exclusive control or a motion act. For the thread of the loop.
   bool acts() const noexcept;

@@ -71,7 +71,8 @@ class Batch {
 };
 
 /// Waits until the last iteration of a burst just sent, or sent before, is done; its row, or -1 if
-/// its batch was rejected. Throws TimeoutError, BackendGone, BackendHalted if it was cut, Cancelled.
+/// its batch was rejected. Throws TimeoutError, BackendGone, BackendHalted if it was cut,
+/// Cancelled.
 Iteration wait_for_burst(const Link& link, LaneSender& lane, CommandId id, Timeout timeout,
                          const Check& check, std::optional<std::uint32_t> quiet = {});
 /// Throws BackendHalted if a halt ended some command of a batch that has ended.

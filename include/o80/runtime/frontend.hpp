@@ -165,7 +165,8 @@ class UntypedFrontend {
 
 /// Halts the backend of a segment, also one that is still starting; the number of the halt.
 /// Throws TimeoutError if there is none in time, SegmentError, BackendGone.
-std::uint64_t halt(const std::string& segment, std::string_view reason, Timeout timeout = std::chrono::seconds(0));
+std::uint64_t halt(const std::string& segment, std::string_view reason,
+                   Timeout timeout = std::chrono::seconds(0));
 
 /// Bursts several backends at once: grants to all, then waits for all.
 std::vector<UntypedObservation> burst(

@@ -1,4 +1,5 @@
-// Halts at iteration level: when they act, what they end, what is refused, and how they are cleared.
+// Halts at iteration level: when they act, what they end, what is refused, and how they are
+// cleared.
 
 #include <gmock/gmock.h>
 
@@ -112,7 +113,8 @@ TEST_F(HaltTest, WhatWasSentBeforeItNeverActsAlsoAfterTheResume) {
   frontend.halt("");
   station.run(1);
   // drawn before the halt acts, committed long after
-  AttachedSegment segment = AttachedSegment::attach("pair", Access::read_write, Deadline(kPatience));
+  AttachedSegment segment =
+      AttachedSegment::attach("pair", Access::read_write, Deadline(kPatience));
   LaneSender sender(segment);
   RecordHead head;
   head.pace = Pace::direct;
@@ -343,7 +345,8 @@ TEST_F(HaltTest, IsSeenByABackendThatStandsStill) {
   EXPECT_EQ(waiting.handle(0).status, Status::halted);
 }
 
-// ------------------------------------------------------------------------------ those who are killed
+// ------------------------------------------------------------------------------ those who are
+// killed
 
 TEST_F(HaltTest, StandsWhenWhoAskedIsKilled) {
   Station station;
@@ -400,9 +403,8 @@ void live_and_die(Before before, const ChildProcess::Ready& ready, bool bursting
 
 std::optional<Halt> halt_of_successor(Before before, BackendOptions options = {.segment = "pair"},
                                       bool was_bursting = false) {
-  ChildProcess child([&](const ChildProcess::Ready& ready) {
-    live_and_die(before, ready, was_bursting);
-  });
+  ChildProcess child(
+      [&](const ChildProcess::Ready& ready) { live_and_die(before, ready, was_bursting); });
   EXPECT_TRUE(child.wait_until_ready());
   child.kill_now();
   Station station(options);
@@ -435,7 +437,8 @@ TEST_F(HaltTest, TheSuccessorOfAHaltedBackendStartsHalted) {
 }
 
 TEST_F(HaltTest, SoDoesTheSuccessorOfThatOne) {
-  ChildProcess child([&](const ChildProcess::Ready& ready) { live_and_die(Before::halted, ready); });
+  ChildProcess child(
+      [&](const ChildProcess::Ready& ready) { live_and_die(Before::halted, ready); });
   ASSERT_TRUE(child.wait_until_ready());
   child.kill_now();
   // this one does not live to publish a row
