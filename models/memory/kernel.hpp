@@ -135,6 +135,8 @@ class Segment {
     make(page.owner_begin);
     make(page.next_id);
     make(page.waiting);
+    make(page.cancels);
+    for (auto& cancelled : page.cancelled) make(cancelled);
     o80::LaneFeedback& feedback = view.feedback(i);
     make(feedback.freed);
     make(feedback.ended);

@@ -137,6 +137,12 @@ this batch, and BackendGone.)")
           "done", [](const PendingBurst& self) { return self.burst.done(); },
           "Whether its last iteration is done.")
       .def(
+          "cancel", [](const PendingBurst& self) { self.burst.cancel(); },
+          R"(Ends it: the backend stands still after the iteration under way.
+
+A burst that has not begun runs no iteration. What was sent with it stays queued. Its wait then
+returns the last row there was.)")
+      .def(
           "wait",
           [](const PendingBurst& self, std::optional<double> timeout) {
             return carrying(self.burst.batch(), [&] {
@@ -150,5 +156,6 @@ this batch, and BackendGone.)")
           "timeout"_a = nb::none(),
           R"(Waits for its last iteration and returns the observation of it.
 
-Raises TimeoutError after `timeout` [s], and BackendGone.)");
+Raises TimeoutError after `timeout` [s], and BackendGone. After a timeout it goes on, and can be
+waited for again, or cancelled.)");
 }

@@ -108,21 +108,37 @@ Observation burst(const Frontend& self, nb::handle iterations, Seconds timeout, 
   return Observation(decoder, std::move(row));
 }
 
-std::vector<Observation> burst_group(const std::vector<std::pair<Frontend*, nb::object>>& members,
-                                     Seconds timeout) {
+/// Begins the bursts of a group; each comes with what decodes its row.
+std::vector<PendingBurst> start_bursts(
+    const std::vector<std::pair<Frontend*, nb::object>>& members) {
   std::vector<std::shared_ptr<UntypedFrontend>> alive;
-  std::vector<std::pair<UntypedFrontend*, std::int64_t>> group;
+  std::vector<o80::BurstMember> group;
   for (const auto& [member, iterations] : members) {
     alive.push_back(member->shared());
     group.emplace_back(alive.back().get(), burst_length(iterations));
   }
+  const std::vector<o80::Burst> bursts = [&] {
+    const Waiting waiting;
+    return o80::start_bursts(group);
+  }();
+  std::vector<PendingBurst> pending;
+  for (std::size_t i = 0; i < bursts.size(); ++i) {
+    pending.push_back({bursts[i], members[i].first->decoder()});
+  }
+  return pending;
+}
+
+std::vector<Observation> wait_for_bursts(const std::vector<PendingBurst>& pending,
+                                         Seconds timeout) {
+  std::vector<o80::Burst> bursts;
+  for (const PendingBurst& one : pending) bursts.push_back(one.burst);
   std::vector<o80::UntypedObservation> rows = [&] {
     const Waiting waiting;
-    return o80::burst(group, timeout_of(timeout), Waiting::check);
+    return o80::wait_for(bursts, timeout_of(timeout), Waiting::check);
   }();
   std::vector<Observation> observations;
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    observations.emplace_back(members[i].first->decoder(), std::move(rows[i]));
+    observations.emplace_back(pending[i].decoder, std::move(rows[i]));
   }
   return observations;
 }
@@ -270,7 +286,10 @@ Raises TimeoutError after `timeout` [s], which carries the `batch`, and what pul
       .def("_start_burst", &start_burst, "iterations"_a.none(), "at"_a.none(), "late"_a,
            nb::sig("def _start_burst(self, iterations: int, at: int | None, late: str) -> Burst"));
 
-  m.def("burst_group", &burst_group, "members"_a, "timeout"_a.none(),
-        nb::sig("def burst_group(members: collections.abc.Sequence[tuple[Frontend, int]], "
+  m.def("start_bursts", &start_bursts, "members"_a,
+        nb::sig("def start_bursts(members: collections.abc.Sequence[tuple[Frontend, int]]) "
+                "-> list[Burst]"));
+  m.def("wait_for_bursts", &wait_for_bursts, "bursts"_a, "timeout"_a.none(),
+        nb::sig("def wait_for_bursts(bursts: collections.abc.Sequence[Burst], "
                 "timeout: float | None) -> list[Observation]"));
 }

@@ -4,6 +4,7 @@ from o80 import robots
 from o80._core import Batch, Burst, Handle, Observation, Stream, version
 from o80.actuator import Actuator, Number
 from o80.backend import Backend, StartAfresh
+from o80.burst_group import BurstGroup, burst
 from o80.errors import (
     BackendFailed,
     BackendGone,
@@ -28,7 +29,7 @@ from o80.errors import (
     TimeoutError,
     UsedAfterFork,
 )
-from o80.frontend import Frontend, burst
+from o80.frontend import Frontend
 from o80.frontend_classes import register_frontend
 from o80.history import History
 from o80.installation import prefix
@@ -50,6 +51,7 @@ __all__ = [
     "BackendSuperseded",
     "Batch",
     "Burst",
+    "BurstGroup",
     "Cancelled",
     "Closed",
     "ControlTaken",

@@ -208,9 +208,13 @@ class Frontend(_core.Frontend):
         late: what if that iteration has begun: "reject" the batch, which then does not burst, or
             take it "now".
 
-        Returns the observation of the last iteration; with `wait=False` a Burst, to be waited for.
+        Returns the observation of the last iteration; with `wait=False` a Burst, to be waited for
+        or cancelled. A call that ends without its last row (a timeout, Ctrl-C) cancels the rest of
+        its burst: the backend stands still again after the iteration under way. So do the end of
+        this frontend and its death. `prepared_burst` does the same many times, faster.
+
         Raises NotBursting, TimeoutError after `timeout` [s], BackendGone, LaneFull,
-        InvalidArgument. `prepared_burst` does the same many times, faster.
+        InvalidArgument.
         """
         if wait:
             return self._burst(iterations, timeout, at, late)
@@ -450,15 +454,3 @@ def _open_again(
 ) -> Frontend:
     """A pickled frontend attaches again by name."""
     return cls(segment, timeout, read_only=read_only, on_error=on_error, dead=dead)
-
-
-def burst(
-    members: Mapping[Frontend, int], timeout: float | None = None
-) -> dict[Frontend, _core.Observation]:
-    """Lets several bursting backends run at the same time, each its number of iterations.
-
-    All are granted theirs first, then all are waited for. Returns the observation of the last
-    iteration of each. Raises NotBursting (before anything runs), TimeoutError, BackendGone.
-    """
-    rows = _core.burst_group(list(members.items()), timeout)
-    return dict(zip(members, rows, strict=True))

@@ -137,6 +137,13 @@ void LaneReceiver::set_burst_done(std::uint64_t id, Iteration row, BurstEnd end)
   flag();
 }
 
+bool LaneReceiver::is_cancelled(std::uint64_t id) const noexcept {
+  if (page_->cancels.load(std::memory_order_relaxed) == 0) return false;
+  return std::ranges::any_of(page_->cancelled, [&](const std::atomic<std::uint64_t>& cancelled) {
+    return cancelled.load(std::memory_order_acquire) == id;  // sync cancelled
+  });
+}
+
 bool LaneReceiver::flush() noexcept {
   has_news_ = false;
   if (freed_ != freed_published_) {

@@ -174,6 +174,16 @@ std::uint64_t LaneSender::send(std::span<const std::byte> batch, std::size_t tic
   return ticket;
 }
 
+void LaneSender::cancel_burst(std::uint64_t id) noexcept {
+  if (!lock_.is_open() || guard_.forked()) return;
+  // whoever cancels at the same time takes another place
+  std::atomic<std::uint64_t>& count = page_->cancels;
+  const std::uint64_t place = count.fetch_add(1, std::memory_order_relaxed) % kCancelsKept;
+  page_->cancelled[place].store(id, std::memory_order_release);  // sync cancelled
+  O80_CRASH_POINT("lane.after_cancel");
+  ring_bell(view_);
+}
+
 LaneSender::StatusAnswer LaneSender::status(std::uint64_t id) const noexcept {
   const StatusSlot& slot = statuses_[id & (statuses() - 1)];
   for (int i = 0; i < kTries; ++i) {

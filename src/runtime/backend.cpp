@@ -153,24 +153,6 @@ Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
   return Step::run;
 }
 
-void UntypedBackend::Body::count_burst() noexcept {
-  if (burst_left_ <= 0) return;
-  --burst_left_;
-  if (burst_left_ == 0) end_burst(current);
-}
-
-void UntypedBackend::Body::end_burst(Iteration row, BurstEnd end) noexcept {
-  lanes[burst_lane_].set_burst_done(burst_id_, row, end);
-  burst_lane_ = kNobody;
-}
-
-void UntypedBackend::Body::cut_burst(BurstEnd end) noexcept {
-  if (!granted()) return;
-  burst_left_ = 0;
-  end_burst(current - 1, end);
-  lanes.look_again();
-}
-
 void UntypedBackend::Body::publish(bool fresh) noexcept {
   if (!begun_) {
     controller.restart(row() + layout.observed, nullptr, 0);
@@ -246,7 +228,7 @@ Step UntypedBackend::try_step() noexcept { return body_->step(0); }
 Step UntypedBackend::step_within(std::int64_t at_most) noexcept {
   return body_->step(std::max<std::int64_t>(at_most, 0));
 }
-void UntypedBackend::cut_burst() noexcept { body_->cut_burst(BurstEnd::done); }
+void UntypedBackend::cut_burst() noexcept { body_->stop_burst(); }
 const std::byte* UntypedBackend::desired() const noexcept { return body_->controller.desired(); }
 const std::uint64_t* UntypedBackend::active() const noexcept {
   return body_->controller.active_mask();

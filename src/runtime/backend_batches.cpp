@@ -28,11 +28,10 @@ void UntypedBackend::Body::changed(const StatusChange& change) noexcept {
   } else {
     tell(change);
   }
-  // a burst that runs until its batch has ended: this iteration is its last, or there is none
-  if (burst_left_ != kUntilEnded || change.lane != burst_lane_ || change.id != burst_id_ + 1)
-    return;
-  burst_left_ = under_way_ ? 1 : 0;
-  if (!under_way_) end_burst(current - 1);
+  // a burst that runs until its batch has ended
+  if (burst_left_ == kUntilEnded && change.lane == burst_lane_ && change.id == burst_id_ + 1) {
+    stop_burst();
+  }
 }
 
 /// What ended in the step of the row that was published, or never will be.
@@ -249,7 +248,7 @@ void UntypedBackend::Body::accept(const StagedBatch& sent) noexcept {
     reject(due, Reason::full);
     return;
   }
-  if (!is_of_dead(due)) grant(due.lane, batch);
+  if (bursts) grant(due, batch);
   if (is_for_later) {
     schedule.add(due);
   } else {
@@ -294,15 +293,6 @@ void UntypedBackend::Body::reject_all(Reason reason) noexcept {
   for (std::uint32_t lane = 0; lane < lanes.size(); ++lane) {
     for (; staging.has_staged(lane); staging.pop(lane)) reject(staging.front(lane), reason);
   }
-}
-
-void UntypedBackend::Body::grant(std::uint32_t lane, const BatchRecord& batch) noexcept {
-  const bool until_ended = (batch.flags & kBurstUntilEnded) != 0;
-  if (schema.head.bursting == 0 || (batch.burst <= 0 && !until_ended)) return;
-  burst_left_ = until_ended ? kUntilEnded : batch.burst;
-  burst_lane_ = lane;
-  burst_id_ = batch.id;
-  burst_incarnation_ = lanes[lane].incarnation();
 }
 
 }  // namespace o80

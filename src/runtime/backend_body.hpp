@@ -58,7 +58,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   std::byte* row() noexcept { return reinterpret_cast<std::byte*>(row_.data()); }
   void publish(bool fresh) noexcept;
   Step step(std::int64_t at_most) noexcept;
-  void cut_burst(BurstEnd end) noexcept;
+  void stop_burst(BurstEnd end = BurstEnd::done) noexcept;
   void end(State state, std::string_view text) noexcept;
   void ask_to_halt(HaltCause cause, std::string_view text) noexcept;
   Step brake() noexcept;
@@ -104,7 +104,8 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   void take(const StagedBatch& sent) noexcept;
   bool reject(const StagedBatch& sent, Reason reason, std::uint32_t aux = 0) noexcept;
   void reject_all(Reason reason) noexcept;
-  void grant(std::uint32_t lane, const BatchRecord& batch) noexcept;
+  void grant(const StagedBatch& sent, const BatchRecord& batch) noexcept;
+  bool is_called_off() const noexcept;
   bool granted() const noexcept { return burst_left_ != 0; }
   void count_burst() noexcept;
   void end_burst(Iteration row, BurstEnd end = BurstEnd::done) noexcept;

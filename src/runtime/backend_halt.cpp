@@ -75,7 +75,7 @@ void UntypedBackend::Body::begin_halt() noexcept {
   halted_below_ = segment.view().bell().tickets.load(std::memory_order_seq_cst);  // sync tickets
   schedule.set_aside();
   controller.halt(current);
-  cut_burst(BurstEnd::cut);
+  stop_burst(BurstEnd::cut);
   if (!driver_halted_ && server_ != nullptr && !server_->halt()) {
     fail("the robot failed when it was told that a halt begins");
   }

@@ -28,6 +28,7 @@ void UntypedBackend::Body::stale(std::uint32_t lane, Reason reason) noexcept {
 
 void UntypedBackend::Body::look_at_lives() noexcept {
   if (granted()) mourn(burst_lane_, lanes[burst_lane_].dead_predecessor());
+  if (granted() && is_called_off()) stop_burst();
   // the bell stands where every frontend writes: whatever it says, lanes are looked at now and then
   const std::uint32_t rounds = liveness.rounds();
   if (rounds != seen_rounds_) lanes.look_again();
@@ -49,8 +50,7 @@ void UntypedBackend::Body::mourn(std::uint32_t lane, std::uint64_t incarnation) 
   if (incarnation <= mourned_[lane]) return;
   mourned_[lane] = incarnation;
   stale(lane, Reason::dead_frontend);
-  // nobody waits for the end of its burst
-  if (granted() && burst_lane_ == lane && burst_incarnation_ <= incarnation) burst_left_ = 1;
+  if (granted() && burst_lane_ == lane && burst_incarnation_ <= incarnation) stop_burst();
   // it may have died before it rang
   lanes.look_again();
 }

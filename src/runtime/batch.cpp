@@ -177,6 +177,11 @@ bool Burst::done() const {
          is_rejected(lane(), batch_.id());
 }
 
+void Burst::cancel() const {
+  link_->segment.check_process();
+  lane().cancel_burst(batch_.id());
+}
+
 Iteration wait_for_burst(const Link& link, LaneSender& lane, CommandId id, Timeout timeout,
                          const Check& check, std::optional<std::uint32_t> quiet) {
   link.segment.check_process();

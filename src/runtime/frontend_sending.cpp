@@ -175,16 +175,6 @@ void UntypedFrontend::forget_added() {
 
 namespace {
 
-BatchRecord batch_of(const PulseOptions& options) {
-  if (options.at != kNow && options.at < 0) {
-    throw InvalidArgument("a batch cannot be taken at iteration " + std::to_string(options.at));
-  }
-  BatchRecord record;
-  record.at = options.at;
-  record.late_now = options.late == PulseOptions::Late::now ? 1 : 0;
-  return record;
-}
-
 /// Whether a batch may stay in the lane for long.
 bool does_stay(const BatchBuilder& builder, const BatchRecord& wanted) {
   return builder.has_commands() || wanted.at != kNow;
@@ -196,6 +186,16 @@ bool has_begun(const LaneSender& lane, CommandId batch) {
 }
 
 }  // namespace
+
+BatchRecord UntypedFrontend::batch_of(const PulseOptions& options) {
+  if (options.at != kNow && options.at < 0) {
+    throw InvalidArgument("a batch cannot be taken at iteration " + std::to_string(options.at));
+  }
+  BatchRecord record;
+  record.at = options.at;
+  record.late_now = options.late == PulseOptions::Late::now ? 1 : 0;
+  return record;
+}
 
 /// What one batch may hold, so that an iteration that takes it stays short.
 void UntypedFrontend::refuse_if_too_much(const BatchBuilder& builder) const {
@@ -318,108 +318,6 @@ Batch UntypedFrontend::pulse(BatchBuilder& batch) {
 
 Batch UntypedFrontend::pulse_to_end(const PulseOptions& options) {
   return pulse(options, bursting() ? kBurstUntilEnded : std::uint16_t{0});
-}
-
-UntypedObservation UntypedFrontend::wait_for_end(const Batch& batch, Timeout timeout,
-                                                 const Check& check) const {
-  UntypedObservation observation(link_->description);
-  Iteration last = -1;
-  if (batch.id() != 0 && bursting()) {
-    last = Burst(link_, batch).wait_done(timeout, check);
-  } else {
-    batch.wait(timeout, check);
-    last = batch.last_iteration();
-  }
-  if (!batch.rejection().empty()) throw_rejected(*link_, "batch", batch);
-  throw_if_halted(*link_, batch);
-  if (last < 0 || !link_->history.read(last, observation.bytes())) latest(observation.bytes());
-  return observation;
-}
-
-UntypedObservation UntypedFrontend::pulse_and_wait(Timeout timeout, const PulseOptions& options,
-                                                   const Check& check) {
-  return wait_for_end(pulse_to_end(options), timeout, check);
-}
-
-Sent UntypedFrontend::send_burst(std::int64_t iterations, const PulseOptions& options) {
-  link_->check_usable();
-  if (!bursting()) {
-    throw NotBursting("'" + segment() +
-                      "' runs by its own clock and cannot be burst: start it with bursting");
-  }
-  if (iterations < 1) {
-    throw InvalidArgument("a burst of " + std::to_string(iterations) +
-                          " iterations: at least 1 is needed");
-  }
-  BatchRecord record = batch_of(options);
-  record.burst = iterations;
-  return send(builder_, record);
-}
-
-Burst UntypedFrontend::start_burst(std::int64_t iterations, const PulseOptions& options) {
-  return {link_, Batch(link_, send_burst(iterations, options))};
-}
-
-UntypedObservation UntypedFrontend::burst(std::int64_t iterations, Timeout timeout,
-                                          const Check& check, const PulseOptions& options) {
-  // as start_burst(iterations).wait(timeout, check), without what only a later question needs
-  const Sent sent = send_burst(iterations, options);
-  UntypedObservation observation(link_->description);  // made while the backend works
-  const Iteration row = wait_for_burst(*link_, *sent.lane, sent.id, timeout, check, sent.quiet);
-  if (row < 0) return Burst(link_, Batch(link_, sent)).wait(timeout, check);  // says why
-  read_last_row(*link_, row, observation);
-  return observation;
-}
-
-Iteration UntypedFrontend::burst_rows(std::span<std::byte> rows, Timeout timeout,
-                                      const Check& check, const PulseOptions& options) {
-  const std::size_t count = rows.size() / layout().size;
-  if (count > link_->history.rows()) {
-    throw InvalidArgument("the " + std::to_string(count) + " rows of a burst of '" + segment() +
-                          "' do not fit into its history of " +
-                          std::to_string(link_->history.rows()));
-  }
-  const Sent sent = send_burst(static_cast<std::int64_t>(count), options);
-  const Iteration last = wait_for_burst(*link_, *sent.lane, sent.id, timeout, check, sent.quiet);
-  if (last < 0) Burst(link_, Batch(link_, sent)).wait(timeout, check);  // says why
-  const Iteration first = last + 1 - static_cast<Iteration>(count);
-  if (link_->history.read_range(first, count, rows.data()).count != count) {
-    throw RowOverwritten("rows " + std::to_string(first) + " to " + std::to_string(last) + " of '" +
-                         segment() + "', those of this burst, are no longer there");
-  }
-  return last;
-}
-
-std::vector<UntypedObservation> burst(
-    std::span<const std::pair<UntypedFrontend*, std::int64_t>> frontends, Timeout timeout,
-    const Check& check) {
-  // nothing is granted if one of them cannot burst
-  for (const auto& [frontend, iterations] : frontends) {
-    frontend->link()->check_usable();
-    if (!frontend->bursting()) {
-      throw NotBursting("'" + frontend->segment() +
-                        "' runs by its own clock and cannot be burst: start it with bursting");
-    }
-    if (iterations < 1) {
-      throw InvalidArgument("a burst of " + std::to_string(iterations) + " iterations of '" +
-                            frontend->segment() + "': at least 1 is needed");
-    }
-  }
-  const Deadline deadline(timeout);
-  std::vector<Burst> bursts;
-  bursts.reserve(frontends.size());
-  for (const auto& [frontend, iterations] : frontends) {
-    bursts.push_back(frontend->start_burst(iterations));
-  }
-  std::vector<UntypedObservation> observations;
-  observations.reserve(frontends.size());
-  for (const Burst& burst : bursts) {
-    const Timeout left = timeout ? Timeout(std::chrono::nanoseconds(
-                                       deadline.left(std::numeric_limits<std::int64_t>::max())))
-                                 : Timeout();
-    observations.push_back(burst.wait(left, check));
-  }
-  return observations;
 }
 
 }  // namespace o80

@@ -44,6 +44,7 @@ CALLS = {
     "Frontend.burst": Call("standing.burst(5)", "standing.close()"),
     "Frontend.burst, inline": Call("inline.burst(10**12)", "inline.close()"),
     "burst": Call("o80.burst({standing: 5})", "standing.close()"),
+    "BurstGroup.wait": Call("o80.burst({standing: 5}, wait=False).wait()", "standing.close()"),
     "Burst.wait": Call("standing.burst(5, wait=False).wait()", "standing.close()"),
     "PreparedBurst.run": Call(
         "[(b.targets.fill(0.5), b.run()) for b in [standing.prepared_burst(5)]]", "standing.close()"

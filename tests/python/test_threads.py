@@ -87,6 +87,10 @@ RESULTS: dict[str, tuple[str, Callable[[Any], bool]]] = {
         "[(b.targets.fill(0.5), b.run())[1] for b in [standing.prepared_burst(4)]][0]",
         lambda row: row >= 4,
     ),
+    "BurstGroup.wait": (
+        "o80.burst({standing: 9}, wait=False).wait()[standing].iteration",
+        lambda row: row >= 9,
+    ),
     "Burst.wait": ("standing.burst(3, wait=False).wait().iteration", lambda row: row >= 3),
     "Batch.wait": (
         "[(b.wait(), b.statuses) for b in [(silent.add_command('b', 0.5), silent.pulse())[1]]]",

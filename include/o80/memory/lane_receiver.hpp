@@ -64,6 +64,9 @@ class LaneReceiver {
   /// Both flag.
   void set_ended(std::uint64_t id) noexcept;
   void set_burst_done(std::uint64_t id, Iteration row, BurstEnd end = BurstEnd::done) noexcept;
+  /// Its sender wants the burst of the batch `id` to end. Of many cancelled at once only the newest
+  /// are known.
+  bool is_cancelled(std::uint64_t id) const noexcept;
   /// Asks for the lane's waiters to be woken at the next flush.
   void flag() noexcept { flagged_ = has_news_ = true; }
   /// flush() has something to do.
@@ -124,6 +127,7 @@ class LaneReceivers {
 
   std::uint32_t size() const noexcept { return static_cast<std::uint32_t>(lanes_.size()); }
   LaneReceiver& operator[](std::uint32_t lane) noexcept { return lanes_[lane]; }
+  const LaneReceiver& operator[](std::uint32_t lane) const noexcept { return lanes_[lane]; }
 
   /// Begins to look for batches: remembers bell and tickets. False if nothing can be there.
   bool look() noexcept;

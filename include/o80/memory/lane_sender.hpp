@@ -65,6 +65,10 @@ class LaneSender {
   /// Throws LaneFull with nothing sent, InvalidArgument, UsedAfterFork.
   std::uint64_t send(std::span<const std::byte> batch, std::size_t ticket_offset);
 
+  /// Asks for the burst of the batch `id` to end, after the iteration under way or before its
+  /// first. From any thread; nothing happens once the lane is given back.
+  void cancel_burst(std::uint64_t id) noexcept;
+
   StatusAnswer status(std::uint64_t id) const noexcept;
   /// The text that came with a status, if it is still there.
   std::optional<std::string> message(std::uint64_t id) const;

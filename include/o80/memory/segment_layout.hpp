@@ -35,6 +35,8 @@ inline constexpr std::uint32_t kMostLanes = 256;               // a status names
 inline constexpr std::uint64_t kMostSkippedIds = 1ULL << 28;   // by the owners of a lane
 inline constexpr std::uint64_t kMostUnmetOwners = 1ULL << 20;  // of a lane, between two looks at it
 
+inline constexpr std::size_t kCancelsKept = 7;  // for a lane
+
 /// The numbers from which every offset in both files follows.
 struct SegmentShape {
   std::uint64_t page_bytes;
@@ -124,8 +126,10 @@ struct LaneSenderPage {
   std::atomic<std::int64_t> life;  // newest row that the owner knew when it last showed life
   alignas(kLineBytes) std::atomic<std::uint32_t> waiting;   // somebody sleeps until `events` moves
   alignas(kLineBytes) std::atomic<std::uint64_t> owner[8];  // text
+  alignas(kLineBytes) std::atomic<std::uint64_t> cancels;   // of bursts, ever
+  std::atomic<std::uint64_t> cancelled[kCancelsKept];       // the newest: ids of their batches
 };
-static_assert(sizeof(LaneSenderPage) == 5 * kLineBytes);
+static_assert(sizeof(LaneSenderPage) == 6 * kLineBytes);
 
 struct BurstSlot {
   std::atomic<std::uint64_t> id;

@@ -60,6 +60,7 @@ class Batch {
 
  private:
   friend class Burst;
+  friend class UntypedFrontend;
   struct Kept;
   Handle ask(CommandId id) const;
 
@@ -92,10 +93,14 @@ class Burst {
   const Batch& batch() const { return batch_; }
   /// Its last iteration is done, or its batch was rejected.
   bool done() const;
+  /// The backend stands still again after the iteration under way; a burst that has not begun runs
+  /// none. What was sent with it stays queued. From any thread.
+  void cancel() const;
   /// Waits until the last iteration of the burst is done; its row, or -1 if the batch was rejected.
   /// Throws TimeoutError, BackendGone, Cancelled.
   Iteration wait_done(Timeout timeout, const Check& check = {}) const;
-  /// Waits for the last iteration of the burst and returns its row.
+  /// Waits for the last iteration of the burst and returns its row. It may be waited for again
+  /// after a timeout.
   /// Throws TimeoutError, BackendGone, Cancelled, Error if the batch was rejected.
   UntypedObservation wait(Timeout timeout, const Check& check = {}) const;
 

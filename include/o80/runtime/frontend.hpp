@@ -27,6 +27,10 @@ struct FrontendOptions {
   Check check = {};   // asked in every wait; false ends it
 };
 
+class UntypedFrontend;
+/// One frontend of a group, and its number of iterations.
+using BurstMember = std::pair<UntypedFrontend*, std::int64_t>;
+
 /// The side that commands and reads, in bytes.
 ///
 /// Move-only. Takes a lane with its first pulse; a pure reader takes none.
@@ -99,6 +103,8 @@ class UntypedFrontend {
   /// Sends what was added and lets a bursting backend run n iterations, from now on also if the
   /// batch is to be taken later: at an iteration of the burst, say.
   Burst start_burst(std::int64_t iterations, const PulseOptions& options = {});
+  /// The same, and waits. When the wait ends without the last row (a timeout, a check that said no)
+  /// the rest of the burst is cancelled; so it is with the calls below and with pulse_and_wait.
   UntypedObservation burst(std::int64_t iterations, Timeout timeout, const Check& check = {},
                            const PulseOptions& options = {});
   /// One iteration for each row that `rows` can hold, and all these rows; that of the last one.
@@ -149,7 +155,11 @@ class UntypedFrontend {
                                     std::span<const std::int64_t> times) const;
   Batch pulse(const PulseOptions& options, std::uint16_t flags);
   Sent send(BatchBuilder& builder, const BatchRecord& record);
+  static BatchRecord batch_of(const PulseOptions& options);
   Sent send_burst(std::int64_t iterations, const PulseOptions& options);
+  friend std::vector<Burst> start_bursts(std::span<const BurstMember> group);
+  void refuse_burst(std::int64_t iterations) const;
+  void refuse_unless_ready(std::int64_t iterations);
   CommandId draw_ids(LaneSender& lane, std::uint64_t n, bool stays);
   void refuse_if_too_much(const BatchBuilder& builder) const;
   void refuse_if_too_many_wait(Iteration at, const LaneSender& lane);
@@ -168,9 +178,15 @@ class UntypedFrontend {
 std::uint64_t halt(const std::string& segment, std::string_view reason,
                    Timeout timeout = std::chrono::seconds(0));
 
-/// Bursts several backends at once: grants to all, then waits for all.
-std::vector<UntypedObservation> burst(
-    std::span<const std::pair<UntypedFrontend*, std::int64_t>> frontends, Timeout timeout,
-    const Check& check = {});
+/// Lets several backends run at once, each its number of iterations, and returns at once. Nothing
+/// is granted unless all of them are alive, burst, and have a lane and room for what was added.
+std::vector<Burst> start_bursts(std::span<const BurstMember> group);
+
+/// The same, and waits for all: as UntypedFrontend::burst, for the group as a whole.
+std::vector<UntypedObservation> burst(std::span<const BurstMember> group, Timeout timeout,
+                                      const Check& check = {});
+/// Waits for bursts that were started together; cancels what is left of them if it cannot.
+std::vector<UntypedObservation> wait_for(std::span<const Burst> bursts, Timeout timeout,
+                                         const Check& check = {});
 
 }  // namespace o80

@@ -1,0 +1,63 @@
+"""Several bursting backends that run at the same time."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Literal, overload
+
+from o80 import _core
+from o80.frontend import Frontend
+
+
+class BurstGroup:
+    """The bursts of a group under way, made by `o80.burst(members, wait=False)`."""
+
+    def __init__(self, bursts: dict[Frontend, _core.Burst]) -> None:
+        self._bursts = bursts
+
+    @property
+    def bursts(self) -> Mapping[Frontend, _core.Burst]:
+        """The burst of each member, to be asked or waited for by itself."""
+        return MappingProxyType(self._bursts)
+
+    @property
+    def done(self) -> bool:
+        """Whether the last iteration of every member is done."""
+        return all(burst.done for burst in self._bursts.values())
+
+    def cancel(self) -> None:
+        """Each member stands still after the iteration under way."""
+        for burst in self._bursts.values():
+            burst.cancel()
+
+    def wait(self, timeout: float | None = None) -> dict[Frontend, _core.Observation]:
+        """Waits for all of them and returns the observation of the last iteration of each.
+
+        timeout: for all together [s].
+
+        When one cannot be waited for (TimeoutError, BackendGone, Ctrl-C, a member whose burst was
+        rejected because another frontend has control), the rest of all bursts is cancelled.
+        """
+        rows = _core.wait_for_bursts(list(self._bursts.values()), timeout)
+        return dict(zip(self._bursts, rows, strict=True))
+
+
+@overload
+def burst(
+    members: Mapping[Frontend, int], timeout: float | None = None, *, wait: Literal[True] = True
+) -> dict[Frontend, _core.Observation]: ...
+@overload
+def burst(members: Mapping[Frontend, int], *, wait: Literal[False]) -> BurstGroup: ...
+def burst(
+    members: Mapping[Frontend, int], timeout: float | None = None, *, wait: bool = True
+) -> dict[Frontend, _core.Observation] | BurstGroup:
+    """Lets several bursting backends run at the same time, each its number of iterations.
+
+    All members are checked first: nothing runs unless each is alive, bursts, and has a lane and
+    room for what was added. Then all are granted theirs, and all are waited for.
+
+    Returns the observation of the last iteration of each; with `wait=False` a BurstGroup, to be
+    waited for or cancelled. Raises NotBursting, InvalidArgument, NoLane, LaneFull and BackendGone
+    before anything runs; and what `BurstGroup.wait` raises.
+    """
+    group = BurstGroup(dict(zip(members, _core.start_bursts(list(members.items())), strict=True)))
+    return group.wait(timeout) if wait else group

@@ -1,0 +1,176 @@
+// How a frontend asks for iterations, of one backend or of several.
+
+#include <algorithm>
+#include <limits>
+#include <set>
+
+#include "o80/runtime/frontend.hpp"
+
+namespace o80 {
+
+namespace {
+
+/// Cancels what is left of a burst whose caller leaves without its last row.
+class CancelUnlessDone {
+ public:
+  CancelUnlessDone(LaneSender* lane, CommandId id) : lane_(lane), id_(id) {}
+  CancelUnlessDone(const CancelUnlessDone&) = delete;
+  CancelUnlessDone& operator=(const CancelUnlessDone&) = delete;
+  ~CancelUnlessDone() {
+    if (lane_ != nullptr) lane_->cancel_burst(id_);
+  }
+  void done() noexcept { lane_ = nullptr; }
+
+ private:
+  LaneSender* lane_;
+  CommandId id_;
+};
+
+}  // namespace
+
+UntypedObservation UntypedFrontend::pulse_and_wait(Timeout timeout, const PulseOptions& options,
+                                                   const Check& check) {
+  return wait_for_end(pulse_to_end(options), timeout, check);
+}
+
+UntypedObservation UntypedFrontend::wait_for_end(const Batch& batch, Timeout timeout,
+                                                 const Check& check) const {
+  UntypedObservation observation(link_->description);
+  Iteration last = -1;
+  if (batch.id() != 0 && bursting()) {
+    CancelUnlessDone rest(batch.lane_.get(), batch.id());
+    last = Burst(link_, batch).wait_done(timeout, check);
+    rest.done();
+    link_->check_usable();
+  } else {
+    batch.wait(timeout, check);
+    last = batch.last_iteration();
+  }
+  if (!batch.rejection().empty()) throw_rejected(*link_, "batch", batch);
+  throw_if_halted(*link_, batch);
+  if (last < 0 || !link_->history.read(last, observation.bytes())) latest(observation.bytes());
+  return observation;
+}
+
+void UntypedFrontend::refuse_burst(std::int64_t iterations) const {
+  link_->check_usable();
+  if (!bursting()) {
+    throw NotBursting("'" + segment() +
+                      "' runs by its own clock and cannot be burst: start it with bursting");
+  }
+  if (iterations < 1) {
+    throw InvalidArgument("a burst of " + std::to_string(iterations) + " iterations of '" +
+                          segment() + "': at least 1 is needed");
+  }
+}
+
+Sent UntypedFrontend::send_burst(std::int64_t iterations, const PulseOptions& options) {
+  refuse_burst(iterations);
+  BatchRecord record = batch_of(options);
+  record.burst = iterations;
+  return send(builder_, record);
+}
+
+Burst UntypedFrontend::start_burst(std::int64_t iterations, const PulseOptions& options) {
+  return {link_, Batch(link_, send_burst(iterations, options))};
+}
+
+UntypedObservation UntypedFrontend::burst(std::int64_t iterations, Timeout timeout,
+                                          const Check& check, const PulseOptions& options) {
+  // as start_burst(iterations).wait(timeout, check), without what only a later question needs
+  const Sent sent = send_burst(iterations, options);
+  CancelUnlessDone rest(sent.lane.get(), sent.id);
+  UntypedObservation observation(link_->description);  // made while the backend works
+  const Iteration row = wait_for_burst(*link_, *sent.lane, sent.id, timeout, check, sent.quiet);
+  rest.done();
+  link_->check_usable();  // its close ends a burst too
+  if (row < 0) return Burst(link_, Batch(link_, sent)).wait(timeout, check);  // says why
+  read_last_row(*link_, row, observation);
+  return observation;
+}
+
+Iteration UntypedFrontend::burst_rows(std::span<std::byte> rows, Timeout timeout,
+                                      const Check& check, const PulseOptions& options) {
+  const std::size_t count = rows.size() / layout().size;
+  if (count > link_->history.rows()) {
+    throw InvalidArgument("the " + std::to_string(count) + " rows of a burst of '" + segment() +
+                          "' do not fit into its history of " +
+                          std::to_string(link_->history.rows()));
+  }
+  const Sent sent = send_burst(static_cast<std::int64_t>(count), options);
+  CancelUnlessDone rest(sent.lane.get(), sent.id);
+  const Iteration last = wait_for_burst(*link_, *sent.lane, sent.id, timeout, check, sent.quiet);
+  rest.done();
+  link_->check_usable();
+  if (last < 0) Burst(link_, Batch(link_, sent)).wait(timeout, check);  // says why
+  const Iteration first = last + 1 - static_cast<Iteration>(count);
+  if (link_->history.read_range(first, count, rows.data()).count != count) {
+    throw RowOverwritten("rows " + std::to_string(first) + " to " + std::to_string(last) + " of '" +
+                         segment() + "', those of this burst, are no longer there");
+  }
+  return last;
+}
+
+// ------------------------------------------------------------------------------ groups
+
+/// Throws what start_burst would throw, and if the backend has gone, as far as can be known.
+void UntypedFrontend::refuse_unless_ready(std::int64_t iterations) {
+  refuse_burst(iterations);
+  const auto lock = link_->lock_to_send();
+  if (link_->runner) link_->runner->refuse_nested();
+  link_->segment.throw_if_gone();
+  BatchRecord wanted;
+  wanted.burst = iterations;
+  refuse_if_too_much(builder_);
+  refuse_if_full(builder_, wanted, *link_->lane());
+}
+
+std::vector<Burst> start_bursts(std::span<const BurstMember> group) {
+  std::set<const Link*> seen;
+  for (const auto& [frontend, iterations] : group) {
+    frontend->refuse_unless_ready(iterations);
+    if (!seen.insert(frontend->link_.get()).second) {
+      throw InvalidArgument("the frontend of '" + frontend->segment() +
+                            "' is in the group twice: give each its iterations once");
+    }
+  }
+  std::vector<Burst> bursts;
+  bursts.reserve(group.size());
+  try {
+    for (const auto& [frontend, iterations] : group) {
+      bursts.push_back(frontend->start_burst(iterations));
+    }
+  } catch (...) {
+    // another thread has taken the room, or a backend has just gone
+    std::ranges::for_each(bursts, &Burst::cancel);
+    throw;
+  }
+  return bursts;
+}
+
+std::vector<UntypedObservation> wait_for(std::span<const Burst> bursts, Timeout timeout,
+                                         const Check& check) {
+  const Deadline deadline(timeout);
+  const auto left = [&] {
+    return timeout ? Timeout(std::chrono::nanoseconds(
+                         deadline.left(std::numeric_limits<std::int64_t>::max())))
+                   : Timeout();
+  };
+  std::vector<UntypedObservation> observations;
+  observations.reserve(bursts.size());
+  try {
+    for (const Burst& burst : bursts) observations.push_back(burst.wait(left(), check));
+  } catch (...) {
+    std::ranges::for_each(bursts, &Burst::cancel);
+    throw;
+  }
+  return observations;
+}
+
+std::vector<UntypedObservation> burst(std::span<const BurstMember> group, Timeout timeout,
+                                      const Check& check) {
+  const std::vector<Burst> bursts = start_bursts(group);
+  return wait_for(bursts, timeout, check);
+}
+
+}  // namespace o80

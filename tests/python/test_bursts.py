@@ -1,0 +1,86 @@
+"""Bursts end early for who sent them; groups begin whole or not at all."""
+
+import pytest
+
+import o80
+
+WAIT = 60.0
+
+
+def test_a_burst_can_be_cancelled(bursting: o80.robots.Process) -> None:
+    with bursting.frontend() as arm:
+        burst = arm.burst(10**15, wait=False)
+        arm.wait_for(3, timeout=WAIT)
+        burst.cancel()
+        last = burst.wait(WAIT).iteration
+
+        assert last >= 3
+        assert burst.done
+        assert arm.burst(1, timeout=WAIT).iteration == last + 1
+
+
+def test_a_burst_that_is_not_done_in_time_goes_no_further(bursting: o80.robots.Process) -> None:
+    with bursting.frontend() as arm:
+        with pytest.raises(o80.TimeoutError):
+            arm.burst(10**15, timeout=0.01)
+        arm.add_command(0, 1.0, iterations=10**12)
+        with pytest.raises(o80.TimeoutError):
+            arm.pulse_and_wait(0.01)
+        last = arm.burst(1, timeout=WAIT).iteration
+
+        assert arm.published == last
+
+
+def test_a_burst_ends_with_its_frontend(bursting: o80.robots.Process) -> None:
+    with bursting.frontend() as arm:
+        arm.burst(10**15, wait=False)
+    with bursting.frontend() as arm:
+        last = arm.burst(1, timeout=WAIT).iteration
+
+        assert arm.published == last
+
+
+def test_a_group_may_return_at_once(segment: str) -> None:
+    robot = o80.robots.load("two_joints")
+    with (
+        robot.start(f"{segment}-left", bursting=True) as one,
+        robot.start(f"{segment}-right", bursting=True) as two,
+        one.frontend() as left,
+        two.frontend() as right,
+    ):
+        group = o80.burst({left: 5, right: 7}, wait=False)
+        rows = group.wait(WAIT)
+
+        assert group.done
+        assert {left: rows[left].iteration, right: rows[right].iteration} == {left: 5, right: 7}
+        assert group.bursts[left].done
+
+        group = o80.burst({left: 10**15, right: 10**15}, wait=False)
+        assert not group.done
+        group.cancel()
+        rows = group.wait(WAIT)
+        assert left.burst(1, timeout=WAIT).iteration == rows[left].iteration + 1
+
+
+def test_a_group_with_a_member_that_is_gone_does_not_begin(segment: str) -> None:
+    robot = o80.robots.load("two_joints")
+    with (
+        robot.inline(f"{segment}-left") as left,
+        robot.start(f"{segment}-right", bursting=True) as two,
+        two.frontend() as right,
+    ):
+        two.stop()
+        with pytest.raises(o80.BackendGone, match=f"{segment}-right"):
+            o80.burst({left: 5, right: 5})
+
+        assert left.latest().iteration == 0
+
+
+def test_a_group_takes_each_member_once_and_more_than_no_iterations(
+    bursting: o80.robots.Process, segment: str
+) -> None:
+    with bursting.frontend() as arm, o80.robots.load("two_joints").inline(f"{segment}-2") as other:
+        with pytest.raises(o80.InvalidArgument, match=bursting.segment):
+            o80.burst({other: 5, arm: 0})
+
+        assert other.latest().iteration == 0
