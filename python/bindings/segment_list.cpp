@@ -3,6 +3,7 @@
 #include <nanobind/stl/vector.h>
 
 #include "bindings.hpp"
+#include "o80/memory/process_start.hpp"
 #include "o80/memory/segment_list.hpp"
 #include "waiting.hpp"
 
@@ -17,6 +18,7 @@ void bind_segment_list(nb::module_& m) {
                    [](const SegmentEntry& entry) { return std::string(name_of(entry.life)); })
       .def_ro("readable", &SegmentEntry::readable)
       .def_ro("pid", &SegmentEntry::pid)
+      .def_ro("process_start", &SegmentEntry::process_start)
       .def_ro("started_at", &SegmentEntry::started_at, "[s] since 1970")
       .def_ro("user", &SegmentEntry::user)
       .def_ro("program", &SegmentEntry::program)
@@ -28,5 +30,6 @@ void bind_segment_list(nb::module_& m) {
     return o80::list_segments();
   });
   m.def("clean", [](const std::string& name) { return o80::clean(name); }, nb::arg("name"));
+  m.def("process_start", &o80::process_start, nb::arg("pid"));
   m.def("clean_dead", &o80::clean_dead);
 }

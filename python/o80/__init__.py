@@ -37,6 +37,7 @@ from o80.limits import Limits
 from o80.prepared_burst import PreparedBurst
 from o80.record import Record
 from o80.segment_list import Segment, clean, segments
+from o80.stopping import stop
 from o80.words import Mode, Profile, Reason, Start, Status
 
 __version__ = version()
@@ -92,5 +93,6 @@ __all__ = [
     "register_frontend",
     "robots",
     "segments",
+    "stop",
     "version",
 ]

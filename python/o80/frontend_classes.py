@@ -1,8 +1,8 @@
 """Which robot has a Frontend class of its own."""
 
-from functools import cache
-from importlib.metadata import EntryPoint, entry_points
 from typing import TYPE_CHECKING
+
+from o80.announced import announced
 
 if TYPE_CHECKING:
     from o80.frontend import Frontend
@@ -10,12 +10,6 @@ if TYPE_CHECKING:
 GROUP = "o80.frontends"
 
 _registered: dict[str, type["Frontend"]] = {}
-
-
-@cache
-def _packaged() -> dict[str, EntryPoint]:
-    """Those that installed packages announce, by the robot's name."""
-    return {point.name: point for point in entry_points(group=GROUP)}
 
 
 def register_frontend(robot: str, cls: type["Frontend"]) -> None:
@@ -28,6 +22,6 @@ def register_frontend(robot: str, cls: type["Frontend"]) -> None:
 
 def of(robot: str) -> type["Frontend"] | None:
     """The class of that robot, or None."""
-    if robot not in _registered and robot in _packaged():
-        _registered[robot] = _packaged()[robot].load()
+    if robot not in _registered and robot in announced(GROUP):
+        _registered[robot] = announced(GROUP)[robot].load()
     return _registered.get(robot)

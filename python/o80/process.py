@@ -191,7 +191,10 @@ def start_process(
             stdin=subprocess.PIPE,
             stdout=output,
             stderr=subprocess.STDOUT,
-            start_new_session=True,  # Ctrl-C is for the program; it stops the robot in order
+            # Ctrl-C is for the program, which stops the robot in order. Not a session of its own:
+            # on a loaded machine the kernel shares processors out between sessions first, and all
+            # the programs that read the robot would weigh as much as the robot alone
+            process_group=0,
         )
     except BaseException:
         output.close()

@@ -13,15 +13,17 @@ import numbers
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
-from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from o80 import _core
+from o80.announced import announced
 from o80.errors import DriverError, InvalidArgument
 from o80.frontend import Frontend
 from o80.process import Process, start_process
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 __all__ = ["Option", "Process", "Robot", "RobotFile", "list", "load"]
 
@@ -50,7 +52,7 @@ class Option:
 def list() -> builtins.list[RobotFile]:
     """All robots that can be loaded by name: of O80_ROBOT_PATH, bundled, and of Python packages."""
     found = {name: Path(path) for name, path in _core.find_robots()}
-    for name, point in _packaged().items():
+    for name, point in announced(GROUP).items():
         if name not in found:
             found[name] = _path_of(point)
     return [RobotFile(name, path) for name, path in found.items()]
@@ -65,18 +67,12 @@ def load(name_or_path: str | os.PathLike[str]) -> "Robot":
     if os.sep not in text:
         if text.endswith(".so") and Path(text).exists():
             text = os.path.join(os.curdir, text)
-        elif text not in (name for name, _ in _core.find_robots()) and text in _packaged():
-            text = str(_path_of(_packaged()[text]))
+        elif text not in (name for name, _ in _core.find_robots()) and text in announced(GROUP):
+            text = str(_path_of(announced(GROUP)[text]))
     return Robot(_core.load_robot(text))
 
 
-@cache
-def _packaged() -> Mapping[str, EntryPoint]:
-    """Robots that installed packages announce: an entry point gives a path, or a function of it."""
-    return {point.name: point for point in entry_points(group=GROUP)}
-
-
-def _path_of(point: EntryPoint) -> Path:
+def _path_of(point: "EntryPoint") -> Path:
     value = point.load()
     path = value() if callable(value) else value
     if not isinstance(path, (str, os.PathLike)):

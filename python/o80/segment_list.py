@@ -13,6 +13,7 @@ class Segment:
     life: str  #: starting, running, stopped, failed, superseded or killed
     readable: bool  #: False: made by another version, or not ours to read or to trust
     pid: int
+    process_start: int  #: tells its process from a later one of the same pid
     user: str
     program: str
     started_at: int  #: [s] since 1970
@@ -34,6 +35,7 @@ def segments() -> list[Segment]:
             life=entry.life,
             readable=entry.readable,
             pid=entry.pid,
+            process_start=entry.process_start,
             user=entry.user,
             program=entry.program,
             started_at=entry.started_at,

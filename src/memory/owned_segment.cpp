@@ -13,6 +13,7 @@
 #include "o80/memory/atomic_words.hpp"
 #include "o80/memory/halt_word.hpp"
 #include "o80/memory/named_segment.hpp"
+#include "o80/memory/process_start.hpp"
 #include "o80/memory/segment_draft.hpp"
 #include "o80/memory/segment_file.hpp"
 #include "o80/memory/segment_name.hpp"
@@ -46,6 +47,7 @@ void fill(const SegmentView& view, const SegmentSpec& spec, std::uint64_t epoch)
   header.epoch = epoch;
   header.started_at = time(nullptr);
   header.pid = getpid();
+  header.process_start = process_start(header.pid);
   copy_text(header.user, sizeof header.user, own_user());
   copy_text(header.program, sizeof header.program, own_program());
   std::memcpy(view.base, &header, sizeof header);

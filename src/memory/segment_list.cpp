@@ -43,6 +43,7 @@ SegmentEntry describe(const std::string& name) {
   entry.life = judge_life(file.descriptor(), state);
   entry.readable = true;
   entry.pid = header.pid;
+  entry.process_start = header.process_start;
   entry.started_at = header.started_at;
   entry.user = printable({header.user, strnlen(header.user, sizeof header.user)});
   entry.program = printable({header.program, strnlen(header.program, sizeof header.program)});

@@ -27,7 +27,7 @@ std::string with_epoch(std::string path, std::string_view mark, std::uint64_t ep
 }  // namespace
 
 std::string segment_directory() {
-  const char* directory = std::getenv("O80_DIRECTORY");
+  const char* directory = secure_getenv("O80_DIRECTORY");
   return directory != nullptr && *directory != '\0' ? directory : "/dev/shm";
 }
 

@@ -9,6 +9,7 @@
 
 #include "o80/base/error.hpp"
 #include "o80/robot/robot.hpp"
+#include "trusted_library.hpp"
 
 namespace o80 {
 
@@ -71,7 +72,7 @@ std::string where(const std::string& name_or_path) {
 
 std::vector<std::string> robot_folders() {
   std::vector<std::string> folders;
-  if (const char* given = std::getenv("O80_ROBOT_PATH"); given != nullptr) {
+  if (const char* given = secure_getenv("O80_ROBOT_PATH"); given != nullptr) {
     std::istringstream parts(given);
     for (std::string folder; std::getline(parts, folder, ':');) {
       if (!folder.empty()) folders.push_back(folder);
@@ -108,7 +109,8 @@ RobotLibrary RobotLibrary::load(const std::string& name_or_path) {
   if (!fs::exists(library.path, ignored)) {
     throw DriverError("there is no robot library '" + library.path + "'");
   }
-  void* handle = dlopen(library.path.c_str(), RTLD_NOW | RTLD_LOCAL);
+  const TrustedLibrary file(library.path);
+  void* handle = dlopen(file.path().c_str(), RTLD_NOW | RTLD_LOCAL);
   if (handle == nullptr) throw DriverError(why_not_loaded(library.path, dlerror()));
   auto* function = reinterpret_cast<RobotTableFunction>(dlsym(handle, kRobotSymbol));
   if (function == nullptr) {

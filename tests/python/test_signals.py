@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import pty
 import re
 import shutil
 import signal
@@ -325,3 +326,38 @@ def test_ctrl_c_twice_ends_a_program_whose_robot_does_not_stop(segment: str) -> 
         with contextlib.suppress(o80.errors.SegmentTaken):  # it is still ending
             o80.clean(segment)
         time.sleep(0.01)
+
+
+AT_A_TERMINAL = """
+import os, time, o80
+with o80.robots.load("two_joints").start({name!r}) as process:
+    assert os.getsid(process.pid) == os.getsid(0), "it shares its scheduling group"
+    with process.frontend() as frontend:
+        try:
+            print("ready", flush=True)
+            time.sleep(60)
+        except KeyboardInterrupt:
+            # a robot that had been interrupted too would have stopped long before
+            frontend.wait_for(frontend.latest().iteration + 300, timeout=60)
+            print("both live", flush=True)
+"""
+
+
+def test_ctrl_c_at_a_terminal_does_not_reach_the_robot(segment: str) -> None:
+    program, terminal = pty.fork()
+    if program == 0:
+        os.execv(sys.executable, [sys.executable, "-c", AT_A_TERMINAL.format(name=segment)])
+    printed = b""
+    watch = threading.Timer(WAIT, os.kill, (program, signal.SIGKILL))
+    watch.start()
+    with contextlib.suppress(OSError):  # the end of a terminal
+        while some := os.read(terminal, 1024):
+            interrupt = b"ready" not in printed and b"ready" in printed + some
+            printed += some
+            if interrupt:
+                os.write(terminal, b"\x03")
+    _, status = os.waitpid(program, 0)
+    watch.cancel()
+    os.close(terminal)
+    assert os.waitstatus_to_exitcode(status) == 0, printed.decode()
+    assert b"both live" in printed

@@ -24,7 +24,7 @@ struct CrashPlan {
   void (*after)() = nullptr;   // and when a stopped process goes on
 
   CrashPlan() {
-    const char* target = std::getenv("O80_CRASH_AT");
+    const char* target = secure_getenv("O80_CRASH_AT");
     if (target == nullptr) return;
     const char* colon = std::strchr(target, ':');
     label = colon == nullptr ? target : std::string(target, colon);

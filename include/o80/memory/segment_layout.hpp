@@ -52,15 +52,16 @@ struct SegmentHeader {
   std::uint32_t version;
   std::uint32_t header_bytes;
   SegmentShape shape;
-  std::uint64_t file_bytes;  // of the segment file
-  std::uint64_t epoch;       // random, never 0
-  std::int64_t started_at;   // [s] since 1970
-  std::int32_t pid;          // for messages only
+  std::uint64_t file_bytes;     // of the segment file
+  std::uint64_t epoch;          // random, never 0
+  std::int64_t started_at;      // [s] since 1970
+  std::uint64_t process_start;  // with `pid`, names the process that `o80 stop` signals
+  std::int32_t pid;
   std::uint32_t reserved;
   char user[32];
   char program[64];
 };
-static_assert(sizeof(SegmentHeader) == 184);
+static_assert(sizeof(SegmentHeader) == 192);
 
 /// Who asked for a halt, and why.
 struct HaltSlot {

@@ -14,7 +14,8 @@ struct SegmentEntry {
   Life life = Life::killed;
   bool readable = false;  // false: no segment of this version, or not ours to read or to trust
   int pid = 0;
-  std::int64_t started_at = 0;  // [s] since 1970
+  std::uint64_t process_start = 0;  // as process_start() gives it
+  std::int64_t started_at = 0;      // [s] since 1970
   std::string user{};
   std::string program{};
   std::uint64_t epoch = 0;

@@ -7,6 +7,7 @@
 #include "o80/base/version.hpp"
 #include "o80/describe/options.hpp"
 #include "o80/robot/driver.hpp"
+#include "o80/robot/driver_checks.hpp"
 #include "o80/robot/table.hpp"
 
 /// Makes a shared library a robot: O80_ROBOT(arm, Arm), once, at global scope.
@@ -14,6 +15,7 @@
 
 /// The same, naming what the library was built with besides o80 ("mujoco 4.0.1").
 #define O80_ROBOT_WITH(robot, DriverType, versions)                                             \
+  static_assert(::o80::kDriverPassed<DriverType>);                                              \
   extern "C" __attribute__((visibility("default"))) const ::o80::RobotTable* o80_robot_table(); \
   const ::o80::RobotTable* o80_robot_table() {                                                  \
     return ::o80::robot_table<DriverType>(#robot, versions);                                    \
@@ -81,6 +83,7 @@ static_assert(static_cast<int>(RequestAnswer::rejected) ==
 /// The table of functions of a driver class.
 template <Driver D>
 const RobotTable* robot_table(const char* name, const char* versions = "") {
+  static_assert(kDriverPassed<D>);
   static const char* robot_name = name;
   static const std::string built_with =
       std::string("o80 ") + O80_VERSION + (*versions == 0 ? "" : std::string("; ") + versions);

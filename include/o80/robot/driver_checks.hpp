@@ -1,0 +1,157 @@
+#pragma once
+
+#include <concepts>
+#include <cstdint>
+#include <type_traits>
+#include <utility>
+
+#include "o80/describe/describe.hpp"
+#include "o80/runtime/request_server.hpp"
+#include "o80/runtime/robot_types.hpp"
+
+// An optional verb or type of a driver that has another signature or nearly the right name would
+// not be used, in silence. Each such mistake is an error with one sentence when the driver is
+// compiled.
+
+namespace o80::driver_checks {
+
+// Whether a class has a member of a name, of whatever kind, private ones included: a class that
+// inherits another such member too cannot tell which one is meant.
+#define O80_MEMBER(name)                                               \
+  struct With_##name {                                                 \
+    int name;                                                          \
+  };                                                                   \
+  template <class D>                                                   \
+  struct Twice_##name : D, With_##name {};                             \
+  template <class D>                                                   \
+  consteval bool has_##name() {                                        \
+    if constexpr (std::is_final_v<D>) {                                \
+      return requires { &D::name; } || requires { typename D::name; }; \
+    } else {                                                           \
+      return !requires { &Twice_##name<D>::name; };                    \
+    }                                                                  \
+  }
+O80_MEMBER(describe)
+O80_MEMBER(wait)
+O80_MEMBER(halt)
+O80_MEMBER(resume)
+O80_MEMBER(on)
+O80_MEMBER(Requests)
+O80_MEMBER(Extended)
+O80_MEMBER(Describe)
+O80_MEMBER(describes)
+O80_MEMBER(descibe)
+O80_MEMBER(desribe)
+O80_MEMBER(discribe)
+O80_MEMBER(Wait)
+O80_MEMBER(waits)
+O80_MEMBER(Halt)
+O80_MEMBER(on_halt)
+O80_MEMBER(onHalt)
+O80_MEMBER(Resume)
+O80_MEMBER(on_resume)
+O80_MEMBER(onResume)
+#undef O80_MEMBER
+
+template <class T>
+struct IsRequests : std::false_type {};
+template <class... Each>
+struct IsRequests<Requests<Each...>> : std::true_type {};
+
+template <class T>
+concept NothingOrServed = std::same_as<T, void> || std::same_as<T, Served>;
+
+template <class D, class Request>
+concept Serves = requires(D& driver, const Request& request) {
+  { driver.on(request) } -> NothingOrServed;
+};
+
+template <class D>
+consteval bool serves_all() {
+  return []<class... Each>(Requests<Each...>) { return (Serves<D, Each> && ...); }(RequestsOf<D>{});
+}
+
+/// The optional verbs: those that are there have the signature that is called.
+template <class D>
+struct Verbs {
+  static_assert(
+      !has_describe<D>() || requires(const D& driver, Schema& schema) {
+        { driver.describe(schema) } -> std::same_as<void>;
+      }, "a driver's describe must be `void describe(o80::Schema& schema) const`, and public");
+  // braces: a number that loses digits on its way is none
+  static_assert(
+      !has_wait<D>() ||
+          requires(D& driver, std::int64_t due) {
+            { driver.wait({due}) } -> std::same_as<void>;
+          },
+      "a driver's wait must be `void wait(std::int64_t due)` (nanoseconds of the monotonic clock), "
+      "and public");
+  static_assert(
+      !has_halt<D>() || requires(D& driver) {
+        { driver.halt() } -> std::same_as<void>;
+      }, "a driver's halt must be `void halt()`, and public");
+  static_assert(
+      !has_resume<D>() || requires(D& driver) {
+        { driver.resume() } -> NothingOrServed;
+      }, "a driver's resume must be `void resume()` or `o80::Served resume()`, and public");
+
+  static_assert(has_describe<D>() || !(has_Describe<D>() || has_describes<D>() ||
+                                       has_descibe<D>() || has_desribe<D>() || has_discribe<D>()),
+                "a driver's verb is called `describe`: this one has another name");
+  static_assert(has_wait<D>() || !(has_Wait<D>() || has_waits<D>()),
+                "a driver's verb is called `wait`: this one has another name");
+  static_assert(has_halt<D>() || !(has_Halt<D>() || has_on_halt<D>() || has_onHalt<D>()),
+                "a driver's verb is called `halt`: this one has another name");
+  static_assert(has_resume<D>() || !(has_Resume<D>() || has_on_resume<D>() || has_onResume<D>()),
+                "a driver's verb is called `resume`: this one has another name");
+  static constexpr bool kPassed = true;
+};
+
+#define O80_TYPE(name) requires { typename D::name; }
+/// The optional types: those that are there can be used, and no other was meant to be one.
+template <class D>
+struct Types {
+  static_assert(!has_Requests<D>() || O80_TYPE(Requests), "a driver's Requests must be public");
+  static_assert(IsRequests<RequestsOf<D>>::value,
+                "a driver's Requests must be `o80::Requests<...>` of structs that O80_DESCRIBE "
+                "describes");
+  static_assert(!has_Extended<D>() || O80_TYPE(Extended), "a driver's Extended must be public");
+  static_assert(std::is_same_v<ExtendedOf<D>, NoExtended> ||
+                    (DescribedStruct<ExtendedOf<D>> && Shareable<ExtendedOf<D>>),
+                "a driver's Extended must be a struct of numbers that O80_DESCRIBE describes");
+  static_assert(has_Requests<D>() ||
+                    !(O80_TYPE(Request) || O80_TYPE(requests) || O80_TYPE(Requets) ||
+                      O80_TYPE(Reqests) || O80_TYPE(Requsets) || O80_TYPE(Reqeusts)),
+                "a driver's requests are listed as `using Requests = o80::Requests<...>`: this "
+                "type has another name");
+  static_assert(has_Extended<D>() ||
+                    !(O80_TYPE(Extension) || O80_TYPE(Extensions) || O80_TYPE(Extend) ||
+                      O80_TYPE(Extends) || O80_TYPE(extended) || O80_TYPE(Extented)),
+                "a driver's sensor values are named by `using Extended = ...`: this type has "
+                "another name");
+  static constexpr bool kPassed = true;
+};
+#undef O80_TYPE
+
+template <class D>
+struct Handlers {
+  static_assert(has_Requests<D>() || !has_on<D>(),
+                "a driver with `on(...)` lists its requests: `using Requests = "
+                "o80::Requests<Home>;`");
+  static_assert(serves_all<D>(),
+                "each struct in a driver's Requests needs `void on(const Each&)` or `o80::Served "
+                "on(const Each&)`, public");
+  static constexpr bool kPassed = true;
+};
+
+}  // namespace o80::driver_checks
+
+namespace o80 {
+
+/// True; does not compile for a driver class with a mistake in what is optional.
+template <class D>
+inline constexpr bool kDriverPassed =
+    driver_checks::Types<D>::kPassed && driver_checks::Verbs<D>::kPassed &&
+    driver_checks::Handlers<D>::kPassed;
+
+}  // namespace o80
