@@ -53,7 +53,7 @@ class KilledTest : public SegmentTest, public ::testing::WithParamInterface<cons
   static void leave_a_dead_segment() {
     // in this order: the backend sweeps when it starts
     ASSERT_TRUE(killed_at("segment.after_state", live_and_end));
-    ASSERT_TRUE(killed_at("create.before_link", [] { SegmentDraft("leg").publish(); }));
+    ASSERT_TRUE(killed_at("create.before_link", [] { SegmentDraft("leg").publish({}); }));
   }
   /// Whatever bears the name can be read and commanded.
   static void expect_whole() {
