@@ -150,7 +150,7 @@ std::optional<Failure> SpanWatch::check(const ScriptWorld& world, std::size_t ac
   }
   const long double covered = std::fabs(track.now - track.before);
   if (number.fastest > 0.0L && !world.script.actuators[actuator].blend &&
-      covered > number.fastest * (1.0L + 1e-9L) + 2.0L * rounding) {
+      covered > number.fastest * (1.0L + 1e-8L) + 2.0L * rounding) {
     std::snprintf(text.data(), text.size(), "a step of %.12Lg where its pace allows %.12Lg",
                   covered, number.fastest);
     return Failure{"pace", world.where(actuator, n) + text.data()};
