@@ -6,14 +6,18 @@
 
 #include <atomic>
 #include <cerrno>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <iterator>
 #include <memory>
 #include <mutex>
 #include <thread>
 
 #include "o80/base/error.hpp"
+#include "o80/control/number_name.hpp"
 #include "o80/robot/loop.hpp"
+#include "o80/robot/loop_report.hpp"
 #include "o80/robot/real_time.hpp"
 #include "o80/robot/run_options.hpp"
 
@@ -31,26 +35,36 @@ void stop_on_signal(int) {
   if (Loop* loop = running_loop.load()) loop->ask_to_stop();
 }
 
-/// SIGINT and SIGTERM stop in order while this lives.
+/// SIGINT, SIGTERM and SIGHUP stop in order while this lives; a closed terminal or pipe kills
+/// nothing.
 class StopSignals {
  public:
   StopSignals() {
     stop_asked = false;
     struct sigaction action{};
-    action.sa_handler = stop_on_signal;
-    sigaction(SIGINT, &action, &interrupt_);
-    sigaction(SIGTERM, &action, &terminate_);
+    for (std::size_t i = 0; i < std::size(kStops); ++i) {
+      action.sa_handler = stop_on_signal;
+      sigaction(kStops[i], nullptr, &before_[i]);
+      // started with nohup, a robot outlives its terminal
+      if (kStops[i] == SIGHUP && before_[i].sa_handler == SIG_IGN) continue;
+      sigaction(kStops[i], &action, nullptr);
+    }
+    action.sa_handler = SIG_IGN;
+    sigaction(SIGPIPE, &action, &pipe_before_);
   }
   StopSignals(const StopSignals&) = delete;
   StopSignals& operator=(const StopSignals&) = delete;
   ~StopSignals() {
-    sigaction(SIGINT, &interrupt_, nullptr);
-    sigaction(SIGTERM, &terminate_, nullptr);
+    for (std::size_t i = 0; i < std::size(kStops); ++i) {
+      sigaction(kStops[i], &before_[i], nullptr);
+    }
+    sigaction(SIGPIPE, &pipe_before_, nullptr);
   }
 
  private:
-  struct sigaction interrupt_{};
-  struct sigaction terminate_{};
+  static constexpr int kStops[] = {SIGINT, SIGTERM, SIGHUP};
+  struct sigaction before_[std::size(kStops)] {};
+  struct sigaction pipe_before_{};
 };
 
 /// The loop that signals stop, as long as this lives.
@@ -120,6 +134,29 @@ std::unique_ptr<Loop> make_loop(const RobotTable& table, const RunOptions& optio
   }
 }
 
+/// The numbers that a halt or stop brings to rest in one iteration, as nothing limits their
+/// acceleration: a few of them, and how many more.
+std::string stops_at_once(const Schema& schema) {
+  constexpr std::uint32_t kNamed = 3;
+  std::string names;
+  std::uint32_t count = 0;
+  for (std::uint32_t i = 0; i < schema.actuators.size(); ++i) {
+    const ActuatorRow& row = schema.actuators[i];
+    std::uint32_t number = 0;
+    schema.each_scalar(row.type, [&](std::uint32_t, const FieldRow& field) {
+      const LimitRow& limit = schema.limits[row.first_limit + number];
+      const std::uint32_t here = number++;
+      const bool moves = field.kind == Kind::float32 || field.kind == Kind::float64;
+      if (!moves || std::isfinite(limit.acceleration)) return;
+      if (count++ >= kNamed) return;
+      ShortText<200> name;
+      name_number(schema, i, here, name);
+      names += (names.empty() ? "" : ", ") + std::string(name.view());
+    });
+  }
+  return count > kNamed ? names + " and " + std::to_string(count - kNamed) + " more" : names;
+}
+
 void announce(const RobotTable& table, const UntypedBackend& backend) {
   const SchemaHead& head = backend.schema().head;
   std::printf("%s runs on segment '%s', ", table.name, backend.name().c_str());
@@ -129,6 +166,11 @@ void announce(const RobotTable& table, const UntypedBackend& backend) {
     std::printf("%g Hz", 1e9 / static_cast<double>(head.period));
   }
   std::printf(", pid %d\n", getpid());
+  const std::string at_once = stops_at_once(backend.schema());
+  if (head.bursting == 0 && !at_once.empty()) {
+    std::printf("no acceleration limit on %s: a halt or stop ends its motion in one iteration\n",
+                at_once.c_str());
+  }
   std::fflush(stdout);
 }
 
@@ -142,6 +184,7 @@ int run_robot(const RobotTable& table, const RunOptions& options) {
     complain(refused.c_str());
   }
   announce(table, loop->backend());
+  const LoopReport report(loop->backend().name());
   const Ended ended = loop->run();
   if (!ended.in_order) complain(ended.fault.c_str());
   return ended.in_order ? 0 : 1;

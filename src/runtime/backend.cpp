@@ -96,6 +96,7 @@ UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, Reques
       stale_(options.stale),
       silence_(options.silence),
       last_life_(lanes.size()),
+      errors_(schema),
       overruns_(options.max_overruns) {
   // completed and late commands, and their batches
   untold_.reserve(2 * (schema.actuators.size() + Controller::kStatusesPerIteration));
@@ -176,6 +177,7 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
     std::memcpy(row() + layout.braking, controller.braking_mask(), layout.mask_words * 8);
   }
   history.publish(current, row());
+  if (begun_ && !fresh) watch_errors();
 
   // whoever waits for it
   if (!fresh) {

@@ -11,6 +11,7 @@
 
 #include "o80/base/time.hpp"
 #include "o80/control/controller.hpp"
+#include "o80/control/error_watch.hpp"
 #include "o80/memory/fork.hpp"
 #include "o80/memory/halt_word.hpp"
 #include "o80/memory/history.hpp"
@@ -113,6 +114,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   // halts
   void watch_halt() noexcept;
   void show_acts() noexcept;
+  void watch_errors() noexcept;
   void begin_halt() noexcept;
   void end_scheduled_before_halt() noexcept;
   bool suits_halt(const StagedBatch& sent) noexcept;
@@ -167,6 +169,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   std::uint64_t halted_below_ = 0;            // tickets: what was sent before the last halt
   std::uint32_t shown_acts_ = 0;
   bool reason_missing_ = false;  // of the halt that acts: its asker has not written it
+  ErrorWatch errors_;
   OverrunLimit overruns_;
   bool stopping_ = false;       // brakes before its end
   bool driver_halted_ = false;  // the driver was told that a halt begins

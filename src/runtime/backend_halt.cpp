@@ -42,6 +42,16 @@ void UntypedBackend::Body::show_acts() noexcept {
   segment.view().counters().acts.store(acts, std::memory_order_relaxed);
 }
 
+/// What the row that was published shows: a robot that is not where it should be.
+void UntypedBackend::Body::watch_errors() noexcept {
+  if (halts.acts()) return;
+  const auto excess = errors_.find(controller.desired(), row() + layout.observed);
+  if (!excess) return;
+  ShortText<248> text;
+  describe_excess(schema, *excess, text);
+  ask_to_halt(HaltCause::error, text.view());
+}
+
 /// An end in order: every command ends, every actuator brakes.
 Step UntypedBackend::Body::brake() noexcept {
   if (!stopping_) {

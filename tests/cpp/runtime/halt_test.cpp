@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <thread>
 
 #include "memory/child_process.hpp"
@@ -192,6 +193,34 @@ TEST_F(HaltTest, IsTheBackendsOwnTooAndOnceForEachCause) {
   EXPECT_EQ(halt->cause, HaltCause::driver);
   EXPECT_EQ(halt->who_text(), "");
   EXPECT_EQ(halt->reason(), "motor 3 is hot");
+}
+
+TEST_F(HaltTest, ARobotThatIsNotWhereItShouldBeHalts) {
+  Station station({.segment = "pair"},
+                  [](Schema& schema) { schema.actuator(1).limits({.error = 0.25}); });
+  station.start();
+  UntypedFrontend frontend("pair");
+  station.before_publish = [&] {
+    if (station.backend.iteration() == 3) station.now[1] = 0.75;  // it hit something
+  };
+  const Batch batch = send(frontend, 1, 1.0, {.pace = iterations(10)});
+  station.run(4);
+  ASSERT_TRUE(frontend.halted());
+  EXPECT_EQ(frontend.halted()->cause, HaltCause::error);
+  EXPECT_EQ(frontend.halted()->iteration, 3 + 1);
+  EXPECT_THAT(std::string(frontend.halted()->reason()),
+              AllOf(HasSubstr("actuator 'elbow'"), HasSubstr("observed at 0.75"),
+                    HasSubstr("desired at 0.3"), HasSubstr("0.25")));
+  EXPECT_EQ(batch.handle(0).status, Status::halted);
+}
+
+TEST_F(HaltTest, AReadingThatIsNoNumberHaltsWhereThereIsAnErrorLimit) {
+  Station station({.segment = "pair"},
+                  [](Schema& schema) { schema.actuator(1).limits({.error = 1e9}); });
+  station.start();
+  station.before_publish = [&] { station.now[1] = std::nan(""); };
+  station.run(2);
+  EXPECT_TRUE(UntypedFrontend("pair").halted());
 }
 
 // ------------------------------------------------------------------------------ resuming

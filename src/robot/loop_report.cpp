@@ -1,0 +1,80 @@
+#include "o80/robot/loop_report.hpp"
+
+#include <pthread.h>
+#include <signal.h>
+
+#include <cstdio>
+#include <exception>
+#include <utility>
+
+#include "o80/base/printable.hpp"
+#include "o80/base/time.hpp"
+#include "o80/memory/futex.hpp"
+#include "o80/runtime/frontend.hpp"
+
+namespace o80 {
+
+namespace {
+constexpr std::int64_t kPeriod = 1'000'000'000;         // between two looks [ns]
+constexpr std::int64_t kBetweenLines = 10'000'000'000;  // about late iterations [ns]
+
+void say(const std::string& text) { std::fprintf(stderr, "o80: %s\n", text.c_str()); }
+
+std::string words_for(const Halt& halt) {
+  std::string text = "halted in iteration " + std::to_string(halt.iteration) + " (halt " +
+                     std::to_string(halt.number) + ", cause " + std::string(to_text(halt.cause));
+  if (!halt.who_text().empty()) text += ", asked for by " + printable(halt.who_text());
+  text += ")";
+  if (!halt.reason().empty()) text += ": " + printable(halt.reason());
+  return text;
+}
+}  // namespace
+
+std::optional<std::string> OverrunReport::look(const RowHead& row, std::int64_t now) {
+  if (row.overruns == last_.overruns) return std::nullopt;
+  if (said_at_ != 0 && now - said_at_ < kBetweenLines) return std::nullopt;
+  said_at_ = now;
+  const RowHead before = std::exchange(last_, row);
+  return std::to_string(row.overruns - before.overruns) + " of the last " +
+         std::to_string(row.iteration - before.iteration) + " iterations were late, " +
+         std::to_string(row.skipped - before.skipped) +
+         " periods were left out: see docs/real_time.md, or lower --frequency";
+}
+
+LoopReport::LoopReport(std::string segment) : segment_(std::move(segment)) {
+  // signals are for the loop's thread
+  sigset_t every;
+  sigset_t before;
+  sigfillset(&every);
+  pthread_sigmask(SIG_BLOCK, &every, &before);
+  thread_ = std::thread([this] { run(); });
+  const sched_param ordinary{};
+  pthread_setschedparam(thread_.native_handle(), SCHED_OTHER, &ordinary);
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+}
+
+LoopReport::~LoopReport() {
+  stop_.store(1, std::memory_order_seq_cst);
+  futex_wake(stop_, kEverybody);
+  thread_.join();
+}
+
+void LoopReport::run() noexcept {
+  try {
+    const UntypedFrontend watcher(segment_, {.access = Access::read_only});
+    OverrunReport overruns;
+    std::uint64_t halted = 0;
+    while (stop_.load(std::memory_order_acquire) == 0) {
+      if (const auto line = overruns.look(watcher.latest().head(), monotonic_now())) say(*line);
+      const std::optional<Halt> halt = watcher.halted();
+      const std::uint64_t now = halt ? halt->number : 0;
+      if (now != halted && halt) say(words_for(*halt));
+      if (now != halted && !halt) say("resumed");
+      halted = now;
+      futex_wait(stop_, 0, kPeriod);
+    }
+  } catch (const std::exception&) {  // the backend has ended: there is nothing left to report
+  }
+}
+
+}  // namespace o80

@@ -1,0 +1,45 @@
+#include "o80/runtime/overrun_limit.hpp"
+
+#include <gmock/gmock.h>
+
+#include "runtime/station.hpp"
+
+namespace o80::test {
+namespace {
+
+constexpr std::int64_t kMilli = 1'000'000;  // [ns]
+
+TEST(OverrunLimit, CountsWithinASecondExactly) {
+  OverrunLimit limit(3);
+  EXPECT_FALSE(limit.exceeded(0));
+  EXPECT_FALSE(limit.exceeded(10 * kMilli));
+  EXPECT_FALSE(limit.exceeded(1000 * kMilli)) << "the first one is a second old";
+  EXPECT_TRUE(limit.exceeded(1009 * kMilli));
+  EXPECT_FALSE(limit.exceeded(2000 * kMilli));
+}
+
+TEST(OverrunLimit, OfOneIsTheFirst) { EXPECT_TRUE(OverrunLimit(1).exceeded(5)); }
+
+TEST(OverrunLimit, OfNoneIsNeverExceeded) {
+  OverrunLimit limit(0);
+  for (int i = 0; i < 1000; ++i) EXPECT_FALSE(limit.exceeded(i));
+}
+
+using OverrunLimitTest = StationTest;
+
+TEST_F(OverrunLimitTest, HaltsTheBackend) {
+  Station station({.segment = "pair", .max_overruns = 2});
+  station.start();
+  UntypedFrontend frontend("pair");
+  station.backend.set_timing({.lateness = 5, .overruns = 1});
+  station.backend.set_timing({.lateness = 0, .overruns = 1});
+  station.run(1);
+  EXPECT_FALSE(frontend.halted());
+  station.backend.set_timing({.lateness = 5, .overruns = 2});
+  station.run(1);
+  ASSERT_TRUE(frontend.halted());
+  EXPECT_EQ(frontend.halted()->cause, HaltCause::overruns);
+}
+
+}  // namespace
+}  // namespace o80::test
