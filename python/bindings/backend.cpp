@@ -52,8 +52,9 @@ struct SchemaBuilder {
 
   void set_extended(std::uint32_t type) { schema.head.extended = type; }
 
-  void add_request(const std::string& name, std::uint32_t type, const std::string& help) {
-    schema.add_request(name, type, help);
+  void add_request(const std::string& name, std::uint32_t type, const std::string& help,
+                   bool while_halted) {
+    schema.add_request(name, type, help, while_halted);
   }
 
   void name_actuator(std::uint32_t actuator, const std::string& name) {
@@ -286,6 +287,29 @@ class Backend final : public o80::RequestServer {
     }
   }
 
+  bool halt() noexcept override {
+    const WithGil locked;
+    try {
+      call_python([&] { return serve_with.attr("halt")(); });
+      return true;
+    } catch (std::exception&) {
+      raised_ = std::current_exception();
+      return false;
+    }
+  }
+
+  o80::Served resume() noexcept override {
+    const WithGil locked;
+    try {
+      const nb::object answer = call_python([&] { return serve_with.attr("resume")(); });
+      if (answer.is_none()) return o80::Served::done();
+      return o80::Served::rejected(nb::cast<std::string>(answer));
+    } catch (std::exception& error) {
+      raised_ = std::current_exception();
+      return o80::Served::failed(error.what());
+    }
+  }
+
   /// The handler has read the robot anew.
   bool read_fresh(o80::FreshReading& reading) noexcept override {
     const WithGil locked;
@@ -318,7 +342,8 @@ o80::Stale stale_called(const std::string& name) {
 
 Backend* make(const SchemaBuilder& builder, const std::string& segment, std::int64_t period,
               bool bursting, std::uint64_t history, std::uint32_t lanes, std::uint32_t lane_blocks,
-              std::uint32_t permission, const std::string& stale, std::int64_t silence) {
+              std::uint32_t permission, const std::string& stale, std::int64_t silence,
+              bool resume) {
   o80::BackendOptions options;
   options.segment = segment;
   options.period = period;
@@ -329,6 +354,7 @@ Backend* make(const SchemaBuilder& builder, const std::string& segment, std::int
   options.permission = permission;
   options.stale = stale_called(stale);
   options.silence = silence;
+  options.resume = resume;
   return new Backend(builder, options);
 }
 
@@ -342,7 +368,8 @@ void bind_backend(nb::module_& m) {
       .def("add_actuators", &SchemaBuilder::add_actuators, "group"_a, "type"_a, "count"_a,
            "is_array"_a)
       .def("set_extended", &SchemaBuilder::set_extended, "type"_a)
-      .def("add_request", &SchemaBuilder::add_request, "name"_a, "type"_a, "help"_a)
+      .def("add_request", &SchemaBuilder::add_request, "name"_a, "type"_a, "help"_a,
+           "while_halted"_a)
       .def("name_actuator", &SchemaBuilder::name_actuator, "actuator"_a, "name"_a)
       .def("set_follow", &SchemaBuilder::set_follow, "actuator"_a)
       .def("set_limits", &SchemaBuilder::set_limits, "actuator"_a, "field"_a, "limits"_a)
@@ -354,7 +381,7 @@ void bind_backend(nb::module_& m) {
   refuse_to_pickle(bound, "a backend", "its segment's name, and open o80.Frontend(name) there");
   bound
       .def(nb::new_(&make), "builder"_a, "segment"_a, "period"_a, "bursting"_a, "history"_a,
-           "lanes"_a, "lane_blocks"_a, "permission"_a, "stale"_a, "silence"_a)
+           "lanes"_a, "lane_blocks"_a, "permission"_a, "stale"_a, "silence"_a, "resume"_a)
       .def_rw("serve_with", &Backend::serve_with, nb::arg().none())
       .def_prop_ro("description",
                    [](const Backend& self) {
@@ -385,6 +412,12 @@ void bind_backend(nb::module_& m) {
             self.between_steps().interrupt(actuator);
           },
           "actuator"_a)
+      .def(
+          "halt",
+          [](const Backend& self, const std::string& text) {
+            self.checked().halt(o80::HaltCause::driver, text);
+          },
+          "text"_a)
       .def("ask_to_stop", [](const Backend& self) { self.checked().ask_to_stop(); })
       .def("end", &Backend::end, "failed"_a, "text"_a)
       .def_prop_ro("failure", &Backend::failure)

@@ -29,6 +29,7 @@ void translate(const std::exception_ptr& thrown, void*) {
   O80_TRANSLATE(BackendKilled)
   O80_TRANSLATE(BackendSuperseded)
   O80_TRANSLATE(BackendGone)
+  O80_TRANSLATE(BackendHalted)
   O80_TRANSLATE(RowOverwritten)
   O80_TRANSLATE(LaneFull)
   O80_TRANSLATE(NoLane)

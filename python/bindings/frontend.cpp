@@ -136,6 +136,7 @@ void bind_frontend(nb::module_& m) {
   frontend.def(nb::init<const Attachment&, std::shared_ptr<Decoder>>());
   bind_sending(m, frontend);
   bind_reading(m, frontend);
+  bind_halting(m, frontend);
   frontend
       .def_prop_ro(
           "segment", [](const Frontend& self) { return self.untyped().segment(); },

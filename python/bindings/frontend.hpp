@@ -60,4 +60,5 @@ using Seconds = std::optional<double>;
 
 // what each file adds to the class
 void bind_sending(nanobind::module_& m, nanobind::class_<Frontend>& frontend);
+void bind_halting(nanobind::module_& m, nanobind::class_<Frontend>& frontend);
 void bind_reading(nanobind::module_& m, nanobind::class_<Frontend>& frontend);

@@ -8,6 +8,7 @@ from o80.burst_group import BurstGroup, burst
 from o80.errors import (
     BackendFailed,
     BackendGone,
+    BackendHalted,
     BackendKilled,
     BackendStopped,
     BackendSuperseded,
@@ -31,6 +32,7 @@ from o80.errors import (
 )
 from o80.frontend import Frontend
 from o80.frontend_classes import register_frontend
+from o80.halts import Halt, halt
 from o80.history import History
 from o80.installation import prefix
 from o80.limits import Limits
@@ -47,6 +49,7 @@ __all__ = [
     "Backend",
     "BackendFailed",
     "BackendGone",
+    "BackendHalted",
     "BackendKilled",
     "BackendStopped",
     "BackendSuperseded",
@@ -59,6 +62,7 @@ __all__ = [
     "DriverError",
     "Error",
     "Frontend",
+    "Halt",
     "Handle",
     "History",
     "InvalidArgument",
@@ -89,6 +93,7 @@ __all__ = [
     "__version__",
     "burst",
     "clean",
+    "halt",
     "prefix",
     "register_frontend",
     "robots",

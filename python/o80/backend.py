@@ -1,7 +1,7 @@
 """The side that iterates, inside a Python program."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Literal, Self
@@ -59,7 +59,8 @@ class Backend:
     bursting: `step` waits until a frontend asks for iterations.
     robot: what it calls itself (None: as the segment).
     history: observations kept (None: as many as 16 MiB hold, 100000 at most).
-    lanes, lane_blocks, permission, stale, silence: as for `o80.robots.Robot.start`.
+    while_halted: requests that are served while it is halted too: those that move nothing.
+    lanes, lane_blocks, permission, stale, silence, resume: as for `o80.robots.Robot.start`.
 
     Leaving a `with` block by an exception ends it as failed: frontends raise its text.
     Used by one thread; `stop` and `close` may come from any. Raises SegmentTaken, SegmentError,
@@ -87,6 +88,8 @@ class Backend:
         permission: int = 0o600,
         stale: Literal["hold", "purge", "halt", "stop"] = "hold",
         silence: int | None = None,
+        resume: bool = False,
+        while_halted: Sequence[str] = (),
     ) -> None:
         if not (math.isfinite(frequency) and frequency > 0):
             raise InvalidArgument(f"a frequency of {frequency} cannot be: it is above 0 [1/s]")
@@ -94,7 +97,7 @@ class Backend:
         writer.add_actuators(actuators, dtype)
         if extended is not None:
             writer.set_extended(extended)
-        writer.add_requests(requests or {})
+        writer.add_requests(requests or {}, while_halted)
         writer.set_limits(limits or {})
         writer.set_rests(rests_at or {})
         writer.set_idle(when_idle)
@@ -110,10 +113,12 @@ class Backend:
             permission,
             stale,
             0 if silence is None else silence,
+            resume,
         )
         self._layout = Layout(native.description)
         self._segment = segment
         self._handlers: dict[str, Handler] = {}
+        self._halt_handlers: dict[str, Callable[[], None]] = {}
         self._observed = self._states(native.observed)
         self._fresh_desired = self._states(native.fresh_desired)
         self._extended: NDArray[Any] = np.ndarray((), self._layout.extras, native.extended)
@@ -176,6 +181,26 @@ class Backend:
         self._open.check()
         self._handlers[request] = handler
 
+    def on_halt(self, handler: Callable[[], None]) -> None:
+        """Sets who is told when a halt begins: commands have ended, desired states brake."""
+        self._open.check()
+        self._halt_handlers["halt"] = handler
+
+    def on_resume(self, handler: Callable[[], None]) -> None:
+        """Sets who is asked before a halt is cleared; it raises RequestRejected to keep it.
+
+        Desired states then begin at what was observed last.
+        """
+        self._open.check()
+        self._halt_handlers["resume"] = handler
+
+    def halt(self, reason: str = "") -> None:
+        """Halts: commands end, actuators brake, nothing moves until a frontend resumes.
+
+        Acts in the first `step` begun after it; from any thread.
+        """
+        self._open.halt(reason)
+
     def interrupt(self, actuator: int | str) -> None:
         """Ends the commands of an actuator as interrupted, in the iteration under way."""
         rows = self._layout.schema["actuators"]
@@ -205,6 +230,7 @@ class Backend:
         text = native.failure if failure is None else failure
         native.end(bool(text), text)
         self._handlers.clear()
+        self._halt_handlers.clear()
 
     def _close_at_exit(self) -> None:
         self.close()
@@ -262,6 +288,7 @@ class Server:
 
     def __init__(self, backend: Backend) -> None:
         self._handlers = backend._handlers
+        self._halt_handlers = backend._halt_handlers
         self._rows = backend._layout.schema["requests"]
         self._observed = backend._observed
         self._extended = backend._extended
@@ -287,6 +314,23 @@ class Server:
         if answer.desired is not None:
             fill(self._desired, answer.desired, "desired")
         return True
+
+    def halt(self) -> None:
+        """A halt begins."""
+        if handler := self._halt_handlers.get("halt"):
+            handler()
+
+    def resume(self) -> str | None:
+        """A halt is to be cleared; why it is not, or None."""
+        self._desired[...] = self._observed
+        handler = self._halt_handlers.get("resume")
+        if handler is None:
+            return None
+        try:
+            handler()
+        except RequestRejected as why:
+            return str(why) or "the handler gave no reason"
+        return None
 
 
 def fill(block: NDArray[Any], values: Any, what: str) -> None:

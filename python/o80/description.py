@@ -62,10 +62,16 @@ class SchemaWriter:
         index = self._type("Extended", extended)
         self.builder.set_extended(index)
 
-    def add_requests(self, requests: Mapping[str, Described | None]) -> None:
+    def add_requests(
+        self, requests: Mapping[str, Described | None], while_halted: Sequence[str] = ()
+    ) -> None:
         """Requests, each with its fields (None: it has none)."""
+        for name in while_halted:
+            if name not in requests:
+                raise InvalidArgument(f"while_halted: there is no request '{name}'")
         for name, fields in requests.items():
-            self.builder.add_request(name, self._type(name, {} if fields is None else fields), "")
+            described = self._type(name, {} if fields is None else fields)
+            self.builder.add_request(name, described, "", name in while_halted)
 
     def set_limits(self, limits: Mapping[Any, Limit | Mapping[str, Limit]]) -> None:
         """Limits of the first number of actuators, or of their fields."""

@@ -56,6 +56,10 @@ class BackendGone(Error):
     """The backend no longer iterates."""
 
 
+class BackendHalted(Error):
+    """The backend is halted: commands end or are refused until somebody resumes it."""
+
+
 class BackendStopped(BackendGone):
     """The backend ended in order."""
 

@@ -23,6 +23,7 @@ from o80.errors import (
     SchemaMismatch,
     UsedAfterFork,
 )
+from o80.halts import Halt
 from o80.history import History
 from o80.layout import Layout
 from o80.prepared_burst import PreparedBurst, checked_count
@@ -279,6 +280,35 @@ class Frontend(_core.Frontend):
         finally:
             with contextlib.suppress(BackendGone, Closed):
                 self._release_control().wait(timeout)
+
+    # ------------------------------------------------------------------ halts
+
+    @property
+    def halted(self) -> Halt | None:
+        """The halt that acts, or None. Asked for a moment ago, its iteration is None."""
+        fields = self._halted
+        if fields is None:
+            return None
+        number, cause, iteration, who, text = fields
+        return Halt(number, cause, None if iteration < 0 else iteration, who, text)
+
+    def resume(self, number: int | None = None, *, timeout: float | None = 5.0) -> None:
+        """Ends a halt: the robot starts afresh from where it is, with nothing queued.
+
+        number: of the halt that was looked at (None: the one that acts now). A halt that came after
+            it stands.
+        timeout: for the backend's answer [s].
+
+        Raises BackendHalted if it is refused: another halt came, the robot still brakes, or it
+        refuses itself.
+        Does nothing if no halt acts.
+        """
+        if number is None:
+            halt = self.halted
+            if halt is None:
+                return
+            number = halt.number
+        self._resume(number, timeout)
 
     # ------------------------------------------------------------------ observing
 

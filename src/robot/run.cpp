@@ -63,7 +63,7 @@ class StopSignals {
 
  private:
   static constexpr int kStops[] = {SIGINT, SIGTERM, SIGHUP};
-  struct sigaction before_[std::size(kStops)] {};
+  struct sigaction before_[std::size(kStops)]{};
   struct sigaction pipe_before_{};
 };
 

@@ -39,6 +39,8 @@ CALLS = {
         "(standing.add_command(0, 1.0), standing.pulse_and_wait())", "standing.close()"
     ),
     "Frontend.request": Call("silent.request('home')", "silent.close()"),
+    "Frontend.resume": Call("(silent.halt(), silent.resume(timeout=None))", "silent.close()"),
+    "halt": Call("o80.halt(late, timeout=None)", "begin(late)", ""),
     "Frontend.control": Call("silent.control(None).__enter__()", "silent.close()"),
     "Frontend.reattach": Call("gone.reattach(None)", "gone.close()"),
     "Frontend.burst": Call("standing.burst(5)", "standing.close()"),

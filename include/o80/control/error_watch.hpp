@@ -45,7 +45,8 @@ class ErrorWatch {
   std::vector<std::optional<StateLayout>> layouts_;  // of each type that is watched
 };
 
-/// "position of actuator 'elbow' is observed at 0.1, 0.4 away from the desired 0.5 (error limit 0.2)".
+/// "position of actuator 'elbow' is observed at 0.1, 0.4 away from the desired 0.5 (error limit
+/// 0.2)".
 void describe_excess(const Schema& schema, const ErrorWatch::Excess& excess,
                      ShortText<248>& text) noexcept;
 

@@ -18,12 +18,12 @@ class OverrunReport {
   std::optional<std::string> look(const RowHead& row, std::int64_t now);
 
  private:
-  RowHead last_{};           // that was reported about
-  std::int64_t said_at_ = 0; // [ns], 0: nothing was said yet
+  RowHead last_{};            // that was reported about
+  std::int64_t said_at_ = 0;  // [ns], 0: nothing was said yet
 };
 
-/// Reads the rows of a loop in this process, from a thread of its own, and says on the standard error
-/// when iterations are late and when the backend halts or resumes.
+/// Reads the rows of a loop in this process, from a thread of its own, and says on the standard
+/// error when iterations are late and when the backend halts or resumes.
 class LoopReport {
  public:
   explicit LoopReport(std::string segment);

@@ -4,6 +4,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "o80/runtime/backend.hpp"
@@ -45,6 +46,13 @@ class Backend final : private RequestServer {
   }
   /// Reads the robot anew after a request answered `start_afresh`.
   void on_fresh_start(std::function<void(Actuators&, Extended&)> read) { read_ = std::move(read); }
+
+  /// Told when a halt begins: commands have ended, the desired states brake.
+  void on_halt(std::function<void()> halt) { halt_ = std::move(halt); }
+  /// Asked before a halt is cleared; `Served::rejected` keeps it.
+  void on_resume(std::function<Served()> resume) { resume_ = std::move(resume); }
+  /// Halts in the program's own name, as a driver's reading may.
+  void halt(std::string_view why) noexcept { backend_.halt(HaltCause::driver, why); }
 
   /// Publishes what was observed in the iteration under way; the first call makes row 0.
   void publish(const Actuators& observed, const Extended& extended = {}) noexcept {
@@ -93,8 +101,28 @@ class Backend final : private RequestServer {
     }
   }
 
+  bool halt() noexcept override {
+    try {
+      if (halt_) halt_();
+      return true;
+    } catch (...) {
+      return false;
+    }
+  }
+  Served resume() noexcept override {
+    try {
+      return resume_ ? resume_() : Served::done();
+    } catch (const std::exception& error) {
+      return Served::failed(error.what());
+    } catch (...) {
+      return Served::failed("the handler of a resume threw");
+    }
+  }
+
   std::map<std::uint32_t, std::function<Served(const std::byte*)>> servers_;
   std::function<void(Actuators&, Extended&)> read_;
+  std::function<void()> halt_;
+  std::function<Served()> resume_;
   UntypedBackend backend_;
 };
 

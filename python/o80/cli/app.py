@@ -10,6 +10,7 @@ import typer
 import o80
 from o80.cli.clean import clean
 from o80.cli.echo import echo
+from o80.cli.halt import halt, resume
 from o80.cli.info import info
 from o80.cli.list_segments import list_segments
 from o80.cli.run import run
@@ -34,6 +35,8 @@ app.command(
 app.command("list")(list_segments)
 app.command("info")(info)
 app.command("echo")(echo)
+app.command("halt")(halt)
+app.command("resume")(resume)
 app.command("stop")(stop)
 app.command("clean")(clean)
 

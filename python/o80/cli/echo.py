@@ -53,6 +53,7 @@ def _print(row: o80.Observation, as_json: bool) -> None:
         return
     out.print(
         f"[bold]{row.iteration:>10}[/bold] {row.time * 1e-9:14.6f} s"
+        f"{'  [yellow]HALTED[/]' if row.halted else ''}"
         f"  desired {_short(row.desired)}  observed {_short(row.observed)}",
         soft_wrap=True,
         markup=True,
@@ -69,6 +70,7 @@ def _plain(row: o80.Observation) -> dict[str, Any]:
         "active": [bool(value) for value in row.active],
         "clamped": [bool(value) for value in row.clamped],
         "braking": [bool(value) for value in row.braking],
+        "halted": row.halted,
     }
 
 

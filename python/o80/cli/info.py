@@ -5,9 +5,11 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 import typer
+from rich.markup import escape
 from rich.table import Table
 
 import o80
+from o80.cli.condition import halt_text, loop_text, watchdog_text
 from o80.cli.screen import out, print_json
 
 
@@ -28,6 +30,9 @@ def info(
             f"rows {frontend.oldest} to {frontend.published}, "
             f"{schema['row']['size']} bytes a row"
         )
+        for said in (halt_text(frontend), loop_text(frontend), watchdog_text(schema)):
+            if said:
+                out.print(escape(said), soft_wrap=True)
         if schema["actuators"]:
             out.print(_actuators(schema))
         if "extended" in schema:
@@ -38,7 +43,8 @@ def info(
             out.print("\n[bold]requests[/bold]")
             for request in schema["requests"]:
                 fields = ", ".join(field["name"] for field in request["type"]["fields"])
-                out.print(f"  {request['name']}({fields})  [dim]{request['help']}[/dim]")
+                served = ", also while halted" if request["while_halted"] else ""
+                out.print(f"  {request['name']}({fields})  [dim]{request['help']}{served}[/dim]")
 
 
 def _actuators(schema: dict[str, Any]) -> Table:

@@ -10,6 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 import o80
+from o80.cli.condition import halt_text, loop_text
 from o80.cli.screen import out, print_json
 
 
@@ -40,6 +41,9 @@ def list_segments(
         )
     out.print(table)
     for row in rows:
+        for said in (row["halted"], row["state_of_loop"]):
+            if said:
+                out.print(f"[yellow]{row['segment']}[/]: {escape(said)}", soft_wrap=True)
         if row["problem"]:
             out.print(f"[yellow]{row['segment']}[/]: {escape(row['problem'])}")
     if any(row["state"] in ("killed", "failed", "stopped") for row in rows):
@@ -60,6 +64,8 @@ def _row(entry: o80.Segment) -> dict[str, Any]:
         "frequency": None,
         "bursting": None,
         "iteration": None,
+        "state_of_loop": None,
+        "halted": None,
     }
     if not entry.readable:
         return row
@@ -69,6 +75,8 @@ def _row(entry: o80.Segment) -> dict[str, Any]:
             row["frequency"] = frontend.frequency
             row["bursting"] = frontend.bursting
             row["iteration"] = frontend.published
+            row["state_of_loop"] = loop_text(frontend)
+            row["halted"] = halt_text(frontend)
     except o80.Error:
         pass  # it went while we looked
     return row

@@ -61,9 +61,9 @@ TEST_F(ErrorWatchTest, WhatHasNoLimitMayBeAnywhere) {
 }
 
 TEST_F(ErrorWatchTest, AReadingThatIsNoNumberIsTooFar) {
-  for (const float wrong : {std::numeric_limits<float>::quiet_NaN(),
-                            std::numeric_limits<float>::infinity(),
-                            -std::numeric_limits<float>::infinity()}) {
+  for (const float wrong :
+       {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(),
+        -std::numeric_limits<float>::infinity()}) {
     observed_[1].torque = wrong;
     EXPECT_TRUE(find()) << wrong;
   }

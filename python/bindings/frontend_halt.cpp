@@ -1,0 +1,72 @@
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+
+#include <string>
+#include <tuple>
+
+#include "frontend.hpp"
+#include "o80/base/printable.hpp"
+#include "o80/memory/verb_word.hpp"
+#include "waiting.hpp"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+
+namespace {
+
+using HaltFields = std::tuple<std::uint64_t, std::string, std::int64_t, std::string, std::string>;
+
+/// Number, cause, iteration, who, text.
+std::optional<HaltFields> halted(const Frontend& self) {
+  const std::optional<o80::Halt> halt = self.untyped().halted();
+  if (!halt) return std::nullopt;
+  return HaltFields{halt->number, std::string(to_text(halt->cause)), halt->iteration,
+                    o80::printable(halt->who_text()), o80::printable(halt->reason())};
+}
+
+std::uint64_t halt(const Frontend& self, const std::string& reason) {
+  const std::shared_ptr<o80::UntypedFrontend> frontend = self.shared();
+  const Waiting waiting;  // an inline robot may be in a burst of another thread
+  return frontend->halt(reason);
+}
+
+void resume(const Frontend& self, std::uint64_t number, std::optional<double> timeout) {
+  const std::shared_ptr<o80::UntypedFrontend> frontend = self.shared();
+  const Waiting waiting;
+  frontend->resume(number, timeout_of(timeout), Waiting::check);
+}
+
+/// The driver verb that has not returned, and for how long [s].
+std::optional<std::tuple<std::string, double>> slow_verb(const Frontend& self) {
+  const o80::SlowVerb slow = o80::slow_verb(self.untyped().link()->segment.view());
+  if (slow.verb == o80::Verb::none) return std::nullopt;
+  return std::tuple{std::string(to_text(slow.verb)),
+                    static_cast<double>(o80::monotonic_now() - slow.since) * 1e-9};
+}
+
+std::uint64_t halt_segment(const std::string& segment, const std::string& reason,
+                           std::optional<double> timeout) {
+  const Waiting waiting;
+  return o80::halt(segment, reason, timeout_of(timeout));
+}
+
+}  // namespace
+
+void bind_halting(nb::module_& m, nb::class_<Frontend>& frontend) {
+  m.def("halt", &halt_segment, "segment"_a, "reason"_a, "timeout"_a.none());
+  frontend
+      .def(
+          "halt", &halt, "reason"_a = "",
+          R"(Halts the backend: every command ends as halted, every actuator brakes within its limits, and
+nothing moves again until `resume`. Acts in the first iteration begun after it, whoever has control.
+
+Returns the number of the halt. Raises ReadOnly, BackendGone.)")
+      .def_prop_ro("_halted", &halted)
+      .def("_resume", &resume, "number"_a, "timeout"_a.none())
+      .def_prop_ro("_slow_verb", &slow_verb)
+      .def(
+          "keep_alive", [](const Frontend& self) { self.untyped().keep_alive(); },
+          R"(Tells the backend's watchdog that this frontend lives, as a pulse or a wait for its own batch
+does; reading does not.)");
+}

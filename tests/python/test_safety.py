@@ -1,0 +1,383 @@
+"""What the arm does when something fails: the rows of docs/safety.md that need whole processes."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+import o80
+
+WAIT = 60.0  # [s] longer than any wait should take
+ROOT = Path(__file__).resolve().parents[2]
+O80 = str(Path(sys.executable).parent / "o80")
+
+COMMANDER = """
+import os, signal, sys, time
+import o80
+arm = o80.Frontend({segment!r})
+arm.add_command(0, 3.0, iterations=10**9)
+arm.pulse()
+print("ready", flush=True)
+{then}
+"""
+
+
+class Commander:
+    """A program that moves the first joint, and then does something else."""
+
+    def __init__(self, segment: str, then: str) -> None:
+        self._program = subprocess.Popen(
+            [sys.executable, "-c", COMMANDER.format(segment=segment, then=then)],
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        assert self._program.stdout is not None
+        assert self._program.stdout.readline() == "ready\n"
+
+    def send(self, number: int) -> None:
+        self._program.send_signal(number)
+
+    def close(self) -> None:
+        self._program.kill()
+        self._program.wait()
+        assert self._program.stdout is not None
+        self._program.stdout.close()
+
+
+Commanders = Callable[[str, str], Commander]
+
+
+@pytest.fixture
+def commander() -> Iterator[Commanders]:
+    started: list[Commander] = []
+
+    def start(segment: str, then: str) -> Commander:
+        started.append(Commander(segment, then))
+        return started[-1]
+
+    yield start
+    for each in started:
+        each.close()
+
+
+def until(true: Callable[[], object]) -> None:
+    end = time.monotonic() + WAIT
+    while not true():
+        assert time.monotonic() < end
+        time.sleep(0.001)
+
+
+def start(segment: str, **options: object) -> o80.robots.Process:
+    return o80.robots.load("two_joints").start(segment, **options)  # type: ignore[arg-type]
+
+
+# ------------------------------------------------------------------------------ learners
+
+
+def test_a_learner_that_hangs_loses_its_commands(segment: str, commander: Commanders) -> None:
+    with start(segment, silence=50, stale="purge") as process, process.frontend() as arm:
+        commander(segment, "while True: time.sleep(3600)")
+        until(lambda: arm.latest().active[0])
+        until(lambda: not arm.latest().active[0])
+        assert arm.halted is None
+
+
+def test_a_learner_that_hangs_halts_the_robot_if_told_so(
+    segment: str, commander: Commanders
+) -> None:
+    with start(segment, silence=50, stale="halt") as process, process.frontend() as arm:
+        commander(segment, "while True: arm.latest()  # reading is no life")
+        until(lambda: arm.halted)
+        halt = arm.halted
+        assert halt is not None
+        assert halt.cause == "silence"
+        assert "pid" in halt.text
+
+
+def test_a_learner_that_shows_life_goes_on(segment: str, commander: Commanders) -> None:
+    with start(segment, silence=2000, stale="halt") as process, process.frontend() as arm:
+        commander(segment, "while True: arm.keep_alive(); time.sleep(0.01)")
+        until(lambda: arm.latest().active[0])
+        first = arm.latest().iteration
+        arm.wait_for(first + 4000, timeout=WAIT)
+        assert arm.halted is None
+        assert arm.latest().active[0]
+
+
+def test_a_wait_for_ones_own_batch_is_life(segment: str) -> None:
+    with start(segment, silence=400, stale="halt") as process, process.frontend() as arm:
+        arm.add_command(0, 1.0, iterations=2000)
+        arm.pulse_and_wait(timeout=WAIT)
+        assert arm.halted is None
+
+
+def test_a_learner_that_dies_halts_the_robot_if_told_so(
+    segment: str, commander: Commanders
+) -> None:
+    with start(segment, stale="halt") as process, process.frontend() as arm:
+        learner = commander(segment, "while True: time.sleep(3600)")
+        learner.send(signal.SIGKILL)
+        until(lambda: arm.halted)
+        halt = arm.halted
+        assert halt is not None
+        assert halt.cause == "dead_frontend"
+
+
+def test_a_halt_acts_while_others_flood_the_robot(segment: str, commander: Commanders) -> None:
+    flood = """
+while True:
+    try:
+        for _ in range(100): arm.add_command(1, 1.0, iterations=10)
+        arm.pulse()
+    except o80.LaneFull:
+        arm.forget_added()
+"""
+    with start(segment) as process, process.frontend() as arm:
+        for _ in range(3):
+            commander(segment, flood)
+        until(lambda: arm.latest().active[1])
+        before = arm.published
+        arm.halt("a flood")
+        until(lambda: arm.latest().halted)
+        halt = arm.halted
+        assert halt is not None
+        assert halt.iteration is not None
+        after = arm.history(since=halt.iteration)
+        assert halt.iteration > before
+        assert after.halted.all()
+        assert (after.desired == after.desired[0]).all(), "no command acts while it is halted"
+
+
+def test_a_busy_machine_of_a_learner_costs_nothing_that_is_queued(
+    segment: str, commander: Commanders
+) -> None:
+    with start(segment) as process, process.frontend() as arm:
+        learner = commander(segment, "while True: time.sleep(3600)")
+        learner.send(signal.SIGSTOP)  # it gets no processor
+        first = arm.latest().iteration
+        arm.wait_for(first + 300, timeout=WAIT)
+        assert arm.latest().active[0]
+
+
+# ------------------------------------------------------------------------------ ends of the process
+
+
+@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGTERM, signal.SIGINT])
+def test_signals_stop_in_order(segment: str, number: signal.Signals) -> None:
+    process = start(segment)
+    with process.frontend() as arm:
+        arm.add_command(0, 3.0, iterations=10**9)
+        batch = arm.pulse()
+        until(lambda: batch.handles[0].status == "active")
+        os.kill(process.pid, number)
+        with pytest.raises(o80.BackendStopped):
+            arm.wait_for(10**12, timeout=WAIT)
+        handle = batch.handles[0]
+        assert (handle.status, handle.reason) == ("purged", "stopped")
+    process.wait(WAIT)
+
+
+def test_a_robot_whose_output_nobody_reads_lives_on(segment: str) -> None:
+    program = subprocess.Popen(
+        [O80, "run", "two_joints", "--segment", segment],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+    )
+    try:
+        assert program.stdout is not None
+        program.stdout.readline()
+        program.stdout.close()  # the terminal is gone, nobody was told
+        with o80.Frontend(segment, timeout=WAIT) as arm:
+            number = arm.halt("said on the closed output")
+            until(lambda: arm.latest().halted)
+            until(lambda: arm.published > 3000)  # a line was due
+            arm.resume(number)
+    finally:
+        program.terminate()
+        program.wait()
+
+
+def test_the_successor_of_a_killed_robot_starts_halted(segment: str) -> None:
+    process = start(segment)
+    with process.frontend() as arm:
+        arm.add_command(0, 3.0, iterations=10**9)
+        arm.pulse()
+        until(lambda: arm.latest().active[0])
+        os.kill(process.pid, signal.SIGKILL)
+        with pytest.raises(o80.BackendKilled):
+            arm.wait_for(10**12, timeout=WAIT)
+    with start(segment) as successor, successor.frontend() as arm:
+        halt = arm.halted
+        assert halt is not None
+        assert halt.cause == "predecessor"
+        assert arm.history()[0].halted
+        arm.add_command(0, 1.0)
+        with pytest.raises(o80.BackendHalted, match="killed while commands acted"):
+            arm.pulse_and_wait(timeout=WAIT)
+        arm.resume(halt.number)
+        arm.add_command(0, 0.1, iterations=5)
+        assert arm.pulse_and_wait(timeout=WAIT).desired[0] == 0.1
+
+
+def test_a_supervisor_may_resume_on_purpose(segment: str) -> None:
+    process = start(segment)
+    with process.frontend() as arm:
+        arm.halt("before")
+        until(lambda: arm.latest().halted)
+        os.kill(process.pid, signal.SIGKILL)
+        with pytest.raises(o80.BackendKilled):
+            arm.wait_for(10**12, timeout=WAIT)
+    with start(segment, resume=True) as successor, successor.frontend() as arm:
+        assert arm.halted is None
+
+
+# ------------------------------------------------------------------------------ the verbs of a halt
+
+
+def test_a_halt_is_shown_refuses_and_is_resumed(process: o80.robots.Process) -> None:
+    with process.frontend() as arm, process.frontend() as other:
+        arm.add_command(0, 3.0, iterations=10**9)
+        batch = arm.pulse()
+        until(lambda: arm.latest().active[0])
+        number = other.halt("the ball is on the floor")
+        assert arm.halted is not None
+        batch.wait(WAIT)
+        assert batch.handles[0].status == o80.Status.HALTED
+        halt = arm.halted
+        assert (halt.number, halt.cause) == (number, "frontend")
+        assert halt.text == "the ball is on the floor"
+        assert f"pid {os.getpid()}" in halt.who
+        arm.add_command(0, 1.0)
+        refused = arm.pulse()
+        refused.wait(WAIT)
+        assert refused.handles[0].status == o80.Status.REJECTED
+        assert "the ball is on the floor" in refused.handles[0].text
+        with pytest.raises(o80.BackendHalted, match="no halt"):
+            arm.resume(number + 1)
+        arm.resume()
+        assert arm.halted is None
+        assert other.halted is None
+
+
+def test_a_halt_ends_a_burst_and_an_inline_robot_knows_it(arm: o80.Frontend) -> None:
+    number = arm.halt("inline")
+    assert arm.halted is not None
+    assert arm.halted.iteration is not None, "latched at once"
+    assert arm.burst(3).halted
+    arm.add_command(0, 1.0)
+    with pytest.raises(o80.BackendHalted):
+        arm.burst(1)
+    arm.request("reset", seed=1)
+    assert arm.halted is not None, "a simulation that was reset is still halted"
+    arm.resume(number)
+    arm.add_command(0, 1.0)
+    assert arm.burst(1).desired[0] == 1.0
+
+
+def test_read_only_frontends_see_halts_and_may_not_ask_for_them(
+    process: o80.robots.Process, segment: str
+) -> None:
+    with o80.Frontend(segment, read_only=True) as reader, process.frontend() as arm:
+        assert reader.halted is None
+        with pytest.raises(o80.ReadOnly):
+            reader.halt()
+        arm.halt("x")
+        until(lambda: reader.halted)
+
+
+def test_an_embedded_backend_halts_and_resumes(segment: str) -> None:
+    told = []
+    refuse = ["the door is open"]
+
+    def resume() -> None:
+        if refuse:
+            raise o80.RequestRejected(refuse.pop())
+
+    with (
+        o80.Backend(
+            segment, 2, requests={"see": None, "go": None}, while_halted=["see"]
+        ) as backend,
+    ):
+        backend.on_halt(lambda: told.append("halt"))
+        backend.on_resume(resume)
+        backend.on("see", lambda _: None)
+        backend.on("go", lambda _: None)
+        backend.publish([0.0, 0.0])
+        with o80.Frontend(segment) as arm:
+            backend.halt("from inside")
+            backend.step()
+            backend.publish([0.5, 0.5])
+            halt = arm.halted
+            assert halt is not None
+            assert (halt.cause, halt.text, told) == ("driver", "from inside", ["halt"])
+            for name, status in (("see", "completed"), ("go", "rejected")):
+                arm.add_request(name)
+                batch = arm.pulse()
+                backend.step()
+                backend.publish()
+                assert batch.handles[0].status == status
+            with pytest.raises(o80.TimeoutError):
+                arm.resume(timeout=0)
+            backend.step()
+            backend.publish()
+            assert arm.halted is not None, "the handler refused"
+            with pytest.raises(o80.TimeoutError):
+                arm.resume(timeout=0)
+            backend.step()
+            backend.publish()
+            assert arm.halted is None
+            assert arm.latest().desired.tolist() == [0.5, 0.5]
+
+
+# ------------------------------------------------------------------------------ the program o80
+
+
+def program(*words: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([O80, *words], capture_output=True, text=True, timeout=WAIT)
+
+
+def test_the_program_halts_shows_and_resumes(process: o80.robots.Process, segment: str) -> None:
+    said = program("halt", segment, "lunch break")
+    assert said.returncode == 0, said.stderr
+    assert f"o80 resume {segment} 1" in said.stdout
+    with process.frontend() as arm:
+        until(lambda: arm.latest().halted)
+    for words in (["list"], ["info", segment]):
+        assert "lunch break" in program(*words).stdout
+    assert "HALTED" in program("echo", segment, "--count", "1").stdout
+    assert "resumed" in program("resume", segment).stdout
+    assert "not halted" in program("resume", segment).stdout
+    assert "lunch break" not in program("list").stdout
+
+
+def test_the_program_says_who_is_not_there(segment: str) -> None:
+    said = program("halt", segment)
+    assert said.returncode == 1
+    assert segment in said.stderr
+
+
+# ------------------------------------------------------------------------------ the page
+
+
+def test_every_row_of_the_page_names_tests_that_exist() -> None:
+    page = (ROOT / "docs" / "safety.md").read_text()
+    _, _, table = page.partition("## What can fail")
+    rows = [line for line in table.splitlines() if line.startswith("| ") and "`" in line]
+    sources = "\n".join(
+        path.read_text()
+        for path in [*ROOT.glob("tests/cpp/*/*.cpp"), *ROOT.glob("tests/python/*.py")]
+    )
+    assert len(rows) >= 12
+    for row in rows:
+        tests = re.findall(r"`(\w+\.\w+|test_\w+)`", row.split(" | ")[-1])
+        assert tests, row
+        for name in tests:
+            suite, dot, case = name.partition(".")
+            written = f"({suite}, {case})" if dot else f"def {name}("
+            assert written in sources, name
