@@ -141,7 +141,7 @@ def test_limits_idle_and_units_reach_the_frontend(segment: str) -> None:
         ({"actuators": ["a"], "when_idle": "rest"}, "'hold' or 'follow'"),
         ({"actuators": ["a"], "frequency": 0}, "frequency"),
         ({"actuators": ["a"], "frequency": float("nan")}, "frequency"),
-        ({"actuators": ["a"], "stale": "wait"}, "'hold', 'purge' or 'stop'"),
+        ({"actuators": ["a"], "stale": "wait"}, "'hold', 'purge', 'halt' or 'stop'"),
         ({"actuators": ["a"], "extended": {"m": (float, (2, 2, 2))}}, "at most 2"),
     ],
 )

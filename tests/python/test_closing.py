@@ -33,6 +33,8 @@ CALLS: dict[str, dict[str, Callable[[Any], Any]]] = {
         "publish": lambda it: it.publish([0.0]),
         "step": lambda it: it.step(WAIT),
         "on": lambda it: it.on("home", print),
+        "on_halt": lambda it: it.on_halt(print),
+        "on_resume": lambda it: it.on_resume(print),
         "interrupt": lambda it: it.interrupt(0),
     },
     "Process": {"wait": lambda it: it.wait(WAIT)},

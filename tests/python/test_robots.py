@@ -147,7 +147,7 @@ def test_options_and_flags_reach_the_robot(segment: str) -> None:
         ({"gain": None}, "gain"),
         ({"frequency": -1.0}, "frequency"),
         ({"history": 0}, "history"),
-        ({"stale": "wait"}, "hold, purge or stop"),
+        ({"stale": "wait"}, "hold, purge, halt or stop"),
         ({"policy": "best"}, "fifo"),
     ],
 )
