@@ -70,7 +70,7 @@ std::optional<SegmentFileName> parse_file_name(std::string_view file) {
                                    std::pair(kDraft, SegmentFileName::Kind::draft)}) {
     const std::size_t at = file.find(mark);
     if (at == std::string_view::npos) continue;
-    const std::string_view digits = file.substr(at + mark.size());
+    const std::string digits(file.substr(at + mark.size()));
     const char* const end = digits.data() + digits.size();
     const auto read = std::from_chars(digits.data(), end, parsed.epoch, 16);
     if (digits.size() != 16 || read.ec != std::errc() || read.ptr != end) return std::nullopt;

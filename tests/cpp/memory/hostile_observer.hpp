@@ -6,6 +6,7 @@
 #include <pthread.h>
 #include <sys/file.h>
 #include <sys/mman.h>
+#include <sys/prctl.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -35,6 +36,8 @@ class HostileObserver {
           if (setresgid(kStranger, kStranger, kStranger) != 0 ||
               setresuid(kStranger, kStranger, kStranger) != 0)
             _exit(2);
+          // with the test, however that ends; to be asked for after a change of user
+          prctl(PR_SET_PDEATHSIG, SIGKILL);
           if (harass(directory) == 0) _exit(4);
           ready();
           pause_for_ever();
