@@ -62,7 +62,7 @@ STEPS: dict[str, list[list[str]]] = {
     "arm64": cpp("arm64"),
     "pytest": [[*PYTHON, "pytest"]],
 }
-ON_DEMAND = {"arm64"}  # an emulator's minutes
+ON_DEMAND = {"arm64", "rt"}  # an emulator's minutes
 CLOSING_LINES = {"dev": 3, "asan": 3, "tsan": 3, "arm64": 3}
 
 

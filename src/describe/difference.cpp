@@ -154,7 +154,11 @@ void forgive(Lines& expected, Lines& found) {
 }  // namespace
 
 std::string difference(const Schema& expected, const Schema& found) {
-  if (expected == found) return "";
+  // a watchdog that is set otherwise makes no other robot
+  Schema same = found;
+  same.head.stale = expected.head.stale;
+  same.head.silence = expected.head.silence;
+  if (expected == same) return "";
   const std::string text = compare(lines_of(expected), lines_of(found));
   return text.empty() ? "  names of types, helps or groups differ\n" : text;
 }

@@ -47,8 +47,8 @@ void watch_forks() noexcept {
 std::uint64_t process_generation() noexcept { return generation.load(std::memory_order_relaxed); }
 
 InheritingMutex& fork_mutex() noexcept {
-  // leaked: the same objects may still lock it at exit
-  static auto* mutex = new InheritingMutex;
+  // leaked: the same objects may still lock it at exit; without it no process can go on
+  static auto* mutex = new InheritingMutex;  // NOLINT(bugprone-unhandled-exception-at-new)
   return *mutex;
 }
 

@@ -23,7 +23,7 @@ constexpr std::int64_t kPassing = 20'000'000;   // [ns]
 constexpr std::int64_t kDying = 1'000'000'000;  // [ns]
 
 std::int64_t patience(int descriptor) noexcept {
-  SegmentHeader header;
+  SegmentHeader header{};
   const bool dead = read_header(descriptor, header) && header.pid > 0 && kill(header.pid, 0) != 0 &&
                     errno == ESRCH;
   return dead ? kDying : kPassing;

@@ -64,7 +64,7 @@ Predecessor supersede(const NamedSegment& former) {
   // descriptors of their own: those of `former` bear its lock, and a lock must not be inherited
   // with a mapping
   const LockFile segment = LockFile::open(former.path(), kOpen);
-  SegmentHeader header;
+  SegmentHeader header{};
   SegmentView view;
   if (!segment.is_open() || !inspect_segment(segment.descriptor(), header, view.offsets).empty())
     return {};

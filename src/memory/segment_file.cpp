@@ -40,7 +40,7 @@ bool read_header(int descriptor, SegmentHeader& header) noexcept {
 }
 
 std::uint64_t epoch_of(int descriptor) noexcept {
-  SegmentHeader header;
+  SegmentHeader header{};
   const bool is_one = read_header(descriptor, header) && header.magic == kSegmentMagic &&
                       header.version == kSegmentVersion;
   return is_one ? header.epoch : 0;
@@ -67,7 +67,7 @@ std::string inspect_segment(int descriptor, SegmentHeader& header, SegmentOffset
 
 std::string inspect_commands(int commands, int segment, const SegmentHeader& header,
                              const SegmentOffsets& offsets) {
-  struct stat status, of_segment;
+  struct stat status{}, of_segment{};
   if (fstat(commands, &status) != 0 || fstat(segment, &of_segment) != 0)
     return std::strerror(errno);
   if (!S_ISREG(status.st_mode)) return "it is not a regular file";

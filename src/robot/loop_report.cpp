@@ -15,7 +15,7 @@
 namespace o80 {
 
 namespace {
-constexpr std::int64_t kPeriod = 1'000'000'000;         // between two looks [ns]
+constexpr std::int64_t kReportPeriod = 1'000'000'000;         // between two looks [ns]
 constexpr std::int64_t kBetweenLines = 10'000'000'000;  // about late iterations [ns]
 
 void say(const std::string& text) { std::fprintf(stderr, "o80: %s\n", text.c_str()); }
@@ -71,9 +71,10 @@ void LoopReport::run() noexcept {
       if (now != halted && halt) say(words_for(*halt));
       if (now != halted && !halt) say("resumed");
       halted = now;
-      futex_wait(stop_, 0, kPeriod);
+      futex_wait(stop_, 0, kReportPeriod);
     }
-  } catch (const std::exception&) {  // the backend has ended: there is nothing left to report
+  } catch (const std::exception&) {
+    return;  // the backend has ended: there is nothing left to report
   }
 }
 

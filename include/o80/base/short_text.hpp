@@ -18,7 +18,7 @@ class ShortText {
  public:
   ShortText& add(std::string_view text) noexcept {
     const std::size_t count = std::min(text.size(), Size - 1 - size_);
-    if (count > 0) std::memcpy(chars_.data() + size_, text.data(), count);
+    std::copy_n(text.begin(), count, chars_.begin() + static_cast<std::ptrdiff_t>(size_));
     size_ += count;
     return *this;
   }

@@ -63,9 +63,8 @@ struct FieldNote {
   constexpr FieldNote(const char* said) : text(said) {}       // NOLINT(google-explicit-constructor)
   constexpr FieldNote(std::string_view said, RestsAt where) : text(said), rest(where) {}
   constexpr FieldNote(RestsAt where) : rest(where) {}  // NOLINT(google-explicit-constructor)
-  constexpr operator std::string_view() const {
-    return text;
-  }  // NOLINT(google-explicit-constructor)
+  // NOLINTNEXTLINE(google-explicit-constructor)
+  constexpr operator std::string_view() const { return text; }
 };
 
 namespace describing {

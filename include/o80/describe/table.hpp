@@ -23,7 +23,7 @@ void check(const Schema& schema);
 /// Tells schemas apart; those of equal hash have equal layout, names, limits and requests.
 std::uint64_t hash(const Schema& schema);
 
-/// What differs, a line each, in words; empty if nothing does.
+/// What differs, a line each, in words; empty if nothing does. A watchdog may be set otherwise.
 std::string difference(const Schema& expected, const Schema& found);
 
 /// The same, but only of what a program that was compiled for `expected` relies on: the actuators'

@@ -17,6 +17,7 @@ namespace o80::driver_checks {
 
 // Whether a class has a member of a name, of whatever kind, private ones included: a class that
 // inherits another such member too cannot tell which one is meant.
+// NOLINTBEGIN(readability-identifier-naming)
 #define O80_MEMBER(name)                                               \
   struct With_##name {                                                 \
     int name;                                                          \
@@ -52,6 +53,7 @@ O80_MEMBER(Resume)
 O80_MEMBER(on_resume)
 O80_MEMBER(onResume)
 #undef O80_MEMBER
+// NOLINTEND(readability-identifier-naming)
 
 template <class T>
 struct IsRequests : std::false_type {};

@@ -17,6 +17,14 @@ TEST(Difference, OfTheSameIsNothing) {
   EXPECT_EQ(layout_difference(schema_of<MixedRobot>(), schema_of<MixedRobot>()), "");
 }
 
+TEST(Difference, OfAWatchdogMakesNoOtherRobot) {
+  const Schema schema = schema_of<MixedRobot>();
+  Schema watched = schema;
+  watched.head.silence = 100;
+  watched.head.stale = Stale::halt;
+  EXPECT_EQ(difference(schema, watched), "");
+}
+
 TEST(Difference, SaysWhatDiffersInWords) {
   const Schema expected = schema_of<MixedRobot>();
   Schema found = expected;

@@ -132,7 +132,7 @@ struct SentCommand {
   std::int64_t found_at;
   std::uint64_t found_id;  // whose status stands in its place
   std::uint32_t found_reason;
-  std::uint32_t overwrite;
+  std::uint32_t arrives_early;  // a motion that fades out on its target, before its last iteration
 };
 
 /// One started process.

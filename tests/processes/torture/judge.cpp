@@ -43,8 +43,15 @@ class Deeds {
     auto i =
         std::lower_bound(done_.begin(), done_.end(), command.value,
                          [](const Done& done, std::uint64_t value) { return done.value < value; });
-    for (; i != done_.end() && i->value == command.value; ++i)
-      if (i->actuator == command.actuator) found.push_back(*i);
+    for (; i != done_.end() && i->value == command.value; ++i) {
+      if (i->actuator != command.actuator) continue;
+      // a minimum jerk that fades out on its target stands there until its last iteration
+      if (!found.empty() && found.back().iteration + 1 == i->iteration) {
+        found.back() = *i;
+      } else {
+        found.push_back(*i);
+      }
+    }
     return found;
   }
   bool fresh_start() const { return fresh_start_; }
@@ -62,7 +69,7 @@ bool has_ended(std::uint32_t status) {
 const char* name_of(Status status) {
   static constexpr const char* kNames[] = {"none",     "queued",      "active", "completed",
                                            "limited",  "overwritten", "purged", "interrupted",
-                                           "rejected", "forgotten"};
+                                           "rejected", "forgotten",   "halted"};
   return kNames[static_cast<std::size_t>(status)];
 }
 
@@ -189,7 +196,7 @@ class Judge {
     }
     if (status == Status::limited)
       return add(Fault::falsely_told, slot, batch, command, "no target was outside of the limits");
-    if (!done.empty())
+    if (!done.empty() && command.arrives_early == 0)
       add(Fault::falsely_told, slot, batch, command,
           "done at " + std::to_string(done[0].iteration) + " all the same");
   }

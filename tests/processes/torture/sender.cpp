@@ -65,8 +65,9 @@ void Sender::add_command() {
   if (chance.percent(20)) options.mode = o80::Mode::overwrite;
   if (chance.percent(20)) options.profile = o80::Profile::minimum_jerk;
   if (chance.percent(20)) options.start = o80::Start::observed;
-  note(SentKind::command, bits_of(target), actuator).overwrite =
-      options.mode == o80::Mode::overwrite ? 1 : 0;
+  const bool fades =
+      options.mode == o80::Mode::overwrite && options.profile == o80::Profile::minimum_jerk;
+  note(SentKind::command, bits_of(target), actuator).arrives_early = fades ? 1 : 0;
   frontend_.add_command(actuator, bytes_of(target), options);
 }
 
