@@ -42,8 +42,12 @@ foreach(folder IN LISTS test_folders)
   if(folder STREQUAL "mujoco" AND NOT TARGET mujoco::mujoco)
     continue()
   endif()
-  # it stands in front of shared libraries, as sanitizers do
+  # one stands in front of shared libraries, as sanitizers do; the other holds parts of the library
+  # a second time
   if(folder STREQUAL "iteration" AND (O80_STATIC OR O80_SANITIZE))
+    continue()
+  endif()
+  if(folder STREQUAL "bounded" AND O80_SANITIZE)
     continue()
   endif()
   set(sources ${test_sources})

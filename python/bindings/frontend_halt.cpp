@@ -48,7 +48,7 @@ std::optional<std::tuple<std::string, double>> slow_verb(const Frontend& self) {
 std::uint64_t halt_segment(const std::string& segment, const std::string& reason,
                            std::optional<double> timeout) {
   const Waiting waiting;
-  return o80::halt(segment, reason, timeout_of(timeout));
+  return o80::halt(segment, reason, timeout_of(timeout), Waiting::check);
 }
 
 }  // namespace

@@ -152,7 +152,10 @@ Limited Limiter::follow(const Motion& motion, std::byte* state, const std::uint6
       continue;
     }
     const double speed = each.number == one ? most : kUnlimited;
-    const Limit limit = each.limiter.follow(motion.number(each.number), speed);
+    // a motion may round to just outside of what its kind can hold
+    const auto [lowest, highest] = range_of(layout_.numbers()[each.number].kind);
+    const double wanted = std::clamp(motion.number(each.number), lowest, highest);
+    const Limit limit = each.limiter.follow(wanted, speed);
     // the target itself stands there, bit for bit
     if (limit == Limit::none && arrived) continue;
     publish(each, state);

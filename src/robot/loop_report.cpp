@@ -15,7 +15,7 @@
 namespace o80 {
 
 namespace {
-constexpr std::int64_t kReportPeriod = 1'000'000'000;         // between two looks [ns]
+constexpr std::int64_t kReportPeriod = 1'000'000'000;   // between two looks [ns]
 constexpr std::int64_t kBetweenLines = 10'000'000'000;  // about late iterations [ns]
 
 void say(const std::string& text) { std::fprintf(stderr, "o80: %s\n", text.c_str()); }

@@ -45,8 +45,10 @@ void UntypedFrontend::keep_alive() {
   if (const auto lane = link_->lane_if_taken()) lane->show_life();
 }
 
-std::uint64_t halt(const std::string& segment, std::string_view reason, Timeout timeout) {
+std::uint64_t halt(const std::string& segment, std::string_view reason, Timeout timeout,
+                   const Check& check) {
   AttachOptions options;
+  options.check = check;
   options.starting = true;
   const AttachedSegment attached =
       AttachedSegment::attach(segment, Access::read_write, Deadline(timeout), options);

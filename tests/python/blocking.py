@@ -55,6 +55,7 @@ CALLS = {
     "Backend.step": Call("stepping.step()", "stepping.close()"),
     "Process.wait": Call("process.wait()", "process.stop()", ""),
     "Process.stop": Call("frozen.stop(1e6)", "os.kill(frozen.pid, SIGCONT)", ""),
+    "stop": Call("o80.stop(frozen.segment, 1e6)", "None", ""),
     "Process.frontend": Call("unborn.frontend(None)", "begin(unborn.segment)", ""),
     "Robot.start": Call(
         "start_process(never, late, [], None)", "open(never, 'wb').close()", "DriverError"
@@ -102,6 +103,7 @@ class Place:
         self._stack = contextlib.ExitStack()
         joints = o80.robots.load("two_joints")
         self.late = f"{name}-late"
+        self.begun: set[str] = set()
         self.never = str(folder / "never.so")
         os.mkfifo(self.never)
         self.silent_backend = self._enter(
@@ -135,8 +137,10 @@ class Place:
         self.standing = self._enter(o80.Frontend(self.standing_backend.segment))
 
     def begin(self, segment: str) -> None:
-        """Starts the backend that somebody waits for."""
-        self._enter(o80.Backend(segment, ["a"])).publish([0.0])
+        """Starts the backend that somebody waits for, once."""
+        if segment not in self.begun:
+            self.begun.add(segment)
+            self._enter(o80.Backend(segment, ["a"])).publish([0.0])
 
     def names(self) -> dict[str, Any]:
         """For a source; frontends are those opened last."""

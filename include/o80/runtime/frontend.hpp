@@ -176,7 +176,7 @@ class UntypedFrontend {
 /// Halts the backend of a segment, also one that is still starting; the number of the halt.
 /// Throws TimeoutError if there is none in time, SegmentError, BackendGone.
 std::uint64_t halt(const std::string& segment, std::string_view reason,
-                   Timeout timeout = std::chrono::seconds(0));
+                   Timeout timeout = std::chrono::seconds(0), const Check& check = {});
 
 /// Lets several backends run at once, each its number of iterations, and returns at once. Nothing
 /// is granted unless all of them are alive, burst, and have a lane and room for what was added.

@@ -51,6 +51,17 @@ TEST(Script, KeepsEveryPromise) {
   }
 }
 
+// scripts that once broke a promise
+TEST(Script, KeepsThePromisesItBroke) {
+  constexpr std::uint64_t kSeeds[] = {
+      1076616};  // a row clamped where rounding left an unsigned kind
+  for (const std::uint64_t seed : kSeeds) {
+    const Script script = random_script(seed);
+    const auto failure = play(script);
+    if (failure) ADD_FAILURE() << "seed " << seed << ", " << report(script, *failure);
+  }
+}
+
 TEST(Script, ReplaysAFile) {
   const char* path = std::getenv("O80_SCRIPT");
   if (path == nullptr) GTEST_SKIP() << "O80_SCRIPT names no file";
