@@ -15,8 +15,12 @@ class InheritingMutex {
 
   void lock() noexcept { pthread_mutex_lock(&mutex_); }
   void unlock() noexcept { pthread_mutex_unlock(&mutex_); }
-  /// In a forked child, whose only thread is none that the kernel knows as the holder.
-  void unlock_in_child() noexcept { initialise(); }
+  /// In a forked child, whose only thread is not the one that the kernel knows as the holder: the
+  /// unlocking is refused there, and is for tools that watch mutexes.
+  void unlock_in_child() noexcept {
+    unlock();
+    initialise();
+  }
 
  private:
   void initialise() noexcept {
