@@ -9,6 +9,8 @@ namespace o80 {
 namespace {
 
 constexpr double kUnlimited = std::numeric_limits<double>::infinity();
+// what a step in a limiter and in its motion may differ by
+constexpr double kStepRounding = 1e-9;
 
 template <class T>
 void store_integer(std::byte* at, double value) noexcept {
@@ -198,7 +200,11 @@ void Limiter::keep_moving(Motion& motion, const std::byte* state,
 
 void Limiter::keep_lagging(Motion& motion, const std::byte* state) const noexcept {
   for (const Number& each : numbers_) {
-    if (!each.limiter.tracks() || each.planned) keep_moving(motion, state, each);
+    // one that was at a bound until now has not moved as its motion has
+    const bool held_back = !std::isfinite(each.limiter.rates().acceleration) &&
+                           std::abs(each.limiter.speed()) <
+                               std::abs(motion.kept_step(each.number)) * (1.0 - kStepRounding);
+    if (!each.limiter.tracks() || each.planned || held_back) keep_moving(motion, state, each);
   }
 }
 

@@ -44,6 +44,8 @@ class Motion {
   /// and in how many iterations.
   void keep_moving(const std::byte* state, std::size_t number, const Moment& moment, double stop,
                    std::int64_t iterations) noexcept;
+  /// How far one number went in the last iteration before `keep_moving`.
+  double kept_step(std::size_t number) const noexcept { return moving_ ? kept_[number].step : 0.0; }
   /// The numbers whose bits are not set do not move on.
   void leave_out(const std::uint64_t* mask) noexcept;
   /// What comes next starts at rest.

@@ -54,6 +54,7 @@ TEST(Script, KeepsEveryPromise) {
 // scripts that once broke a promise
 TEST(Script, KeepsThePromisesItBroke) {
   constexpr std::uint64_t kSeeds[] = {
+      1074205,   // a motion that had just left a bound was continued at its reference's speed
       1076616};  // a row clamped where rounding left an unsigned kind
   for (const std::uint64_t seed : kSeeds) {
     const Script script = random_script(seed);
