@@ -107,6 +107,7 @@ class Relacy:
     """Compiles models together with the sources of the product, or with a mutant of them."""
 
     SOURCES = (
+        "src/memory/halt_word.cpp",
         "src/memory/history.cpp",
         "src/memory/lane_receiver.cpp",
         "src/memory/lane_sender.cpp",

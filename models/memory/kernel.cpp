@@ -110,6 +110,7 @@ void ForkGuard::check(std::string_view) const {}
 // names of users and owners are for messages
 std::string user_name(uid_t) { return {}; }
 void store_text(rl::atomic<std::uint64_t>*, std::size_t, std::string_view) noexcept {}
+void load_text(const rl::atomic<std::uint64_t>*, std::size_t, char*) noexcept {}
 std::string load_text(const rl::atomic<std::uint64_t>*, std::size_t) { return {}; }
 
 AttachedSegment AttachedSegment::attach(std::string_view, Access access, const Deadline&,

@@ -73,6 +73,11 @@ class Segment {
     make(view.bell().tickets);
     make(view.bell().wanted, std::numeric_limits<std::int64_t>::max());
     make(view.bell().passed_on);
+    make(view.bell().halts);
+    for (o80::HaltSlot& reason : view.bell().reasons) make(reason);
+    make(view.counters().halted);
+    make(view.counters().cleared);
+    make(view.counters().halt);
     words(view.history(), row_words * slots, false);
     for (std::uint32_t i = 0; i < lanes; ++i) make_lane(i);
   }
@@ -116,6 +121,11 @@ class Segment {
   void make(rl::atomic<T>& place, std::int64_t value = 0) {
     std::construct_at(&place, static_cast<T>(value));
     destroyers_.push_back([&place] { std::destroy_at(&place); });
+  }
+  void make(o80::HaltSlot& slot) {
+    make(slot.number);
+    make(slot.iteration);
+    make(slot.cause);
   }
   void make(o80::BurstSlot& slot) {
     make(slot.id);
