@@ -77,8 +77,9 @@ struct Halts : rl::test_suite<Halts, 2 + kAskers> {
   }
 
   void show(o80::HaltLatch& halts, std::uint64_t number) {
-    if (halts.show(100 + static_cast<o80::Iteration>(number)))
-      reasons[number] = static_cast<unsigned>(halts.halt().cause);
+    if (!halts.show(100 + static_cast<o80::Iteration>(number))) return;
+    reasons[number] = static_cast<unsigned>(halts.halt().cause);
+    model::check(reasons[number] != 0, "a halt is shown with a reason that is not there yet");
   }
 
   void read() {
