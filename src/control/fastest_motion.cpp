@@ -92,16 +92,52 @@ FastestMotion::FastestMotion(double position, double speed, double acceleration,
     cruise_ = root(beyond_at, lowest, rates_.speed, 1e-13 * distance_);
     before_ = static_cast<std::int64_t>(std::ceil(time_to(cruise_) * (1.0 - kTimeRounding)));
   }
-  const double at_lowest = distance(lowest, static_cast<double>(before_)) - distance_;
-  if (at_lowest > 0.0) {
-    // between this one and the way to rest, which are not a whole iteration apart
-    cruise_ = lowest;
-    share_ = at_lowest / (at_lowest + distance_ - stop.displacement() * sign_);
-    stop_ = VelocityChange(-start_speed_, start_acceleration_, rates_);
+  if (distance(lowest, static_cast<double>(before_)) > distance_) {
+    mix(lowest);
   } else {
     cruise_ = cruise_for(static_cast<double>(before_), lowest, cruise_);
   }
   settle();
+}
+
+FastestMotion::Stop FastestMotion::stop_after(std::int64_t eased) const noexcept {
+  const auto k = static_cast<double>(eased);
+  const double jerk = eased > 0 ? std::copysign(rates_.jerk, -start_acceleration_) : 0.0;
+  const double acceleration = start_acceleration_ + k * jerk;
+  const double speed = start_speed_ + k * start_acceleration_ + jerk * k * (k + 1.0) / 2.0;
+  const double moved = k * start_speed_ + start_acceleration_ * k * (k + 1.0) / 2.0 +
+                       jerk * k * (k + 1.0) * (k + 2.0) / 6.0;
+  Stop stop{start_acceleration_, jerk, eased, 0.0, VelocityChange(-speed, acceleration, rates_)};
+  stop.distance = moved + stop.rest.displacement();
+  return stop;
+}
+
+/// Between two ways to rest that let go of the brake for one iteration more or less; beyond the
+/// last of them, between it and the slowest cruise. Sums of positions are linear, limits convex.
+void FastestMotion::mix(double lowest) noexcept {
+  mixed_ = true;
+  cruise_ = lowest;
+  nearer_ = stop_after(0);
+  const double size = start_acceleration_ < 0.0 ? -start_acceleration_ : 0.0;
+  auto most = size > 0.0 ? static_cast<std::int64_t>(size / rates_.jerk) : std::int64_t{0};
+  farther_ = stop_after(most);
+  cruises_ = farther_.distance <= distance_;
+  if (cruises_) {
+    nearer_ = farther_;
+    const double at_lowest = distance(lowest, static_cast<double>(before_));
+    share_ = (at_lowest - distance_) / (at_lowest - nearer_.distance);
+    return;
+  }
+  while (most - nearer_.eased > 1) {
+    const Stop tried = stop_after(nearer_.eased + (most - nearer_.eased) / 2);
+    if (tried.distance > distance_) {
+      farther_ = tried;
+      most = tried.eased;
+    } else {
+      nearer_ = tried;
+    }
+  }
+  share_ = (farther_.distance - distance_) / (farther_.distance - nearer_.distance);
 }
 
 double FastestMotion::time_to(double cruise) const noexcept {
@@ -127,14 +163,17 @@ void FastestMotion::settle() noexcept {
   to_cruise_ = VelocityChange(cruise_ - start_speed_, start_acceleration_, rates_);
   to_rest_ = VelocityChange(-cruise_, 0.0, rates_);
   speed_ = start_speed_;
-  iterations_ = std::max({std::int64_t{1}, before_ + to_rest_.steps(), stop_.steps()});
+  const std::int64_t cruising = cruises_ ? before_ + to_rest_.steps() : farther_.steps();
+  iterations_ = std::max({std::int64_t{1}, cruising, nearer_.steps()});
 }
 
 void FastestMotion::stretch(std::int64_t iterations) noexcept {
   if (iterations <= iterations_ || before_ == 0) return;
   const FastestMotion shortest = *this;
-  stop_ = {};
-  share_ = 0.0;
+  mixed_ = false;
+  nearer_ = {};
+  cruises_ = true;
+  settle();
   for (int i = 0; i < kMostCorrections && iterations_ != iterations; ++i) {
     before_ += iterations - iterations_;
     if (before_ < 0) break;
@@ -148,10 +187,13 @@ void FastestMotion::stretch(std::int64_t iterations) noexcept {
 double FastestMotion::next() noexcept {
   ++done_;
   if (done_ >= iterations_) return target_;
-  double acceleration =
-      done_ <= before_ ? to_cruise_.acceleration(done_) : to_rest_.acceleration(done_ - before_);
-  if (share_ > 0.0) {
-    acceleration = (1.0 - share_) * acceleration + share_ * stop_.acceleration(done_);
+  double acceleration = farther_.acceleration(done_);
+  if (cruises_) {
+    acceleration =
+        done_ <= before_ ? to_cruise_.acceleration(done_) : to_rest_.acceleration(done_ - before_);
+  }
+  if (mixed_) {
+    acceleration = (1.0 - share_) * acceleration + share_ * nearer_.acceleration(done_);
   }
   speed_ += acceleration;
   position_ += sign_ * speed_;

@@ -29,6 +29,21 @@ class FastestMotion {
   double next() noexcept;
 
  private:
+  /// A way to rest that first lets go of the brake for some iterations.
+  struct Stop {
+    double start = 0.0;      // acceleration before it
+    double jerk = 0.0;       // while it lets go
+    std::int64_t eased = 0;  // iterations of that
+    double distance = 0.0;
+    VelocityChange rest;
+    double acceleration(std::int64_t i) const noexcept {
+      return i <= eased ? start + static_cast<double>(i) * jerk : rest.acceleration(i - eased);
+    }
+    std::int64_t steps() const noexcept { return eased + rest.steps(); }
+  };
+
+  Stop stop_after(std::int64_t eased) const noexcept;
+  void mix(double lowest) noexcept;
   /// Distance with so many iterations before it slows down from `cruise`.
   double distance(double cruise, double before) const noexcept;
   std::int64_t steps_to(double cruise) const noexcept;
@@ -53,8 +68,12 @@ class FastestMotion {
   std::int64_t iterations_ = 1;
   VelocityChange to_cruise_;
   VelocityChange to_rest_;
-  VelocityChange stop_;  // the way to rest, where it is part of the motion
-  double share_ = 0.0;   // of that way
+  // where the target lies little beyond the way to rest: the mean of two ways
+  bool mixed_ = false;
+  Stop nearer_;
+  Stop farther_;  // unless that is the way over the cruising speed
+  bool cruises_ = true;
+  double share_ = 0.0;  // of the nearer one
 };
 
 }  // namespace o80

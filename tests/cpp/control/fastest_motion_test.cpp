@@ -75,6 +75,25 @@ TEST_F(FastestMotionTest, FromRestToRestTakesTheKnownTime) {
   EXPECT_EQ(FastestMotion(1.0, 0.0, 0.0, 1.0, rates).iterations(), 1);
 }
 
+TEST_F(FastestMotionTest, LetsGoOfTheBrakeForATargetJustBeyondTheWayToRest) {
+  // 36.4 iterations are the fewest in continuous time
+  const Rates rates{0.00357, 1.756e-4, 8.529e-6};
+  NumberLimiter limiter(-1.0, 1.0, rates);
+  limiter.restart(0.0);
+  FastestMotion first(0.0, 0.0, 0.0, 0.115629, rates);
+  limiter.begin();
+  for (int i = 0; i < 49; ++i) limiter.follow(first.next());
+
+  FastestMotion second(limiter.position(), limiter.speed(), limiter.acceleration(), 0.136052,
+                       rates);
+
+  EXPECT_LE(second.iterations(), 38);
+  limiter.begin();
+  for (std::int64_t i = second.iterations(); i > 0; --i)
+    ASSERT_EQ(limiter.follow(second.next()), Limit::none);
+  EXPECT_EQ(limiter.position(), 0.136052);
+}
+
 TEST_F(FastestMotionTest, StretchesToEndWithASlowerOne) {
   int exact = 0;
   for (int round = 0; round < 3000; ++round) {
