@@ -69,7 +69,8 @@ void Frontend::add_command(nb::handle named, nb::handle target,
 std::vector<std::byte> Frontend::request_bytes(std::uint32_t index, nb::handle fields) const {
   const o80::Schema& schema = decoder_->description->schema;
   const o80::RequestRow& row = schema.requests[index];
-  return StateBytes(schema, row.type, fields, "request '" + row.name.str() + "'").bytes;
+  const std::string owner = "request '" + row.name.str() + "'";
+  return StateBytes(schema, row.type, fields, owner, Missing::by_default).bytes;
 }
 
 void Frontend::close() {

@@ -119,9 +119,8 @@ void write_label(const Schema& schema, const FieldRow& field, nb::handle value, 
   std::memcpy(to, &number, field.size);  // little end first
 }
 
-std::string fields_of(const Schema& schema, std::uint32_t type) {
+std::string fields_of(const Schema& schema, const o80::TypeRow& row) {
   std::string there;
-  const o80::TypeRow& row = schema.types[type];
   for (std::uint32_t i = 0; i < row.fields; ++i) {
     there += (i == 0 ? "" : ", ") + schema.fields[row.first_field + i].name.str();
   }
@@ -131,7 +130,8 @@ std::string fields_of(const Schema& schema, std::uint32_t type) {
 /// Fills a struct, number after number.
 class Writer {
  public:
-  Writer(const Schema& schema, StateBytes& state) : schema_(schema), state_(state) {}
+  Writer(const Schema& schema, StateBytes& state, Missing missing)
+      : schema_(schema), state_(state), missing_(missing) {}
 
   /// `number` is the place of the struct's first number in the whole state.
   void write(std::uint32_t type, nb::handle value, std::byte* to, std::uint32_t number,
@@ -174,7 +174,7 @@ class Writer {
         field(member, value[name], to + member.offset, place,
               "'" + member.name.str() + "' of " + what);
       } else {
-        state_.whole = false;
+        left_out(row, member, to, what);
       }
       place += numbers_in(member);
     }
@@ -187,7 +187,7 @@ class Writer {
       }
       if (!known) {
         throw InvalidArgument(what + " has no field " + text_of(name) + ": " +
-                              fields_of(schema_, type));
+                              fields_of(schema_, row));
       }
     }
   }
@@ -202,7 +202,7 @@ class Writer {
     }
     if (!is_sequence || PySequence_Size(value.ptr()) != static_cast<Py_ssize_t>(row.fields)) {
       refuse(what,
-             "a mapping, a record, or all its fields in order (" + fields_of(schema_, type) + ")",
+             "a mapping, a record, or all its fields in order (" + fields_of(schema_, row) + ")",
              value);
     }
     for (std::uint32_t i = 0; i < row.fields; ++i) {
@@ -210,6 +210,18 @@ class Writer {
       field(member, value[i], to + member.offset, number, "'" + member.name.str() + "' of " + what);
       number += numbers_in(member);
     }
+  }
+
+  void left_out(const o80::TypeRow& type, const FieldRow& member, std::byte* to,
+                const std::string& what) {
+    state_.whole = false;
+    if (missing_ == Missing::kept) return;
+    if (member.has_default == 0) {
+      throw InvalidArgument(what + " needs '" + member.name.str() +
+                            "', which has no default: " + fields_of(schema_, type));
+    }
+    const std::byte* from = schema_.defaults.data() + type.first_default + member.offset;
+    std::memcpy(to + member.offset, from, std::size_t{member.size} * member.count());
   }
 
   /// A plain, a vector or a matrix field.
@@ -261,6 +273,7 @@ class Writer {
 
   const Schema& schema_;
   StateBytes& state_;
+  Missing missing_;
 };
 
 }  // namespace
@@ -305,7 +318,7 @@ void write_number(const Schema& schema, const FieldRow& field, nb::handle value,
 }
 
 StateBytes::StateBytes(const Schema& schema, std::uint32_t type, nb::handle value,
-                       const std::string& owner)
+                       const std::string& owner, Missing missing)
     : bytes(schema.types[type].size), mask(o80::mask_words(schema.scalar_count(type))) {
-  Writer(schema, *this).write(type, value, bytes.data(), 0, owner);
+  Writer(schema, *this, missing).write(type, value, bytes.data(), 0, owner);
 }

@@ -16,6 +16,10 @@ const o80::FieldRow* plain_number(const o80::Schema& schema, std::uint32_t type)
 void write_number(const o80::Schema& schema, const o80::FieldRow& field, nanobind::handle value,
                   std::byte* to, const std::string& what);
 
+/// What becomes of the fields of a struct that a mapping leaves out: they stay as they are, or get
+/// their default, and it is an error if they have none.
+enum class Missing : std::uint8_t { kept, by_default };
+
 /// A described struct from Python: a number, a mapping, a record, or a sequence of all its fields.
 struct StateBytes {
   std::vector<std::byte> bytes;
@@ -24,5 +28,5 @@ struct StateBytes {
 
   /// Throws InvalidArgument, naming `owner`, the field and what there is.
   StateBytes(const o80::Schema& schema, std::uint32_t type, nanobind::handle value,
-             const std::string& owner);
+             const std::string& owner, Missing missing = Missing::kept);
 };

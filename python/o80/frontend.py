@@ -162,7 +162,7 @@ class Frontend(_core.Frontend):
 
         name: of the request; `requests` lists them.
         timeout: for the answer [s].
-        fields: of the request; what is not given is zero.
+        fields: of the request; those that have a default may be left out.
 
         It needs no pulse; what was added and not pulsed stays added. Raises RequestRejected with
         the driver's text, TimeoutError, BackendGone. `add_request` makes one part of a pulse.

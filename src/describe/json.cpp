@@ -1,7 +1,7 @@
-#include <cmath>
-#include <iomanip>
-#include <sstream>
+#include <algorithm>
+#include <cstring>
 
+#include "json_writer.hpp"
 #include "o80/describe/layout.hpp"
 #include "o80/describe/table.hpp"
 
@@ -9,79 +9,75 @@ namespace o80 {
 
 namespace {
 
-/// Writes JSON; commas are set where they belong.
-class JsonWriter {
- public:
-  void open(char bracket) {
-    separate();
-    text_ << bracket;
-    first_ = true;
-  }
-  void close(char bracket) {
-    text_ << bracket;
-    first_ = false;
-  }
-  void key(std::string_view name) {
-    separate();
-    quote(name);
-    text_ << ": ";
-    after_key_ = true;
-  }
-  void value(std::string_view text) {
-    separate();
-    quote(text);
-  }
-  void value(bool yes) {
-    separate();
-    text_ << (yes ? "true" : "false");
-  }
-  void value(std::int64_t number) {
-    separate();
-    text_ << number;
-  }
-  void value(double number) {
-    separate();
-    if (std::isfinite(number)) {
-      text_ << std::setprecision(17) << number;
-    } else {
-      text_ << "null";
-    }
-  }
-  std::string str() const { return text_.str(); }
-
- private:
-  void separate() {
-    if (!first_ && !after_key_) text_ << ", ";
-    first_ = false;
-    after_key_ = false;
-  }
-  void quote(std::string_view text) {
-    text_ << '"';
-    for (const char c : text) {
-      if (c == '"' || c == '\\') {
-        text_ << '\\' << c;
-      } else if (static_cast<unsigned char>(c) < 32) {
-        text_ << "\\u" << std::hex << std::setw(4) << std::setfill('0') << static_cast<int>(c)
-              << std::dec;
-      } else {
-        text_ << c;
-      }
-    }
-    text_ << '"';
-  }
-
-  std::ostringstream text_;
-  bool first_ = true;
-  bool after_key_ = false;
-};
-
 constexpr const char* kKinds[] = {"bool",    "int8",   "int16",  "int32",  "int64",
                                   "uint8",   "uint16", "uint32", "uint64", "float32",
                                   "float64", "enum",   "struct", "text"};
 
 void write_type(JsonWriter& json, const Schema& schema, std::uint32_t index);
 
-void write_field(JsonWriter& json, const Schema& schema, const FieldRow& field) {
+template <class T>
+T number_at(const std::byte* from) {
+  T number;
+  std::memcpy(&number, from, sizeof number);
+  return number;
+}
+
+/// An integer of 1 to 8 bytes.
+void write_integer(JsonWriter& json, const std::byte* from, std::uint32_t size, bool is_signed) {
+  std::uint64_t bits = 0;
+  std::memcpy(&bits, from, size);  // little end first
+  if (!is_signed) return json.value(bits);
+  const std::uint32_t unused = 64 - 8 * size;
+  json.value(static_cast<std::int64_t>(bits << unused) >> unused);
+}
+
+void write_value(JsonWriter& json, const Schema& schema, const FieldRow& field,
+                 const std::byte* from);
+
+void write_element(JsonWriter& json, const Schema& schema, const FieldRow& field,
+                   const std::byte* from) {
+  switch (field.kind) {
+    case Kind::structure: {
+      const TypeRow& type = schema.types[field.type];
+      json.open('{');
+      for (std::uint32_t i = 0; i < type.fields; ++i) {
+        const FieldRow& member = schema.fields[type.first_field + i];
+        json.key(member.name.view());
+        write_value(json, schema, member, from + member.offset);
+      }
+      return json.close('}');
+    }
+    case Kind::boolean:
+      return json.value(number_at<std::uint8_t>(from) != 0);
+    case Kind::float32:
+      return json.value(double{number_at<float>(from)});
+    case Kind::float64:
+      return json.value(number_at<double>(from));
+    case Kind::enumeration:
+      return write_integer(json, from, field.size, field.is_signed != 0);
+    default:
+      return write_integer(json, from, field.size, field.kind < Kind::uint8);
+  }
+}
+
+/// What a field holds, arrays as such.
+void write_value(JsonWriter& json, const Schema& schema, const FieldRow& field,
+                 const std::byte* from) {
+  if (field.rows == 0) return write_element(json, schema, field, from);
+  json.open('[');
+  for (std::uint32_t i = 0; i < field.rows; ++i) {
+    if (field.columns != 0) json.open('[');
+    for (std::uint32_t j = 0; j < std::max(field.columns, 1U); ++j) {
+      write_element(json, schema, field, from);
+      from += field.size;
+    }
+    if (field.columns != 0) json.close(']');
+  }
+  json.close(']');
+}
+
+void write_field(JsonWriter& json, const Schema& schema, const TypeRow& type,
+                 const FieldRow& field) {
   json.open('{');
   json.key("name");
   json.value(field.name.view());
@@ -103,6 +99,10 @@ void write_field(JsonWriter& json, const Schema& schema, const FieldRow& field) 
   if (field.resting != 0) {
     json.key("rest");
     json.value(field.rest);
+  }
+  if (field.has_default != 0) {
+    json.key("default");
+    write_value(json, schema, field, schema.defaults.data() + type.first_default + field.offset);
   }
   if (field.kind == Kind::enumeration) {
     json.key("signed");
@@ -132,7 +132,7 @@ void write_type(JsonWriter& json, const Schema& schema, std::uint32_t index) {
   json.key("fields");
   json.open('[');
   for (std::uint32_t i = 0; i < type.fields; ++i) {
-    write_field(json, schema, schema.fields[type.first_field + i]);
+    write_field(json, schema, type, schema.fields[type.first_field + i]);
   }
   json.close(']');
   json.close('}');

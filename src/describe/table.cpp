@@ -17,8 +17,8 @@ constexpr std::uint32_t kMostNested = 16;
 
 struct TableHead {
   std::uint64_t magic = kMagic;
-  std::uint32_t counts[7] = {};
-  std::uint32_t sizes[7] = {};
+  std::uint32_t counts[8] = {};
+  std::uint32_t sizes[8] = {};
 };
 
 /// Calls `visit` for every table of rows of a schema, in the order of the bytes.
@@ -31,6 +31,7 @@ void each_table(SchemaLike& schema, Visit&& visit) {
   visit(4, schema.actuators);
   visit(5, schema.limits);
   visit(6, schema.requests);
+  visit(7, schema.defaults);
 }
 
 [[noreturn]] void refuse(const std::string& why) {
@@ -128,12 +129,19 @@ std::vector<std::uint64_t> check_types(const Schema& schema) {
     if (std::uint64_t{type.first_field} + type.fields > schema.fields.size()) {
       refuse(name + "has fields that are not there");
     }
+    const bool has_value = type.first_default != kNoType;
+    if (has_value && std::uint64_t{type.first_default} + type.size > schema.defaults.size()) {
+      refuse(name + "has defaults that are not there");
+    }
     std::set<std::string_view> names;
     std::uint64_t count = 0;
     std::uint32_t depth = 0;
     for (std::uint32_t f = 0; f < type.fields; ++f) {
       const FieldRow& field = schema.fields[type.first_field + f];
       check_field(schema, i, field);
+      if (field.has_default > (has_value ? 1 : 0)) {
+        refuse(name + "has no default for '" + field.name.str() + "'");
+      }
       if (!names.insert(field.name.view()).second) {
         refuse(name + "has two fields '" + field.name.str() + "'");
       }

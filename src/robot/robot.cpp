@@ -75,6 +75,7 @@ Schema Robot::describe() const {
     out.actuators.assign(rows->actuators, rows->actuators + rows->actuator_count);
     out.limits.assign(rows->limits, rows->limits + rows->limit_count);
     out.requests.assign(rows->requests, rows->requests + rows->request_count);
+    out.defaults.assign(rows->defaults, rows->defaults + rows->default_count);
   };
   if (table_.describe(driver_, &schema, copy, &fault) != 0) {
     throw DriverError("robot '" + std::string(table_.name) +

@@ -85,6 +85,25 @@ def test_a_robot_library_needs_the_headers_and_no_more(scale: o80.robots.Robot) 
         assert robot.burst(2).extended.weight == 2.0
 
 
+def test_a_field_of_a_request_has_its_default_or_must_be_given(scale: o80.robots.Robot) -> None:
+    with scale.inline() as robot:
+        with pytest.raises(
+            o80.InvalidArgument, match=r"'calibrate' needs 'offset'.*offset, factor"
+        ):
+            robot.request("calibrate", factor=3.0)
+        assert robot.burst(1).extended.weight == 1.0
+
+        robot.request("calibrate", offset=0.5)
+        assert robot.burst(1).extended.weight == 0.5 + 2.0 * robot.published
+
+        robot.request("calibrate", offset=0.5, factor=3.0)
+        assert robot.burst(1).extended.weight == 0.5 + 3.0 * robot.published
+
+        offset, factor = robot.schema["requests"][0]["type"]["fields"]
+        assert "default" not in offset
+        assert factor["default"] == 2.0
+
+
 def test_what_a_driver_prints_is_no_part_of_its_fault(scale: o80.robots.Robot) -> None:
     with pytest.raises(o80.DriverError) as caught:
         scale.start("scale-that-is-broken", broken=True)

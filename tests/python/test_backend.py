@@ -253,7 +253,7 @@ def test_a_handler_may_reject(segment: str) -> None:
             with pytest.raises(o80.RequestRejected, match="the brake is on"):
                 frontend.request("home", timeout=WAIT)
             with pytest.raises(o80.RequestRejected, match="nobody serves 'reset'"):
-                frontend.request("reset", timeout=WAIT)
+                frontend.request("reset", seed=0, pose=[0.0, 0.0], timeout=WAIT)
             frontend.burst(1, timeout=WAIT)
 
 
@@ -269,7 +269,7 @@ def test_a_handler_may_start_afresh(segment: str) -> None:
             batch = frontend.pulse()
             frontend.burst(10, timeout=WAIT)
 
-            frontend.request("reset", timeout=WAIT)
+            frontend.request("reset", seed=0, pose=[0.0, 0.0], timeout=WAIT)
 
             fresh = frontend.latest()
             assert (fresh.fresh, fresh.iteration) == (True, 11)

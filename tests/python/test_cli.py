@@ -98,7 +98,7 @@ def test_info_describes_a_robot(folder: Path, robot: "subprocess.Popen[str]") ->
     assert "shoulder" in text
     assert "-3 to 3" in text
     assert "effort(2) [rad]" in text
-    assert "reset(seed)" in text
+    assert "reset(seed=0)" in text
     schema = json.loads(o80(folder, "info", "two_joints", "--json"))
     assert [actuator["name"] for actuator in schema["actuators"]] == ["shoulder", "elbow"]
 

@@ -33,6 +33,37 @@ def test_an_unknown_request_or_field_is_refused_with_what_there_is(arm: o80.Fron
         arm.request("reset", seed=-1)
 
 
+def test_fields_with_a_default_may_be_left_out(arm: o80.Frontend) -> None:
+    arm.request("reset")
+    arm.request("snapshot")
+    arm.request("restore")
+
+
+def test_fields_without_a_default_must_be_given(segment: str) -> None:
+    gains = {"stiffness": float, "of": {"joint": int, "axis": int}}
+    with o80.Backend(segment, ["a"], requests={"set_gains": gains}, bursting=True) as backend:
+        taken: list[tuple[float, int, int]] = []
+
+        def set_gains(request: o80.Record) -> None:
+            taken.append((request.stiffness, request.of.joint, request.of.axis))
+
+        backend.on("set_gains", set_gains)
+        backend.publish([0.0])
+        with o80.Frontend(segment) as arm:
+            with pytest.raises(o80.InvalidArgument, match="'set_gains' needs 'stiffness'"):
+                arm.request("set_gains")
+            with pytest.raises(o80.InvalidArgument, match="needs 'of'"):
+                arm.add_request("set_gains", stiffness=1.0)
+            with pytest.raises(o80.InvalidArgument, match=r"'of' of .*'set_gains' needs 'axis'"):
+                arm.add_request("set_gains", stiffness=1.0, of={"joint": 2})
+            assert arm.added == 0
+
+            arm.add_request("set_gains", stiffness=1.0, of={"joint": 2, "axis": 3})
+            arm.burst(1, wait=False)
+            backend.step(WAIT)
+    assert taken == [(1.0, 2, 3)]
+
+
 def test_a_request_may_be_part_of_a_pulse(arm: o80.Frontend) -> None:
     arm.add_command(0, 1.0)
     arm.burst(10)

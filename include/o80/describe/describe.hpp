@@ -3,123 +3,20 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
+#include <cstring>
 #include <string>
 #include <string_view>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
-#include "o80/describe/for_each.hpp"
+#include "o80/describe/defaults.hpp"
+#include "o80/describe/described.hpp"
 #include "o80/describe/schema.hpp"
 
-/// Describes a struct: O80_DESCRIBE(Joint, (position, "[rad]"), (velocity, "[rad/s]",
-/// o80::rests_at(0))), at namespace scope.
-///
-/// A text may hold a unit in brackets and a help. A field of an actuator's state that rests goes
-/// there when no command drives it. Every field must be named: a forgotten one does not compile.
-#define O80_DESCRIBE(Type, ...)                                                                  \
-  static_assert(std::is_aggregate_v<Type>, #Type " must be a plain struct to be described");     \
-  static_assert(::o80::field_count<Type>() == (0 O80_FOR_EACH(O80_PLUS_ONE, ~, __VA_ARGS__)),    \
-                #Type ": describe every field, once (arrays as std::array, 64 fields at most)"); \
-  [[maybe_unused]] constexpr std::string_view o80_type_name(::o80::Tag<Type>) { return #Type; }  \
-  template <class O80Visit>                                                                      \
-  constexpr void o80_describe(::o80::Tag<Type>, [[maybe_unused]] O80Visit&& o80_visit) {         \
-    using O80Type [[maybe_unused]] = Type;                                                       \
-    O80_FOR_EACH(O80_FIELD, ~, __VA_ARGS__)                                                      \
-  }                                                                                              \
-  static_assert(true)
-
-/// Describes an enumeration: O80_DESCRIBE_ENUM(ControlMode, off, position, torque).
-#define O80_DESCRIBE_ENUM(Type, ...)                                                            \
-  [[maybe_unused]] constexpr std::string_view o80_type_name(::o80::Tag<Type>) { return #Type; } \
-  template <class O80Visit>                                                                     \
-  constexpr void o80_labels(::o80::Tag<Type>, O80Visit&& o80_visit) {                           \
-    using O80Type = Type;                                                                       \
-    O80_FOR_EACH(O80_LABEL, ~, __VA_ARGS__)                                                     \
-  }                                                                                             \
-  static_assert(true)
-
-#define O80_PLUS_ONE(fixed, field) +1
-#define O80_FIELD(fixed, field) O80_JOIN(O80_FIELD_, O80_IS_GROUP(field))(field)
-#define O80_FIELD_0(field) O80_FIELD_NAMED(field, "")
-#define O80_FIELD_1(field) O80_FIELD_NAMED field
-#define O80_FIELD_NAMED(field, ...)                                         \
-  o80_visit(#field, &O80Type::field, std::size_t{offsetof(O80Type, field)}, \
-            ::o80::FieldNote(__VA_ARGS__));
-#define O80_LABEL(fixed, label) o80_visit(#label, O80Type::label);
+// Described structs as rows of a schema, and their values as bytes.
 
 namespace o80 {
-
-/// Carries a type to the functions that O80_DESCRIBE makes, which are found by its namespace.
-template <class T>
-struct Tag {};
-
-/// What O80_DESCRIBE says about a field: a text, and where it rests.
-struct FieldNote {
-  std::string_view text;
-  std::optional<RestsAt> rest;
-
-  constexpr FieldNote(std::string_view said) : text(said) {}  // NOLINT(google-explicit-constructor)
-  constexpr FieldNote(const char* said) : text(said) {}       // NOLINT(google-explicit-constructor)
-  constexpr FieldNote(std::string_view said, RestsAt where) : text(said), rest(where) {}
-  constexpr FieldNote(RestsAt where) : rest(where) {}  // NOLINT(google-explicit-constructor)
-  // NOLINTNEXTLINE(google-explicit-constructor)
-  constexpr operator std::string_view() const { return text; }
-};
-
-namespace describing {
-
-struct Anything {
-  template <class T>
-  operator T() const;  // NOLINT(google-explicit-constructor)
-};
-
-template <class T, std::size_t... I>
-constexpr bool takes(std::index_sequence<I...>) {
-  return requires { T{(static_cast<void>(I), Anything{})...}; };
-}
-
-template <class T>
-struct ArrayOf : std::false_type {};
-template <class T, std::size_t N>
-struct ArrayOf<std::array<T, N>> : std::true_type {
-  using Element = T;
-  static constexpr std::size_t kCount = N;
-};
-
-}  // namespace describing
-
-/// How many fields a plain struct has (arrays are std::array, which counts as one).
-template <class T, std::size_t N = 64>
-consteval std::size_t field_count() {
-  if constexpr (N == 0 || describing::takes<T>(std::make_index_sequence<N>{})) {
-    return N;
-  } else {
-    return field_count<T, N - 1>();
-  }
-}
-
-template <class T>
-concept DescribedStruct = requires(void (*visit)(...)) {
-  o80_type_name(Tag<T>{});
-  o80_describe(Tag<T>{}, [](auto&&...) {});
-};
-template <class T>
-concept DescribedEnum = std::is_enum_v<T> && requires { o80_labels(Tag<T>{}, [](auto&&...) {}); };
-template <class T>
-concept Number = std::is_arithmetic_v<T> && !std::is_same_v<T, char> &&
-                 !std::is_same_v<T, wchar_t> && !std::is_same_v<T, long double>;
-
-/// What may be the state of an actuator, sensor values or the body of a request.
-template <class T>
-concept Shareable =
-    Number<T> || DescribedEnum<T> || (DescribedStruct<T> && std::is_trivially_copyable_v<T>);
-
-/// A state type with its own way to interpolate: `static T blend(const T&, const T&, double)`.
-template <class T>
-concept Blending = requires(const T& state, double share) {
-  { T::blend(state, state, share) } -> std::same_as<T>;
-};
 
 namespace describing {
 
@@ -135,6 +32,9 @@ constexpr Kind kind_of() {
                              kWidth);
   }
 }
+
+template <class T>
+void add_defaults(Schema& schema, TypeRow& row, std::vector<FieldRow>& members);
 
 template <class T>
 inline constexpr char kKey = 0;  // its address tells types apart
@@ -208,6 +108,7 @@ std::uint32_t type_of(Schema& schema) {
   row.alignment = alignof(T);
   row.first_field = static_cast<std::uint32_t>(schema.fields.size());
   row.fields = static_cast<std::uint32_t>(members.size());
+  if constexpr (DescribedStruct<T>) add_defaults<T>(schema, row, members);
   schema.fields.insert(schema.fields.end(), members.begin(), members.end());
   schema.types.push_back(row);
   TypeHooks hooks;
@@ -270,6 +171,25 @@ T unpack(const std::byte* from) {
   if constexpr (!std::is_empty_v<T>) std::memcpy(&value, from, sizeof(T));
   return value;
 }
+
+namespace describing {
+
+/// Marks the fields that have a default, and keeps their values.
+template <class T>
+void add_defaults(Schema& schema, TypeRow& row, std::vector<FieldRow>& members) {
+  constexpr auto kHasDefault = defaults_of<T>(std::make_index_sequence<field_count<T>()>());
+  bool any = false;
+  for (std::size_t i = 0; i < members.size(); ++i) {
+    members[i].has_default = kHasDefault[i] ? 1 : 0;
+    any = any || kHasDefault[i];
+  }
+  if (!any) return;
+  row.first_default = static_cast<std::uint32_t>(schema.defaults.size());
+  schema.defaults.resize(schema.defaults.size() + sizeof(T));
+  pack(T{}, schema.defaults.data() + row.first_default);
+}
+
+}  // namespace describing
 
 /// A robot without actuators: a pure sensor.
 struct NoActuators {};

@@ -72,10 +72,10 @@ struct FieldRow {
   std::uint32_t first_label = 0;  // of an enumeration
   std::uint32_t labels = 0;
   Kind kind = Kind::float64;
-  std::uint8_t is_signed = 0;  // of an enumeration
-  std::uint8_t resting = 0;    // 1: goes to `rest` when no command drives it
-  std::uint8_t reserved = 0;
-  double rest = 0.0;  // in the field's unit
+  std::uint8_t is_signed = 0;    // of an enumeration
+  std::uint8_t resting = 0;      // 1: goes to `rest` when no command drives it
+  std::uint8_t has_default = 0;  // 1: a request may leave it out
+  double rest = 0.0;             // in the field's unit
 
   std::uint32_t count() const { return (rows == 0 ? 1 : rows) * (columns == 0 ? 1 : columns); }
   bool operator==(const FieldRow&) const = default;
@@ -88,6 +88,8 @@ struct TypeRow {
   std::uint32_t alignment = 1;
   std::uint32_t first_field = 0;
   std::uint32_t fields = 0;
+  std::uint32_t first_default = kNoType;  // a value of this struct, for fields that have a default
+  std::uint32_t reserved = 0;
   bool operator==(const TypeRow&) const = default;
 };
 

@@ -72,8 +72,9 @@ class Schema {
   std::vector<ActuatorRow> actuators;
   std::vector<LimitRow> limits;
   std::vector<RequestRow> requests;
-  std::vector<TypeHooks> hooks;   // one for each type; stays in the backend's process
-  std::vector<const void*> keys;  // one for each type: of which C++ type it came, or null
+  std::vector<std::byte> defaults;  // values of structs of which a field has a default
+  std::vector<TypeHooks> hooks;     // one for each type; stays in the backend's process
+  std::vector<const void*> keys;    // one for each type: of which C++ type it came, or null
 
   // a driver's describe()
   ActuatorDescription actuator(std::uint32_t index);
@@ -99,7 +100,7 @@ class Schema {
   bool operator==(const Schema& other) const {
     return head == other.head && types == other.types && fields == other.fields &&
            labels == other.labels && groups == other.groups && actuators == other.actuators &&
-           limits == other.limits && requests == other.requests;
+           limits == other.limits && requests == other.requests && defaults == other.defaults;
   }
 
   /// The place of an actuator that is described already; used by the typed description.
@@ -182,6 +183,7 @@ inline std::uint32_t Schema::add_type(std::string_view name, std::vector<FieldRo
                             "' has no size: give its kind (or, for an enumeration, its size)");
     }
     if (nested) field.size = types.at(field.type).size;
+    field.has_default = 0;  // the new type has no value
     field.offset = round_up(end, alignment);
     end = field.offset + field.size * field.count();
     type.alignment = alignment > type.alignment ? alignment : type.alignment;

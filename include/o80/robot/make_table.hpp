@@ -128,13 +128,15 @@ const RobotTable* robot_table(const char* name, const char* versions = "") {
                              schema.actuators.data(),
                              schema.limits.data(),
                              schema.requests.data(),
+                             schema.defaults.data(),
                              count(schema.types),
                              count(schema.fields),
                              count(schema.labels),
                              count(schema.groups),
                              count(schema.actuators),
                              count(schema.limits),
-                             count(schema.requests)};
+                             count(schema.requests),
+                             count(schema.defaults)};
         rows(context, &all);
         return 0;
       });

@@ -43,8 +43,9 @@ struct SchemaRows {
   const ActuatorRow* actuators;
   const LimitRow* limits;
   const RequestRow* requests;
+  const std::byte* defaults;
   std::uint32_t type_count, field_count, label_count, group_count, actuator_count, limit_count,
-      request_count;
+      request_count, default_count;
 };
 
 /// What a driver is to write.

@@ -42,7 +42,7 @@ def info(
         if schema["requests"]:
             out.print("\n[bold]requests[/bold]")
             for request in schema["requests"]:
-                fields = ", ".join(field["name"] for field in request["type"]["fields"])
+                fields = ", ".join(_argument(field) for field in request["type"]["fields"])
                 served = ", also while halted" if request["while_halted"] else ""
                 out.print(f"  {request['name']}({fields})  [dim]{request['help']}{served}[/dim]")
 
@@ -67,6 +67,17 @@ def _field(field: dict[str, Any]) -> str:
     unit = f" \\[{field['unit']}]" if field["unit"] else ""
     shape = f"({', '.join(str(n) for n in field['shape'])})" if field["shape"] else ""
     return f"{field['name'] or field['kind']}{shape}{unit}"
+
+
+def _argument(field: dict[str, Any]) -> str:
+    """A field of a request; one without a default must be given."""
+    if "default" not in field:
+        return str(field["name"])
+    default = field["default"]
+    for label, value in field.get("labels", {}).items():
+        if value == default:
+            default = label
+    return f"{field['name']}={default}"
 
 
 def _limit(limit: dict[str, Any]) -> str:

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <type_traits>
+#include <utility>
+
+#include "o80/describe/described.hpp"
+
+// Which fields of a described struct have a default: read from an object without an initialiser
+// while the program is compiled. A field without a default member initialiser has no value there,
+// and reading it is no constant expression.
+
+namespace o80::describing {
+
+template <class T>
+constexpr bool read_numbers(const T& value) {
+  bool all = true;
+  if constexpr (ArrayOf<T>::value) {
+    for (const auto& element : value) all = all && read_numbers(element);
+  } else if constexpr (DescribedStruct<T>) {
+    o80_describe(Tag<T>{}, [&](auto&&, auto T::* member, auto&&...) {
+      all = all && read_numbers(value.*member);
+    });
+  } else {
+    [[maybe_unused]] const T read = value;
+  }
+  return all;
+}
+
+template <class T, std::size_t I>
+constexpr bool read_field() {
+  T value;
+  std::size_t i = 0;
+  bool all = true;
+  o80_describe(Tag<T>{}, [&](auto&&, auto T::* member, auto&&...) {
+    if (i++ == I) all = read_numbers(value.*member);
+  });
+  return all;
+}
+
+/// Field I has a default member initialiser, of constants, for each of its numbers.
+template <class T, std::size_t I>
+concept HasDefault = requires { typename std::bool_constant<read_field<T, I>()>; };
+
+template <class T, std::size_t... I>
+consteval auto defaults_of(std::index_sequence<I...>) {
+  return std::array<bool, sizeof...(I)>{HasDefault<T, I>...};
+}
+
+}  // namespace o80::describing
