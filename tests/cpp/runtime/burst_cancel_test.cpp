@@ -119,6 +119,7 @@ TEST_F(BurstCancelTest, ABurstThatWasStartedCanBeWaitedForAgainAfterATimeout) {
 
 TEST_F(BurstCancelTest, NoMemberOfAGroupMovesIfOneCannot) {
   UntypedFrontend frontend("pair");
+  add(frontend, 0, 1.0);  // goes with no burst that is refused
   const auto refused_with = [&](UntypedFrontend& other, std::int64_t iterations) {
     const BurstMember group[] = {{&frontend, 5}, {&other, iterations}};
     std::string message;
@@ -159,6 +160,7 @@ TEST_F(BurstCancelTest, NoMemberOfAGroupMovesIfOneCannot) {
   // gone
   other.backend.end(State::stopped);
   EXPECT_THAT(refused_with(second, 5), HasSubstr("other"));
+  EXPECT_EQ(frontend.pulse().size(), 1U);
 }
 
 TEST_F(BurstCancelTest, AGroupReturnsAtOnceWithEachItsOwnIterationsToWaitFor) {
