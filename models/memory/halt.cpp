@@ -1,5 +1,5 @@
-// The halt: each one that is asked for is latched, also by a backend that stands still; a resume clears
-// none that it has not seen; what is shown is of one halt.
+// The halt: each one that is asked for is latched, also by a backend that stands still; a resume
+// clears none that it has not seen; what is shown is of one halt.
 //
 // mutant asked_without_the_bell: src/memory/halt_word.cpp
 //   - O80_CRASH_POINT("halt.after_count");

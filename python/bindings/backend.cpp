@@ -1,11 +1,9 @@
 #include "o80/runtime/backend.hpp"
 
 #include <nanobind/nanobind.h>
-#include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
-#include <nanobind/stl/vector.h>
 
 #include <algorithm>
 #include <atomic>
@@ -22,6 +20,7 @@
 #include "o80/memory/fork.hpp"
 #include "o80/runtime/observation.hpp"
 #include "pickling.hpp"
+#include "schema_builder.hpp"
 #include "waiting.hpp"
 
 namespace nb = nanobind;
@@ -31,100 +30,6 @@ using o80::InvalidArgument;
 namespace {
 
 constexpr std::int64_t kLook = 50'000'000;  // between looks at signals [ns]
-
-/// A schema while Python describes it.
-struct SchemaBuilder {
-  o80::Schema schema;
-
-  explicit SchemaBuilder(const std::string& robot) { schema.head.robot = o80::NameText(robot); }
-
-  /// A type from its fields: (name, kind, shape, text, labels or None, type).
-  std::uint32_t add_type(const std::string& name, const nb::list& fields) {
-    std::vector<o80::FieldRow> members;
-    for (nb::handle each : fields) members.push_back(member(nb::cast<nb::tuple>(each)));
-    return schema.add_type(name, std::move(members));
-  }
-
-  std::uint32_t add_actuators(const std::string& group, std::uint32_t type, std::uint32_t count,
-                              bool is_array) {
-    return schema.add_actuators(group, type, count, is_array);
-  }
-
-  void set_extended(std::uint32_t type) { schema.head.extended = type; }
-
-  void add_request(const std::string& name, std::uint32_t type, const std::string& help,
-                   bool while_halted) {
-    schema.add_request(name, type, help, while_halted);
-  }
-
-  void name_actuator(std::uint32_t actuator, const std::string& name) {
-    schema.actuator(actuator).name(name);
-  }
-
-  void set_follow(std::uint32_t actuator) {
-    schema.actuator(actuator).when_idle(o80::WhenIdle::follow);
-  }
-
-  std::vector<std::string> actuators() const {
-    std::vector<std::string> names;
-    for (const o80::ActuatorRow& row : schema.actuators) names.push_back(row.name.str());
-    return names;
-  }
-
-  /// Of a field, or of the first number if it is empty: as o80::Limits has them, in its order.
-  void set_limits(std::uint32_t actuator, const std::string& field,
-                  const std::array<double, 6>& given) {
-    const o80::Limits limits{given[0], given[1], given[2], given[3], given[4], given[5]};
-    if (field.empty()) {
-      schema.actuator(actuator).limits(limits);
-    } else {
-      schema.actuator(actuator).limits(field, limits);
-    }
-  }
-
-  void rests_at(std::uint32_t actuator, const std::string& field, double value) {
-    schema.actuator(actuator).rests_at(field, value);
-  }
-
- private:
-  o80::FieldRow member(const nb::tuple& row) {
-    const auto name = nb::cast<std::string>(row[0]);
-    const auto shape = nb::cast<std::vector<std::uint32_t>>(row[2]);
-    if (shape.size() > 2) {
-      throw InvalidArgument("field '" + name + "' has " + std::to_string(shape.size()) +
-                            " dimensions: at most 2 can be described");
-    }
-    o80::FieldRow field = o80::scalar_field(name, kind_of(nb::cast<std::string>(row[1])),
-                                            nb::cast<std::string>(row[3]));
-    if (!shape.empty()) field.rows = shape[0];
-    if (shape.size() == 2) field.columns = shape[1];
-    if (field.kind == o80::Kind::structure) field.type = nb::cast<std::uint32_t>(row[5]);
-    if (field.kind == o80::Kind::enumeration) add_labels(field, nb::cast<nb::dict>(row[4]));
-    return field;
-  }
-
-  void add_labels(o80::FieldRow& field, const nb::dict& labels) {
-    field.size = 8;
-    field.is_signed = 1;
-    field.first_label = static_cast<std::uint32_t>(schema.labels.size());
-    field.labels = static_cast<std::uint32_t>(labels.size());
-    for (const auto& [name, value] : labels) {
-      schema.labels.push_back(
-          {o80::NameText(nb::cast<std::string>(name)), nb::cast<std::int64_t>(value)});
-    }
-  }
-
-  static o80::Kind kind_of(const std::string& name) {
-    using o80::Kind;
-    constexpr const char* kNames[] = {"bool",    "int8",   "int16",  "int32",  "int64",
-                                      "uint8",   "uint16", "uint32", "uint64", "float32",
-                                      "float64", "enum",   "struct"};
-    for (std::size_t i = 0; i < std::size(kNames); ++i) {
-      if (name == kNames[i]) return static_cast<Kind>(i);
-    }
-    throw InvalidArgument("numbers of kind '" + name + "' cannot be described");
-  }
-};
 
 /// The compiled half of o80.Backend.
 ///
@@ -361,20 +266,7 @@ Backend* make(const SchemaBuilder& builder, const std::string& segment, std::int
 }  // namespace
 
 void bind_backend(nb::module_& m) {
-  nb::class_<SchemaBuilder>(m, "SchemaBuilder", "A robot while it is described.")
-      .def(nb::init<const std::string&>(), "robot"_a)
-      .def("add_type", &SchemaBuilder::add_type, "name"_a, "fields"_a,
-           nb::sig("def add_type(self, name: str, fields: list[typing.Any]) -> int"))
-      .def("add_actuators", &SchemaBuilder::add_actuators, "group"_a, "type"_a, "count"_a,
-           "is_array"_a)
-      .def("set_extended", &SchemaBuilder::set_extended, "type"_a)
-      .def("add_request", &SchemaBuilder::add_request, "name"_a, "type"_a, "help"_a,
-           "while_halted"_a)
-      .def("name_actuator", &SchemaBuilder::name_actuator, "actuator"_a, "name"_a)
-      .def("set_follow", &SchemaBuilder::set_follow, "actuator"_a)
-      .def("set_limits", &SchemaBuilder::set_limits, "actuator"_a, "field"_a, "limits"_a)
-      .def("rests_at", &SchemaBuilder::rests_at, "actuator"_a, "field"_a, "value"_a)
-      .def_prop_ro("actuators", &SchemaBuilder::actuators);
+  bind_schema_builder(m);
 
   nb::class_<Backend> bound(m, "Backend", nb::type_slots(backend_slots),
                             "The compiled half of o80.Backend.");

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "o80/describe/schema.hpp"
+
+/// A schema while Python describes it.
+struct SchemaBuilder {
+  o80::Schema schema;
+
+  explicit SchemaBuilder(const std::string& robot) { schema.head.robot = o80::NameText(robot); }
+
+  /// A type from its fields: (name, kind, shape, text, labels or None, type).
+  std::uint32_t add_type(const std::string& name, const nanobind::list& fields);
+
+  std::uint32_t add_actuators(const std::string& group, std::uint32_t type, std::uint32_t count,
+                              bool is_array) {
+    return schema.add_actuators(group, type, count, is_array);
+  }
+
+  void set_extended(std::uint32_t type) { schema.head.extended = type; }
+
+  void add_request(const std::string& name, std::uint32_t type, const std::string& help,
+                   bool while_halted) {
+    schema.add_request(name, type, help, while_halted);
+  }
+
+  void name_actuator(std::uint32_t actuator, const std::string& name) {
+    schema.actuator(actuator).name(name);
+  }
+
+  void set_follow(std::uint32_t actuator) {
+    schema.actuator(actuator).when_idle(o80::WhenIdle::follow);
+  }
+
+  std::vector<std::string> actuators() const {
+    std::vector<std::string> names;
+    for (const o80::ActuatorRow& row : schema.actuators) names.push_back(row.name.str());
+    return names;
+  }
+
+  /// Of a field, or of the first number if it is empty: as o80::Limits has them, in its order.
+  void set_limits(std::uint32_t actuator, const std::string& field,
+                  const std::array<double, 6>& given) {
+    const o80::Limits limits{given[0], given[1], given[2], given[3], given[4], given[5]};
+    if (field.empty()) {
+      schema.actuator(actuator).limits(limits);
+    } else {
+      schema.actuator(actuator).limits(field, limits);
+    }
+  }
+
+  void rests_at(std::uint32_t actuator, const std::string& field, double value) {
+    schema.actuator(actuator).rests_at(field, value);
+  }
+
+ private:
+  o80::FieldRow member(const nanobind::tuple& row);
+  void add_labels(o80::FieldRow& field, const nanobind::dict& labels);
+};
+
+void bind_schema_builder(nanobind::module_& m);
