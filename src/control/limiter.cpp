@@ -3,7 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
+#include <type_traits>
 #include <utility>
+
+#include "o80/describe/visit_number.hpp"
 
 namespace o80 {
 namespace {
@@ -21,36 +25,12 @@ void store_integer(std::byte* at, double value) noexcept {
   std::memcpy(at, &whole, sizeof whole);
 }
 
-template <class T>
-std::pair<double, double> range_as() noexcept {
-  using Range = std::numeric_limits<T>;
-  return {static_cast<double>(Range::lowest()), static_cast<double>(Range::max())};
-}
-
 /// What numbers of a kind can be: nothing else may be asked of them on the way to rest either.
 std::pair<double, double> range_of(Kind kind) noexcept {
-  switch (kind) {
-    case Kind::int8:
-      return range_as<std::int8_t>();
-    case Kind::int16:
-      return range_as<std::int16_t>();
-    case Kind::int32:
-      return range_as<std::int32_t>();
-    case Kind::int64:
-      return range_as<std::int64_t>();
-    case Kind::uint8:
-      return range_as<std::uint8_t>();
-    case Kind::uint16:
-      return range_as<std::uint16_t>();
-    case Kind::uint32:
-      return range_as<std::uint32_t>();
-    case Kind::uint64:
-      return range_as<std::uint64_t>();
-    case Kind::float32:
-      return range_as<float>();
-    default:
-      return range_as<double>();
-  }
+  return visit_number(kind, []<class T>(T) {
+    using Range = std::numeric_limits<T>;
+    return std::pair(static_cast<double>(Range::lowest()), static_cast<double>(Range::max()));
+  });
 }
 
 /// The nearest value of a kind that is not beyond `low` or `high`.
@@ -105,37 +85,14 @@ void Limiter::publish(const Number& number, std::byte* state) const noexcept {
   // a number outside its bounds stays there until it moves inward
   const double low = std::min(number.limiter.minimum(), value);
   const double high = std::max(number.limiter.maximum(), value);
-  switch (place.kind) {
-    case Kind::float64:
-      std::memcpy(at, &value, sizeof value);
-      return;
-    case Kind::float32: {
-      const float narrow = nearest_float(value, low, high);
-      std::memcpy(at, &narrow, sizeof narrow);
-      return;
+  visit_number(place.kind, [&]<class T>(T) {
+    if constexpr (std::is_integral_v<T>) {
+      store_integer<T>(at, nearest_whole(value, low, high));
+    } else {
+      const auto exact = static_cast<T>(sizeof(T) < 8 ? nearest_float(value, low, high) : value);
+      std::memcpy(at, &exact, sizeof exact);
     }
-    default:
-      break;
-  }
-  const double whole = nearest_whole(value, low, high);
-  switch (place.kind) {
-    case Kind::int8:
-      return store_integer<std::int8_t>(at, whole);
-    case Kind::int16:
-      return store_integer<std::int16_t>(at, whole);
-    case Kind::int32:
-      return store_integer<std::int32_t>(at, whole);
-    case Kind::int64:
-      return store_integer<std::int64_t>(at, whole);
-    case Kind::uint8:
-      return store_integer<std::uint8_t>(at, whole);
-    case Kind::uint16:
-      return store_integer<std::uint16_t>(at, whole);
-    case Kind::uint32:
-      return store_integer<std::uint32_t>(at, whole);
-    default:
-      return store_integer<std::uint64_t>(at, whole);
-  }
+  });
 }
 
 /// A number that no command moves any more comes to rest, wherever that is.

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <type_traits>
+
+#include "o80/describe/visit_number.hpp"
 
 namespace o80 {
 namespace {
@@ -170,42 +173,17 @@ void Motion::mixed_state(double time, std::byte* out) noexcept {
       continue;
     }
     values_[i] = moved(i, time);
-    const auto wide = [&]<class T>(T) {
-      const T straight =
-          moved_wide(load<T>(begins + offset), load<T>(ends + offset), share_of(time));
-      store(at, continues_ ? to_integer<T>(static_cast<long double>(values_[i])) : straight);
-    };
-    switch (numbers[i].kind) {
-      case Kind::float64:
-        store(at, values_[i]);
-        break;
-      case Kind::float32:
-        store(at, static_cast<float>(values_[i]));
-        break;
-      case Kind::int8:
-        store(at, to_integer<std::int8_t>(values_[i]));
-        break;
-      case Kind::int16:
-        store(at, to_integer<std::int16_t>(values_[i]));
-        break;
-      case Kind::int32:
-        store(at, to_integer<std::int32_t>(values_[i]));
-        break;
-      case Kind::int64:
-        wide(std::int64_t{});
-        break;
-      case Kind::uint8:
-        store(at, to_integer<std::uint8_t>(values_[i]));
-        break;
-      case Kind::uint16:
-        store(at, to_integer<std::uint16_t>(values_[i]));
-        break;
-      case Kind::uint32:
-        store(at, to_integer<std::uint32_t>(values_[i]));
-        break;
-      default:
-        wide(std::uint64_t{});
-    }
+    visit_number(numbers[i].kind, [&]<class T>(T) {
+      if constexpr (std::is_floating_point_v<T>) {
+        store(at, static_cast<T>(values_[i]));
+      } else if (sizeof(T) < 8) {
+        store(at, to_integer<T>(values_[i]));
+      } else if (continues_) {
+        store(at, to_integer<T>(static_cast<long double>(values_[i])));
+      } else {
+        store(at, moved_wide(load<T>(begins + offset), load<T>(ends + offset), share_of(time)));
+      }
+    });
   }
 }
 

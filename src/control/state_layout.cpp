@@ -4,6 +4,8 @@
 #include <cmath>
 #include <string>
 
+#include "o80/describe/visit_number.hpp"
+
 namespace o80 {
 
 StateLayout::StateLayout(const Schema& schema, std::uint32_t type)
@@ -133,30 +135,8 @@ bool StateLayout::finite(const std::byte* state, const std::uint64_t* mask) cons
 
 double StateLayout::number(std::size_t number, const std::byte* state) const noexcept {
   const std::byte* at = state + numbers_[number].offset;
-  switch (numbers_[number].kind) {
-    case Kind::float64:
-      return load<double>(at);
-    case Kind::float32:
-      return load<float>(at);
-    case Kind::int8:
-      return load<std::int8_t>(at);
-    case Kind::int16:
-      return load<std::int16_t>(at);
-    case Kind::int32:
-      return load<std::int32_t>(at);
-    case Kind::int64:
-      return static_cast<double>(load<std::int64_t>(at));
-    case Kind::uint8:
-      return load<std::uint8_t>(at);
-    case Kind::uint16:
-      return load<std::uint16_t>(at);
-    case Kind::uint32:
-      return load<std::uint32_t>(at);
-    case Kind::uint64:
-      return static_cast<double>(load<std::uint64_t>(at));
-    default:
-      return load<std::uint8_t>(at);  // of a boolean; an enumeration is never reckoned with
-  }
+  return visit_number(numbers_[number].kind,
+                      [&]<class T>(T) { return static_cast<double>(load<T>(at)); });
 }
 
 }  // namespace o80
