@@ -40,6 +40,7 @@ std::byte* BatchBuilder::open(const RecordHead& head, std::uint64_t payload_byte
       ++commands_;
       break;
     case RecordKind::request:
+    case RecordKind::resume:
       ++requests_;
       break;
     case RecordKind::take_control:

@@ -196,7 +196,9 @@ void BatchPlanner::add(std::uint32_t lane_index, BlockIndex record,
     case RecordKind::request:
       if (!while_halted_[pool_.head(record).actuator]) lane.effort.moves = true;
       [[fallthrough]];
-    case RecordKind::resume:  // may start afresh too
+    case RecordKind::resume:
+      // may start afresh too, and is never express: commands sent before it, while the robot was
+      // halted, are rejected and would act if it overtook them
       lane.effort.express = false;
       ++lane.effort.requests;
       end_part(lane_index, budget);

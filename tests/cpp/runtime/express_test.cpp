@@ -99,6 +99,23 @@ TEST_F(ExpressTest, ControlIsNotLetGoOfBeforeWhatWasSentUnderIt) {
   EXPECT_GE(release.first_iteration(), mine.first_iteration());
 }
 
+TEST_F(ExpressTest, AResumeWaitsForWhatWasSentBeforeIt) {
+  station.start();
+  UntypedFrontend one("pair");
+  const std::uint64_t number = one.halt("stop");
+  station.run(1);
+  const auto others = flood(7);
+  station.run(1);
+  BatchBuilder resume;
+  resume.resume(number);
+  const Batch resumed = one.pulse(resume);
+  for (int i = 0; i < 1000 && !resumed.ended(); ++i) station.run(1);
+  EXPECT_EQ(resumed.handle(0).status, Status::completed) << resumed.handle(0).text;
+  for (const Batch& flood : floods) {
+    EXPECT_EQ(flood.handle(0).reason, Reason::halted) << "sent while the robot was halted";
+  }
+}
+
 TEST_F(ExpressTest, APurgeEndsWhatWaitsForALaterIterationIfItWasSentBefore) {
   station.start();
   UntypedFrontend one("pair");
