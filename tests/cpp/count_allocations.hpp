@@ -1,14 +1,13 @@
 #pragma once
 
-// Counts every `new` of a test program: to be included by one of its files only.
+// Counts every `new` of a thread of a test program: to be included by one of its files only.
 
-#include <atomic>
 #include <cstddef>
 #include <cstdlib>
 #include <new>
 
 namespace {
-std::atomic<std::size_t> allocations = 0;
+thread_local std::size_t allocations = 0;  // of the calling thread
 }  // namespace
 
 // clang's thread sanitizer brings operators of its own, which nobody may replace: nothing is

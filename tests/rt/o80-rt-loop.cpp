@@ -1,6 +1,6 @@
 // A robot of two joints whose loop watches itself: `o80-rt-loop --iterations N` and every flag of
 // `o80 run`. After N iterations it stops in order and prints what happened between the first and
-// the last to the process, and to the loop's thread: page faults, allocations, context switches.
+// the last to the loop's thread: page faults, allocations, context switches.
 
 #include <sched.h>
 #include <sys/resource.h>
@@ -46,7 +46,7 @@ class WatchedJoints {
  private:
   struct Account {
     rusage usage{};             // of the loop's thread
-    std::size_t allocated = 0;  // by the process
+    std::size_t allocated = 0;  // by it
   };
   static Account look() {
     Account account;

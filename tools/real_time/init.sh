@@ -55,7 +55,7 @@ for program in o80_test_*; do
   passed=0
   skipped=0
   ./"$program" --gtest_list_tests "--gtest_filter=$tests" > /tmp/tests
-  awk '/^[^ ]/ { print $1 }' /tmp/tests > /tmp/suites
+  awk '/^[^ ]+\./ { print $1 }' /tmp/tests > /tmp/suites
   while read -r suite; do
     begin=$(uptime_s)
     timeout -s KILL "$limit" chrt $class 10 ./"$program" "--gtest_filter=$(tests_of "$suite")" \
@@ -97,7 +97,7 @@ echo "rt: ended loop $?"
 wait $frontend
 echo "rt: ended frontend $?"
 sed 's/^/rt: /' /tmp/loop /tmp/frontend
-sed 's/^/rt: refused /' /tmp/complaints
+sed 's/^/rt: said /' /tmp/complaints
 echo "rt: cyclictest $(tr -d '\n' < /tmp/cyclictest)"
 echo "rt: over"
 poweroff -f
