@@ -84,6 +84,13 @@ class Controller::Body {
   bool finish_pending() noexcept;
   bool active() const noexcept;
   bool acts(std::uint32_t lane) const noexcept;
+  /// In the last step, or, if it has just lost its command, in the next one.
+  bool braking() const noexcept {
+    return std::ranges::any_of(braking_mask, [](std::uint64_t word) { return word != 0; }) ||
+           std::ranges::any_of(actuators_, [](const ActuatorQueue& queue) {
+             return queue.empty() && !queue.at_rest();
+           });
+  }
   bool holds() const noexcept {
     return std::ranges::any_of(actuators_,
                                [](const ActuatorQueue& queue) { return queue.holds(); });
@@ -407,9 +414,7 @@ const std::uint64_t* Controller::braking_mask() const noexcept {
   return body_->braking_mask.data();
 }
 
-bool Controller::braking() const noexcept {
-  return std::ranges::any_of(body_->braking_mask, [](std::uint64_t word) { return word != 0; });
-}
+bool Controller::braking() const noexcept { return body_->braking(); }
 
 std::uint32_t Controller::words() const noexcept {
   return static_cast<std::uint32_t>(body_->active_mask.size());

@@ -235,6 +235,9 @@ const std::byte* UntypedBackend::desired() const noexcept { return body_->contro
 const std::uint64_t* UntypedBackend::active() const noexcept {
   return body_->controller.active_mask();
 }
+const std::uint64_t* UntypedBackend::braking() const noexcept {
+  return body_->controller.braking_mask();
+}
 Iteration UntypedBackend::iteration() const noexcept { return body_->current; }
 std::int64_t UntypedBackend::time() const noexcept { return body_->time(); }
 void UntypedBackend::set_timing(const Timing& timing) noexcept { body_->set_timing(timing); }

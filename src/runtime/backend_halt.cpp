@@ -124,7 +124,11 @@ Outcome UntypedBackend::Body::resume(std::uint32_t lane, CommandId id,
   };
   ShortText<200> why;
   const std::uint64_t acting = halts.halt().number;
-  if (taking_ticket_ < halted_below_ || number < acting) {
+  if (taking_ticket_ < halted_below_ && number == acting) {
+    why.add("halt ").add(acting).add(" begins only now: resume it when the robot has braked");
+    return refuse(why.view());
+  }
+  if (number < acting) {
     why.add("halt ").add(acting).add(" came after it: look at it, then resume that one");
     return refuse(why.view());
   }
@@ -133,7 +137,9 @@ Outcome UntypedBackend::Body::resume(std::uint32_t lane, CommandId id,
     return refuse(why.view());
   }
   if (controller.braking() || schedule.has_aside()) {
-    return refuse("the robot still brakes: resume when it has come to rest");
+    return refuse(schema.head.bursting == 0
+                      ? "the robot still brakes: resume when it has come to rest"
+                      : "the robot still brakes: let it come to rest in a burst, then resume");
   }
 
   // the robot may refuse; a halt that comes meanwhile wins

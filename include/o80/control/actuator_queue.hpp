@@ -45,6 +45,11 @@ class ActuatorQueue {
   bool empty() const noexcept { return queue_.empty(); }
   /// A direct value keeps a resting number away from its rest until something takes its place.
   bool holds() const noexcept { return holds_ && limiter_.away_from_rest(); }
+  /// An iteration without a command would not move it.
+  bool at_rest() const noexcept {
+    const bool still = limiter_.at_rest() && (holds_ || !limiter_.away_from_rest());
+    return still || follows();
+  }
   /// A command of this lane, or the direct value it gave last, still acts.
   bool acts(std::uint32_t lane) const noexcept {
     return queue_.has(lane) || (holder_ == lane && holds());

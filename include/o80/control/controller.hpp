@@ -84,7 +84,7 @@ class Controller {
   const std::uint64_t* clamped_mask() const noexcept;
   /// One bit an actuator, in whole words: the last step brought it to rest, without a command.
   const std::uint64_t* braking_mask() const noexcept;
-  /// Some actuator has not come to rest.
+  /// Some actuator has no command and has not come to rest; O(actuators).
   bool braking() const noexcept;
   /// Words of a mask.
   std::uint32_t words() const noexcept;

@@ -49,6 +49,10 @@ class Limiter {
   /// One iteration towards rest; resting numbers go where they rest, or, with `hold`, stay. True
   /// while anything moves.
   bool brake(std::byte* state, bool hold) noexcept;
+  /// Nothing that limits tell how to stop is moving.
+  bool at_rest() const noexcept {
+    return std::ranges::all_of(numbers_, [](const Number& each) { return each.limiter.at_rest(); });
+  }
   /// Some resting number is not where it rests.
   bool away_from_rest() const noexcept {
     return std::ranges::any_of(numbers_, [](const Number& each) {

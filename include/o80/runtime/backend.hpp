@@ -89,8 +89,10 @@ class UntypedBackend {
   /// Commands, exclusive control or a motion act. For the thread of the loop.
   bool acts() const noexcept;
   const std::byte* desired() const noexcept;
-  /// One bit an actuator: a command gave its desired state.
+  /// One bit an actuator: a command gave its desired state, or it brakes.
   const std::uint64_t* active() const noexcept;
+  /// One bit an actuator: without a command, it comes to rest within its limits.
+  const std::uint64_t* braking() const noexcept;
   /// The iteration under way; before the first `step`, 0.
   Iteration iteration() const noexcept;
   /// Time of the iteration under way, on the schema's clock [ns].

@@ -251,6 +251,27 @@ TEST_F(HaltTest, ResumeStartsAfreshFromWhereTheRobotIs) {
   EXPECT_EQ(batch.handle(0).status, Status::completed);
 }
 
+TEST_F(HaltTest, ResumeIsRefusedUntilTheRobotHasBraked) {
+  // a backend that stands still latches a halt without an iteration in which it could brake
+  BurstingStation bursting("pair", {}, [](Schema& schema) {
+    schema.actuator(0).limits({.speed = 100.0, .acceleration = 10'000.0});
+  });
+  UntypedFrontend frontend("pair");
+  add(frontend, 0, 10.0, {.pace = fastest()});
+  frontend.burst(5, kPatience);
+  const double speed = desired(frontend.latest()) - desired(frontend.wait_for(4, kAtOnce));
+  ASSERT_GT(speed, 0.03);
+  const std::uint64_t number = frontend.halt("");
+  while (frontend.halted()->iteration < 0) std::this_thread::yield();  // it is latched
+  EXPECT_THAT(message_of<BackendHalted>([&] { frontend.resume(number, kPatience); }),
+              HasSubstr("still brakes"));
+  frontend.burst(10, kPatience);
+  EXPECT_NEAR(desired(frontend.wait_for(6, kAtOnce)) - desired(frontend.wait_for(5, kAtOnce)),
+              speed - 0.01, 1e-9);
+  frontend.resume(number, kPatience);
+  EXPECT_EQ(desired(frontend.latest()), desired(frontend.wait_for(15, kAtOnce)));
+}
+
 TEST_F(HaltTest, ResumeClearsNoHaltThatCameAfterTheOneItNames) {
   Station station;
   station.start();

@@ -145,8 +145,9 @@ class Station final : private RequestServer {
 class BurstingStation {
  public:
   explicit BurstingStation(const std::string& segment = "pair",
-                           const std::function<void(Station&)>& prepare = {})
-      : station({.segment = segment, .bursting = true}) {
+                           const std::function<void(Station&)>& prepare = {},
+                           const std::function<void(Schema&)>& describe = {})
+      : station({.segment = segment, .bursting = true}, describe) {
     if (prepare) prepare(station);
     station.start();
     thread_ = std::thread([this] { station.serve_bursts(); });
