@@ -50,7 +50,17 @@ STEPS: dict[str, list[list[str]]] = {
     "dev": cpp("dev"),
     "torture": [
         # chance is the machine's; the mixes are the same in every run
-        ["build/dev/bin/o80-torture", "--kills", "2000", "--seed", "77", "--python", sys.executable]
+        [
+            "build/dev/bin/o80-torture",
+            "--kills",
+            "2000",
+            "--halts",
+            "300",
+            "--seed",
+            "77",
+            "--python",
+            sys.executable,
+        ]
     ],
     "tidy": [[sys.executable, "tools/tidy.py"]],
     "models": [[sys.executable, "models/run.py"]],

@@ -135,6 +135,7 @@ void be_a_usurper(Actor& actor);
 void be_a_commander(Actor& actor);
 void be_a_burster(Actor& actor);
 void be_a_group_burster(Actor& actor);
+void be_a_halter(Actor& actor);
 void be_a_reader(Actor& actor);
 void be_an_auditor(Actor& actor, std::uint32_t segments);
 

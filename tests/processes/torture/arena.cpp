@@ -82,6 +82,8 @@ void Arena::begin(std::uint64_t seed, const std::string& replay) {
     }
     add(Role::group_burster, chance_.between(1, 2));
   }
+  for (std::uint32_t i = 0; i < segments_; ++i)
+    if (chance_.percent(60)) add(Role::halter, chance_.between(1, 2), i);
   next_kill_ = now + chance_.between(20, 100) * kMillisecond;
   next_stop_ = now + chance_.between(20, 300) * kMillisecond;
   begin_phase(Phase::act, now);
@@ -195,6 +197,7 @@ void Arena::finish() {
   for (const Failure& failure : judge(*round_)) fail(failure.fault, failure.text);
   ++tally_.rounds;
   tally_.commands += commands_of(*round_);
+  tally_.halts += halts_of(*round_);
   for (std::uint32_t i = 0; i < actors_; ++i) {
     const Slot& slot = round_->slots[i];
     tally_.calls += slot.calls;

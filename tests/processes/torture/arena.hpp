@@ -28,6 +28,7 @@ struct Tally {
   std::uint64_t timeouts = 0;
   std::uint64_t rows = 0;
   std::uint64_t commands = 0;
+  HaltCount halts;
   std::array<std::int64_t, 4> longest_phase{};  // [ns]
   std::vector<std::int64_t> noticed;
   std::vector<std::int64_t> recovered;

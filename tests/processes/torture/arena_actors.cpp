@@ -109,6 +109,9 @@ void Arena::act(Slot& slot) {
       case Role::group_burster:
         be_a_group_burster(actor);
         break;
+      case Role::halter:
+        be_a_halter(actor);
+        break;
       case Role::reader:
         be_a_reader(actor);
         break;

@@ -115,6 +115,8 @@ class Auditor {
         refused_since = 0;
       } catch (const o80::LaneFull& error) {
         refused(error.what());
+      } catch (const o80::BackendHalted&) {
+        // a commander died meanwhile, say: bursts are served all the same
       } catch (const o80::BackendGone&) {
         throw;
       } catch (const o80::TimeoutError&) {

@@ -13,6 +13,8 @@ struct Habits {
   o80::BackendOptions options;
   std::int64_t pause;  // of an iteration [ns]
   bool interrupts;
+  bool halts;
+  bool limited;
   o80::Iteration orphan_at;  // -1: never
   o80::Iteration fails_at;   // the same
 };
@@ -28,11 +30,15 @@ Habits draw(Actor& actor, bool bursting) {
   habits.options.lanes = static_cast<std::uint32_t>(chance.between(2, 8));
   habits.options.lane_blocks = 16U << chance.below(7);
   constexpr o80::Stale kStale[] = {o80::Stale::hold, o80::Stale::hold, o80::Stale::purge,
-                                   o80::Stale::stop};
+                                   o80::Stale::stop, o80::Stale::halt};
   habits.options.stale = kStale[chance.below(std::size(kStale))];
   if (habits.options.stale != o80::Stale::hold && chance.percent(40))
     habits.options.silence = chance.between(20, 200);
+  habits.options.resume = chance.percent(10);
   habits.interrupts = chance.percent(30);
+  habits.halts = chance.percent(15);
+  // the same for all of a round: a frontend attaches again only to the robot it knows
+  habits.limited = mix(actor.round.seed, 99) % 2 == 0;
   habits.orphan_at = chance.percent(15) ? chance.between(0, 200) : -1;
   habits.fails_at = chance.percent(10) ? chance.between(1, 400) : -1;
   return habits;
@@ -44,17 +50,24 @@ class Machine final : private o80::RequestServer {
   Machine(Actor& actor, const Habits& habits)
       : life_(actor.round.lives[actor.slot.generation]),
         number_(actor.slot.generation),
-        backend_(schema_of("torture"), habits.options, this) {
+        chance_(mix(actor.slot.seed, 1)),
+        backend_(schema_of("torture", habits.limited), habits.options, this) {
     life_.epoch = epoch_of(habits.options.segment);
   }
 
   o80::UntypedBackend& backend() { return backend_; }
   bool is_full() const { return life_.rows.load() + 16 >= kMostRows; }
 
+  o80::Step step() {
+    stepped_at_ = o80::monotonic_now();
+    life_.steps = backend_.iteration();
+    return backend_.step_within(20 * kMillisecond);
+  }
+
   void publish() {
     const States desired = states(backend_.desired());
     const States observed = desired;
-    note(desired, static_cast<std::uint32_t>(backend_.active()[0]));
+    note(desired, static_cast<std::uint32_t>(backend_.active()[0] & ~backend_.braking()[0]), false);
     o80::pack(observed, backend_.observed());
     o80::pack(sensors(desired, observed), backend_.extended());
     chain_ = last_;
@@ -62,12 +75,18 @@ class Machine final : private o80::RequestServer {
   }
 
  private:
-  static o80::Schema schema_of(const char* robot) {
+  static o80::Schema schema_of(const char* robot, bool limited) {
     o80::Schema schema;
     schema.head.robot = o80::NameText(robot);
     o80::describe_types<Robot>(schema);
-    for (std::uint32_t i = 0; i < kActuators; ++i)
-      schema.actuator(i).limits({.minimum = kLowest, .maximum = kHighest});
+    for (std::uint32_t i = 0; i < kActuators; ++i) {
+      o80::Limits limits{.minimum = kLowest, .maximum = kHighest};
+      if (limited && i == kLimited) {
+        limits.speed = kSpeed;
+        limits.acceleration = kAcceleration;
+      }
+      schema.actuator(i).limits(limits);
+    }
     return schema;
   }
   States states(const std::byte* bytes) const { return o80::unpack<States>(bytes); }
@@ -79,10 +98,13 @@ class Machine final : private o80::RequestServer {
     row.digest = made.digest;
     return made;
   }
-  void note(const States& desired, std::uint32_t active) {
+  void note(const States& desired, std::uint32_t active, bool fresh) {
     JournalRow& row = life_.journal[static_cast<std::size_t>(backend_.iteration())];
     row.desired = desired;
     row.active = active;
+    row.fresh = fresh ? 1 : 0;
+    row.halted = backend_.halted().number;
+    row.stepped_at = stepped_at_;
     row.at = o80::monotonic_now();
     life_.rows = backend_.iteration() + 1;
   }
@@ -95,11 +117,20 @@ class Machine final : private o80::RequestServer {
       life_.requests[place] = {mark.id, backend_.iteration()};
       life_.served = place + 1;
     }
-    return request == 0 ? o80::Served::done() : o80::Served::start_afresh();
+    return request == 1 ? o80::Served::start_afresh() : o80::Served::done();
+  }
+  o80::Served resume() noexcept override {
+    const bool granted = !chance_.percent(15);
+    const std::uint32_t place = life_.resumed;
+    if (place < kMostResumes) {
+      life_.resumes[place] = {backend_.halted().number, backend_.iteration(), granted ? 1U : 0U};
+      life_.resumed = place + 1;
+    }
+    return granted ? o80::Served::done() : o80::Served::rejected("the brakes are hot");
   }
   bool read_fresh(o80::FreshReading& reading) noexcept override {
     const States observed = states(reading.observed);
-    note(observed, 0);
+    note(observed, 0, true);
     o80::pack(sensors(observed, observed), reading.extended);
     chain_ = last_;
     return true;
@@ -109,6 +140,8 @@ class Machine final : private o80::RequestServer {
   std::uint32_t number_;
   std::uint64_t chain_ = 0;  // digest of the last row
   std::uint64_t last_ = 0;   // and of the one under way
+  std::int64_t stepped_at_ = 0;
+  Chance chance_;
   o80::UntypedBackend backend_;
 };
 
@@ -126,7 +159,7 @@ std::string iterate(Actor& actor, const Habits& habits, Machine& machine) {
   machine.publish();
   while (true) {
     if (actor.phase() == Phase::end || machine.is_full()) return "";
-    const o80::Step step = backend.step_within(20 * kMillisecond);
+    const o80::Step step = machine.step();
     if (step == o80::Step::standing) continue;
     if (step == o80::Step::ended) {
       judge_own_end(actor, habits, std::string(backend.failure()));
@@ -136,6 +169,8 @@ std::string iterate(Actor& actor, const Habits& habits, Machine& machine) {
     if (backend.iteration() == habits.orphan_at) actor.leave_an_orphan([] {});
     if (habits.interrupts && actor.chance.below(100) == 0)
       backend.interrupt(static_cast<std::uint32_t>(actor.chance.below(kActuators)));
+    if (habits.halts && actor.acting() && actor.chance.below(300) == 0)
+      backend.halt(o80::HaltCause::driver, "the belt slipped");
     if (!habits.options.bursting && habits.pause > 0 && actor.acting()) actor.pause(habits.pause);
     machine.publish();
   }
@@ -155,6 +190,9 @@ void be_a_backend(Actor& actor, bool bursting) {
   Generation& life = actor.round.lives[actor.slot.generation];
   life.stops_stale = habits.options.stale == o80::Stale::stop ? 1 : 0;
   life.bursting = bursting ? 1 : 0;
+  life.watches = habits.options.silence > 0 ? 1 : 0;
+  life.limited = habits.limited ? 1 : 0;
+  life.ignores_halts = bursting || habits.options.resume ? 1 : 0;
   try {
     Machine machine(actor, habits);
     run(actor, habits, machine, life);
@@ -167,6 +205,8 @@ void be_a_backend(Actor& actor, bool bursting) {
 /// Starts a second backend beside one that lives, or is stopped: it must be refused.
 void be_a_usurper(Actor& actor) {
   Generation& life = actor.round.lives[actor.slot.generation];
+  // it may have the name until it is refused
+  life.usurped = 1;
   try {
     o80::Schema schema;
     schema.head.robot = o80::NameText("usurper");
@@ -177,6 +217,7 @@ void be_a_usurper(Actor& actor) {
                  actor.slot.generation);
   } catch (const o80::SegmentTaken&) {
     // as it must be
+    life.usurped = 0;
   }
 }
 

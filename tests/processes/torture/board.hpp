@@ -19,6 +19,8 @@ inline constexpr std::uint32_t kMostServed = 4096;
 inline constexpr std::uint32_t kMostBatches = 1024;  // of an actor
 inline constexpr std::uint32_t kMostCommands = 4096;
 inline constexpr std::uint32_t kMostSamples = 4096;
+inline constexpr std::uint32_t kMostHalts = 512;    // asked for by an actor
+inline constexpr std::uint32_t kMostResumes = 512;  // of an actor, of a generation
 
 enum class Phase : std::uint32_t { act, settle, audit, end };
 
@@ -28,6 +30,7 @@ enum class Role : std::uint32_t {
   commander,
   burster,
   group_burster,
+  halter,
   reader,
   auditor,
   usurper,
@@ -41,7 +44,7 @@ constexpr bool is_backend(Role role) {
 }
 constexpr bool is_sender(Role role) {
   return role == Role::commander || role == Role::burster || role == Role::group_burster ||
-         role == Role::python_commander;
+         role == Role::halter || role == Role::python_commander;
 }
 
 /// What went wrong, by kind.
@@ -57,6 +60,7 @@ enum class Fault : std::uint32_t {
   taken_alive,
   bad_error,
   crash,
+  halt_broken,
   left_over,
   count
 };
@@ -66,14 +70,23 @@ const char* name_of(Fault fault);
 struct JournalRow {
   std::uint64_t digest;
   std::array<double, kActuators> desired;
-  std::int64_t at;       // [ns]
-  std::uint32_t active;  // a bit an actuator
-  std::uint32_t reserved;
+  std::int64_t at;          // [ns]
+  std::int64_t stepped_at;  // [ns], when its step was about to begin
+  std::uint64_t halted;     // number of the halt that acted, 0: none
+  std::uint32_t active;     // a bit an actuator that a command moves
+  std::uint32_t fresh;
 };
 
 struct ServedRequest {
   std::uint64_t mark;
   std::int64_t iteration;
+};
+
+/// What the driver answered to who resumed.
+struct ServedResume {
+  std::uint64_t number;  // of the halt that acted
+  std::int64_t iteration;
+  std::uint32_t granted;
 };
 
 /// The life of one backend.
@@ -89,12 +102,19 @@ struct Generation {
   std::atomic<std::int64_t> dead_at;    // the kernel has taken it down
   std::atomic<std::uint32_t> drained;   // all that was sent must have ended
   std::uint32_t bursting;
-  std::uint32_t stops_stale;          // ends when a sender dies
-  std::atomic<std::uint32_t> failed;  // it ends as failed
+  std::uint32_t stops_stale;           // ends when a sender dies
+  std::uint32_t limited;               // kLimited has limits of speed and acceleration
+  std::uint32_t watches;               // takes control from who is silent
+  std::uint32_t ignores_halts;         // of the backend before
+  std::atomic<std::uint32_t> failed;   // it ends as failed
+  std::atomic<std::uint32_t> usurped;  // when it was dead, a second backend took its name and left
   std::atomic<std::int64_t> rows;
+  std::atomic<std::int64_t> steps;  // the iteration whose step was begun last
   std::atomic<std::uint32_t> served;
   std::array<std::atomic<std::uint32_t>, 16> lane_owners;  // actor + 1
   std::array<ServedRequest, kMostServed> requests;
+  std::atomic<std::uint32_t> resumed;
+  std::array<ServedResume, kMostResumes> resumes;
   std::array<JournalRow, kMostRows> journal;
 };
 
@@ -120,7 +140,7 @@ struct SentBatch {
   std::int64_t sent_at;    // [ns], when it was out; 0: not told
 };
 
-enum class SentKind : std::uint32_t { command, mark, other, take_control, release_control };
+enum class SentKind : std::uint32_t { command, mark, other, take_control, release_control, look };
 
 struct SentCommand {
   std::uint64_t value;  // bits of the (last) target, or the mark of a request
@@ -133,6 +153,25 @@ struct SentCommand {
   std::uint64_t found_id;  // whose status stands in its place
   std::uint32_t found_reason;
   std::uint32_t arrives_early;  // a motion that fades out on its target, before its last iteration
+};
+
+/// A halt that an actor asked for.
+struct AskedHalt {
+  std::atomic<std::uint32_t> asked;  // Sent
+  std::uint32_t generation;          // kNoGeneration: by name, of whatever bore it
+  std::uint64_t number;
+  std::int64_t began_at;     // [ns]
+  std::int64_t returned_at;  // [ns]
+};
+inline constexpr std::uint32_t kNoGeneration = 0xFFFFFFFF;
+
+enum class Resumed : std::uint32_t { nothing, unknown, done, refused };
+
+struct AskedResume {
+  std::atomic<std::uint32_t> resumed;  // Resumed
+  std::uint32_t generation;
+  std::uint64_t number;
+  std::int64_t returned_at;  // [ns]; 0: it did not, or the number was a guess
 };
 
 /// One started process.
@@ -163,6 +202,12 @@ struct Slot {
   std::atomic<std::uint32_t> commands;
   std::array<SentBatch, kMostBatches> sent_batches;
   std::array<SentCommand, kMostCommands> sent_commands;
+  std::atomic<std::uint32_t> halts;
+  std::atomic<std::uint32_t> resumes;
+  std::atomic<std::uint32_t> bursts_halted;
+  std::atomic<std::uint32_t> halted_in_control;
+  std::array<AskedHalt, kMostHalts> asked_halts;
+  std::array<AskedResume, kMostResumes> asked_resumes;
 
   void stops(std::int64_t now) { stopped.fetch_sub(now); }
   void goes_on(std::int64_t now) { stopped.fetch_add(now); }

@@ -1,5 +1,6 @@
 #include <optional>
 
+#include "torture/halting.hpp"
 #include "torture/sender.hpp"
 #include "torture/verify.hpp"
 
@@ -26,9 +27,11 @@ class Burster {
     if (actor_.chance.percent(20)) sender.pulse();
     const std::int64_t n = actor_.chance.percent(20) ? 0 : actor_.chance.between(1, 12);
     const std::optional<o80::Burst> burst = sender.burst(n);
+    if (actor_.chance.percent(2)) halt(actor_, sender.frontend());
     if (burst && sender.open() > 0 && sender.last().id() == burst->batch().id())
       wait(sender, *burst, verifier, stopped);
     sender.settle();
+    if (actor_.chance.percent(20)) resume(actor_, sender.frontend(), call_began_);
     if (actor_.chance.percent(50)) actor_.pause(actor_.chance.between(0, 2) * kMillisecond);
   }
 
@@ -46,6 +49,8 @@ class Burster {
                     static_cast<long>(row));
     } catch (const o80::TimeoutError&) {
       actor_.judge_timeout(sender.life(), call_began_, stopped);
+    } catch (const o80::BackendHalted&) {
+      ++actor_.slot.bursts_halted;
     } catch (const o80::RowOverwritten&) {
       // forgotten: others did many bursts since
     }
@@ -98,6 +103,8 @@ class GroupBurster {
       }
     } catch (const o80::TimeoutError&) {
       for (const Sender* sender : both) actor_.judge_timeout(sender->life(), call_began_, stopped);
+    } catch (const o80::BackendHalted&) {
+      ++actor_.slot.bursts_halted;
     } catch (const o80::RowOverwritten&) {
       // others were faster
     } catch (const o80::LaneFull&) {
@@ -110,7 +117,10 @@ class GroupBurster {
     } catch (const o80::Error& error) {
       if (std::string(error.what()).find("exclusive") == std::string::npos) throw;
     }
-    for (Sender* sender : both) sender->settle();
+    for (Sender* sender : both) {
+      sender->settle();
+      if (actor_.chance.percent(20)) resume(actor_, sender->frontend(), call_began_);
+    }
   }
 
   void burst_at_once(const Both& both, std::array<Verifier, 2>& verifiers) {

@@ -1,3 +1,4 @@
+#include "torture/halting.hpp"
 #include "torture/sender.hpp"
 
 namespace torture {
@@ -36,13 +37,21 @@ class Commander {
     call_began_ = o80::monotonic_now();
     if (sender.open_commands() < most_open_) {
       sender.add_some();
-      sender.pulse(when(sender));
+      const bool sent = sender.pulse(when(sender));
+      // the more so when a lane is full
+      if (actor_.chance.percent(sender.controls() ? 10 : sent ? 1 : 5)) halt_now(sender);
     }
+    if (actor_.chance.percent(10)) resume(actor_, sender.frontend(), call_began_);
     if (orphans_ && actor_.chance.below(50) == 0) leave_an_orphan(sender);
     if (sender.open() > 0 && actor_.chance.percent(40)) wait(sender);
     sender.settle();
     if (sender.open_commands() >= most_open_ && sender.open() > 0) wait(sender);
     if (!keen_) actor_.pause(actor_.chance.between(0, 3) * kMillisecond);
+  }
+
+  void halt_now(Sender& sender) {
+    if (sender.controls()) ++actor_.slot.halted_in_control;
+    halt(actor_, sender.frontend());
   }
 
   o80::PulseOptions when(Sender& sender) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstdio>
 #include <map>
 
 #include "o80/control/record.hpp"
@@ -87,6 +88,7 @@ class Judge {
     }
     for (const Generation& life : round_.lives) judge_limits(life);
     for (auto& [generation, bursts] : bursts_) judge_bursts(generation, bursts);
+    judge_halts(round_, failures_);
     return std::move(failures_);
   }
 
@@ -135,14 +137,19 @@ class Judge {
   }
 
   void judge(const Slot& slot, const SentBatch& batch, const SentCommand& command) {
-    if (command.kind != SentKind::command && command.kind != SentKind::mark) return;
+    const SentKind kind = command.kind;
+    if (kind != SentKind::command && kind != SentKind::mark && kind != SentKind::look) return;
     const Generation& life = round_.lives[batch.generation];
-    const std::vector<Done> done = deeds(batch.generation).of(command);
+    std::vector<Done> done = deeds(batch.generation).of(command);
+    // within limits of acceleration, places of the way there and back may be the same
+    const std::int64_t end = has_ended(command.told) ? command.told_at : command.found_at;
+    if (is_limited(batch, command))
+      std::erase_if(done, [&](const Done& each) { return each.iteration != end; });
     const auto sent = static_cast<Sent>(batch.sent.load());
     if (done.size() > 1)
       return add(Fault::doubled, slot, batch, command,
                  "done at " + std::to_string(done[0].iteration) + " and " +
-                     std::to_string(done[1].iteration));
+                     std::to_string(done[1].iteration) + around(life, done[1]));
     if (sent == Sent::refused && !done.empty())
       return add(Fault::falsely_told, slot, batch, command, "refused, and done all the same");
     if (sent != Sent::sent) return;
@@ -162,6 +169,27 @@ class Judge {
       add(Fault::falsely_told, slot, batch, command,
           "done at " + std::to_string(done[0].iteration) + ", and nobody was told" +
               told_of(slot, batch));
+  }
+
+  bool is_limited(const SentBatch& batch, const SentCommand& command) const {
+    return round_.lives[batch.generation].limited != 0 && command.actuator == kLimited &&
+           command.kind == SentKind::command;
+  }
+
+  /// The actuator in the rows around, for who wonders.
+  static std::string around(const Generation& life, const Done& done) {
+    std::string text;
+    const std::int64_t last =
+        std::min<std::int64_t>({life.rows - 1, kMostRows - 1, done.iteration + 2});
+    for (std::int64_t k = std::max<std::int64_t>(0, done.iteration - 4); k <= last; ++k) {
+      const JournalRow& row = life.journal[static_cast<std::size_t>(k)];
+      char line[80];
+      std::snprintf(line, sizeof line, "\n    row %ld: %s, %a", static_cast<long>(k),
+                    (row.active >> done.actuator & 1) != 0 ? "active" : "idle",
+                    row.desired[done.actuator]);
+      text += line;
+    }
+    return text;
   }
 
   /// What became of all of a batch, for who wonders.
@@ -194,9 +222,9 @@ class Judge {
             "done at " + std::to_string(done[0].iteration));
       return;
     }
-    if (status == Status::limited)
+    if (status == Status::limited && !is_limited(batch, command))
       return add(Fault::falsely_told, slot, batch, command, "no target was outside of the limits");
-    if (!done.empty() && command.arrives_early == 0)
+    if (!done.empty() && command.arrives_early == 0 && status != Status::limited)
       add(Fault::falsely_told, slot, batch, command,
           "done at " + std::to_string(done[0].iteration) + " all the same");
   }
@@ -271,7 +299,7 @@ class Judge {
       for_each(slot, attachment, SentKind::take_control,
                [&](const SentBatch& batch, const SentCommand& take) {
                  const std::int64_t from = done_at(take, -1);
-                 if (from < 0) return;
+                 if (from < 0 || round_.lives[batch.generation].watches != 0) return;
                  std::int64_t until = lived_until(slot, batch);
                  for_each(slot, attachment, SentKind::release_control,
                           [&](const SentBatch&, const SentCommand& release) {

@@ -41,24 +41,51 @@ constexpr Label kBackend[] = {{"create.before_lock", 1},
                               {"backend.after_take", 30},
                               {"backend.after_step", 100},
                               {"staged.before", 20},
-                              {"staged.after", 20}};
+                              {"staged.after", 20},
+                              {"halt.before_count", 2},
+                              {"halt.after_count", 2},
+                              {"halt.before_reason", 4},
+                              {"halt.before_number", 4}};
 
-constexpr Label kBursting[] = {
-    {"burst.before", 30},        {"burst.before_row", 30},      {"burst.before_id", 30},
-    {"burst.before_newest", 30}, {"burst.after", 30},           {"bell.before_sleep", 20},
-    {"bell.after_sleep", 20},    {"history.before_row", 100},   {"history.after_published", 100},
-    {"status.after_word", 60},   {"status.before_word", 60},    {"events.before", 30},
-    {"events.after", 30},        {"lane.before_freed", 30},     {"create.before_rename", 1},
-    {"create.after_rename", 1},  {"segment.after_state", 1},    {"backend.after_take", 30},
-    {"staged.after", 20},        {"create.after_draft", 1},     {"create.after_former", 1},
-    {"sweep.after_draft", 1},    {"segment.between_unlinks", 1}};
+constexpr Label kBursting[] = {{"burst.before", 30},
+                               {"burst.before_row", 30},
+                               {"burst.before_id", 30},
+                               {"burst.before_newest", 30},
+                               {"burst.after", 30},
+                               {"bell.before_sleep", 20},
+                               {"bell.after_sleep", 20},
+                               {"history.before_row", 100},
+                               {"history.after_published", 100},
+                               {"status.after_word", 60},
+                               {"status.before_word", 60},
+                               {"events.before", 30},
+                               {"events.after", 30},
+                               {"lane.before_freed", 30},
+                               {"create.before_rename", 1},
+                               {"create.after_rename", 1},
+                               {"segment.after_state", 1},
+                               {"backend.after_take", 30},
+                               {"staged.after", 20},
+                               {"create.after_draft", 1},
+                               {"create.after_former", 1},
+                               {"sweep.after_draft", 1},
+                               {"segment.between_unlinks", 1},
+                               {"halt.before_reason", 4},
+                               {"halt.before_number", 4}};
 
 constexpr Label kSender[] = {
     {"lane.after_lock", 1},        {"lane.before_dead", 1},   {"lane.before_incarnation", 1},
     {"lane.after_incarnation", 1}, {"lane.before_copy", 20},  {"lane.before_ticket", 20},
     {"lane.before_commit", 20},    {"lane.after_commit", 20}, {"bell.before_ring", 20},
     {"bell.after_ring", 20},       {"lane.before_close", 1},  {"lane.after_close", 1},
-    {"lane.before_ids", 20},       {"lane.before_sleep", 10}, {"lane.after_sleep", 10}};
+    {"lane.before_ids", 20},       {"lane.before_sleep", 10}, {"lane.after_sleep", 10},
+    {"halt.after_count", 3},       {"halt.before_number", 3}};
+
+constexpr Label kHalter[] = {{"halt.before_count", 10},     {"halt.after_count", 10},
+                             {"halt.before_reason", 10},    {"halt.before_number", 10},
+                             {"bell.before_ring", 10},      {"bell.after_ring", 10},
+                             {"lane.after_incarnation", 1}, {"lane.before_commit", 10},
+                             {"lane.after_commit", 10},     {"lane.after_sleep", 10}};
 
 constexpr Label kReader[] = {
     {"rows.before_register", 10}, {"rows.before_sleep", 10}, {"rows.before_pass_on", 5}};
@@ -75,6 +102,8 @@ std::span<const Label> labels_of(Role role) {
     case Role::burster:
     case Role::group_burster:
       return kSender;
+    case Role::halter:
+      return kHalter;
     case Role::reader:
       return kReader;
     default:

@@ -4,7 +4,7 @@ namespace torture {
 
 const char* name_of(Role role) {
   static constexpr const char* kNames[] = {
-      "backend", "bursting backend", "commander", "burster",          "group burster",
+      "backend", "bursting backend", "commander", "burster",          "group burster", "halter",
       "reader",  "auditor",          "usurper",   "Python commander", "Python reader"};
   return kNames[static_cast<std::size_t>(role)];
 }
@@ -21,6 +21,7 @@ const char* name_of(Fault fault) {
                                            "taken while alive",
                                            "wrong errors",
                                            "crashes",
+                                           "halts broken",
                                            "left over"};
   return kNames[static_cast<std::size_t>(fault)];
 }

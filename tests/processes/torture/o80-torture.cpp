@@ -23,6 +23,7 @@ namespace {
 
 struct Options {
   std::uint64_t kills = 2000;
+  std::uint64_t halts = 0;
   std::uint64_t seed = 0;
   std::int64_t round = -1;   // only this one, again and again
   std::int64_t seconds = 0;  // 0: until there are enough kills
@@ -58,7 +59,7 @@ class Campaign {
  private:
   bool step() {
     const std::int64_t now = o80::monotonic_now();
-    const bool enough = tally_.kills >= options_.kills || failures() >= 20 || late(now);
+    const bool enough = is_done() || failures() >= 20 || late(now);
     bool busy = false;
     for (Arena& arena : arenas_) {
       if (arena.idle() && !enough) begin(arena);
@@ -86,6 +87,10 @@ class Campaign {
     arena.begin(mix(options_.seed, round),
                 "round " + std::to_string(round) + ", to be played again with --seed " +
                     std::to_string(options_.seed) + " --round " + std::to_string(round));
+  }
+
+  bool is_done() const {
+    return tally_.kills >= options_.kills && tally_.halts.asked >= options_.halts;
   }
 
   bool late(std::int64_t now) const {
@@ -137,6 +142,15 @@ class Campaign {
         number(tally_.rounds), number(tally_.starts), number(tally_.usurpers),
         number(tally_.orphans), number(tally_.calls), number(tally_.timeouts), number(tally_.rows),
         number(tally_.commands));
+    const HaltCount& halts = tally_.halts;
+    std::printf(
+        "%lu halts asked for, %lu of these by who had taken control, %lu more by who was killed "
+        "meanwhile; %lu seen by drivers, %lu of these in motion\n"
+        "%lu commands and %lu bursts ended by them, %lu resumes, %lu successors of the killed "
+        "started halted\n",
+        number(halts.asked), number(halts.controlled), number(halts.interrupted),
+        number(halts.begun), number(halts.moving), number(halts.commands), number(halts.bursts),
+        number(halts.resumed), number(halts.inherited));
     std::printf("longest phase of a round: act %.1f s, settle %.1f s, audit %.1f s\n",
                 static_cast<double>(tally_.longest_phase[0]) / 1e9,
                 static_cast<double>(tally_.longest_phase[1]) / 1e9,
@@ -148,14 +162,14 @@ class Campaign {
       std::printf("%-44s %6lu\n", name_of(fault), number(tally_.failures[fault]));
     }
     if (interrupted != 0) std::printf("interrupted\n");
-    const bool late_and_short =
-        tally_.kills < options_.kills && failures() == 0 && interrupted == 0;
+    const bool late_and_short = !is_done() && failures() == 0 && interrupted == 0;
     if (late_and_short)
-      std::printf("only %lu of %lu kills in %ld s\n", number(tally_.kills), number(options_.kills),
+      std::printf("only %lu of %lu kills and %lu of %lu halts in %ld s\n", number(tally_.kills),
+                  number(options_.kills), number(halts.asked), number(options_.halts),
                   static_cast<long>(options_.seconds));
-    std::printf("seed %lu, %.0f s\n%lu kills, %lu failures\n", number(options_.seed),
+    std::printf("seed %lu, %.0f s\n%lu kills, %lu halts, %lu failures\n", number(options_.seed),
                 static_cast<double>(o80::monotonic_now() - began_) / 1e9, number(tally_.kills),
-                number(failures()));
+                number(halts.asked), number(failures()));
     return failures() == 0 && !late_and_short && interrupted == 0 ? 0 : 1;
   }
 
@@ -171,6 +185,7 @@ Options parse(int argc, char** argv) {
   Options options;
   options.seed = std::random_device()() % 1'000'000;
   static const option kLong[] = {{"kills", required_argument, nullptr, 'k'},
+                                 {"halts", required_argument, nullptr, 'h'},
                                  {"seed", required_argument, nullptr, 's'},
                                  {"round", required_argument, nullptr, 'r'},
                                  {"seconds-limit", required_argument, nullptr, 't'},
@@ -181,6 +196,9 @@ Options parse(int argc, char** argv) {
     switch (c) {
       case 'k':
         options.kills = std::strtoull(optarg, nullptr, 10);
+        break;
+      case 'h':
+        options.halts = std::strtoull(optarg, nullptr, 10);
         break;
       case 's':
         options.seed = std::strtoull(optarg, nullptr, 10);
@@ -199,7 +217,7 @@ Options parse(int argc, char** argv) {
         break;
       default:
         std::printf(
-            "o80-torture [--kills 2000] [--seed S] [--round R] [--seconds-limit S] "
+            "o80-torture [--kills 2000] [--halts 0] [--seed S] [--round R] [--seconds-limit S] "
             "[--arenas 3] [--python INTERPRETER]\n");
         std::exit(2);
     }

@@ -17,6 +17,10 @@ inline constexpr std::uint32_t kFiller = 24;
 // of every desired state; quintics that overshoot are clamped there
 inline constexpr double kLowest = 0;
 inline constexpr double kHighest = 2;
+// with some backends, one actuator has these limits too
+inline constexpr std::uint32_t kLimited = kActuators - 1;
+inline constexpr double kSpeed = 200;            // [1/s]
+inline constexpr double kAcceleration = 20'000;  // [1/s^2]
 
 constexpr std::uint64_t mix(std::uint64_t a, std::uint64_t b = 0) {
   std::uint64_t z = a * 0x9E3779B97F4A7C15ULL + b + 0x632BE59BD9B4E019ULL;
@@ -34,6 +38,12 @@ struct Again {
   std::uint64_t id = 0;
 };
 
+/// Served also while the backend is halted.
+struct Look {
+  static constexpr bool kWhileHalted = true;
+  std::uint64_t id = 0;
+};
+
 struct Sensors {
   std::uint64_t generation = 0;  // which backend
   std::uint64_t chain = 0;       // digest of the row before
@@ -43,6 +53,7 @@ struct Sensors {
 
 O80_DESCRIBE(Mark, id);
 O80_DESCRIBE(Again, id);
+O80_DESCRIBE(Look, id);
 O80_DESCRIBE(Sensors, generation, chain, digest, filler);
 
 using States = std::array<double, kActuators>;
@@ -50,7 +61,7 @@ using States = std::array<double, kActuators>;
 struct Robot {
   using Actuators = States;
   using Extended = Sensors;
-  using Requests = o80::Requests<Mark, Again>;
+  using Requests = o80::Requests<Mark, Again, Look>;
 };
 
 inline bool is_refused(std::uint64_t mark) { return mark % 7 == 0; }

@@ -45,7 +45,8 @@ void Sender::add_command() {
   const auto actuator = static_cast<std::uint32_t>(chance.below(kActuators));
   const double target = unique_target(chance.bits());
   o80::CommandOptions options;
-  switch (chance.below(7)) {
+  const bool limited = life_.limited != 0 && actuator == kLimited;
+  switch (chance.below(limited ? 8 : 7)) {
     case 0:
       options.pace = o80::iterations(chance.between(1, 20));
       break;
@@ -57,7 +58,10 @@ void Sender::add_command() {
           o80::until(std::max<o80::Iteration>(0, frontend_.published()) + chance.between(0, 30));
       break;
     case 3:
-      options.pace = o80::speed(static_cast<double>(chance.between(20, 2000)));
+      options.pace = o80::speed(static_cast<double>(chance.between(20, limited ? 200 : 2000)));
+      break;
+    case 7:
+      options.pace = o80::fastest();
       break;
     default:
       break;
@@ -65,8 +69,8 @@ void Sender::add_command() {
   if (chance.percent(20)) options.mode = o80::Mode::overwrite;
   if (chance.percent(20)) options.profile = o80::Profile::minimum_jerk;
   if (chance.percent(20)) options.start = o80::Start::observed;
-  const bool fades =
-      options.mode == o80::Mode::overwrite && options.profile == o80::Profile::minimum_jerk;
+  const bool fades = limited || (options.mode == o80::Mode::overwrite &&
+                                 options.profile == o80::Profile::minimum_jerk);
   note(SentKind::command, bits_of(target), actuator).arrives_early = fades ? 1 : 0;
   frontend_.add_command(actuator, bytes_of(target), options);
 }
@@ -76,7 +80,8 @@ void Sender::add_trajectory() {
   const auto actuator = static_cast<std::uint32_t>(chance.below(kActuators));
   std::vector<double> rows(static_cast<std::size_t>(chance.between(2, 30)));
   for (double& row : rows) row = unique_target(chance.bits());
-  note(SentKind::command, bits_of(rows.back()), actuator);
+  note(SentKind::command, bits_of(rows.back()), actuator).arrives_early =
+      life_.limited != 0 && actuator == kLimited ? 1 : 0;
   const auto count = static_cast<std::uint32_t>(rows.size());
   const auto states = std::as_bytes(std::span(rows));
   if (chance.percent(50)) {
@@ -110,6 +115,10 @@ void Sender::add_some() {
       add_trajectory();
     } else if (kind < 82) {
       add_outside();
+    } else if (kind < 84) {
+      const Look look{chance.bits() >> 1 | 3ULL << 62};
+      note(SentKind::look, look.id, 0);
+      frontend_.add_request(2, bytes_of(look));
     } else if (kind < 92) {
       const Mark mark{chance.bits() >> 1};
       note(SentKind::mark, mark.id, 0);
@@ -127,9 +136,11 @@ void Sender::add_some() {
     } else if (kind < 98) {
       note(SentKind::take_control, 0, 0);
       frontend_.add_take_control();
+      controls_ = true;
     } else {
       note(SentKind::release_control, 0, 0);
       frontend_.add_release_control();
+      controls_ = false;
     }
   }
 }

@@ -42,6 +42,8 @@ class Sender {
   void settle_all();
   std::size_t open() const { return open_.size(); }
   std::size_t open_commands() const;
+  /// It has taken control, if the backend agreed.
+  bool controls() const { return controls_; }
   void close();
 
  private:
@@ -65,6 +67,7 @@ class Sender {
   std::deque<Open> open_;
   std::uint32_t first_ = 0;  // command of the batch being made
   std::uint32_t attachment_ = 0;
+  bool controls_ = false;
   std::uint32_t lane_ = kNoLane;
 };
 

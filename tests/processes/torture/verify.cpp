@@ -23,6 +23,9 @@ Sensors Verifier::verify(const std::byte* row, o80::Iteration k) {
   if (std::memcmp(&expected, &found, sizeof found) != 0) wrong("it is torn");
   const JournalRow& noted = life_.journal[static_cast<std::size_t>(head.iteration)];
   if (noted.digest != found.digest) wrong("it is not what the driver made");
+  // row 0 shows halts that came while it was made
+  if (head.iteration > 0 && (noted.halted != 0) != (head.halted != 0))
+    wrong("what it says of a halt is not what the driver was told");
   if (life_.first_seen_at == 0) {
     const std::int64_t now = o80::monotonic_now();
     std::int64_t never = 0;
