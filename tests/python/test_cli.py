@@ -41,6 +41,11 @@ def o80(folder: Path, *words: str, fails: bool = False) -> str:
     return done.stderr if fails else done.stdout
 
 
+def in_a_line(said: str) -> str:
+    """What stands in a box, without its borders and line breaks."""
+    return " ".join(said.replace("│", " ").split())
+
+
 def start(folder: Path, *words: str) -> "subprocess.Popen[str]":
     """A robot that is up."""
     process = subprocess.Popen(
@@ -109,7 +114,21 @@ def test_echo_prints_rows_in_order(folder: Path, robot: "subprocess.Popen[str]")
     first = rows[0]["iteration"]
     assert [row["iteration"] for row in rows] == list(range(first, first + 5))
     assert rows[0]["extended"] == {"effort": [0.0, 0.0]}
-    assert "observed (0 0)" in o80(folder, "echo", "two_joints", "--count", "1")
+    line = o80(folder, "echo", "two_joints", "--count", "1")
+    assert "observed (0 0)" in line
+    assert "extended effort (0 0)" in line
+
+
+@pytest.mark.parametrize("rate", ["0", "-2", "nan", "inf"])
+def test_echo_refuses_a_rate_that_is_not_positive(folder: Path, rate: str) -> None:
+    said = o80(folder, "echo", "nobody", "--rate", rate, fails=True)
+    assert f"rate must be positive, got {rate}" in in_a_line(said)
+
+
+def test_echo_refuses_odd_numbers(folder: Path) -> None:
+    assert "'--count'" in o80(folder, "echo", "nobody", "--count=-1", fails=True)
+    said = o80(folder, "echo", "nobody", "--timeout", "nan", fails=True)
+    assert "a timeout cannot be NaN" in said
 
 
 def test_stop_ends_a_robot_in_order(folder: Path, robot: "subprocess.Popen[str]") -> None:

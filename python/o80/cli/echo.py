@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 import time
 from typing import Annotated, Any
@@ -14,15 +15,25 @@ import o80
 from o80.cli.screen import out
 
 
+def _rate(value: float) -> float:
+    if not (value > 0 and math.isfinite(value)):
+        raise typer.BadParameter(
+            f"rate must be positive, got {value:g}; --every prints every row", param_hint="--rate"
+        )
+    return value
+
+
 def echo(
     segment: Annotated[str, typer.Argument(help="Name of a segment; see o80 list.")],
-    rate: Annotated[float, typer.Option(help="Rows printed a second, at most.")] = 10.0,
-    count: Annotated[int, typer.Option(help="Stop after so many rows; 0: never.")] = 0,
+    rate: Annotated[
+        float, typer.Option(callback=_rate, help="Rows printed a second, at most.")
+    ] = 10.0,
+    count: Annotated[int, typer.Option(min=0, help="Stop after so many rows; 0: never.")] = 0,
     every: Annotated[bool, typer.Option(help="Every row, in order, however many.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object a line.")] = False,
     timeout: Annotated[float, typer.Option(help="Seconds to wait for a row.")] = 5.0,
 ) -> None:
-    """Print observations: iteration, time, what was asked, what came of it.
+    """Print observations: iteration, time, desired and observed states, sensor values.
 
     Of a dead segment: the last ones, and why it ended.
     """
@@ -51,10 +62,11 @@ def _print(row: o80.Observation, as_json: bool) -> None:
         sys.stdout.write("\n")
         sys.stdout.flush()
         return
+    sensors = "" if row.extended is None else f"  extended {_short(row.extended)}"
     out.print(
         f"[bold]{row.iteration:>10}[/bold] {row.time * 1e-9:14.6f} s"
         f"{'  [yellow]HALTED[/]' if row.halted else ''}"
-        f"  desired {_short(row.desired)}  observed {_short(row.observed)}",
+        f"  desired {_short(row.desired)}  observed {_short(row.observed)}{sensors}",
         soft_wrap=True,
         markup=True,
     )
