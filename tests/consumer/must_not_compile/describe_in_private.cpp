@@ -1,28 +1,12 @@
 // error: describe must be
-#include "o80/robot/make_table.hpp"
-
-struct Joint {
-  double position = 0.0;
-};
-O80_DESCRIBE(Joint, (position, "[rad]"));
+#include "arm.hpp"
 
 class Arm {
- public:
-  struct Config {};
-  using Actuators = std::array<Joint, 2>;
-
-  explicit Arm(const Config&) {}
-  void start() {}
-  void write(const o80::Desired<Arm>&) {}
-  void read(o80::Reading<Arm>&) {}
-  void stop() noexcept {}
+  ARM_WITHOUT_MISTAKE
 #ifndef RIGHT
  private:
-#else
-
 #endif
   void describe(o80::Schema&) const {}
 };
-O80_DESCRIBE(Arm::Config);
 
-O80_ROBOT(arm, Arm)
+ARM_AS_ROBOT

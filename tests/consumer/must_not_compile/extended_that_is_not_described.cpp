@@ -1,34 +1,17 @@
 // error: a driver's Extended must be a struct of numbers
-#include "o80/robot/make_table.hpp"
+#include "arm.hpp"
 
-struct Joint {
-  double position = 0.0;
-};
-O80_DESCRIBE(Joint, (position, "[rad]"));
-struct Force {
-  double x = 0.0;
-};
-O80_DESCRIBE(Force, x);
 struct Torque {
   double x;
 };
 
 class Arm {
- public:
-  struct Config {};
-  using Actuators = std::array<Joint, 2>;
+  ARM_WITHOUT_MISTAKE
 #ifndef RIGHT
   using Extended = Torque;
 #else
   using Extended = Force;
 #endif
-
-  explicit Arm(const Config&) {}
-  void start() {}
-  void write(const o80::Desired<Arm>&) {}
-  void read(o80::Reading<Arm>&) {}
-  void stop() noexcept {}
 };
-O80_DESCRIBE(Arm::Config);
 
-O80_ROBOT(arm, Arm)
+ARM_AS_ROBOT

@@ -1,35 +1,15 @@
 // error: a driver's Requests must be public
-#include "o80/robot/make_table.hpp"
-
-struct Joint {
-  double position = 0.0;
-};
-O80_DESCRIBE(Joint, (position, "[rad]"));
-struct Home {
-  double speed = 1.0;
-};
-O80_DESCRIBE(Home, speed);
+#include "arm.hpp"
 
 class Arm {
- public:
-  struct Config {};
-  using Actuators = std::array<Joint, 2>;
-
-  explicit Arm(const Config&) {}
-  void start() {}
-  void write(const o80::Desired<Arm>&) {}
-  void read(o80::Reading<Arm>&) {}
-  void stop() noexcept {}
+  ARM_WITHOUT_MISTAKE
 #ifndef RIGHT
  private:
-#else
-
 #endif
   using Requests = o80::Requests<Home>;
 
  public:
   void on(const Home&) {}
 };
-O80_DESCRIBE(Arm::Config);
 
-O80_ROBOT(arm, Arm)
+ARM_AS_ROBOT
