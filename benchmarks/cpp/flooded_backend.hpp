@@ -88,6 +88,25 @@ class Sender {
     const double target = 1.0;
     batch.command(head, std::as_bytes(std::span(&target, 1)));
   }
+  /// One command for the actuators first, first + 1, ...
+  void group(std::uint32_t first, std::uint32_t members, std::uint32_t actuators, Mode mode,
+             Pace pace = Pace::iterations, std::int64_t amount = 1'000'000) {
+    RecordHead head;
+    head.mode = mode;
+    head.pace = pace;
+    if (pace == Pace::speed) {
+      head.speed = 1e-3;
+    } else {
+      head.amount = amount;
+    }
+    const double target = 1.0;
+    std::vector<BatchBuilder::Member> all;
+    for (std::uint32_t i = 0; i < members; ++i) {
+      head.actuator = static_cast<std::uint16_t>((first + i) % actuators);
+      all.push_back({head, {}, std::as_bytes(std::span(&target, 1))});
+    }
+    batch.group(all);
+  }
   std::uint32_t blocks() const { return lane_->blocks(); }
   std::uint32_t free_blocks() const { return lane_->free_blocks(); }
   LaneSender& lane() { return *lane_; }
@@ -163,7 +182,30 @@ inline std::vector<Load> heaviest_loads() {
     } while (to.send());
     to.batch.clear();
   };
+  const auto groups = [](Sender& to, std::uint32_t actuators, Mode mode, std::uint32_t members,
+                         Pace pace, std::int64_t amount = 1'000'000) {
+    for (std::uint32_t i = 0; to.batch.blocks() + members + 17 < to.blocks(); ++i) {
+      to.group(i, members, actuators, mode, pace, amount);
+    }
+    to.send();
+  };
+  const auto groups_of_all = [groups](Sender& to, std::uint32_t actuators, Iteration) {
+    groups(to, actuators, Mode::queue, actuators, Pace::speed);
+  };
+  const auto groups_of_two = [groups](Sender& to, std::uint32_t actuators, Iteration) {
+    groups(to, actuators, Mode::queue, 2, Pace::direct);
+  };
+  const auto overwriting_groups = [groups](Sender& to, std::uint32_t actuators, Iteration) {
+    groups(to, actuators, Mode::overwrite, actuators, Pace::iterations);
+  };
+  const auto late_groups = [groups](Sender& to, std::uint32_t actuators, Iteration) {
+    groups(to, actuators, Mode::queue, 2, Pace::until, 0);
+  };
   return {{"idle", 0, {}},
+          {"8 lanes full of commands for all actuators", 8, groups_of_all},
+          {"8 lanes full of commands for two actuators", 8, groups_of_two},
+          {"8 lanes full of commands for all actuators, overwriting", 8, overwriting_groups},
+          {"8 lanes full of commands for two actuators, too late", 8, late_groups},
           {"16 367 queued", 1, queued},
           {"8 lanes x 16 367 queued", 8, queued},
           {"16 367 overwrites", 1, overwrites},

@@ -87,7 +87,7 @@ void ActuatorQueue::follow(const std::byte* observed) noexcept {
 ActuatorQueue::Moved ActuatorQueue::step(Iteration iteration, const std::byte* observed,
                                          std::uint32_t& late_budget) noexcept {
   if (running_) {
-    if (iteration > motion_.last()) begin_row(iteration, observed);
+    if (planned_ || iteration > motion_.last()) begin_row(iteration, observed);
   } else if (!begin_next(iteration, observed, late_budget)) {
     return come_to_rest(observed);
   }
@@ -130,7 +130,19 @@ ActuatorQueue::Moved ActuatorQueue::come_to_rest(const std::byte* observed) noex
 
 bool ActuatorQueue::begin_next(Iteration iteration, const std::byte* observed,
                                std::uint32_t& late_budget) noexcept {
-  // skip what was to end before now
+  if (!end_late(iteration, late_budget)) return false;
+  const RecordHead& head = pool_->head(queue_.front());
+  if (is_member(head) && !ledger_->groups().is_complete(head, iteration)) {
+    end_motion();  // what it begins when the others have come does not continue what ran before
+    return false;
+  }
+  begin_command(iteration);
+  begin_row(iteration, observed);
+  return true;
+}
+
+/// Skips what was to end before now; false if nothing is left to begin.
+bool ActuatorQueue::end_late(Iteration iteration, std::uint32_t& late_budget) noexcept {
   while (!queue_.empty()) {
     const RecordHead& late = pool_->head(queue_.front());
     if (late.pace != Pace::until || late.amount >= iteration) break;
@@ -141,8 +153,10 @@ bool ActuatorQueue::begin_next(Iteration iteration, const std::byte* observed,
     queue_.pop();
     ledger_->end(record, Status::rejected, Reason::late, 0, iteration);
   }
-  if (queue_.empty()) return false;
+  return !queue_.empty();
+}
 
+void ActuatorQueue::begin_command(Iteration iteration) noexcept {
   // mask, times and rows of the command lie behind its head
   const BlockIndex record = queue_.front();
   const RecordHead& head = pool_->head(record);
@@ -166,9 +180,33 @@ bool ActuatorQueue::begin_next(Iteration iteration, const std::byte* observed,
   // a stream of direct commands is one motion
   if (pace_ != Pace::direct || !streams_) limiter_.begin();
   streams_ = false;
+  if (is_member(head) && pace_ == Pace::duration) carry_.carry(ledger_->groups().agreed(head));
   ledger_->activate(record, iteration);
-  begin_row(iteration, observed);
-  return true;
+}
+
+void ActuatorQueue::arrive(Iteration iteration, std::uint32_t& late_budget) noexcept {
+  if (running_ || !end_late(iteration, late_budget)) return;
+  const RecordHead& head = pool_->head(queue_.front());
+  if (!is_member(head)) return;
+  ledger_->groups().arrive(head, iteration);
+  // rounding that one queue still owes is owed by all
+  if (head.pace == Pace::duration) {
+    ledger_->groups().offer(head, iteration, carry_.carried());
+  }
+}
+
+void ActuatorQueue::plan_with_others(Iteration iteration, const std::byte* observed) noexcept {
+  if (queue_.empty()) return;
+  const RecordHead& head = pool_->head(queue_.front());
+  if (!is_member(head) || (head.pace != Pace::speed && head.pace != Pace::fastest)) return;
+  if (running_ && iteration <= motion_.last()) return;
+  if (!running_) {
+    if (!ledger_->groups().is_complete(head, iteration)) return;
+    begin_command(iteration);
+  }
+  plan_row(iteration, observed);
+  ledger_->groups().offer(head, iteration, row_iterations_);
+  planned_ = true;
 }
 
 /// The next row of the command => to; false if there is none.
@@ -187,6 +225,19 @@ bool ActuatorQueue::read_row() noexcept {
 
 void ActuatorQueue::begin_row(Iteration iteration, const std::byte* observed) noexcept {
   const RecordHead& head = pool_->head(queue_.front());
+  if (std::exchange(planned_, false)) {
+    row_iterations_ = ledger_->groups().agreed(head);
+    if (pace_ == Pace::fastest) limiter_.stretch_fastest(row_iterations_);
+  } else {
+    plan_row(iteration, observed);
+  }
+  motion_.begin(iteration, row_iterations_, head.profile, head.pace);
+  first_row_ = false;
+}
+
+/// The next row, from where to where, and the iterations it takes by itself.
+void ActuatorQueue::plan_row(Iteration iteration, const std::byte* observed) noexcept {
+  const RecordHead& head = pool_->head(queue_.front());
 
   // desired or observed, or the row before => from
   if (!first_row_) {
@@ -201,9 +252,7 @@ void ActuatorQueue::begin_row(Iteration iteration, const std::byte* observed) no
   }
   read_row();
   if (partial_) motion_.leave_out(mask());
-  const std::int64_t count = iterations(head, iteration);
-  motion_.begin(iteration, count, head.profile, head.pace);
-  first_row_ = false;
+  row_iterations_ = iterations(head, iteration);
 }
 
 std::int64_t ActuatorQueue::iterations(const RecordHead& head, Iteration iteration) noexcept {

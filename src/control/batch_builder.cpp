@@ -34,9 +34,11 @@ std::byte* BatchBuilder::open(const RecordHead& head, std::uint64_t payload_byte
   written.payload_bytes = static_cast<std::uint32_t>(payload_bytes);
   std::byte* bytes = blocks_[first].bytes.data();
   std::memcpy(bytes, &written, sizeof written);
+  if (head.kind == RecordKind::member) return bytes + sizeof written;  // of a group
   ++records_;
   switch (head.kind) {
     case RecordKind::command:
+    case RecordKind::group:
       ++commands_;
       break;
     case RecordKind::request:
@@ -56,9 +58,43 @@ std::byte* BatchBuilder::open(const RecordHead& head, std::uint64_t payload_byte
 std::uint32_t BatchBuilder::command(const RecordHead& head, std::span<const std::uint64_t> mask,
                                     std::span<const std::int64_t> times, std::uint32_t rows,
                                     std::span<const std::byte> states) {
-  assert(times.empty() || (times.size() == rows && head.pace == Pace::duration));
   RecordHead written = head;
   written.kind = RecordKind::command;
+  add_command(written, mask, times, rows, states);
+  return records_ - 1;
+}
+
+std::uint32_t BatchBuilder::group(std::span<const Member> members,
+                                  std::span<const std::int64_t> times, std::uint32_t rows) {
+  assert(!members.empty());
+  const std::size_t before = blocks_.size();
+  RecordHead head = members.front().head;
+  head.kind = RecordKind::group;
+  head.actuator = 0;
+  head.partial = 0;
+  head.rows = static_cast<std::uint32_t>(members.size());
+  open(head, 0);
+  try {
+    for (const Member& member : members) {
+      RecordHead written = member.head;
+      written.kind = RecordKind::member;
+      add_command(written, member.mask, times, rows, member.states);
+    }
+  } catch (...) {
+    // all or nothing
+    blocks_.resize(before);
+    --records_;
+    --commands_;
+    throw;
+  }
+  return records_ - 1;
+}
+
+void BatchBuilder::add_command(const RecordHead& head, std::span<const std::uint64_t> mask,
+                               std::span<const std::int64_t> times, std::uint32_t rows,
+                               std::span<const std::byte> states) {
+  assert(times.empty() || (times.size() == rows && head.pace == Pace::duration));
+  RecordHead written = head;
   written.partial = mask.empty() ? 0 : 1;
   written.rows = rows;
   std::byte* bytes = open(written, mask.size_bytes() + times.size_bytes() + states.size_bytes());
@@ -66,7 +102,6 @@ std::uint32_t BatchBuilder::command(const RecordHead& head, std::span<const std:
     if (!part.empty()) std::memcpy(bytes, part.data(), part.size());
     bytes += part.size();
   }
-  return records_ - 1;
 }
 
 std::uint32_t BatchBuilder::purge(std::uint16_t actuator_or_every) {
@@ -110,15 +145,15 @@ std::span<const Block> BatchBuilder::seal(const BatchRecord& batch) {
   if (is_express(batch)) written.flags |= kExpress;
   std::memcpy(blocks_.front().bytes.data(), &written, sizeof written);
 
-  // the ids follow the batch's
+  // the ids follow the batch's; members bear that of their group
   std::size_t block = 1;
   for (std::uint32_t place = 0; place < records_; ++place) {
-    std::byte* bytes = blocks_[block].bytes.data();
+    const CommandId id = record_id(batch.id, place);
     RecordHead head;
-    std::memcpy(&head, bytes, sizeof head);
-    head.id = record_id(batch.id, place);
-    std::memcpy(bytes, &head, sizeof head);
-    block += blocks_of(head.payload_bytes);
+    std::memcpy(&head, blocks_[block].bytes.data(), sizeof head);
+    block = set_id(block, id);
+    const std::uint32_t members = head.kind == RecordKind::group ? head.rows : 0;
+    for (std::uint32_t i = 0; i < members; ++i) block = set_id(block, id);
   }
   return blocks_;
 }
@@ -126,6 +161,16 @@ std::span<const Block> BatchBuilder::seal(const BatchRecord& batch) {
 bool BatchBuilder::is_express(const BatchRecord& batch) const noexcept {
   return commands_ == 0 && requests_ == 0 && records_ > 0 && records_ <= kMostExpressRecords &&
          batch.at == kNow && batch.burst == 0 && (batch.flags & kBurstUntilEnded) == 0;
+}
+
+/// Of the record that starts there; the block behind it.
+std::size_t BatchBuilder::set_id(std::size_t block, CommandId id) {
+  std::byte* bytes = blocks_[block].bytes.data();
+  RecordHead head;
+  std::memcpy(&head, bytes, sizeof head);
+  head.id = id;
+  std::memcpy(bytes, &head, sizeof head);
+  return block + blocks_of(head.payload_bytes);
 }
 
 void BatchBuilder::set_ticket(std::uint64_t ticket) noexcept {

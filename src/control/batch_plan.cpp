@@ -14,10 +14,11 @@ constexpr std::size_t kSpareFirst = 2;
 constexpr std::size_t kTraits = 3;
 constexpr std::size_t kSpareBlocks = 4;
 
-// traits: the number of requests, and these
-constexpr std::uint32_t kIsExpress = 1U << 16;
-constexpr std::uint32_t kReleases = 1U << 17;
-constexpr std::uint32_t kMoves = 1U << 18;
+// traits: the number of requests, these, and above them the number of groups
+constexpr std::uint32_t kIsExpress = 1U << 8;
+constexpr std::uint32_t kReleases = 1U << 9;
+constexpr std::uint32_t kMoves = 1U << 10;
+constexpr std::uint32_t kFirstGroupBit = 11;
 
 // what steps take of an iteration, next to copying a block: 1
 constexpr std::uint32_t kBatchWork = 6;
@@ -55,6 +56,8 @@ void BatchPlanner::begin(Lane& lane, BlockIndex batch) noexcept {
   lane.blocks = 1;
   lane.effort = {.work = kBatchWork, .express = true};
   lane.control_orders = 0;
+  lane.group = kNoBlock;
+  lane.groups = 0;
   begin_part(lane);
   record_of(pool_, batch).own = {kNoBlock, 0, kNoBlock, 0, 0};
 }
@@ -80,6 +83,7 @@ bool BatchPlanner::check(std::uint32_t lane_index, BlockIndex batch,
 }
 
 void BatchPlanner::complete(std::uint32_t lane_index, std::uint32_t& budget) noexcept {
+  if (lanes_[lane_index].group != kNoBlock) fail_group(lane_index, budget);  // it goes on nowhere
   end_part(lane_index, budget);
   Lane& lane = lanes_[lane_index];
   const BlockChain chain = pool_.chain(lane.batch);
@@ -88,7 +92,8 @@ void BatchPlanner::complete(std::uint32_t lane_index, std::uint32_t& budget) noe
   record.own[kMissingFrom] = lane.place;
   record.own[kSpareFirst] = lane.cursor;
   record.own[kTraits] = lane.effort.requests | (is_express ? kIsExpress : 0) |
-                        (lane.effort.releases ? kReleases : 0) | (lane.effort.moves ? kMoves : 0);
+                        (lane.effort.releases ? kReleases : 0) | (lane.effort.moves ? kMoves : 0) |
+                        lane.groups << kFirstGroupBit;
   record.own[kSpareBlocks] = chain.blocks - lane.blocks;
   record.blocks = lane.effort.work;
   known_[lane.batch] = Known::plan;
@@ -112,7 +117,8 @@ void BatchPlanner::begin_record(Lane& lane) noexcept {
     return;
   }
   lane.record_blocks = static_cast<std::uint32_t>(claimed);
-  if (head.id != record_id(pool_.batch(lane.batch).id, lane.place)) {
+  const bool is_wanted = (head.kind == RecordKind::member) == (lane.group != kNoBlock);
+  if (!is_wanted || head.id != record_id(pool_.batch(lane.batch).id, lane.place)) {
     lane.verdict = Verdict::invalid;
     lane.to_walk = lane.record_blocks - 1;
     return;
@@ -147,8 +153,19 @@ bool BatchPlanner::check_record(std::uint32_t lane_index, std::uint32_t& budget)
     lane.last = pool_.next(lane.last);
   }
   RecordHead& head = pool_.head(lane.cursor);
-  if (lane.verdict == Verdict::valid && is_one_too_many(lane, head)) {
-    lane.verdict = Verdict::invalid;
+  const bool fits =
+      lane.group == kNoBlock ? !is_one_too_many(lane, head) : fits_group(lane_index, head);
+  if (lane.verdict == Verdict::valid && !fits) lane.verdict = Verdict::invalid;
+  if (lane.group != kNoBlock) {
+    lane.group_blocks += lane.record_blocks;
+    if (lane.verdict == Verdict::invalid) {
+      fail_group(lane_index, budget);
+    } else {
+      add_member(lane);
+      if (lane.members_left == 0) complete_group(lane_index, budget);
+    }
+    go_on_behind(lane);
+    return true;
   }
   if (lane.verdict == Verdict::invalid) {
     head.kind = RecordKind::invalid_list;
@@ -158,12 +175,84 @@ bool BatchPlanner::check_record(std::uint32_t lane_index, std::uint32_t& budget)
   }
   if (is_timed(head)) note_rows(head, lane.progress.rows);
   head.own = {kNoBlock, lane.batch, lane.last, kNoBlock};
-  add(lane_index, lane.cursor, budget);
+  if (head.kind == RecordKind::group) {
+    begin_group(lane);
+  } else {
+    add(lane_index, lane.cursor, budget);
+    ++lane.place;
+  }
+  go_on_behind(lane);
+  return true;
+}
+
+void BatchPlanner::go_on_behind(Lane& lane) noexcept {
   lane.cursor = pool_.next(lane.last);
   lane.begun = false;
   lane.blocks += lane.record_blocks;
+}
+
+// ------------------------------------------------------------------------------ groups
+
+void BatchPlanner::begin_group(Lane& lane) noexcept {
+  lane.group = lane.cursor;
+  lane.first_member = lane.last_member = kNoBlock;
+  lane.members_left = pool_.head(lane.cursor).rows;
+  lane.group_blocks = 1;
+}
+
+/// A member does what its group does, and no other member is of its actuator.
+bool BatchPlanner::fits_group(std::uint32_t lane_index, const RecordHead& head) noexcept {
+  if (head.actuator >= actuators_) return false;
+  const Lane& lane = lanes_[lane_index];
+  const RecordHead& group = pool_.head(lane.group);
+  Target& to = target(lane_index, head.actuator);
+  const bool is_new = std::exchange(to.group, lane.group) != lane.group;
+  const bool is_first = lane.first_member == kNoBlock;
+  const bool same_rows = is_first || head.rows == pool_.head(lane.first_member).rows;
+  return is_new && same_rows && head.mode == group.mode && head.pace == group.pace &&
+         head.profile == group.profile && head.start == group.start && head.amount == group.amount;
+}
+
+void BatchPlanner::add_member(Lane& lane) noexcept {
+  RecordHead& head = pool_.head(lane.cursor);
+  head.kind = RecordKind::command;
+  if (is_timed(head)) note_rows(head, lane.progress.rows);
+  head.id = kMemberMark | lane.group;
+  head.own = {kNoBlock, lane.batch, lane.last, kNoBlock};
+  (lane.first_member == kNoBlock ? lane.first_member
+                                 : pool_.head(lane.last_member).own[Own::kOther]) = lane.cursor;
+  lane.last_member = lane.cursor;
+  --lane.members_left;
+}
+
+/// Its members go to their queues like any command.
+void BatchPlanner::complete_group(std::uint32_t lane_index, std::uint32_t& budget) noexcept {
+  Lane& lane = lanes_[lane_index];
+  CommandGroup group;
+  group.open = static_cast<std::uint16_t>(pool_.head(lane.group).rows);
+  CommandGroups(pool_).at(lane.group) = group;
+  for (BlockIndex member = lane.first_member; member != kNoBlock;) {
+    const BlockIndex record = member;
+    member = std::exchange(pool_.head(record).own[Own::kOther], kNoBlock);
+    add(lane_index, record, budget);
+    spend(budget, 1);
+  }
+  lane.group = kNoBlock;
+  ++lane.groups;
   ++lane.place;
-  return true;
+}
+
+/// The blocks of the group, as far as they were looked at, are one record that is invalid.
+void BatchPlanner::fail_group(std::uint32_t lane_index, std::uint32_t& budget) noexcept {
+  Lane& lane = lanes_[lane_index];
+  RecordHead& head = pool_.head(lane.group);
+  head.kind = RecordKind::invalid_list;
+  head.payload_bytes =
+      static_cast<std::uint32_t>(lane.group_blocks * kBlockBytes - sizeof(RecordHead));
+  head.own = {kNoBlock, lane.batch, lane.last, kNoBlock};
+  const BlockIndex group = std::exchange(lane.group, kNoBlock);
+  add(lane_index, group, budget);
+  ++lane.place;
 }
 
 /// Whoever writes into its lane itself may have passed over what `pulse` refuses.
@@ -355,7 +444,7 @@ Effort BatchPlanner::effort(BlockIndex batch) const noexcept {
   if (known_[batch] != Known::plan) return {.work = kBatchWork};
   const BatchRecord& record = pool_.batch(batch);
   const std::uint32_t traits = record.own[kTraits];
-  return {record.blocks, traits & 0xFFFF, (traits & kIsExpress) != 0, (traits & kReleases) != 0,
+  return {record.blocks, traits & 0xFF, (traits & kIsExpress) != 0, (traits & kReleases) != 0,
           (traits & kMoves) != 0};
 }
 
@@ -364,7 +453,10 @@ std::optional<Plan> BatchPlanner::plan(BlockIndex batch) noexcept {
   if (known != Known::plan) return std::nullopt;
   const auto& own = pool_.batch(batch).own;
   const BlockIndex last = pool_.chain(batch).last;
-  return Plan{own[kSteps], own[kMissingFrom], {own[kSpareFirst], last, own[kSpareBlocks]}};
+  return Plan{own[kSteps],
+              own[kMissingFrom],
+              {own[kSpareFirst], last, own[kSpareBlocks]},
+              own[kTraits] >> kFirstGroupBit};
 }
 
 void BatchPlanner::forget(std::uint32_t lane, BlockIndex batch) noexcept {

@@ -81,6 +81,8 @@ class Controller::Body {
   void restart(const std::byte* observed, const std::byte* desired, Iteration row) noexcept;
   void take(std::uint32_t lane, BlockIndex batch, BatchHandler& handler) noexcept;
   void step(Iteration iteration, const std::byte* observed) noexcept;
+  void step_groups(Iteration iteration, const std::byte* observed,
+                   std::uint32_t& late_budget) noexcept;
   bool finish_pending() noexcept;
   bool active() const noexcept;
   bool acts(std::uint32_t lane) const noexcept;
@@ -141,7 +143,7 @@ class Controller::Body {
   std::vector<ActuatorQueue> actuators_;
   std::vector<std::uint64_t> busy_;    // has commands, or has just lost its last
   std::vector<std::uint64_t> follow_;  // follows when idle
-  std::uint32_t late_told_ = 0;        // in the last step
+  std::uint32_t told_ = 0;             // statuses, in the last step
 };
 
 Controller::Body::Body(const Schema& schema, BlockPool& blocks, StatusSink& sink,
@@ -196,7 +198,7 @@ void Controller::Body::take(std::uint32_t lane, BlockIndex batch, BatchHandler& 
 
   const Iteration taken_at = handler.iteration();
   const Taking from{lane, pool.batch(batch).ticket};
-  ledger.enter(lane, batch, plan->spare, taken_at);
+  ledger.enter(lane, batch, plan->spare, plan->groups, taken_at);
   ledger.reject_from(batch, plan->missing_from, Reason::invalid, 0, taken_at);
   for (BlockIndex step = plan->steps; step != kNoBlock;) {
     const BlockIndex record = step;
@@ -281,8 +283,24 @@ void Controller::Body::purge(const Taking& from, const RecordHead& head,
   });
 }
 
+/// Commands of several actuators begin when all their queues have come to them.
+void Controller::Body::step_groups(Iteration iteration, const std::byte* observed,
+                                   std::uint32_t& late_budget) noexcept {
+  // the others do not wait for members that were dropped
+  told_ = ledger.work(kStatusesPerIteration);
+  const auto each_busy = [&](auto&& visit) {
+    for (std::size_t word = 0; word < busy_.size(); ++word) {
+      each_bit(busy_[word], static_cast<std::uint32_t>(word * 64), visit);
+    }
+  };
+  each_busy([&](std::uint32_t i) { actuators_[i].arrive(iteration, late_budget); });
+  each_busy([&](std::uint32_t i) { actuators_[i].plan_with_others(iteration, of(i, observed)); });
+}
+
 void Controller::Body::step(Iteration iteration, const std::byte* observed) noexcept {
   std::uint32_t late_budget = kStatusesPerIteration;
+  told_ = 0;
+  if (ledger.open_groups() > 0) step_groups(iteration, observed, late_budget);
   for (std::size_t word = 0; word < busy_.size(); ++word) {
     const auto base = static_cast<std::uint32_t>(word * 64);
     std::uint64_t active = 0;
@@ -315,12 +333,13 @@ void Controller::Body::step(Iteration iteration, const std::byte* observed) noex
     clamped_mask[word] = clamped;
     braking_mask[word] = braking;
   }
-  late_told_ = kStatusesPerIteration - late_budget;
+  told_ += kStatusesPerIteration - late_budget;
 }
 
 bool Controller::Body::finish_pending() noexcept {
-  const std::uint32_t told = std::exchange(late_told_, 0);
-  return ledger.work(kStatusesPerIteration - told);
+  const std::uint32_t told = std::min(std::exchange(told_, 0), kStatusesPerIteration);
+  ledger.work(kStatusesPerIteration - told);
+  return !ledger.pending();
 }
 
 bool Controller::Body::acts(std::uint32_t lane) const noexcept {

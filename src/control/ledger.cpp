@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <new>
+#include <utility>
 
 namespace o80 {
 
@@ -34,7 +35,8 @@ std::uint32_t Ledger::lane_of(BlockIndex record) const noexcept {
 }
 
 void Ledger::enter(std::uint32_t lane, BlockIndex block, const BlockChain& spare,
-                   Iteration iteration) noexcept {
+                   std::uint32_t groups, Iteration iteration) noexcept {
+  open_groups_ += groups;
   const BatchRecord record = pool_.batch(block);
   TakenBatch taken;
   taken.records = record.records;
@@ -84,20 +86,46 @@ void Ledger::reject(std::uint32_t lane, BlockIndex block, Reason reason, std::ui
 }
 
 void Ledger::activate(BlockIndex record, Iteration iteration) noexcept {
-  sink_.changed(
-      {lane_of(record), pool_.head(record).id, Status::active, Reason::none, 0, iteration});
+  const RecordHead& head = pool_.head(record);
+  CommandId id = head.id;
+  if (is_member(head)) {
+    const BlockIndex group = CommandGroups::head_of(head);
+    if (groups_.at(group).active != 0) return;
+    groups_.at(group).active = 1;
+    id = pool_.head(group).id;
+  }
+  sink_.changed({lane_of(record), id, Status::active, Reason::none, 0, iteration});
 }
 
 void Ledger::end(BlockIndex record, Status status, Reason reason, std::uint8_t aux,
                  Iteration iteration) noexcept {
   const RecordHead& head = pool_.head(record);
+  const CommandId id = head.id;
+  const bool of_group = is_member(head);
+  const BlockIndex group = CommandGroups::head_of(head);
   const BlockIndex block = head.own[Own::kBatch];
   const auto blocks = static_cast<std::uint32_t>(blocks_of(head.payload_bytes));
   const std::uint32_t lane = batch(block).lane;
-  sink_.changed({lane, head.id, status, reason, aux, iteration});
+  if (!of_group) sink_.changed({lane, id, status, reason, aux, iteration});
   pool_.release(record, head.own[Own::kLast], blocks);
   sink_.freed(lane, blocks);
+  if (of_group) return member_ended(group, status, reason, aux, iteration);
   ended(block, iteration);
+}
+
+void Ledger::member_ended(BlockIndex record, Status status, Reason reason, std::uint8_t aux,
+                          Iteration iteration) noexcept {
+  CommandGroup& group = groups_.at(record);
+  group.last_end = std::max(group.last_end, iteration);
+  if (status != Status::completed && group.end == Status::none) {
+    group.end = status;
+    group.reason = reason;
+    group.aux = aux;
+  }
+  if (--group.open > 0) return;
+  --open_groups_;
+  const CommandGroup of = group;
+  end(record, of.end == Status::none ? Status::completed : of.end, of.reason, of.aux, of.last_end);
 }
 
 void Ledger::ended(BlockIndex block, Iteration iteration) noexcept {
@@ -145,24 +173,25 @@ bool Ledger::tell_rejected(BlockIndex block, std::uint32_t& budget) noexcept {
   return taken.told == taken.records;
 }
 
-bool Ledger::work(std::uint32_t budget) noexcept {
+std::uint32_t Ledger::work(std::uint32_t most) noexcept {
+  std::uint32_t budget = most;
   while (true) {
     // the group at hand
     while (group_.record != kNoBlock) {
-      if (budget == 0) return false;
+      if (budget == 0) return most;
       const BlockIndex record = group_.record;
       group_.record = pool_.head(record).own[Own::kNext];
       end(record, group_.status, group_.reason, 0, group_.iteration);
       --budget;
     }
-    if (first_ == kNoBlock) return true;
-    if (budget == 0) return false;
+    if (first_ == kNoBlock) return most - budget;
+    if (budget == 0) return most;
 
     // the next one: records of a batch that have no blocks, or records that were dropped
     const BlockIndex group = first_;
     if (static_cast<RecordKind>(*pool_.bytes(group)) == RecordKind::batch) {
       // the batch stays open while it is told
-      if (!tell_rejected(group, budget)) return false;
+      if (!tell_rejected(group, budget)) return most - budget;
       first_ = link(group);
       ++batch(group).open;
       ended(group, batch(group).rejected_at);

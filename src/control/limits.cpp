@@ -139,6 +139,11 @@ bool CommandCheck::within(std::uint32_t actuator, const std::byte* state,
   return true;
 }
 
+std::uint32_t CommandCheck::words_of_mask(std::uint32_t actuator) const {
+  const StateLayout& layout = *layouts_[schema_.actuators[actuator].type];
+  return mask_words(static_cast<std::uint32_t>(layout.numbers().size()));
+}
+
 void CommandCheck::targets(std::uint32_t index, std::span<const std::byte> states,
                            std::span<const std::uint64_t> mask) const {
   const std::uint32_t known = actuator(std::int64_t{index});

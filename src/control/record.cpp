@@ -12,6 +12,10 @@ std::string_view to_text(RecordKind kind) noexcept {
       return "purge";
     case RecordKind::request:
       return "request";
+    case RecordKind::group:
+      return "group";
+    case RecordKind::member:
+      return "member";
     case RecordKind::take_control:
       return "take_control";
     case RecordKind::release_control:

@@ -74,7 +74,11 @@ RecordCheck::Verdict RecordCheck::begin(const BlockPool& pool, BlockIndex block,
   progress = {Cursor(pool, block, sizeof(RecordHead), head.payload_bytes)};
   switch (head.kind) {
     case RecordKind::command:
+    case RecordKind::member:
       return begin_command(head, progress);
+    case RecordKind::group:
+      return verdict(head.payload_bytes == 0 && head.rows > 0 &&
+                     head.rows <= actuator_types_.size());
     case RecordKind::request:
       return check_request(head, progress.payload);
     case RecordKind::purge:

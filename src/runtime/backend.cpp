@@ -99,7 +99,7 @@ UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, Reques
       errors_(schema),
       overruns_(options.max_overruns) {
   // completed and late commands, and their batches
-  untold_.reserve(2 * (schema.actuators.size() + Controller::kStatusesPerIteration));
+  untold_.reserve(2 * (schema.actuators.size() + 2 * Controller::kStatusesPerIteration));
   express_lanes_.reserve(lanes.size());
   for (std::uint32_t i = 0; i < lanes.size(); ++i) lives_[i] = liveness.lane(i);
 }
@@ -112,6 +112,7 @@ Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
       at_most > 0 && at_most < kForEver ? monotonic_now() + at_most : at_most;
   const std::uint32_t most_looks = 2 + pool.size() / kWorkPerIteration;
   std::uint32_t looks = 0;
+  const bool stands = schema.head.bursting != 0 && !granted();
   while (true) {
     look_at_lives();
     watch_halt();
@@ -140,6 +141,10 @@ Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
     bell.wait(lanes.bell_seen(), std::min(left, kSlice));
   }
   O80_CRASH_POINT("backend.after_take");
+  // dropped members leave their groups when they are told: a burst must not begin differently
+  // depending on how long the backend has stood before
+  while (stands && !controller.finish_pending()) {
+  }
   if (granted()) {
     share_ = {};
     take_due();

@@ -67,9 +67,10 @@ void check_times(std::span<const std::int64_t> times, std::uint32_t rows) {
 
 // ------------------------------------------------------------------------------ adding
 
-std::uint32_t UntypedFrontend::add_command(std::uint32_t actuator, std::span<const std::byte> state,
-                                           const CommandOptions& options,
-                                           std::span<const std::uint64_t> mask) {
+RecordHead UntypedFrontend::checked_command(std::uint32_t actuator,
+                                            std::span<const std::byte> state,
+                                            const CommandOptions& options,
+                                            std::span<const std::uint64_t> mask) const {
   const std::uint32_t index = check_->actuator(std::int64_t{actuator});
   check_->targets(index, state, mask);
   CommandOptions paced = options;
@@ -78,8 +79,69 @@ std::uint32_t UntypedFrontend::add_command(std::uint32_t actuator, std::span<con
   if (paced.pace.pace == Pace::speed) check_->speed(index, paced.pace.per_second, mask);
   if (paced.pace.pace == Pace::fastest) check_->fastest(index, mask);
   if (paced.pace.pace == Pace::direct) check_->direct(index, state, mask);
+  return head_of(index, paced, check_->profile(index));
+}
+
+std::uint32_t UntypedFrontend::add_command(std::uint32_t actuator, std::span<const std::byte> state,
+                                           const CommandOptions& options,
+                                           std::span<const std::uint64_t> mask) {
+  const RecordHead head = checked_command(actuator, state, options, mask);
   const auto lock = link_->lock_to_send();
-  return builder_.command(head_of(index, paced, check_->profile(index)), mask, {}, 1, state);
+  return builder_.command(head, mask, {}, 1, state);
+}
+
+std::size_t UntypedFrontend::size_of_state(std::uint32_t actuator) const {
+  return schema().types[schema().actuators[actuator].type].size;
+}
+
+void UntypedFrontend::refuse_twice(std::span<const std::uint32_t> actuators) const {
+  if (actuators.empty()) throw InvalidArgument("a command needs at least one actuator");
+  for (std::size_t i = 0; i < actuators.size(); ++i) {
+    if (std::ranges::count(actuators.subspan(0, i), actuators[i]) == 0) continue;
+    throw InvalidArgument("actuator '" + schema().actuators[actuators[i]].name.str() +
+                          "' is named twice: one command gives it one target");
+  }
+}
+
+std::uint32_t UntypedFrontend::add_commands(std::span<const std::uint32_t> actuators,
+                                            std::span<const std::byte> states,
+                                            const CommandOptions& options,
+                                            std::span<const std::uint64_t> masks) {
+  std::size_t bytes = 0;
+  std::size_t words = 0;
+  for (const std::uint32_t actuator : actuators) {
+    bytes += size_of_state(check_->actuator(std::int64_t{actuator}));
+    words += check_->words_of_mask(actuator);
+  }
+  refuse_twice(actuators);
+  const auto refuse_size = [&](const char* what, std::size_t given, std::size_t wanted,
+                               const char* unit) {
+    if (given == wanted) return;
+    throw InvalidArgument(std::string("the ") + what + " of " + std::to_string(actuators.size()) +
+                          " actuators take " + std::to_string(wanted) + ' ' + unit + ", " +
+                          std::to_string(given) + " were given");
+  };
+  refuse_size("states", states.size(), bytes, "bytes");
+  if (!masks.empty()) refuse_size("masks", masks.size(), words, "words");
+
+  const auto lock = link_->lock_to_send();
+  members_.clear();
+  Profile profile = Profile::linear;
+  for (const std::uint32_t actuator : actuators) {
+    const auto state = states.first(size_of_state(actuator));
+    const auto mask = masks.first(masks.empty() ? 0 : check_->words_of_mask(actuator));
+    members_.push_back({checked_command(actuator, state, options, mask), mask, state});
+    if (members_.back().head.profile == Profile::minimum_jerk) profile = Profile::minimum_jerk;
+    states = states.subspan(state.size());
+    masks = masks.subspan(mask.size());
+  }
+  // they move in one way: smoothly if one of them does
+  for (BatchBuilder::Member& member : members_) member.head.profile = profile;
+  if (members_.size() == 1) {
+    const BatchBuilder::Member& only = members_.front();
+    return builder_.command(only.head, only.mask, {}, 1, only.states);
+  }
+  return builder_.group(members_);
 }
 
 /// Checks a trajectory; its options, with the pace that follows from its times.
@@ -120,15 +182,18 @@ std::uint32_t UntypedFrontend::add_trajectories(std::span<const std::uint32_t> a
   for (std::size_t i = 0; i < actuators.size(); ++i) {
     paced = checked_trajectory(actuators[i], rows, states.subspan(i * each, each), options, times);
   }
-  // under one lock: the pulse of another thread sends all or none of them
+  refuse_twice(actuators);
+  const std::span<const std::int64_t> ends = rows > 1 ? times : std::span<const std::int64_t>{};
   const auto lock = link_->lock_to_send();
-  const std::uint32_t first = builder_.records();
-  for (std::size_t i = 0; i < actuators.size(); ++i) {
-    builder_.command(head_of(actuators[i], paced, Profile::linear), {},
-                     rows > 1 ? times : std::span<const std::int64_t>{}, rows,
-                     states.subspan(i * each, each));
+  if (actuators.size() == 1) {
+    return builder_.command(head_of(actuators[0], paced, Profile::linear), {}, ends, rows, states);
   }
-  return first;
+  members_.clear();
+  for (std::size_t i = 0; i < actuators.size(); ++i) {
+    members_.push_back(
+        {head_of(actuators[i], paced, Profile::linear), {}, states.subspan(i * each, each)});
+  }
+  return builder_.group(members_, ends, rows);
 }
 
 std::uint32_t UntypedFrontend::add_purge(std::uint32_t actuator) {

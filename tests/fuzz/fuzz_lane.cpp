@@ -233,24 +233,45 @@ class Liar {
     }
   }
   static void add_command(Bytes& bytes, RecordHead& head, BatchBuilder& builder) {
-    head.mode = static_cast<Mode>(bytes.below(2));
+    const std::uint32_t mode = bytes.below(4);
+    head.mode = static_cast<Mode>(mode % 2);
+    const bool is_group = mode >= 2;
     head.pace = static_cast<Pace>(bytes.below(5));
     head.profile = static_cast<Profile>(bytes.below(2));
     head.start = static_cast<Start>(bytes.below(2));
     head.amount = static_cast<std::int64_t>(bytes.word());
     const std::uint32_t rows = 1 + bytes.below(3);
-    const std::size_t size = head.actuator < 2 ? sizeof(double) : sizeof(Hand);
-    std::vector<std::byte> states(rows * size);
-    for (std::byte& byte : states) byte = bytes.number<std::byte>();
+    const std::vector<std::byte> states = add_states(bytes, head.actuator, rows);
     const bool partial = bytes.below(2) == 1;
     const std::array<std::uint64_t, 1> mask{bytes.word()};
     std::vector<std::int64_t> times;
     if (head.pace == Pace::duration && rows > 1)
       for (std::uint32_t i = 0; i < rows; ++i)
         times.push_back(static_cast<std::int64_t>(bytes.word()));
-    builder.command(
-        head, partial ? std::span<const std::uint64_t>(mask) : std::span<const std::uint64_t>(),
-        times, rows, states);
+    const auto named =
+        partial ? std::span<const std::uint64_t>(mask) : std::span<const std::uint64_t>();
+    if (!is_group) {
+      builder.command(head, named, times, rows, states);
+      return;
+    }
+    // the same for others too, some of them twice, or alike in name only
+    std::vector<BatchBuilder::Member> members{{head, named, states}};
+    std::vector<std::vector<std::byte>> more(bytes.below(4));
+    for (std::vector<std::byte>& of_member : more) {
+      RecordHead other = head;
+      other.actuator = static_cast<std::uint16_t>(bytes.below(4));
+      if (bytes.below(16) == 0) other.amount = static_cast<std::int64_t>(bytes.word());
+      of_member = add_states(bytes, other.actuator, rows);
+      members.push_back({other, named, of_member});
+    }
+    builder.group(members, times, rows);
+  }
+  static std::vector<std::byte> add_states(Bytes& bytes, std::uint16_t actuator,
+                                           std::uint32_t rows) {
+    const std::size_t size = actuator < 2 ? sizeof(double) : sizeof(Hand);
+    std::vector<std::byte> states(rows * size);
+    for (std::byte& byte : states) byte = bytes.number<std::byte>();
+    return states;
   }
 
   AttachedSegment segment_;

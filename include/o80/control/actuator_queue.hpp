@@ -40,6 +40,11 @@ class ActuatorQueue {
   void drop(Status status, Reason reason, Iteration iteration) noexcept;
   /// Ends what one lane sent, the direct value it gave last included.
   void drop_lane(std::uint32_t lane, Status status, Reason reason, Iteration iteration) noexcept;
+  /// What queues do for commands of several actuators before any of them steps: all tell when such
+  /// a command is their next, then all whose group is complete plan their next row, so that the
+  /// slowest decides how many iterations it takes.
+  void arrive(Iteration iteration, std::uint32_t& late_budget) noexcept;
+  void plan_with_others(Iteration iteration, const std::byte* observed) noexcept;
   /// `late_budget` is how many late commands may still be told in this iteration.
   Moved step(Iteration iteration, const std::byte* observed, std::uint32_t& late_budget) noexcept;
   bool empty() const noexcept { return queue_.empty(); }
@@ -64,7 +69,10 @@ class ActuatorQueue {
  private:
   bool begin_next(Iteration iteration, const std::byte* observed,
                   std::uint32_t& late_budget) noexcept;
+  bool end_late(Iteration iteration, std::uint32_t& late_budget) noexcept;
+  void begin_command(Iteration iteration) noexcept;
   void begin_row(Iteration iteration, const std::byte* observed) noexcept;
+  void plan_row(Iteration iteration, const std::byte* observed) noexcept;
   bool read_row() noexcept;
   std::int64_t iterations(const RecordHead& head, Iteration iteration) noexcept;
   std::int64_t iterations_at(double speed, Profile profile) noexcept;
@@ -102,7 +110,9 @@ class ActuatorQueue {
   bool partial_ = false;
   bool timed_ = false;
   bool first_row_ = false;
-  std::int64_t time_ = 0;  // end of the last row [ns]
+  bool planned_ = false;             // its next row, with those of its group
+  std::int64_t row_iterations_ = 1;  // of the row that is planned
+  std::int64_t time_ = 0;            // end of the last row [ns]
   Cursor times_;
   Cursor rows_;
   std::vector<std::uint64_t> mask_;

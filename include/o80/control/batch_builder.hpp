@@ -25,6 +25,15 @@ class BatchBuilder {
   std::uint32_t command(const RecordHead& head, std::span<const std::byte> state) {
     return command(head, {}, {}, 1, state);
   }
+  /// One command for several actuators. Heads as above, all alike but for the actuator; `times`
+  /// and `rows` are those of each member.
+  struct Member {
+    RecordHead head;
+    std::span<const std::uint64_t> mask;
+    std::span<const std::byte> states;
+  };
+  std::uint32_t group(std::span<const Member> members, std::span<const std::int64_t> times = {},
+                      std::uint32_t rows = 1);
   std::uint32_t purge(std::uint16_t actuator_or_every);
   /// Drops only what this lane sent.
   std::uint32_t purge_own(std::uint16_t actuator_or_every);
@@ -51,6 +60,10 @@ class BatchBuilder {
 
  private:
   std::byte* open(const RecordHead& head, std::uint64_t payload_bytes);
+  void add_command(const RecordHead& head, std::span<const std::uint64_t> mask,
+                   std::span<const std::int64_t> times, std::uint32_t rows,
+                   std::span<const std::byte> states);
+  std::size_t set_id(std::size_t block, CommandId id);
   bool is_express(const BatchRecord& batch) const noexcept;
 
   std::vector<Block> blocks_;  // the batch's own block first

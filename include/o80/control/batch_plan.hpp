@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "o80/control/command_group.hpp"
 #include "o80/control/ledger.hpp"
 #include "o80/control/pool.hpp"
 #include "o80/control/record.hpp"
@@ -18,6 +19,7 @@ struct Plan {
   BlockIndex steps = kNoBlock;     // the first; the others follow by Own::kOther
   std::uint32_t missing_from = 0;  // place of the first record that has no blocks
   BlockChain spare;                // blocks that no record uses
+  std::uint32_t groups = 0;        // commands of several actuators
 };
 
 /// How much taking a checked batch takes of an iteration.
@@ -68,10 +70,11 @@ class BatchPlanner {
   };
   /// One actuator in the part of a lane's batch that is being checked.
   struct Target {
-    std::uint64_t epoch = 0;     // what else is here is valid while this is the lane's
-    BlockIndex list = kNoBlock;  // commands that will be appended, if nothing drops them
-    bool list_is_step = false;   // the first of them overwrites: it is a step already
-    bool listed = false;         // in `listed_`: has a list, or moves on after an overwrite
+    std::uint64_t epoch = 0;      // what else is here is valid while this is the lane's
+    BlockIndex list = kNoBlock;   // commands that will be appended, if nothing drops them
+    bool list_is_step = false;    // the first of them overwrites: it is a step already
+    bool listed = false;          // in `listed_`: has a list, or moves on after an overwrite
+    BlockIndex group = kNoBlock;  // the last one that it was a member of
     Done done;
   };
   struct Lane {
@@ -89,6 +92,13 @@ class BatchPlanner {
     RecordCheck::Progress progress;
     Effort effort;
     std::uint32_t control_orders = 0;
+    // the group whose members are being checked
+    BlockIndex group = kNoBlock;
+    BlockIndex first_member = kNoBlock;
+    BlockIndex last_member = kNoBlock;
+    std::uint32_t members_left = 0;
+    std::uint32_t group_blocks = 0;
+    std::uint32_t groups = 0;  // of the batch, so far
     // of the part under way
     std::array<BlockIndex, 4> ends{};  // first of the lists of records of one end
     Done all;                          // done to every queue
@@ -101,8 +111,16 @@ class BatchPlanner {
   void begin_record(Lane& lane) noexcept;
   static void stop_reading(Lane& lane) noexcept;
   bool check_record(std::uint32_t lane, std::uint32_t& budget) noexcept;
+  void go_on_behind(Lane& lane) noexcept;
   bool is_one_too_many(Lane& lane, const RecordHead& head) const noexcept;
   void complete(std::uint32_t lane, std::uint32_t& budget) noexcept;
+
+  // groups
+  bool fits_group(std::uint32_t lane, const RecordHead& head) noexcept;
+  void begin_group(Lane& lane) noexcept;
+  void add_member(Lane& lane) noexcept;
+  void complete_group(std::uint32_t lane, std::uint32_t& budget) noexcept;
+  void fail_group(std::uint32_t lane, std::uint32_t& budget) noexcept;
 
   // a checked record => steps
   void add(std::uint32_t lane, BlockIndex record, std::uint32_t& budget) noexcept;

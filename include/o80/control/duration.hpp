@@ -27,6 +27,9 @@ class DurationCarry {
     return true;
   }
   void reset() noexcept { carry_ = 0; }
+  /// What is carried [ns], and the carry of another queue in its place: theirs go on together.
+  std::int64_t carried() const noexcept { return carry_; }
+  void carry(std::int64_t nanoseconds) noexcept { carry_ = nanoseconds; }
 
  private:
   /// Iterations until the exact end of a duration, rounded; not above 0 if that has passed.

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "o80/control/command_group.hpp"
 #include "o80/control/pool.hpp"
 #include "o80/control/record.hpp"
 #include "o80/control/status.hpp"
@@ -22,11 +23,15 @@ struct Own {
 /// Realtime: everything but construction. Dropping is O(1); `work` tells the statuses bit by bit.
 class Ledger {
  public:
-  Ledger(BlockPool& pool, StatusSink& sink) : pool_(pool), sink_(sink) {}
+  Ledger(BlockPool& pool, StatusSink& sink) : pool_(pool), sink_(sink), groups_(pool) {}
+
+  /// Commands of several actuators that were taken and have not ended.
+  std::uint32_t open_groups() const noexcept { return open_groups_; }
+  CommandGroups& groups() noexcept { return groups_; }
 
   /// Enters a batch as taken; it stays open until `close` and until all its records have ended.
   /// `spare` are its blocks that no record uses.
-  void enter(std::uint32_t lane, BlockIndex batch, const BlockChain& spare,
+  void enter(std::uint32_t lane, BlockIndex batch, const BlockChain& spare, std::uint32_t groups,
              Iteration iteration) noexcept;
   /// Ends the records from `place` on, which have no blocks, as rejected; told in `work`.
   void reject_from(BlockIndex batch, std::uint32_t place, Reason reason, std::uint8_t aux,
@@ -37,16 +42,17 @@ class Ledger {
   void reject(std::uint32_t lane, BlockIndex batch, Reason reason, std::uint8_t aux,
               Iteration iteration, Status status = Status::rejected) noexcept;
 
-  /// A command has begun.
+  /// A command has begun; of several actuators, one of its members.
   void activate(BlockIndex record, Iteration iteration) noexcept;
-  /// A record has ended: told at once.
+  /// A record has ended: told at once. That of a group when its last member has ended, with the
+  /// first end that is not completed.
   void end(BlockIndex record, Status status, Reason reason, std::uint8_t aux,
            Iteration iteration) noexcept;
   /// A list of records has ended: told in `work`.
   void drop(BlockIndex first, Status status, Reason reason, Iteration iteration) noexcept;
 
-  /// Tells at most `budget` ends; false when some are left.
-  bool work(std::uint32_t budget) noexcept;
+  /// Tells at most `budget` ends; how many it has told.
+  std::uint32_t work(std::uint32_t budget) noexcept;
   bool pending() const noexcept { return group_.record != kNoBlock || first_ != kNoBlock; }
 
   std::uint32_t lane_of(BlockIndex record) const noexcept;
@@ -64,10 +70,14 @@ class Ledger {
   void ended(BlockIndex batch, Iteration iteration) noexcept;
   void append(BlockIndex group) noexcept;
   BlockIndex& link(BlockIndex group) noexcept;
+  void member_ended(BlockIndex group, Status status, Reason reason, std::uint8_t aux,
+                    Iteration iteration) noexcept;
   bool tell_rejected(BlockIndex batch, std::uint32_t& budget) noexcept;
 
   BlockPool& pool_;
   StatusSink& sink_;
+  CommandGroups groups_;
+  std::uint32_t open_groups_ = 0;
   Group group_;                  // whose ends are being told
   BlockIndex first_ = kNoBlock;  // of the groups that wait: dropped records, or a batch's missing
   BlockIndex last_ = kNoBlock;

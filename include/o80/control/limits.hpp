@@ -25,6 +25,8 @@ class CommandCheck {
   std::uint32_t actuator(std::string_view name) const;
   /// The index itself, if there is such an actuator.
   std::uint32_t actuator(std::int64_t index) const;
+  /// Words of a mask of its numbers.
+  std::uint32_t words_of_mask(std::uint32_t actuator) const;
   /// Targets, one state after the other.
   void targets(std::uint32_t actuator, std::span<const std::byte> states,
                std::span<const std::uint64_t> mask = {}) const;

@@ -27,6 +27,8 @@ enum class RecordKind : std::uint8_t {
   take_control,
   release_control,
   resume,  // clears halts up to the number in `amount`
+  group,   // one command for several actuators: `rows` members follow, and end as one
+  member,
   // what a plan makes of the kinds of some records; sent by a frontend, they are garbage
   overwritten_list = 0x80,  // the first of a list of records with this end, known to no queue
   purged_list,
@@ -95,6 +97,9 @@ inline constexpr std::int64_t kLongestDuration = std::int64_t{1} << 61;
 /// trajectory has its own times (pace duration, rows > 1), the end of each row since the start of
 /// the command (int64 [ns]); then the rows, each a state. Of a request: its struct.
 /// `iterations` is a pace for each row, so is `speed`; `until` has one row.
+///
+/// A group is a record of a batch without payload; its members are not, and bear its id. Each is
+/// laid out as a command, with pace, mode, profile, start and number of rows of the group.
 struct RecordHead {
   RecordKind kind = RecordKind::command;
   Mode mode = Mode::queue;
@@ -105,7 +110,7 @@ struct RecordHead {
   std::uint16_t actuator = 0;  // purge: or kEveryActuator; request: which request
   CommandId id = 0;            // the batch's, plus 2, plus its place in the batch
   std::uint32_t payload_bytes = 0;
-  std::uint32_t rows = 1;
+  std::uint32_t rows = 1;  // of a group: members
   union {
     std::int64_t amount = 0;  // duration [ns], last iteration of until, number of iterations
     double speed;             // of the first number of the state [1/s]

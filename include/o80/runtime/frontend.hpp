@@ -65,14 +65,20 @@ class UntypedFrontend {
   std::uint32_t add_command(std::uint32_t actuator, std::span<const std::byte> state,
                             const CommandOptions& options = {},
                             std::span<const std::uint64_t> mask = {});
+  /// One command for several actuators: they begin together when all their queues have come to it,
+  /// take as many iterations as the slowest of them, and have one status. `states` holds their
+  /// states one after the other, `masks` a mask for each, or nothing.
+  std::uint32_t add_commands(std::span<const std::uint32_t> actuators,
+                             std::span<const std::byte> states, const CommandOptions& options = {},
+                             std::span<const std::uint64_t> masks = {});
   /// One command through `rows` states. With `times` (ends of the rows since its start [ns]),
   /// which needs no pace, or at options.pace for each row.
   std::uint32_t add_trajectory(std::uint32_t actuator, std::uint32_t rows,
                                std::span<const std::byte> states,
                                const CommandOptions& options = {.pace = iterations(1)},
                                std::span<const std::int64_t> times = {});
-  /// One for each of several actuators, all or none; `states` holds the rows of the first actuator,
-  /// then those of the second... Returns the place of the first.
+  /// One command through `rows` states for several actuators, as above; `states` holds the rows
+  /// of the first actuator, then those of the second...
   std::uint32_t add_trajectories(std::span<const std::uint32_t> actuators, std::uint32_t rows,
                                  std::span<const std::byte> states,
                                  const CommandOptions& options = {.pace = iterations(1)},
@@ -149,6 +155,11 @@ class UntypedFrontend {
   std::shared_ptr<Link> link() const { return link_; }
 
  private:
+  RecordHead checked_command(std::uint32_t actuator, std::span<const std::byte> state,
+                             const CommandOptions& options,
+                             std::span<const std::uint64_t> mask) const;
+  std::size_t size_of_state(std::uint32_t actuator) const;
+  void refuse_twice(std::span<const std::uint32_t> actuators) const;
   CommandOptions checked_trajectory(std::uint32_t actuator, std::uint32_t rows,
                                     std::span<const std::byte> states,
                                     const CommandOptions& options,
@@ -170,7 +181,8 @@ class UntypedFrontend {
 
   std::shared_ptr<Link> link_;
   std::unique_ptr<CommandCheck> check_;
-  BatchBuilder builder_;  // guarded by link_->sending
+  BatchBuilder builder_;                       // guarded by link_->sending
+  std::vector<BatchBuilder::Member> members_;  // likewise, of the group that is being added
 };
 
 /// Halts the backend of a segment, also one that is still starting; the number of the halt.

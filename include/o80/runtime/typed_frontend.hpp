@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <initializer_list>
 #include <span>
 #include <string>
 #include <string_view>
@@ -45,6 +46,27 @@ class Frontend : public UntypedFrontend {
   std::uint32_t add_command(std::string_view name, const State& target,
                             const CommandOptions& options = {}) {
     return add_command(actuator(name), target, options);
+  }
+  using UntypedFrontend::add_commands;
+  /// One command for several actuators of one state type, a target for each.
+  template <Shareable State>
+  std::uint32_t add_commands(std::span<const std::string_view> names,
+                             std::span<const State> targets, const CommandOptions& options = {}) {
+    std::vector<std::uint32_t> indices;
+    for (const std::string_view name : names)
+      check_state<State>(indices.emplace_back(actuator(name)));
+    std::vector<std::byte> bytes(targets.size() * sizeof(State));
+    for (std::size_t i = 0; i < targets.size(); ++i) {
+      pack(targets[i], bytes.data() + i * sizeof(State));
+    }
+    return UntypedFrontend::add_commands(indices, bytes, options);
+  }
+  template <Shareable State>
+  std::uint32_t add_commands(std::initializer_list<std::string_view> names,
+                             std::initializer_list<State> targets,
+                             const CommandOptions& options = {}) {
+    return add_commands(std::span(names.begin(), names.size()),
+                        std::span<const State>(targets.begin(), targets.size()), options);
   }
   /// One command through all rows, `options.pace` for each.
   template <Shareable State>

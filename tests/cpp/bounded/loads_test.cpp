@@ -125,6 +125,9 @@ struct Mix {
     queue,
     overwrite,
     until_past,
+    group_queue,
+    group_overwrite,
+    group_late,
     purge_all,
     purge_one,
     purge_own,
@@ -134,14 +137,15 @@ struct Mix {
   };
   std::array<std::uint32_t, kinds> weights{};
   std::uint32_t records = 1;   // of a batch, at most
+  std::uint32_t members = 2;   // of a group, at most
   std::uint32_t later_in = 0;  // one batch in so many is for a later iteration, 0: none
   std::uint32_t lanes = 8;
 
   std::string text() const {
     std::string out;
     for (const std::uint32_t weight : weights) out += std::to_string(weight) + ' ';
-    return out + "of " + std::to_string(records) + ", later " + std::to_string(later_in) + ", " +
-           std::to_string(lanes) + " lanes";
+    return out + "of " + std::to_string(records) + ", groups of " + std::to_string(members) +
+           ", later " + std::to_string(later_in) + ", " + std::to_string(lanes) + " lanes";
   }
 };
 
@@ -153,8 +157,15 @@ void fill(Sender& to, const Mix& mix, std::uint32_t actuators, std::mt19937& ran
   bool sent = true;
   while (sent) {
     const std::uint32_t records = 1 + random() % mix.records;
-    for (std::uint32_t i = 0; i < records && to.batch.blocks() + 1 < to.blocks(); ++i) {
+    const std::uint32_t most_members = std::min(mix.members, actuators);
+    for (std::uint32_t i = 0; i < records && to.batch.blocks() + 2 + most_members < to.blocks();
+         ++i) {
       const std::uint32_t actuator = random() % actuators;
+      const auto group = [&](Mode mode) {
+        const bool with_speed = random() % 2 == 0;
+        to.group(actuator, 1 + random() % most_members, actuators, mode,
+                 with_speed ? Pace::speed : Pace::iterations, 1 + random() % 1000);
+      };
       switch (kind(random)) {
         case Mix::queue:
           to.command(actuator, Mode::queue);
@@ -164,6 +175,15 @@ void fill(Sender& to, const Mix& mix, std::uint32_t actuators, std::mt19937& ran
           break;
         case Mix::until_past:
           to.command(actuator, Mode::queue, Pace::until, 0);
+          break;
+        case Mix::group_queue:
+          group(Mode::queue);
+          break;
+        case Mix::group_overwrite:
+          group(Mode::overwrite);
+          break;
+        case Mix::group_late:
+          to.group(actuator, 1 + random() % most_members, actuators, Mode::queue, Pace::until, 0);
           break;
         case Mix::purge_all:
           to.batch.purge(kEveryActuator);
@@ -211,7 +231,7 @@ Most run(const Mix& mix, std::uint32_t actuators) {
 }
 
 Mix changed(Mix mix, std::mt19937& random) {
-  const std::uint32_t what = random() % (Mix::kinds + 3);
+  const std::uint32_t what = random() % (Mix::kinds + 4);
   constexpr std::array<std::uint32_t, 7> kSizes = {1, 2, 4, 16, 64, 500, 2000};
   if (what < Mix::kinds) {
     mix.weights[what] = random() % 2 == 0 ? 0 : 1 + random() % 100;
@@ -219,6 +239,8 @@ Mix changed(Mix mix, std::mt19937& random) {
     mix.records = kSizes[random() % kSizes.size()];
   } else if (what == Mix::kinds + 1) {
     mix.later_in = random() % 4;
+  } else if (what == Mix::kinds + 2) {
+    mix.members = kSizes[random() % 5];
   } else {
     mix.lanes = 1 + random() % flood::kLanes;
   }

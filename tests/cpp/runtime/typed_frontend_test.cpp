@@ -57,6 +57,25 @@ TEST_F(TypedTest, CommandsARobotOfMixedStatesByNameAndByIndex) {
   EXPECT_EQ(row.extended().matrix[2][1], 4);
 }
 
+TEST_F(TypedTest, CommandsSeveralActuatorsOfOneTypeAtOnce) {
+  Backend<MixedRobot> backend({.segment = "mixed"});
+  backend.publish({});
+  Frontend<MixedRobot> frontend("mixed");
+  frontend.add_commands({"joints_3", "joints_0"}, {Joint{.position = 1}, Joint{.position = 2}},
+                        {.pace = iterations(2)});
+  EXPECT_THAT(message_of<InvalidArgument>(
+                  [&] { frontend.add_commands({"joints_3", "gripper"}, {Joint{}, Joint{}}); }),
+              HasSubstr("'gripper'"));
+  EXPECT_THAT(message_of<InvalidArgument>(
+                  [&] { frontend.add_commands({"joints_3", "joints_0"}, {Joint{}}); }),
+              HasSubstr("2 actuators"));
+  EXPECT_EQ(frontend.pulse().size(), 1U);
+  const auto desired = backend.step();
+  ASSERT_TRUE(desired);
+  EXPECT_EQ(desired->joints[3].position, 0.5);
+  EXPECT_EQ(desired->joints[0].position, 1);
+}
+
 TEST_F(TypedTest, RefusesAStateOfAnotherTypeEvenIfItHasTheSameSize) {
   Backend<MixedRobot> backend({.segment = "mixed"});
   backend.publish({});

@@ -41,18 +41,10 @@ long double LinearReference::observed(std::size_t a, std::size_t n) const {
 void LinearReference::act(const ScriptStep& step, std::size_t place) {
   switch (step.action) {
     case Action::command:
-      batches_[step.lane].push_back({place, &step});
+      batches_[step.lane].push_back({place, &step, nullptr});
       break;
     case Action::pulse:
-      for (const Queued& queued : batches_[step.lane]) {
-        Actuator& actuator = actuators_[queued.step->actuator];
-        if (queued.step->head.mode == Mode::overwrite) {
-          drop(queued.step->actuator, Status::overwritten, next_);
-        }
-        actuator.queue.push_back(queued);
-        outcomes_[queued.place] = {};
-      }
-      batches_[step.lane].clear();
+      pulse(step.lane);
       break;
     case Action::purge:
       drop(step.actuator, Status::purged, next_);
@@ -83,6 +75,41 @@ void LinearReference::act(const ScriptStep& step, std::size_t place) {
   }
 }
 
+void LinearReference::pulse(std::uint32_t lane) {
+  const Queued* before = nullptr;
+  for (Queued& queued : batches_[lane]) {
+    if (queued.step->group != 0) {
+      const bool goes_on = before != nullptr && before->step->group == queued.step->group;
+      queued.group = goes_on ? before->group : std::make_shared<Group>();
+      queued.group->places.push_back(queued.place);
+      ++queued.group->open;
+    }
+    before = &queued;
+  }
+  for (const Queued& queued : batches_[lane]) {
+    if (queued.step->head.mode == Mode::overwrite) {
+      drop(queued.step->actuator, Status::overwritten, next_);
+    }
+    actuators_[queued.step->actuator].queue.push_back(queued);
+    outcomes_[queued.place] = {};
+  }
+  batches_[lane].clear();
+}
+
+/// A command of several actuators ends with its last member, as the first that is not completed.
+void LinearReference::end(const Queued& queued, Status status, Iteration iteration) {
+  if (queued.group == nullptr) {
+    outcomes_[queued.place] = {status, iteration};
+    return;
+  }
+  Group& group = *queued.group;
+  if (status != Status::completed && group.end.status == Status::none) group.end.status = status;
+  group.end.iteration = std::max(group.end.iteration, iteration);
+  if (--group.open > 0) return;
+  if (group.end.status == Status::none) group.end.status = Status::completed;
+  for (const std::size_t place : group.places) outcomes_[place] = group.end;
+}
+
 void LinearReference::restart(const std::vector<double>* states) {
   drop(kEveryActuator, Status::purged, next_);
   std::size_t i = 0;
@@ -100,7 +127,7 @@ void LinearReference::drop(std::uint16_t which, Status status, Iteration iterati
   for (std::size_t a = 0; a < actuators_.size(); ++a) {
     if (which != kEveryActuator && which != a) continue;
     Actuator& actuator = actuators_[a];
-    for (const Queued& queued : actuator.queue) outcomes_[queued.place] = {status, iteration};
+    for (const Queued& queued : actuator.queue) end(queued, status, iteration);
     actuator.queue.clear();
     actuator.running = actuator.unbroken = false;
   }
@@ -115,7 +142,7 @@ void LinearReference::drop_lane(std::uint16_t which, std::uint32_t lane) {
     }
     std::erase_if(actuator.queue, [&](const Queued& queued) {
       if (queued.step->lane != lane) return false;
-      outcomes_[queued.place] = {Status::purged, next_};
+      end(queued, Status::purged, next_);
       return true;
     });
     if (actuator.queue.empty()) actuator.unbroken = false;
@@ -123,22 +150,98 @@ void LinearReference::drop_lane(std::uint16_t which, std::uint32_t lane) {
 }
 
 void LinearReference::step() {
-  for (std::size_t a = 0; a < actuators_.size(); ++a) step(a);
+  const auto each = [&](auto&& visit) {
+    for (std::size_t a = 0; a < actuators_.size(); ++a) visit(a);
+  };
+  each([&](std::size_t a) { end_late(a); });
+  each([&](std::size_t a) {
+    const auto& queue = actuators_[a].queue;
+    if (!queue.empty() && queue.front().group) queue.front().group->arrived = 0;
+  });
+  each([&](std::size_t a) {
+    const auto& queue = actuators_[a].queue;
+    if (!actuators_[a].running && !queue.empty() && queue.front().group) {
+      ++queue.front().group->arrived;
+    }
+  });
+  each([&](std::size_t a) {
+    Actuator& actuator = actuators_[a];
+    actuator.begins = !actuator.running && may_begin(a);
+    if (!actuator.begins) return;
+    if (!actuator.unbroken) actuator.exact = (next_ - 1) * kPeriodNs;
+    actuator.unbroken = true;
+  });
+  each([&](std::size_t a) { agree_on_exact(a); });
+  each([&](std::size_t a) { begin(a); });
+  each([&](std::size_t a) { agree_on_last(a); });
+  each([&](std::size_t a) { move(a); });
   ++next_;
 }
 
-void LinearReference::step(std::size_t a) {
+void LinearReference::end_late(std::size_t a) {
   Actuator& actuator = actuators_[a];
-  if (!actuator.running && !begin_command(a)) {
+  while (!actuator.running && !actuator.queue.empty()) {
+    const RecordHead& head = actuator.queue.front().step->head;
+    if (head.pace != Pace::until || head.amount >= next_) return;
+    end(actuator.queue.front(), Status::rejected, next_);
+    actuator.queue.pop_front();
+    actuator.unbroken = false;
+  }
+}
+
+/// A member of a group waits until the others that are left are first in their queues.
+bool LinearReference::may_begin(std::size_t a) const {
+  const auto& queue = actuators_[a].queue;
+  if (queue.empty()) return false;
+  const Group* group = queue.front().group.get();
+  return group == nullptr || group->arrived == group->open;
+}
+
+/// A duration of several actuators counts from the latest of their queues' exact ends.
+void LinearReference::agree_on_exact(std::size_t a) {
+  if (!actuators_[a].begins) return;
+  const Queued& queued = actuators_[a].queue.front();
+  if (queued.group == nullptr || queued.step->head.pace != Pace::duration) return;
+  for (Actuator& other : actuators_) {
+    const bool together = other.begins && other.queue.front().group == queued.group;
+    if (together) other.exact = std::max(other.exact, actuators_[a].exact);
+  }
+}
+
+void LinearReference::begin(std::size_t a) {
+  Actuator& actuator = actuators_[a];
+  if (actuator.begins) {
+    actuator.running = true;
+    actuator.started = actuator.exact;
+    actuator.row = 0;
+    begin_row(a, true);
+  } else if (actuator.running && next_ > actuator.last) {
+    ++actuator.row;
+    begin_row(a, false);
+  }
+}
+
+/// Each row of a group takes as long as its slowest member needs.
+void LinearReference::agree_on_last(std::size_t a) {
+  const Actuator& actuator = actuators_[a];
+  if (!actuator.running || actuator.first != next_) return;
+  const Group* group = actuator.queue.front().group.get();
+  for (Actuator& other : actuators_) {
+    if (group == nullptr || !other.running || other.queue.front().group.get() != group) continue;
+    if (other.last >= actuator.last) continue;
+    other.exact += (actuator.last - other.last) * kPeriodNs;
+    other.last = actuator.last;
+  }
+}
+
+void LinearReference::move(std::size_t a) {
+  Actuator& actuator = actuators_[a];
+  if (!actuator.running) {
     actuator.unbroken = false;
     for (std::size_t n = 0; n < desired_[a].size() && script_.actuators[a].follow; ++n) {
       desired_[a][n] = observed(a, n);
     }
     return;
-  }
-  if (next_ > actuator.last) {
-    ++actuator.row;
-    begin_row(a, false);
   }
   for (std::size_t n = 0; n < desired_[a].size(); ++n) desired_[a][n] = between(a, n);
 
@@ -146,28 +249,9 @@ void LinearReference::step(std::size_t a) {
   const ScriptStep& step = *actuator.queue.front().step;
   const std::size_t rows = step.values.size() / desired_[a].size();
   if (next_ < actuator.last || actuator.row + 1 < rows) return;
-  outcomes_[actuator.queue.front().place] = {Status::completed, next_};
+  end(actuator.queue.front(), Status::completed, next_);
   actuator.queue.pop_front();
   actuator.running = false;
-}
-
-bool LinearReference::begin_command(std::size_t a) {
-  Actuator& actuator = actuators_[a];
-  while (!actuator.queue.empty()) {
-    const RecordHead& head = actuator.queue.front().step->head;
-    if (head.pace != Pace::until || head.amount >= next_) break;
-    outcomes_[actuator.queue.front().place] = {Status::rejected, next_};
-    actuator.queue.pop_front();
-    actuator.unbroken = false;
-  }
-  if (actuator.queue.empty()) return false;
-  if (!actuator.unbroken) actuator.exact = (next_ - 1) * kPeriodNs;
-  actuator.unbroken = true;
-  actuator.running = true;
-  actuator.started = actuator.exact;
-  actuator.row = 0;
-  begin_row(a, true);
-  return true;
 }
 
 void LinearReference::begin_row(std::size_t a, bool begins_command) {

@@ -3,9 +3,11 @@
 #include <cstdint>
 #include <deque>
 #include <map>
+#include <memory>
 #include <vector>
 
 #include "scripts/script.hpp"
+#include "scripts/script_outcome.hpp"
 
 namespace o80::test {
 
@@ -13,13 +15,6 @@ namespace o80::test {
 /// (docs/commands.md) a second time, as plainly as can be: it shares no code with the controller.
 class LinearReference {
  public:
-  /// How a command of the script stands.
-  struct Outcome {
-    Status status = Status::none;
-    Iteration iteration = 0;
-    bool operator==(const Outcome&) const = default;
-  };
-
   explicit LinearReference(const Script& script);
 
   /// Any step but run.
@@ -29,18 +24,27 @@ class LinearReference {
 
   /// Desired, as the field holds it, of every actuator and number.
   const std::vector<std::vector<long double>>& desired() const { return desired_; }
-  /// Of the commands that were pulsed, by their place in the script.
+  /// How the commands that were pulsed stand, by their place in the script.
   const std::map<std::size_t, Outcome>& outcomes() const { return outcomes_; }
   Iteration iteration() const { return next_ - 1; }
 
  private:
+  /// A command of several actuators.
+  struct Group {
+    std::vector<std::size_t> places;  // of its members
+    std::size_t open = 0;             // of them, that have not ended
+    std::size_t arrived = 0;          // of them, first in their queues
+    Outcome end;                      // the first status that is not completed, the last iteration
+  };
   struct Queued {
     std::size_t place;
     const ScriptStep* step;
+    std::shared_ptr<Group> group;  // or none
   };
   struct Actuator {
     std::deque<Queued> queue;  // the running one first
     bool running = false;
+    bool begins = false;  // a command, in this iteration
     std::size_t row = 0;
     Iteration first = 0;  // of the row
     Iteration last = 0;
@@ -54,8 +58,14 @@ class LinearReference {
   void restart(const std::vector<double>* states);
   void drop(std::uint16_t actuator, Status status, Iteration iteration);
   void drop_lane(std::uint16_t actuator, std::uint32_t lane);
-  void step(std::size_t a);
-  bool begin_command(std::size_t a);
+  void pulse(std::uint32_t lane);
+  void end(const Queued& queued, Status status, Iteration iteration);
+  void end_late(std::size_t a);
+  bool may_begin(std::size_t a) const;
+  void agree_on_exact(std::size_t a);
+  void agree_on_last(std::size_t a);
+  void begin(std::size_t a);
+  void move(std::size_t a);
   void begin_row(std::size_t a, bool begins_command);
   Iteration end_of_row(std::size_t a);
   long double observed(std::size_t a, std::size_t n) const;
@@ -64,8 +74,8 @@ class LinearReference {
   const Script& script_;
   std::vector<Actuator> actuators_;
   std::vector<std::vector<long double>> desired_;
-  std::vector<std::vector<const double*>> readings_;  // null: where it is desired
-  std::map<std::uint32_t, std::vector<Queued>> batches_;
+  std::vector<std::vector<const double*>> readings_;      // null: where it is desired
+  std::map<std::uint32_t, std::vector<Queued>> batches_;  // of each lane
   std::map<std::size_t, Outcome> outcomes_;
   Iteration next_ = 0;
 };

@@ -29,7 +29,7 @@ class Comparison {
         }
       } else {
         reference_.act(step, i);
-        act(step, i);
+        world_.act(step, i);
       }
     }
     for (int n = 0; n < 3; ++n) {
@@ -40,38 +40,6 @@ class Comparison {
   std::int64_t iterations() const { return reference_.iteration(); }
 
  private:
-  void act(const ScriptStep& step, std::size_t place) {
-    Controller& controller = world_.rig.controller;
-    switch (step.action) {
-      case Action::command:
-        return world_.add(step, place);
-      case Action::pulse:
-        return world_.pulse(step.lane);
-      case Action::purge:
-        return controller.purge(step.actuator, world_.rig.next);
-      case Action::purge_own:
-        return controller.purge_lane(step.lane, step.actuator, world_.rig.next);
-      case Action::interrupt:
-        return controller.interrupt(step.actuator, world_.iteration);
-      case Action::halt:
-        return controller.halt(world_.rig.next);
-      case Action::restart:
-        return world_.restart(nullptr);
-      case Action::restart_with:
-        return world_.restart(&step.values);
-      case Action::read:
-        world_.actuators[step.actuator].numbers[step.number].reading = step.values[0];
-        return;
-      case Action::track:
-        for (ActuatorTrack& actuator : world_.actuators) {
-          for (NumberTrack& number : actuator.numbers) number.reading.reset();
-        }
-        return;
-      default:
-        return;
-    }
-  }
-
   std::string iterate() {
     if (const auto failure = world_.step()) return failure->text;
     reference_.step();
@@ -88,10 +56,8 @@ class Comparison {
 
   std::string statuses() const {
     for (const SentCommand* command : world_.sent) {
-      const LinearReference::Outcome& expected = reference_.outcomes().at(command->step);
-      const LinearReference::Outcome found =
-          is_end(command->status) ? LinearReference::Outcome{command->status, command->ended_at}
-                                  : LinearReference::Outcome{};
+      const Outcome& expected = reference_.outcomes().at(command->step);
+      const Outcome& found = command->told;
       if (found == expected) continue;
       return "the command of step " + std::to_string(command->step) + " is " +
              std::string(to_text(found.status)) + " at " + std::to_string(found.iteration) +

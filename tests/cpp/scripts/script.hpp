@@ -52,9 +52,10 @@ struct ScriptStep {
   std::uint32_t lane = 0;
   std::uint16_t actuator = 0;  // or kEveryActuator
   std::uint32_t number = 0;
-  std::int64_t count = 0;  // iterations of run
-  RecordHead head;         // pace, amount or speed, profile, mode and start
-  std::uint64_t mask = 0;  // 0: the whole state
+  std::int64_t count = 0;   // iterations of run
+  RecordHead head;          // pace, amount or speed, profile, mode and start
+  std::uint64_t mask = 0;   // 0: the whole state
+  std::uint32_t group = 0;  // commands in a row with the same number are one command; 0: alone
   std::vector<std::int64_t> times;
   std::vector<double> values;  // rows of targets, desired states of restart_with, the reading
 };

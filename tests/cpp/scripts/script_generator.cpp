@@ -4,6 +4,9 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <memory>
+#include <utility>
+#include <vector>
 
 namespace o80::test {
 namespace {
@@ -50,12 +53,16 @@ Range range_of_kind(Kind kind) {
 
 class Generator {
  public:
-  Generator(std::uint64_t seed, bool linear) : dice_(seed), linear_(linear) {}
+  /// Every fourth seed has commands of several actuators; they are drawn apart from the rest.
+  Generator(std::uint64_t seed, bool linear) : dice_(seed), linear_(linear) {
+    if (seed % 4 == 3) grouping_ = std::make_unique<Dice>(seed ^ 0x6f38305f67727570U);
+  }
 
   Script script() {
     const std::int64_t count = dice_.one_in(2) ? 1 : dice_.whole(1, 3);
     for (std::int64_t i = 0; i < count; ++i) add_actuator();
     while (played_ < kLongestScript && script_.steps.size() < 300) add_round();
+    if (grouping_ != nullptr && count > 1) add_groups();
     return std::move(script_);
   }
 
@@ -91,13 +98,17 @@ class Generator {
   void add_trajectory(std::uint16_t actuator, std::uint32_t lane);
   void add_command(std::uint16_t actuator, std::uint32_t lane);
   void add_restart();
+  void add_groups();
+  bool may_join(std::uint16_t actuator, const ScriptStep& first) const;
+  bool can_go_fastest(std::uint16_t actuator) const;
   RecordHead any_head(std::uint16_t actuator);
   double any_target(std::uint16_t actuator, std::size_t number);
   void add_targets(ScriptStep& step, std::size_t rows);
   std::uint64_t any_mask(std::uint16_t actuator);
 
   Dice dice_;
-  bool linear_;  // and not limited
+  std::unique_ptr<Dice> grouping_;  // only where there are groups
+  bool linear_;                     // and not limited
   Script script_;
   std::vector<std::vector<Range>> ranges_;
   std::int64_t played_ = 0;
@@ -272,6 +283,44 @@ void Generator::add_reading() {
   step.values.push_back(value);
 }
 
+/// Gives some commands further actuators, which do the same.
+void Generator::add_groups() {
+  std::vector<ScriptStep> steps;
+  steps.swap(script_.steps);
+  std::uint32_t groups = 0;
+  std::swap(dice_, *grouping_);
+  for (ScriptStep& step : steps) {
+    const bool is_first = step.action == Action::command && dice_.one_in(2);
+    if (is_first) step.group = ++groups;
+    script_.steps.push_back(step);
+    if (!is_first) continue;
+    const std::size_t rows = step.values.size() / script_.actuators[step.actuator].numbers.size();
+    for (std::uint16_t a = 0; a < script_.actuators.size(); ++a) {
+      if (a == step.actuator || !may_join(a, step) || dice_.one_in(4)) continue;
+      ScriptStep member = step;
+      member.actuator = a;
+      member.mask = any_mask(a);
+      member.values.clear();
+      add_targets(member, rows);
+      script_.steps.push_back(member);
+    }
+  }
+}
+
+bool Generator::may_join(std::uint16_t actuator, const ScriptStep& first) const {
+  if (first.head.pace == Pace::fastest) return can_go_fastest(actuator);
+  if (first.head.pace != Pace::speed) return true;
+  // at a speed that suits its range, too
+  const double ratio = ranges_[actuator].front().size() / ranges_[first.actuator].front().size();
+  return ratio < 10.0;
+}
+
+bool Generator::can_go_fastest(std::uint16_t actuator) const {
+  return std::ranges::all_of(script_.actuators[actuator].numbers, [](const NumberSpec& number) {
+    return number.moves() && std::isfinite(number.limits.acceleration);
+  });
+}
+
 void Generator::add_restart() {
   if (dice_.one_in(2)) {
     add(Action::restart);
@@ -336,11 +385,7 @@ RecordHead Generator::any_head(std::uint16_t actuator) {
       head.amount = played_ + dice_.whole(-3, 150);
       break;
     case 6: {
-      const auto& numbers = script_.actuators[actuator].numbers;
-      const bool all_limited = std::ranges::all_of(numbers, [](const NumberSpec& number) {
-        return number.moves() && std::isfinite(number.limits.acceleration);
-      });
-      if (all_limited) {
+      if (can_go_fastest(actuator)) {
         head.pace = Pace::fastest;
         break;
       }

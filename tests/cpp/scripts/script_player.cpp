@@ -30,7 +30,7 @@ class Player {
   std::optional<Failure> run(std::int64_t iterations);
   std::optional<Failure> come_to_rest();
   std::optional<Failure> finish();
-  void restart(const std::vector<double>* desired);
+  void watch_again();
   std::int64_t braking_time() const;
 
   ScriptWorld world_;
@@ -41,55 +41,27 @@ class Player {
 };
 
 std::optional<Failure> Player::act(const ScriptStep& step, std::size_t place) {
-  Controller& controller = world_.rig.controller;
   switch (step.action) {
-    case Action::command:
-      world_.add(step, place);
-      break;
-    case Action::pulse:
-      world_.pulse(step.lane);
-      break;
     case Action::run:
       return run(step.count);
-    case Action::purge:
-      controller.purge(step.actuator, world_.rig.next);
-      world_.note_drop(step.actuator);
-      break;
-    case Action::purge_own:
-      controller.purge_lane(step.lane, step.actuator, world_.rig.next);
-      world_.note_drop(step.actuator, false);
-      break;
-    case Action::interrupt:
-      controller.interrupt(step.actuator, world_.iteration);
-      world_.note_drop(step.actuator, false);
-      break;
-    case Action::halt:
-      controller.halt(world_.rig.next);
-      world_.note_drop(kEveryActuator);
-      break;
     case Action::resume:
       if (auto failure = come_to_rest()) return failure;
-      restart(nullptr);
+      world_.restart(nullptr);
+      watch_again();
       break;
     case Action::restart:
-      restart(nullptr);
-      break;
     case Action::restart_with:
-      restart(&step.values);
+      world_.act(step, place);
+      watch_again();
       break;
-    case Action::read:
-      world_.actuators.at(step.actuator).numbers.at(step.number).reading = step.values.at(0);
-      break;
-    case Action::track:
-      for (ActuatorTrack& actuator : world_.actuators) {
-        for (NumberTrack& number : actuator.numbers) number.reading.reset();
-      }
+    default:
+      world_.act(step, place);
   }
   return std::nullopt;
 }
 
-void Player::restart(const std::vector<double>* desired) {
-  world_.restart(desired);
+/// After a fresh start.
+void Player::watch_again() {
   limits_.restart(world_);
   spans_.restart(world_);
   times_.restart(world_);
@@ -133,8 +105,7 @@ std::optional<Failure> Player::come_to_rest() {
   for (std::int64_t i = 0; world_.rig.controller.active() || world_.rig.controller.braking(); ++i) {
     if (i == longest) return Failure{"braking", "nothing runs, but it never comes to rest"};
     if (world_.rig.controller.active()) {
-      world_.rig.controller.purge(kEveryActuator, world_.rig.next);
-      world_.note_drop(kEveryActuator);
+      world_.purge(kEveryActuator);
     }
     if (auto failure = run(1)) return failure;
   }
@@ -143,8 +114,7 @@ std::optional<Failure> Player::come_to_rest() {
 
 /// Purges, brakes, and stands still; then all is told and every block is back.
 std::optional<Failure> Player::finish() {
-  world_.rig.controller.purge(kEveryActuator, world_.rig.next);
-  world_.note_drop(kEveryActuator);
+  world_.purge(kEveryActuator);
   if (auto failure = run(1)) return failure;
   if (auto failure = come_to_rest()) return failure;
   if (auto failure = run(kIdleIterations)) return failure;

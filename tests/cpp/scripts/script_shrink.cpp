@@ -63,6 +63,16 @@ class Shrinker {
     return any;
   }
 
+  /// Visits a command and those that are one command with it.
+  template <class Visit>
+  static void each_of_group(Script& script, std::size_t i, Visit&& visit) {
+    const std::uint32_t group = script.steps[i].group;
+    if (group == 0) return visit(script.steps[i]);
+    for (ScriptStep& step : script.steps) {
+      if (step.action == Action::command && step.group == group) visit(step);
+    }
+  }
+
   /// The last row of trajectories, one after the other.
   bool drop_rows() {
     bool any = false;
@@ -71,13 +81,16 @@ class Shrinker {
         dropped = false;
         const ScriptStep& step = script_.steps[i];
         if (step.action != Action::command) break;
-        const std::size_t numbers = script_.actuators[step.actuator].numbers.size();
-        const std::size_t rows = step.values.size() / numbers;
+        const auto numbers_of = [&](const ScriptStep& each) {
+          return script_.actuators[each.actuator].numbers.size();
+        };
+        const std::size_t rows = step.values.size() / numbers_of(step);
         if (rows <= (step.times.empty() ? 1U : 2U)) break;
         Script changed = script_;
-        ScriptStep& shorter = changed.steps[i];
-        shorter.values.resize(shorter.values.size() - numbers);
-        if (!shorter.times.empty()) shorter.times.pop_back();
+        each_of_group(changed, i, [&](ScriptStep& shorter) {
+          shorter.values.resize(shorter.values.size() - numbers_of(shorter));
+          if (!shorter.times.empty()) shorter.times.pop_back();
+        });
         any |= dropped = accept(std::move(changed));
       }
     }
@@ -91,11 +104,17 @@ class Shrinker {
       change(changed.steps[i]);
       if (changed.text() != script_.text()) any |= accept(std::move(changed));
     };
+    const auto try_change_of_all = [&](std::size_t i, auto&& change) {
+      Script changed = script_;
+      each_of_group(changed, i, change);
+      if (changed.text() != script_.text()) any |= accept(std::move(changed));
+    };
     for (std::size_t i = 0; i < script_.steps.size(); ++i) {
       if (script_.steps[i].action != Action::command) continue;
-      try_change(i, [](ScriptStep& step) { step.head.profile = Profile::linear; });
-      try_change(i, [](ScriptStep& step) { step.head.start = Start::desired; });
-      try_change(i, [](ScriptStep& step) { step.head.mode = Mode::queue; });
+      try_change_of_all(i, [](ScriptStep& step) { step.head.profile = Profile::linear; });
+      try_change_of_all(i, [](ScriptStep& step) { step.head.start = Start::desired; });
+      try_change_of_all(i, [](ScriptStep& step) { step.head.mode = Mode::queue; });
+      try_change_of_all(i, [](ScriptStep& step) { step.group = 0; });
       try_change(i, [](ScriptStep& step) { step.mask = 0; });
       for (std::size_t v = 0; v < script_.steps[i].values.size(); ++v) {
         try_change(i, [v](ScriptStep& step) { step.values[v] = 0.0; });

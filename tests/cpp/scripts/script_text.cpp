@@ -107,6 +107,7 @@ void print_command(std::ostringstream& out, const ScriptStep& step) {
   if (head.mode == Mode::overwrite) out << " overwrite";
   if (head.start == Start::observed) out << " observed";
   if (step.mask != 0) out << " mask " << step.mask;
+  if (step.group != 0) out << " group " << step.group;
   if (!step.times.empty()) out << " times";
   for (const std::int64_t time : step.times) out << ' ' << time;
   out << " to";
@@ -213,6 +214,8 @@ void parse_command(Line& line, ScriptStep& step) {
       step.head.start = Start::observed;
     } else if (word == "mask") {
       step.mask = static_cast<std::uint64_t>(line.whole());
+    } else if (word == "group") {
+      step.group = line.index();
     } else if (word == "times") {
       times = true;
     } else if (times) {

@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace o80::test {
 namespace {
+
+constexpr std::uint32_t kEveryLane = 0xFFFF'FFFF;
 
 bool bit_of(const std::uint64_t* mask, std::size_t actuator) {
   return (mask[actuator / 64] >> (actuator % 64) & 1) != 0;
@@ -82,30 +85,113 @@ void ScriptWorld::add(const ScriptStep& step, std::size_t place) {
   std::vector<std::uint64_t> mask;
   if (step.mask != 0) mask.push_back(step.mask);
   LaneBatch& batch = batches_[step.lane];
+  if (batch.first != nullptr && batch.first->group != step.group) add_group(batch);
+  if (step.group != 0) {
+    if (batch.first == nullptr) batch.first = &step;
+    batch.rows = static_cast<std::uint32_t>(rows);
+    batch.commands.push_back({place, batch.builder.records(), true});
+    batch.group.push_back({head, mask, states});
+    return;
+  }
   const std::uint32_t at =
       batch.builder.command(head, mask, step.times, static_cast<std::uint32_t>(rows), states);
-  batch.commands.push_back({place, at});
+  batch.commands.push_back({place, at, false});
+}
+
+void ScriptWorld::add_group(LaneBatch& batch) {
+  const ScriptStep* first = std::exchange(batch.first, nullptr);
+  if (first == nullptr) return;
+  std::vector<BatchBuilder::Member> members;
+  for (const Member& member : batch.group) {
+    members.push_back({member.head, member.mask, member.states});
+  }
+  batch.builder.group(members, first->times, batch.rows);
+  batch.group.clear();
 }
 
 void ScriptWorld::pulse(std::uint32_t lane) {
   LaneBatch& batch = batches_[lane];
+  add_group(batch);
   BatchRecord record;
   CommandId& used = rig.used_ids[lane];
   record.id = used + 1;
   used += 2 + batch.builder.records();
   blocks_sent += batch.builder.blocks();
   for (const Pending& pending : batch.commands) {
-    const CommandId id = record_id(record.id, pending.place);
-    SentCommand& command = commands_[{lane, id}];
+    const ScriptStep& step = script.steps[pending.step];
+    if (step.head.mode == Mode::overwrite) {
+      end_members(step.actuator, kEveryLane, Status::overwritten, rig.next);
+    }
+    SentCommand& command = commands_.emplace_back();
     command.step = pending.step;
     command.lane = lane;
-    command.id = id;
+    command.id = record_id(record.id, pending.place);
+    command.is_member = pending.is_member;
     sent.push_back(&command);
+    records_[{lane, command.id}].push_back(&command);
+    if (command.is_member) members.push_back(&command);
   }
   const BlockIndex first = rig.place(batch.builder.seal(record));
   rig.controller.take(lane, first, rig);
   batch.builder.clear();
   batch.commands.clear();
+}
+
+void ScriptWorld::act(const ScriptStep& step, std::size_t place) {
+  switch (step.action) {
+    case Action::command:
+      return add(step, place);
+    case Action::pulse:
+      return pulse(step.lane);
+    case Action::purge:
+      return purge(step.actuator);
+    case Action::purge_own:
+      rig.controller.purge_lane(step.lane, step.actuator, rig.next);
+      note_drop(step.actuator, false);
+      return end_members(step.actuator, step.lane, Status::purged, rig.next);
+    case Action::interrupt:
+      rig.controller.interrupt(step.actuator, iteration);
+      note_drop(step.actuator, false);
+      return end_members(step.actuator, kEveryLane, Status::interrupted, iteration);
+    case Action::halt:
+      rig.controller.halt(rig.next);
+      note_drop(kEveryActuator);
+      return end_members(kEveryActuator, kEveryLane, Status::halted, rig.next);
+    case Action::restart:
+      return restart(nullptr);
+    case Action::restart_with:
+      return restart(&step.values);
+    case Action::read:
+      actuators.at(step.actuator).numbers.at(step.number).reading = step.values.at(0);
+      return;
+    case Action::track:
+      for (ActuatorTrack& actuator : actuators) {
+        for (NumberTrack& number : actuator.numbers) number.reading.reset();
+      }
+      return;
+    default:
+      return;
+  }
+}
+
+void ScriptWorld::purge(std::uint16_t actuator) {
+  rig.controller.purge(actuator, rig.next);
+  note_drop(actuator);
+  end_members(actuator, kEveryLane, Status::purged, rig.next);
+}
+
+/// Members of groups leave them.
+void ScriptWorld::end_members(std::uint16_t actuator, std::uint32_t lane, Status status,
+                              Iteration at) {
+  std::erase_if(members, [&](SentCommand* member) {
+    const bool ends = (actuator == kEveryActuator || step_of(*member).actuator == actuator) &&
+                      (lane == kEveryLane || member->lane == lane);
+    if (!ends) return false;
+    member->status = status;
+    member->ended_at = at;
+    first_ends_.try_emplace({member->lane, member->id}, status);
+    return true;
+  });
 }
 
 void ScriptWorld::restart(const std::vector<double>* desired) {
@@ -124,6 +210,7 @@ void ScriptWorld::restart(const std::vector<double>* desired) {
   }
   rig.controller.restart(rig.observed.data(), desired != nullptr ? states.data() : nullptr,
                          rig.next);
+  end_members(kEveryActuator, kEveryLane, Status::purged, rig.next);
   iteration = rig.next++;
   note_drop(kEveryActuator);
   look();
@@ -155,24 +242,49 @@ std::optional<Failure> ScriptWorld::hear() {
   const auto& changes = rig.witness.changes;
   for (; heard_ < changes.size(); ++heard_) {
     const StatusChange& change = changes[heard_];
-    const auto found = commands_.find({change.lane, change.id});
-    if (found == commands_.end()) continue;  // a batch
-    SentCommand& command = found->second;
-    if (command.ended_at != kNever) {
-      return Failure{"one end", "a command ended twice: " + std::to_string(command.id)};
-    }
-    command.status = change.status;
-    if (change.status == Status::active) {
-      if (change.iteration != iteration || command.active_since != kNever) {
+    const auto found = records_.find({change.lane, change.id});
+    if (found == records_.end()) continue;  // a batch
+    for (SentCommand* command : found->second) {
+      if (command->told.status != Status::none) {
+        return Failure{"one end", "a command ended twice: " + std::to_string(command->id)};
+      }
+      if (is_end(change.status)) {
+        if (auto failure = hear_end(*command, change)) return failure;
+        continue;
+      }
+      if (command->ended_at != kNever) continue;  // a member that has left
+      if (change.iteration != iteration || command->active_since != kNever) {
         return Failure{"activation", "a command became active at another iteration or twice"};
       }
-      command.active_since = change.iteration;
-      running_[step_of(command).actuator].push_back(&command);
-    } else if (is_end(change.status)) {
-      command.ended_at = change.iteration;
-      ended.push_back(&command);
+      command->status = change.status;
+      command->active_since = change.iteration;
+      running_[step_of(*command).actuator].push_back(command);
     }
   }
+  return std::nullopt;
+}
+
+std::optional<Failure> ScriptWorld::hear_end(SentCommand& command, const StatusChange& change) {
+  command.told = {change.status, change.iteration};
+  if (command.is_member && command.active_since != kNever) {
+    const auto first = first_ends_.find({command.lane, command.id});
+    const bool expected = first != first_ends_.end() ? change.status == first->second
+                                                     : change.status == Status::completed ||
+                                                           change.status == Status::limited;
+    if (!expected) return Failure{"end of several", "not the first end of its members is told"};
+  }
+  if (command.ended_at != kNever) return std::nullopt;  // a member that has left
+  command.status = change.status;
+  if (command.is_member && command.active_since != kNever) {
+    const bool limited = actuators[step_of(command).actuator].clamped;
+    if (change.status == Status::completed && limited) {
+      return Failure{"end of several", "completed, though a member is limited"};
+    }
+    command.status = limited ? Status::limited : Status::completed;
+  }
+  command.ended_at = change.iteration;
+  ended.push_back(&command);
+  std::erase(members, &command);
   return std::nullopt;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <optional>
 #include <string>
@@ -9,6 +10,7 @@
 
 #include "control/rig.hpp"
 #include "scripts/script.hpp"
+#include "scripts/script_outcome.hpp"
 
 namespace o80::test {
 
@@ -20,7 +22,8 @@ struct Failure {
   std::string text;
 };
 
-/// A command that was sent, and what was told of it.
+/// A command that was sent, and what was told of it. Of a member of a group nothing is told, so
+/// `status` and `ended_at` follow from what ended it, or else from the end of all.
 struct SentCommand {
   std::size_t step = 0;  // of the script
   std::uint32_t lane = 0;
@@ -28,6 +31,8 @@ struct SentCommand {
   Status status = Status::queued;
   Iteration active_since = kNever;
   Iteration ended_at = kNever;
+  bool is_member = false;  // of a command of several actuators
+  Outcome told;            // the end that was told; of a member, that of all
 
   /// It gave the desired state of this iteration.
   bool drove(Iteration iteration) const {
@@ -64,11 +69,11 @@ class ScriptWorld {
  public:
   explicit ScriptWorld(const Script& played);
 
-  void add(const ScriptStep& step, std::size_t place);
-  void pulse(std::uint32_t lane);
+  /// Any step but run and resume.
+  void act(const ScriptStep& step, std::size_t place);
+  void purge(std::uint16_t actuator);
   /// A fresh start: its row takes an iteration.
   void restart(const std::vector<double>* desired);
-  void note_drop(std::uint16_t actuator, bool surely = true);
   /// One iteration; the failure is of what was told, not of motion.
   std::optional<Failure> step();
 
@@ -88,26 +93,45 @@ class ScriptWorld {
   std::vector<ActuatorTrack> actuators;
   std::vector<SentCommand*> sent;         // in order; of all lanes
   std::vector<const SentCommand*> ended;  // in this iteration
+  std::vector<SentCommand*> members;      // of groups, that have not ended
   Iteration iteration = 0;                // of the last row
   std::uint64_t blocks_sent = 0;
 
  private:
-  void observe();
-  void look();
-  std::optional<Failure> hear();
-  std::optional<Failure> find_drivers();
-
   struct Pending {
     std::size_t step;
-    std::uint32_t place;
+    std::uint32_t place;  // of its record
+    bool is_member;
+  };
+  struct Member {
+    RecordHead head;
+    std::vector<std::uint64_t> mask;
+    std::vector<std::byte> states;
   };
   struct LaneBatch {
     BatchBuilder builder;
     std::vector<Pending> commands;
+    std::vector<Member> group;  // that is being added
+    const ScriptStep* first = nullptr;
+    std::uint32_t rows = 1;
   };
+
+  void add(const ScriptStep& step, std::size_t place);
+  static void add_group(LaneBatch& batch);
+  void pulse(std::uint32_t lane);
+  void note_drop(std::uint16_t actuator, bool surely = true);
+  void end_members(std::uint16_t actuator, std::uint32_t lane, Status status, Iteration at);
+  void observe();
+  void look();
+  std::optional<Failure> hear();
+  std::optional<Failure> hear_end(SentCommand& command, const StatusChange& change);
+  std::optional<Failure> find_drivers();
+
   std::map<std::uint32_t, LaneBatch> batches_;
-  std::map<std::pair<std::uint32_t, CommandId>, SentCommand> commands_;
-  std::vector<std::vector<const SentCommand*>> running_;  // of each actuator
+  std::deque<SentCommand> commands_;
+  std::map<std::pair<std::uint32_t, CommandId>, std::vector<SentCommand*>> records_;
+  std::map<std::pair<std::uint32_t, CommandId>, Status> first_ends_;  // of groups, if not completed
+  std::vector<std::vector<const SentCommand*>> running_;              // of each actuator
   std::size_t heard_ = 0;
 };
 

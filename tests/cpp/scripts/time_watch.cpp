@@ -23,15 +23,48 @@ std::optional<Failure> TimeWatch::step(const ScriptWorld& world) {
       clocks_[step.actuator].known = false;
     }
   }
+  for (const SentCommand* member : world.members) {
+    const ScriptStep& step = world.step_of(*member);
+    const bool late = step.head.pace == Pace::until && step.head.amount < world.iteration;
+    if (late && member->active_since == kNever) clocks_[step.actuator].known = false;
+  }
+  for (std::size_t a = 0; a < clocks_.size(); ++a) {
+    if (begins(world, a)) begin(world, a);
+  }
+  for (std::size_t a = 0; a < clocks_.size(); ++a) {
+    if (begins(world, a)) begin_together(world, a);
+  }
   for (std::size_t a = 0; a < clocks_.size(); ++a) {
     const ActuatorTrack& actuator = world.actuators[a];
     if (actuator.driver == nullptr) continue;
-    if (actuator.driver != actuator.previous) begin(world, a);
     if (actuator.driver->ended_at == world.iteration) {
       if (auto failure = end(world, a)) return failure;
     }
   }
   return std::nullopt;
+}
+
+bool TimeWatch::begins(const ScriptWorld& world, std::size_t actuator) {
+  const SentCommand* driver = world.actuators[actuator].driver;
+  return driver != nullptr && driver != world.actuators[actuator].previous;
+}
+
+/// A duration of several actuators counts from the latest of their queues' exact ends.
+void TimeWatch::begin_together(const ScriptWorld& world, std::size_t actuator) {
+  const SentCommand& command = *world.actuators[actuator].driver;
+  if (!command.is_member || world.step_of(command).head.pace != Pace::duration) return;
+  Clock together = clocks_[actuator];
+  const auto each_other = [&](auto&& visit) {
+    for (std::size_t a = 0; a < clocks_.size(); ++a) {
+      const SentCommand* other = world.actuators[a].driver;
+      if (other != nullptr && other->lane == command.lane && other->id == command.id) visit(a);
+    }
+  };
+  each_other([&](std::size_t a) {
+    together.exact = std::max(together.exact, clocks_[a].exact);
+    together.known = together.known && clocks_[a].known;
+  });
+  each_other([&](std::size_t a) { clocks_[a] = together; });
 }
 
 void TimeWatch::begin(const ScriptWorld& world, std::size_t actuator) {

@@ -26,7 +26,9 @@ class TimeWatch {
     bool known = true;       // no command of the queue was dropped or late since it began
   };
 
+  static bool begins(const ScriptWorld& world, std::size_t actuator);
   void begin(const ScriptWorld& world, std::size_t actuator);
+  void begin_together(const ScriptWorld& world, std::size_t actuator);
   std::optional<Failure> end(const ScriptWorld& world, std::size_t actuator);
 
   std::vector<Clock> clocks_;

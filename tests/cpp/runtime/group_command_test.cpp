@@ -1,0 +1,274 @@
+// One command for several actuators, as a frontend adds it and a backend carries it out.
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include "runtime/station.hpp"
+
+namespace o80::test {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+constexpr std::array<std::uint32_t, 2> kBoth{0, 1};
+
+std::uint32_t add_both(UntypedFrontend& frontend, double shoulder, double elbow,
+                       const CommandOptions& options = {}) {
+  const std::array<double, 2> targets{shoulder, elbow};
+  return frontend.add_commands(kBoth, std::as_bytes(std::span(targets)), options);
+}
+
+class GroupCommandTest : public StationTest {};
+
+TEST_F(GroupCommandTest, IsOneRecordWithOneStatus) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  add_both(frontend, 2.0, 4.0, {.pace = iterations(2)});
+  EXPECT_EQ(frontend.added(), 1U);
+  const Batch batch = frontend.pulse();
+  EXPECT_EQ(batch.size(), 1U);
+  station.run(1);
+  EXPECT_EQ(batch.handle(0).status, Status::active);
+  station.run(1);
+  EXPECT_EQ(batch.handle(0).status, Status::completed);
+  EXPECT_EQ(batch.handle(0).iteration, 2);
+  EXPECT_TRUE(batch.ended());
+  EXPECT_THAT(desired(frontend, 1, 2), ElementsAre(1, 2));
+  EXPECT_THAT(desired(frontend, 1, 2, 1), ElementsAre(2, 4));
+}
+
+TEST_F(GroupCommandTest, WaitsForItsSlowestQueueAndTakesAsLongAsItsSlowestMember) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  add(frontend, 0, 3.0, {.pace = iterations(3)});
+  add_both(frontend, 3.5, 2.0, {.pace = speed(1000)});
+  const Batch batch = frontend.pulse();
+  station.run(5);
+  EXPECT_THAT(desired(frontend, 1, 5), ElementsAre(1, 2, 3, 3.25, 3.5));
+  EXPECT_THAT(desired(frontend, 1, 5, 1), ElementsAre(0, 0, 0, 1, 2));
+  EXPECT_EQ(batch.last_iteration(), 5);
+}
+
+TEST_F(GroupCommandTest, ATrajectoryIsOneToo) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  const std::array<double, 6> rows{1, 2, 3, 10, 20, 30};
+  frontend.add_trajectories(kBoth, 3, std::as_bytes(std::span(rows)));
+  const Batch batch = frontend.pulse();
+  EXPECT_EQ(batch.size(), 1U);
+  station.run(3);
+  EXPECT_THAT(desired(frontend, 1, 3), ElementsAre(1, 2, 3));
+  EXPECT_THAT(desired(frontend, 1, 3, 1), ElementsAre(10, 20, 30));
+  EXPECT_EQ(batch.handle(0).status, Status::completed);
+}
+
+TEST_F(GroupCommandTest, IsRefusedWholeWithTheReason) {
+  Station station({.segment = "pair"}, [](Schema& schema) {
+    schema.actuator(1).limits({.minimum = -1, .maximum = 1, .speed = 10});
+  });
+  station.start();
+  UntypedFrontend frontend("pair");
+  const auto refusal = [&](std::vector<std::uint32_t> actuators, std::vector<double> targets,
+                           const CommandOptions& options = {.pace = iterations(2)}) {
+    return message_of<InvalidArgument>(
+        [&] { frontend.add_commands(actuators, std::as_bytes(std::span(targets)), options); });
+  };
+  EXPECT_THAT(refusal({}, {}), HasSubstr("at least one actuator"));
+  EXPECT_THAT(refusal({0, 2}, {0.5, 0.5}), HasSubstr("shoulder (0), elbow (1)"));
+  EXPECT_THAT(refusal({1, 0, 1}, {0.5, 0.5, 0.5}), AllOf(HasSubstr("'elbow'"), HasSubstr("twice")));
+  EXPECT_THAT(refusal({0, 1}, {0.5, 1.5}), HasSubstr("elbow"));
+  EXPECT_THAT(refusal({0, 1}, {std::nan(""), 0.5}), HasSubstr("shoulder"));
+  EXPECT_THAT(refusal({0, 1}, {0.5, 0.5}, {.pace = speed(11)}), HasSubstr("elbow"));
+  EXPECT_THAT(refusal({0, 1}, {0.5, 0.5}, {.pace = fastest()}), HasSubstr("shoulder"));
+  EXPECT_THAT(refusal({0, 1}, {0.5}), AllOf(HasSubstr("2 actuators"), HasSubstr("16 bytes")));
+  EXPECT_THAT(refusal({0, 1}, {0.5, 0.5, 0.5}), AllOf(HasSubstr("24"), HasSubstr("16 bytes")));
+  EXPECT_EQ(frontend.added(), 0U);
+  EXPECT_EQ(refusal({1, 0}, {0.5, 2.0}), "");
+}
+
+TEST_F(GroupCommandTest, MovesSmoothlyIfOneOfItsActuatorsDoesByDefault) {
+  Station station({.segment = "pair"}, [](Schema& schema) {
+    schema.actuator(1).limits({.speed = 1e6, .acceleration = 1e9});
+  });
+  station.start();
+  UntypedFrontend frontend("pair");
+  add_both(frontend, 1.0, 1.0, {.pace = iterations(4)});
+  frontend.pulse();
+  station.run(4);
+  EXPECT_EQ(desired(frontend, 1, 4), desired(frontend, 1, 4, 1)) << "one way for both";
+  EXPECT_LT(desired(frontend.wait_for(1, kAtOnce)), 0.25) << "a minimum jerk begins at rest";
+}
+
+TEST_F(GroupCommandTest, FillsItsLaneAsItsBlocksSay) {
+  Station station({.segment = "pair", .lane_blocks = 64});
+  station.start();
+  UntypedFrontend frontend("pair");
+  // a block for the batch, then three for each: its head and two members
+  for (int i = 0; i < 20; ++i) add_both(frontend, i, i);
+  EXPECT_THAT(message_of<LaneFull>([&] { frontend.pulse(); }), HasSubstr("takes 61 blocks"));
+  frontend.forget_added();
+  for (int round = 0; round < 20; ++round) {
+    for (int i = 0; i < 19; ++i) add_both(frontend, i, i);
+    const Batch batch = frontend.pulse();
+    station.run(19);
+    ASSERT_TRUE(batch.ended());
+    ASSERT_EQ(batch.handle(18).status, Status::completed);
+  }
+}
+
+TEST_F(GroupCommandTest, ABatchStagedOverSeveralIterationsActsWhole) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  constexpr int kGroups = 2000;
+  for (int i = 1; i <= kGroups; ++i) add_both(frontend, i, -i);
+  const Batch batch = frontend.pulse();
+  Iteration begun = 0;
+  while (batch.first_iteration() < 0) {
+    ASSERT_LT(begun, 100);
+    EXPECT_EQ(desired(frontend.latest(), 0), 0.0);
+    station.run(1);
+    ++begun;
+  }
+  EXPECT_GT(begun, 3) << "it was staged";
+  station.run(kGroups);
+  ASSERT_TRUE(batch.ended());
+  for (int i = 1; i <= kGroups; ++i) {
+    ASSERT_EQ(batch.handle(static_cast<std::size_t>(i - 1)).iteration, begun + i - 1);
+    const UntypedObservation row = frontend.wait_for(begun + i - 1, kAtOnce);
+    ASSERT_EQ(desired(row, 0), i);
+    ASSERT_EQ(desired(row, 1), -i);
+  }
+}
+
+// ------------------------------------------------------------------------------ losing members
+
+TEST_F(GroupCommandTest, GoesOnWhenAnotherFrontendOverwritesOneMember) {
+  Station station;
+  station.start();
+  UntypedFrontend one("pair");
+  UntypedFrontend other("pair");
+  add_both(one, 8.0, 8.0, {.pace = iterations(8)});
+  const Batch batch = one.pulse();
+  station.run(2);
+  send(other, 1, 0.5, {.mode = Mode::overwrite});
+  station.run(1);
+  EXPECT_EQ(batch.handle(0).status, Status::active);
+  station.run(5);
+  EXPECT_EQ(batch.handle(0).status, Status::overwritten);
+  EXPECT_EQ(batch.handle(0).iteration, 8) << "when its last member ended";
+  EXPECT_EQ(desired(one.latest(), 0), 8.0);
+  EXPECT_EQ(desired(one.latest(), 1), 0.5);
+}
+
+TEST_F(GroupCommandTest, GoesOnWhenTheDriverInterruptsOneMember) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  add_both(frontend, 8.0, 8.0, {.pace = iterations(8)});
+  const Batch batch = frontend.pulse();
+  station.before_publish = [&] {
+    if (station.backend.iteration() == 3) station.backend.interrupt(1);
+  };
+  station.run(8);
+  EXPECT_EQ(batch.handle(0).status, Status::interrupted);
+  EXPECT_EQ(batch.handle(0).iteration, 8);
+  EXPECT_EQ(desired(frontend.latest(), 0), 8.0);
+  EXPECT_EQ(desired(frontend.latest(), 1), 3.0);
+}
+
+TEST_F(GroupCommandTest, EndsAtOnceWhenAllItsMembersDo) {
+  const auto ends_as = [](auto&& end, Status status) {
+    Station station;
+    station.start();
+    UntypedFrontend frontend("pair");
+    add_both(frontend, 8.0, 8.0, {.pace = iterations(8)});
+    add_both(frontend, 9.0, 9.0, {.pace = iterations(8)});
+    const Batch batch = frontend.pulse();
+    station.run(2);
+    end(frontend);
+    station.run(1);
+    for (const std::size_t i : {0, 1}) {
+      EXPECT_EQ(batch.handle(i).status, status);
+      EXPECT_EQ(batch.handle(i).iteration, 3);
+    }
+    EXPECT_TRUE(batch.ended());
+  };
+  ends_as([](UntypedFrontend& frontend) { frontend.halt("enough"); }, Status::halted);
+  ends_as(
+      [](UntypedFrontend& frontend) {
+        frontend.add_purge();
+        frontend.pulse();
+      },
+      Status::purged);
+  ends_as(
+      [](UntypedFrontend& frontend) {
+        add_both(frontend, 1.0, 1.0, {.mode = Mode::overwrite});
+        frontend.pulse();
+      },
+      Status::overwritten);
+}
+
+TEST_F(GroupCommandTest, EndsWithItsFrontendIfToldSo) {
+  Station station({.segment = "pair", .stale = Stale::purge, .silence = 5});
+  station.start();
+  UntypedFrontend frontend("pair");
+  add_both(frontend, 100.0, 100.0, {.pace = iterations(100)});
+  const Batch batch = frontend.pulse();
+  station.run(20);
+  const Handle handle = batch.handle(0);
+  EXPECT_EQ(handle.status, Status::purged);
+  EXPECT_EQ(handle.reason, Reason::silence);
+}
+
+// ------------------------------------------------------------------------------ bursting
+
+TEST_F(GroupCommandTest, ABurstUntilItsEndRunsUntilItsLastMemberHasEnded) {
+  Station station({.segment = "pair", .bursting = true});
+  station.start();
+  UntypedFrontend frontend("pair");
+  add(frontend, 0, 3.0, {.pace = iterations(3)});
+  add_both(frontend, 4.0, 2.0, {.pace = iterations(2)});
+  const Batch batch = frontend.pulse_to_end();
+  EXPECT_EQ(station.drive(), Step::standing);
+  EXPECT_TRUE(batch.ended());
+  EXPECT_EQ(frontend.published(), 5);
+}
+
+TEST_F(GroupCommandTest, BeginsAtTheSameIterationHoweverLongTheBackendStoodBefore) {
+  // one queue waits behind a dropped member of a group; telling its drop takes several iterations
+  const auto begins = [](bool stands_between) {
+    Station station({.segment = "pair", .bursting = true});
+    station.start();
+    UntypedFrontend frontend("pair");
+    for (int i = 0; i < 5000; ++i) add(frontend, 1, 1.0, {.pace = iterations(1'000'000)});
+    add_both(frontend, 5.0, 5.0);
+    frontend.pulse();
+    frontend.start_burst(20);
+    station.drive();
+    frontend.add_purge(1);
+    frontend.pulse();
+    if (stands_between) station.drive();
+    frontend.start_burst(20);
+    station.drive();
+    if (stands_between) station.drive();
+    for (Iteration i = frontend.published() - 19; i <= frontend.published(); ++i) {
+      if (desired(frontend.wait_for(i, kAtOnce)) == 5.0) return i;
+    }
+    return Iteration{-1};
+  };
+  EXPECT_EQ(begins(false), begins(true));
+  EXPECT_GT(begins(true), 0);
+}
+
+}  // namespace
+}  // namespace o80::test
