@@ -7,6 +7,7 @@
 
 #include <array>
 #include <cstring>
+#include <vector>
 
 #include "bindings.hpp"
 #include "o80/describe/table.hpp"
@@ -17,6 +18,24 @@ namespace nb = nanobind;
 using namespace nb::literals;
 using o80::InvalidArgument;
 using o80::UntypedFrontend;
+
+namespace {
+
+/// Of a list, tuple or array of targets; -1 for anything else.
+Py_ssize_t length_of(nb::handle targets) {
+  if (PySequence_Check(targets.ptr()) == 0 || PyUnicode_Check(targets.ptr()) != 0) return -1;
+  const Py_ssize_t length = PyObject_Size(targets.ptr());
+  if (length < 0) PyErr_Clear();
+  return length;
+}
+
+/// Adds so many bytes; where they are.
+std::byte* grown(std::vector<std::byte>& bytes, std::size_t size) {
+  bytes.resize(bytes.size() + size);
+  return bytes.data() + bytes.size() - size;
+}
+
+}  // namespace
 
 Frontend::Frontend(const Attachment& attachment, std::shared_ptr<Decoder> decoder)
     : untyped_(attachment.frontend), robot_(attachment.robot), decoder_(std::move(decoder)) {
@@ -64,6 +83,51 @@ void Frontend::add_command(nb::handle named, nb::handle target,
   const StateBytes state(schema, schema.actuators[index].type, target, name_of(index));
   frontend->add_command(index, state.bytes, options,
                         state.whole ? std::span<const std::uint64_t>{} : state.mask);
+}
+
+std::vector<std::uint32_t> Frontend::actuators(nb::handle named) const {
+  std::vector<std::uint32_t> indices;
+  if (named.is_none()) {
+    for (std::uint32_t i = 0; i < plain_.size(); ++i) indices.push_back(i);
+  } else {
+    for (const nb::handle one : named) indices.push_back(actuator(one));
+  }
+  return indices;
+}
+
+void Frontend::add_commands(nb::handle named, nb::handle targets,
+                            const o80::CommandOptions& options) const {
+  const std::shared_ptr<UntypedFrontend> frontend = untyped_;
+  const std::vector<std::uint32_t> chosen = actuators(named);
+  const o80::Schema& schema = decoder_->description->schema;
+  if (length_of(targets) != static_cast<Py_ssize_t>(chosen.size())) {
+    throw InvalidArgument("a command for " + std::to_string(chosen.size()) +
+                          " actuators needs a target for each, in their order: not " +
+                          nb::cast<std::string>(nb::repr(targets)));
+  }
+  std::vector<std::byte> states;
+  std::vector<std::uint64_t> masks;
+  bool whole = true;
+  std::size_t i = 0;
+  for (const nb::handle target : targets) {
+    const std::uint32_t index = chosen.at(i++);
+    if (const o80::FieldRow* number = plain_[index]) {
+      std::byte* const at = grown(states, number->size);
+      if (number->kind == o80::Kind::float64 && PyFloat_Check(target.ptr())) {
+        const double value = PyFloat_AS_DOUBLE(target.ptr());
+        std::memcpy(at, &value, sizeof value);
+      } else {
+        write_number(schema, *number, target, at, name_of(index));
+      }
+      masks.push_back(1);
+      continue;
+    }
+    const StateBytes state(schema, schema.actuators[index].type, target, name_of(index));
+    states.insert(states.end(), state.bytes.begin(), state.bytes.end());
+    masks.insert(masks.end(), state.mask.begin(), state.mask.end());
+    whole = whole && state.whole;
+  }
+  frontend->add_commands(chosen, states, options, whole ? std::span<const std::uint64_t>{} : masks);
 }
 
 std::vector<std::byte> Frontend::request_bytes(std::uint32_t index, nb::handle fields) const {

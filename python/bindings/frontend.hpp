@@ -35,6 +35,9 @@ class Frontend {
   std::uint32_t actuator(nanobind::handle named) const;
   void add_command(nanobind::handle named, nanobind::handle target,
                    const o80::CommandOptions& options) const;
+  /// One command for several actuators (None: for all), a target for each.
+  void add_commands(nanobind::handle named, nanobind::handle targets,
+                    const o80::CommandOptions& options) const;
   std::vector<std::byte> request_bytes(std::uint32_t index, nanobind::handle fields) const;
   Observation blank() const { return Observation(decoder_); }
 
@@ -47,6 +50,7 @@ class Frontend {
 
  private:
   std::string name_of(std::uint32_t index) const;
+  std::vector<std::uint32_t> actuators(nanobind::handle named) const;
 
   std::shared_ptr<o80::UntypedFrontend> untyped_;
   std::shared_ptr<o80::InlineRobot> robot_;

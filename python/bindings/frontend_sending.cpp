@@ -31,10 +31,16 @@ void add_command(const Frontend& self, nb::handle actuator, nb::handle target, n
                               .start = start_of(start),
                               .on_limit = on_limit_of(on_limit)};
   if (!profile.is_none()) options.profile = profile_of(profile);
-  self.add_command(actuator, target, options);
+  const bool several = actuator.is_none() || (PySequence_Check(actuator.ptr()) != 0 &&
+                                              PyUnicode_Check(actuator.ptr()) == 0);
+  if (several) {
+    self.add_commands(actuator, target, options);
+  } else {
+    self.add_command(actuator, target, options);
+  }
 }
 
-/// One trajectory for each of several actuators, all or none.
+/// One trajectory for several actuators.
 /// `states` holds the rows of the first, then those of the second...; `times` are ends [ns].
 void add_trajectories(const Frontend& self, const std::vector<std::uint32_t>& actuators,
                       std::uint32_t rows, nb::handle states, nb::handle times, nb::handle speed,
@@ -178,19 +184,23 @@ void add_request(const Frontend& self, std::string_view name, nb::handle fields)
 
 void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
   frontend
-      .def("add_command", &add_command, "actuator"_a.none(), "target"_a.none(), nb::kw_only(),
-           "duration"_a = nb::none(), "speed"_a = nb::none(), "until"_a = nb::none(),
-           "iterations"_a = nb::none(), "fastest"_a = false, "mode"_a = "queue",
-           "profile"_a = nb::none(), "start"_a = "desired", "on_limit"_a = "end",
-           nb::sig(
-               "def add_command(self, actuator: typing.SupportsIndex | str, target: typing.Any, *, "
-               "duration: float | None = None, speed: float | None = None, "
-               "until: int | None = None, iterations: int | None = None, fastest: bool = False, "
-               "mode: str = 'queue', profile: str | None = None, start: str = 'desired', "
-               "on_limit: str = 'end') -> None"),
-           R"(Adds a command to what the next pulse sends.
+      .def(
+          "add_command", &add_command, "actuator"_a.none(), "target"_a.none(), nb::kw_only(),
+          "duration"_a = nb::none(), "speed"_a = nb::none(), "until"_a = nb::none(),
+          "iterations"_a = nb::none(), "fastest"_a = false, "mode"_a = "queue",
+          "profile"_a = nb::none(), "start"_a = "desired", "on_limit"_a = "end",
+          nb::sig("def add_command(self, actuator: typing.SupportsIndex | str | "
+                  "collections.abc.Sequence[typing.SupportsIndex | str] | None, "
+                  "target: typing.Any, *, "
+                  "duration: float | None = None, speed: float | None = None, "
+                  "until: int | None = None, iterations: int | None = None, fastest: bool = False, "
+                  "mode: str = 'queue', profile: str | None = None, start: str = 'desired', "
+                  "on_limit: str = 'end') -> None"),
+          R"(Adds a command to what the next pulse sends.
 
-actuator: its index or its name.
+actuator: its index or its name; several, or None for all, for one command that they carry out
+    together: it begins when all their queues have come to it, takes as many iterations as the
+    slowest of them, and has one status. It needs one target for each.
 target: the state to reach, in the unit of its field: a number for a state of one number;
     otherwise a mapping (what is missing keeps its desired value), a record, or all fields in order.
 duration: time to get there [s].

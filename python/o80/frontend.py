@@ -117,7 +117,7 @@ class Frontend(_core.Frontend):
         profile: str = "linear",
         start: str = "desired",
     ) -> None:
-        """Adds one command through many states for each of several actuators.
+        """Adds one command through many states, for one or several actuators.
 
         targets: (T, actuators), row after row; (T,) for a single actuator. Numbers for states of
             one number, else a structured array, or a mapping from each field to an array.
@@ -127,7 +127,8 @@ class Frontend(_core.Frontend):
         speed: at which to go to each row, as in add_command.
         mode, profile, start: as in add_command.
 
-        All of it is added or, if InvalidArgument is raised, none.
+        Several actuators go through each row together, as in add_command. All of it is added or,
+        if InvalidArgument is raised, none.
         """
         if times is not None and (iterations is not None or speed is not None):
             raise InvalidArgument(

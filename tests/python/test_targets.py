@@ -143,10 +143,95 @@ def test_a_trajectory_moves_all_actuators_row_by_row(arm: o80.Frontend) -> None:
     assert np.array_equal(arm.history(10).desired, targets)
 
 
-def test_a_trajectory_has_one_command_an_actuator(arm: o80.Frontend) -> None:
+def test_a_trajectory_of_several_actuators_is_one_command(arm: o80.Frontend) -> None:
     arm.add_trajectory(np.zeros((100, 2)))
 
-    assert len(arm.pulse()) == 2
+    assert len(arm.pulse()) == 1
+
+
+# ---------------------------------------------------------------------------- several at once
+
+
+def test_several_actuators_move_by_one_command(arm: o80.Frontend) -> None:
+    arm.add_command(["elbow", 0], [0.4, 0.2], iterations=2)
+    batch = arm.pulse()
+    arm.burst(3, timeout=WAIT)
+
+    assert batch.statuses == ["completed"]
+    assert arm.history(3).desired.tolist() == [[0.1, 0.2], [0.2, 0.4], [0.2, 0.4]]
+
+
+def test_none_names_all_actuators(arm: o80.Frontend) -> None:
+    arm.add_command(None, np.array([0.1, 0.3]))
+    arm.pulse_and_wait(timeout=WAIT)
+
+    assert arm.latest().desired.tolist() == [0.1, 0.3]
+
+
+def test_they_take_as_long_as_the_slowest(arm: o80.Frontend) -> None:
+    arm.add_command(None, [0.1, 0.4], speed=100.0)
+    last = arm.pulse_and_wait(timeout=WAIT)
+
+    assert last.iteration == 4
+    assert np.allclose(arm.history(4).desired[:, 0], [0.025, 0.05, 0.075, 0.1])
+
+
+@pytest.mark.parametrize(
+    "target",
+    [0.5, [0.1], [0.1, 0.2, 0.3], "ab", {"shoulder": 1.0}, np.array(0.5), np.zeros((1, 2))],
+)
+def test_they_need_a_target_each(arm: o80.Frontend, target: object) -> None:
+    with pytest.raises(o80.InvalidArgument, match="target for each"):
+        arm.add_command(["shoulder", "elbow"], target)
+    assert arm.added == 0
+
+
+@pytest.mark.parametrize(
+    ("actuators", "targets", "message"),
+    [
+        ([], [], "at least one actuator"),
+        (["shoulder", "hand"], [0.1, 0.2], "'hand'"),
+        ([0, 7], [0.1, 0.2], "7"),
+        ([0, 1.5], [0.1, 0.2], "by its index or its name"),
+        (["shoulder", "elbow"], [0.1, float("nan")], "'elbow'"),
+        (["shoulder", "elbow"], [0.1, "far"], "'elbow'"),
+        (["shoulder", "elbow"], [[0.1, 0.2], [0.3, 0.4]], "'shoulder'"),
+    ],
+)
+def test_one_that_cannot_be_refuses_all(
+    arm: o80.Frontend, actuators: list[str | int], targets: list[float], message: str
+) -> None:
+    with pytest.raises(o80.InvalidArgument, match=message):
+        arm.add_command(actuators, targets)
+    assert arm.added == 0
+
+
+def test_one_that_is_overwritten_leaves_the_others(arm: o80.Frontend) -> None:
+    arm.add_command(None, [0.4, 0.4], iterations=4)
+    batch = arm.pulse()
+    arm.burst(2, timeout=WAIT)
+    arm.add_command("elbow", 0.0, mode="overwrite")
+    arm.pulse()
+    arm.burst(1, timeout=WAIT)
+    assert batch.statuses == ["active"]
+    arm.burst(1, timeout=WAIT)
+
+    assert batch.statuses == ["overwritten"]
+    assert arm.latest().desired.tolist() == [0.4, 0.0]
+
+
+def test_each_of_them_is_named_once(arm: o80.Frontend) -> None:
+    with pytest.raises(o80.InvalidArgument, match="'elbow' is named twice"):
+        arm.add_command(["elbow", 1], [0.1, 0.2])
+
+
+def test_states_of_several_types_may_be_given_in_part(robot: Robot) -> None:
+    robot.frontend.add_command(["a", "valve"], [{"position": 0.8}, True])
+    robot.frontend.pulse()
+    row = robot.step()
+
+    assert row.joints["position"][0] == 0.8
+    assert row.valve
 
 
 def test_a_trajectory_takes_its_iterations_for_each_row(arm: o80.Frontend) -> None:

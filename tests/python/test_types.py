@@ -14,6 +14,8 @@ with o80.robots.load("two_joints").start(frequency=500.0, gain=2.0) as process:
     arm: o80.Frontend = process.frontend()
     arm.add_command("elbow", 0.5, duration=2.0, mode=o80.Mode.OVERWRITE)
     arm.add_command(0, {"position": 1.0}, until=3, profile="minimum_jerk")
+    arm.add_command(["elbow", 0], [0.5, 0.1], speed=2.0)
+    arm.add_command(None, np.zeros(2))
     arm.add_trajectory(np.zeros((3, 2)), times=[0.1, 0.2, 0.3])
     observation: o80.Observation = arm.pulse_and_wait(timeout=5.0)
     batch: o80.Batch = arm.pulse(at=3)
@@ -30,7 +32,7 @@ with o80.robots.load("two_joints").start(frequency=500.0, gain=2.0) as process:
 """
 MISTAKES = [
     'arm.add_command("elbow", 0.5, lasting=2.0)',
-    "arm.add_command(None, 0.5)",
+    "arm.add_command(0.5, 0.5)",
     'arm.pulse_and_wait(timeout="5")',
     "arm.latest().iterations",
     "arm.history(since=1.5)",

@@ -102,10 +102,9 @@ class Arm:
 
     def go_back(self) -> None:
         """To the start by commands, as a real arm must."""
-        for muscle in range(MUSCLES):
-            self.frontend.add_command(
-                muscle, self.start_pressures[muscle], duration=RETURN_SECONDS, mode="overwrite"
-            )
+        self.frontend.add_command(
+            None, self.start_pressures, duration=RETURN_SECONDS, mode="overwrite"
+        )
         self.frontend.pulse_and_wait(timeout=RETURN_SECONDS + TIMEOUT)
         end = time.monotonic() + LONGEST_RETURN
         while time.monotonic() < end:
