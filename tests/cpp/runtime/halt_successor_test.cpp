@@ -1,0 +1,117 @@
+// Which backends start halted because of how their predecessor ended.
+
+#include <gmock/gmock.h>
+
+#include <optional>
+
+#include "memory/child_process.hpp"
+#include "o80/base/error.hpp"
+#include "o80/control/batch_builder.hpp"
+#include "runtime/station.hpp"
+
+namespace o80::test {
+namespace {
+
+using ::testing::HasSubstr;
+using HaltSuccessorTest = StationTest;
+
+enum class Before { idle, acting, halted, asked, resumed, stopped, failed };
+
+/// Leaves a backend in some state and dies.
+void live_and_die(Before before, const ChildProcess::Ready& ready, bool bursting = false) {
+  Station station({.segment = "pair", .bursting = bursting});
+  station.start();
+  UntypedFrontend frontend("pair");
+  const auto iterate = [&] {
+    if (bursting) frontend.start_burst(1);
+    station.iterate();
+  };
+  iterate();
+  if (before == Before::acting) {
+    send(frontend, 0, 100.0, {.pace = iterations(100)});
+    iterate();
+  }
+  if (before == Before::halted || before == Before::resumed) {
+    frontend.halt("me");
+    iterate();
+  }
+  if (before == Before::resumed) {
+    BatchBuilder builder;
+    builder.resume(1);
+    frontend.pulse(builder);
+    iterate();
+    if (frontend.halted()) return;  // without a word
+    iterate();
+  }
+  if (before == Before::asked) frontend.halt("me");
+  if (before == Before::stopped) station.backend.end(State::stopped);
+  if (before == Before::failed) station.backend.end(State::failed, "broken");
+  ready();
+  pause_for_ever();
+}
+
+std::optional<Halt> halt_of_successor(Before before, BackendOptions options = {.segment = "pair"},
+                                      bool was_bursting = false) {
+  ChildProcess child(
+      [&](const ChildProcess::Ready& ready) { live_and_die(before, ready, was_bursting); });
+  EXPECT_TRUE(child.wait_until_ready());
+  child.kill_now();
+  Station station(options);
+  station.start();
+  UntypedFrontend frontend("pair");
+  const auto halt = frontend.halted();
+  EXPECT_EQ(frontend.wait_for(0, kAtOnce).head().halted, halt ? 1U : 0U);
+  if (halt) {
+    const Batch batch = send(frontend, 0, 1.0);
+    station.run(1);
+    EXPECT_EQ(batch.handle(0).status, Status::rejected);
+  }
+  return halt;
+}
+
+TEST_F(HaltSuccessorTest, OfABackendThatWasKilledWhileItActedStartsHalted) {
+  const auto halt = halt_of_successor(Before::acting);
+  ASSERT_TRUE(halt);
+  EXPECT_EQ(halt->cause, HaltCause::predecessor);
+  EXPECT_THAT(std::string(halt->reason()), HasSubstr("killed while commands acted"));
+}
+
+TEST_F(HaltSuccessorTest, OfAHaltedBackendStartsHalted) {
+  for (const Before before : {Before::halted, Before::asked}) {
+    const auto halt = halt_of_successor(before);
+    ASSERT_TRUE(halt);
+    EXPECT_EQ(halt->cause, HaltCause::predecessor);
+    EXPECT_THAT(std::string(halt->reason()), HasSubstr("never resumed"));
+  }
+}
+
+TEST_F(HaltSuccessorTest, OfAHaltedBackendWithoutARowStartsHaltedToo) {
+  ChildProcess child(
+      [&](const ChildProcess::Ready& ready) { live_and_die(Before::halted, ready); });
+  ASSERT_TRUE(child.wait_until_ready());
+  child.kill_now();
+  // this one does not live to publish a row
+  ChildProcess second([&](const ChildProcess::Ready& ready) {
+    Station station;
+    ready();
+    pause_for_ever();
+  });
+  ASSERT_TRUE(second.wait_until_ready());
+  second.kill_now();
+  Station station;
+  station.start();
+  EXPECT_TRUE(UntypedFrontend("pair").halted());
+}
+
+TEST_F(HaltSuccessorTest, OfAnyOtherBackendDoesNot) {
+  EXPECT_FALSE(halt_of_successor(Before::idle));
+  EXPECT_FALSE(halt_of_successor(Before::resumed));
+  EXPECT_FALSE(halt_of_successor(Before::stopped));
+  EXPECT_FALSE(halt_of_successor(Before::failed));
+  EXPECT_FALSE(halt_of_successor(Before::halted, {.segment = "pair", .resume = true}));
+  EXPECT_FALSE(halt_of_successor(Before::acting, {.segment = "pair", .resume = true}));
+  EXPECT_FALSE(halt_of_successor(Before::acting, {.segment = "pair"}, true)) << "a simulation died";
+}
+
+}  // namespace
+}  // namespace o80::test

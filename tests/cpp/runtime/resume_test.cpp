@@ -1,0 +1,131 @@
+// How a halt is cleared, and what is served until then.
+
+#include <gmock/gmock.h>
+
+#include <thread>
+
+#include "o80/base/error.hpp"
+#include "o80/control/batch_builder.hpp"
+#include "runtime/station.hpp"
+
+namespace o80::test {
+namespace {
+
+using ::testing::HasSubstr;
+using ResumeTest = StationTest;
+
+TEST_F(ResumeTest, StartsAfreshFromWhereTheRobotIs) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  send(frontend, 0, 10.0, {.pace = iterations(10)});
+  station.run(3);
+  const std::uint64_t number = frontend.halt("");
+  station.run(1);
+  station.now = {1.5, -2.5};  // somebody moved it
+  BatchBuilder builder;
+  builder.resume(number);
+  const Batch resume = frontend.pulse(builder);
+  station.run(1);
+  EXPECT_EQ(resume.handle(0).status, Status::completed);
+  const auto fresh = frontend.wait_for(resume.handle(0).iteration, kAtOnce);
+  EXPECT_EQ(fresh.head().fresh, 1U);
+  EXPECT_EQ(fresh.head().halted, 0U);
+  EXPECT_EQ(desired(fresh), 1.5);
+  EXPECT_EQ(desired(fresh, 1), -2.5);
+  EXPECT_FALSE(frontend.halted());
+  EXPECT_EQ(frontend.latest().head().halted, 0U);
+  const Batch batch = send(frontend, 0, 2.5);
+  station.run(1);
+  EXPECT_EQ(batch.handle(0).status, Status::completed);
+}
+
+TEST_F(ResumeTest, IsRefusedUntilTheRobotHasBraked) {
+  // a backend that stands still latches a halt without an iteration in which it could brake
+  BurstingStation bursting("pair", {}, [](Schema& schema) {
+    schema.actuator(0).limits({.speed = 100.0, .acceleration = 10'000.0});
+  });
+  UntypedFrontend frontend("pair");
+  add(frontend, 0, 10.0, {.pace = fastest()});
+  frontend.burst(5, kPatience);
+  const double speed = desired(frontend.latest()) - desired(frontend.wait_for(4, kAtOnce));
+  ASSERT_GT(speed, 0.03);
+  const std::uint64_t number = frontend.halt("");
+  while (frontend.halted()->iteration < 0) std::this_thread::yield();  // it is latched
+  EXPECT_THAT(message_of<BackendHalted>([&] { frontend.resume(number, kPatience); }),
+              HasSubstr("still brakes"));
+  frontend.burst(10, kPatience);
+  EXPECT_NEAR(desired(frontend.wait_for(6, kAtOnce)) - desired(frontend.wait_for(5, kAtOnce)),
+              speed - 0.01, 1e-9);
+  frontend.resume(number, kPatience);
+  EXPECT_EQ(desired(frontend.latest()), desired(frontend.wait_for(15, kAtOnce)));
+}
+
+TEST_F(ResumeTest, ClearsNoHaltThatCameAfterTheOneItNames) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  frontend.halt("first");
+  station.run(1);
+  frontend.halt("second");
+  station.run(1);
+  for (const std::uint64_t number : {1, 3}) {
+    BatchBuilder builder;
+    builder.resume(number);
+    const Batch resume = frontend.pulse(builder);
+    station.run(1);
+    EXPECT_EQ(resume.handle(0).status, Status::rejected);
+    EXPECT_THAT(resume.handle(0).text,
+                HasSubstr(number == 1 ? "halt 2 came after it" : "there is no halt 3"));
+    ASSERT_TRUE(frontend.halted());
+  }
+  EXPECT_EQ(frontend.halted()->reason(), "second");
+}
+
+TEST_F(ResumeTest, LosesAgainstAHaltInTheSameIteration) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  const std::uint64_t number = frontend.halt("");
+  BatchBuilder builder;
+  builder.resume(number);
+  const Batch resume = frontend.pulse(builder);
+  station.run(1);
+  EXPECT_EQ(resume.handle(0).status, Status::rejected);
+  EXPECT_TRUE(frontend.halted());
+  EXPECT_EQ(frontend.latest().head().halted, 1U);
+}
+
+TEST_F(ResumeTest, WithoutAHaltChangesNothing) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  const Batch running = send(frontend, 0, 9.0, {.pace = iterations(9)});
+  BatchBuilder builder;
+  builder.resume(7);
+  const Batch resume = frontend.pulse(builder);
+  station.run(3);
+  EXPECT_EQ(resume.handle(0).status, Status::completed);
+  EXPECT_EQ(running.handle(0).status, Status::active);
+}
+
+TEST_F(ResumeTest, IsNotNeededByRequestsThatAreServedWhileHalted) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  frontend.halt("");
+  station.run(1);
+  add_request(frontend, Reset{.seed = 5});
+  const Batch marked = frontend.pulse();
+  add_request<Refuse>(frontend);
+  const Batch other = frontend.pulse();
+  station.run(1);
+  EXPECT_EQ(marked.handle(0).status, Status::completed);
+  EXPECT_EQ(other.handle(0).status, Status::rejected);
+  EXPECT_EQ(other.handle(0).reason, Reason::halted);
+  EXPECT_EQ(desired(frontend.latest()), 5.0) << "a plant that was reset is where it is";
+  EXPECT_TRUE(frontend.halted()) << "and the halt stands";
+}
+
+}  // namespace
+}  // namespace o80::test
