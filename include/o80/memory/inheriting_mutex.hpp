@@ -15,8 +15,8 @@ class InheritingMutex {
 
   void lock() noexcept { pthread_mutex_lock(&mutex_); }
   void unlock() noexcept { pthread_mutex_unlock(&mutex_); }
-  /// In a forked child, whose only thread is not the one that the kernel knows as the holder: the
-  /// unlocking is refused there, and is for tools that watch mutexes.
+  /// In a forked child, whose only thread is not the holder: a mutex that checks errors refuses the
+  /// unlocking before it asks the kernel, and tools that watch mutexes see it.
   void unlock_in_child() noexcept {
     unlock();
     initialise();
@@ -26,7 +26,10 @@ class InheritingMutex {
   void initialise() noexcept {
     pthread_mutexattr_t attributes;
     pthread_mutexattr_init(&attributes);
+    pthread_mutexattr_settype(&attributes, PTHREAD_MUTEX_ERRORCHECK);
+#ifndef O80_WITHOUT_PRIORITY_INHERITANCE
     pthread_mutexattr_setprotocol(&attributes, PTHREAD_PRIO_INHERIT);
+#endif
     pthread_mutex_init(&mutex_, &attributes);
     pthread_mutexattr_destroy(&attributes);
   }
