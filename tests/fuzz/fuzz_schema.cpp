@@ -50,10 +50,12 @@ void use(const Schema& schema) {
       continue;
     }
   }
-  // and what a backend does
+  // and what a backend does, which has a period
+  Schema paced = schema;
+  paced.head.period = std::max<std::int64_t>(schema.head.period, 1);
   BlockPool pool(16);
   Deaf deaf;
-  Controller controller(schema, pool, deaf, 1);
+  Controller controller(paced, pool, deaf, 1);
   const std::vector<std::uint64_t> observed(layout.block / 8 + 1);
   const auto* bytes = reinterpret_cast<const std::byte*>(observed.data());
   controller.restart(bytes, nullptr, 0);
