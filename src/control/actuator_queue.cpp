@@ -43,7 +43,7 @@ void ActuatorQueue::drop(Status status, Reason reason, Iteration iteration) noex
   }
   carry_.reset();
   running_ = false;
-  holds_ = false;
+  limiter_.release();
   while (!queue_.empty()) ledger_->drop(queue_.take_any(), status, reason, iteration);
 }
 
@@ -68,7 +68,7 @@ void ActuatorQueue::end_motion() noexcept {
 void ActuatorQueue::drop_lane(std::uint32_t lane, Status status, Reason reason,
                               Iteration iteration) noexcept {
   if (running_ && queue_.front_lane() == lane) end_motion();
-  if (holder_ == lane) holds_ = false;
+  if (holder_ == lane) limiter_.release();
   ledger_->drop(queue_.take(lane), status, reason, iteration);
   if (queue_.empty()) end_motion();
 }
@@ -79,9 +79,9 @@ void ActuatorQueue::restart(const std::byte* state) noexcept {
   streams_ = false;
 }
 
-void ActuatorQueue::follow(const std::byte* observed) noexcept {
+bool ActuatorQueue::follow(const std::byte* observed) noexcept {
   layout_->copy_finite(desired_, observed);
-  limiter_.restart(desired_);
+  return limiter_.brake_resting(desired_);
 }
 
 ActuatorQueue::Moved ActuatorQueue::step(Iteration iteration, const std::byte* observed,
@@ -105,9 +105,9 @@ Limited ActuatorQueue::move(Iteration iteration) noexcept {
 
 void ActuatorQueue::end_running(Iteration iteration) noexcept {
   const BlockIndex record = queue_.front();
-  holds_ = pace_ == Pace::direct;
+  streams_ = pace_ == Pace::direct;
+  if (streams_) limiter_.hold(mask());
   holder_ = queue_.front_lane();
-  streams_ = holds_;
   running_ = false;
   queue_.pop();
   if (limited_.limit == Limit::none) {
@@ -121,11 +121,8 @@ void ActuatorQueue::end_running(Iteration iteration) noexcept {
 ActuatorQueue::Moved ActuatorQueue::come_to_rest(const std::byte* observed) noexcept {
   streams_ = false;
   if (empty()) end_motion();
-  if (follows()) {
-    follow(observed);
-    return Moved::idle;
-  }
-  return limiter_.any() && limiter_.brake(desired_, holds_) ? Moved::braking : Moved::idle;
+  const bool moves = follows() ? follow(observed) : limiter_.any() && limiter_.brake(desired_);
+  return moves ? Moved::braking : Moved::idle;
 }
 
 bool ActuatorQueue::begin_next(Iteration iteration, const std::byte* observed,
@@ -170,7 +167,7 @@ void ActuatorQueue::begin_command(Iteration iteration) noexcept {
     times_ = rows_;
     rows_ = rows_of_timed(*pool_, head, layout_->size());
   }
-  holds_ = false;
+  limiter_.release();
   pace_ = head.pace;
   first_number_ = layout_->first_commanded(mask());
   most_ = pace_ == Pace::speed ? head.speed * period_ : kNoSpeed;

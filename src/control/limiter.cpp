@@ -70,6 +70,7 @@ Limiter::Limiter(const Schema& schema, const ActuatorRow& actuator, const StateL
 }
 
 void Limiter::restart(const std::byte* state) noexcept {
+  release();
   for (Number& each : numbers_) each.limiter.restart(layout_.number(each.number, state));
 }
 
@@ -95,9 +96,21 @@ void Limiter::publish(const Number& number, std::byte* state) const noexcept {
   });
 }
 
-/// A number that no command moves any more comes to rest, wherever that is.
+/// One iteration towards rest; true while it moves.
+bool Limiter::Number::brake() noexcept {
+  const double before = limiter.position();
+  const bool was_away = away();
+  if (was_away) {
+    limiter.follow(*rest);
+  } else if (!limiter.at_rest()) {
+    limiter.brake();
+  }
+  return was_away || limiter.position() != before || !limiter.at_rest();
+}
+
+/// A number that no command moves any more comes to rest.
 void Limiter::leave_out(Number& number, std::byte* state) noexcept {
-  if (!number.limiter.at_rest()) number.limiter.brake();
+  number.brake();
   publish(number, state);
 }
 
@@ -123,21 +136,35 @@ Limited Limiter::follow(const Motion& motion, std::byte* state, const std::uint6
   return result;
 }
 
-bool Limiter::brake(std::byte* state, bool hold) noexcept {
+bool Limiter::brake(std::byte* state) noexcept {
   bool moves = false;
   for (Number& each : numbers_) {
-    NumberLimiter& limiter = each.limiter;
-    const double before = limiter.position();
-    const bool away = each.rest.has_value() && !hold && before != *each.rest;
-    if (away) {
-      limiter.follow(*each.rest);
-    } else if (!limiter.at_rest()) {
-      limiter.brake();
-    }
-    moves = moves || away || limiter.position() != before || !limiter.at_rest();
-    if (limiter.position() != before) publish(each, state);
+    const double before = each.limiter.position();
+    moves = each.brake() || moves;
+    if (each.limiter.position() != before) publish(each, state);
   }
   return moves;
+}
+
+bool Limiter::brake_resting(std::byte* state) noexcept {
+  bool moves = false;
+  for (Number& each : numbers_) {
+    if (each.rest) {
+      moves = each.brake() || moves;
+      publish(each, state);
+    } else {
+      each.limiter.restart(layout_.number(each.number, state));
+    }
+  }
+  return moves;
+}
+
+void Limiter::hold(const std::uint64_t* mask) noexcept {
+  for (Number& each : numbers_) each.held = each.rest.has_value() && masked(mask, each.number);
+}
+
+void Limiter::release() noexcept {
+  for (Number& each : numbers_) each.held = false;
 }
 
 void Limiter::keep_moving(Motion& motion, const std::byte* state,

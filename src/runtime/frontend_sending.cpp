@@ -153,6 +153,8 @@ CommandOptions UntypedFrontend::checked_trajectory(std::uint32_t actuator, std::
   if (rows == 0) throw InvalidArgument("the trajectory has no row");
   check_->targets(index, states);
   CommandOptions paced = options;
+  // no trajectory is direct: its last state does not stay
+  if (paced.pace.pace == Pace::direct) paced.pace = iterations(1);
   if (!times.empty()) {
     check_times(times, rows);
     paced.pace = duration(std::chrono::nanoseconds(times.back()));

@@ -49,11 +49,10 @@ class ActuatorQueue {
   Moved step(Iteration iteration, const std::byte* observed, std::uint32_t& late_budget) noexcept;
   bool empty() const noexcept { return queue_.empty(); }
   /// A direct value keeps a resting number away from its rest until something takes its place.
-  bool holds() const noexcept { return holds_ && limiter_.away_from_rest(); }
+  bool holds() const noexcept { return limiter_.holds(); }
   /// An iteration without a command would not move it.
   bool at_rest() const noexcept {
-    const bool still = limiter_.at_rest() && (holds_ || !limiter_.away_from_rest());
-    return still || follows();
+    return follows() ? limiter_.resting_at_rest() : limiter_.at_rest();
   }
   /// A command of this lane, or the direct value it gave last, still acts.
   bool acts(std::uint32_t lane) const noexcept {
@@ -62,8 +61,9 @@ class ActuatorQueue {
 
   /// Begins at rest in this state; what is no finite number keeps its last desired value.
   void restart(const std::byte* state) noexcept;
-  /// The state of an actuator that follows, as long as it is idle.
-  void follow(const std::byte* observed) noexcept;
+  /// The state of an actuator that follows, as long as it is idle: what was observed, but for the
+  /// numbers that rest. True while one of these moves.
+  bool follow(const std::byte* observed) noexcept;
   bool follows() const noexcept { return when_idle_ == WhenIdle::follow; }
 
  private:
@@ -97,8 +97,7 @@ class ActuatorQueue {
   LaneLists queue_;  // in front the one that runs, if one does
   bool running_ = false;
   Limited limited_;           // by the last iteration
-  bool holds_ = false;        // a direct value stays until something takes its place
-  std::uint32_t holder_ = 0;  // lane that gave it
+  std::uint32_t holder_ = 0;  // lane that gave the direct value that stays
   bool streams_ = false;      // the iteration before was a direct command's
 
   // of the command that runs

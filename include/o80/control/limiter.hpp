@@ -43,21 +43,32 @@ class Limiter {
   void begin() noexcept;
 
   /// What a motion asks of the numbers of `mask` (null: all) => what the limits admit, for one
-  /// iteration; the others come to rest. One number catches up no faster than `most`.
+  /// iteration; the others come to rest, resting ones where they rest. One number catches up no
+  /// faster than `most`.
   Limited follow(const Motion& motion, std::byte* state, const std::uint64_t* mask,
                  std::uint32_t one, double most) noexcept;
-  /// One iteration towards rest; resting numbers go where they rest, or, with `hold`, stay. True
+  /// One iteration towards rest; resting numbers go where they rest, unless they are held. True
   /// while anything moves.
-  bool brake(std::byte* state, bool hold) noexcept;
-  /// Nothing that limits tell how to stop is moving.
-  bool at_rest() const noexcept {
-    return std::ranges::all_of(numbers_, [](const Number& each) { return each.limiter.at_rest(); });
-  }
-  /// Some resting number is not where it rests.
-  bool away_from_rest() const noexcept {
+  bool brake(std::byte* state) noexcept;
+  /// The same where the others are what was observed, which is in `state`.
+  bool brake_resting(std::byte* state) noexcept;
+  /// Resting numbers of `mask` (null: all) stay where they are until `release`.
+  void hold(const std::uint64_t* mask) noexcept;
+  void release() noexcept;
+  /// Some number is held away from where it rests.
+  bool holds() const noexcept {
     return std::ranges::any_of(numbers_, [](const Number& each) {
-      return each.rest.has_value() && each.limiter.position() != *each.rest;
+      return each.held && each.limiter.position() != *each.rest;
     });
+  }
+  /// Braking would move nothing.
+  bool at_rest() const noexcept {
+    return std::ranges::all_of(numbers_, [](const Number& each) { return each.at_rest(); });
+  }
+  /// The same of resting numbers.
+  bool resting_at_rest() const noexcept {
+    return std::ranges::all_of(
+        numbers_, [](const Number& each) { return !each.rest.has_value() || each.at_rest(); });
   }
   /// Tells a motion how the numbers move that lag behind it ...
   void keep_lagging(Motion& motion, const std::byte* state) const noexcept;
@@ -79,6 +90,11 @@ class Limiter {
     std::optional<double> rest;
     FastestMotion fastest;
     bool planned = false;  // part of the fastest motion
+    bool held = false;     // stays away from where it rests
+
+    bool away() const noexcept { return rest && !held && limiter.position() != *rest; }
+    bool at_rest() const noexcept { return limiter.at_rest() && !away(); }
+    bool brake() noexcept;
   };
   void publish(const Number& number, std::byte* state) const noexcept;
   void leave_out(Number& number, std::byte* state) noexcept;

@@ -135,5 +135,76 @@ TEST(Resting, KeepsTheLimitsOnTheWay) {
   EXPECT_FALSE(rig.controller.braking());
 }
 
+TEST(Resting, AFieldThatACommandDoesNotNameGoesToRestWhileItRuns) {
+  const std::vector<std::uint64_t> position_only = {1};
+  RecordHead partial = over(100);
+  partial.partial = 1;
+  RecordHead partial_direct = direct();
+  partial_direct.partial = 1;
+  for (const RecordHead& successor : {partial, partial_direct}) {
+    for (const RecordHead& first : {over(3), direct()}) {
+      for (const Mode mode : {Mode::queue, Mode::overwrite}) {
+        Rig rig(joint(0.5, {.speed = 1000.0}));
+        rig.add(0, first, {1.0, 2.0});
+        rig.pulse();
+        rig.run(3);
+        ASSERT_GT(rig.desired(kVelocity), 0.9);
+        RecordHead next = successor;
+        next.mode = mode;
+        rig.add_rows(0, next, 1, {3.0, 0.0}, {}, position_only);
+        rig.pulse();
+        rig.run(5);
+        EXPECT_EQ(rig.desired(kVelocity), 0.5);
+      }
+    }
+  }
+}
+
+TEST(Resting, ADirectValueOfAnotherThatLeavesItOutEndsIt) {
+  Rig rig(joint(0.0));
+  rig.add(0, direct(), {1.0, 2.0});
+  rig.pulse(0);
+  rig.run(3);
+  EXPECT_TRUE(rig.controller.acts(0));
+  RecordHead head = direct();
+  head.partial = 1;
+  rig.add_rows(0, head, 1, {3.0, 0.0}, {}, {1});
+  rig.pulse(1);
+  rig.run(2);
+  EXPECT_EQ(rig.desired(), 3.0);
+  EXPECT_EQ(rig.desired(kVelocity), 0.0);
+  EXPECT_FALSE(rig.controller.acts(0));
+  EXPECT_FALSE(rig.controller.acts(1));
+}
+
+TEST(Resting, OfAnActuatorThatFollowsTheFieldRestsAndTheOthersFollow) {
+  Schema schema = joint(0.0, {.speed = 1000.0});
+  schema.actuator(0).when_idle(WhenIdle::follow);
+  Rig rig(schema);
+  rig.observe(0, 0.25);
+  rig.observe(8, 7.0);
+  rig.add(0, over(3), {1.0, 2.0});
+  rig.pulse();
+  rig.run(3);
+  EXPECT_EQ(rig.desired(kVelocity), 2.0);
+  rig.step();
+  EXPECT_EQ(rig.desired(kVelocity), 1.0) << "on its way at 1000/s";
+  EXPECT_TRUE(rig.controller.braking());
+  EXPECT_EQ(rig.desired(), 0.25);
+  rig.run(3);
+  EXPECT_EQ(rig.desired(kVelocity), 0.0);
+  EXPECT_FALSE(rig.controller.braking());
+
+  rig.add(0, direct(), {1.0, 1.0});
+  rig.pulse();
+  rig.run(10);
+  EXPECT_EQ(rig.desired(kVelocity), 1.0) << "a direct value stays";
+  EXPECT_TRUE(rig.controller.acts(0));
+  rig.controller.halt(rig.next);
+  rig.run(3);
+  EXPECT_EQ(rig.desired(kVelocity), 0.0);
+  EXPECT_EQ(rig.desired(), 0.25);
+}
+
 }  // namespace
 }  // namespace o80::test

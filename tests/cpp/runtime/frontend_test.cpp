@@ -71,6 +71,17 @@ TEST_F(FrontendTest, FollowsATrajectoryRowByRow) {
   EXPECT_THAT(desired(frontend, 1, 6, 1), ElementsAre(0.5, 1, 1.5, 2, 3, 4));
 }
 
+TEST_F(FrontendTest, TheLastStateOfATrajectoryIsNoDirectValue) {
+  Station station({.segment = "pair"}, [](Schema& schema) { schema.actuator(0).rests_at("", 0); });
+  station.start();
+  UntypedFrontend frontend("pair");
+  const std::array<double, 2> rows{1, 2};
+  frontend.add_trajectory(0, 2, std::as_bytes(std::span(rows)), {.mode = Mode::overwrite});
+  frontend.pulse();
+  station.run(3);
+  EXPECT_THAT(desired(frontend, 1, 3), ElementsAre(1, 2, 0));
+}
+
 TEST_F(FrontendTest, RefusesATrajectoryWhoseTimesMakeNoSense) {
   Station station;
   station.start();

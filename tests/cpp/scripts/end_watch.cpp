@@ -93,7 +93,6 @@ std::optional<Failure> EndWatch::masks(const ScriptWorld& world, std::size_t act
 std::optional<Failure> EndWatch::idle(const ScriptWorld& world, std::size_t actuator) const {
   const ActuatorSpec& spec = world.script.actuators[actuator];
   const ActuatorTrack& track = world.actuators[actuator];
-  if (track.braking) return std::nullopt;
   const bool dropped = track.last != nullptr && track.last->status != Status::completed;
   const bool was_direct = track.last != nullptr && !dropped &&
                           track.dropped_at <= track.last->ended_at &&
@@ -101,7 +100,7 @@ std::optional<Failure> EndWatch::idle(const ScriptWorld& world, std::size_t actu
   for (std::size_t n = 0; n < spec.numbers.size(); ++n) {
     const NumberSpec& number = spec.numbers[n];
     const NumberTrack& place = track.numbers[n];
-    if (spec.follow) {
+    if (spec.follow && !number.resting) {
       std::array<std::byte, 8> bytes{};
       store_as(number.kind, place.reading.value_or(0.0), bytes.data());
       const long double seen = place.reading ? load_as(number.kind, bytes.data()) : place.before;
@@ -109,8 +108,10 @@ std::optional<Failure> EndWatch::idle(const ScriptWorld& world, std::size_t actu
       if (place.now == expected) continue;
       return Failure{"following", world.where(actuator, n) + positions(place.now, expected)};
     }
+    if (track.braking) continue;
     // at rest: a resting field that no direct command left where it is
-    if (number.resting && track.last != nullptr && !was_direct && !spec.blend) {
+    const bool was_left = was_direct && world.names(*track.last, n);
+    if (number.resting && track.last != nullptr && !was_left && !spec.blend) {
       std::array<std::byte, 8> bytes{};
       store_as(number.kind, number.rest, bytes.data());
       const long double rest = load_as(number.kind, bytes.data());

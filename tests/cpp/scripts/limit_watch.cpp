@@ -18,9 +18,11 @@ std::string text_of(const char* what, long double value, long double allowed) {
   return text.data();
 }
 
-bool is_following(const ScriptWorld& world, std::size_t actuator) {
-  const ActuatorTrack& track = world.actuators[actuator];
-  return world.script.actuators[actuator].follow && track.driver == nullptr && !track.braking;
+/// A field that rests follows nothing.
+bool is_following(const ScriptWorld& world, std::size_t actuator, std::size_t number) {
+  const ActuatorSpec& spec = world.script.actuators[actuator];
+  return spec.follow && world.actuators[actuator].driver == nullptr &&
+         !spec.numbers[number].resting;
 }
 
 }  // namespace
@@ -70,7 +72,7 @@ std::optional<Failure> LimitWatch::step(const ScriptWorld& world) {
       if (!std::isfinite(track.now)) {
         return Failure{"finite", world.where(a, n) + "desired is not finite"};
       }
-      if (is_following(world, a)) {
+      if (is_following(world, a, n)) {
         pasts_[a][n].fill(track.now);
         continue;
       }

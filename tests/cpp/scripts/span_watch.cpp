@@ -111,6 +111,10 @@ void SpanWatch::begin(const ScriptWorld& world, std::size_t actuator, bool taken
       for (std::size_t row = 1; row < world.rows_of(command); ++row) {
         targets.include(world.target(command, row, n));
       }
+    } else if (const NumberSpec& spec = world.script.actuators[actuator].numbers[n]; spec.resting) {
+      std::array<std::byte, 8> bytes{};
+      store_as(spec.kind, spec.rest, bytes.data());
+      targets.include(load_as(spec.kind, bytes.data()));
     }
     span.include(targets);
     number.span = span;
