@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 #include <type_traits>
+
+#include "o80/describe/visit_number.hpp"
 
 namespace o80 {
 
@@ -157,7 +160,25 @@ std::vector<std::uint64_t> check_types(const Schema& schema) {
   return numbers;
 }
 
-void check_limit(const ActuatorRow& actuator, const LimitRow& limit) {
+/// A number of this kind can be where it is to rest.
+bool can_rest(const FieldRow& field, double rest) {
+  if (field.kind == Kind::boolean || field.kind == Kind::enumeration) return false;
+  return visit_number(field.kind, [rest]<class T>(T) {
+    using Range = std::numeric_limits<T>;
+    const bool whole = !std::is_integral_v<T> || std::trunc(rest) == rest;
+    return whole && rest >= static_cast<double>(Range::lowest()) &&
+           rest <= static_cast<double>(Range::max());
+  });
+}
+
+void check_limit(const ActuatorRow& actuator, const FieldRow& field, const LimitRow& limit) {
+  if (limit.resting == 1 && !can_rest(field, limit.rest)) {
+    const std::string name = field.name.view().empty() ? "" : "'" + field.name.str() + "' of ";
+    refuse(name + "actuator '" + actuator.name.str() + "' cannot rest at " +
+           std::to_string(limit.rest) +
+           ": rests_at() needs a value that its kind can hold, and no "
+           "boolean or enumeration");
+  }
   const std::string of = "the limits of actuator '" + actuator.name.str() + "' ";
   if (std::isnan(limit.minimum) || std::isnan(limit.maximum) || limit.minimum > limit.maximum) {
     refuse(of + "are from " + std::to_string(limit.minimum) + " to " +
@@ -210,9 +231,10 @@ void check_actuators(const Schema& schema, const std::vector<std::uint64_t>& num
         actuator.limits != numbers[actuator.type]) {
       refuse(name + "has not one limit for each number");
     }
-    for (std::uint32_t i = 0; i < actuator.limits; ++i) {
-      check_limit(actuator, schema.limits[actuator.first_limit + i]);
-    }
+    const LimitRow* limit = schema.limits.data() + actuator.first_limit;
+    schema.each_scalar(actuator.type, [&](std::uint32_t, const FieldRow& field) {
+      check_limit(actuator, field, *limit++);
+    });
   }
 }
 

@@ -79,6 +79,30 @@ TEST(Table, RefusesWhatCannotBeUsed) {
               HasSubstr("control character"));
 }
 
+TEST(Table, RefusesARestThatANumberCannotHave) {
+  const auto refusal_of = [](Kind kind, double rest) -> std::string {
+    Schema schema;
+    schema.head.robot = NameText("tool");
+    schema.add_actuators("tool", schema.add_type("Tool", {scalar_field("x", kind)}), 1, false);
+    schema.head.block = 8;
+    schema.actuator(0).rests_at("x", rest);
+    try {
+      check(schema);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(refusal_of(Kind::boolean, 0), HasSubstr("'x' of actuator 'tool' cannot rest at 0.0"));
+  EXPECT_THAT(refusal_of(Kind::uint8, -1), HasSubstr("a value that its kind can hold"));
+  EXPECT_THAT(refusal_of(Kind::uint8, 256), HasSubstr("cannot rest"));
+  EXPECT_THAT(refusal_of(Kind::int32, 0.5), HasSubstr("cannot rest"));
+  EXPECT_THAT(refusal_of(Kind::float32, 1e39), HasSubstr("cannot rest"));
+  EXPECT_EQ(refusal_of(Kind::uint8, 255), "");
+  EXPECT_EQ(refusal_of(Kind::int8, -128), "");
+  EXPECT_EQ(refusal_of(Kind::float32, 0.1), "");
+}
+
 TEST(Table, RefusesArraysWhoseSizeOverflows) {
   EXPECT_THAT(refusal([](Schema& s) {
                 s.fields[0].rows = 1U << 31;
