@@ -75,6 +75,8 @@ def times_of(times: ArrayLike) -> NDArray[np.int64]:
     seconds = np.asarray(times, np.float64)
     if seconds.ndim != 1 or not np.all(np.isfinite(seconds)):
         raise InvalidArgument("the times of a trajectory are finite numbers (T,) [s]")
+    if seconds.size == 0:
+        raise InvalidArgument("the times of a trajectory are empty: give one for each row")
     if np.any(np.abs(seconds) > 1e9):
         raise InvalidArgument("the times of a trajectory are too long to be counted")
     return np.rint(seconds * 1e9).astype(np.int64)
