@@ -149,6 +149,11 @@ def test_a_trajectory_of_several_actuators_is_one_command(arm: o80.Frontend) -> 
     assert len(arm.pulse()) == 1
 
 
+def test_times_that_are_empty_are_refused(arm: o80.Frontend) -> None:
+    with pytest.raises(o80.InvalidArgument, match="one for each row"):
+        arm.add_trajectory(np.zeros((1, 2)), times=[])
+
+
 # ---------------------------------------------------------------------------- several at once
 
 
