@@ -91,6 +91,9 @@ def main() -> int:
     try:
         kernel = arguments.kernel or obtain_kernel(machine)
     except NoKernelError as error:
+        if arguments.short:  # the tests of every day go on where there is no such kernel
+            print(f"skipped: {error}")
+            return 0
         print(error, file=sys.stderr)
         return 1
     image = machine / "root.cpio"

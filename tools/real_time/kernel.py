@@ -12,17 +12,19 @@ class NoKernelError(Exception):
 
 
 def image_package() -> str:
-    """Name of the package that holds the image."""
-    shown = subprocess.run(
-        ["apt-cache", "depends", META_PACKAGE], capture_output=True, text=True, check=False
-    )
-    found = re.search(r"Depends: (linux-image-\S+-rt-amd64)", shown.stdout)
-    if found is None:
-        raise NoKernelError(
-            f"apt knows no package {META_PACKAGE}: run `apt-get update` as root on a Debian "
-            "machine, or give a PREEMPT_RT kernel with --kernel"
+    """Name of the package that holds the image; apt's lists are renewed if they lack it."""
+    for command in (None, ["apt-get", "update", "-qq"]):
+        if command is not None:
+            subprocess.run(command, check=False)
+        shown = subprocess.run(
+            ["apt-cache", "depends", META_PACKAGE], capture_output=True, text=True, check=False
         )
-    return found[1]
+        if found := re.search(r"Depends: (linux-image-\S+-rt-amd64)", shown.stdout):
+            return found[1]
+    raise NoKernelError(
+        f"apt knows no package {META_PACKAGE}: run `apt-get update` as root on a Debian "
+        "machine, or give a PREEMPT_RT kernel with --kernel"
+    )
 
 
 def obtain_kernel(folder: Path) -> Path:
