@@ -229,7 +229,8 @@ Raises InvalidArgument for what the robot cannot follow.)")
           nb::sig("def add_request(self, name: str, /, **fields: typing.Any) -> None"),
           R"(Adds a request to what the next pulse sends.
 
-It is served in order with the commands of that pulse; fields that are not given are zero.)")
+It is served in order with the commands of that pulse. Every field without a default must be given;
+`o80 info` shows the defaults.)")
       .def(
           "add_purge",
           [](const Frontend& self, nb::handle actuator) {

@@ -48,6 +48,7 @@ class Backend:
         an IntEnum, or a mapping from field names to these.
     extended: dtype (or mapping) of further sensor values.
     requests: names of the requests it serves, each with the dtype of its fields, or None; see `on`.
+        Its fields have no defaults: who sends it gives all of them.
     limits: of actuators: o80.Limits, or (minimum, maximum, speed, ...), of the first number of the
         state, or a mapping from fields to these; None is no limit.
     rests_at: of actuators: a mapping from fields to the values to which they go when no command
