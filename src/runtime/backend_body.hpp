@@ -116,7 +116,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   void show_acts() noexcept;
   void watch_errors() noexcept;
   void begin_halt() noexcept;
-  void end_scheduled_before_halt() noexcept;
+  void end_scheduled() noexcept;
   bool suits_halt(const StagedBatch& sent) noexcept;
   Outcome start_afresh(std::uint32_t lane, CommandId id) noexcept;
 

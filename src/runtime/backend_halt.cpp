@@ -9,7 +9,7 @@
 namespace o80 {
 
 namespace {
-constexpr std::uint32_t kScheduledPerIteration = 256;  // batches that a halt ends
+constexpr std::uint32_t kScheduledPerIteration = 256;  // batches that end before they are due
 }
 
 /// Asks for a halt in the backend's own name. While one of this cause acts, another is the same
@@ -26,7 +26,7 @@ void UntypedBackend::Body::watch_halt() noexcept {
   } else if (reason_missing_) {
     reason_missing_ = !halts.show(halts.halt().iteration);
   }
-  end_scheduled_before_halt();
+  end_scheduled();
 }
 
 /// What a successor must know if this backend is killed now; before the desired states are written.
@@ -92,11 +92,16 @@ void UntypedBackend::Body::begin_halt() noexcept {
   driver_halted_ = true;
 }
 
-/// Batches that wait for a later iteration end now: a bounded number in each iteration.
-void UntypedBackend::Body::end_scheduled_before_halt() noexcept {
+/// Batches that wait for a later iteration end now, if a halt or the watchdog wants it: a bounded
+/// number in each iteration.
+void UntypedBackend::Body::end_scheduled() noexcept {
   for (std::uint32_t i = 0; i < kScheduledPerIteration && schedule.has_aside(); ++i) {
     const StagedBatch sent = schedule.take_aside();
     if (!suits_halt(sent)) continue;
+    if (sent.silent) {
+      controller.reject(sent.lane, sent.batch, Reason::silence, 0, current, Status::purged);
+      continue;
+    }
     if (schedule.has_room(sent.lane, sent.at)) {
       schedule.add(sent);
     } else {

@@ -12,6 +12,8 @@ namespace o80 {
 void UntypedBackend::Body::stale(std::uint32_t lane, Reason reason) noexcept {
   if (stale_ == Stale::purge) controller.purge_lane(lane, kEveryActuator, current, reason);
   const bool silent = reason == Reason::silence;
+  // what a dead one scheduled is known by its lane when it is due
+  if (silent) schedule.set_aside_of_silent(lane);
   const std::string_view why = silent ? "a commanding frontend showed no life for longer than is "
                                         "allowed: see silence and stale"
                                       : "a commanding frontend died";

@@ -1,7 +1,6 @@
 #include "o80/runtime/schedule.hpp"
 
 #include <algorithm>
-#include <utility>
 
 namespace o80 {
 
@@ -15,7 +14,7 @@ bool later(const StagedBatch& a, const StagedBatch& b) noexcept {
 Schedule::Schedule(std::uint32_t lanes)
     : iterations_(std::size_t{lanes} * kMostScheduled), counts_(lanes) {
   heap_.reserve(iterations_.size());
-  aside_.reserve(iterations_.size());
+  aside_.reserve(2 * iterations_.size());
 }
 
 bool Schedule::has_room(std::uint32_t lane, Iteration at) const noexcept {
@@ -39,9 +38,24 @@ void Schedule::drop_next() noexcept {
 }
 
 void Schedule::set_aside() noexcept {
-  if (has_aside()) return;
-  std::swap(heap_, aside_);
+  // what is left of an earlier time stays; beyond that, a batch is judged when it is due
+  if (aside_.size() + heap_.size() > aside_.capacity()) return;
+  aside_.insert(aside_.end(), heap_.begin(), heap_.end());
+  heap_.clear();
   std::ranges::fill(counts_, 0);
+}
+
+void Schedule::set_aside_of_silent(std::uint32_t lane) noexcept {
+  if (counts_[lane] == 0 || aside_.size() + counts_[lane] > aside_.capacity()) return;
+  const auto rest = std::ranges::partition(
+      heap_, [&](const StagedBatch& batch) { return batch.lane != lane; });
+  for (StagedBatch& batch : rest) {
+    batch.silent = true;
+    aside_.push_back(batch);
+  }
+  heap_.erase(rest.begin(), rest.end());
+  std::ranges::make_heap(heap_, later);
+  counts_[lane] = 0;
 }
 
 StagedBatch Schedule::take_aside() noexcept {

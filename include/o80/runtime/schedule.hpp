@@ -22,6 +22,7 @@ struct StagedBatch {
   bool had_left = false;          // its sender no longer had the lane then
   bool of_dead = false;           // and was known to be dead
   bool late_now = false;
+  bool silent = false;  // its sender has fallen silent since
 };
 
 /// Batches sent for a later iteration, the next one first.
@@ -41,8 +42,9 @@ class Schedule {
   void drop_next() noexcept;
 
   /// All that is there is no longer scheduled, but waits to be judged one by one (after a halt).
-  /// Does nothing while some of an earlier halt are left.
   void set_aside() noexcept;
+  /// The same for what one lane has there, whose sender has fallen silent; O(batches).
+  void set_aside_of_silent(std::uint32_t lane) noexcept;
   bool has_aside() const noexcept { return !aside_.empty(); }
   StagedBatch take_aside() noexcept;
 

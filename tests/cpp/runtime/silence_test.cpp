@@ -31,6 +31,48 @@ TEST_F(SilenceTest, PurgesTheCommandsOfASilentCommander) {
   EXPECT_EQ(desired(frontend.latest()), 6.0) << "five iterations after the batch";
 }
 
+TEST_F(SilenceTest, EndsWhatTheSilentCommanderHasScheduled) {
+  Station station(watched(Stale::purge));
+  station.start();
+  UntypedFrontend silent("pair");
+  UntypedFrontend lively("pair");
+  send(silent, 0, 100.0, {.pace = iterations(100)});
+  add(silent, 1, 5.0);
+  silent.add_take_control();
+  const Batch later = silent.pulse({.at = 20});
+  add(lively, 1, 3.0);
+  const Batch others = lively.pulse({.at = 20});
+  station.run(7);
+  EXPECT_EQ(later.handle(0).status, Status::purged);
+  EXPECT_EQ(later.handle(0).reason, Reason::silence);
+  EXPECT_EQ(later.handle(0).iteration, 7) << "when the silence is noticed, not when it was due";
+  EXPECT_EQ(later.handle(1).status, Status::purged);
+  station.run(14);
+  EXPECT_EQ(others.handle(0).status, Status::completed);
+  EXPECT_EQ(desired(lively.latest(), 1), 3.0) << "what others scheduled acts";
+  // its sender is free to begin again
+  EXPECT_EQ(desired(silent.latest(), 0), 6.0);
+  send(silent, 0, 1.0);
+  station.run(1);
+  EXPECT_EQ(desired(silent.latest(), 0), 1.0);
+}
+
+TEST_F(SilenceTest, AHaltEndsItTooAlsoWhatAHaltWouldLeave) {
+  Station station(watched(Stale::halt));
+  station.start();
+  UntypedFrontend silent("pair");
+  send(silent, 0, 100.0, {.pace = iterations(100)});
+  add(silent, 1, 5.0);
+  const Batch command = silent.pulse({.at = 20});
+  add_request(silent, Reset{.seed = 9});  // is served while halted
+  const Batch request = silent.pulse({.at = 20});
+  station.run(7);
+  ASSERT_TRUE(silent.halted());
+  EXPECT_EQ(command.handle(0).status, Status::halted);
+  EXPECT_EQ(request.handle(0).status, Status::purged);
+  EXPECT_EQ(request.handle(0).reason, Reason::silence);
+}
+
 TEST_F(SilenceTest, StopsIfToldSo) {
   Station station(watched(Stale::stop));
   station.start();
