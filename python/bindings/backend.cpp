@@ -72,7 +72,9 @@ class Backend final : public o80::RequestServer {
     o80::UntypedBackend& backend = between_steps();
     copy(observed_, backend.observed());
     copy(extended_, backend.extended());
-    backend.publish();
+    if (!backend.publish()) {
+      throw InvalidArgument("'" + name_ + "' cannot begin: " + std::string(backend.failure()));
+    }
     begun_ = true;
   }
 
@@ -86,6 +88,9 @@ class Backend final : public o80::RequestServer {
     if (raised_) std::rethrow_exception(std::exchange(raised_, nullptr));
     if (!backend_) {
       throw o80::Closed("the backend of segment '" + name_ + "' was closed while it was in step");
+    }
+    if (step == o80::Step::ended && backend_->unreadable()) {
+      throw InvalidArgument("'" + name_ + "' cannot go on: " + std::string(backend_->failure()));
     }
     return step == o80::Step::run;
   }

@@ -32,13 +32,22 @@ Loop::~Loop() {
 
 void Loop::start() {
   const bool started = calls(Verb::start, [&] { return robot_->start(); });
-  if (!started || !read() || !is_finite(backend_.observed())) {
-    if (fault_.empty()) failed("start");
+  if (!started) failed("start");
+  if (!started || !read() || !begin()) {
     const std::string why = fault_;
     stop();
     throw DriverError(why);
   }
-  backend_.publish();
+}
+
+/// Row 0.
+bool Loop::begin() {
+  if (backend_.publish()) return true;
+  fault_ = "'";
+  fault_ += robot_->table().name;
+  fault_ += "' cannot begin: ";
+  fault_ += backend_.failure();
+  return false;
 }
 
 // commands => desired => hardware, wait, hardware => observed, the row is published
@@ -155,24 +164,13 @@ bool Loop::read_fresh(FreshReading& reading) noexcept {
   finished_ = finished_ || view.finished != 0;
   note_halt(view);
   reading.has_desired = view.has_desired != 0;
-  return is_finite(reading.observed) && (!reading.has_desired || is_finite(reading.desired));
+  return true;
 }
 
 void Loop::note_halt(const ReadingView& view) noexcept {
   if (view.halted == 0) return;
   const std::size_t size = strnlen(view.halt_text.text, sizeof view.halt_text.text);
   backend_.halt(HaltCause::driver, {view.halt_text.text, size});
-}
-
-/// What a robot begins with has to be numbers: nothing could be commanded from there.
-bool Loop::is_finite(const std::byte* block) noexcept {
-  ShortText<200> text;
-  if (!backend_.first_not_finite(block, text)) return true;
-  fault_ = "'";
-  fault_ += robot_->table().name;
-  fault_ += "' begins with a reading that is no number: ";
-  fault_ += text.view();
-  return false;
 }
 
 bool Loop::halt() noexcept {

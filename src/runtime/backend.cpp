@@ -159,6 +159,30 @@ Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
   return Step::run;
 }
 
+/// The one place that refuses readings: what a robot begins with, or begins afresh with, has to be
+/// numbers, for nothing could be commanded from there. True if some are not; `why` names the first.
+bool UntypedBackend::Body::name_not_finite(const std::byte* states, std::string_view what,
+                                           ShortText<248>& why) const noexcept {
+  const std::optional<NotFinite> found = controller.not_finite(states);
+  if (!found) return false;
+  name_number(schema, found->actuator, found->number, why);
+  why.add(" is no number (NaN or infinite) in ").add(what);
+  return true;
+}
+
+bool UntypedBackend::Body::can_begin(const std::byte* states, std::string_view what) noexcept {
+  ShortText<248> why;
+  if (name_not_finite(states, what, why)) note_failure(why.view());
+  return why.view().empty();
+}
+
+bool UntypedBackend::Body::publish_first() noexcept {
+  if (!can_begin(row() + layout.observed, "the first reading")) return false;
+  if (!stop.load(std::memory_order_relaxed)) failure[0] = 0;  // of one that was refused before
+  publish(false);
+  return true;
+}
+
 void UntypedBackend::Body::publish(bool fresh) noexcept {
   if (!begun_) {
     controller.restart(row() + layout.observed, nullptr, 0);
@@ -228,7 +252,11 @@ const std::string& UntypedBackend::name() const noexcept { return body_->segment
 
 std::byte* UntypedBackend::observed() noexcept { return body_->row() + body_->layout.observed; }
 std::byte* UntypedBackend::extended() noexcept { return body_->row() + body_->layout.extended; }
-void UntypedBackend::publish() noexcept { body_->publish(false); }
+bool UntypedBackend::publish() noexcept {
+  if (!body_->has_begun()) return body_->publish_first();
+  body_->publish(false);
+  return true;
+}
 
 Step UntypedBackend::step() noexcept { return body_->step(kForEver); }
 Step UntypedBackend::try_step() noexcept { return body_->step(0); }
@@ -260,13 +288,6 @@ void UntypedBackend::interrupt(std::uint32_t actuator) noexcept {
   body_->controller.interrupt(actuator, body_->current);
 }
 
-bool UntypedBackend::first_not_finite(const std::byte* block, ShortText<200>& text) const noexcept {
-  const std::optional<NotFinite> found = body_->controller.not_finite(block);
-  if (!found) return false;
-  name_number(schema(), found->actuator, found->number, text);
-  return true;
-}
-
 void UntypedBackend::ask_to_stop() noexcept {
   body_->stop.store(true, std::memory_order_relaxed);
   body_->bell.interrupt();
@@ -275,6 +296,7 @@ bool UntypedBackend::stop_asked() const noexcept {
   return body_->stop.load(std::memory_order_relaxed);
 }
 std::string_view UntypedBackend::failure() const noexcept { return body_->failure.data(); }
+bool UntypedBackend::unreadable() const noexcept { return body_->unreadable; }
 
 void UntypedBackend::end(State stopped_or_failed, std::string_view text) noexcept {
   body_->end(stopped_or_failed, text);

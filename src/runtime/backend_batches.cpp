@@ -62,10 +62,14 @@ void UntypedBackend::Body::wake(bool lanes_wait, bool reader_waits) noexcept {
   }
 }
 
-void UntypedBackend::Body::fail(std::string_view text) noexcept {
+void UntypedBackend::Body::note_failure(std::string_view text) noexcept {
   const std::size_t size = std::min(text.size(), failure.size() - 1);
   std::memcpy(failure.data(), text.data(), size);
   failure[size] = 0;
+}
+
+void UntypedBackend::Body::fail(std::string_view text) noexcept {
+  note_failure(text);
   stop.store(true, std::memory_order_relaxed);
 }
 
@@ -95,10 +99,16 @@ Outcome UntypedBackend::Body::request(std::uint32_t lane, CommandId id, std::uin
 Outcome UntypedBackend::Body::start_afresh(std::uint32_t lane, CommandId id) noexcept {
   auto* desired = reinterpret_cast<std::byte*>(fresh_desired_.data());
   FreshReading reading{row() + layout.observed, row() + layout.extended, desired};
-  if (!server_->read_fresh(reading)) {
-    constexpr std::string_view kWhy = "the robot could not be read after a fresh start";
-    fail(kWhy);
-    lanes[lane].set_message(id, kWhy);
+  bool reads = server_->read_fresh(reading);
+  if (!reads) note_failure("the robot could not be read in a fresh start");
+  reads = reads && can_begin(reading.observed, "the reading of a fresh start");
+  if (reads && reading.has_desired) {
+    reads = can_begin(reading.desired, "the desired states of a fresh start");
+  }
+  if (!reads) {
+    unreadable = true;
+    stop.store(true, std::memory_order_relaxed);
+    lanes[lane].set_message(id, failure.data());
     return {Status::rejected, Reason::driver, 0};
   }
   controller.restart(reading.observed, reading.has_desired ? reading.desired : nullptr, current);

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "o80/base/short_text.hpp"
 #include "o80/base/time.hpp"
 #include "o80/control/controller.hpp"
 #include "o80/control/error_watch.hpp"
@@ -57,6 +58,8 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   void freed(std::uint32_t lane, std::uint32_t blocks) noexcept override;
 
   std::byte* row() noexcept { return reinterpret_cast<std::byte*>(row_.data()); }
+  bool has_begun() const noexcept { return begun_; }
+  bool publish_first() noexcept;
   void publish(bool fresh) noexcept;
   Step step(std::int64_t at_most) noexcept;
   void stop_burst(BurstEnd end = BurstEnd::done) noexcept;
@@ -86,6 +89,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   Timing timing;
   std::atomic<bool> stop{false};
   std::array<char, 248> failure{};
+  bool unreadable = false;  // the robot could not begin afresh
   Iteration current = 0;  // under way, or about to be
 
  private:
@@ -128,6 +132,12 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   void break_silence(std::uint32_t lane) noexcept;
   void stale(std::uint32_t lane, Reason reason) noexcept;
   void fail(std::string_view text) noexcept;
+  void note_failure(std::string_view text) noexcept;
+
+  // readings
+  bool name_not_finite(const std::byte* states, std::string_view what,
+                       ShortText<248>& why) const noexcept;
+  bool can_begin(const std::byte* states, std::string_view what) noexcept;
 
   void tell(const StatusChange& change) noexcept;
   void tell_of_the_row(bool published) noexcept;

@@ -56,6 +56,7 @@ void UntypedBackend::Body::watch_errors() noexcept {
 Step UntypedBackend::Body::brake() noexcept {
   if (!stopping_) {
     stopping_ = true;
+    if (unreadable) return Step::ended;  // where it is nobody knows
     const bool acted = acts();
     controller.purge(kEveryActuator, current, Reason::stopped);
     if (!acted) return Step::ended;
@@ -145,6 +146,11 @@ Outcome UntypedBackend::Body::resume(std::uint32_t lane, CommandId id,
     return refuse(schema.head.bursting == 0
                       ? "the robot still brakes: resume when it has come to rest"
                       : "the robot still brakes: let it come to rest in a burst, then resume");
+  }
+
+  ShortText<248> unread;
+  if (name_not_finite(row() + layout.observed, "the last reading", unread)) {
+    return refuse(unread.view(), Reason::driver);
   }
 
   // the robot may refuse; a halt that comes meanwhile wins

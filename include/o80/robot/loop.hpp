@@ -59,7 +59,7 @@ class Loop final : public RequestServer {
   bool iterate() noexcept;
   void brake() noexcept;
   void note_halt(const ReadingView& view) noexcept;
-  bool is_finite(const std::byte* block) noexcept;
+  bool begin();
   /// Calls into the driver; observers see which verb has not returned.
   template <class Call>
   auto calls(Verb verb, Call&& call) noexcept {

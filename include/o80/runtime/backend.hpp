@@ -9,7 +9,6 @@
 #include <string>
 #include <string_view>
 
-#include "o80/base/short_text.hpp"
 #include "o80/describe/layout.hpp"
 #include "o80/describe/schema.hpp"
 #include "o80/memory/halt_word.hpp"
@@ -73,8 +72,9 @@ class UntypedBackend {
   /// The blocks of the row under way, to be filled before `publish`.
   std::byte* observed() noexcept;
   std::byte* extended() noexcept;
-  /// Publishes the row under way; the first one is row 0 and makes the backend running.
-  void publish() noexcept;
+  /// Publishes the row under way; the first one is row 0 and makes the backend running. False, and
+  /// nothing is published, if a number of row 0 is NaN or infinite: `failure` names it.
+  bool publish() noexcept;
 
   /// Commands => desired. Bursting, `step` waits for a grant, `try_step` does not.
   Step step() noexcept;
@@ -112,14 +112,14 @@ class UntypedBackend {
   /// Ends the commands of an actuator as interrupted, in the iteration under way.
   void interrupt(std::uint32_t actuator) noexcept;
 
-  /// Names the first number of a block of states that is infinite or NaN; false if there is none.
-  bool first_not_finite(const std::byte* block, ShortText<200>& text) const noexcept;
-
   /// Makes `step` end. From any thread or signal handler.
   void ask_to_stop() noexcept;
   bool stop_asked() const noexcept;
-  /// Why `step` ended on its own: a failed request's text, a stale command's policy.
+  /// Why `step` ended on its own: a failed request's text, a stale command's policy; or why row 0
+  /// was refused.
   std::string_view failure() const noexcept;
+  /// It ended because the robot could not begin afresh from its reading.
+  bool unreadable() const noexcept;
   /// Tells frontends that no row will follow; `text` is the fault of a failed one.
   void end(State stopped_or_failed, std::string_view text = {}) noexcept;
 

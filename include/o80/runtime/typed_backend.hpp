@@ -54,14 +54,18 @@ class Backend final : private RequestServer {
   /// Halts in the program's own name, as a driver's reading may.
   void halt(std::string_view why) noexcept { backend_.halt(HaltCause::driver, why); }
 
-  /// Publishes what was observed in the iteration under way; the first call makes row 0.
-  void publish(const Actuators& observed, const Extended& extended = {}) noexcept {
+  /// Publishes what was observed in the iteration under way; the first call makes row 0. That one
+  /// throws InvalidArgument if a number of it is NaN or infinite; none after it throws.
+  void publish(const Actuators& observed, const Extended& extended = {}) {
     if constexpr (!std::is_same_v<Actuators, NoActuators>) pack(observed, backend_.observed());
     if constexpr (!std::is_same_v<Extended, NoExtended>) pack(extended, backend_.extended());
-    backend_.publish();
+    if (!backend_.publish()) {
+      throw InvalidArgument("'" + backend_.name() + "' cannot begin: " +
+                            std::string(backend_.failure()));
+    }
   }
-  /// The desired states of the next iteration; empty when a stop was asked for. Bursting, waits
-  /// for a grant.
+  /// The desired states of the next iteration; empty when a stop was asked for, or when it failed:
+  /// `untyped().failure()` says why. Bursting, waits for a grant.
   std::optional<Actuators> step() noexcept {
     if (backend_.step() != Step::run) return std::nullopt;
     return unpack<Actuators>(backend_.desired());

@@ -1,11 +1,14 @@
 #include "o80/runtime/typed_backend.hpp"
 
+#include <cmath>
+
 #include "o80/runtime/typed_frontend.hpp"
 #include "runtime/station.hpp"
 
 namespace o80::test {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 class TypedBackendTest : public StationTest {};
@@ -79,6 +82,56 @@ TEST_F(TypedBackendTest, ARequestThatThrowsEndsItAsFailed) {
   backend.reset();
   EXPECT_THAT(message_of<BackendFailed>([&] { frontend.wait_for(1, kPatience); }),
               HasSubstr("sparks"));
+}
+
+TEST_F(TypedBackendTest, RefusesAFirstReadingThatIsNoNumber) {
+  Backend<Pair> backend({.segment = "pair"});
+  EXPECT_THAT(message_of<InvalidArgument>([&] { backend.publish({1, std::nan("")}); }),
+              AllOf(HasSubstr("actuator 'actuator_1'"), HasSubstr("first reading")));
+  EXPECT_THROW(Frontend<Pair>("pair", {.timeout = kAtOnce}), TimeoutError) << "it has not begun";
+  backend.publish({1, 2});
+  EXPECT_EQ(Frontend<Pair>("pair").latest().desired()[1], 2) << "the next one may be";
+  EXPECT_TRUE(backend.step());
+}
+
+TEST_F(TypedBackendTest, AFreshReadingThatIsNoNumberEndsItAsFailed) {
+  Backend<Pair> backend({.segment = "pair"});
+  backend.on<Reset>([](const Reset&) { return Served::start_afresh(); });
+  backend.on_fresh_start(
+      [](Pair::Actuators& observed, Pair::Effort&) { observed = {-INFINITY, 0}; });
+  backend.publish({});
+  Frontend<Pair> frontend("pair");
+  frontend.add_request(Reset{});
+  const Batch batch = frontend.pulse();
+  EXPECT_FALSE(backend.step());
+  EXPECT_EQ(batch.handle(0).status, Status::rejected);
+  EXPECT_THAT(batch.handle(0).text, HasSubstr("actuator 'actuator_0'"));
+  EXPECT_THAT(std::string(backend.untyped().failure()),
+              AllOf(HasSubstr("actuator 'actuator_0'"), HasSubstr("fresh start")));
+  EXPECT_EQ(frontend.latest().iteration(), 0) << "no row begins with it";
+}
+
+TEST_F(TypedBackendTest, IsNotResumedWhileItsReadingIsNoNumber) {
+  Backend<Pair> backend({.segment = "pair"});
+  backend.publish({});
+  Frontend<Pair> frontend("pair");
+  const auto resume = [&] {
+    BatchBuilder builder;
+    builder.resume(1);
+    const Batch batch = frontend.pulse(builder);
+    EXPECT_TRUE(backend.step());
+    return batch.handle(0);
+  };
+  backend.halt("the belt slipped");
+  ASSERT_TRUE(backend.step());
+  backend.publish({std::nan(""), 0});
+  const Handle refused = resume();
+  EXPECT_EQ(refused.status, Status::rejected);
+  EXPECT_THAT(refused.text, HasSubstr("actuator 'actuator_0'"));
+  EXPECT_TRUE(frontend.halted());
+  backend.publish({1.5, 0});
+  EXPECT_EQ(resume().status, Status::completed);
+  EXPECT_EQ(frontend.latest().desired()[0], 1.5);
 }
 
 TEST_F(TypedBackendTest, RefusesAServerForARequestThatIsNotListed) {
