@@ -298,10 +298,13 @@ class Frontend(_core.Frontend):
 
         number: of the halt that was looked at (None: the one that acts now). A halt that came after
             it stands.
-        timeout: for the backend's answer [s].
+        timeout: for the halt to act, the robot to come to rest, and the backend's answer [s].
 
-        Raises BackendHalted if it is refused: another halt came, the robot still brakes, or it
-        refuses itself.
+        Needs a lane, but no control. In bursting it does not wait for the robot to rest: burst until
+        it does.
+
+        Raises BackendHalted if it is refused: another halt came, the robot refuses, or it still
+        brakes and bursts. Raises TimeoutError, NoLane, BackendGone.
         Does nothing if no halt acts.
         """
         if number is None:

@@ -269,7 +269,6 @@ void UntypedBackend::Body::accept(const StagedBatch& sent) noexcept {
 void UntypedBackend::Body::take(const StagedBatch& sent) noexcept {
   O80_COUNT(batch_taken);
   taking_owner_ = sent.had_left ? 0 : sent.incarnation;
-  taking_ticket_ = sent.ticket;
   controller.take(sent.lane, sent.batch, *this);
 }
 

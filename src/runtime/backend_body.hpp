@@ -172,8 +172,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
 
   std::uint32_t holder_ = kNobody;  // lane with exclusive control
   std::uint64_t holder_incarnation_ = 0;
-  std::uint64_t taking_owner_ = 0;   // who sent the batch that is being taken
-  std::uint64_t taking_ticket_ = 0;  // and its ticket
+  std::uint64_t taking_owner_ = 0;  // who sent the batch that is being taken
 
   std::atomic<std::uint32_t> own_causes_{0};  // of halts that this process asked for, a bit each
   std::uint64_t halted_below_ = 0;            // tickets: what was sent before the last halt

@@ -130,10 +130,6 @@ Outcome UntypedBackend::Body::resume(std::uint32_t lane, CommandId id,
   };
   ShortText<200> why;
   const std::uint64_t acting = halts.halt().number;
-  if (taking_ticket_ < halted_below_ && number == acting) {
-    why.add("halt ").add(acting).add(" begins only now: resume it when the robot has braked");
-    return refuse(why.view());
-  }
   if (number < acting) {
     why.add("halt ").add(acting).add(" came after it: look at it, then resume that one");
     return refuse(why.view());

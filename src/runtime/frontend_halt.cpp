@@ -5,6 +5,13 @@
 
 namespace o80 {
 
+namespace {
+Timeout left_of(const Deadline& deadline, Timeout timeout) {
+  if (!timeout) return {};
+  return std::chrono::nanoseconds(deadline.left(timeout->count()));
+}
+}  // namespace
+
 std::uint64_t UntypedFrontend::halt(std::string_view reason) {
   link_->check_usable();
   if (link_->segment.access() != Access::read_write) {
@@ -30,14 +37,48 @@ std::optional<Halt> UntypedFrontend::halted() const {
 }
 
 void UntypedFrontend::resume(std::uint64_t number, Timeout timeout, const Check& check) {
-  BatchBuilder builder;
-  builder.resume(number);
-  const Batch batch = pulse(builder);
-  batch.wait(timeout, check);
-  if (!batch.rejection().empty()) throw_rejected(*link_, "resume", batch);
-  const Handle handle = batch.handle(0);
-  if (handle.status == Status::completed) return;
-  throw BackendHalted("'" + segment() + "' does not resume: " + handle.text);
+  const Deadline deadline(timeout);
+  while (true) {
+    wait_for_rest(number, deadline, check);
+    BatchBuilder builder;
+    builder.resume(number);
+    const Batch batch = pulse(builder);
+    batch.wait(left_of(deadline, timeout), check);
+    const Handle handle = batch.handle(0);
+    if (handle.status == Status::completed) return;
+    // at rest, the backend may still have to end what was scheduled before the halt
+    const std::optional<Halt> acting = link_->halt();
+    const bool is_early = !bursting() && handle.reason == Reason::halted && acting &&
+                          acting->number == number && !deadline.over();
+    if (!is_early) {
+      throw BackendHalted("'" + segment() + "' does not resume: " + handle.text);
+    }
+    link_->rows.wait_for_row(published() + 1, deadline, link_->guarded(check));
+  }
+}
+
+/// In real time: until the halt is latched and the robot has come to rest, as rows tell. Returns at
+/// once if another halt acts, or none: the backend knows what to say.
+void UntypedFrontend::wait_for_rest(std::uint64_t number, const Deadline& deadline,
+                                    const Check& check) {
+  link_->check_usable();
+  if (bursting()) return;
+  while (true) {
+    const std::optional<Halt> acting = link_->halt();
+    if (!acting || acting->number != number) return;
+    const bool is_latched = acting->iteration >= 0;
+    Iteration next = published() + 1;
+    if (is_latched && published() >= acting->iteration) {
+      const UntypedObservation row = latest();
+      if (!row.any_braking()) return;
+      next = row.iteration() + 1;
+    }
+    if (link_->rows.wait_for_row(next, deadline, link_->guarded(check)) == Waited::timed_out) {
+      throw TimeoutError("halt " + std::to_string(number) + " of '" + segment() + "' " +
+                         (is_latched ? "still brakes the robot" : "does not act yet") +
+                         ": give resume more time");
+    }
+  }
 }
 
 void UntypedFrontend::keep_alive() {

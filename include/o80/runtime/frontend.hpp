@@ -124,8 +124,9 @@ class UntypedFrontend {
   /// The halt that acts, or was asked for last (`iteration` is -1 until it acts); nothing if none.
   std::optional<Halt> halted() const;
   /// Clears halts up to this number: the robot starts afresh from where it is, in a row of its own.
-  /// Throws BackendHalted if it is refused (another halt came after it, the robot still brakes or
-  /// refuses), TimeoutError, BackendGone.
+  /// In real time it waits until that halt acts and the robot has come to rest. Needs a lane, but
+  /// no control. Throws BackendHalted if it is refused (another halt came after it, the robot
+  /// refuses, or still brakes and bursts), TimeoutError, NoLane, BackendGone.
   void resume(std::uint64_t number, Timeout timeout, const Check& check = {});
   /// Tells the backend's watchdog that this frontend lives, as a pulse or a wait for a batch does.
   void keep_alive();
@@ -165,6 +166,7 @@ class UntypedFrontend {
                                     const CommandOptions& options,
                                     std::span<const std::int64_t> times) const;
   Batch pulse(const PulseOptions& options, std::uint16_t flags);
+  void wait_for_rest(std::uint64_t number, const Deadline& deadline, const Check& check);
   Sent send(BatchBuilder& builder, const BatchRecord& record);
   static BatchRecord batch_of(const PulseOptions& options);
   Sent send_burst(std::int64_t iterations, const PulseOptions& options);

@@ -43,6 +43,13 @@ class UntypedObservation {
   /// The limits changed it.
   bool clamped(std::uint32_t actuator) const { return bit(layout().clamped, actuator); }
   bool braking(std::uint32_t actuator) const { return bit(layout().braking, actuator); }
+  /// The same of any actuator.
+  bool any_braking() const {
+    for (std::uint32_t word = 0; word < layout().mask_words; ++word) {
+      if (unpack<std::uint64_t>(bytes() + layout().braking + word * 8) != 0) return true;
+    }
+    return false;
+  }
 
  private:
   bool bit(std::uint32_t mask, std::uint32_t actuator) const {

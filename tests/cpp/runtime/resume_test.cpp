@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <atomic>
+#include <cmath>
 #include <thread>
 
 #include "o80/base/error.hpp"
@@ -82,18 +84,90 @@ TEST_F(ResumeTest, ClearsNoHaltThatCameAfterTheOneItNames) {
   EXPECT_EQ(frontend.halted()->reason(), "second");
 }
 
-TEST_F(ResumeTest, LosesAgainstAHaltInTheSameIteration) {
+TEST_F(ResumeTest, LosesAgainstALaterHaltInTheSameIteration) {
   Station station;
   station.start();
   UntypedFrontend frontend("pair");
   const std::uint64_t number = frontend.halt("");
+  station.run(1);
   BatchBuilder builder;
   builder.resume(number);
   const Batch resume = frontend.pulse(builder);
+  frontend.halt("second");
   station.run(1);
   EXPECT_EQ(resume.handle(0).status, Status::rejected);
   EXPECT_TRUE(frontend.halted());
   EXPECT_EQ(frontend.latest().head().halted, 1U);
+}
+
+TEST_F(ResumeTest, NamesAHaltHoweverSoonItIsSent) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  const auto resume = [&] {
+    BatchBuilder builder;
+    builder.resume(frontend.halt(""));
+    return frontend.pulse(builder);
+  };
+  const Batch at_rest = resume();
+  station.run(1);
+  EXPECT_EQ(at_rest.handle(0).status, Status::completed) << at_rest.handle(0).text;
+  EXPECT_FALSE(frontend.halted());
+  send(frontend, 0, 10.0, {.pace = iterations(10)});
+  station.run(3);
+  const Batch moving = resume();
+  station.run(1);
+  EXPECT_THAT(moving.handle(0).text, HasSubstr("still brakes"));
+  EXPECT_TRUE(frontend.halted());
+}
+
+void limit_shoulder(Schema& schema) {
+  schema.actuator(0).limits({.speed = 100.0, .acceleration = 10'000.0});  // 0.1, 0.01 an iteration
+}
+
+TEST_F(ResumeTest, OfAFrontendWaitsUntilTheRobotRests) {
+  Station station({.segment = "pair"}, limit_shoulder);
+  station.start();
+  UntypedFrontend frontend("pair");
+  send(frontend, 0, 1e6, {.pace = speed(100.0), .profile = Profile::linear});
+  station.run(20);
+  const std::uint64_t number = frontend.halt("the ball is on the floor");
+  std::atomic<bool> over{false};
+  std::thread loop([&] {
+    while (!over) {
+      station.iterate();
+      std::this_thread::yield();
+    }
+  });
+  const std::string refused =
+      message_of<Error>([&] { frontend.resume(number, kPatience); });
+  over = true;
+  loop.join();
+  EXPECT_EQ(refused, "");
+  EXPECT_FALSE(frontend.halted());
+  double before = 0.1;
+  Iteration k = 21;
+  for (; frontend.wait_for(k, kAtOnce).head().fresh == 0; ++k) {
+    const double step =
+        desired(frontend.wait_for(k, kAtOnce)) - desired(frontend.wait_for(k - 1, kAtOnce));
+    EXPECT_LE(std::abs(step - before), 0.01 + 1e-9) << "row " << k;
+    before = step;
+  }
+  EXPECT_GE(k, 30) << "it takes ten iterations to rest";
+}
+
+TEST_F(ResumeTest, OfAFrontendSaysWhatItWaitsFor) {
+  Station station({.segment = "pair"}, limit_shoulder);
+  station.start();
+  UntypedFrontend frontend("pair");
+  send(frontend, 0, 1e6, {.pace = speed(100.0), .profile = Profile::linear});
+  station.run(20);
+  const std::uint64_t number = frontend.halt("");
+  EXPECT_THAT(message_of<TimeoutError>([&] { frontend.resume(number, kAtOnce); }),
+              HasSubstr("does not act yet"));
+  station.run(1);
+  EXPECT_THAT(message_of<TimeoutError>([&] { frontend.resume(number, kAtOnce); }),
+              HasSubstr("still brakes"));
 }
 
 TEST_F(ResumeTest, WithoutAHaltChangesNothing) {
