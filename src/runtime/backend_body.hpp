@@ -174,8 +174,9 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   std::uint64_t holder_incarnation_ = 0;
   std::uint64_t taking_owner_ = 0;  // who sent the batch that is being taken
 
-  std::atomic<std::uint32_t> own_causes_{0};  // of halts that this process asked for, a bit each
-  std::uint64_t halted_below_ = 0;            // tickets: what was sent before the last halt
+  // the text of the last halt that this process asked for, for each cause; 0: none since a resume
+  std::array<std::atomic<std::uint64_t>, kHaltCauses> own_halts_{};
+  std::uint64_t halted_below_ = 0;  // tickets: what was sent before the last halt
   std::uint32_t shown_acts_ = 0;
   bool reason_missing_ = false;  // of the halt that acts: its asker has not written it
   ErrorWatch errors_;

@@ -10,13 +10,21 @@ namespace o80 {
 
 namespace {
 constexpr std::uint32_t kScheduledPerIteration = 256;  // batches that end before they are due
+
+/// Tells texts apart (FNV-1a); never 0.
+std::uint64_t fingerprint(std::string_view text) noexcept {
+  std::uint64_t print = 0xCBF29CE484222325;
+  for (const char c : text) print = (print ^ static_cast<unsigned char>(c)) * 0x100000001B3;
+  return print | 1;
+}
 }
 
-/// Asks for a halt in the backend's own name. While one of this cause acts, another is the same
-/// one: a driver may repeat it with each reading, and `resume` still names a number.
+/// Asks for a halt in the backend's own name. A driver may repeat a halt with each reading: the same
+/// text again is the same halt, so that `resume` can name it. Another text is another halt.
 void UntypedBackend::Body::ask_to_halt(HaltCause cause, std::string_view text) noexcept {
-  const std::uint32_t bit = 1U << static_cast<std::uint32_t>(cause);
-  if ((own_causes_.fetch_or(bit, std::memory_order_relaxed) & bit) != 0) return;
+  std::atomic<std::uint64_t>& last = own_halts_[static_cast<std::size_t>(cause)];
+  const std::uint64_t print = fingerprint(text);
+  if (last.exchange(print, std::memory_order_relaxed) == print) return;
   ask_for_halt(segment.view(), cause, {}, text);
 }
 
@@ -159,7 +167,7 @@ Outcome UntypedBackend::Body::resume(std::uint32_t lane, CommandId id,
   }
   driver_halted_ = false;
   if (!halts.clear()) return refuse("another halt came at the same moment");
-  own_causes_.store(0, std::memory_order_relaxed);
+  for (auto& last : own_halts_) last.store(0, std::memory_order_relaxed);
   reason_missing_ = false;
   if (server_ != nullptr) return start_afresh(lane, id);
   controller.restart(row() + layout.observed, nullptr, current);

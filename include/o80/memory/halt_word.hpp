@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string_view>
@@ -24,6 +25,7 @@ enum class HaltCause : std::uint32_t {
   overruns,       // too many iterations were late
   predecessor     // the backend before was halted, or died while commands acted
 };
+inline constexpr std::size_t kHaltCauses = 8;
 std::string_view to_text(HaltCause cause) noexcept;
 
 /// One halt: its number, and why it was asked for.

@@ -193,6 +193,27 @@ TEST_F(HaltTest, IsTheBackendsOwnTooAndOnceForEachCause) {
   EXPECT_EQ(halt->reason(), "motor 3 is hot");
 }
 
+TEST_F(HaltTest, OfTheBackendForAnotherReasonIsAnotherOne) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  station.backend.halt(HaltCause::driver, "the belt slipped");
+  station.run(1);
+  ASSERT_EQ(frontend.halted()->number, 1U);
+  for (int i = 0; i < 3; ++i) {
+    station.backend.halt(HaltCause::driver, "a person is in the cell");
+    station.run(1);
+    EXPECT_EQ(frontend.halted()->number, 2U);
+    EXPECT_EQ(frontend.halted()->reason(), "a person is in the cell");
+  }
+  BatchBuilder builder;
+  builder.resume(1);
+  const Batch resume = frontend.pulse(builder);
+  station.run(1);
+  EXPECT_EQ(resume.handle(0).status, Status::rejected);
+  EXPECT_THAT(resume.handle(0).text, HasSubstr("halt 2 came after it"));
+}
+
 TEST_F(HaltTest, ARobotThatIsNotWhereItShouldBeHalts) {
   Station station({.segment = "pair"},
                   [](Schema& schema) { schema.actuator(1).limits({.error = 0.25}); });
