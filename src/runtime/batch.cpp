@@ -71,7 +71,7 @@ std::string words_for(const Link& link, const Handle& handle, std::uint8_t aux) 
     case Reason::full:
       return "too many batches of its lane wait for later iterations";
     case Reason::halted: {
-      const std::string halt = link.halt_text();
+      const std::string halt = link.halt_text(handle.iteration);
       return halt.empty() ? "the backend was halted" : halt;
     }
     default:
@@ -201,7 +201,8 @@ Iteration wait_for_burst(const Link& link, LaneSender& lane, CommandId id, Timeo
   }
   if (answer.known != LaneSender::Known::yes) return -1;
   if (answer.end == BurstEnd::cut) {
-    const std::string halt = link.halt_text();
+    // it ended before the iteration in which the halt began
+    const std::string halt = link.halt_text(answer.row + 1);
     throw BackendHalted("the burst of '" + link.segment.name() + "' ended in iteration " +
                         std::to_string(answer.row) + ": " + (halt.empty() ? "it was cut" : halt));
   }

@@ -70,13 +70,13 @@ std::optional<Halt> Link::halt() const {
   return maps_bell ? asked_halt(segment.view()) : shown_halt(segment.view());
 }
 
-std::string Link::halt_text() const {
-  const std::optional<Halt> acting = halt();
-  if (!acting) return "";
-  std::string text = "it is halted";
-  if (acting->iteration >= 0) text += " since iteration " + std::to_string(acting->iteration);
-  text +=
-      " (halt " + std::to_string(acting->number) + ", cause " + std::string(to_text(acting->cause));
+std::string Link::halt_text(Iteration iteration) const {
+  // every resume takes an iteration, so that no halt before this one can have begun in between
+  const std::optional<Halt> acting = shown_halt(segment.view());
+  if (!acting || acting->iteration < 0 || acting->iteration > iteration) return "";
+  std::string text = "it is halted since iteration " + std::to_string(acting->iteration) +
+                     " (halt " + std::to_string(acting->number) + ", cause " +
+                     std::string(to_text(acting->cause));
   if (!acting->who_text().empty()) text += ", asked for by " + printable(acting->who_text());
   text += ")";
   if (!acting->reason().empty()) text += ": " + printable(acting->reason());

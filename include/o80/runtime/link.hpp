@@ -54,8 +54,9 @@ struct Link {
   std::unique_lock<std::mutex> lock_to_send() const;
   /// The halt that acts; if this frontend may write, also one that was asked for and does not yet.
   std::optional<Halt> halt() const;
-  /// "it is halted since iteration 7 (halt 3, asked for by pid 5 (python): "why")", or nothing.
-  std::string halt_text() const;
+  /// "it is halted since iteration 7 (halt 3, cause frontend, asked for by pid 5 (python)): why" of
+  /// the halt that ended something in this iteration, or nothing if that one no longer acts.
+  std::string halt_text(Iteration iteration) const;
   /// The caller's check, which also ends waits on a closed frontend.
   Check guarded(const Check& check) const;
 

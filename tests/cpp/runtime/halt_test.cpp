@@ -214,6 +214,38 @@ TEST_F(HaltTest, OfTheBackendForAnotherReasonIsAnotherOne) {
   EXPECT_THAT(resume.handle(0).text, HasSubstr("halt 2 came after it"));
 }
 
+TEST_F(HaltTest, AStatusBearsNoReasonOfALaterHalt) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  const auto ended_by = [&](const char* why) {
+    const Batch batch = send(frontend, 0, 9.0, {.pace = iterations(9)});
+    station.run(2);
+    frontend.halt(why);
+    station.run(1);
+    return batch;
+  };
+  const Batch first = ended_by("the first");
+  const Batch refused = send(frontend, 0, 1.0);
+  station.run(1);
+  BatchBuilder builder;
+  builder.resume(1);
+  frontend.pulse(builder);
+  station.run(1);
+  const Batch second = ended_by("the second");
+  for (const Handle& handle : {first.handle(0), refused.handle(0)}) {
+    EXPECT_EQ(handle.reason, Reason::halted);
+    EXPECT_EQ(handle.text, "the backend was halted") << "by which one is no longer known";
+  }
+  EXPECT_THAT(second.handle(0).text, HasSubstr("the second"));
+  // asked for, and not acting yet: it has ended nothing
+  frontend.halt("the third");
+  const Batch third = send(frontend, 0, 1.0);
+  EXPECT_EQ(third.handle(0).status, Status::queued);
+  station.run(1);
+  EXPECT_THAT(third.handle(0).text, HasSubstr("the third"));
+}
+
 TEST_F(HaltTest, ARobotThatIsNotWhereItShouldBeHalts) {
   Station station({.segment = "pair"},
                   [](Schema& schema) { schema.actuator(1).limits({.error = 0.25}); });
