@@ -61,9 +61,9 @@ Ended Loop::run() noexcept {
 }
 
 /// An end in order in real time: the actuators come to rest first, within a second at most. Only a
-/// failed verb, or a robot that says itself that it is done, leaves no time for that.
+/// failed verb leaves no time for that.
 void Loop::brake() noexcept {
-  if (!paced_ || finished_ || !fault_.empty()) return;
+  if (!paced_ || !fault_.empty()) return;
   const std::int64_t end = monotonic_now() + kLongestBraking;
   braking_ = true;
   while (monotonic_now() < end && backend_.brake() == Step::run) {

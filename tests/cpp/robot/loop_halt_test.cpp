@@ -131,6 +131,29 @@ TEST_F(LoopHaltTest, AStopBrakesWithinTheLimitsAndThenStopsTheDriver) {
   EXPECT_LE(std::abs(before), 0.01 + 1e-9) << "at rest when the driver is stopped";
 }
 
+TEST_F(LoopHaltTest, ARobotThatIsDoneBrakesBeforeItIsStopped) {
+  Puppet::limits = {.speed = 1000.0, .acceleration = 1e6};  // of iterations: 0.1 and 0.01
+  std::vector<double> written;
+  Puppet::on_write = [&](const Desired<Puppet>& desired) { written.push_back(desired[0]); };
+  Puppet::on_read = [&](Reading<Puppet>& reading) {
+    if (!written.empty() && written.back() > 5.0) reading.finish();
+  };
+  Loop loop = timed_loop();
+  loop.start();
+  UntypedFrontend frontend("puppet");
+  send(frontend, 0, 1000.0, {.pace = speed(1000.0), .profile = Profile::linear});
+  EXPECT_TRUE(loop.run().in_order);
+  ASSERT_GT(written.size(), 10U);
+  double before = written.front();  // from 0
+  for (std::size_t i = 1; i < written.size(); ++i) {
+    const double step = written[i] - written[i - 1];
+    EXPECT_LE(std::abs(step - before), 0.01 + 1e-9) << "row " << i;
+    before = step;
+  }
+  EXPECT_LE(std::abs(before), 0.01 + 1e-9) << "at rest when the driver is stopped";
+  EXPECT_EQ(Puppet::calls.stopped, 1);
+}
+
 TEST_F(LoopHaltTest, ARobotThatDoesNothingIsStoppedAtOnce) {
   Loop loop = timed_loop();
   loop.start();
