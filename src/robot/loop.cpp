@@ -4,6 +4,7 @@
 #include <bit>
 
 #include "o80/base/error.hpp"
+#include "o80/base/short_text.hpp"
 #include "o80/base/time.hpp"
 #include "o80/memory/signal.hpp"
 
@@ -99,7 +100,7 @@ bool Loop::pace() noexcept {
   if (robot_->table().paces_itself != 0) {
     if (!calls(Verb::wait, [&] { return robot_->wait(pacer_.due()); })) return failed("wait");
     backend_.set_timing(pacer_.tick(monotonic_now()));
-    return true;
+    return !pacer_.runs_ahead() || failed_to_wait();
   }
   // a signal may come just before the sleep, and wake nobody: a long one is cut into slices. A
   // motion is not hurried by a stop: the robot would be asked to do the step in less time
@@ -131,6 +132,20 @@ bool Loop::read() noexcept {
     }
   }
   return true;
+}
+
+/// Its ticks come so fast that no limit of a speed holds any more.
+bool Loop::failed_to_wait() noexcept {
+  const double period = static_cast<double>(backend_.schema().head.period) * 1e-6;
+  const Pacer::FastTicks& fast = pacer_.fast_ticks();
+  ShortText<400> text;
+  text.add("'").add(robot_->table().name).add("' failed in wait: ").add(fast.ticks);
+  text.add(" ticks came in ").add(static_cast<double>(fast.time) * 1e-6);
+  text.add(" ms, where the period of ").add(period).add(" ms says ");
+  text.add(static_cast<double>(fast.ticks) * period);
+  text.add(" ms: give the rate of the robot's ticks (--frequency), or make wait() wait for them");
+  fault_ = text.view();
+  return false;
 }
 
 bool Loop::failed(const char* verb) noexcept {

@@ -30,6 +30,15 @@ const Timing& Pacer::tick(std::int64_t now) noexcept {
     timing_.skipped += missed;
     if (missed > 0 && !overrun_) ++timing_.overruns;
   }
+  // late ticks take back what early ones gained
+  ahead_ -= timing_.lateness + period_ / kClockTolerance;
+  if (ahead_ > 0) {
+    ++fast_.ticks;
+    fast_.time += period_ + timing_.lateness;
+  } else {
+    ahead_ = 0;
+    fast_ = {};
+  }
   due_ = now + period_;
   return timing_;
 }

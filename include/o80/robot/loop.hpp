@@ -69,6 +69,7 @@ class Loop final : public RequestServer {
     return result;
   }
   bool failed(const char* verb) noexcept;
+  bool failed_to_wait() noexcept;
 
   std::unique_ptr<Robot> robot_;
   ForkGuard guard_;

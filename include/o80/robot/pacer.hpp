@@ -27,11 +27,26 @@ class Pacer {
   const Timing& next(std::int64_t now) noexcept;
   /// The period is over because the robot ticked: the next one is measured from here.
   const Timing& tick(std::int64_t now) noexcept;
+  /// Ticks have come so much faster than the period says that no limit of a speed holds any more.
+  bool runs_ahead() const noexcept { return ahead_ > kMostPeriodsAhead * period_; }
+  /// The ticks that came too fast, since they last came in time.
+  struct FastTicks {
+    std::int64_t ticks = 0;
+    std::int64_t time = 0;  // in which they came [ns]
+  };
+  const FastTicks& fast_ticks() const noexcept { return fast_; }
 
  private:
+  /// Ticks that were late may be caught up at once: so many, however long they were missing.
+  static constexpr std::int64_t kMostPeriodsAhead = 10;
+  /// The robot's clock may be faster than this one by one part in so many, for ever.
+  static constexpr std::int64_t kClockTolerance = 50;
+
   std::int64_t period_;
   std::int64_t due_ = 0;
-  bool overrun_ = false;  // counted in this period
+  bool overrun_ = false;    // counted in this period
+  std::int64_t ahead_ = 0;  // of the clock, by the ticks [ns]
+  FastTicks fast_;
   Timing timing_;
 };
 

@@ -74,6 +74,41 @@ TEST(Pacer, FollowsARobotThatTicksByItsOwnClock) {
   EXPECT_EQ(pacer.tick(now + 60).skipped, 2U) << "an early tick is no harm";
 }
 
+TEST(Pacer, CountsHowFarARobotThatTicksRunsAheadOfTheClock) {
+  Pacer pacer(100);
+  pacer.begin(0);
+  for (int tick = 1; tick <= 10; ++tick) {
+    pacer.tick(10 * tick);
+    EXPECT_FALSE(pacer.runs_ahead()) << tick;
+  }
+  pacer.tick(110);
+  EXPECT_FALSE(pacer.runs_ahead());
+  pacer.tick(120);
+  ASSERT_TRUE(pacer.runs_ahead()) << "twelve periods in little more than one";
+  EXPECT_EQ(pacer.fast_ticks().ticks, 12);
+  EXPECT_EQ(pacer.fast_ticks().time, 120);
+}
+
+TEST(Pacer, AllowsForSomeLateTicksAndForAFastClock) {
+  Pacer pacer(1000);
+  pacer.begin(0);
+  std::int64_t now = 0;
+  for (int i = 0; i < 100'000; ++i) {
+    now += 985;  // one and a half per cent faster
+    pacer.tick(now);
+    ASSERT_FALSE(pacer.runs_ahead()) << i;
+  }
+  for (int gap = 0; gap < 100; ++gap) {
+    now += 10'000;  // then the nine that were late come at once, and the next in time
+    pacer.tick(now);
+    for (int i = 0; i < 9; ++i) pacer.tick(now += 1);
+    ASSERT_FALSE(pacer.runs_ahead()) << gap;
+  }
+  now += 1'000'000;  // a long gap allows for no more
+  for (int i = 0; i < 20; ++i) pacer.tick(now += 1);
+  EXPECT_TRUE(pacer.runs_ahead());
+}
+
 TEST(SleepUntil, IsNotOverBeforeItsMoment) {
   const std::int64_t due = monotonic_now() + 2'000'000;
   while (!sleep_until(due)) {
