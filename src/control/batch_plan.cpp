@@ -15,6 +15,8 @@ constexpr std::size_t kTraits = 3;
 constexpr std::size_t kSpareBlocks = 4;
 
 // traits: the number of requests, these, and above them the number of groups
+constexpr std::uint32_t kRequests = 0x7F;  // their number
+constexpr std::uint32_t kResumes = 1U << 7;
 constexpr std::uint32_t kIsExpress = 1U << 8;
 constexpr std::uint32_t kReleases = 1U << 9;
 constexpr std::uint32_t kMoves = 1U << 10;
@@ -56,6 +58,7 @@ void BatchPlanner::begin(Lane& lane, BlockIndex batch) noexcept {
   lane.blocks = 1;
   lane.effort = {.work = kBatchWork, .express = true};
   lane.control_orders = 0;
+  lane.resumes = 0;
   lane.group = kNoBlock;
   lane.groups = 0;
   begin_part(lane);
@@ -89,10 +92,13 @@ void BatchPlanner::complete(std::uint32_t lane_index, std::uint32_t& budget) noe
   const BlockChain chain = pool_.chain(lane.batch);
   BatchRecord& record = record_of(pool_, lane.batch);
   const bool is_express = lane.effort.express && lane.place == record.records;
+  const bool bursts = record.burst != 0 || (record.flags & kBurstUntilEnded) != 0;
+  const bool only_resumes = lane.resumes > 0 && lane.resumes == record.records && !bursts;
   record.own[kMissingFrom] = lane.place;
   record.own[kSpareFirst] = lane.cursor;
   record.own[kTraits] = lane.effort.requests | (is_express ? kIsExpress : 0) |
                         (lane.effort.releases ? kReleases : 0) | (lane.effort.moves ? kMoves : 0) |
+                        (only_resumes ? kResumes : 0) |
                         lane.groups << kFirstGroupBit;
   record.own[kSpareBlocks] = chain.blocks - lane.blocks;
   record.blocks = lane.effort.work;
@@ -286,6 +292,7 @@ void BatchPlanner::add(std::uint32_t lane_index, BlockIndex record,
       if (!while_halted_[pool_.head(record).actuator]) lane.effort.moves = true;
       [[fallthrough]];
     case RecordKind::resume:
+      if (pool_.head(record).kind == RecordKind::resume) ++lane.resumes;
       // may start afresh too, and is never express: commands sent before it, while the robot was
       // halted, are rejected and would act if it overtook them
       lane.effort.express = false;
@@ -444,8 +451,8 @@ Effort BatchPlanner::effort(BlockIndex batch) const noexcept {
   if (known_[batch] != Known::plan) return {.work = kBatchWork};
   const BatchRecord& record = pool_.batch(batch);
   const std::uint32_t traits = record.own[kTraits];
-  return {record.blocks, traits & 0xFF, (traits & kIsExpress) != 0, (traits & kReleases) != 0,
-          (traits & kMoves) != 0};
+  return {record.blocks, traits & kRequests, (traits & kIsExpress) != 0, (traits & kReleases) != 0,
+          (traits & kMoves) != 0, (traits & kResumes) != 0};
 }
 
 std::optional<Plan> BatchPlanner::plan(BlockIndex batch) noexcept {

@@ -278,7 +278,9 @@ bool UntypedBackend::Body::admit(const StagedBatch& sent) noexcept {
   watch_holder();
   const std::uint64_t sender = sent.had_left ? 0 : sent.incarnation;
   const bool is_holders = holder_ == sent.lane && holder_incarnation_ == sender;
-  if (holder_ != kNobody && !is_holders) return reject(sent, Reason::exclusive, holder_);
+  // control is about commands: whoever may halt may resume
+  const bool is_free = holder_ == kNobody || controller.effort(sent.batch).resumes;
+  if (!is_free && !is_holders) return reject(sent, Reason::exclusive, holder_);
   if (sent.at < current && !sent.late_now) return reject(sent, Reason::late);
   if (stale_ == Stale::purge && is_of_dead(sent)) return reject(sent, Reason::dead_frontend);
   return true;

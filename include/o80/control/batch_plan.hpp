@@ -29,6 +29,7 @@ struct Effort {
   bool express = false;        // nothing but purges and control orders
   bool releases = false;       // some of which let go of control
   bool moves = false;  // has what a halt refuses: a command, a request not marked `while_halted`
+  bool resumes = false;  // nothing but orders to resume, and no burst
 };
 
 /// Turns a batch in the pool into the few steps that take it, checking each of its records.
@@ -92,6 +93,7 @@ class BatchPlanner {
     RecordCheck::Progress progress;
     Effort effort;
     std::uint32_t control_orders = 0;
+    std::uint32_t resumes = 0;
     // the group whose members are being checked
     BlockIndex group = kNoBlock;
     BlockIndex first_member = kNoBlock;

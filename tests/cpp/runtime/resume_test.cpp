@@ -170,6 +170,31 @@ TEST_F(ResumeTest, OfAFrontendSaysWhatItWaitsFor) {
               HasSubstr("still brakes"));
 }
 
+TEST_F(ResumeTest, NeedsNoControl) {
+  Station station({.segment = "pair", .lanes = 3});
+  station.start();
+  UntypedFrontend holder("pair");
+  UntypedFrontend other("pair");
+  holder.add_take_control();
+  holder.pulse();
+  station.run(1);
+  const std::uint64_t number = other.halt("");
+  station.run(1);
+  BatchBuilder mixed;
+  mixed.resume(number);
+  mixed.purge(kEveryActuator);
+  const Batch refused = other.pulse(mixed);
+  BatchBuilder builder;
+  builder.resume(number);
+  const Batch resume = other.pulse(builder);
+  station.run(1);
+  EXPECT_EQ(refused.handle(0).reason, Reason::exclusive) << "nothing else passes with it";
+  EXPECT_EQ(resume.handle(0).status, Status::completed) << resume.handle(0).text;
+  const Batch batch = send(other, 0, 1.0);
+  station.run(1);
+  EXPECT_EQ(batch.handle(0).reason, Reason::exclusive) << "control stays with its holder";
+}
+
 TEST_F(ResumeTest, WithoutAHaltChangesNothing) {
   Station station;
   station.start();
