@@ -98,8 +98,7 @@ void BatchPlanner::complete(std::uint32_t lane_index, std::uint32_t& budget) noe
   record.own[kSpareFirst] = lane.cursor;
   record.own[kTraits] = lane.effort.requests | (is_express ? kIsExpress : 0) |
                         (lane.effort.releases ? kReleases : 0) | (lane.effort.moves ? kMoves : 0) |
-                        (only_resumes ? kResumes : 0) |
-                        lane.groups << kFirstGroupBit;
+                        (only_resumes ? kResumes : 0) | lane.groups << kFirstGroupBit;
   record.own[kSpareBlocks] = chain.blocks - lane.blocks;
   record.blocks = lane.effort.work;
   known_[lane.batch] = Known::plan;
@@ -451,8 +450,12 @@ Effort BatchPlanner::effort(BlockIndex batch) const noexcept {
   if (known_[batch] != Known::plan) return {.work = kBatchWork};
   const BatchRecord& record = pool_.batch(batch);
   const std::uint32_t traits = record.own[kTraits];
-  return {record.blocks, traits & kRequests, (traits & kIsExpress) != 0, (traits & kReleases) != 0,
-          (traits & kMoves) != 0, (traits & kResumes) != 0};
+  return {record.blocks,
+          traits & kRequests,
+          (traits & kIsExpress) != 0,
+          (traits & kReleases) != 0,
+          (traits & kMoves) != 0,
+          (traits & kResumes) != 0};
 }
 
 std::optional<Plan> BatchPlanner::plan(BlockIndex batch) noexcept {

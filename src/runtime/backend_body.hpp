@@ -90,7 +90,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   std::atomic<bool> stop{false};
   std::array<char, 248> failure{};
   bool unreadable = false;  // the robot could not begin afresh
-  Iteration current = 0;  // under way, or about to be
+  Iteration current = 0;    // under way, or about to be
 
  private:
   // batches => controller

@@ -17,10 +17,10 @@ std::uint64_t fingerprint(std::string_view text) noexcept {
   for (const char c : text) print = (print ^ static_cast<unsigned char>(c)) * 0x100000001B3;
   return print | 1;
 }
-}
+}  // namespace
 
-/// Asks for a halt in the backend's own name. A driver may repeat a halt with each reading: the same
-/// text again is the same halt, so that `resume` can name it. Another text is another halt.
+/// Asks for a halt in the backend's own name. A driver may repeat a halt with each reading: the
+/// same text again is the same halt, so that `resume` can name it. Another text is another halt.
 void UntypedBackend::Body::ask_to_halt(HaltCause cause, std::string_view text) noexcept {
   std::atomic<std::uint64_t>& last = own_halts_[static_cast<std::size_t>(cause)];
   const std::uint64_t print = fingerprint(text);

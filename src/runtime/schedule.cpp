@@ -47,8 +47,8 @@ void Schedule::set_aside() noexcept {
 
 void Schedule::set_aside_of_silent(std::uint32_t lane) noexcept {
   if (counts_[lane] == 0 || aside_.size() + counts_[lane] > aside_.capacity()) return;
-  const auto rest = std::ranges::partition(
-      heap_, [&](const StagedBatch& batch) { return batch.lane != lane; });
+  const auto rest =
+      std::ranges::partition(heap_, [&](const StagedBatch& batch) { return batch.lane != lane; });
   for (StagedBatch& batch : rest) {
     batch.silent = true;
     aside_.push_back(batch);

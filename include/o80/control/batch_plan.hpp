@@ -28,7 +28,7 @@ struct Effort {
   std::uint32_t requests = 0;  // that the driver will serve
   bool express = false;        // nothing but purges and control orders
   bool releases = false;       // some of which let go of control
-  bool moves = false;  // has what a halt refuses: a command, a request not marked `while_halted`
+  bool moves = false;    // has what a halt refuses: a command, a request not marked `while_halted`
   bool resumes = false;  // nothing but orders to resume, and no burst
 };
 

@@ -103,8 +103,8 @@ class UntypedBackend {
   void leave() noexcept;
 
   /// Halts: commands end, every actuator brakes, and nothing moves again until a frontend resumes.
-  /// Acts in the first step begun after it. The same cause and text again are the same halt; another
-  /// text is another halt. From any thread or signal handler.
+  /// Acts in the first step begun after it. The same cause and text again are the same halt;
+  /// another text is another halt. From any thread or signal handler.
   void halt(HaltCause cause, std::string_view text) noexcept;
   /// The halt that acts; number 0 if none does. For the thread of the loop.
   const Halt& halted() const noexcept;

@@ -60,8 +60,8 @@ class Backend final : private RequestServer {
     if constexpr (!std::is_same_v<Actuators, NoActuators>) pack(observed, backend_.observed());
     if constexpr (!std::is_same_v<Extended, NoExtended>) pack(extended, backend_.extended());
     if (!backend_.publish()) {
-      throw InvalidArgument("'" + backend_.name() + "' cannot begin: " +
-                            std::string(backend_.failure()));
+      throw InvalidArgument("'" + backend_.name() +
+                            "' cannot begin: " + std::string(backend_.failure()));
     }
   }
   /// The desired states of the next iteration; empty when a stop was asked for, or when it failed:

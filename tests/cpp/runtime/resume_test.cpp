@@ -100,8 +100,12 @@ TEST_F(ResumeTest, LosesAgainstALaterHaltInTheSameIteration) {
   EXPECT_EQ(frontend.latest().head().halted, 1U);
 }
 
+void limit_shoulder(Schema& schema) {
+  schema.actuator(0).limits({.speed = 100.0, .acceleration = 10'000.0});  // 0.1, 0.01 an iteration
+}
+
 TEST_F(ResumeTest, NamesAHaltHoweverSoonItIsSent) {
-  Station station;
+  Station station({.segment = "pair"}, limit_shoulder);
   station.start();
   UntypedFrontend frontend("pair");
   const auto resume = [&] {
@@ -113,16 +117,12 @@ TEST_F(ResumeTest, NamesAHaltHoweverSoonItIsSent) {
   station.run(1);
   EXPECT_EQ(at_rest.handle(0).status, Status::completed) << at_rest.handle(0).text;
   EXPECT_FALSE(frontend.halted());
-  send(frontend, 0, 10.0, {.pace = iterations(10)});
-  station.run(3);
+  send(frontend, 0, 10.0, {.pace = fastest()});
+  station.run(5);
   const Batch moving = resume();
   station.run(1);
   EXPECT_THAT(moving.handle(0).text, HasSubstr("still brakes"));
   EXPECT_TRUE(frontend.halted());
-}
-
-void limit_shoulder(Schema& schema) {
-  schema.actuator(0).limits({.speed = 100.0, .acceleration = 10'000.0});  // 0.1, 0.01 an iteration
 }
 
 TEST_F(ResumeTest, OfAFrontendWaitsUntilTheRobotRests) {
@@ -139,8 +139,7 @@ TEST_F(ResumeTest, OfAFrontendWaitsUntilTheRobotRests) {
       std::this_thread::yield();
     }
   });
-  const std::string refused =
-      message_of<Error>([&] { frontend.resume(number, kPatience); });
+  const std::string refused = message_of<Error>([&] { frontend.resume(number, kPatience); });
   over = true;
   loop.join();
   EXPECT_EQ(refused, "");
