@@ -269,6 +269,10 @@ void UntypedBackend::Body::accept(const StagedBatch& sent) noexcept {
 void UntypedBackend::Body::take(const StagedBatch& sent) noexcept {
   O80_COUNT(batch_taken);
   taking_owner_ = sent.had_left ? 0 : sent.incarnation;
+  // the count of tickets may have been put back since the batch was staged: a purge would end what
+  // is sent from now on
+  auto* record = reinterpret_cast<BatchRecord*>(pool.bytes(sent.batch));
+  record->ticket = lanes.drawn_at_most(sent.ticket);
   controller.take(sent.lane, sent.batch, *this);
 }
 

@@ -142,6 +142,10 @@ class LaneReceivers {
   }
   /// The next ticket that will be drawn.
   std::uint64_t tickets_drawn() const noexcept;
+  /// This ticket, or the count of tickets if nobody can have drawn it yet.
+  std::uint64_t drawn_at_most(std::uint64_t ticket) const noexcept {
+    return ticket < below_ ? ticket : std::min(ticket, tickets_drawn());
+  }
   /// Whether somebody has put back the count of tickets since this was last asked.
   bool tickets_were_put_back() noexcept { return std::exchange(put_back_, false); }
   /// Makes the next look() look whatever the bell says (a lane's owner died).

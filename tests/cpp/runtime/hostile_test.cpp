@@ -140,6 +140,31 @@ TEST_F(HostileTest, GarbageThatComesFasterThanItIsThrownAwayDoesNotKeepTheLoop) 
   flood.join();
 }
 
+TEST_F(HostileTest, APurgeWhoseTicketIsFarAheadEndsNothingThatIsSentLater) {
+  Station station;
+  station.start();
+  UntypedFrontend honest("pair");
+  UntypedFrontend liar("pair");
+  send(honest, 0, 0.5);
+  station.run(1);
+  AttachedSegment segment =
+      AttachedSegment::attach("pair", Access::read_write, Deadline(kPatience));
+  auto& tickets = segment.view().bell().tickets;
+  const std::uint64_t drawn = tickets.load();
+  // the count is far ahead when the purge is staged, and put back before it acts
+  tickets.store(std::uint64_t{1} << 60);
+  liar.add_purge();
+  const Batch purge = liar.pulse({.at = station.last() + 4});
+  station.run(1);
+  tickets.store(drawn);
+  send(honest, 0, 0.6);
+  station.run(4);
+  EXPECT_EQ(purge.handle(0).status, Status::completed);
+  const Batch batch = send(honest, 0, 1.0);
+  station.run(2);
+  EXPECT_EQ(batch.handle(0).status, Status::completed);
+}
+
 TEST_F(HostileTest, GarbageOnTheBellsPageDelaysOthersAtMost) {
   Watched watched({.segment = "pair"});
   Liar liar;
