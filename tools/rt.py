@@ -49,6 +49,7 @@ LEFT_OUT_OF_SHORT = (
     "ExpressTest.*",
     "FileOwnerTest.*",
     "ForeignFileTest.*",
+    "HaltSuccessorTest.*",
     "Hostile*",
     "IdsInFlight.*",
     "LyingOwnerTest.*",
