@@ -44,15 +44,21 @@ Mapping map(const LockFile& file, std::uint64_t bytes) {
   return {file.descriptor(), bytes, Mapping::Protection::read_write, Mapping::Faults::later};
 }
 
-/// The view's backend is dead; another starter may have marked it as superseded before it died too.
-Predecessor judge_predecessor(const SegmentView& view) {
+State state_of(const SegmentView& view) {
+  return static_cast<State>(view.counters().state.load(std::memory_order_acquire));  // sync state
+}
+
+/// The view's backend is dead, and the view is marked as superseded. `state` is what stood there
+/// before; another starter may have marked it before it died too.
+Predecessor judge_predecessor(const SegmentView& view, State state) {
   const Counters& counters = view.counters();
   Predecessor predecessor;
   predecessor.was_halted = counters.halted.load(std::memory_order_acquire) != 0;  // sync halted
   if (view.commands != nullptr)
-    predecessor.was_halted |= view.bell().halts.load(std::memory_order_seq_cst) !=  // sync halts
-                              counters.cleared.load(std::memory_order_acquire);     // sync cleared
-  const auto state = static_cast<State>(counters.state.load(std::memory_order_acquire));
+    // a change, not a load: a halt that is asked for after it finds the mark (frontend_halt.cpp)
+    predecessor.was_halted |=
+        view.bell().halts.fetch_add(0, std::memory_order_seq_cst) !=  // sync halts
+        counters.cleared.load(std::memory_order_acquire);             // sync cleared
   predecessor.died_acting = counters.acts.load(std::memory_order_relaxed) != 0 &&
                             state != State::stopped && state != State::failed;
   return predecessor;
@@ -79,9 +85,9 @@ Predecessor supersede(const NamedSegment& former) {
     commands_mapping = map(commands, view.offsets.commands_bytes);
     view.commands = commands_mapping.data();
   }
-  const Predecessor predecessor = judge_predecessor(view);
+  const State state = state_of(view);
   end_segment(view, State::superseded);
-  return predecessor;
+  return judge_predecessor(view, state);
 }
 
 }  // namespace

@@ -21,6 +21,8 @@ std::uint64_t UntypedFrontend::halt(std::string_view reason) {
   link_->segment.throw_if_gone();
   const std::uint64_t number =
       ask_for_halt(link_->segment.view(), HaltCause::frontend, own_process(), reason);
+  // a successor that has not inherited this halt has superseded the segment before
+  link_->segment.throw_if_gone();
   // an inline robot latches it now, unless a burst in this very thread is about to
   std::shared_ptr<InlineRunner> runner;
   {
@@ -91,9 +93,19 @@ std::uint64_t halt(const std::string& segment, std::string_view reason, Timeout 
   AttachOptions options;
   options.check = check;
   options.starting = true;
-  const AttachedSegment attached =
-      AttachedSegment::attach(segment, Access::read_write, Deadline(timeout), options);
-  return ask_for_halt(attached.view(), HaltCause::frontend, own_process(), reason);
+  const Deadline deadline(timeout);
+  while (true) {
+    const AttachedSegment attached =
+        AttachedSegment::attach(segment, Access::read_write, deadline, options);
+    const std::uint64_t number =
+        ask_for_halt(attached.view(), HaltCause::frontend, own_process(), reason);
+    try {
+      attached.throw_if_gone();
+      return number;
+    } catch (const BackendSuperseded&) {
+      // its successor has the name now, or is about to
+    }
+  }
 }
 
 }  // namespace o80

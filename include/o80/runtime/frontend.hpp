@@ -119,7 +119,8 @@ class UntypedFrontend {
 
   // halts
   /// Halts the backend, whoever has control and whatever its lanes are doing; the number of the
-  /// halt. Acts in the first iteration begun after it. Throws ReadOnly, BackendGone.
+  /// halt. Acts in the first iteration begun after it. Throws ReadOnly, BackendGone (also when the
+  /// backend went meanwhile: its successor may not be halted).
   std::uint64_t halt(std::string_view reason);
   /// The halt that acts, or was asked for last (`iteration` is -1 until it acts); nothing if none.
   std::optional<Halt> halted() const;

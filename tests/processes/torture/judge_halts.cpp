@@ -61,6 +61,12 @@ class HaltedLife {
     while (k < rows_ && row(k).stepped_at < time) ++k;
     return k;
   }
+  /// Some halt was asked for, answered, and not resumed.
+  bool may_act() const {
+    std::uint64_t last = rows_ == 0 ? 0 : row(rows_ - 1).halted;
+    for_each_asked([&](const AskedHalt& asked) { last = std::max(last, asked.number); });
+    return last != 0 && !may_be_cleared(last, rows_);
+  }
   bool is_resumed(std::int64_t k) const {
     return std::any_of(
         life_.resumes.begin(), life_.resumes.begin() + resumes_,
@@ -238,7 +244,7 @@ bool died_halted(const Round& round, const Generation& life) {
   const JournalRow& last = halts.row(halts.rows() - 1);
   // in the middle of the next step nobody can tell
   if (last.active != 0 && life.steps < life.rows) return true;
-  return last.halted != 0 && !halts.may_be_cleared(last.halted, halts.rows());
+  return halts.may_act();
 }
 
 bool starts_halted(const Round& round, const Generation& life) {
