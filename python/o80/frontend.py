@@ -300,8 +300,8 @@ class Frontend(_core.Frontend):
             it stands.
         timeout: for the halt to act, the robot to come to rest, and the backend's answer [s].
 
-        Needs a lane, but no control. In bursting it does not wait for the robot to rest: burst until
-        it does.
+        Needs a lane, but no control. In bursting it does not wait for the robot to rest: burst
+        until it does.
 
         Raises BackendHalted if it is refused: another halt came, the robot refuses, or it still
         brakes and bursts. Raises TimeoutError, NoLane, BackendGone.

@@ -203,6 +203,69 @@ def test_a_robot_whose_output_nobody_reads_lives_on(segment: str) -> None:
         program.wait()
 
 
+def test_a_robot_started_with_nohup_goes_on_when_the_terminal_closes(segment: str) -> None:
+    program = subprocess.Popen(
+        ["nohup", O80, "run", "two_joints", "--segment", segment],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        with o80.Frontend(segment, timeout=WAIT) as arm:
+            program.send_signal(signal.SIGHUP)
+            arm.add_command(0, 0.1, iterations=50)
+            assert arm.pulse_and_wait(timeout=WAIT).desired[0] == 0.1
+            assert arm.halted is None
+    finally:
+        program.terminate()
+        program.wait()
+
+
+FULL_DIRECTORY = """
+import errno, os, subprocess, sys
+import o80
+directory = sys.argv[1]
+subprocess.run(["mount", "-t", "tmpfs", "-o", "size=96m", "o80", directory], check=True)
+os.environ["O80_DIRECTORY"] = directory
+with o80.robots.load("two_joints").start("arm") as process, process.frontend() as arm:
+    filler = os.open(directory + "/filler", os.O_CREAT | os.O_WRONLY)
+    try:
+        while True:
+            os.write(filler, bytes(1 << 12))
+    except OSError as error:
+        assert error.errno == errno.ENOSPC, error
+    arm.add_command(0, 0.1, iterations=20)
+    assert arm.pulse_and_wait(timeout=60).desired[0] == 0.1
+    number = arm.halt("the directory is full")
+    while not arm.latest().halted:
+        arm.wait_for(arm.published + 1, timeout=60)
+    arm.resume(number, timeout=60)
+    try:
+        o80.robots.load("two_joints").start("other")
+    except o80.Error as error:
+        print("refused:", error)
+"""
+
+
+def test_a_robot_goes_on_when_the_directory_is_full_and_a_second_one_is_refused(
+    tmp_path: Path,
+) -> None:
+    apart = ["unshare", "--mount", "--propagation", "private"]
+    if subprocess.run([*apart, "true"], capture_output=True).returncode != 0:
+        pytest.skip("this user may not mount a small file system")
+
+    done = subprocess.run(
+        [*apart, sys.executable, "-c", FULL_DIRECTORY, str(tmp_path)],
+        capture_output=True,
+        text=True,
+        timeout=2 * WAIT,
+    )
+
+    assert done.returncode == 0, done.stderr
+    assert "refused: " in done.stdout
+    assert "has no room" in done.stdout
+
+
 def test_the_successor_of_a_killed_robot_starts_halted(segment: str) -> None:
     process = start(segment)
     with process.frontend() as arm:

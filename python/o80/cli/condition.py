@@ -24,6 +24,14 @@ def halt_text(frontend: o80.Frontend) -> str:
     )
 
 
+def start_text(started_at: int) -> str:
+    """What is wrong with a backend that is starting since then [s since 1970]; or nothing."""
+    age = time.time() - started_at
+    if age <= _SLOW + 1:  # the start is known in whole seconds
+        return ""
+    return f"start, or the first read of its driver, has not returned for {age:.0f} s"
+
+
 def loop_text(frontend: o80.Frontend) -> str:
     """What is wrong with its loop: a driver that hangs, no rows, late iterations; or nothing."""
     if not frontend.alive or frontend.published < 0:

@@ -10,7 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 import o80
-from o80.cli.condition import halt_text, loop_text
+from o80.cli.condition import halt_text, loop_text, start_text
 from o80.cli.screen import out, print_json
 
 
@@ -69,6 +69,9 @@ def _row(entry: o80.Segment) -> dict[str, Any]:
     }
     if not entry.readable:
         return row
+    if entry.life == "starting":
+        row["state_of_loop"] = start_text(entry.started_at)
+        return row  # nobody can attach to it yet
     try:
         with o80.Frontend(entry.name, timeout=0.2, read_only=True, dead=True) as frontend:
             row["robot"] = frontend.schema["robot"]
