@@ -99,12 +99,10 @@ std::uint64_t halt(const std::string& segment, std::string_view reason, Timeout 
         AttachedSegment::attach(segment, Access::read_write, deadline, options);
     const std::uint64_t number =
         ask_for_halt(attached.view(), HaltCause::frontend, own_process(), reason);
-    try {
-      attached.throw_if_gone();
-      return number;
-    } catch (const BackendSuperseded&) {
-      // its successor has the name now, or is about to
-    }
+    // its successor has the name now, or is about to
+    if (attached.life() == Life::superseded) continue;
+    attached.throw_if_gone();
+    return number;
   }
 }
 
