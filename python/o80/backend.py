@@ -146,6 +146,9 @@ class Backend:
         observed: an array (actuators,), or a mapping from groups to states.
         extended: a mapping from fields to values, or a record. What is None, or no field of the
             mapping, is as it was in the row before.
+
+        Raises InvalidArgument if row 0 has a number that is NaN or infinite: publish it again when
+        the robot reads.
         """
         native = self._open
         if observed is not None:
@@ -159,7 +162,8 @@ class Backend:
 
         Bursting, it waits until a frontend asks for iterations; raises TimeoutError after
         `timeout` [s]. None follows `stop`. Requests are served in here: what a handler raises
-        (other than RequestRejected) is raised, and the backend is to be closed.
+        (other than RequestRejected) is raised, and the backend is to be closed. So is a StartAfresh
+        with a number that is NaN or infinite, as InvalidArgument.
         """
         native = self._open
         if not native.step(timeout):
@@ -198,7 +202,8 @@ class Backend:
     def halt(self, reason: str = "") -> None:
         """Halts: commands end, actuators brake, nothing moves until a frontend resumes.
 
-        Acts in the first `step` begun after it; from any thread.
+        Acts in the first `step` begun after it; from any thread. The same reason again is the same
+        halt, another reason is another one.
         """
         self._open.halt(reason)
 

@@ -278,7 +278,7 @@ void UntypedBackend::Body::take(const StagedBatch& sent) noexcept {
 
 /// Whether a batch may be taken in this iteration; else it ends as rejected.
 bool UntypedBackend::Body::admit(const StagedBatch& sent) noexcept {
-  if (!suits_halt(sent)) return false;
+  if (!suits_halt(sent) || ends_for_silence(sent)) return false;
   watch_holder();
   const std::uint64_t sender = sent.had_left ? 0 : sent.incarnation;
   const bool is_holders = holder_ == sent.lane && holder_incarnation_ == sender;

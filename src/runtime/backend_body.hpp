@@ -122,6 +122,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   void begin_halt() noexcept;
   void end_scheduled() noexcept;
   bool suits_halt(const StagedBatch& sent) noexcept;
+  bool ends_for_silence(const StagedBatch& sent) noexcept;
   Outcome start_afresh(std::uint32_t lane, CommandId id) noexcept;
 
   // what the helper thread saw

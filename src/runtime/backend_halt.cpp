@@ -107,16 +107,20 @@ void UntypedBackend::Body::end_scheduled() noexcept {
   for (std::uint32_t i = 0; i < kScheduledPerIteration && schedule.has_aside(); ++i) {
     const StagedBatch sent = schedule.take_aside();
     if (!suits_halt(sent)) continue;
-    if (sent.silent) {
-      controller.reject(sent.lane, sent.batch, Reason::silence, 0, current, Status::purged);
-      continue;
-    }
+    if (ends_for_silence(sent)) continue;
     if (schedule.has_room(sent.lane, sent.at)) {
       schedule.add(sent);
     } else {
       reject(sent, Reason::full);
     }
   }
+}
+
+/// Whether a batch ends because its sender has fallen silent since.
+bool UntypedBackend::Body::ends_for_silence(const StagedBatch& sent) noexcept {
+  if (!sent.silent) return false;
+  controller.reject(sent.lane, sent.batch, Reason::silence, 0, current, Status::purged);
+  return true;
 }
 
 /// Whether a batch may be taken for all that halts say; else it ends. Batches that were sent before

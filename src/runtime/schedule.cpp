@@ -46,13 +46,12 @@ void Schedule::set_aside() noexcept {
 }
 
 void Schedule::set_aside_of_silent(std::uint32_t lane) noexcept {
-  if (counts_[lane] == 0 || aside_.size() + counts_[lane] > aside_.capacity()) return;
+  if (counts_[lane] == 0) return;
+  for (StagedBatch& batch : heap_) batch.silent = batch.silent || batch.lane == lane;
+  if (aside_.size() + counts_[lane] > aside_.capacity()) return;
   const auto rest =
       std::ranges::partition(heap_, [&](const StagedBatch& batch) { return batch.lane != lane; });
-  for (StagedBatch& batch : rest) {
-    batch.silent = true;
-    aside_.push_back(batch);
-  }
+  aside_.insert(aside_.end(), rest.begin(), rest.end());
   heap_.erase(rest.begin(), rest.end());
   std::ranges::make_heap(heap_, later);
   counts_[lane] = 0;

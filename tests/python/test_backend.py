@@ -19,6 +19,57 @@ def run(backend: o80.Backend) -> None:
         backend.publish(desired)
 
 
+NAN = float("nan")
+
+
+def test_a_first_reading_has_to_be_numbers(segment: str) -> None:
+    joint = [("position", float), ("velocity", float)]
+    with o80.Backend(segment, ["elbow"], joint) as backend:
+        with pytest.raises(o80.InvalidArgument, match="velocity of actuator 'elbow'"):
+            backend.publish(np.array([(1.0, NAN)], joint))
+        with pytest.raises(o80.InvalidArgument, match="row 0"):
+            backend.step()
+        backend.publish(np.array([(1.0, 2.0)], joint))
+        desired = backend.step()
+        assert desired is not None
+        assert desired["velocity"].tolist() == [2.0]
+
+
+def test_a_fresh_reading_has_to_be_numbers(segment: str) -> None:
+    backend = o80.Backend(segment, ["elbow"], requests={"home": None})
+    backend.publish([1.2])
+    backend.on("home", lambda _: o80.StartAfresh([NAN]))
+    with o80.Frontend(segment) as arm:
+        arm.add_request("home")
+        batch = arm.pulse()
+        with pytest.raises(o80.InvalidArgument, match=r"actuator 'elbow'.*fresh start"):
+            backend.step()
+        assert batch.handles[0].status == o80.Status.REJECTED
+        assert "'elbow'" in batch.handles[0].text
+        backend.close()
+        with pytest.raises(o80.BackendFailed, match="'elbow'"):
+            arm.wait_for(1, timeout=WAIT)
+
+
+def test_a_halt_is_not_resumed_while_the_reading_is_no_number(segment: str) -> None:
+    with o80.Backend(segment, ["elbow"]) as backend:
+        backend.publish([1.2])
+        with o80.Frontend(segment) as arm:
+            number = arm.halt()
+            backend.step()
+            backend.publish([NAN])
+            with pytest.raises(o80.TimeoutError):
+                arm.resume(number, timeout=0)
+            backend.step()
+            backend.publish([1.5])
+            assert arm.halted is not None
+            with pytest.raises(o80.TimeoutError):
+                arm.resume(number, timeout=0)
+            assert backend.step() is not None
+            assert arm.halted is None
+            assert arm.latest().desired.tolist() == [1.5]
+
+
 class Running:
     """The loop of a bursting backend, in a thread of its own; what it raised is kept."""
 

@@ -398,6 +398,22 @@ def test_an_embedded_backend_halts_and_resumes(segment: str) -> None:
             assert arm.latest().desired.tolist() == [0.5, 0.5]
 
 
+def test_a_halt_may_be_resumed_at_once_while_the_robot_moves_and_another_has_control(
+    process: o80.robots.Process,
+) -> None:
+    """The example of docs/safety.md."""
+    with process.frontend() as arm, process.frontend() as other:
+        with other.control():
+            other.add_command(0, 3.0, iterations=10**9)
+            batch = other.pulse()
+            until(lambda: arm.latest().active[0])
+            number = arm.halt("the ball is on the floor")
+            assert arm.halted is not None
+            arm.resume(number)
+            assert arm.halted is None
+        assert batch.handles[0].status == o80.Status.HALTED
+
+
 # ------------------------------------------------------------------------------ the program o80
 
 

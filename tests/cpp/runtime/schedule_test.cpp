@@ -31,5 +31,32 @@ TEST(Schedule, GivesTheEarliestFirstAndThoseOfOneIterationInTheOrderOfTheirPulse
   EXPECT_TRUE(schedule.empty());
 }
 
+TEST(Schedule, SetsAsideWhatASilentSenderHasThereAndKeepsTheOthersInOrder) {
+  Schedule schedule(2);
+  constexpr std::uint32_t kEach = kMostScheduled;
+  for (std::uint32_t i = 0; i < kEach; ++i) {
+    const auto at = static_cast<Iteration>(i * 7919 % kEach);
+    for (const std::uint32_t lane : {0U, 1U}) {
+      schedule.add({.at = at, .ticket = 2 * i + lane, .lane = lane});
+    }
+  }
+  schedule.set_aside_of_silent(1);
+  for (Iteration at = 0; at < kEach; ++at) {
+    ASSERT_FALSE(schedule.empty());
+    EXPECT_EQ(schedule.next().at, at);
+    EXPECT_EQ(schedule.next().lane, 0U);
+    schedule.drop_next();
+  }
+  EXPECT_TRUE(schedule.empty());
+  for (std::uint32_t i = 0; i < kEach; ++i) {
+    ASSERT_TRUE(schedule.has_aside());
+    const StagedBatch batch = schedule.take_aside();
+    EXPECT_EQ(batch.lane, 1U);
+    EXPECT_TRUE(batch.silent);
+  }
+  EXPECT_FALSE(schedule.has_aside());
+  EXPECT_TRUE(schedule.has_room(1, 0));
+}
+
 }  // namespace
 }  // namespace o80
