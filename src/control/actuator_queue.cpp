@@ -195,7 +195,7 @@ void ActuatorQueue::arrive(Iteration iteration, std::uint32_t& late_budget) noex
 void ActuatorQueue::plan_with_others(Iteration iteration, const std::byte* observed) noexcept {
   if (queue_.empty()) return;
   const RecordHead& head = pool_->head(queue_.front());
-  if (!is_member(head) || (head.pace != Pace::speed && head.pace != Pace::fastest)) return;
+  if (!is_member(head) || !CommandGroups::agrees_on_rows(head)) return;
   if (running_ && iteration <= motion_.last()) return;
   if (!running_) {
     if (!ledger_->groups().is_complete(head, iteration)) return;

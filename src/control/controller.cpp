@@ -286,8 +286,9 @@ void Controller::Body::purge(const Taking& from, const RecordHead& head,
 /// Commands of several actuators begin when all their queues have come to them.
 void Controller::Body::step_groups(Iteration iteration, const std::byte* observed,
                                    std::uint32_t& late_budget) noexcept {
-  // the others do not wait for members that were dropped
+  // dropped members end before those that step; the others do not wait for them
   told_ = ledger.work(kStatusesPerIteration);
+  if (ledger.undecided_groups() == 0) return;
   const auto each_busy = [&](auto&& visit) {
     for (std::size_t word = 0; word < busy_.size(); ++word) {
       each_bit(busy_[word], static_cast<std::uint32_t>(word * 64), visit);

@@ -37,6 +37,7 @@ std::uint32_t Ledger::lane_of(BlockIndex record) const noexcept {
 void Ledger::enter(std::uint32_t lane, BlockIndex block, const BlockChain& spare,
                    std::uint32_t groups, Iteration iteration) noexcept {
   open_groups_ += groups;
+  undecided_groups_ += groups;
   const BatchRecord record = pool_.batch(block);
   TakenBatch taken;
   taken.records = record.records;
@@ -93,6 +94,7 @@ void Ledger::activate(BlockIndex record, Iteration iteration) noexcept {
     if (groups_.at(group).active != 0) return;
     groups_.at(group).active = 1;
     id = pool_.head(group).id;
+    if (!CommandGroups::agrees_on_rows(pool_.head(group))) --undecided_groups_;
   }
   sink_.changed({lane_of(record), id, Status::active, Reason::none, 0, iteration});
 }
@@ -125,6 +127,7 @@ void Ledger::member_ended(BlockIndex record, Status status, Reason reason, std::
   if (--group.open > 0) return;
   --open_groups_;
   const CommandGroup of = group;
+  if (of.active == 0 || CommandGroups::agrees_on_rows(pool_.head(record))) --undecided_groups_;
   end(record, of.end == Status::none ? Status::completed : of.end, of.reason, of.aux, of.last_end);
 }
 

@@ -36,6 +36,10 @@ class CommandGroups {
  public:
   explicit CommandGroups(BlockPool& pool) : pool_(&pool) {}
 
+  /// Members whose own numbers of iterations differ from row to row.
+  static bool agrees_on_rows(const RecordHead& head) noexcept {
+    return head.pace == Pace::speed || head.pace == Pace::fastest;
+  }
   static BlockIndex head_of(const RecordHead& member) noexcept {
     return static_cast<BlockIndex>(member.id & ~kMemberMark);
   }

@@ -27,6 +27,9 @@ class Ledger {
 
   /// Commands of several actuators that were taken and have not ended.
   std::uint32_t open_groups() const noexcept { return open_groups_; }
+  /// Those of them whose members still have to agree: on when to begin, or on the
+  /// iterations of each row.
+  std::uint32_t undecided_groups() const noexcept { return undecided_groups_; }
   CommandGroups& groups() noexcept { return groups_; }
 
   /// Enters a batch as taken; it stays open until `close` and until all its records have ended.
@@ -78,6 +81,7 @@ class Ledger {
   StatusSink& sink_;
   CommandGroups groups_;
   std::uint32_t open_groups_ = 0;
+  std::uint32_t undecided_groups_ = 0;
   Group group_;                  // whose ends are being told
   BlockIndex first_ = kNoBlock;  // of the groups that wait: dropped records, or a batch's missing
   BlockIndex last_ = kNoBlock;
