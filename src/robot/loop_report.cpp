@@ -61,7 +61,9 @@ LoopReport::~LoopReport() {
 
 void LoopReport::run() noexcept {
   try {
-    const UntypedFrontend watcher(segment_, {.access = Access::read_only});
+    // the loop may have ended before this thread began: nobody waits for a backend that never comes
+    const Check goes_on = [this] { return stop_.load(std::memory_order_acquire) == 0; };
+    const UntypedFrontend watcher(segment_, {.access = Access::read_only, .check = goes_on});
     OverrunReport overruns;
     std::uint64_t halted = 0;
     while (stop_.load(std::memory_order_acquire) == 0) {

@@ -2,6 +2,9 @@
 
 #include <gmock/gmock.h>
 
+#include "memory/private_directory.hpp"
+#include "o80/base/time.hpp"
+
 namespace o80::test {
 namespace {
 
@@ -34,6 +37,15 @@ TEST(OverrunReport, SaysHowManyAtOnceAndThenAtALimitedRate) {
   EXPECT_THAT(report.look(row(11000, 3333, 12), 11 * kSecond).value_or(""),
               HasSubstr("3030 of the last 10000 iterations were late, 0 periods"));
   EXPECT_FALSE(report.look(row(30000, 3333, 12), 30 * kSecond)) << "none since";
+}
+
+TEST(LoopReport, EndsAtOnceAlthoughItHasFoundNoBackend) {
+  const PrivateDirectory directory;
+  const std::int64_t begin = monotonic_now();
+  {
+    const LoopReport report("gone");
+  }
+  EXPECT_LT(monotonic_now() - begin, 5 * kSecond / 2) << "it waits 5 s for a backend that may come";
 }
 
 }  // namespace
