@@ -164,11 +164,10 @@ std::string own_program() {
   char name[64] = "";
   const int file = open("/proc/self/comm", O_RDONLY | O_CLOEXEC);
   if (file < 0) return "unknown";
-  const ssize_t length = read(file, name, sizeof name - 1);
+  ssize_t length = read(file, name, sizeof name - 1);
   close(file);
-  std::string program = text_of(name, length > 0 ? static_cast<std::size_t>(length) : 0);
-  while (!program.empty() && program.back() == '\n') program.pop_back();
-  return program;
+  while (length > 0 && name[length - 1] == '\n') --length;
+  return text_of(name, length > 0 ? static_cast<std::size_t>(length) : 0);
 }
 
 std::string own_process() { return "pid " + std::to_string(getpid()) + " (" + own_program() + ")"; }

@@ -1,11 +1,13 @@
 #include "o80/memory/segment_list.hpp"
 
 #include <gmock/gmock.h>
+#include <sys/prctl.h>
 
 #include <fstream>
 
 #include "memory/segments.hpp"
 #include "o80/base/error.hpp"
+#include "o80/memory/segment_file.hpp"
 
 namespace o80 {
 namespace {
@@ -31,6 +33,15 @@ TEST_F(SegmentListTest, ShowsEverySegmentByNameWithItsLife) {
   EXPECT_TRUE(entries[0].readable);
   EXPECT_FALSE(entries[3].readable);
   EXPECT_FALSE(entries[0].user.empty());
+}
+
+TEST(OwnProgram, IsTheNameOfTheProcessFitForATerminal) {
+  char before[16] = "";
+  prctl(PR_GET_NAME, before);
+  prctl(PR_SET_NAME, "a\tlearner");
+  EXPECT_EQ(own_program(), "a?learner") << "without the end of the line";
+  EXPECT_EQ(own_process(), "pid " + std::to_string(getpid()) + " (a?learner)");
+  prctl(PR_SET_NAME, before);
 }
 
 TEST_F(SegmentListTest, IsEmptyWhereThereIsNothing) {
