@@ -230,6 +230,17 @@ Iteration Burst::wait_done(Timeout timeout, const Check& check) const {
   return wait_for_burst(*link_, lane(), batch_.id(), timeout, check);
 }
 
+void Burst::throw_if_failed() const {
+  // what is done is done, whatever became of the backend
+  const bool gone = link_->segment.gone();
+  if (done()) {
+    if (wait_done(std::chrono::nanoseconds(0)) < 0) throw_rejected(*link_, "burst", batch_);
+    return;
+  }
+  link_->check_usable();
+  if (gone) link_->segment.throw_if_gone();
+}
+
 void read_last_row(const Link& link, Iteration row, UntypedObservation& observation) {
   if (!link.history.read(row, observation.bytes())) {
     throw RowOverwritten("row " + std::to_string(row) + " of '" + link.segment.name() +

@@ -156,10 +156,23 @@ std::vector<UntypedObservation> wait_for(std::span<const Burst> bursts, Timeout 
                          deadline.left(std::numeric_limits<std::int64_t>::max())))
                    : Timeout();
   };
+  // a member may fail while an earlier one runs on
+  const auto look_at_all = [&] { std::ranges::for_each(bursts, &Burst::throw_if_failed); };
+  const Check watch = [&] {
+    look_at_all();
+    return !check || check();
+  };
   std::vector<UntypedObservation> observations;
   observations.reserve(bursts.size());
   try {
-    for (const Burst& burst : bursts) observations.push_back(burst.wait(left(), check));
+    for (const Burst& burst : bursts) {
+      try {
+        observations.push_back(burst.wait(left(), watch));
+      } catch (const TimeoutError&) {
+        look_at_all();  // a failure says more
+        throw;
+      }
+    }
   } catch (...) {
     std::ranges::for_each(bursts, &Burst::cancel);
     throw;

@@ -103,6 +103,9 @@ class Burst {
   /// after a timeout.
   /// Throws TimeoutError, BackendGone, Cancelled, Error if the batch was rejected.
   UntypedObservation wait(Timeout timeout, const Check& check = {}) const;
+  /// Throws what `wait` would throw for a burst that can no longer be done: BackendHalted,
+  /// BackendGone, Closed, Error if its batch was rejected. Does not wait.
+  void throw_if_failed() const;
 
  private:
   LaneSender& lane() const { return *batch_.lane_; }

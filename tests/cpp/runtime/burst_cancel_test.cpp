@@ -13,6 +13,7 @@
 namespace o80::test {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 class BurstCancelTest : public StationTest {
@@ -192,6 +193,67 @@ TEST_F(BurstCancelTest, AGroupThatIsNotDoneInTimeIsCancelledWhole) {
   other.drive();
   EXPECT_EQ(station.last(), 0);
   EXPECT_EQ(other.last(), 0);
+}
+
+/// A group of two under way, whose second member has run two iterations and fails then.
+class BurstGroupFailureTest : public BurstCancelTest {
+ protected:
+  BurstGroupFailureTest() {
+    other.start();
+    second.emplace("other");
+    const BurstMember group[] = {{&first, 1'000'000'000}, {&*second, 1'000'000'000}};
+    bursts = start_bursts(group);
+    station.run(3);
+    other.run(2);
+  }
+  /// The first member stands still again.
+  void expect_the_first_cancelled() {
+    EXPECT_EQ(station.drive(), Step::standing);
+    EXPECT_EQ(station.last(), 3);
+  }
+
+  Station other{{.segment = "other", .bursting = true}};
+  UntypedFrontend first{"pair"};
+  std::optional<UntypedFrontend> second;
+  std::vector<Burst> bursts;
+};
+
+TEST_F(BurstGroupFailureTest, AMemberThatHaltsIsNoticedWhileAnEarlierOneIsWaitedFor) {
+  other.backend.halt(HaltCause::driver, "collision");
+  other.drive();
+  EXPECT_THAT(message_of<BackendHalted>([&] { wait_for(bursts, kPatience); }),
+              AllOf(HasSubstr("'other'"), HasSubstr("collision")));
+  expect_the_first_cancelled();
+}
+
+TEST_F(BurstGroupFailureTest, SoIsOneWhoseBackendEnds) {
+  other.backend.end(State::failed, "the motor burnt");
+  EXPECT_THAT(message_of<BackendFailed>([&] { wait_for(bursts, kPatience); }),
+              AllOf(HasSubstr("'other'"), HasSubstr("the motor burnt")));
+  expect_the_first_cancelled();
+}
+
+TEST_F(BurstGroupFailureTest, SoIsOneWhoseFrontendIsClosed) {
+  second->close();
+  EXPECT_THAT(message_of<Closed>([&] { wait_for(bursts, kPatience); }), HasSubstr("'other'"));
+  expect_the_first_cancelled();
+}
+
+TEST_F(BurstGroupFailureTest, ATimeoutDoesNotBlameAMemberThatStillRuns) {
+  other.backend.halt(HaltCause::driver, "collision");
+  other.drive();
+  EXPECT_THAT(message_of<BackendHalted>([&] { wait_for(bursts, kAtOnce); }), HasSubstr("'other'"));
+  expect_the_first_cancelled();
+}
+
+TEST_F(BurstGroupFailureTest, WhatAMemberFinishedBeforeItEndedCounts) {
+  const Burst done = second->start_burst(1);
+  bursts[1].cancel();
+  other.drive();
+  EXPECT_EQ(done.wait_done(kAtOnce), 3);
+  other.backend.end(State::failed, "the motor burnt");
+  EXPECT_THROW(wait_for(bursts, kAtOnce), TimeoutError) << "of the first";
+  expect_the_first_cancelled();
 }
 
 }  // namespace
