@@ -146,7 +146,7 @@ std::string stops_at_once(const Schema& schema) {
     schema.each_scalar(row.type, [&](std::uint32_t, const FieldRow& field) {
       const LimitRow& limit = schema.limits[row.first_limit + number];
       const std::uint32_t here = number++;
-      const bool moves = field.kind == Kind::float32 || field.kind == Kind::float64;
+      const bool moves = field.kind != Kind::boolean && field.kind != Kind::enumeration;
       if (!moves || std::isfinite(limit.acceleration)) return;
       if (count++ >= kNamed) return;
       ShortText<200> name;

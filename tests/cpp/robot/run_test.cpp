@@ -16,6 +16,7 @@
 #include <sstream>
 
 #include "memory/child_process.hpp"
+#include "o80/base/time.hpp"
 #include "robot/puppet.hpp"
 
 namespace o80::test {
@@ -23,6 +24,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 /// A processor that this process may use.
 int usable_processor() {
@@ -51,6 +53,40 @@ class RunTest : public PuppetTest {
   }
 };
 
+/// Runs a table as a process would, in this one.
+int run_here(const RobotTable& table, std::vector<std::string> words) {
+  words.insert(words.begin(), "program");
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+  return run(table, static_cast<int>(words.size()), arguments.data());
+}
+
+/// A stepper motor and a switch, that is done at once.
+struct Stepper {
+  struct Axis {
+    std::int32_t position = 0;
+    bool powered = false;
+  };
+  struct Config {};
+  using Actuators = std::array<Axis, 1>;
+  explicit Stepper(const Config&) {}
+  void start() {}
+  void write(const Desired<Stepper>&) {}
+  void read(Reading<Stepper>& reading) { reading.finish(); }
+  void stop() noexcept {}
+};
+O80_DESCRIBE(Stepper::Config);
+O80_DESCRIBE(Stepper::Axis, (position, "[steps]"), powered);
+
+TEST_F(RunTest, SaysAtItsStartWhichNumbersAHaltStopsInOneIteration) {
+  ::testing::internal::CaptureStdout();
+  EXPECT_EQ(run_here(*robot_table<Stepper>("stepper"), {}), 0);
+  EXPECT_THAT(::testing::internal::GetCapturedStdout(),
+              AllOf(HasSubstr("no acceleration limit on"), HasSubstr("position"),
+                    Not(HasSubstr("powered"))));
+}
+
 TEST_F(RunTest, RunsARobotLibraryUntilASignalStopsItInOrder) {
   for (const int signal : {SIGINT, SIGTERM}) {
     Program program(two_joints({"--frequency", "500"}));
@@ -71,6 +107,16 @@ TEST_F(RunTest, ASignalEndsEvenALongPeriodAtOnce) {
   ASSERT_TRUE(program.says("runs on segment"));
   program.signal(SIGINT);
   EXPECT_EQ(program.end().code, 0);
+}
+
+TEST_F(RunTest, OneThatIsAskedToStopWhileItStartsEndsAtOnce) {
+  Puppet::on_read = [](Reading<Puppet>& reading) {
+    if (reading.iteration() == 0) raise(SIGTERM);
+  };
+  const std::int64_t begin = monotonic_now();
+  EXPECT_EQ(run_here(table(), {}), 0);
+  EXPECT_LT(monotonic_now() - begin, 2'500'000'000);
+  EXPECT_EQ(Puppet::calls.stopped, 1);
 }
 
 TEST_F(RunTest, StopsABurstingRobotThatStandsStill) {
@@ -101,15 +147,6 @@ TEST_F(RunTest, ASecondOneOfTheNameIsRefusedNamingTheOwner) {
   EXPECT_EQ(UntypedFrontend("two_joints").life(), Life::running);
   first.signal(SIGTERM);
   EXPECT_EQ(first.end().code, 0);
-}
-
-/// Runs a table as a process would, in this one.
-int run_here(const RobotTable& table, std::vector<std::string> words) {
-  words.insert(words.begin(), "program");
-  std::vector<char*> arguments;
-  for (std::string& word : words) arguments.push_back(word.data());
-  arguments.push_back(nullptr);
-  return run(table, static_cast<int>(words.size()), arguments.data());
 }
 
 TEST_F(RunTest, ASecondOneOfTheNameDoesNotEvenConstructItsDriver) {
