@@ -149,10 +149,10 @@ concept Driver = requires(D& driver, const Desired<D>& desired, Reading<D>& read
   typename D::Actuators;
   requires DescribedStruct<typename D::Config>;
   requires std::constructible_from<D, const typename D::Config&>;
-  driver.start();
-  driver.write(desired);
-  driver.read(reading);
-  { driver.stop() } noexcept;
+  { driver.start() } -> std::same_as<void>;
+  { driver.write(desired) } -> std::same_as<void>;
+  { driver.read(reading) } -> std::same_as<void>;
+  { driver.stop() } noexcept -> std::same_as<void>;
 };
 
 }  // namespace o80

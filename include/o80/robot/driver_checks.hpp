@@ -6,12 +6,13 @@
 #include <utility>
 
 #include "o80/describe/describe.hpp"
+#include "o80/robot/driver.hpp"
 #include "o80/runtime/request_server.hpp"
 #include "o80/runtime/robot_types.hpp"
 
-// An optional verb or type of a driver that has another signature or nearly the right name would
-// not be used, in silence. Each such mistake is an error with one sentence when the driver is
-// compiled.
+// A part of a driver that is missing, has another signature or nearly the right name is an error
+// with one sentence when the driver is compiled. Without these checks an optional part with such a
+// mistake would silently not be used.
 
 namespace o80::driver_checks {
 
@@ -50,6 +51,8 @@ O80_MEMBER(Halt)
 O80_MEMBER(on_halt)
 O80_MEMBER(onHalt)
 O80_MEMBER(Resume)
+O80_MEMBER(resme)
+O80_MEMBER(reusme)
 O80_MEMBER(on_resume)
 O80_MEMBER(onResume)
 #undef O80_MEMBER
@@ -72,6 +75,53 @@ template <class D>
 consteval bool serves_all() {
   return []<class... Each>(Requests<Each...>) { return (Serves<D, Each> && ...); }(RequestsOf<D>{});
 }
+
+#define O80_TYPE(name) requires { typename D::name; }
+template <class D>
+consteval bool config_is_described() {
+  if constexpr (O80_TYPE(Config)) return DescribedStruct<typename D::Config>;
+  return true;  // there is none: said before
+}
+
+/// What every driver has.
+template <class D>
+struct Parts {
+  static_assert(O80_TYPE(Config), "a driver needs a public `struct Config`, empty or with fields");
+  static_assert(
+      config_is_described<D>(),
+      "a driver's Config must be described: `O80_DESCRIBE(Arm::Config, (gain, \"help\"));`, or "
+      "`O80_DESCRIBE(Arm::Config);` if it is empty");
+  static_assert(O80_TYPE(Actuators),
+                "a driver needs a public `using Actuators = std::array<Joint, 4>;`, a described "
+                "struct of actuators, o80::NoActuators or o80::RunTimeActuators");
+  static constexpr bool kPassed = true;
+};
+
+/// The verbs of every driver. They have the signature that is called: an answer would be ignored.
+template <class D>
+struct NeededVerbs {
+  static_assert(std::constructible_from<D, const typename D::Config&>,
+                "a driver needs a public constructor `explicit Arm(const Config& config)`");
+  static_assert(
+      requires(D& driver) {
+        { driver.start() } -> std::same_as<void>;
+      }, "a driver needs `void start()`, public; it throws if it cannot start");
+  static_assert(
+      requires(D& driver, const Desired<D>& desired) {
+        { driver.write(desired) } -> std::same_as<void>;
+      }, "a driver needs `void write(const o80::Desired<Arm>& desired)`, public");
+  static_assert(
+      requires(D& driver, Reading<D>& reading) {
+        { driver.read(reading) } -> std::same_as<void>;
+      },
+      "a driver needs `void read(o80::Reading<Arm>& reading)`, public; it tells a failure by "
+      "`reading.fault(text)`");
+  static_assert(
+      requires(D& driver) {
+        { driver.stop() } noexcept -> std::same_as<void>;
+      }, "a driver needs `void stop() noexcept`, public");
+  static constexpr bool kPassed = true;
+};
 
 /// The optional verbs: those that are there have the signature that is called.
 template <class D>
@@ -104,12 +154,12 @@ struct Verbs {
                 "a driver's verb is called `wait`: this one has another name");
   static_assert(has_halt<D>() || !(has_Halt<D>() || has_on_halt<D>() || has_onHalt<D>()),
                 "a driver's verb is called `halt`: this one has another name");
-  static_assert(has_resume<D>() || !(has_Resume<D>() || has_on_resume<D>() || has_onResume<D>()),
+  static_assert(has_resume<D>() || !(has_Resume<D>() || has_on_resume<D>() || has_onResume<D>() ||
+                                     has_resme<D>() || has_reusme<D>()),
                 "a driver's verb is called `resume`: this one has another name");
   static constexpr bool kPassed = true;
 };
 
-#define O80_TYPE(name) requires { typename D::name; }
 /// The optional types: those that are there can be used, and no other was meant to be one.
 template <class D>
 struct Types {
@@ -150,9 +200,10 @@ struct Handlers {
 
 namespace o80 {
 
-/// True; does not compile for a driver class with a mistake in what is optional.
+/// True; does not compile for a driver class with a mistake.
 template <class D>
 inline constexpr bool kDriverPassed =
+    driver_checks::Parts<D>::kPassed && driver_checks::NeededVerbs<D>::kPassed &&
     driver_checks::Types<D>::kPassed && driver_checks::Verbs<D>::kPassed &&
     driver_checks::Handlers<D>::kPassed;
 

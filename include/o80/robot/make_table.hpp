@@ -81,9 +81,9 @@ static_assert(static_cast<int>(RequestAnswer::rejected) ==
 }  // namespace driving
 
 /// The table of functions of a driver class.
-template <Driver D>
+template <class D>
 const RobotTable* robot_table(const char* name, const char* versions = "") {
-  static_assert(kDriverPassed<D>);
+  static_assert(kDriverPassed<D> && Driver<D>);
   static const char* robot_name = name;
   static const std::string built_with =
       std::string("o80 ") + O80_VERSION + (*versions == 0 ? "" : std::string("; ") + versions);

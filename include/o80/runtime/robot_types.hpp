@@ -12,8 +12,11 @@ namespace o80 {
 struct RunTimeActuators {};
 
 /// The requests a robot serves.
-template <Shareable... Each>
-struct Requests {};
+template <class... Each>
+struct Requests {
+  static_assert((Shareable<Each> && ...),
+                "each of o80::Requests must be a struct of numbers that O80_DESCRIBE describes");
+};
 
 namespace robot_types {
 

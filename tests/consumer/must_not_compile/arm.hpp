@@ -19,16 +19,34 @@ struct Force {
 };
 O80_DESCRIBE(Force, x);
 
+// The verbs, unless one of them is the mistake.
+#ifndef ARM_START
+#define ARM_START \
+  void start() {}
+#endif
+#ifndef ARM_WRITE
+#define ARM_WRITE \
+  void write(const o80::Desired<Arm>&) {}
+#endif
+#ifndef ARM_READ
+#define ARM_READ \
+  void read(o80::Reading<Arm>&) {}
+#endif
+#ifndef ARM_STOP
+#define ARM_STOP \
+  void stop() noexcept {}
+#endif
+
 /// Begins the class Arm.
 #define ARM_WITHOUT_MISTAKE               \
  public:                                  \
   struct Config {};                       \
   using Actuators = std::array<Joint, 2>; \
   explicit Arm(const Config&) {}          \
-  void start() {}                         \
-  void write(const o80::Desired<Arm>&) {} \
-  void read(o80::Reading<Arm>&) {}        \
-  void stop() noexcept {}
+  ARM_START                               \
+  ARM_WRITE                               \
+  ARM_READ                                \
+  ARM_STOP
 
 /// Follows the class Arm.
 #define ARM_AS_ROBOT         \
