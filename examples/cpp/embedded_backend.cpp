@@ -14,7 +14,7 @@ namespace {
 struct Motor {
   double speed;
 };
-O80_DESCRIBE(Motor, (speed, "[rad/s]"));
+O80_DESCRIBE(Motor, (speed, "[rad/s]", o80::rests_at(0)));  // to 0 when no command drives it
 
 struct Mixer {
   using Actuators = std::array<Motor, 3>;

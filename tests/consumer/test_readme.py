@@ -37,6 +37,10 @@ def test_the_first_minute_in_cpp(tmp_path: Path) -> None:
     run("cmake", "--build", "build", folder=tmp_path)
     robot = o80.robots.load(tmp_path / "build" / "wheels.so")
     with robot.start(gain=0.2) as process, process.frontend() as wheels:
-        wheels.add_command(0, 1.0, duration=0.1)
-        wheels.pulse_and_wait(timeout=20.0)
-        assert wheels.latest().desired[0] == 1.0
+        wheels.add_command(0, {"speed": 1.0}, duration=0.1)
+        assert wheels.pulse_and_wait(timeout=20.0).desired["speed"][0] == 1.0
+        wheels.add_command(0, {"speed": 1.0}, duration=100.0)
+        wheels.pulse()
+        wheels.halt("a wall")
+        halted = wheels.wait_for(wheels.published + 10, timeout=20.0)
+        assert halted.desired["speed"][0] == 0.0
