@@ -46,7 +46,7 @@ def stop_entry(entry: Segment, timeout: float) -> None:
         if time.monotonic() > end:
             raise TimeoutError(
                 f"'{entry.name}' (pid {entry.pid}) did not stop in {timeout:g} s: its driver may "
-                f"hang; give it more time, or end it with `kill -9 {entry.pid}` and `o80 clean`"
+                f"hang; give it more time, or end it with `kill -9 {entry.pid}`"
             )
         time.sleep(LOOK)
 
