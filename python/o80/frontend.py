@@ -1,6 +1,7 @@
 """The side that commands and reads."""
 
 import contextlib
+import threading
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
@@ -12,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from o80 import _core, at_exit, frontend_classes
 from o80.actuator import Actuator, actuators_of
+from o80.checked import whole, whole_or_none
 from o80.errors import (
     BackendGone,
     Closed,
@@ -100,6 +102,8 @@ class Frontend(_core.Frontend):
         self._decoder = _core.Decoder(self._description, self._layout)
         super().__init__(attachment, self._decoder)
         self._first = self._read(self.oldest, 1) if self.published >= 0 else None
+        self._control_lock = threading.Lock()
+        self._control_blocks = 0
         self._is_set_up = True
         at_exit.close_later(self)
 
@@ -263,24 +267,38 @@ class Frontend(_core.Frontend):
     def control(self, timeout: float | None = 5.0) -> Iterator[Self]:
         """Exclusive control within a `with` block: batches of other frontends are rejected.
 
+        Blocks of one frontend may nest or overlap: control ends with the last of them.
         Raises ControlTaken, naming the holder, if another frontend has it.
         """
-        batch = self._take_control()
+        self._check_usable()
+        with self._control_lock:
+            batch = self._take_control()
+            self._control_blocks += 1
         try:
             batch.wait(timeout)
         except BaseException:
             # it may be given yet
             with contextlib.suppress(Error):
-                self._release_control()
+                self._leave_control()
             raise
         handle = batch.handles[0]
         if handle.status != Status.COMPLETED:
+            with self._control_lock:
+                self._control_blocks -= 1
             raise ControlTaken(f"no control of '{self.segment}': {handle.text}")
         try:
             yield self
         finally:
             with contextlib.suppress(BackendGone, Closed):
-                self._release_control().wait(timeout)
+                if (released := self._leave_control()) is not None:
+                    released.wait(timeout)
+
+    def _leave_control(self) -> _core.Batch | None:
+        """A block ends; the last one releases control."""
+        self._check_usable()
+        with self._control_lock:
+            self._control_blocks -= 1
+            return self._release_control() if self._control_blocks == 0 else None
 
     # ------------------------------------------------------------------ halts
 
@@ -312,7 +330,7 @@ class Frontend(_core.Frontend):
             if halt is None:
                 return
             number = halt.number
-        self._resume(number, timeout)
+        self._resume(whole(number, "the number of a halt", 1), timeout)
 
     # ------------------------------------------------------------------ observing
 
@@ -323,6 +341,9 @@ class Frontend(_core.Frontend):
 
         None of them: all that are still there. What is no longer there is left out.
         """
+        n = whole_or_none(n, "n, the number of observations,")
+        since = whole_or_none(since, "since")
+        until = whole_or_none(until, "until")
         oldest, last = self.oldest, self.published
         if n is not None and (since is not None or until is not None):
             raise InvalidArgument("give either n, or since and until")

@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from o80 import _core
+from o80.checked import whole
 from o80.errors import InvalidArgument
 
 
@@ -16,7 +17,7 @@ class PreparedBurst:
 
     targets: (steps, actuators), to be filled before a run: numbers for states of one number, else
         structured. What is not filled of floats is not a number, and refused. Targets stay from run
-        to run.
+        to run. An array that is assigned is copied into them.
     rows: (iterations,), structured like `history().rows`: those of the last run, in the same
         memory every time. Copy what you keep.
 
@@ -33,13 +34,36 @@ class PreparedBurst:
         pace: tuple[int, str, str, str],
     ) -> None:
         states.view(np.uint8).fill(255)
-        self.targets: NDArray[Any] = states.swapaxes(0, 1)
-        self.rows = rows
+        self._targets: NDArray[Any] = states.swapaxes(0, 1)
+        self._rows = rows
         self._frontend = frontend
         steps = states.shape[1]
         self._run = _core.PreparedBurst(
             actuators, steps, *pace, states.view(np.uint8), rows.view(np.uint8)
         ).run
+
+    @property
+    def targets(self) -> NDArray[Any]:
+        """The targets of the next run, (steps, actuators)."""
+        return self._targets
+
+    @targets.setter
+    def targets(self, values: ArrayLike) -> None:
+        wanted = self._targets.dtype
+        given = np.asarray(values, None if wanted.names is None else wanted)
+        if given.shape != self._targets.shape:
+            raise InvalidArgument(
+                f"targets have the shape (steps, actuators) = {self._targets.shape}, "
+                f"not {given.shape}"
+            )
+        if wanted.names is None and not np.can_cast(given.dtype, wanted, "same_kind"):
+            raise InvalidArgument(f"targets are of dtype {wanted}, not {given.dtype}")
+        self._targets[...] = given
+
+    @property
+    def rows(self) -> NDArray[Any]:
+        """The rows of the last run, (iterations,)."""
+        return self._rows
 
     def run(
         self, timeout: float | None = None, *, at: int | None = None, late: str = "reject"
@@ -57,6 +81,4 @@ class PreparedBurst:
 
 def checked_count(count: int, name: str) -> int:
     """At least 1. Raises InvalidArgument."""
-    if count < 1:
-        raise InvalidArgument(f"{name} of a burst: {count}, at least 1 is needed")
-    return count
+    return whole(count, f"{name} of a burst", 1)

@@ -131,6 +131,25 @@ def test_exclusive_control_keeps_others_out(process: o80.robots.Process) -> None
     assert taken.statuses == [o80.Status.COMPLETED]
 
 
+def test_control_within_control_changes_nothing(process: o80.robots.Process) -> None:
+    def refused_reason(other: o80.Frontend) -> o80.Reason | None:
+        other.add_command(0, 1.0)
+        sent = other.pulse()
+        sent.wait(WAIT)
+        return sent.handles[0].reason if sent.statuses == [o80.Status.REJECTED] else None
+
+    with process.frontend() as arm, process.frontend() as other:
+        with arm.control():
+            with arm.control():
+                assert refused_reason(other) == o80.Reason.EXCLUSIVE
+            assert refused_reason(other) == o80.Reason.EXCLUSIVE
+            with pytest.raises(o80.ControlTaken), other.control():
+                pass
+        assert refused_reason(other) is None
+        with other.control():
+            assert refused_reason(arm) == o80.Reason.EXCLUSIVE
+
+
 def test_a_reader_takes_no_lane_and_cannot_command(process: o80.robots.Process) -> None:
     with o80.Frontend(process.segment, read_only=True) as reader:
         assert reader.latest().iteration >= 0

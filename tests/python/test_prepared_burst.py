@@ -152,3 +152,31 @@ def test_of_a_closed_frontend_it_says_so(segment: str) -> None:
 def test_it_is_not_pickled(arm: o80.Frontend) -> None:
     with pytest.raises(TypeError, match="cannot be pickled"):
         pickle.dumps(arm.prepared_burst(1))
+
+
+def test_an_array_that_is_assigned_is_copied_into_its_targets(arm: o80.Frontend) -> None:
+    burst = arm.prepared_burst(1, steps=1)
+    action = np.array([[0.3, -0.6]])
+    burst.targets = action
+    action[:] = 0
+    burst.run(WAIT)
+    assert burst.rows["desired"].tolist() == [[0.3, -0.6]]
+
+    burst.targets = [[1, 0]]
+    burst.run(WAIT)
+    assert burst.rows["desired"].tolist() == [[1.0, 0.0]]
+
+
+@pytest.mark.parametrize("wrong", [[0.3, -0.6], 0.3, [[0.1], [0.2]], "x", None])
+def test_targets_of_another_shape_are_refused(arm: o80.Frontend, wrong: object) -> None:
+    burst = arm.prepared_burst(1)
+    with pytest.raises(o80.InvalidArgument, match=r"\(steps, actuators\) = \(1, 2\), not"):
+        burst.targets = wrong
+
+
+def test_targets_that_are_no_numbers_and_rows_cannot_be_assigned(arm: o80.Frontend) -> None:
+    burst = arm.prepared_burst(1)
+    with pytest.raises(o80.InvalidArgument, match="dtype float64"):
+        burst.targets = [["a", "b"]]
+    with pytest.raises(AttributeError):
+        burst.rows = np.zeros(1)  # type: ignore[misc]

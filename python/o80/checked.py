@@ -1,0 +1,34 @@
+"""Arguments of calls: each error names the argument and what is expected."""
+
+import operator
+from collections.abc import Mapping
+from typing import Any
+
+from o80.errors import InvalidArgument
+
+
+def whole(value: Any, name: str, least: int | None = None) -> int:
+    """A whole number. Raises InvalidArgument."""
+    try:
+        number = operator.index(value)
+    except TypeError:
+        raise InvalidArgument(f"{name} is a whole number, not {value!r}") from None
+    if isinstance(value, bool):
+        raise InvalidArgument(f"{name} is a whole number, not {value!r}")
+    if least is not None and number < least:
+        raise InvalidArgument(f"{name} must be at least {least}, got {number}")
+    return number
+
+
+def whole_or_none(value: Any, name: str, least: int | None = None) -> int | None:
+    """The same, or None."""
+    return None if value is None else whole(value, name, least)
+
+
+def mapping(value: Any, name: str, holds: str) -> Mapping[Any, Any]:
+    """A mapping; None is an empty one. Raises InvalidArgument."""
+    if value is None:
+        return {}
+    if not isinstance(value, Mapping):
+        raise InvalidArgument(f"{name} is a mapping from {holds}, not {value!r}")
+    return value
