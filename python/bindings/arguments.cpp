@@ -11,6 +11,22 @@
 namespace nb = nanobind;
 using o80::InvalidArgument;
 
+bool truth_of(nb::handle value, const char* name) {
+  if (!PyBool_Check(value.ptr())) {
+    throw InvalidArgument(std::string(name) + " is True or False, not " +
+                          nb::cast<std::string>(nb::repr(value)));
+  }
+  return value.ptr() == Py_True;
+}
+
+std::string string_of(nb::handle value, const char* name) {
+  if (!PyUnicode_Check(value.ptr())) {
+    throw InvalidArgument(std::string(name) + " is a text, not " +
+                          nb::cast<std::string>(nb::repr(value)));
+  }
+  return nb::cast<std::string>(value);
+}
+
 double number_of(nb::handle value, const char* name) {
   const double number = PyFloat_AsDouble(value.ptr());
   if ((number == -1.0 && PyErr_Occurred() != nullptr) || std::isnan(number)) {

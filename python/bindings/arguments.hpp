@@ -4,12 +4,15 @@
 
 #include <chrono>
 #include <cstdint>
+#include <string>
 
 #include "o80/runtime/command.hpp"
 
 // Arguments of Python calls as what the core takes; each throws InvalidArgument naming the
 // argument.
 
+bool truth_of(nanobind::handle value, const char* name);
+std::string string_of(nanobind::handle value, const char* name);
 double number_of(nanobind::handle value, const char* name);
 std::int64_t count_of(nanobind::handle value, const char* name);
 

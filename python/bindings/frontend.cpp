@@ -56,7 +56,8 @@ std::uint32_t Frontend::actuator(nb::handle named) const {
   }
   const nb::object index = nb::steal(PyNumber_Index(named.ptr()));
   std::int64_t number = 0;
-  if (!index.is_valid() || !nb::try_cast<std::int64_t>(index, number)) {
+  if (PyBool_Check(named.ptr()) || !index.is_valid() ||
+      !nb::try_cast<std::int64_t>(index, number)) {
     PyErr_Clear();
     throw InvalidArgument("an actuator is given by its index or its name, not by " +
                           nb::cast<std::string>(nb::repr(named)));

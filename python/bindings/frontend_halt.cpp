@@ -5,6 +5,7 @@
 #include <string>
 #include <tuple>
 
+#include "arguments.hpp"
 #include "frontend.hpp"
 #include "o80/base/printable.hpp"
 #include "o80/memory/verb_word.hpp"
@@ -25,7 +26,8 @@ std::optional<HaltFields> halted(const Frontend& self) {
                     o80::printable(halt->who_text()), o80::printable(halt->reason())};
 }
 
-std::uint64_t halt(const Frontend& self, const std::string& reason) {
+std::uint64_t halt(const Frontend& self, nb::handle why) {
+  const std::string reason = string_of(why, "the reason of a halt");
   const std::shared_ptr<o80::UntypedFrontend> frontend = self.shared();
   const Waiting waiting;  // an inline robot may be in a burst of another thread
   return frontend->halt(reason);
@@ -57,7 +59,7 @@ void bind_halting(nb::module_& m, nb::class_<Frontend>& frontend) {
   m.def("halt", &halt_segment, "segment"_a, "reason"_a, "timeout"_a.none());
   frontend
       .def(
-          "halt", &halt, "reason"_a = "",
+          "halt", &halt, "reason"_a.none() = "", nb::sig("def halt(self, reason: str = '') -> int"),
           R"(Halts the backend: every command ends as halted, every actuator brakes within its limits, and
 nothing moves again until `resume`. Acts in the first iteration begun after it, whoever has control.
 

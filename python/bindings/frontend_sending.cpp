@@ -24,9 +24,10 @@ using o80::UntypedFrontend;
 namespace {
 
 void add_command(const Frontend& self, nb::handle actuator, nb::handle target, nb::handle duration,
-                 nb::handle speed, nb::handle until, nb::handle iterations, bool fastest,
+                 nb::handle speed, nb::handle until, nb::handle iterations, nb::handle fastest,
                  nb::handle mode, nb::handle profile, nb::handle start, nb::handle on_limit) {
-  o80::CommandOptions options{.pace = pace_of(duration, speed, until, iterations, fastest),
+  const bool is_fastest = truth_of(fastest, "fastest");
+  o80::CommandOptions options{.pace = pace_of(duration, speed, until, iterations, is_fastest),
                               .mode = mode_of(mode),
                               .start = start_of(start),
                               .on_limit = on_limit_of(on_limit)};
@@ -187,8 +188,8 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
       .def(
           "add_command", &add_command, "actuator"_a.none(), "target"_a.none(), nb::kw_only(),
           "duration"_a = nb::none(), "speed"_a = nb::none(), "until"_a = nb::none(),
-          "iterations"_a = nb::none(), "fastest"_a = false, "mode"_a = "queue",
-          "profile"_a = nb::none(), "start"_a = "desired", "on_limit"_a = "end",
+          "iterations"_a = nb::none(), "fastest"_a.none() = false, "mode"_a.none() = "queue",
+          "profile"_a = nb::none(), "start"_a.none() = "desired", "on_limit"_a.none() = "end",
           nb::sig("def add_command(self, actuator: typing.SupportsIndex | str | "
                   "collections.abc.Sequence[typing.SupportsIndex | str] | None, "
                   "target: typing.Any, *, "

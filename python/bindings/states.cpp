@@ -178,6 +178,9 @@ class Writer {
       }
       place += numbers_in(member);
     }
+    if (missing_ == Missing::kept && row.fields > 0 && nb::len(names) == 0) {
+      throw InvalidArgument(what + " gives no field: " + fields_of(schema_, row));
+    }
     if (found == nb::len(names)) return;
     for (nb::handle name : names) {
       bool known = false;

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o80 import _core, at_exit
+from o80.checked import mapping, whole, whole_or_none
 from o80.description import Described, Limit, SchemaWriter
 from o80.errors import Closed, InvalidArgument, RequestRejected
 from o80.layout import Layout, dtype_of_type
@@ -94,13 +95,21 @@ class Backend:
     ) -> None:
         if not (math.isfinite(frequency) and frequency > 0):
             raise InvalidArgument(f"a frequency of {frequency} cannot be: it is above 0 [1/s]")
-        writer = SchemaWriter(robot or segment, units or {})
+        history = whole_or_none(history, "history", 1)
+        silence = whole_or_none(silence, "silence", 1)
+        lanes = whole(lanes, "lanes", 1)
+        lane_blocks = whole(lane_blocks, "lane_blocks", 16)
+        permission = whole(permission, "permission", 0)
+        requests = mapping(requests, "requests", "names to dtypes or None")
+        limits = mapping(limits, "limits", "actuators to limits")
+        rests_at = mapping(rests_at, "rests_at", "actuators to fields and values")
+        writer = SchemaWriter(robot or segment, mapping(units, "units", "fields to units"))
         writer.add_actuators(actuators, dtype)
         if extended is not None:
             writer.set_extended(extended)
-        writer.add_requests(requests or {}, while_halted)
-        writer.set_limits(limits or {})
-        writer.set_rests(rests_at or {})
+        writer.add_requests(requests, while_halted)
+        writer.set_limits(limits)
+        writer.set_rests(rests_at)
         writer.set_idle(when_idle)
         self._native: _core.Backend | None = None
         native = _core.Backend(

@@ -1,8 +1,10 @@
 """Arguments of calls: each error names the argument and what is expected."""
 
 import operator
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
+
+import numpy as np
 
 from o80.errors import InvalidArgument
 
@@ -32,3 +34,10 @@ def mapping(value: Any, name: str, holds: str) -> Mapping[Any, Any]:
     if not isinstance(value, Mapping):
         raise InvalidArgument(f"{name} is a mapping from {holds}, not {value!r}")
     return value
+
+
+def sequence(value: Any, name: str, example: str) -> Sequence[Any]:
+    """A list or the like, but no text. Raises InvalidArgument."""
+    if isinstance(value, str) or not isinstance(value, (Sequence, np.ndarray)):
+        raise InvalidArgument(f"{name} is a list such as {example}, not {value!r}")
+    return list(value)

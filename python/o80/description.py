@@ -29,6 +29,10 @@ class SchemaWriter:
             for group, members in actuators.items():
                 self._add_group(group, members)
         elif isinstance(actuators, int):
+            if actuators < 0:
+                raise InvalidArgument(
+                    f"the number of actuators must be at least 0, got {actuators}"
+                )
             if actuators > 0:
                 self.builder.add_actuators("", self._type("State", dtype), actuators, True)
         elif isinstance(actuators, Sequence) and not isinstance(actuators, str):

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from o80 import _core
 from o80.announced import announced
+from o80.checked import sequence, whole
 from o80.errors import DriverError, InvalidArgument
 from o80.frontend import Frontend
 from o80.process import Process, start_process
@@ -167,14 +168,14 @@ class Robot:
             "history": history,
             "lanes": lanes,
             "lane-blocks": lane_blocks,
-            "permission": f"{permission:o}",
+            "permission": f"{whole(permission, 'permission', 0):o}",
             "stale": stale,
             "silence": silence,
             "max-overruns": max_overruns,
             "resume": resume,
             "policy": policy,
             "priority": priority,
-            "cpus": ",".join(map(str, cpus)) or None,
+            "cpus": ",".join(map(str, sequence(cpus, "cpus", "[2, 3]"))) or None,
             "lock-memory": lock_memory,
         }
         words: builtins.list[str] = []

@@ -72,7 +72,12 @@ def _from_fields(targets: Mapping[str, ArrayLike], kind: np.dtype[Any]) -> NDArr
 
 def times_of(times: ArrayLike) -> NDArray[np.int64]:
     """[s] => [ns]"""
-    seconds = np.asarray(times, np.float64)
+    try:
+        seconds = np.asarray(times, np.float64)
+    except (TypeError, ValueError):
+        raise InvalidArgument(
+            f"the times of a trajectory are finite numbers (T,) [s], not {times!r}"
+        ) from None
     if seconds.ndim != 1 or not np.all(np.isfinite(seconds)):
         raise InvalidArgument("the times of a trajectory are finite numbers (T,) [s]")
     if seconds.size == 0:

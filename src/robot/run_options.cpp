@@ -161,6 +161,7 @@ RunOptions parse_run_options(const RobotTable& table, int argc, char** argv) {
   RunOptions options;
   options.backend.segment = table.name;
   options.real_time.priority = 80;
+  bool has_priority = false;
   opterr = 0;
   optind = 1;
   for (int chosen = 0;
@@ -175,6 +176,7 @@ RunOptions parse_run_options(const RobotTable& table, int argc, char** argv) {
     const auto index = static_cast<std::size_t>(chosen);
     if (index < std::size(kFlags)) {
       set_flag(options, names[index], optarg);
+      has_priority = has_priority || names[index] == "priority";
     } else {
       const std::size_t own = (index - std::size(kFlags)) % robot_options.size();
       options.robot.emplace_back(robot_options[own], optarg);
@@ -182,6 +184,9 @@ RunOptions parse_run_options(const RobotTable& table, int argc, char** argv) {
   }
   if (optind < argc) {
     throw InvalidArgument("'" + std::string(argv[optind]) + "' is no flag; see --help");
+  }
+  if (has_priority && options.real_time.policy == RealTimeOptions::Policy::other) {
+    throw InvalidArgument("--priority needs --policy fifo or rr: policy other has no priorities");
   }
   check_options(table, options.robot);
   return options;

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <limits>
 #include <memory>
+#include <sstream>
 #include <string>
 
 #include "backend_body.hpp"
@@ -31,6 +32,12 @@ Schema prepared(Schema schema, const BackendOptions& options) {
   if (options.silence < 0) {
     throw InvalidArgument("silence must be 0 (no watchdog) or a number of iterations, got " +
                           std::to_string(options.silence));
+  }
+  if (options.permission < 0400 || options.permission > 0777) {
+    std::ostringstream why;
+    why << "permission must be an octal mode such as 0600, 0640 or 0660, got " << options.permission
+        << " (octal " << std::oct << options.permission << ")";
+    throw InvalidArgument(why.str());
   }
   schema.head.period = options.period;
   schema.head.bursting = options.bursting ? 1 : 0;

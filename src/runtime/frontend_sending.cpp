@@ -47,6 +47,19 @@ void check_pace(const PaceSpec& pace, std::uint32_t rows) {
   }
 }
 
+/// Options that would say nothing, or say two things.
+void check_options(const CommandOptions& options) {
+  const bool goes_on = options.on_limit == OnLimit::go_on;
+  if (goes_on && options.pace.pace != Pace::direct) {
+    throw InvalidArgument(
+        "on_limit 'go_on' is for commands without a pace: leave out the pace, or on_limit");
+  }
+  if (options.profile && (goes_on || options.pace.pace == Pace::fastest)) {
+    throw InvalidArgument(
+        "a command that goes as fast as its limits allow has no profile: leave out profile");
+  }
+}
+
 void check_times(std::span<const std::int64_t> times, std::uint32_t rows) {
   if (times.size() != rows) {
     throw InvalidArgument("a trajectory of " + std::to_string(rows) +
@@ -73,6 +86,7 @@ RecordHead UntypedFrontend::checked_command(std::uint32_t actuator,
                                             std::span<const std::uint64_t> mask) const {
   const std::uint32_t index = check_->actuator(std::int64_t{actuator});
   check_->targets(index, state, mask);
+  check_options(options);
   CommandOptions paced = options;
   if (paced.pace.pace == Pace::direct && paced.on_limit == OnLimit::go_on) paced.pace = fastest();
   check_pace(paced.pace, 1);

@@ -32,6 +32,12 @@ TEST_F(RunOptionsTest, HaveDefaults) {
   EXPECT_EQ(options.backend.permission, 0600U);
 }
 
+TEST_F(RunOptionsTest, APriorityNeedsAPolicyThatHasOne) {
+  EXPECT_THAT(refusal({"--priority", "90"}), HasSubstr("needs --policy fifo or rr"));
+  EXPECT_THAT(refusal({"--policy", "other", "--priority", "90"}), HasSubstr("needs --policy"));
+  EXPECT_EQ(parse({"--priority", "90", "--policy", "rr"}).real_time.priority, 90);
+}
+
 TEST_F(RunOptionsTest, AreReadFromFlags) {
   const RunOptions options = parse({"--segment=left",
                                     "--frequency",

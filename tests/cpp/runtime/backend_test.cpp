@@ -234,6 +234,11 @@ TEST_F(BackendTest, RefusesOptionsThatCannotBe) {
   EXPECT_THAT(message_of<InvalidArgument>(
                   [] { Station({.segment = "pair", .stale = Stale::hold, .silence = 1000}); }),
               HasSubstr("purge, halt or stop"));
+  for (const mode_t wrong : {0U, 0200U, 644U}) {  // the last forgot its leading 0
+    EXPECT_THAT(
+        message_of<InvalidArgument>([&] { Station({.segment = "pair", .permission = wrong}); }),
+        HasSubstr("permission must be an octal mode"));
+  }
   EXPECT_EQ(directory_.files(), 0U);
 }
 

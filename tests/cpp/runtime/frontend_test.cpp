@@ -82,6 +82,22 @@ TEST_F(FrontendTest, TheLastStateOfATrajectoryIsNoDirectValue) {
   EXPECT_THAT(desired(frontend, 1, 3), ElementsAre(1, 2, 0));
 }
 
+TEST_F(FrontendTest, RefusesOptionsThatContradictEachOther) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  const auto refusal = [&](const CommandOptions& options) {
+    return message_of<InvalidArgument>([&] { add(frontend, 0, 1.0, options); });
+  };
+  EXPECT_THAT(refusal({.pace = iterations(5), .on_limit = OnLimit::go_on}),
+              HasSubstr("without a pace"));
+  EXPECT_THAT(refusal({.pace = fastest(), .profile = Profile::linear}),
+              HasSubstr("has no profile"));
+  EXPECT_THAT(refusal({.profile = Profile::linear, .on_limit = OnLimit::go_on}),
+              HasSubstr("has no profile"));
+  EXPECT_EQ(frontend.added(), 0U);
+}
+
 TEST_F(FrontendTest, RefusesATrajectoryWhoseTimesMakeNoSense) {
   Station station;
   station.start();

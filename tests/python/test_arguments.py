@@ -1,0 +1,95 @@
+"""Arguments of the wrong type or range, and options that contradict each other, are refused with a
+sentence that names the argument.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+import o80
+
+
+@pytest.mark.parametrize(
+    ("call", "text"),
+    [
+        (lambda arm: arm.resume(-1), "number of a halt must be at least 1, got -1"),
+        (lambda arm: arm.resume("x"), "number of a halt is a whole number, not 'x'"),
+        (lambda arm: arm.halt(None), "reason of a halt is a text, not None"),
+        (lambda arm: arm.history("x"), "observations, is a whole number, not 'x'"),
+        (lambda arm: arm.history(since="x"), "since is a whole number, not 'x'"),
+        (lambda arm: arm.prepared_burst("x"), "iterations of a burst is a whole number, not 'x'"),
+        (lambda arm: arm.add_trajectory([[0, 0]], times="abc"), "times .* not 'abc'"),
+        (lambda arm: arm.add_command(0, 0.1, mode=None), "mode cannot be None"),
+        (lambda arm: arm.add_command(0, 0.1, start=None), "start cannot be None"),
+        (lambda arm: arm.add_command(0, 0.1, on_limit=None), "on_limit cannot be None"),
+        (lambda arm: arm.add_command(0, 0.1, fastest=1), "fastest is True or False, not 1"),
+        (lambda arm: arm.add_command(True, 0.1), "index or its name, not by True"),
+        (
+            lambda arm: arm.add_command(0, 0.1, on_limit="go_on", duration=1.0),
+            "on_limit .* without a pace",
+        ),
+        (
+            lambda arm: arm.add_command(0, 0.1, fastest=True, profile="linear"),
+            "has no profile",
+        ),
+    ],
+)
+def test_a_frontend_says_which_argument_is_wrong(
+    arm: o80.Frontend, call: Callable[[Any], object], text: str
+) -> None:
+    with pytest.raises(o80.InvalidArgument, match=text):
+        call(arm)
+
+    assert arm.added == 0
+    assert arm.halted is None
+
+
+@pytest.mark.parametrize(
+    ("wrong", "text"),
+    [
+        ({"permission": 644}, r"permission must be an octal mode.*octal 1204"),
+        ({"permission": 0}, "permission must be an octal mode"),
+        ({"permission": "640"}, "permission is a whole number, not '640'"),
+        ({"actuators": -1}, "number of actuators must be at least 0, got -1"),
+        ({"lane_blocks": 1}, "lane_blocks must be at least 16, got 1"),
+        ({"lanes": 0}, "lanes must be at least 1, got 0"),
+        ({"silence": 1.5, "stale": "halt"}, "silence is a whole number, not 1.5"),
+        ({"history": -1}, "history must be at least 1, got -1"),
+        ({"requests": ["home"]}, r"requests is a mapping from names .*, not \['home'\]"),
+        ({"limits": [1.0]}, "limits is a mapping from actuators"),
+    ],
+)
+def test_a_backend_says_which_argument_is_wrong(
+    segment: str, wrong: dict[str, Any], text: str
+) -> None:
+    with pytest.raises(o80.InvalidArgument, match=text):
+        o80.Backend(segment, **{"actuators": ["a"], **wrong})
+
+    assert segment not in [entry.name for entry in o80.segments()]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "text"),
+    [
+        ({"cpus": 3}, r"cpus is a list such as \[2, 3\], not 3"),
+        ({"permission": "640"}, "permission is a whole number, not '640'"),
+        ({"permission": 644}, "permission"),
+        ({"priority": 90}, "--priority needs --policy fifo or rr"),
+    ],
+)
+def test_a_robot_says_which_argument_is_wrong(
+    segment: str, wrong: dict[str, Any], text: str
+) -> None:
+    with pytest.raises(o80.InvalidArgument, match=text):
+        o80.robots.load("two_joints").start(segment, **wrong)
+
+
+def test_a_target_that_gives_no_field_is_refused(segment: str) -> None:
+    fields = {"position": float, "velocity": float}
+    with o80.Backend(segment, ["a"], fields) as backend:
+        backend.publish()
+        with o80.Frontend(segment) as frontend:
+            with pytest.raises(o80.InvalidArgument, match=r"gives no field.*position"):
+                frontend.add_command("a", {})
+            assert frontend.added == 0
