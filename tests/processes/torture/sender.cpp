@@ -67,7 +67,8 @@ void Sender::add_command() {
       break;
   }
   if (chance.percent(20)) options.mode = o80::Mode::overwrite;
-  if (chance.percent(20)) options.profile = o80::Profile::minimum_jerk;
+  const bool has_profile = options.pace.pace != o80::Pace::fastest;
+  if (chance.percent(20) && has_profile) options.profile = o80::Profile::minimum_jerk;
   if (chance.percent(20)) options.start = o80::Start::observed;
   const bool fades = limited || (options.mode == o80::Mode::overwrite &&
                                  options.profile == o80::Profile::minimum_jerk);
