@@ -168,6 +168,15 @@ def test_a_busy_machine_of_a_learner_costs_nothing_that_is_queued(
 # ------------------------------------------------------------------------------ ends of the process
 
 
+@pytest.fixture
+def terminal_that_may_close() -> Iterator[None]:
+    """Also where the tests themselves were started with nohup, which children inherit."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)
+
+
+@pytest.mark.usefixtures("terminal_that_may_close")
 @pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGTERM, signal.SIGINT])
 def test_signals_stop_in_order(segment: str, number: signal.Signals) -> None:
     process = start(segment)
