@@ -2,7 +2,9 @@
 
 #include <sys/stat.h>
 
+#include <filesystem>
 #include <fstream>
+#include <set>
 #include <sstream>
 #include <string>
 
@@ -20,13 +22,34 @@ struct Eight {
   using Actuators = std::array<double, 8>;
 };
 
+/// What the files of a segment take, its own and the commanders'.
+struct Reserved {
+  std::set<ino_t> files;
+  double bytes = 0;
+};
+
+Reserved reserved(const std::string& name) {
+  Reserved sum;
+  const std::filesystem::path own = segment_path(name);
+  for (const auto& entry : std::filesystem::directory_iterator(own.parent_path())) {
+    const std::string each = entry.path().filename();
+    const std::string commanders = own.filename().string() + ".commanders-";
+    if (entry.path() != own && !each.starts_with(commanders)) continue;
+    struct stat file{};
+    stat(entry.path().c_str(), &file);
+    sum.files.insert(file.st_ino);
+    sum.bytes += static_cast<double>(file.st_blocks) * 512;
+  }
+  return sum;
+}
+
 /// What the pages of this process take, those it shares counted in part [B].
 struct Resident {
-  double segment = 0;  // mapped from the given file, however often; 0: from none
+  double segment = 0;  // mapped from the given files, however often; 0: from none
   double rest = 0;
 };
 
-Resident resident(ino_t file) {
+Resident resident(const std::set<ino_t>& files) {
   Resident sum;
   std::ifstream maps("/proc/self/smaps");
   bool ours = false;
@@ -39,7 +62,7 @@ Resident resident(ino_t file) {
       std::string passed;
       ino_t mapped = 0;
       words >> passed >> passed >> passed >> mapped;
-      ours = mapped == file;
+      ours = files.contains(mapped);
     } else if (double kibibytes = 0; word == "Pss:" && words >> kibibytes) {
       (ours ? sum.segment : sum.rest) += kibibytes * 1024;
     }
@@ -49,7 +72,7 @@ Resident resident(ino_t file) {
 
 void measure() {
   const std::string name = segment_name("memory");
-  const auto [anonymous, files] = resident(0);
+  const auto [anonymous, files] = resident({0});
   Backend<Eight> backend({.segment = name, .history = kRows});
   for (std::uint64_t i = 0; i < kRows + 10; ++i) {
     if (i > 0) backend.step();
@@ -65,15 +88,14 @@ void measure() {
   backend.step();
   backend.publish({});
 
-  struct stat file{};
-  stat(segment_path(name).c_str(), &file);
+  const Reserved both = reserved(name);
   const BackendOptions defaults;
   const double rows = static_cast<double>(kRows) * frontend.layout().size;
   const double lanes =
       static_cast<double>(std::uint64_t{defaults.lanes} * defaults.lane_blocks * kBlockBytes);
   sample("payload", "MB", (rows + lanes) / kMegabyte);
-  sample("reserved", "MB", static_cast<double>(file.st_blocks) * 512 / kMegabyte);
-  const Resident after = resident(file.st_ino);
+  sample("reserved", "MB", both.bytes / kMegabyte);
+  const Resident after = resident(both.files);
   sample("resident", "MB", after.segment / kMegabyte);
   // beside the segment: the pool in which queued commands lie, as large as the lanes, and the rest
   sample("private", "MB", (after.rest - anonymous - files) / kMegabyte);
