@@ -65,7 +65,10 @@ void UntypedFrontend::wait_for_rest(std::uint64_t number, const Deadline& deadli
                                     const Check& check) {
   link_->check_usable();
   if (bursting()) return;
+  // rows may come faster than a wait for one of them looks around
+  const Check goes_on = link_->guarded(check);
   while (true) {
+    const bool is_called_off = !goes_on();
     const std::optional<Halt> acting = link_->halt();
     if (!acting || acting->number != number) return;
     const bool is_latched = acting->iteration >= 0;
@@ -75,7 +78,7 @@ void UntypedFrontend::wait_for_rest(std::uint64_t number, const Deadline& deadli
       if (!row.any_braking()) return;
       next = row.iteration() + 1;
     }
-    if (link_->rows.wait_for_row(next, deadline, link_->guarded(check)) == Waited::timed_out) {
+    if (is_called_off || link_->rows.wait_for_row(next, deadline, goes_on) == Waited::timed_out) {
       throw TimeoutError("halt " + std::to_string(number) + " of '" + segment() + "' " +
                          (is_latched ? "still brakes the robot" : "does not act yet") +
                          ": give resume more time");

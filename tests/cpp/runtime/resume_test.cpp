@@ -155,6 +155,28 @@ TEST_F(ResumeTest, OfAFrontendWaitsUntilTheRobotRests) {
   EXPECT_GE(k, 30) << "it takes ten iterations to rest";
 }
 
+TEST_F(ResumeTest, OfAFrontendCanBeCalledOffHoweverFastRowsCome) {
+  Station station({.segment = "pair"}, limit_shoulder);
+  station.start();
+  UntypedFrontend frontend("pair");
+  send(frontend, 0, 1e6, {.pace = speed(100.0), .profile = Profile::linear});
+  station.run(20);
+  const std::uint64_t number = frontend.halt("");
+  std::atomic<bool> over{false};
+  std::thread loop([&] {
+    while (!over) {
+      station.iterate();
+      std::this_thread::yield();
+    }
+  });
+  const std::string refused = message_of<Error>(
+      [&] { frontend.resume(number, kPatience, []() -> bool { throw Error("Ctrl-C"); }); });
+  over = true;
+  loop.join();
+  EXPECT_EQ(refused, "Ctrl-C");
+  EXPECT_TRUE(frontend.halted());
+}
+
 TEST_F(ResumeTest, OfAFrontendSaysWhatItWaitsFor) {
   Station station({.segment = "pair"}, limit_shoulder);
   station.start();
