@@ -124,6 +124,7 @@ bool Loop::read() noexcept {
   view.time = backend_.time();
   if (!calls(Verb::read, [&] { return robot_->read(view); })) return failed("read");
   finished_ = finished_ || view.finished != 0;
+  if (paced_ && view.missed != 0) backend_.set_timing(pacer_.missed());
   note_halt(view);
   for (std::uint32_t word = 0; word < interrupted_.size(); ++word) {
     for (std::uint64_t bits = interrupted_[word]; bits != 0; bits &= bits - 1) {

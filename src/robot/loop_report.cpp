@@ -36,7 +36,8 @@ std::optional<std::string> OverrunReport::look(const RowHead& row, std::int64_t 
   said_at_ = now;
   const RowHead before = std::exchange(last_, row);
   return std::to_string(row.overruns - before.overruns) + " of the last " +
-         std::to_string(row.iteration - before.iteration) + " iterations were late, " +
+         std::to_string(row.iteration - before.iteration) +
+         " iterations were late or missed their tick, " +
          std::to_string(row.skipped - before.skipped) +
          " periods were left out: see docs/real_time.md, or lower --frequency";
 }

@@ -5,8 +5,8 @@
 namespace o80 {
 
 bool Pacer::in_time(std::int64_t now) noexcept {
-  overrun_ = now > due_;
-  if (overrun_) ++timing_.overruns;
+  overrun_ = false;
+  if (now > due_) count_overrun();
   return !overrun_;
 }
 
@@ -17,7 +17,7 @@ const Timing& Pacer::next(std::int64_t now) noexcept {
     const std::int64_t missed = (now - due_) / period_ + 1;
     timing_.skipped += static_cast<std::uint32_t>(missed);
     due_ += missed * period_;
-    if (!overrun_) ++timing_.overruns;
+    count_overrun();
   }
   return timing_;
 }
@@ -28,7 +28,7 @@ const Timing& Pacer::tick(std::int64_t now) noexcept {
   if (timing_.lateness > 0) {
     const auto missed = static_cast<std::uint32_t>((timing_.lateness + period_ / 2) / period_);
     timing_.skipped += missed;
-    if (missed > 0 && !overrun_) ++timing_.overruns;
+    if (missed > 0) count_overrun();
   }
   // late ticks take back what early ones gained
   ahead_ -= timing_.lateness + period_ / kClockTolerance;
@@ -41,6 +41,16 @@ const Timing& Pacer::tick(std::int64_t now) noexcept {
   }
   due_ = now + period_;
   return timing_;
+}
+
+const Timing& Pacer::missed() noexcept {
+  count_overrun();
+  return timing_;
+}
+
+void Pacer::count_overrun() noexcept {
+  if (!overrun_) ++timing_.overruns;
+  overrun_ = true;
 }
 
 bool sleep_until(std::int64_t due) noexcept {

@@ -83,7 +83,8 @@ void UntypedBackend::Body::set_timing(const Timing& now) noexcept {
   timing = now;
   if (late == 0 || !overruns_.exceeded(monotonic_now())) return;
   ShortText<120> text;
-  text.add(overruns_.most()).add(" iterations within a second were late: --max-overruns");
+  text.add(overruns_.most())
+      .add(" iterations within a second were late or missed their tick: --max-overruns");
   ask_to_halt(HaltCause::overruns, text.view());
 }
 

@@ -102,6 +102,9 @@ class Reading {
     view_.halt_text.text[size] = 0;
     view_.halted = 1;
   }
+  /// This tick of the robot brought no reading (a packet was lost): the last one stays, and the
+  /// iteration counts as an overrun. Nothing in bursting.
+  void missed() { view_.missed = 1; }
   /// The robot is done: the loop ends in order after this row.
   void finish() { view_.finished = 1; }
   /// The commands of this actuator end as interrupted, in this iteration.

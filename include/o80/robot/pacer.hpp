@@ -27,6 +27,9 @@ class Pacer {
   const Timing& next(std::int64_t now) noexcept;
   /// The period is over because the robot ticked: the next one is measured from here.
   const Timing& tick(std::int64_t now) noexcept;
+  /// The tick of the period that has just ended brought no reading: an overrun, unless the period
+  /// counted as one already.
+  const Timing& missed() noexcept;
   /// Ticks have come so much faster than the period says that no limit of a speed holds any more.
   bool runs_ahead() const noexcept { return ahead_ > kMostPeriodsAhead * period_; }
   /// The ticks that came too fast, since they last came in time.
@@ -41,6 +44,9 @@ class Pacer {
   static constexpr std::int64_t kMostPeriodsAhead = 10;
   /// The robot's clock may be faster than this one by one part in so many, for ever.
   static constexpr std::int64_t kClockTolerance = 50;
+
+  /// Once a period.
+  void count_overrun() noexcept;
 
   std::int64_t period_;
   std::int64_t due_ = 0;

@@ -11,7 +11,7 @@
 
 namespace o80 {
 
-inline constexpr std::uint32_t kRobotTableVersion = 3;
+inline constexpr std::uint32_t kRobotTableVersion = 4;
 
 /// Why a call failed.
 struct FaultText {
@@ -67,6 +67,7 @@ struct ReadingView {
   std::int64_t time;          // [ns]
   std::uint32_t finished;     // set it to end the loop in order
   std::uint32_t has_desired;  // set it if `desired` was filled
+  std::uint32_t missed;       // set it if this tick of the robot brought no reading
   std::uint32_t halted;       // set it to halt the backend
   FaultText halt_text;        // and say why
 };

@@ -70,8 +70,36 @@ TEST(Pacer, FollowsARobotThatTicksByItsOwnClock) {
     ASSERT_EQ(pacer.due(), now + 100);
   }
   now += 303;  // two ticks were lost
+  EXPECT_TRUE(pacer.in_time(now - 250));
   EXPECT_EQ(pacer.tick(now).skipped, 2U);
-  EXPECT_EQ(pacer.tick(now + 60).skipped, 2U) << "an early tick is no harm";
+  EXPECT_EQ(pacer.tick(now).overruns, 1U) << "one iteration was late, however many ticks were lost";
+  EXPECT_TRUE(pacer.in_time(now));
+  const Timing early = pacer.tick(now + 60);
+  EXPECT_EQ(early.skipped, 2U) << "an early tick is no harm";
+  EXPECT_EQ(early.overruns, 1U);
+}
+
+TEST(Pacer, CountsATickWithoutAReadingAsAnOverrunAndSkipsNothing) {
+  Pacer pacer(100);
+  pacer.begin(0);
+  EXPECT_TRUE(pacer.in_time(50));
+  pacer.tick(120);
+  const Timing timing = pacer.missed();
+  EXPECT_EQ(timing.overruns, 1U);
+  EXPECT_EQ(timing.skipped, 0U) << "the iteration was there, its reading was not";
+  EXPECT_EQ(pacer.missed().overruns, 1U) << "an iteration counts once";
+  EXPECT_TRUE(pacer.in_time(200));
+  pacer.tick(220);
+  EXPECT_EQ(pacer.missed().overruns, 2U);
+}
+
+TEST(Pacer, CountsAnIterationThatIsLateAndHasNoReadingOnce) {
+  Pacer pacer(100);
+  pacer.begin(0);
+  EXPECT_FALSE(pacer.in_time(130));
+  pacer.tick(330);
+  EXPECT_EQ(pacer.missed().overruns, 1U);
+  EXPECT_EQ(pacer.missed().skipped, 2U);
 }
 
 TEST(Pacer, CountsHowFarARobotThatTicksRunsAheadOfTheClock) {
