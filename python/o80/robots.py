@@ -123,7 +123,7 @@ class Robot:
         self,
         segment: str | None = None,
         *,
-        frequency: float = 1000.0,
+        frequency: float | None = None,
         bursting: bool = False,
         history: int | None = None,
         lanes: int | None = None,
@@ -143,7 +143,8 @@ class Robot:
         """Starts it as a process of its own, which ends when this one does.
 
         segment: the name to attach to (None: the robot's).
-        frequency: iterations a second [1/s]; bursting, of simulated time.
+        frequency: iterations a second [1/s]; bursting, of simulated time. None: the robot's own
+            (a simulator's model says it), or 1000.
         bursting: stands still until a frontend asks for iterations.
         history: observations kept (None: as many as 16 MiB hold, 100000 at most).
         lanes, lane_blocks: frontends that may command at once, and blocks of 64 bytes that each
@@ -192,27 +193,27 @@ class Robot:
         self,
         segment: str | None = None,
         *,
-        frequency: float = 1000.0,
+        frequency: float | None = None,
         history: int | None = None,
         **config: Any,
     ) -> Frontend:
         """Starts it inside this process: bursts of the frontend run in the thread that asks.
 
         segment: a name for others to attach to (None: an unused one).
-        frequency: iterations a second of simulated time [1/s].
+        frequency: iterations a second of simulated time [1/s]; None: the robot's own, or 1000.
         history: observations kept (None: as many as 16 MiB hold, 100000 at most).
         config: its own options, see `options`.
 
         Closing the frontend stops the robot. Raises DriverError, SegmentTaken, InvalidArgument.
         """
-        if not (math.isfinite(frequency) and frequency > 0):
-            raise InvalidArgument(f"a frequency of {frequency} cannot be: it is above 0 [1/s]")
+        if frequency is not None and not (math.isfinite(frequency) and frequency > 0):
+            raise InvalidArgument(f"frequency must be positive, got {frequency} [1/s]")
         if history is not None and history < 1:
             raise InvalidArgument(f"a history of {history} observations: at least 1 is needed")
         name = segment or _core.unused_segment_name(self.name)
         try:
             attachment = self._library.start_inline(
-                name, round(1e9 / frequency), history or 0, self._config(config)
+                name, round(1e9 / frequency) if frequency else 0, history or 0, self._config(config)
             )
         except Exception:
             if segment is None:

@@ -22,7 +22,7 @@ struct Config {
   JointMode mode = JointMode::imposed;
   std::string balls;
   std::uint32_t extra_balls = 0;
-  std::uint32_t steps = 1;
+  std::uint32_t steps = 0;
   double timestep = 0;
   std::string keyframe;
   std::uint32_t slots = 8;
@@ -48,7 +48,7 @@ O80_DESCRIBE(Config, (model, "MJCF file"),
               "imposed: joints are put where they are asked to be; control: the model's actuators"),
              (balls, "free bodies: imposed while commanded, else in free flight"),
              (extra_balls, "copies of the first ball to add, named <ball>_1 and on"),
-             (steps, "of the simulator in an iteration"),
+             (steps, "of the simulator in an iteration; 0: as many as its period holds"),
              (timestep, "of the simulator; 0: as the model says [s]"),
              (keyframe, "of the model to start from; empty: none"), (slots, "for snapshots"),
              (racket, "geom (ellipsoid: an elliptic blade) that balls bounce on; empty: none"),

@@ -6,6 +6,9 @@
 namespace o80::mujoco {
 namespace {
 
+/// Share of a period: what rounding takes from a printed frequency.
+constexpr double kPeriodTolerance = 1e-5;
+
 FieldRow structure(std::string_view name, std::uint32_t type, std::size_t count,
                    std::string_view text) {
   FieldRow field = scalar_field(name, Kind::structure, text, static_cast<std::uint32_t>(count));
@@ -96,23 +99,50 @@ MujocoDriver::Places MujocoDriver::add_to(Schema& schema) const {
   return at;
 }
 
-void MujocoDriver::check_period(const Desired<MujocoDriver>& desired) {
-  if (std::abs(desired.period() - simulation_.period()) > 0.5e-9) {
-    char text[400];
-    const double step = simulation_.period() / steps_;
+// the iteration lasts a whole number of steps, as many as were asked for
+void MujocoDriver::describe(Schema& schema) const {
+  (void)add_to(schema);
+  const std::int64_t asked = schema.asked_period();
+  const double step = simulation_.timestep() * 1e9;
+  const std::uint32_t steps = asked == 0 ? std::max(1U, steps_) : steps_in(asked);
+  schema.period(std::llround(steps * step));
+}
+
+std::uint32_t MujocoDriver::steps_in(std::int64_t period) const {
+  const double step = simulation_.timestep() * 1e9;
+  const auto asked = static_cast<double>(period);
+  const double steps = steps_ > 0 ? steps_ : std::max(1.0, std::round(asked / step));
+  if (std::abs(steps * step - asked) <= kPeriodTolerance * asked)
+    return static_cast<std::uint32_t>(steps);
+
+  char text[400];
+  if (steps_ > 0) {
     std::snprintf(text, sizeof text,
-                  "%u step(s) of %g s make %g s, but the loop's period is %g s. Run it at "
-                  "--frequency %g, or give the simulator steps=%.0f or timestep=%g",
-                  steps_, step, simulation_.period(), desired.period(), 1 / simulation_.period(),
-                  std::max(1.0, std::round(desired.period() / step)), desired.period() / steps_);
-    throw DriverError(text);
+                  "%u steps of %g ms make iterations of %g ms, not of %g ms (%g Hz). Ask for "
+                  "%g Hz, or leave out either the frequency or steps",
+                  steps_, step * 1e-6, steps * step * 1e-6, asked * 1e-6, 1e9 / asked,
+                  1e9 / (steps * step));
+  } else {
+    const double fewer = std::floor(asked / step);
+    const double more = fewer + 1;
+    char slower[40] = "";
+    if (fewer > 0) std::snprintf(slower, sizeof slower, " or %g", 1e9 / (more * step));
+    std::snprintf(
+        text, sizeof text,
+        "%g Hz (iterations of %g ms) is not a whole number of the model's steps of %g ms. "
+        "Ask for %g%s Hz, leave the frequency out (%g Hz), or give timestep=%.9g [s]",
+        1e9 / asked, asked * 1e-6, step * 1e-6, 1e9 / (std::max(1.0, fewer) * step), slower,
+        1e9 / step, asked / more * 1e-9);
   }
-  period_checked_ = true;
+  throw DriverError(text);
 }
 
 // desired => targets => one iteration
 void MujocoDriver::write(const Desired<MujocoDriver>& desired) {
-  if (!period_checked_) check_period(desired);
+  if (!steps_known_) {
+    simulation_.steps(steps_in(std::llround(desired.period() * 1e9)));
+    steps_known_ = true;
+  }
   Targets& targets = simulation_.targets();
   for (std::size_t i = 0; i < places_.joints.size(); ++i) {
     targets.joints[i] = desired.at(places_.joints[i]);

@@ -27,7 +27,7 @@ class MujocoDriver {
   /// Throws DriverError.
   explicit MujocoDriver(const Config& config);
 
-  void describe(Schema& schema) const { (void)add_to(schema); }
+  void describe(Schema& schema) const;
   void start() {}
   void write(const Desired<MujocoDriver>& desired);
   void read(Reading<MujocoDriver>& reading);
@@ -57,14 +57,15 @@ class MujocoDriver {
     std::uint32_t first_ball = 0;  // actuator
   };
   Places add_to(Schema& schema) const;
-  void check_period(const Desired<MujocoDriver>& desired);
+  /// Throws DriverError if no whole number of steps lasts so long [ns].
+  std::uint32_t steps_in(std::int64_t period) const;
   void go_on_from_targets(Reading<MujocoDriver>& reading);
   Served no_such_slot() const noexcept;
 
   Simulation simulation_;
-  std::uint32_t steps_;
+  std::uint32_t steps_;  // 0: as many as the period holds
   Places places_;
-  bool period_checked_ = false;
+  bool steps_known_ = false;
 };
 
 }  // namespace o80::mujoco

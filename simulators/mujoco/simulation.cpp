@@ -31,7 +31,7 @@ bool was_put(const Pose& from, const Pose& to, double step, double jump) noexcep
 }  // namespace
 
 Simulation::Simulation(const Config& config) : config_(config), model_(config) {
-  if (config.steps == 0) throw DriverError("steps is 0: an iteration has at least one step");
+  config_.steps = std::max(1U, config.steps);
   data_.reset(mj_makeData(model_.model.get()));
   if (!data_) throw DriverError("there is no memory for the model's data");
   const mjtNum* gravity = model_.model->opt.gravity;

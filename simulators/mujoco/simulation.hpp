@@ -47,8 +47,12 @@ class Simulation {
   explicit Simulation(const Config& config);
 
   const Model& model() const noexcept { return model_; }
+  /// Of the engine [s].
+  double timestep() const noexcept { return model_.model->opt.timestep; }
   /// Length of an iteration [s].
-  double period() const noexcept { return model_.model->opt.timestep * config_.steps; }
+  double period() const noexcept { return timestep() * config_.steps; }
+  /// Of the engine in an iteration, at least 1.
+  void steps(std::uint32_t count) noexcept { config_.steps = count; }
   /// What `advance` strives for; written before it.
   Targets& targets() noexcept { return now_.targets; }
 

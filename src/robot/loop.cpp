@@ -16,8 +16,8 @@ constexpr std::int64_t kLongestBraking = 1'000'000'000;  // [ns]
 
 Loop::Loop(std::unique_ptr<Robot> robot, const BackendOptions& options)
     : robot_(std::move(robot)),
-      backend_(robot_->describe(), options, this),
-      pacer_(options.period),
+      backend_(robot_->describe(options.period), options, this),
+      pacer_(backend_.schema().head.period),
       paced_(!options.bursting),
       interrupted_(backend_.layout().mask_words + 1) {
   fault_.reserve(1024);

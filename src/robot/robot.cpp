@@ -60,7 +60,7 @@ Robot::~Robot() {
   table_.destroy(driver_);
 }
 
-Schema Robot::describe() const {
+Schema Robot::describe(std::int64_t period) const {
   Schema schema;
   FaultText fault{};
   const auto copy = [](void* context, const SchemaRows* rows) {
@@ -77,7 +77,7 @@ Schema Robot::describe() const {
     out.requests.assign(rows->requests, rows->requests + rows->request_count);
     out.defaults.assign(rows->defaults, rows->defaults + rows->default_count);
   };
-  if (table_.describe(driver_, &schema, copy, &fault) != 0) {
+  if (table_.describe(driver_, period, &schema, copy, &fault) != 0) {
     throw DriverError("robot '" + std::string(table_.name) +
                       "' cannot be described: " + fault.text);
   }

@@ -18,7 +18,7 @@ namespace {
 
 constexpr RunFlag kFlags[] = {
     {"segment", "NAME", "name that frontends attach to (default: the robot's)"},
-    {"frequency", "HZ", "iterations a second (default: 1000)"},
+    {"frequency", "HZ", "iterations a second (default: the robot's own, or 1000)"},
     {"bursting", nullptr, "stand still until a frontend asks for iterations"},
     {"history", "ROWS", "rows kept (default: as many as 16 MiB hold, at most 100000)"},
     {"lanes", "N", "frontends that may command at once (default: 8)"},

@@ -1,6 +1,7 @@
 #include "o80/runtime/backend.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 #include <cstring>
 #include <limits>
 #include <memory>
@@ -18,13 +19,36 @@ namespace {
 
 constexpr std::uint64_t kDefaultHistoryBytes = 16U << 20;
 constexpr std::uint64_t kDefaultHistoryRows = 100'000;
+constexpr std::int64_t kDefaultPeriod = 1'000'000;  // [ns]
+constexpr std::int64_t kPeriodRounding = 100'000;
 constexpr std::int64_t kForEver = std::numeric_limits<std::int64_t>::max();
 
-Schema prepared(Schema schema, const BackendOptions& options) {
-  if (options.period <= 0) {
-    throw InvalidArgument("the period is " + std::to_string(options.period) +
-                          " ns: it must be above 0");
+std::string rate_text(std::int64_t period) {
+  std::ostringstream text;
+  text << 1e9 / static_cast<double>(period) << " Hz (" << static_cast<double>(period) * 1e-6
+       << " ms)";
+  return text.str();
+}
+
+/// The period that was asked for, the robot's own, or 1 ms.
+std::int64_t period_of(const Schema& schema, const BackendOptions& options) {
+  const std::int64_t own = schema.head.period;
+  if (options.period < 0) {
+    throw InvalidArgument("the period must be positive, got " + std::to_string(options.period) +
+                          " ns");
   }
+  // a printed frequency is rounded: 166.667 Hz are meant to be 6 ms
+  const bool same = std::abs(options.period - own) * kPeriodRounding <= own;
+  if (options.period > 0 && own > 0 && !same) {
+    throw InvalidArgument("robot '" + std::string(schema.head.robot.view()) + "' runs at " +
+                          rate_text(own) + ", not at " + rate_text(options.period) +
+                          ": leave the frequency out, or ask for its own");
+  }
+  if (own > 0) return own;
+  return options.period > 0 ? options.period : kDefaultPeriod;
+}
+
+Schema prepared(Schema schema, const BackendOptions& options) {
   if (options.silence > 0 && options.stale == Stale::hold) {
     throw InvalidArgument(
         "the watchdog (silence) needs a policy: set stale to purge, halt or stop, not to hold");
@@ -39,7 +63,7 @@ Schema prepared(Schema schema, const BackendOptions& options) {
         << " (octal " << std::oct << options.permission << ")";
     throw InvalidArgument(why.str());
   }
-  schema.head.period = options.period;
+  schema.head.period = period_of(schema, options);
   schema.head.bursting = options.bursting ? 1 : 0;
   schema.head.clock = options.bursting ? Clock::simulated : Clock::monotonic;
   schema.head.stale = options.stale;

@@ -20,6 +20,13 @@ SAYS = {
     "embedded_simulation": ["iteration 300"],
     "history": ["1000 rows, observed is an array of shape (1000, 2)"],
     "mirroring": ["asked for exactly what was seen: True"],
+    "mujoco_control": [
+        "500 Hz, as the model says; actuators: push",
+        "after 2 s the pole stands: True",
+        "100 Hz: five steps of the model in each iteration",
+    ],
+    "mujoco_imposed": ["met the paddle at iteration", "rose again at"],
+    "mujoco_pictures": ["5 pictures of shape (240, 320, 3)", "they differ: True"],
     "paces": [
         "in 0.25 s:            250",
         "at 10 rad/s:          100",

@@ -77,6 +77,10 @@ class Schema {
   std::vector<const void*> keys;    // one for each type: of which C++ type it came, or null
 
   // a driver's describe()
+  /// The period that the user asks for [ns]; 0 if none was asked for.
+  std::int64_t asked_period() const { return head.period; }
+  /// The period that this robot runs at [ns]. Without this call it runs at any.
+  void period(std::int64_t own) { head.period = own; }
   ActuatorDescription actuator(std::uint32_t index);
   ActuatorDescription actuator(std::string_view name);
 

@@ -45,8 +45,9 @@ Result guarded(FaultText* fault, Result failed, Call&& call) noexcept {
 }
 
 template <Driver D>
-void describe_driver(const D& driver, const char* name, Schema& schema) {
+void describe_driver(const D& driver, const char* name, std::int64_t period, Schema& schema) {
   schema.head.robot = NameText(name);
+  schema.head.period = period;
   describe_types<D>(schema);
   if constexpr (requires { driver.describe(schema); }) driver.describe(schema);
   schema.head.block = round_up(schema.head.block, 8);
@@ -111,11 +112,11 @@ const RobotTable* robot_table(const char* name, const char* versions = "") {
       return driving::guarded<void*>(
           fault, nullptr, [&]() -> void* { return new D(driving::config_of<D>(values, count)); });
     };
-    t.describe = [](void* robot, void* context, void (*rows)(void*, const SchemaRows*),
-                    FaultText* fault) {
+    t.describe = [](void* robot, std::int64_t period, void* context,
+                    void (*rows)(void*, const SchemaRows*), FaultText* fault) {
       return driving::guarded<int>(fault, 1, [&] {
         Schema schema;
-        driving::describe_driver(*static_cast<const D*>(robot), robot_name, schema);
+        driving::describe_driver(*static_cast<const D*>(robot), robot_name, period, schema);
         const auto count = [](const auto& rows_of) {
           return static_cast<std::uint32_t>(rows_of.size());
         };

@@ -36,8 +36,8 @@ class Robot {
   ~Robot();
 
   const RobotTable& table() const { return table_; }
-  /// Throws DriverError.
-  Schema describe() const;
+  /// `period`: that the user asks for [ns]; 0 if none was asked for. Throws DriverError.
+  Schema describe(std::int64_t period = 0) const;
 
   // the driver's verbs; false: `fault()` says why
   bool start() noexcept;

@@ -88,8 +88,9 @@ struct RobotTable {
   /// Whether a robot can be created with these options: their names and texts are known.
   int (*accepts)(const OptionValue* values, std::uint32_t count, FaultText* fault);
   void* (*create)(const OptionValue* values, std::uint32_t count, FaultText* fault);
-  int (*describe)(void* robot, void* context, void (*rows)(void* context, const SchemaRows* rows),
-                  FaultText* fault);
+  /// `period`: that the user asks for [ns]; 0 if none was asked for.
+  int (*describe)(void* robot, std::int64_t period, void* context,
+                  void (*rows)(void* context, const SchemaRows* rows), FaultText* fault);
   int (*start)(void* robot, FaultText* fault);
   int (*wait)(void* robot, std::int64_t due, FaultText* fault);
   int (*write)(void* robot, const DesiredView* desired, FaultText* fault);

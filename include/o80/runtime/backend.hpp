@@ -21,7 +21,7 @@ namespace o80 {
 /// Everything about a backend that is not its robot.
 struct BackendOptions {
   std::string segment;
-  std::int64_t period = 1'000'000;    // [ns]
+  std::int64_t period = 0;            // [ns]; 0: the robot's own, or 1 ms
   bool bursting = false;              // stands still until a frontend asks for iterations
   std::uint64_t history = 0;          // rows kept; 0: as many as 16 MiB hold, 1e5 at most
   std::uint32_t lanes = 8;            // frontends that may command at once

@@ -28,6 +28,23 @@ using testing::HasSubstr;
 using testing::Pointwise;
 using testing::ThrowsMessage;
 
+constexpr const char* kPendulum = R"(
+<mujoco>
+  <worldbody>
+    <body>
+      <joint name="hinge" type="hinge" axis="0 1 0" damping="0.1"/>
+      <geom name="bob" type="capsule" fromto="0 0 0 0 0 -0.5" size="0.02"/>
+    </body>
+    <body name="box" pos="2 0 0.11"><freejoint/><geom type="box" size="0.1 0.1 0.1"/></body>
+    <geom type="plane" size="5 5 1" pos="0 0 0"/>
+  </worldbody>
+  <actuator><motor name="motor" joint="hinge" ctrlrange="-2 2" ctrllimited="true"/></actuator>
+  <sensor>
+    <jointpos name="angle" joint="hinge"/>
+    <framepos name="box_position" objtype="body" objname="box"/>
+  </sensor>
+</mujoco>)";
+
 TEST_F(MujocoDriverTest, NamesJointsAndBallsAsTheModelDoes) {
   Inline twin(table_tennis({{"extra_balls", "2"}}));
 
@@ -162,12 +179,60 @@ TEST_F(MujocoDriverTest, StepsOfTheSimulatorShareAnIteration) {
   EXPECT_THAT(records[0].position, Pointwise(DoubleNear(1e-8), records[1].position));
 }
 
-TEST_F(MujocoDriverTest, RefusesALoopOfAnotherPeriodAndSaysWhatToDo) {
-  Inline twin(table_tennis(), 10'000'000);
+TEST_F(MujocoDriverTest, RunsAtThePeriodOfTheModelIfNoOtherIsAskedFor) {
+  EXPECT_EQ(Inline(table_tennis(), 0).frontend.period(), 2'000'000);
+  EXPECT_EQ(Inline(table_tennis({{"steps", "5"}}), 0).frontend.period(), 10'000'000);
+  EXPECT_EQ(Inline(table_tennis({{"timestep", "0.0005"}}), 0).frontend.period(), 500'000);
+  // a timestep need not be a whole number of nanoseconds
+  Inline odd(table_tennis({{"timestep", "0.00033333333333"}}), 0);
+  EXPECT_EQ(odd.frontend.period(), 333'333);
+  odd.burst(3);
+}
 
-  EXPECT_THAT([&] { twin.burst(1); },
-              ThrowsMessage<Error>(AllOf(HasSubstr("--frequency 500"), HasSubstr("steps=5"),
-                                         HasSubstr("timestep=0.01"))));
+TEST_F(MujocoDriverTest, TakesAsManyStepsAsThePeriodHolds) {
+  Inline one_by_one({{"model", file("pendulum.xml", kPendulum)}, {"mode", "control"}}, 2'000'000);
+  Inline by_five({{"model", file("pendulum.xml", kPendulum)}, {"mode", "control"}}, 10'000'000);
+  for (Inline* robot : {&one_by_one, &by_five}) robot->ask("motor", 1.5);
+  const Seen single = one_by_one.burst(200);
+  const Seen five = by_five.burst(40);
+
+  EXPECT_EQ(single.extended<JointState>("joints").position,
+            five.extended<JointState>("joints").position);
+}
+
+TEST_F(MujocoDriverTest, RefusesAPeriodOfNoWholeNumberOfStepsBeforeItStarts) {
+  const auto start = [](std::int64_t period, const OptionValues& more) {
+    return [=] { Inline twin(table_tennis(more), period); };
+  };
+  EXPECT_THAT(start(1'000'000, {}),
+              ThrowsMessage<Error>(AllOf(HasSubstr("1000 Hz (iterations of 1 ms)"),
+                                         HasSubstr("steps of 2 ms"), HasSubstr("Ask for 500 Hz"),
+                                         HasSubstr("timestep=0.001 [s]"))));
+  EXPECT_THAT(start(5'000'000, {}), ThrowsMessage<Error>(AllOf(
+                                        HasSubstr("200 Hz"), HasSubstr("Ask for 250 or 166.667 Hz"),
+                                        HasSubstr("timestep=0.00166666667"))));
+  EXPECT_THAT(start(2'000'000, {{"steps", "5"}}),
+              ThrowsMessage<Error>(AllOf(HasSubstr("5 steps of 2 ms make iterations of 10 ms"),
+                                         HasSubstr("Ask for 100 Hz"))));
+}
+
+TEST_F(MujocoDriverTest, TheAdviceAboutThePeriodWorks) {
+  for (const std::int64_t period : {1'000'000, 5'000'000, 3'333'333, 7'000'001, 400'000}) {
+    std::string text;
+    try {
+      Inline twin(table_tennis(), period);
+    } catch (const Error& error) {
+      text = error.what();
+    }
+    const std::size_t at = text.find("timestep=");
+    ASSERT_NE(at, std::string::npos) << period << ": " << text;
+    const std::string advised = text.substr(at + 9, text.find(' ', at) - at - 9);
+    Inline twin(table_tennis({{"timestep", advised}}), period);
+    EXPECT_NO_THROW(twin.burst(2)) << text;
+    const double rate = std::stod(text.substr(text.find("Ask for ") + 8));
+    Inline slower(table_tennis(), std::llround(1e9 / rate));
+    EXPECT_NO_THROW(slower.burst(2)) << text;
+  }
 }
 
 TEST_F(MujocoDriverTest, AnswersWrongNamesWithTheRightOnes) {
@@ -181,23 +246,6 @@ TEST_F(MujocoDriverTest, AnswersWrongNamesWithTheRightOnes) {
   EXPECT_THAT(start({{"model", "nowhere.xml"}}), ThrowsMessage<Error>(HasSubstr("nowhere.xml")));
   EXPECT_THAT(start({}), ThrowsMessage<Error>(HasSubstr("model=PATH")));
 }
-
-constexpr const char* kPendulum = R"(
-<mujoco>
-  <worldbody>
-    <body>
-      <joint name="hinge" type="hinge" axis="0 1 0" damping="0.1"/>
-      <geom name="bob" type="capsule" fromto="0 0 0 0 0 -0.5" size="0.02"/>
-    </body>
-    <body name="box" pos="2 0 0.11"><freejoint/><geom type="box" size="0.1 0.1 0.1"/></body>
-    <geom type="plane" size="5 5 1" pos="0 0 0"/>
-  </worldbody>
-  <actuator><motor name="motor" joint="hinge" ctrlrange="-2 2" ctrllimited="true"/></actuator>
-  <sensor>
-    <jointpos name="angle" joint="hinge"/>
-    <framepos name="box_position" objtype="body" objname="box"/>
-  </sensor>
-</mujoco>)";
 
 TEST_F(MujocoDriverTest, AnyModelRunsWithItsJointsImposedAndTheRestAsPhysicsSays) {
   Inline twin({{"model", file("pendulum.xml", kPendulum)}});

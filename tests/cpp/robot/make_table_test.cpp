@@ -2,6 +2,7 @@
 
 #include "o80/robot/loop.hpp"
 #include "o80/robot/robot.hpp"
+#include "robot/inline_simulation.hpp"
 #include "robot/puppet.hpp"
 
 namespace o80::test {
@@ -58,7 +59,16 @@ struct Model {
 };
 O80_DESCRIBE(Model::Config, joints);
 
-static_assert(Driver<Puppet> && Driver<Sensor> && Driver<Model>);
+/// A driver of hardware that ticks at a fixed rate.
+struct Ticking : Sensor {
+  static constexpr std::int64_t kPeriod = 2'500'000;  // [ns]
+  using Sensor::Sensor;
+  void describe(Schema& schema) const { schema.period(kPeriod); }
+  void write(const Desired<Ticking>& desired) { iteration = desired.iteration(); }
+  void read(Reading<Ticking>& reading) { reading.extended.temperature = 20; }
+};
+
+static_assert(Driver<Ticking> && Driver<Puppet> && Driver<Sensor> && Driver<Model>);
 
 TEST_F(MakeTableTest, ListsTheOptionsOfTheConfig) {
   const std::vector<Option> options = options_of(table());
@@ -74,6 +84,25 @@ TEST_F(MakeTableTest, DescribesTheDriverAcrossTheTable) {
   EXPECT_EQ(schema.head.robot.view(), "puppet");
   EXPECT_EQ(schema.actuators[1].name.view(), "right");
   EXPECT_EQ(schema.requests[0].name.view(), "poke");
+}
+
+TEST_F(MakeTableTest, ARobotWithAPeriodOfItsOwnRunsAtItOrIsNotStarted) {
+  const auto period_of = [](std::int64_t asked) {
+    return InlineSimulation("ticking", *robot_table<Ticking>("ticking"), {}, asked)
+        .frontend.period();
+  };
+  EXPECT_EQ(period_of(0), Ticking::kPeriod);
+  EXPECT_EQ(period_of(Ticking::kPeriod), Ticking::kPeriod);
+  EXPECT_EQ(period_of(Ticking::kPeriod + 20), Ticking::kPeriod);  // rounded
+  EXPECT_THAT(message_of<InvalidArgument>([&] { period_of(1'000'000); }),
+              AllOf(HasSubstr("robot 'ticking' runs at 400 Hz (2.5 ms), not at 1000 Hz (1 ms)"),
+                    HasSubstr("leave the frequency out")));
+  EXPECT_THAT(message_of<InvalidArgument>([&] { period_of(-1); }), HasSubstr("must be positive"));
+}
+
+TEST_F(MakeTableTest, ARobotOfAnyPeriodRunsAtOneKilohertzUnlessAskedOtherwise) {
+  InlineSimulation sensor("sensor", *robot_table<Sensor>("sensor"), {}, 0);
+  EXPECT_EQ(sensor.frontend.period(), 1'000'000);
 }
 
 TEST_F(MakeTableTest, NothingThatADriverThrowsCrossesTheTable) {

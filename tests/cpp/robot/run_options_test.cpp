@@ -27,7 +27,7 @@ class RunOptionsTest : public PuppetTest {
 TEST_F(RunOptionsTest, HaveDefaults) {
   const RunOptions options = parse({});
   EXPECT_EQ(options.backend.segment, "puppet");
-  EXPECT_EQ(options.backend.period, 1'000'000);
+  EXPECT_EQ(options.backend.period, 0);
   EXPECT_FALSE(options.backend.bursting);
   EXPECT_EQ(options.backend.permission, 0600U);
 }

@@ -229,8 +229,8 @@ TEST_F(BackendTest, PublishesTheTimingOfThePeriods) {
 }
 
 TEST_F(BackendTest, RefusesOptionsThatCannotBe) {
-  EXPECT_THAT(message_of<InvalidArgument>([] { Station({.segment = "pair", .period = 0}); }),
-              HasSubstr("above 0"));
+  EXPECT_THAT(message_of<InvalidArgument>([] { Station({.segment = "pair", .period = -1}); }),
+              HasSubstr("period must be positive, got -1 ns"));
   EXPECT_THAT(message_of<InvalidArgument>(
                   [] { Station({.segment = "pair", .stale = Stale::hold, .silence = 1000}); }),
               HasSubstr("purge, halt or stop"));

@@ -1,0 +1,23 @@
+"""A MuJoCo model whose joint is put where it is asked to be, and a ball that flies and bounces."""
+
+from pathlib import Path
+
+import o80
+
+MODEL = Path(__file__).parent / "models" / "paddle.xml"
+
+with o80.robots.load("mujoco").inline(
+    model=MODEL, balls="ball", racket="blade", floor="floor"
+) as robot:
+    # the ball hangs where it is told to, until nobody tells it any more
+    robot.add_command("ball", {"position": [0.0, 0.0, 1.2], "velocity": [0.0, 0.0, 0.0]})
+    robot.burst(1)
+    # the paddle meets it on its way down
+    robot.add_command("lift", {"position": 0.2, "velocity": 0.0}, duration=0.3)
+    observation = robot.burst(1000)
+
+    ball = observation.extended["contacts"][0]
+    print(f"met the paddle at iteration {ball['iteration']}, and again: {ball['count'] > 1}")
+    print(
+        f"rose again at {ball['velocity_after'][2]:.2f} m/s after falling at {-ball['velocity_before'][2]:.2f} m/s"
+    )
