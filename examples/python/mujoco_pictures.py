@@ -27,7 +27,7 @@ data = mujoco.MjData(model)
 places = [int(model.joint(actuator.name).qposadr[0]) for actuator in robot.actuators]
 with mujoco.Renderer(model, height=240, width=320) as renderer:
     pictures = []
-    for row in rows.observed["position"][::100]:
+    for row in rows.observed.joints["position"][::100]:
         data.qpos[places] = row
         mujoco.mj_forward(model, data)
         renderer.update_scene(data, camera="side")

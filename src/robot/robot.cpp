@@ -78,8 +78,7 @@ Schema Robot::describe(std::int64_t period) const {
     out.defaults.assign(rows->defaults, rows->defaults + rows->default_count);
   };
   if (table_.describe(driver_, period, &schema, copy, &fault) != 0) {
-    throw DriverError("robot '" + std::string(table_.name) +
-                      "' cannot be described: " + fault.text);
+    throw DriverError("robot '" + std::string(table_.name) + "' cannot be started: " + fault.text);
   }
   return schema;
 }

@@ -26,7 +26,7 @@ SAYS = {
         "100 Hz: five steps of the model in each iteration",
     ],
     "mujoco_imposed": ["met the paddle at iteration", "rose again at"],
-    "mujoco_pictures": ["5 pictures of shape (240, 320, 3)", "they differ: True"],
+    "mujoco_pictures": ["6 pictures of shape (240, 320, 3)", "they differ: True"],
     "paces": [
         "in 0.25 s:            250",
         "at 10 rad/s:          100",
