@@ -18,6 +18,5 @@ with o80.robots.load("mujoco").inline(
 
     ball = observation.extended["contacts"][0]
     print(f"met the paddle at iteration {ball['iteration']}, and again: {ball['count'] > 1}")
-    print(
-        f"rose again at {ball['velocity_after'][2]:.2f} m/s after falling at {-ball['velocity_before'][2]:.2f} m/s"
-    )
+    down, up = -ball["velocity_before"][2], ball["velocity_after"][2]
+    print(f"rose again at {up:.2f} m/s after falling at {down:.2f} m/s")

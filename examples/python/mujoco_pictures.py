@@ -1,6 +1,6 @@
 """Pictures of what a MuJoCo robot did, drawn from its history.
 
-Needs `pip install mujoco-core[rendering]==4.0.1`, and EGL or OSMesa (Debian: libegl1 or libosmesa6).
+Needs `pip install "o80[rendering]"`, and EGL or OSMesa (Debian: libegl1 or libosmesa6).
 """
 
 import os
