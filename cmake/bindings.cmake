@@ -10,7 +10,7 @@ find_package(nanobind CONFIG REQUIRED)
 file(GLOB binding_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/python/bindings/*.cpp)
 nanobind_add_module(_core NOMINSIZE NB_SUPPRESS_WARNINGS ${binding_sources})
 target_include_directories(_core PRIVATE ${PROJECT_SOURCE_DIR}/python/bindings)
-target_link_libraries(_core PRIVATE o80 o80_warnings)
+target_link_libraries(_core PRIVATE o80 o80_private_headers o80_warnings)
 set_target_properties(
   _core PROPERTIES INSTALL_RPATH "$ORIGIN/lib" LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/python
 )

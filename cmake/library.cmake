@@ -10,6 +10,11 @@ target_include_directories(
                         $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>
 )
 
+# what o80's own programs, bindings and tests include beside them; never installed
+add_library(o80_private_headers INTERFACE)
+target_link_libraries(o80_private_headers INTERFACE o80_headers)
+target_include_directories(o80_private_headers INTERFACE ${PROJECT_SOURCE_DIR}/src)
+
 file(GLOB o80_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/*/*.cpp)
 list(FILTER o80_sources EXCLUDE REGEX "/src/programs/")
 if(O80_STATIC)
@@ -19,7 +24,9 @@ else()
   add_library(o80 SHARED ${o80_sources})
 endif()
 add_library(o80::o80 ALIAS o80)
-target_link_libraries(o80 PUBLIC o80_headers Threads::Threads PRIVATE ${CMAKE_DL_LIBS} o80_warnings)
+target_link_libraries(
+  o80 PUBLIC o80_headers Threads::Threads PRIVATE ${CMAKE_DL_LIBS} o80_private_headers o80_warnings
+)
 # no fused multiply-add: machines agree on every desired state, bit for bit
 target_compile_options(o80 PRIVATE -ffp-contract=off)
 # calls inside the library are direct, and may be inlined across its files

@@ -4,7 +4,7 @@ if(NOT O80_SANITIZE AND NOT CMAKE_CROSSCOMPILING)
   target_compile_definitions(o80_crash_points PUBLIC O80_CRASH_POINTS)
   target_compile_options(o80_crash_points PRIVATE -ffp-contract=off)
   target_link_libraries(
-    o80_crash_points PUBLIC o80_headers Threads::Threads ${CMAKE_DL_LIBS} PRIVATE o80_warnings
+    o80_crash_points PUBLIC o80_headers Threads::Threads ${CMAKE_DL_LIBS} PRIVATE o80_private_headers o80_warnings
   )
   file(GLOB torture_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tests/processes/torture/*.cpp)
   add_executable(o80-torture ${torture_sources})
@@ -13,5 +13,5 @@ if(NOT O80_SANITIZE AND NOT CMAKE_CROSSCOMPILING)
     o80-torture
     PRIVATE O80_TORTURE_ACTOR="${PROJECT_SOURCE_DIR}/tests/processes/torture/actor.py"
   )
-  target_link_libraries(o80-torture PRIVATE o80_crash_points o80_warnings)
+  target_link_libraries(o80-torture PRIVATE o80_crash_points o80_private_headers o80_warnings)
 endif()

@@ -121,7 +121,8 @@ class Relacy:
         # a copy: it stays one state of the sources while they are worked on
         self.product = fresh(BUILD / "product")
         shutil.copytree(ROOT / "include", self.product / "include")
-        shutil.copytree(ROOT / "src" / "memory", self.product / "src" / "memory")
+        for layer in ("base", "memory"):
+            shutil.copytree(ROOT / "src" / layer, self.product / "src" / layer)
         shutil.copytree(MODELS / "memory", self.product / "models")
         forced = self.product / "models" / "relacy_std.hpp"
         run(["g++", *self.FLAGS, "-x", "c++-header", str(forced)], self.product)
@@ -159,7 +160,10 @@ class Relacy:
         place = overlay or self.product
         target = place / (source.replace("/", "_") + ".o")
         places = [overlay, self.product] if overlay else [self.product]
-        includes = [f"-I{self.product}/models/stand_in", *(f"-I{p}/include" for p in places)]
+        includes = [
+            f"-I{self.product}/models/stand_in",
+            *(f"-I{p}/{folder}" for p in places for folder in ("src", "include")),
+        ]
         command = ["g++", *self.FLAGS, *includes, *self.forced]
         run([*command, "-c", str(tree / source), "-o", str(target)], self.product)
         return target

@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
+#include "control/batch_builder.hpp"
+#include "memory/lane.hpp"
 #include "o80/base/error.hpp"
-#include "o80/control/batch_builder.hpp"
-#include "o80/memory/lane.hpp"
 #include "o80/runtime/backend.hpp"
 
 // A backend stepped by hand, and frontends that write into their lanes whatever fits, past all that

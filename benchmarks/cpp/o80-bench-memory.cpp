@@ -9,7 +9,8 @@
 #include <string>
 
 #include "empty_robot.hpp"
-#include "o80/memory/segment_name.hpp"
+#include "control/record.hpp"
+#include "memory/segment_name.hpp"
 #include "sample.hpp"
 
 namespace o80::bench {

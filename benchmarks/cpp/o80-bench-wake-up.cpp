@@ -3,7 +3,7 @@
 #include <sys/mman.h>
 
 #include "empty_robot.hpp"
-#include "o80/memory/futex.hpp"
+#include "memory/futex.hpp"
 #include "ping_pong.hpp"
 #include "sample.hpp"
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <thread>
 
-#include "o80/memory/spinner.hpp"
+#include "memory/spinner.hpp"
 #include "sample.hpp"
 
 namespace o80::bench {

@@ -17,8 +17,8 @@
 //   + counters.state.store(static_cast<std::uint32_t>(state), std::memory_order_seq_cst);
 
 #include "kernel.hpp"
+#include "memory/segment_file.hpp"
 #include "o80/base/error.hpp"
-#include "o80/memory/segment_file.hpp"
 
 namespace {
 

@@ -27,7 +27,7 @@
 //   +
 
 #include "kernel.hpp"
-#include "o80/memory/halt_word.hpp"
+#include "memory/halt_word.hpp"
 
 namespace {
 

@@ -2,8 +2,8 @@
 
 #include "kernel.hpp"
 
+#include "memory/futex.hpp"
 #include "o80/base/error.hpp"
-#include "o80/memory/futex.hpp"
 
 // Relacy counts allocations: all of the program, its libraries included, go the same way
 [[gnu::used]] static void* (*const allocate)(std::size_t) = &::operator new;

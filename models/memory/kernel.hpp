@@ -5,10 +5,10 @@
 /// Time stands still: no slice ever passes, so nothing heals a lost wake-up, and Relacy reports a
 /// state in which everybody sleeps.
 
-#include "o80/memory/history.hpp"
-#include "o80/memory/lane.hpp"
-#include "o80/memory/segment_layout.hpp"
-#include "o80/memory/signal.hpp"
+#include "memory/history.hpp"
+#include "memory/lane.hpp"
+#include "memory/segment_layout.hpp"
+#include "memory/signal.hpp"
 
 namespace model {
 

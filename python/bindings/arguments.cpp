@@ -5,8 +5,8 @@
 #include <cmath>
 #include <string>
 
+#include "control/record.hpp"
 #include "o80/base/error.hpp"
-#include "o80/control/record.hpp"
 
 namespace nb = nanobind;
 using o80::InvalidArgument;

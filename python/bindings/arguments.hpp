@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string>
 
-#include "o80/runtime/command.hpp"
+#include "o80/control/command.hpp"
 
 // Arguments of Python calls as what the core takes; each throws InvalidArgument naming the
 // argument.

@@ -17,7 +17,7 @@
 #include <utility>
 
 #include "bindings.hpp"
-#include "o80/memory/fork.hpp"
+#include "memory/fork.hpp"
 #include "o80/runtime/observation.hpp"
 #include "pickling.hpp"
 #include "schema_builder.hpp"
@@ -116,7 +116,7 @@ class Backend final : public o80::RequestServer {
                                 "' ends when the handler of a request returns, which it has not");
       }
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
-      Waiting::check();
+      Waiting::keep_waiting();
     }
   }
 
@@ -173,7 +173,7 @@ class Backend final : public o80::RequestServer {
         throw o80::TimeoutError("nobody asked '" + name_ +
                                 "' for an iteration in time: it is bursting");
       }
-      Waiting::check();
+      Waiting::keep_waiting();
     }
   }
 

@@ -110,7 +110,7 @@ void bind_batch(nb::module_& m) {
           [](const Batch& self, std::optional<double> timeout) {
             carrying(self, [&] {
               const Waiting waiting;
-              self.wait(timeout_of(timeout), Waiting::check);
+              self.wait(timeout_of(timeout), Waiting::keep_waiting);
             });
           },
           "timeout"_a = nb::none(),
@@ -148,7 +148,7 @@ returns the last row there was.)")
             return carrying(self.burst.batch(), [&] {
               o80::UntypedObservation row = [&] {
                 const Waiting waiting;
-                return self.burst.wait(timeout_of(timeout), Waiting::check);
+                return self.burst.wait(timeout_of(timeout), Waiting::keep_waiting);
               }();
               return Observation(self.decoder, std::move(row));
             });

@@ -10,7 +10,8 @@
 #include <vector>
 
 #include "bindings.hpp"
-#include "o80/describe/table.hpp"
+#include "describe/table.hpp"
+#include "runtime/link.hpp"
 #include "states.hpp"
 #include "waiting.hpp"
 
@@ -62,7 +63,7 @@ std::uint32_t Frontend::actuator(nb::handle named) const {
     throw InvalidArgument("an actuator is given by its index or its name, not by " +
                           nb::cast<std::string>(nb::repr(named)));
   }
-  return frontend->check().actuator(number);
+  return frontend->command_check().actuator(number);
 }
 
 void Frontend::add_command(nb::handle named, nb::handle target,
@@ -164,7 +165,7 @@ Attachment attach(const std::string& segment, Seconds timeout, bool read_only, b
   options.timeout = timeout_of(timeout);
   options.access = read_only ? o80::Access::read_only : o80::Access::read_write;
   options.dead = dead;
-  options.check = Waiting::check;
+  options.keep_waiting = Waiting::keep_waiting;
   const Waiting waiting;
   return {std::make_shared<UntypedFrontend>(segment, options), nullptr};
 }
@@ -176,8 +177,8 @@ Attachment attach_again(const Frontend& self, Seconds timeout, bool read_only) {
   o80::FrontendOptions options;
   options.timeout = timeout_of(timeout);
   options.access = read_only ? o80::Access::read_only : o80::Access::read_write;
-  const o80::Check check = Waiting::check;
-  options.check = former->link()->guarded(check);
+  const o80::KeepWaiting keep_waiting = Waiting::keep_waiting;
+  options.keep_waiting = former->link()->guarded(keep_waiting);
   const Waiting waiting;
   return {std::make_shared<UntypedFrontend>(former->segment(), options), nullptr};
 }

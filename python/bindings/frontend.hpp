@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "o80/robot/inline_robot.hpp"
 #include "o80/runtime/frontend.hpp"
 #include "observation.hpp"
+#include "robot/inline_robot.hpp"
 
 /// A frontend before Python has made a class of it: attached, or that of an inline robot.
 struct Attachment {

@@ -6,9 +6,10 @@
 #include <tuple>
 
 #include "arguments.hpp"
+#include "base/printable.hpp"
 #include "frontend.hpp"
-#include "o80/base/printable.hpp"
-#include "o80/memory/verb_word.hpp"
+#include "memory/verb_word.hpp"
+#include "runtime/link.hpp"
 #include "waiting.hpp"
 
 namespace nb = nanobind;
@@ -36,7 +37,7 @@ std::uint64_t halt(const Frontend& self, nb::handle why) {
 void resume(const Frontend& self, std::uint64_t number, std::optional<double> timeout) {
   const std::shared_ptr<o80::UntypedFrontend> frontend = self.shared();
   const Waiting waiting;
-  frontend->resume(number, timeout_of(timeout), Waiting::check);
+  frontend->resume(number, timeout_of(timeout), Waiting::keep_waiting);
 }
 
 /// The driver verb that has not returned, and for how long [s].
@@ -50,7 +51,7 @@ std::optional<std::tuple<std::string, double>> slow_verb(const Frontend& self) {
 std::uint64_t halt_segment(const std::string& segment, const std::string& reason,
                            std::optional<double> timeout) {
   const Waiting waiting;
-  return o80::halt(segment, reason, timeout_of(timeout), Waiting::check);
+  return o80::halt(segment, reason, timeout_of(timeout), Waiting::keep_waiting);
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "buffer.hpp"
 #include "frontend.hpp"
 #include "pickling.hpp"
+#include "runtime/link.hpp"
 #include "waiting.hpp"
 
 namespace nb = nanobind;
@@ -30,7 +31,7 @@ Observation wait_for(const Frontend& self, nb::handle iteration, Seconds timeout
   Observation observation = self.blank();
   const auto frontend = self.shared();
   const Waiting waiting;
-  frontend->wait_for(wanted, observation.row.bytes(), timeout_of(timeout), Waiting::check);
+  frontend->wait_for(wanted, observation.row.bytes(), timeout_of(timeout), Waiting::keep_waiting);
   return observation;
 }
 
@@ -41,7 +42,7 @@ Observation next_row(const std::shared_ptr<UntypedFrontend>& frontend,
   Observation observation(decoder);
   const Waiting waiting;
   observation.missed = frontend->wait_for_next(position, observation.row.bytes(),
-                                               timeout_of(timeout), Waiting::check);
+                                               timeout_of(timeout), Waiting::keep_waiting);
   return observation;
 }
 

@@ -11,8 +11,8 @@
 #include "arguments.hpp"
 #include "batch.hpp"
 #include "buffer.hpp"
+#include "control/batch_builder.hpp"
 #include "frontend.hpp"
-#include "o80/control/batch_builder.hpp"
 #include "waiting.hpp"
 #include "words.hpp"
 
@@ -81,7 +81,7 @@ Observation pulse_and_wait(const Frontend& self, Seconds timeout, nb::handle at,
   return carrying(batch, [&] {
     o80::UntypedObservation row = [&] {
       const Waiting waiting;
-      return frontend->wait_for_end(batch, timeout_of(timeout), Waiting::check);
+      return frontend->wait_for_end(batch, timeout_of(timeout), Waiting::keep_waiting);
     }();
     return Observation(decoder, std::move(row));
   });
@@ -110,7 +110,7 @@ Observation burst(const Frontend& self, nb::handle iterations, Seconds timeout, 
   const auto decoder = self.decoder();
   o80::UntypedObservation row = [&] {
     const Waiting waiting;
-    return frontend->burst(count, timeout_of(timeout), Waiting::check, options);
+    return frontend->burst(count, timeout_of(timeout), Waiting::keep_waiting, options);
   }();
   return Observation(decoder, std::move(row));
 }
@@ -141,7 +141,7 @@ std::vector<Observation> wait_for_bursts(const std::vector<PendingBurst>& pendin
   for (const PendingBurst& one : pending) bursts.push_back(one.burst);
   std::vector<o80::UntypedObservation> rows = [&] {
     const Waiting waiting;
-    return o80::wait_for(bursts, timeout_of(timeout), Waiting::check);
+    return o80::wait_for(bursts, timeout_of(timeout), Waiting::keep_waiting);
   }();
   std::vector<Observation> observations;
   for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -169,7 +169,7 @@ Batch send_request(const Frontend& self, std::string_view name, nb::handle field
   const auto frontend = self.shared();
   const std::uint32_t index = frontend->request_index(name);
   const std::vector<std::byte> payload = self.request_bytes(index, fields);
-  frontend->check().request(index, payload);
+  frontend->command_check().request(index, payload);
   return send_alone(self, [&](o80::BatchBuilder& batch) {
     batch.request(static_cast<std::uint16_t>(index), payload);
   });

@@ -7,9 +7,9 @@
 #include <span>
 
 #include "bindings.hpp"
+#include "describe/table.hpp"
 #include "interpreter.hpp"
 #include "o80/base/error.hpp"
-#include "o80/describe/table.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;

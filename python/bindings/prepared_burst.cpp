@@ -38,7 +38,8 @@ class PreparedBurst {
     const auto frontend = self.shared();
     frontend->add_trajectories(actuators_, steps_, targets_.span(), options_);
     const Waiting waiting;
-    return frontend->burst_rows(rows_.writable(), timeout_of(timeout), Waiting::check, options);
+    return frontend->burst_rows(rows_.writable(), timeout_of(timeout), Waiting::keep_waiting,
+                                options);
   }
 
  private:

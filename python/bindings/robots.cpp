@@ -7,8 +7,8 @@
 
 #include "bindings.hpp"
 #include "frontend.hpp"
-#include "o80/robot/library.hpp"
-#include "o80/robot/run_options.hpp"
+#include "robot/library.hpp"
+#include "robot/run_options.hpp"
 #include "waiting.hpp"
 
 namespace nb = nanobind;
@@ -25,8 +25,9 @@ Attachment start_inline(const o80::RobotLibrary& library, const std::string& seg
   backend.segment = segment;
   backend.period = period;
   backend.history = history;
-  auto robot = std::make_shared<o80::InlineRobot>(
-      std::make_unique<o80::Robot>(*library.table, options), std::move(backend), Waiting::check);
+  auto robot =
+      std::make_shared<o80::InlineRobot>(std::make_unique<o80::Robot>(*library.table, options),
+                                         std::move(backend), Waiting::keep_waiting);
   return {std::make_shared<o80::UntypedFrontend>(robot->segment(), robot), robot};
 }
 

@@ -3,7 +3,7 @@
 #include <nanobind/stl/vector.h>
 
 #include "bindings.hpp"
-#include "o80/memory/process_start.hpp"
+#include "memory/process_start.hpp"
 #include "o80/memory/segment_list.hpp"
 #include "waiting.hpp"
 

@@ -6,8 +6,8 @@
 #include <string_view>
 #include <type_traits>
 
+#include "control/record.hpp"
 #include "o80/base/error.hpp"
-#include "o80/control/record.hpp"
 
 namespace nb = nanobind;
 using o80::FieldRow;

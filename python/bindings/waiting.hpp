@@ -12,11 +12,11 @@
 
 /// Around every call that may block: other Python threads run on, and Ctrl-C comes through.
 ///
-/// Lets go of the GIL until it is destroyed; `check` goes into the call's Check.
+/// Lets go of the GIL until it is destroyed; `keep_waiting` goes into the call as KeepWaiting.
 class Waiting {
  public:
   /// Raises what a signal's handler raised, usually KeyboardInterrupt.
-  static bool check() {
+  static bool keep_waiting() {
     const WithGil locked;
     if (call_python(PyErr_CheckSignals) != 0) throw nanobind::python_error();
     return true;

@@ -2,8 +2,8 @@
 
 #include <nanobind/nanobind.h>
 
-#include "o80/control/record.hpp"
-#include "o80/runtime/command.hpp"
+#include "control/record.hpp"
+#include "o80/control/command.hpp"
 
 // Words of a few letters: enums that are strings in Python (o80.words).
 

@@ -1,10 +1,10 @@
-#include "o80/control/actuator_queue.hpp"
+#include "control/actuator_queue.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include "o80/control/record_check.hpp"
+#include "control/record_check.hpp"
 
 namespace o80 {
 namespace {

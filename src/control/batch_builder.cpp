@@ -1,4 +1,4 @@
-#include "o80/control/batch_builder.hpp"
+#include "control/batch_builder.hpp"
 
 #include <cassert>
 #include <cstring>

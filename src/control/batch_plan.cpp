@@ -1,4 +1,4 @@
-#include "o80/control/batch_plan.hpp"
+#include "control/batch_plan.hpp"
 
 #include <algorithm>
 #include <utility>

@@ -1,4 +1,4 @@
-#include "o80/control/controller.hpp"
+#include "control/controller.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -10,12 +10,12 @@
 #include <utility>
 #include <vector>
 
+#include "control/actuator_queue.hpp"
+#include "control/batch_plan.hpp"
+#include "control/ledger.hpp"
+#include "control/purge_tickets.hpp"
+#include "control/state_layout.hpp"
 #include "o80/base/error.hpp"
-#include "o80/control/actuator_queue.hpp"
-#include "o80/control/batch_plan.hpp"
-#include "o80/control/ledger.hpp"
-#include "o80/control/purge_tickets.hpp"
-#include "o80/control/state_layout.hpp"
 
 namespace o80 {
 namespace {

@@ -1,8 +1,8 @@
-#include "o80/control/error_watch.hpp"
+#include "control/error_watch.hpp"
 
 #include <cmath>
 
-#include "o80/control/number_name.hpp"
+#include "control/number_name.hpp"
 
 namespace o80 {
 

@@ -1,4 +1,4 @@
-#include "o80/control/fastest_motion.hpp"
+#include "control/fastest_motion.hpp"
 
 #include <algorithm>
 #include <cmath>

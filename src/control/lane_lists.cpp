@@ -1,4 +1,4 @@
-#include "o80/control/lane_lists.hpp"
+#include "control/lane_lists.hpp"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "o80/control/ledger.hpp"
+#include "control/ledger.hpp"
 
 #include <algorithm>
 #include <new>

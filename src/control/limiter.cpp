@@ -1,4 +1,4 @@
-#include "o80/control/limiter.hpp"
+#include "control/limiter.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "o80/describe/visit_number.hpp"
+#include "describe/visit_number.hpp"
 
 namespace o80 {
 namespace {

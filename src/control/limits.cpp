@@ -1,12 +1,12 @@
-#include "o80/control/limits.hpp"
+#include "control/limits.hpp"
 
 #include <charconv>
 #include <cmath>
 #include <limits>
 #include <string>
 
-#include "o80/base/short_text.hpp"
-#include "o80/control/number_name.hpp"
+#include "base/short_text.hpp"
+#include "control/number_name.hpp"
 
 namespace o80 {
 namespace {

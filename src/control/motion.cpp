@@ -1,11 +1,11 @@
-#include "o80/control/motion.hpp"
+#include "control/motion.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <type_traits>
 
-#include "o80/describe/visit_number.hpp"
+#include "describe/visit_number.hpp"
 
 namespace o80 {
 namespace {

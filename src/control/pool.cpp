@@ -1,4 +1,4 @@
-#include "o80/control/pool.hpp"
+#include "control/pool.hpp"
 
 #include <sys/mman.h>
 

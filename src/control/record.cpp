@@ -1,4 +1,4 @@
-#include "o80/control/record.hpp"
+#include "control/record.hpp"
 
 namespace o80 {
 

@@ -1,4 +1,4 @@
-#include "o80/control/record_check.hpp"
+#include "control/record_check.hpp"
 
 #include <algorithm>
 #include <cmath>

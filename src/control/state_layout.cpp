@@ -1,10 +1,10 @@
-#include "o80/control/state_layout.hpp"
+#include "control/state_layout.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <string>
 
-#include "o80/describe/visit_number.hpp"
+#include "describe/visit_number.hpp"
 
 namespace o80 {
 

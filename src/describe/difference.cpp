@@ -2,7 +2,7 @@
 #include <map>
 #include <sstream>
 
-#include "o80/describe/table.hpp"
+#include "describe/table.hpp"
 
 namespace o80 {
 

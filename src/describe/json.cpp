@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <cstring>
 
-#include "json_writer.hpp"
+#include "describe/json_writer.hpp"
+#include "describe/table.hpp"
 #include "o80/describe/layout.hpp"
-#include "o80/describe/table.hpp"
 
 namespace o80 {
 

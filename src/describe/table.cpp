@@ -1,4 +1,4 @@
-#include "o80/describe/table.hpp"
+#include "describe/table.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <set>
 #include <type_traits>
 
-#include "o80/describe/visit_number.hpp"
+#include "describe/visit_number.hpp"
 
 namespace o80 {
 

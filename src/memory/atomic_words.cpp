@@ -1,4 +1,4 @@
-#include "o80/memory/atomic_words.hpp"
+#include "memory/atomic_words.hpp"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "o80/memory/attached_segment.hpp"
+#include "memory/attached_segment.hpp"
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -8,12 +8,12 @@
 #include <cstring>
 #include <utility>
 
+#include "memory/atomic_words.hpp"
+#include "memory/file_owner.hpp"
+#include "memory/segment_file.hpp"
+#include "memory/segment_name.hpp"
 #include "o80/base/error.hpp"
-#include "o80/memory/atomic_words.hpp"
-#include "o80/memory/file_owner.hpp"
-#include "o80/memory/segment_file.hpp"
 #include "o80/memory/segment_list.hpp"
-#include "o80/memory/segment_name.hpp"
 
 namespace o80 {
 
@@ -156,7 +156,7 @@ AttachedSegment AttachedSegment::attach(std::string_view name, Access access,
       throw TimeoutError(segment_called(name) +
                          " has no running backend within the time given: " + search.reason() +
                          ". " + what_there_is() + " Start one with `o80 run`, or check the name.");
-    if (polls % kPollsBetweenChecks == 0 && options.check && !options.check())
+    if (polls % kPollsBetweenChecks == 0 && options.keep_waiting && !options.keep_waiting())
       throw Cancelled("the wait for " + segment_called(name) + " was cancelled");
     const timespec pause{.tv_sec = 0, .tv_nsec = std::max<long>(deadline.left(kPoll), 1000)};
     nanosleep(&pause, nullptr);

@@ -1,4 +1,4 @@
-#include "o80/memory/file_lock.hpp"
+#include "memory/file_lock.hpp"
 
 #include <fcntl.h>
 

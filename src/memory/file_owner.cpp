@@ -1,4 +1,4 @@
-#include "o80/memory/file_owner.hpp"
+#include "memory/file_owner.hpp"
 
 #include <pwd.h>
 #include <stdlib.h>

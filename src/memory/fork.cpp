@@ -1,4 +1,4 @@
-#include "o80/memory/fork.hpp"
+#include "memory/fork.hpp"
 
 #include <fcntl.h>
 #include <pthread.h>
@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "memory/file_lock.hpp"
 #include "o80/base/error.hpp"
-#include "o80/memory/file_lock.hpp"
 
 namespace o80 {
 

@@ -1,4 +1,4 @@
-#include "o80/memory/futex.hpp"
+#include "memory/futex.hpp"
 
 #include <linux/futex.h>
 #include <sys/syscall.h>

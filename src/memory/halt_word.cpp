@@ -1,10 +1,10 @@
-#include "o80/memory/halt_word.hpp"
+#include "memory/halt_word.hpp"
 
 #include <algorithm>
 
-#include "o80/base/crash_point.hpp"
-#include "o80/memory/atomic_words.hpp"
-#include "o80/memory/signal.hpp"
+#include "base/crash_point.hpp"
+#include "memory/atomic_words.hpp"
+#include "memory/signal.hpp"
 
 namespace o80 {
 

@@ -1,4 +1,4 @@
-#include "helper_scheduling.hpp"
+#include "memory/helper_scheduling.hpp"
 
 #include <algorithm>
 #include <future>

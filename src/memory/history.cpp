@@ -1,12 +1,12 @@
-#include "o80/memory/history.hpp"
+#include "memory/history.hpp"
 
 #include <algorithm>
 #include <atomic>
 #include <cstring>
 
-#include "o80/base/crash_point.hpp"
-#include "o80/memory/atomic_words.hpp"
-#include "o80/memory/prefetch.hpp"
+#include "base/crash_point.hpp"
+#include "memory/atomic_words.hpp"
+#include "memory/prefetch.hpp"
 
 // The thread sanitizer does not model fences; every word they order is atomic, so it has nothing
 // to report either.

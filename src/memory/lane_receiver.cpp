@@ -1,10 +1,10 @@
-#include "o80/memory/lane_receiver.hpp"
+#include "memory/lane_receiver.hpp"
 
 #include <algorithm>
 
-#include "o80/base/crash_point.hpp"
-#include "o80/memory/atomic_words.hpp"
-#include "o80/memory/futex.hpp"
+#include "base/crash_point.hpp"
+#include "memory/atomic_words.hpp"
+#include "memory/futex.hpp"
 
 namespace o80 {
 

@@ -1,14 +1,14 @@
-#include "o80/memory/lane_sender.hpp"
+#include "memory/lane_sender.hpp"
 
 #include <algorithm>
 
-#include "o80/base/crash_point.hpp"
+#include "base/crash_point.hpp"
+#include "base/printable.hpp"
+#include "memory/atomic_words.hpp"
+#include "memory/futex.hpp"
+#include "memory/prefetch.hpp"
+#include "memory/segment_file.hpp"
 #include "o80/base/error.hpp"
-#include "o80/base/printable.hpp"
-#include "o80/memory/atomic_words.hpp"
-#include "o80/memory/futex.hpp"
-#include "o80/memory/prefetch.hpp"
-#include "o80/memory/segment_file.hpp"
 
 namespace o80 {
 
@@ -263,8 +263,8 @@ void LaneSender::sleep(std::uint32_t seen, std::int64_t at_most) {
     futex_wait(wake, now, at_most);
 }
 
-bool LaneSender::look_around(const Check& check) const {
-  if (check && !check())
+bool LaneSender::look_around(const KeepWaiting& keep_waiting) const {
+  if (keep_waiting && !keep_waiting())
     throw Cancelled("the wait for segment '" + segment_->name() + "' was cancelled");
   return segment_->gone();
 }

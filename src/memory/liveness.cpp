@@ -1,4 +1,4 @@
-#include "o80/memory/liveness.hpp"
+#include "memory/liveness.hpp"
 
 #include <pthread.h>
 #include <signal.h>
@@ -10,10 +10,10 @@
 #include <thread>
 #include <utility>
 
-#include "helper_scheduling.hpp"
+#include "memory/futex.hpp"
+#include "memory/helper_scheduling.hpp"
+#include "memory/verb_word.hpp"
 #include "o80/base/time.hpp"
-#include "o80/memory/futex.hpp"
-#include "o80/memory/verb_word.hpp"
 
 namespace o80 {
 

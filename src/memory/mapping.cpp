@@ -1,4 +1,4 @@
-#include "o80/memory/mapping.hpp"
+#include "memory/mapping.hpp"
 
 #include <sys/mman.h>
 

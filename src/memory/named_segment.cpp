@@ -1,4 +1,4 @@
-#include "o80/memory/named_segment.hpp"
+#include "memory/named_segment.hpp"
 
 #include <fcntl.h>
 #include <signal.h>
@@ -7,12 +7,12 @@
 #include <cerrno>
 #include <optional>
 
-#include "o80/base/crash_point.hpp"
+#include "base/crash_point.hpp"
+#include "memory/file_owner.hpp"
+#include "memory/segment_file.hpp"
+#include "memory/segment_name.hpp"
 #include "o80/base/error.hpp"
 #include "o80/base/time.hpp"
-#include "o80/memory/file_owner.hpp"
-#include "o80/memory/segment_file.hpp"
-#include "o80/memory/segment_name.hpp"
 
 namespace o80 {
 

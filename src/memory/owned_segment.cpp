@@ -1,4 +1,4 @@
-#include "o80/memory/owned_segment.hpp"
+#include "memory/owned_segment.hpp"
 
 #include <time.h>
 #include <unistd.h>
@@ -8,15 +8,15 @@
 #include <limits>
 #include <utility>
 
-#include "o80/base/crash_point.hpp"
+#include "base/crash_point.hpp"
+#include "memory/atomic_words.hpp"
+#include "memory/halt_word.hpp"
+#include "memory/named_segment.hpp"
+#include "memory/process_start.hpp"
+#include "memory/segment_draft.hpp"
+#include "memory/segment_file.hpp"
+#include "memory/segment_name.hpp"
 #include "o80/base/error.hpp"
-#include "o80/memory/atomic_words.hpp"
-#include "o80/memory/halt_word.hpp"
-#include "o80/memory/named_segment.hpp"
-#include "o80/memory/process_start.hpp"
-#include "o80/memory/segment_draft.hpp"
-#include "o80/memory/segment_file.hpp"
-#include "o80/memory/segment_name.hpp"
 
 namespace o80 {
 

@@ -1,4 +1,4 @@
-#include "o80/memory/process_start.hpp"
+#include "memory/process_start.hpp"
 
 #include <fcntl.h>
 #include <unistd.h>

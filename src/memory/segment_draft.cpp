@@ -1,4 +1,4 @@
-#include "o80/memory/segment_draft.hpp"
+#include "memory/segment_draft.hpp"
 
 #include <fcntl.h>
 #include <sys/random.h>
@@ -10,13 +10,13 @@
 #include <cstdio>
 #include <cstring>
 
-#include "o80/base/crash_point.hpp"
+#include "base/crash_point.hpp"
+#include "memory/file_owner.hpp"
+#include "memory/mapping.hpp"
+#include "memory/named_segment.hpp"
+#include "memory/segment_file.hpp"
+#include "memory/segment_name.hpp"
 #include "o80/base/error.hpp"
-#include "o80/memory/file_owner.hpp"
-#include "o80/memory/mapping.hpp"
-#include "o80/memory/named_segment.hpp"
-#include "o80/memory/segment_file.hpp"
-#include "o80/memory/segment_name.hpp"
 
 namespace o80 {
 

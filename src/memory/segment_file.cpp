@@ -1,4 +1,4 @@
-#include "o80/memory/segment_file.hpp"
+#include "memory/segment_file.hpp"
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -8,11 +8,11 @@
 #include <cerrno>
 #include <cstring>
 
-#include "o80/base/crash_point.hpp"
-#include "o80/base/printable.hpp"
-#include "o80/memory/file_lock.hpp"
-#include "o80/memory/file_owner.hpp"
-#include "o80/memory/futex.hpp"
+#include "base/crash_point.hpp"
+#include "base/printable.hpp"
+#include "memory/file_lock.hpp"
+#include "memory/file_owner.hpp"
+#include "memory/futex.hpp"
 
 namespace o80 {
 

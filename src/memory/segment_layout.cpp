@@ -1,4 +1,4 @@
-#include "o80/memory/segment_layout.hpp"
+#include "memory/segment_layout.hpp"
 
 #include <bit>
 

@@ -8,13 +8,13 @@
 #include <cstddef>
 #include <cstring>
 
+#include "base/printable.hpp"
+#include "memory/file_lock.hpp"
+#include "memory/file_owner.hpp"
+#include "memory/named_segment.hpp"
+#include "memory/segment_file.hpp"
+#include "memory/segment_name.hpp"
 #include "o80/base/error.hpp"
-#include "o80/base/printable.hpp"
-#include "o80/memory/file_lock.hpp"
-#include "o80/memory/file_owner.hpp"
-#include "o80/memory/named_segment.hpp"
-#include "o80/memory/segment_file.hpp"
-#include "o80/memory/segment_name.hpp"
 
 namespace o80 {
 

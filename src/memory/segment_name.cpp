@@ -1,4 +1,4 @@
-#include "o80/memory/segment_name.hpp"
+#include "memory/segment_name.hpp"
 
 #include <dirent.h>
 

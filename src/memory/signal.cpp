@@ -1,13 +1,13 @@
-#include "o80/memory/signal.hpp"
+#include "memory/signal.hpp"
 
 #include <time.h>
 
 #include <algorithm>
 #include <limits>
 
-#include "o80/base/crash_point.hpp"
+#include "base/crash_point.hpp"
+#include "memory/futex.hpp"
 #include "o80/base/error.hpp"
-#include "o80/memory/futex.hpp"
 
 namespace o80 {
 
@@ -18,7 +18,8 @@ constexpr Iteration kNoWish = std::numeric_limits<Iteration>::max();
 RowWaiter::RowWaiter(const AttachedSegment& segment, std::int64_t poll) noexcept
     : segment_(&segment), view_(segment.view()), poll_(std::max<std::int64_t>(poll, 1000)) {}
 
-Waited RowWaiter::wait_for_row(Iteration k, const Deadline& deadline, const Check& check) {
+Waited RowWaiter::wait_for_row(Iteration k, const Deadline& deadline,
+                               const KeepWaiting& keep_waiting) {
   segment_->check_process();
   const std::atomic<std::int64_t>& published = view_.counters().published;
   const auto ready = [&] {
@@ -37,7 +38,7 @@ Waited RowWaiter::wait_for_row(Iteration k, const Deadline& deadline, const Chec
     if (nap > 0 && !segment_->has_ended()) continue;
     look_at = monotonic_now() + kSlice;
     nap = kSlice;
-    if (check && !check())
+    if (keep_waiting && !keep_waiting())
       throw Cancelled("the wait for a row of segment '" + segment_->name() + "' was cancelled");
     // rows may have come before the end
     const bool gone = segment_->gone();

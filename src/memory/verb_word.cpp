@@ -1,4 +1,4 @@
-#include "o80/memory/verb_word.hpp"
+#include "memory/verb_word.hpp"
 
 #include <iterator>
 

@@ -4,8 +4,8 @@
 #include <cstring>
 #include <exception>
 
-#include "o80/robot/library.hpp"
 #include "o80/robot/run.hpp"
+#include "robot/library.hpp"
 
 int main(int argc, char** argv) {
   if (argc < 2 || std::strcmp(argv[1], "--help") == 0 || argv[1][0] == '-') {

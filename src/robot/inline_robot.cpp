@@ -1,4 +1,4 @@
-#include "o80/robot/inline_robot.hpp"
+#include "robot/inline_robot.hpp"
 
 #include <unistd.h>
 
@@ -6,8 +6,8 @@
 #include <atomic>
 #include <utility>
 
+#include "memory/futex.hpp"
 #include "o80/base/error.hpp"
-#include "o80/memory/futex.hpp"
 
 namespace o80 {
 
@@ -22,16 +22,16 @@ BackendOptions bursting(BackendOptions options) {
 }
 }  // namespace
 
-/// The right to run iterations: one thread at a time. Waiting for it asks `check`.
+/// The right to run iterations: one thread at a time. Waiting for it asks `keep_waiting`.
 class InlineRobot::Turn {
  public:
-  Turn(InlineRobot& robot, const Check& check) : robot_(robot) {
+  Turn(InlineRobot& robot, const KeepWaiting& keep_waiting) : robot_(robot) {
     std::atomic<std::uint32_t>& turn = robot.turn_;
     std::uint32_t free = 0;
     if (!turn.compare_exchange_strong(free, 1, std::memory_order_acquire)) {  // sync turn
       while (turn.exchange(2, std::memory_order_acquire) != 0) {              // sync turn
         futex_wait(turn, 2, kSlice);
-        if (check && !check()) {
+        if (keep_waiting && !keep_waiting()) {
           throw Cancelled("the wait for '" + robot.segment() + "' was cut by its caller");
         }
       }
@@ -51,16 +51,17 @@ class InlineRobot::Turn {
   InlineRobot& robot_;
 };
 
-InlineRobot::InlineRobot(std::unique_ptr<Robot> robot, BackendOptions options, Check check)
-    : check_(std::move(check)),
-      at_once_(check_ ? 1 : kMostAtOnce),
+InlineRobot::InlineRobot(std::unique_ptr<Robot> robot, BackendOptions options,
+                         KeepWaiting keep_waiting)
+    : keep_waiting_(std::move(keep_waiting)),
+      at_once_(keep_waiting_ ? 1 : kMostAtOnce),
       loop_(std::move(robot), bursting(std::move(options))) {
   loop_.start();
 }
 
 void InlineRobot::run() {
-  const Turn turn(*this, check_);
-  if (check_) looked_at_ = monotonic_now();
+  const Turn turn(*this, keep_waiting_);
+  if (keep_waiting_) looked_at_ = monotonic_now();
   Step step = Step::run;
   while (!stopping_ && (step = loop_.run_granted(at_once_)) == Step::run) look_around();
   if (stopping_) {
@@ -78,14 +79,14 @@ void InlineRobot::refuse_nested() const {
 
 /// Asks the check every slice of time; the slower the robot, the fewer iterations lie between.
 void InlineRobot::look_around() {
-  if (!check_) return;
+  if (!keep_waiting_) return;
   const std::int64_t now = monotonic_now();
   const std::int64_t took = now - std::exchange(looked_at_, now);
   at_once_ = took > kLongAtOnce ? std::max(1U, at_once_ / 2) : std::min(kMostAtOnce, at_once_ * 2);
   if (now < look_at_) return;
   look_at_ = now + kSlice;
   try {
-    if (!check_()) throw Cancelled("the burst of '" + segment() + "' was cut by its caller");
+    if (!keep_waiting_()) throw Cancelled("the burst of '" + segment() + "' was cut by its caller");
   } catch (...) {
     loop_.cut_burst();
     throw;

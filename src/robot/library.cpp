@@ -1,4 +1,4 @@
-#include "o80/robot/library.hpp"
+#include "robot/library.hpp"
 
 #include <dlfcn.h>
 
@@ -8,8 +8,8 @@
 #include <sstream>
 
 #include "o80/base/error.hpp"
-#include "o80/robot/robot.hpp"
-#include "trusted_library.hpp"
+#include "robot/robot.hpp"
+#include "robot/trusted_library.hpp"
 
 namespace o80 {
 

@@ -1,12 +1,13 @@
-#include "o80/robot/loop.hpp"
+#include "robot/loop.hpp"
 
 #include <algorithm>
 #include <bit>
 
+#include "base/short_text.hpp"
+#include "memory/signal.hpp"
+#include "memory/verb_word.hpp"
 #include "o80/base/error.hpp"
-#include "o80/base/short_text.hpp"
 #include "o80/base/time.hpp"
-#include "o80/memory/signal.hpp"
 
 namespace o80 {
 

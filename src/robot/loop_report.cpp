@@ -1,4 +1,4 @@
-#include "o80/robot/loop_report.hpp"
+#include "robot/loop_report.hpp"
 
 #include <pthread.h>
 #include <signal.h>
@@ -7,9 +7,9 @@
 #include <exception>
 #include <utility>
 
-#include "o80/base/printable.hpp"
+#include "base/printable.hpp"
+#include "memory/futex.hpp"
 #include "o80/base/time.hpp"
-#include "o80/memory/futex.hpp"
 #include "o80/runtime/frontend.hpp"
 
 namespace o80 {
@@ -63,8 +63,8 @@ LoopReport::~LoopReport() {
 void LoopReport::run() noexcept {
   try {
     // the loop may have ended before this thread began: nobody waits for a backend that never comes
-    const Check goes_on = [this] { return stop_.load(std::memory_order_acquire) == 0; };
-    const UntypedFrontend watcher(segment_, {.access = Access::read_only, .check = goes_on});
+    const KeepWaiting goes_on = [this] { return stop_.load(std::memory_order_acquire) == 0; };
+    const UntypedFrontend watcher(segment_, {.access = Access::read_only, .keep_waiting = goes_on});
     OverrunReport overruns;
     std::uint64_t halted = 0;
     while (stop_.load(std::memory_order_acquire) == 0) {

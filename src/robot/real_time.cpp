@@ -1,4 +1,4 @@
-#include "o80/robot/real_time.hpp"
+#include "robot/real_time.hpp"
 
 #include <alloca.h>
 #include <sched.h>
@@ -8,7 +8,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "o80/memory/liveness.hpp"
+#include "memory/liveness.hpp"
 
 namespace o80 {
 

@@ -1,4 +1,4 @@
-#include "o80/robot/robot.hpp"
+#include "robot/robot.hpp"
 
 #include <algorithm>
 #include <cstdio>

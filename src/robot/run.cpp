@@ -14,12 +14,12 @@
 #include <mutex>
 #include <thread>
 
+#include "control/number_name.hpp"
 #include "o80/base/error.hpp"
-#include "o80/control/number_name.hpp"
-#include "o80/robot/loop.hpp"
-#include "o80/robot/loop_report.hpp"
-#include "o80/robot/real_time.hpp"
-#include "o80/robot/run_options.hpp"
+#include "robot/loop.hpp"
+#include "robot/loop_report.hpp"
+#include "robot/real_time.hpp"
+#include "robot/run_options.hpp"
 
 namespace o80 {
 

@@ -1,4 +1,4 @@
-#include "o80/robot/run_options.hpp"
+#include "robot/run_options.hpp"
 
 #include <getopt.h>
 

@@ -1,4 +1,4 @@
-#include "trusted_library.hpp"
+#include "robot/trusted_library.hpp"
 
 #include <fcntl.h>
 #include <sys/auxv.h>

@@ -8,10 +8,10 @@
 #include <sstream>
 #include <string>
 
-#include "backend_body.hpp"
-#include "o80/base/crash_point.hpp"
-#include "o80/control/number_name.hpp"
-#include "o80/describe/table.hpp"
+#include "base/crash_point.hpp"
+#include "control/number_name.hpp"
+#include "describe/table.hpp"
+#include "runtime/backend_body.hpp"
 
 namespace o80 {
 

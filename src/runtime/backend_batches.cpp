@@ -4,8 +4,8 @@
 #include <cstring>
 #include <optional>
 
-#include "backend_body.hpp"
-#include "o80/memory/futex.hpp"
+#include "memory/futex.hpp"
+#include "runtime/backend_body.hpp"
 
 namespace o80 {
 

@@ -9,20 +9,22 @@
 #include <utility>
 #include <vector>
 
-#include "o80/base/short_text.hpp"
+#include "base/short_text.hpp"
+#include "control/controller.hpp"
+#include "control/error_watch.hpp"
+#include "memory/fork.hpp"
+#include "memory/halt_word.hpp"
+#include "memory/history.hpp"
+#include "memory/lane.hpp"
+#include "memory/liveness.hpp"
+#include "memory/owned_segment.hpp"
+#include "memory/signal.hpp"
+#include "memory/verb_word.hpp"
 #include "o80/base/time.hpp"
-#include "o80/control/controller.hpp"
-#include "o80/control/error_watch.hpp"
-#include "o80/memory/fork.hpp"
-#include "o80/memory/halt_word.hpp"
-#include "o80/memory/history.hpp"
-#include "o80/memory/lane.hpp"
-#include "o80/memory/liveness.hpp"
-#include "o80/memory/signal.hpp"
 #include "o80/runtime/backend.hpp"
-#include "o80/runtime/overrun_limit.hpp"
-#include "o80/runtime/schedule.hpp"
-#include "staging.hpp"
+#include "runtime/overrun_limit.hpp"
+#include "runtime/schedule.hpp"
+#include "runtime/staging.hpp"
 
 namespace o80 {
 

@@ -1,6 +1,6 @@
 // How a burst is granted, counted and ended.
 
-#include "backend_body.hpp"
+#include "runtime/backend_body.hpp"
 
 namespace o80 {
 

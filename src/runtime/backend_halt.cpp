@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
-#include "backend_body.hpp"
-#include "o80/base/short_text.hpp"
+#include "base/short_text.hpp"
+#include "runtime/backend_body.hpp"
 
 namespace o80 {
 

@@ -3,9 +3,9 @@
 #include <array>
 #include <iterator>
 
-#include "backend_body.hpp"
-#include "o80/base/short_text.hpp"
-#include "o80/memory/atomic_words.hpp"
+#include "base/short_text.hpp"
+#include "memory/atomic_words.hpp"
+#include "runtime/backend_body.hpp"
 
 namespace o80 {
 

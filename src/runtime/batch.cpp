@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <unordered_map>
 
+#include "base/printable.hpp"
+#include "memory/atomic_words.hpp"
 #include "o80/base/error.hpp"
-#include "o80/base/printable.hpp"
-#include "o80/memory/atomic_words.hpp"
+#include "runtime/link.hpp"
+#include "runtime/sent.hpp"
 
 namespace o80 {
 
@@ -151,10 +153,10 @@ std::string Batch::rejection() const {
   return handle.status == Status::rejected ? handle.text : "";
 }
 
-void Batch::wait(Timeout timeout, const Check& check) const {
+void Batch::wait(Timeout timeout, const KeepWaiting& keep_waiting) const {
   if (id_ == 0) return;  // an empty batch was never sent
   const Deadline deadline(timeout);
-  const Check guarded = link_->guarded(check);
+  const KeepWaiting guarded = link_->guarded(keep_waiting);
   const auto ended = [&] { return is_end(ask(id_ + 1).status); };
   if (lane_->wait_until(ended, deadline, guarded) == Waited::timed_out) {
     throw TimeoutError("the batch sent to '" + link_->segment.name() +
@@ -183,14 +185,15 @@ void Burst::cancel() const {
 }
 
 Iteration wait_for_burst(const Link& link, LaneSender& lane, CommandId id, Timeout timeout,
-                         const Check& check, std::optional<std::uint32_t> quiet) {
+                         const KeepWaiting& keep_waiting, std::optional<std::uint32_t> quiet) {
   link.segment.check_process();
   LaneSender::BurstAnswer answer{};
   const auto over = [&] {
     answer = lane.burst(id);
     return answer.known != LaneSender::Known::not_yet || is_rejected(lane, id);
   };
-  if (lane.wait_until(over, Deadline(timeout), link.guarded(check), quiet) == Waited::timed_out) {
+  if (lane.wait_until(over, Deadline(timeout), link.guarded(keep_waiting), quiet) ==
+      Waited::timed_out) {
     throw TimeoutError("the burst of '" + link.segment.name() +
                        "' was not done in time: give more time, or see whether another "
                        "frontend's burst comes before it");
@@ -226,8 +229,8 @@ void throw_rejected(const Link& link, const char* what, const Batch& batch) {
   throw Error(text);
 }
 
-Iteration Burst::wait_done(Timeout timeout, const Check& check) const {
-  return wait_for_burst(*link_, lane(), batch_.id(), timeout, check);
+Iteration Burst::wait_done(Timeout timeout, const KeepWaiting& keep_waiting) const {
+  return wait_for_burst(*link_, lane(), batch_.id(), timeout, keep_waiting);
 }
 
 void Burst::throw_if_failed() const {
@@ -248,9 +251,9 @@ void read_last_row(const Link& link, Iteration row, UntypedObservation& observat
   }
 }
 
-UntypedObservation Burst::wait(Timeout timeout, const Check& check) const {
+UntypedObservation Burst::wait(Timeout timeout, const KeepWaiting& keep_waiting) const {
   UntypedObservation observation(link_->description);  // made while the backend works
-  const Iteration row = wait_done(timeout, check);
+  const Iteration row = wait_done(timeout, keep_waiting);
   if (row < 0) throw_rejected(*link_, "burst", batch_);
   read_last_row(*link_, row, observation);
   return observation;

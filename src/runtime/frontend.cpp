@@ -1,5 +1,7 @@
 #include "o80/runtime/frontend.hpp"
 
+#include "runtime/link.hpp"
+
 #include <algorithm>
 #include <utility>
 
@@ -8,26 +10,24 @@ namespace o80 {
 UntypedFrontend::UntypedFrontend(const std::string& segment, const FrontendOptions& options) {
   AttachOptions attach;
   attach.dead = options.dead ? AttachOptions::Dead::accept : AttachOptions::Dead::wait;
-  attach.check = options.check;
+  attach.keep_waiting = options.keep_waiting;
   link_ = std::make_shared<Link>(
       AttachedSegment::attach(segment, options.access, Deadline(options.timeout), attach), nullptr);
-  check_ = std::make_unique<CommandCheck>(link_->description->schema);
 }
 
 UntypedFrontend::UntypedFrontend(const std::string& segment, std::shared_ptr<InlineRunner> runner)
     : link_(std::make_shared<Link>(
           AttachedSegment::attach(segment, Access::read_write, Deadline(std::chrono::seconds(5))),
-          std::move(runner))),
-      check_(std::make_unique<CommandCheck>(link_->description->schema)) {}
+          std::move(runner))) {}
 
 UntypedFrontend::UntypedFrontend(UntypedFrontend&&) noexcept = default;
 UntypedFrontend& UntypedFrontend::operator=(UntypedFrontend&& other) noexcept {
   // what was here closes with `other`
   std::swap(link_, other.link_);
-  std::swap(check_, other.check_);
-  std::swap(builder_, other.builder_);
   return *this;
 }
+
+const CommandCheck& UntypedFrontend::command_check() const { return link_->command_check; }
 
 UntypedFrontend::~UntypedFrontend() {
   if (link_) close();
@@ -48,7 +48,7 @@ Life UntypedFrontend::life() const {
 }
 
 std::uint32_t UntypedFrontend::actuator(std::string_view name) const {
-  return check_->actuator(name);
+  return link_->command_check.actuator(name);
 }
 
 std::uint32_t UntypedFrontend::request_index(std::string_view name) const {
@@ -100,12 +100,12 @@ void UntypedFrontend::missing(Iteration k) const {
 }
 
 void UntypedFrontend::wait_for(Iteration k, std::byte* row, Timeout timeout,
-                               const Check& check) const {
+                               const KeepWaiting& keep_waiting) const {
   link_->check_usable();
   if (k < 0) throw InvalidArgument("there is no row " + std::to_string(k) + ": rows begin at 0");
   if (k > link_->history.published()) {
     const Deadline deadline(timeout);
-    if (link_->rows.wait_for_row(k, deadline, link_->guarded(check)) == Waited::timed_out) {
+    if (link_->rows.wait_for_row(k, deadline, link_->guarded(keep_waiting)) == Waited::timed_out) {
       throw TimeoutError("row " + std::to_string(k) + " of '" + segment() +
                          "' was not there in time: it is at row " +
                          std::to_string(link_->history.published()) +
@@ -116,9 +116,9 @@ void UntypedFrontend::wait_for(Iteration k, std::byte* row, Timeout timeout,
 }
 
 UntypedObservation UntypedFrontend::wait_for(Iteration k, Timeout timeout,
-                                             const Check& check) const {
+                                             const KeepWaiting& keep_waiting) const {
   UntypedObservation observation(link_->description);
-  wait_for(k, observation.bytes(), timeout, check);
+  wait_for(k, observation.bytes(), timeout, keep_waiting);
   return observation;
 }
 
@@ -146,12 +146,13 @@ Rows UntypedFrontend::history(std::size_t n) const {
 }
 
 std::int64_t UntypedFrontend::wait_for_next(Iteration& position, std::byte* row, Timeout timeout,
-                                            const Check& check) const {
+                                            const KeepWaiting& keep_waiting) const {
   link_->check_usable();
   const Iteration wanted = position;
   if (wanted > link_->history.published()) {
     const Deadline deadline(timeout);
-    if (link_->rows.wait_for_row(wanted, deadline, link_->guarded(check)) == Waited::timed_out) {
+    if (link_->rows.wait_for_row(wanted, deadline, link_->guarded(keep_waiting)) ==
+        Waited::timed_out) {
       throw TimeoutError("row " + std::to_string(wanted) + " of '" + segment() +
                          "' was not there in time");
     }
@@ -173,7 +174,7 @@ void UntypedFrontend::close() {
   // batches that are still asked keep their statuses, not the lane
   if (link_->lane_) link_->lane_->give_back();
   link_->lane_.reset();
-  builder_.clear();
+  link_->builder.clear();
   link_->runner.reset();
 }
 

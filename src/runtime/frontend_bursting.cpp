@@ -5,6 +5,8 @@
 #include <set>
 
 #include "o80/runtime/frontend.hpp"
+#include "runtime/link.hpp"
+#include "runtime/sent.hpp"
 
 namespace o80 {
 
@@ -29,21 +31,21 @@ class CancelUnlessDone {
 }  // namespace
 
 UntypedObservation UntypedFrontend::pulse_and_wait(Timeout timeout, const PulseOptions& options,
-                                                   const Check& check) {
-  return wait_for_end(pulse_to_end(options), timeout, check);
+                                                   const KeepWaiting& keep_waiting) {
+  return wait_for_end(pulse_to_end(options), timeout, keep_waiting);
 }
 
 UntypedObservation UntypedFrontend::wait_for_end(const Batch& batch, Timeout timeout,
-                                                 const Check& check) const {
+                                                 const KeepWaiting& keep_waiting) const {
   UntypedObservation observation(link_->description);
   Iteration last = -1;
   if (batch.id() != 0 && bursting()) {
     CancelUnlessDone rest(batch.lane_.get(), batch.id());
-    last = Burst(link_, batch).wait_done(timeout, check);
+    last = Burst(link_, batch).wait_done(timeout, keep_waiting);
     rest.done();
     link_->check_usable();
   } else {
-    batch.wait(timeout, check);
+    batch.wait(timeout, keep_waiting);
     last = batch.last_iteration();
   }
   if (!batch.rejection().empty()) throw_rejected(*link_, "batch", batch);
@@ -68,7 +70,7 @@ Sent UntypedFrontend::send_burst(std::int64_t iterations, const PulseOptions& op
   refuse_burst(iterations);
   BatchRecord record = batch_of(options);
   record.burst = iterations;
-  return send(builder_, record);
+  return send(link_->builder, record);
 }
 
 Burst UntypedFrontend::start_burst(std::int64_t iterations, const PulseOptions& options) {
@@ -76,21 +78,25 @@ Burst UntypedFrontend::start_burst(std::int64_t iterations, const PulseOptions& 
 }
 
 UntypedObservation UntypedFrontend::burst(std::int64_t iterations, Timeout timeout,
-                                          const Check& check, const PulseOptions& options) {
-  // as start_burst(iterations).wait(timeout, check), without what only a later question needs
+                                          const KeepWaiting& keep_waiting,
+                                          const PulseOptions& options) {
+  // as start_burst(iterations).wait(timeout, keep_waiting), without what only a later question
+  // needs
   const Sent sent = send_burst(iterations, options);
   CancelUnlessDone rest(sent.lane.get(), sent.id);
   UntypedObservation observation(link_->description);  // made while the backend works
-  const Iteration row = wait_for_burst(*link_, *sent.lane, sent.id, timeout, check, sent.quiet);
+  const Iteration row =
+      wait_for_burst(*link_, *sent.lane, sent.id, timeout, keep_waiting, sent.quiet);
   rest.done();
   link_->check_usable();  // its close ends a burst too
-  if (row < 0) return Burst(link_, Batch(link_, sent)).wait(timeout, check);  // says why
+  if (row < 0) return Burst(link_, Batch(link_, sent)).wait(timeout, keep_waiting);  // says why
   read_last_row(*link_, row, observation);
   return observation;
 }
 
 Iteration UntypedFrontend::burst_rows(std::span<std::byte> rows, Timeout timeout,
-                                      const Check& check, const PulseOptions& options) {
+                                      const KeepWaiting& keep_waiting,
+                                      const PulseOptions& options) {
   const std::size_t count = rows.size() / layout().size;
   if (count > link_->history.rows()) {
     throw InvalidArgument("the " + std::to_string(count) + " rows of a burst of '" + segment() +
@@ -99,10 +105,11 @@ Iteration UntypedFrontend::burst_rows(std::span<std::byte> rows, Timeout timeout
   }
   const Sent sent = send_burst(static_cast<std::int64_t>(count), options);
   CancelUnlessDone rest(sent.lane.get(), sent.id);
-  const Iteration last = wait_for_burst(*link_, *sent.lane, sent.id, timeout, check, sent.quiet);
+  const Iteration last =
+      wait_for_burst(*link_, *sent.lane, sent.id, timeout, keep_waiting, sent.quiet);
   rest.done();
   link_->check_usable();
-  if (last < 0) Burst(link_, Batch(link_, sent)).wait(timeout, check);  // says why
+  if (last < 0) Burst(link_, Batch(link_, sent)).wait(timeout, keep_waiting);  // says why
   const Iteration first = last + 1 - static_cast<Iteration>(count);
   if (link_->history.read_range(first, count, rows.data()).count != count) {
     throw RowOverwritten("rows " + std::to_string(first) + " to " + std::to_string(last) + " of '" +
@@ -121,8 +128,8 @@ void UntypedFrontend::refuse_unless_ready(std::int64_t iterations) {
   link_->segment.throw_if_gone();
   BatchRecord wanted;
   wanted.burst = iterations;
-  refuse_if_too_much(builder_);
-  refuse_if_full(builder_, wanted, *link_->lane());
+  refuse_if_too_much(link_->builder);
+  refuse_if_full(link_->builder, wanted, *link_->lane());
 }
 
 std::vector<Burst> start_bursts(std::span<const BurstMember> group) {
@@ -149,7 +156,7 @@ std::vector<Burst> start_bursts(std::span<const BurstMember> group) {
 }
 
 std::vector<UntypedObservation> wait_for(std::span<const Burst> bursts, Timeout timeout,
-                                         const Check& check) {
+                                         const KeepWaiting& keep_waiting) {
   const Deadline deadline(timeout);
   const auto left = [&] {
     return timeout ? Timeout(std::chrono::nanoseconds(
@@ -158,9 +165,9 @@ std::vector<UntypedObservation> wait_for(std::span<const Burst> bursts, Timeout 
   };
   // a member may fail while an earlier one runs on
   const auto look_at_all = [&] { std::ranges::for_each(bursts, &Burst::throw_if_failed); };
-  const Check watch = [&] {
+  const KeepWaiting watch = [&] {
     look_at_all();
-    return !check || check();
+    return !keep_waiting || keep_waiting();
   };
   std::vector<UntypedObservation> observations;
   observations.reserve(bursts.size());
@@ -181,9 +188,9 @@ std::vector<UntypedObservation> wait_for(std::span<const Burst> bursts, Timeout 
 }
 
 std::vector<UntypedObservation> burst(std::span<const BurstMember> group, Timeout timeout,
-                                      const Check& check) {
+                                      const KeepWaiting& keep_waiting) {
   const std::vector<Burst> bursts = start_bursts(group);
-  return wait_for(bursts, timeout, check);
+  return wait_for(bursts, timeout, keep_waiting);
 }
 
 }  // namespace o80

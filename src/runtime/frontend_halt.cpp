@@ -1,7 +1,8 @@
 // How a frontend halts, resumes and shows life.
 
-#include "o80/memory/segment_file.hpp"
+#include "memory/segment_file.hpp"
 #include "o80/runtime/frontend.hpp"
+#include "runtime/link.hpp"
 
 namespace o80 {
 
@@ -38,14 +39,15 @@ std::optional<Halt> UntypedFrontend::halted() const {
   return link_->halt();
 }
 
-void UntypedFrontend::resume(std::uint64_t number, Timeout timeout, const Check& check) {
+void UntypedFrontend::resume(std::uint64_t number, Timeout timeout,
+                             const KeepWaiting& keep_waiting) {
   const Deadline deadline(timeout);
   while (true) {
-    wait_for_rest(number, deadline, check);
+    wait_for_rest(number, deadline, keep_waiting);
     BatchBuilder builder;
     builder.resume(number);
     const Batch batch = pulse(builder);
-    batch.wait(left_of(deadline, timeout), check);
+    batch.wait(left_of(deadline, timeout), keep_waiting);
     const Handle handle = batch.handle(0);
     if (handle.status == Status::completed) return;
     // at rest, the backend may still have to end what was scheduled before the halt
@@ -55,18 +57,18 @@ void UntypedFrontend::resume(std::uint64_t number, Timeout timeout, const Check&
     if (!is_early) {
       throw BackendHalted("'" + segment() + "' does not resume: " + handle.text);
     }
-    link_->rows.wait_for_row(published() + 1, deadline, link_->guarded(check));
+    link_->rows.wait_for_row(published() + 1, deadline, link_->guarded(keep_waiting));
   }
 }
 
 /// In real time: until the halt is latched and the robot has come to rest, as rows tell. Returns at
 /// once if another halt acts, or none: the backend knows what to say.
 void UntypedFrontend::wait_for_rest(std::uint64_t number, const Deadline& deadline,
-                                    const Check& check) {
+                                    const KeepWaiting& keep_waiting) {
   link_->check_usable();
   if (bursting()) return;
   // rows may come faster than a wait for one of them looks around
-  const Check goes_on = link_->guarded(check);
+  const KeepWaiting goes_on = link_->guarded(keep_waiting);
   while (true) {
     const bool is_called_off = !goes_on();
     const std::optional<Halt> acting = link_->halt();
@@ -92,9 +94,9 @@ void UntypedFrontend::keep_alive() {
 }
 
 std::uint64_t halt(const std::string& segment, std::string_view reason, Timeout timeout,
-                   const Check& check) {
+                   const KeepWaiting& keep_waiting) {
   AttachOptions options;
-  options.check = check;
+  options.keep_waiting = keep_waiting;
   options.starting = true;
   const Deadline deadline(timeout);
   while (true) {

@@ -4,7 +4,9 @@
 #include <limits>
 
 #include "o80/runtime/frontend.hpp"
-#include "o80/runtime/schedule.hpp"
+#include "runtime/link.hpp"
+#include "runtime/schedule.hpp"
+#include "runtime/sent.hpp"
 
 namespace o80 {
 
@@ -84,16 +86,17 @@ RecordHead UntypedFrontend::checked_command(std::uint32_t actuator,
                                             std::span<const std::byte> state,
                                             const CommandOptions& options,
                                             std::span<const std::uint64_t> mask) const {
-  const std::uint32_t index = check_->actuator(std::int64_t{actuator});
-  check_->targets(index, state, mask);
+  const std::uint32_t index = link_->command_check.actuator(std::int64_t{actuator});
+  link_->command_check.targets(index, state, mask);
   check_options(options);
   CommandOptions paced = options;
   if (paced.pace.pace == Pace::direct && paced.on_limit == OnLimit::go_on) paced.pace = fastest();
   check_pace(paced.pace, 1);
-  if (paced.pace.pace == Pace::speed) check_->speed(index, paced.pace.per_second, mask);
-  if (paced.pace.pace == Pace::fastest) check_->fastest(index, mask);
-  if (paced.pace.pace == Pace::direct) check_->direct(index, state, mask);
-  return head_of(index, paced, check_->profile(index));
+  if (paced.pace.pace == Pace::speed)
+    link_->command_check.speed(index, paced.pace.per_second, mask);
+  if (paced.pace.pace == Pace::fastest) link_->command_check.fastest(index, mask);
+  if (paced.pace.pace == Pace::direct) link_->command_check.direct(index, state, mask);
+  return head_of(index, paced, link_->command_check.profile(index));
 }
 
 std::uint32_t UntypedFrontend::add_command(std::uint32_t actuator, std::span<const std::byte> state,
@@ -101,7 +104,7 @@ std::uint32_t UntypedFrontend::add_command(std::uint32_t actuator, std::span<con
                                            std::span<const std::uint64_t> mask) {
   const RecordHead head = checked_command(actuator, state, options, mask);
   const auto lock = link_->lock_to_send();
-  return builder_.command(head, mask, {}, 1, state);
+  return link_->builder.command(head, mask, {}, 1, state);
 }
 
 std::size_t UntypedFrontend::size_of_state(std::uint32_t actuator) const {
@@ -124,8 +127,8 @@ std::uint32_t UntypedFrontend::add_commands(std::span<const std::uint32_t> actua
   std::size_t bytes = 0;
   std::size_t words = 0;
   for (const std::uint32_t actuator : actuators) {
-    bytes += size_of_state(check_->actuator(std::int64_t{actuator}));
-    words += check_->words_of_mask(actuator);
+    bytes += size_of_state(link_->command_check.actuator(std::int64_t{actuator}));
+    words += link_->command_check.words_of_mask(actuator);
   }
   refuse_twice(actuators);
   const auto refuse_size = [&](const char* what, std::size_t given, std::size_t wanted,
@@ -139,23 +142,24 @@ std::uint32_t UntypedFrontend::add_commands(std::span<const std::uint32_t> actua
   if (!masks.empty()) refuse_size("masks", masks.size(), words, "words");
 
   const auto lock = link_->lock_to_send();
-  members_.clear();
+  link_->members.clear();
   Profile profile = Profile::linear;
   for (const std::uint32_t actuator : actuators) {
     const auto state = states.first(size_of_state(actuator));
-    const auto mask = masks.first(masks.empty() ? 0 : check_->words_of_mask(actuator));
-    members_.push_back({checked_command(actuator, state, options, mask), mask, state});
-    if (members_.back().head.profile == Profile::minimum_jerk) profile = Profile::minimum_jerk;
+    const auto mask = masks.first(masks.empty() ? 0 : link_->command_check.words_of_mask(actuator));
+    link_->members.push_back({checked_command(actuator, state, options, mask), mask, state});
+    if (link_->members.back().head.profile == Profile::minimum_jerk)
+      profile = Profile::minimum_jerk;
     states = states.subspan(state.size());
     masks = masks.subspan(mask.size());
   }
   // they move in one way: smoothly if one of them does
-  for (BatchBuilder::Member& member : members_) member.head.profile = profile;
-  if (members_.size() == 1) {
-    const BatchBuilder::Member& only = members_.front();
-    return builder_.command(only.head, only.mask, {}, 1, only.states);
+  for (BatchBuilder::Member& member : link_->members) member.head.profile = profile;
+  if (link_->members.size() == 1) {
+    const BatchBuilder::Member& only = link_->members.front();
+    return link_->builder.command(only.head, only.mask, {}, 1, only.states);
   }
-  return builder_.group(members_);
+  return link_->builder.group(link_->members);
 }
 
 /// Checks a trajectory; its options, with the pace that follows from its times.
@@ -163,9 +167,9 @@ CommandOptions UntypedFrontend::checked_trajectory(std::uint32_t actuator, std::
                                                    std::span<const std::byte> states,
                                                    const CommandOptions& options,
                                                    std::span<const std::int64_t> times) const {
-  const std::uint32_t index = check_->actuator(std::int64_t{actuator});
+  const std::uint32_t index = link_->command_check.actuator(std::int64_t{actuator});
   if (rows == 0) throw InvalidArgument("the trajectory has no row");
-  check_->targets(index, states);
+  link_->command_check.targets(index, states);
   CommandOptions paced = options;
   // no trajectory is direct: its last state does not stay
   if (paced.pace.pace == Pace::direct) paced.pace = iterations(1);
@@ -176,8 +180,8 @@ CommandOptions UntypedFrontend::checked_trajectory(std::uint32_t actuator, std::
     throw InvalidArgument("a trajectory at a duration needs the times of its rows");
   }
   check_pace(paced.pace, rows);
-  if (paced.pace.pace == Pace::speed) check_->speed(index, paced.pace.per_second);
-  if (paced.pace.pace == Pace::fastest) check_->fastest(index);
+  if (paced.pace.pace == Pace::speed) link_->command_check.speed(index, paced.pace.per_second);
+  if (paced.pace.pace == Pace::fastest) link_->command_check.fastest(index);
   return paced;
 }
 
@@ -202,54 +206,55 @@ std::uint32_t UntypedFrontend::add_trajectories(std::span<const std::uint32_t> a
   const std::span<const std::int64_t> ends = rows > 1 ? times : std::span<const std::int64_t>{};
   const auto lock = link_->lock_to_send();
   if (actuators.size() == 1) {
-    return builder_.command(head_of(actuators[0], paced, Profile::linear), {}, ends, rows, states);
+    return link_->builder.command(head_of(actuators[0], paced, Profile::linear), {}, ends, rows,
+                                  states);
   }
-  members_.clear();
+  link_->members.clear();
   for (std::size_t i = 0; i < actuators.size(); ++i) {
-    members_.push_back(
+    link_->members.push_back(
         {head_of(actuators[i], paced, Profile::linear), {}, states.subspan(i * each, each)});
   }
-  return builder_.group(members_, ends, rows);
+  return link_->builder.group(link_->members, ends, rows);
 }
 
 std::uint32_t UntypedFrontend::add_purge(std::uint32_t actuator) {
-  if (actuator != kEveryActuator) check_->actuator(std::int64_t{actuator});
+  if (actuator != kEveryActuator) link_->command_check.actuator(std::int64_t{actuator});
   const auto lock = link_->lock_to_send();
-  return builder_.purge(static_cast<std::uint16_t>(actuator));
+  return link_->builder.purge(static_cast<std::uint16_t>(actuator));
 }
 
 std::uint32_t UntypedFrontend::add_purge_own() {
   const auto lock = link_->lock_to_send();
-  return builder_.purge_own(kEveryActuator);
+  return link_->builder.purge_own(kEveryActuator);
 }
 
 std::uint32_t UntypedFrontend::add_request(std::uint32_t request,
                                            std::span<const std::byte> payload) {
-  check_->request(request, payload);
+  link_->command_check.request(request, payload);
   const auto lock = link_->lock_to_send();
-  return builder_.request(static_cast<std::uint16_t>(request), payload);
+  return link_->builder.request(static_cast<std::uint16_t>(request), payload);
 }
 
 std::uint32_t UntypedFrontend::add_take_control() {
   const auto lock = link_->lock_to_send();
-  return builder_.take_control();
+  return link_->builder.take_control();
 }
 
 std::uint32_t UntypedFrontend::add_release_control() {
   const auto lock = link_->lock_to_send();
-  return builder_.release_control();
+  return link_->builder.release_control();
 }
 
 std::size_t UntypedFrontend::added() const {
   link_->segment.check_process();
   const std::scoped_lock lock(link_->sending);
-  return builder_.records();
+  return link_->builder.records();
 }
 
 void UntypedFrontend::forget_added() {
   link_->segment.check_process();
   const std::scoped_lock lock(link_->sending);
-  builder_.clear();
+  link_->builder.clear();
 }
 
 // ------------------------------------------------------------------------------ sending
@@ -387,9 +392,9 @@ Batch UntypedFrontend::pulse(const PulseOptions& options, std::uint16_t flags) {
   record.flags = flags;
   {
     const auto lock = link_->lock_to_send();
-    if (builder_.empty()) return {};
+    if (link_->builder.empty()) return {};
   }
-  return {link_, send(builder_, record)};
+  return {link_, send(link_->builder, record)};
 }
 
 Batch UntypedFrontend::pulse(BatchBuilder& batch) {

@@ -1,9 +1,9 @@
-#include "o80/runtime/link.hpp"
+#include "runtime/link.hpp"
 
 #include <algorithm>
 
-#include "o80/base/printable.hpp"
-#include "o80/describe/table.hpp"
+#include "base/printable.hpp"
+#include "describe/table.hpp"
 
 namespace o80 {
 
@@ -25,6 +25,7 @@ std::shared_ptr<const Description> describe(const AttachedSegment& segment) {
 Link::Link(AttachedSegment attached, std::shared_ptr<InlineRunner> inline_runner)
     : segment(std::move(attached)),
       description(describe(segment)),
+      command_check(description->schema),
       history(segment.view()),
       rows(segment),
       runner(std::move(inline_runner)),
@@ -83,12 +84,12 @@ std::string Link::halt_text(Iteration iteration) const {
   return text;
 }
 
-Check Link::guarded(const Check& check) const {
-  return [this, &check] {
+KeepWaiting Link::guarded(const KeepWaiting& keep_waiting) const {
+  return [this, &keep_waiting] {
     if (closed.load(std::memory_order_relaxed)) {
       throw Closed("the frontend of '" + segment.name() + "' was closed while it waited");
     }
-    return !check || check();
+    return !keep_waiting || keep_waiting();
   };
 }
 

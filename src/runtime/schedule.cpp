@@ -1,4 +1,4 @@
-#include "o80/runtime/schedule.hpp"
+#include "runtime/schedule.hpp"
 
 #include <algorithm>
 

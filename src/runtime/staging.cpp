@@ -1,4 +1,4 @@
-#include "staging.hpp"
+#include "runtime/staging.hpp"
 
 #include <algorithm>
 #include <cstddef>

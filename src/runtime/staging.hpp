@@ -5,10 +5,10 @@
 #include <span>
 #include <vector>
 
-#include "o80/control/controller.hpp"
-#include "o80/control/pool.hpp"
-#include "o80/memory/lane_receiver.hpp"
-#include "o80/runtime/schedule.hpp"
+#include "control/controller.hpp"
+#include "control/pool.hpp"
+#include "memory/lane_receiver.hpp"
+#include "runtime/schedule.hpp"
 
 namespace o80 {
 

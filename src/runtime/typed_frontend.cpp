@@ -1,5 +1,7 @@
 #include "o80/runtime/typed_frontend.hpp"
 
+#include "describe/table.hpp"
+
 namespace o80 {
 
 void check_types(const Schema& expected, const Schema& found, const std::string& segment) {

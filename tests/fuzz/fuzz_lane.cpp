@@ -12,15 +12,16 @@
 #include <string>
 #include <vector>
 
+#include "control/batch_builder.hpp"
 #include "fuzz/bytes.hpp"
 #include "fuzz/robot.hpp"
+#include "memory/atomic_words.hpp"
+#include "memory/lane.hpp"
+#include "memory/liveness.hpp"
 #include "o80/base/error.hpp"
-#include "o80/control/batch_builder.hpp"
-#include "o80/memory/atomic_words.hpp"
-#include "o80/memory/lane.hpp"
-#include "o80/memory/liveness.hpp"
 #include "o80/runtime/backend.hpp"
 #include "o80/runtime/frontend.hpp"
+#include "runtime/link.hpp"
 
 namespace o80::fuzz {
 namespace {

@@ -6,14 +6,14 @@
 #include <cstring>
 #include <vector>
 
+#include "control/controller.hpp"
+#include "control/limits.hpp"
+#include "control/pool.hpp"
+#include "describe/table.hpp"
 #include "fuzz/bytes.hpp"
 #include "fuzz/robot.hpp"
 #include "o80/base/error.hpp"
-#include "o80/control/controller.hpp"
-#include "o80/control/limits.hpp"
-#include "o80/control/pool.hpp"
 #include "o80/describe/layout.hpp"
-#include "o80/describe/table.hpp"
 
 namespace o80::fuzz {
 namespace {

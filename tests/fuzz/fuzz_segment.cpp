@@ -15,16 +15,17 @@
 #include <utility>
 #include <vector>
 
+#include "describe/table.hpp"
 #include "fuzz/bytes.hpp"
 #include "fuzz/robot.hpp"
+#include "memory/segment.hpp"
+#include "memory/segment_file.hpp"
+#include "memory/segment_name.hpp"
 #include "o80/base/error.hpp"
-#include "o80/describe/table.hpp"
-#include "o80/memory/segment.hpp"
-#include "o80/memory/segment_file.hpp"
-#include "o80/memory/segment_name.hpp"
 #include "o80/runtime/backend.hpp"
 #include "o80/runtime/frontend.hpp"
 #include "o80/runtime/typed_frontend.hpp"
+#include "runtime/link.hpp"
 
 namespace o80::fuzz {
 namespace {

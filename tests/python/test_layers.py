@@ -8,7 +8,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 LAYERS = ("base", "describe", "memory", "control", "runtime", "robot")
-INCLUDE = re.compile(r'^#include "o80/(\w+)/', re.MULTILINE)
+INCLUDE = re.compile(r'^#include "(?:o80/)?(\w+)/', re.MULTILINE)
+PUBLIC = re.compile(r'^#include "(o80/.*)"', re.MULTILINE)
 
 
 def sources(layer: str) -> Iterator[Path]:
@@ -36,3 +37,34 @@ def test_every_folder_of_the_core_is_a_layer() -> None:
     folders = {file.name for file in (ROOT / "include" / "o80").iterdir() if file.is_dir()}
 
     assert folders <= set(LAYERS)
+
+
+def reached_from(header: str) -> set[str]:
+    """The public headers that this one includes, and those that they include."""
+    reached: set[str] = set()
+    waiting = [header]
+    while waiting:
+        name = waiting.pop()
+        if name not in reached:
+            reached.add(name)
+            waiting += PUBLIC.findall((ROOT / "include" / name).read_text())
+    return reached
+
+
+def test_public_headers_include_only_public_headers() -> None:
+    includes = re.compile(r'^#include "(.*)"', re.MULTILINE)
+
+    private = [
+        f"{file.relative_to(ROOT)} includes {used}"
+        for file in (ROOT / "include").rglob("*.hpp")
+        for used in includes.findall(file.read_text())
+        if not (ROOT / "include" / used).is_file()
+    ]
+
+    assert not private
+
+
+def test_every_public_header_is_reached_from_the_umbrella() -> None:
+    public = {str(file.relative_to(ROOT / "include")) for file in (ROOT / "include").rglob("*.hpp")}
+
+    assert public == reached_from("o80/o80.hpp")

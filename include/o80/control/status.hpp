@@ -1,30 +1,48 @@
 #pragma once
 
 #include <cstdint>
-
-#include "o80/control/record.hpp"
+#include <string_view>
 
 namespace o80 {
 
-/// A record or a batch has changed its status.
-struct StatusChange {
-  std::uint32_t lane = 0;
-  CommandId id = 0;
-  Status status = Status::none;
-  Reason reason = Reason::none;
-  std::uint8_t aux = 0;  // of exclusive: the lane that has control
-  Iteration iteration = 0;
+/// Names a command, a request or a batch within its lane: from 1, never used twice.
+using CommandId = std::uint64_t;
+
+/// The progress of a command or a request; every one ends with one of those from `completed` on.
+enum class Status : std::uint8_t {
+  none,
+  queued,
+  active,
+  completed,
+  limited,  // completed, but clamped at its last iteration
+  overwritten,
+  purged,
+  interrupted,
+  rejected,
+  forgotten,  // asked too late: only a frontend says so
+  halted
 };
 
-/// Where the controller tells what became of commands and batches.
-class StatusSink {
- public:
-  virtual void changed(const StatusChange& change) noexcept = 0;
-  /// So many blocks of a lane went back to the pool: of a record, or a batch's own.
-  virtual void freed(std::uint32_t lane, std::uint32_t blocks) noexcept = 0;
-
- protected:
-  ~StatusSink() = default;
+/// Why a status is what it is.
+enum class Reason : std::uint8_t {
+  none,
+  late,
+  exclusive,  // another lane has control, aux says which
+  invalid,    // garbage in the lane
+  limits,
+  driver,  // the text is the driver's
+  fresh_start,
+  dead_frontend,
+  silence,
+  stopped,
+  halted,
+  full  // more of its kind wait already than one lane may have
 };
+
+std::string_view to_text(Status status) noexcept;
+std::string_view to_text(Reason reason) noexcept;
+
+/// Whether a command with this status changes no more.
+constexpr bool is_end(Status status) noexcept { return status >= Status::completed; }
 
 }  // namespace o80

@@ -9,14 +9,16 @@
 #include <string>
 #include <string_view>
 
+#include "o80/base/time.hpp"
 #include "o80/describe/layout.hpp"
 #include "o80/describe/schema.hpp"
-#include "o80/memory/halt_word.hpp"
-#include "o80/memory/segment.hpp"
-#include "o80/memory/verb_word.hpp"
+#include "o80/memory/halt.hpp"
+#include "o80/memory/life.hpp"
 #include "o80/runtime/request_server.hpp"
 
 namespace o80 {
+
+enum class Verb : std::uint8_t;
 
 /// Everything about a backend that is not its robot.
 struct BackendOptions {

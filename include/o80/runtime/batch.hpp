@@ -2,16 +2,20 @@
 
 #include <cstdint>
 #include <memory>
-#include <mutex>
-#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "o80/control/record.hpp"
-#include "o80/memory/segment.hpp"
-#include "o80/runtime/link.hpp"
+#include "o80/base/keep_waiting.hpp"
+#include "o80/base/time.hpp"
+#include "o80/control/status.hpp"
+#include "o80/runtime/observation.hpp"
 
 namespace o80 {
+
+class LaneSender;
+struct Link;
+struct Sent;
 
 /// What became of one command or request.
 struct Handle {
@@ -20,14 +24,6 @@ struct Handle {
   Reason reason = Reason::none;
   Iteration iteration = -1;  // at which the status changed; -1 while it is queued
   std::string text;          // of a rejection: why, in words
-};
-
-/// What has just been sent.
-struct Sent {
-  std::shared_ptr<LaneSender> lane;
-  CommandId id = 0;
-  std::uint32_t records = 0;
-  std::uint32_t quiet = 0;  // the lane's events before
 };
 
 /// What one pulse sent: to be waited for, and asked what became of it.
@@ -56,7 +52,7 @@ class Batch {
   /// Waits until every record has an end status and, in real time, the row of that iteration is
   /// there (a bursting backend may stand still before it).
   /// Throws TimeoutError, BackendGone, Cancelled.
-  void wait(Timeout timeout, const Check& check = {}) const;
+  void wait(Timeout timeout, const KeepWaiting& keep_waiting = {}) const;
 
  private:
   friend class Burst;
@@ -70,18 +66,6 @@ class Batch {
   std::uint32_t records_ = 0;
   std::shared_ptr<Kept> kept_;
 };
-
-/// Waits until the last iteration of a burst just sent, or sent before, is done; its row, or -1 if
-/// its batch was rejected. Throws TimeoutError, BackendGone, BackendHalted if it was cut,
-/// Cancelled.
-Iteration wait_for_burst(const Link& link, LaneSender& lane, CommandId id, Timeout timeout,
-                         const Check& check, std::optional<std::uint32_t> quiet = {});
-/// Throws BackendHalted if a halt ended some command of a batch that has ended.
-void throw_if_halted(const Link& link, const Batch& batch);
-/// Throws Error, or BackendHalted, with the reason why a batch was rejected.
-[[noreturn]] void throw_rejected(const Link& link, const char* what, const Batch& batch);
-/// Copies the row that this returned.
-void read_last_row(const Link& link, Iteration row, UntypedObservation& observation);
 
 /// A burst under way.
 class Burst {
@@ -98,11 +82,11 @@ class Burst {
   void cancel() const;
   /// Waits until the last iteration of the burst is done; its row, or -1 if the batch was rejected.
   /// Throws TimeoutError, BackendGone, Cancelled.
-  Iteration wait_done(Timeout timeout, const Check& check = {}) const;
+  Iteration wait_done(Timeout timeout, const KeepWaiting& keep_waiting = {}) const;
   /// Waits for the last iteration of the burst and returns its row. It may be waited for again
   /// after a timeout.
   /// Throws TimeoutError, BackendGone, Cancelled, Error if the batch was rejected.
-  UntypedObservation wait(Timeout timeout, const Check& check = {}) const;
+  UntypedObservation wait(Timeout timeout, const KeepWaiting& keep_waiting = {}) const;
   /// Throws what `wait` would throw for a burst that can no longer be done: BackendHalted,
   /// BackendGone, Closed, Error if its batch was rejected. Does not wait.
   void throw_if_failed() const;

@@ -11,20 +11,30 @@
 #include <utility>
 #include <vector>
 
-#include "o80/control/limits.hpp"
-#include "o80/memory/halt_word.hpp"
+#include "o80/base/error.hpp"
+#include "o80/base/keep_waiting.hpp"
+#include "o80/base/time.hpp"
+#include "o80/control/command.hpp"
+#include "o80/memory/access.hpp"
+#include "o80/memory/halt.hpp"
+#include "o80/memory/life.hpp"
 #include "o80/runtime/batch.hpp"
-#include "o80/runtime/command.hpp"
-#include "o80/runtime/link.hpp"
 #include "o80/runtime/observation.hpp"
 
 namespace o80 {
 
+class BatchBuilder;
+class CommandCheck;
+class InlineRunner;
+class LaneSender;
+struct BatchRecord;
+struct RecordHead;
+
 struct FrontendOptions {
   Timeout timeout = std::chrono::seconds(5);  // to wait for the backend
   Access access = Access::read_write;
-  bool dead = false;  // attach also to a backend that is gone, to read its history
-  Check check = {};   // asked in every wait; false ends it
+  bool dead = false;              // attach also to a backend that is gone, to read its history
+  KeepWaiting keep_waiting = {};  // asked in every wait; false ends it
 };
 
 class UntypedFrontend;
@@ -58,7 +68,7 @@ class UntypedFrontend {
   std::uint32_t actuator(std::string_view name) const;
   std::uint32_t request_index(std::string_view name) const;
   /// Refuses what the robot cannot follow, as the verbs below do.
-  const CommandCheck& check() const { return *check_; }
+  const CommandCheck& command_check() const;
 
   // what the next pulse sends; each returns its place in the batch
   /// Adds a command. `mask` has a bit for each number of the state that is given; empty: all.
@@ -102,20 +112,21 @@ class UntypedFrontend {
   Batch pulse_to_end(const PulseOptions& options = {});
   /// Waits for the end of such a batch and returns the row of its last iteration.
   UntypedObservation wait_for_end(const Batch& batch, Timeout timeout,
-                                  const Check& check = {}) const;
+                                  const KeepWaiting& keep_waiting = {}) const;
   /// Both at once.
   UntypedObservation pulse_and_wait(Timeout timeout, const PulseOptions& options = {},
-                                    const Check& check = {});
+                                    const KeepWaiting& keep_waiting = {});
   /// Sends what was added and lets a bursting backend run n iterations, from now on also if the
   /// batch is to be taken later: at an iteration of the burst, say.
   Burst start_burst(std::int64_t iterations, const PulseOptions& options = {});
-  /// The same, and waits. When the wait ends without the last row (a timeout, a check that said no)
-  /// the rest of the burst is cancelled; so it is with the calls below and with pulse_and_wait.
-  UntypedObservation burst(std::int64_t iterations, Timeout timeout, const Check& check = {},
-                           const PulseOptions& options = {});
+  /// The same, and waits. When the wait ends without the last row (a timeout, `keep_waiting` is
+  /// false) the rest of the burst is cancelled; so it is with the calls below and with
+  /// pulse_and_wait.
+  UntypedObservation burst(std::int64_t iterations, Timeout timeout,
+                           const KeepWaiting& keep_waiting = {}, const PulseOptions& options = {});
   /// One iteration for each row that `rows` can hold, and all these rows; that of the last one.
-  Iteration burst_rows(std::span<std::byte> rows, Timeout timeout, const Check& check = {},
-                       const PulseOptions& options = {});
+  Iteration burst_rows(std::span<std::byte> rows, Timeout timeout,
+                       const KeepWaiting& keep_waiting = {}, const PulseOptions& options = {});
 
   // halts
   /// Halts the backend, whoever has control and whatever its lanes are doing; the number of the
@@ -128,7 +139,7 @@ class UntypedFrontend {
   /// In real time it waits until that halt acts and the robot has come to rest. Needs a lane, but
   /// no control. Throws BackendHalted if it is refused (another halt came after it, the robot
   /// refuses, or still brakes and bursts), TimeoutError, NoLane, BackendGone.
-  void resume(std::uint64_t number, Timeout timeout, const Check& check = {});
+  void resume(std::uint64_t number, Timeout timeout, const KeepWaiting& keep_waiting = {});
   /// Tells the backend's watchdog that this frontend lives, as a pulse or a wait for a batch does.
   void keep_alive();
 
@@ -140,8 +151,10 @@ class UntypedFrontend {
   /// Fills a row of this frontend's size; throws as latest().
   void latest(std::byte* row) const;
   /// Row k, as soon as it is there. Throws RowOverwritten, TimeoutError, BackendGone.
-  UntypedObservation wait_for(Iteration k, Timeout timeout, const Check& check = {}) const;
-  void wait_for(Iteration k, std::byte* row, Timeout timeout, const Check& check = {}) const;
+  UntypedObservation wait_for(Iteration k, Timeout timeout,
+                              const KeepWaiting& keep_waiting = {}) const;
+  void wait_for(Iteration k, std::byte* row, Timeout timeout,
+                const KeepWaiting& keep_waiting = {}) const;
   /// As many of the rows first..last as there are.
   Rows history(Iteration first, Iteration last) const;
   /// The last n.
@@ -149,7 +162,7 @@ class UntypedFrontend {
   /// The next row in sequence for a position of the caller's own: waits for row `position`; if it
   /// is overwritten, jumps to the oldest one there. Returns how many were missed.
   std::int64_t wait_for_next(Iteration& position, std::byte* row, Timeout timeout,
-                             const Check& check = {}) const;
+                             const KeepWaiting& keep_waiting = {}) const;
 
   /// Gives the lane back; every further use throws Closed. Sent motion goes on.
   void close();
@@ -167,7 +180,8 @@ class UntypedFrontend {
                                     const CommandOptions& options,
                                     std::span<const std::int64_t> times) const;
   Batch pulse(const PulseOptions& options, std::uint16_t flags);
-  void wait_for_rest(std::uint64_t number, const Deadline& deadline, const Check& check);
+  void wait_for_rest(std::uint64_t number, const Deadline& deadline,
+                     const KeepWaiting& keep_waiting);
   Sent send(BatchBuilder& builder, const BatchRecord& record);
   static BatchRecord batch_of(const PulseOptions& options);
   Sent send_burst(std::int64_t iterations, const PulseOptions& options);
@@ -183,15 +197,12 @@ class UntypedFrontend {
   SegmentError damaged() const;
 
   std::shared_ptr<Link> link_;
-  std::unique_ptr<CommandCheck> check_;
-  BatchBuilder builder_;                       // guarded by link_->sending
-  std::vector<BatchBuilder::Member> members_;  // likewise, of the group that is being added
 };
 
 /// Halts the backend of a segment, also one that is still starting; the number of the halt.
 /// Throws TimeoutError if there is none in time, SegmentError, BackendGone.
 std::uint64_t halt(const std::string& segment, std::string_view reason,
-                   Timeout timeout = std::chrono::seconds(0), const Check& check = {});
+                   Timeout timeout = std::chrono::seconds(0), const KeepWaiting& keep_waiting = {});
 
 /// Lets several backends run at once, each its number of iterations, and returns at once. Nothing
 /// is granted unless all of them are alive, burst, and have a lane and room for what was added.
@@ -199,9 +210,9 @@ std::vector<Burst> start_bursts(std::span<const BurstMember> group);
 
 /// The same, and waits for all: as UntypedFrontend::burst, for the group as a whole.
 std::vector<UntypedObservation> burst(std::span<const BurstMember> group, Timeout timeout,
-                                      const Check& check = {});
+                                      const KeepWaiting& keep_waiting = {});
 /// Waits for bursts that were started together; cancels what is left of them if it cannot.
 std::vector<UntypedObservation> wait_for(std::span<const Burst> bursts, Timeout timeout,
-                                         const Check& check = {});
+                                         const KeepWaiting& keep_waiting = {});
 
 }  // namespace o80

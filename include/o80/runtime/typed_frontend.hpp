@@ -2,13 +2,13 @@
 
 #include <array>
 #include <initializer_list>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
-#include "o80/describe/table.hpp"
 #include "o80/runtime/frontend.hpp"
 #include "o80/runtime/typed_observation.hpp"
 

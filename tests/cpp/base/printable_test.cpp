@@ -1,4 +1,4 @@
-#include "o80/base/printable.hpp"
+#include "base/printable.hpp"
 
 #include <gtest/gtest.h>
 

@@ -3,7 +3,7 @@
 #include <utility>
 #include <vector>
 
-#include "o80/control/visit_block.hpp"
+#include "control/visit_block.hpp"
 
 namespace {
 

@@ -1,4 +1,4 @@
-#include "o80/control/actuator_queue.hpp"
+#include "control/actuator_queue.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "o80/control/controller.hpp"
+#include "control/controller.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

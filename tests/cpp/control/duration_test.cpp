@@ -1,4 +1,4 @@
-#include "o80/control/duration.hpp"
+#include "control/duration.hpp"
 
 #include <gtest/gtest.h>
 

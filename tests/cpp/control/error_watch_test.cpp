@@ -1,4 +1,4 @@
-#include "o80/control/error_watch.hpp"
+#include "control/error_watch.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,4 +1,4 @@
-#include "o80/control/fastest_motion.hpp"
+#include "control/fastest_motion.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <limits>
 #include <random>
 
-#include "o80/control/number_limiter.hpp"
+#include "control/number_limiter.hpp"
 
 namespace o80 {
 namespace {

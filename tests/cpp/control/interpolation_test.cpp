@@ -1,4 +1,4 @@
-#include "o80/control/interpolation.hpp"
+#include "control/interpolation.hpp"
 
 #include <gtest/gtest.h>
 

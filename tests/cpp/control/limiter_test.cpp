@@ -1,4 +1,4 @@
-#include "o80/control/limiter.hpp"
+#include "control/limiter.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "o80/control/limits.hpp"
+#include "control/limits.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

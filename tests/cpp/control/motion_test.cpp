@@ -1,4 +1,4 @@
-#include "o80/control/motion.hpp"
+#include "control/motion.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

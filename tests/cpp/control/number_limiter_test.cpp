@@ -1,4 +1,4 @@
-#include "o80/control/number_limiter.hpp"
+#include "control/number_limiter.hpp"
 
 #include <gtest/gtest.h>
 

@@ -10,10 +10,10 @@
 #include <utility>
 #include <vector>
 
-#include "o80/control/batch_builder.hpp"
-#include "o80/control/controller.hpp"
-#include "o80/control/pool.hpp"
-#include "o80/control/record.hpp"
+#include "control/batch_builder.hpp"
+#include "control/controller.hpp"
+#include "control/pool.hpp"
+#include "control/record.hpp"
 #include "o80/describe/schema.hpp"
 
 namespace o80::test {

@@ -1,4 +1,4 @@
-#include "o80/control/velocity_change.hpp"
+#include "control/velocity_change.hpp"
 
 #include <gtest/gtest.h>
 

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "describe/described.hpp"
-#include "o80/describe/table.hpp"
+#include "describe/table.hpp"
 
 namespace described {
 

@@ -1,7 +1,7 @@
 #include <gmock/gmock.h>
 
 #include "describe/described.hpp"
-#include "o80/describe/table.hpp"
+#include "describe/table.hpp"
 
 namespace o80 {
 namespace {

@@ -5,7 +5,7 @@
 #include <fstream>
 
 #include "describe/described.hpp"
-#include "o80/describe/table.hpp"
+#include "describe/table.hpp"
 
 namespace o80 {
 namespace {

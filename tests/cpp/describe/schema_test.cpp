@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "describe/described.hpp"
-#include "o80/describe/table.hpp"
+#include "describe/table.hpp"
 
 namespace o80 {
 namespace {

@@ -1,4 +1,4 @@
-#include "o80/describe/table.hpp"
+#include "describe/table.hpp"
 
 #include <gmock/gmock.h>
 

@@ -27,7 +27,7 @@
 #include <utility>
 #include <vector>
 
-#include "o80/memory/futex.hpp"
+#include "memory/futex.hpp"
 
 namespace o80::test {
 namespace {

@@ -18,7 +18,7 @@
 #include <thread>
 #include <vector>
 
-#include "o80/memory/futex.hpp"
+#include "memory/futex.hpp"
 
 namespace o80::test {
 namespace {

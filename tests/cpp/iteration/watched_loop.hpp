@@ -14,8 +14,8 @@
 #include <utility>
 
 #include "iteration/interception.hpp"
-#include "o80/robot/loop.hpp"
 #include "o80/robot/make_table.hpp"
+#include "robot/loop.hpp"
 #include "runtime/station.hpp"
 
 namespace o80::test {

@@ -7,11 +7,11 @@
 #include <functional>
 #include <optional>
 
+#include "base/crash_point.hpp"
+#include "memory/segment_draft.hpp"
+#include "memory/segment_name.hpp"
 #include "memory/segments.hpp"
-#include "o80/base/crash_point.hpp"
 #include "o80/base/error.hpp"
-#include "o80/memory/segment_draft.hpp"
-#include "o80/memory/segment_name.hpp"
 
 namespace o80 {
 namespace {

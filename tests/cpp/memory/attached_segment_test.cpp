@@ -1,4 +1,4 @@
-#include "o80/memory/attached_segment.hpp"
+#include "memory/attached_segment.hpp"
 
 #include <gmock/gmock.h>
 
@@ -55,13 +55,13 @@ TEST_F(AttachedSegmentTest, WaitsForABackendThatComesLaterAndStartsSlowly) {
     segment.set_state(State::running);
     looked.get_future().wait();
   });
-  const Check count = [&] {
+  const KeepWaiting count = [&] {
     ++checks;
     return true;
   };
 
   const AttachedSegment segment =
-      AttachedSegment::attach("arm", Access::read_write, patient(), {.check = count});
+      AttachedSegment::attach("arm", Access::read_write, patient(), {.keep_waiting = count});
 
   EXPECT_EQ(segment.life(), Life::running);
   looked.set_value();
@@ -88,9 +88,9 @@ TEST_F(AttachedSegmentTest, CanIgnoreTheFailureOfAnEarlierBackend) {
 }
 
 TEST_F(AttachedSegmentTest, EndsItsWaitWhenTheCallerSaysSo) {
-  EXPECT_THROW(
-      AttachedSegment::attach("arm", Access::read_only, patient(), {.check = [] { return false; }}),
-      Cancelled);
+  EXPECT_THROW(AttachedSegment::attach("arm", Access::read_only, patient(),
+                                       {.keep_waiting = [] { return false; }}),
+               Cancelled);
 }
 
 TEST_F(AttachedSegmentTest, RefusesForeignFilesAtOnce) {

@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "o80/memory/atomic_words.hpp"
-#include "o80/memory/lane.hpp"
+#include "memory/atomic_words.hpp"
+#include "memory/lane.hpp"
 
 namespace o80 {
 

@@ -1,15 +1,15 @@
 // Anybody may create a file that bears the name of a robot.
 
-#include "o80/memory/file_owner.hpp"
+#include "memory/file_owner.hpp"
 
 #include <gmock/gmock.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include "memory/child_process.hpp"
+#include "memory/segment_name.hpp"
 #include "memory/segments.hpp"
 #include "o80/base/error.hpp"
-#include "o80/memory/segment_name.hpp"
 
 namespace o80 {
 namespace {

@@ -13,9 +13,9 @@
 
 #include "memory/child_process.hpp"
 #include "memory/file_bytes.hpp"
+#include "memory/history.hpp"
 #include "memory/segments.hpp"
 #include "o80/base/error.hpp"
-#include "o80/memory/history.hpp"
 
 namespace o80 {
 namespace {

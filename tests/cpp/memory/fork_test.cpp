@@ -1,14 +1,14 @@
-#include "o80/memory/fork.hpp"
+#include "memory/fork.hpp"
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
 
 #include "memory/blocks.hpp"
 #include "memory/child_process.hpp"
+#include "memory/liveness.hpp"
 #include "memory/segments.hpp"
+#include "memory/signal.hpp"
 #include "o80/base/error.hpp"
-#include "o80/memory/liveness.hpp"
-#include "o80/memory/signal.hpp"
 
 namespace o80 {
 namespace {

@@ -1,4 +1,4 @@
-#include "o80/memory/halt_word.hpp"
+#include "memory/halt_word.hpp"
 
 #include <gmock/gmock.h>
 
@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "memory/child_process.hpp"
+#include "memory/fork.hpp"
 #include "memory/segments.hpp"
-#include "o80/memory/fork.hpp"
-#include "o80/memory/signal.hpp"
+#include "memory/signal.hpp"
 
 namespace o80 {
 namespace {

@@ -13,10 +13,10 @@
 #include <thread>
 
 #include "memory/child_process.hpp"
+#include "memory/fork.hpp"
+#include "memory/lane.hpp"
+#include "memory/liveness.hpp"
 #include "memory/segments.hpp"
-#include "o80/memory/fork.hpp"
-#include "o80/memory/lane.hpp"
-#include "o80/memory/liveness.hpp"
 
 namespace o80 {
 namespace {

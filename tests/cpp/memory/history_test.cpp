@@ -1,4 +1,4 @@
-#include "o80/memory/history.hpp"
+#include "memory/history.hpp"
 
 #include <gmock/gmock.h>
 

@@ -11,12 +11,12 @@
 #include <optional>
 #include <thread>
 
+#include "memory/futex.hpp"
+#include "memory/lane.hpp"
+#include "memory/liveness.hpp"
+#include "memory/segment_draft.hpp"
 #include "memory/segments.hpp"
 #include "o80/base/error.hpp"
-#include "o80/memory/futex.hpp"
-#include "o80/memory/lane.hpp"
-#include "o80/memory/liveness.hpp"
-#include "o80/memory/segment_draft.hpp"
 
 namespace o80 {
 namespace {

@@ -7,12 +7,12 @@
 
 #include "memory/blocks.hpp"
 #include "memory/child_process.hpp"
+#include "memory/history.hpp"
+#include "memory/segment_draft.hpp"
+#include "memory/segment_name.hpp"
 #include "memory/segments.hpp"
+#include "memory/signal.hpp"
 #include "o80/base/error.hpp"
-#include "o80/memory/history.hpp"
-#include "o80/memory/segment_draft.hpp"
-#include "o80/memory/segment_name.hpp"
-#include "o80/memory/signal.hpp"
 
 namespace o80 {
 namespace {
@@ -47,7 +47,7 @@ TEST_F(KillTest, EndsTheWaitsOfItsFrontendsAndLeavesTheHistory) {
   LaneSender sender(segment);
   std::int64_t killed_at = 0;
   std::atomic<int> waiting{0};
-  const Check count = [&] {
+  const KeepWaiting count = [&] {
     ++waiting;
     return true;
   };

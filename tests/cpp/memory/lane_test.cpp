@@ -1,4 +1,4 @@
-#include "o80/memory/lane.hpp"
+#include "memory/lane.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,4 +1,4 @@
-#include "o80/memory/liveness.hpp"
+#include "memory/liveness.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,8 +6,8 @@
 #include <thread>
 
 #include "memory/child_process.hpp"
+#include "memory/lane.hpp"
 #include "memory/segments.hpp"
-#include "o80/memory/lane.hpp"
 
 namespace o80 {
 namespace {

@@ -1,4 +1,4 @@
-#include "o80/memory/owned_segment.hpp"
+#include "memory/owned_segment.hpp"
 
 #include <gmock/gmock.h>
 #include <sys/stat.h>
@@ -6,9 +6,9 @@
 #include <fstream>
 #include <thread>
 
+#include "memory/segment_name.hpp"
 #include "memory/segments.hpp"
 #include "o80/base/error.hpp"
-#include "o80/memory/segment_name.hpp"
 
 namespace o80 {
 namespace {

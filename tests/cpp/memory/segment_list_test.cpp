@@ -5,9 +5,9 @@
 
 #include <fstream>
 
+#include "memory/segment_file.hpp"
 #include "memory/segments.hpp"
 #include "o80/base/error.hpp"
-#include "o80/memory/segment_file.hpp"
 
 namespace o80 {
 namespace {

@@ -1,13 +1,13 @@
-#include "o80/memory/signal.hpp"
+#include "memory/signal.hpp"
 
 #include <gmock/gmock.h>
 
 #include <atomic>
 #include <thread>
 
+#include "memory/history.hpp"
 #include "memory/segments.hpp"
 #include "o80/base/error.hpp"
-#include "o80/memory/history.hpp"
 
 namespace o80 {
 namespace {

@@ -1,4 +1,4 @@
-#include "o80/memory/spinner.hpp"
+#include "memory/spinner.hpp"
 
 #include <gtest/gtest.h>
 #include <sched.h>

@@ -7,11 +7,11 @@
 #include <thread>
 
 #include "memory/blocks.hpp"
+#include "memory/history.hpp"
+#include "memory/liveness.hpp"
 #include "memory/segments.hpp"
+#include "memory/signal.hpp"
 #include "o80/base/error.hpp"
-#include "o80/memory/history.hpp"
-#include "o80/memory/liveness.hpp"
-#include "o80/memory/signal.hpp"
 
 namespace o80 {
 namespace {

@@ -17,7 +17,7 @@
 
 #include "count_allocations.hpp"
 #include "mujoco/table_tennis_scene.hpp"
-#include "o80/robot/library.hpp"
+#include "robot/library.hpp"
 
 namespace o80::mujoco {
 namespace {

@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <new>
 
-#include "o80/robot/loop.hpp"
+#include "robot/loop.hpp"
 #include "robot/puppet.hpp"
 
 namespace {

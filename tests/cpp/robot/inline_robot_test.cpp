@@ -1,7 +1,7 @@
-#include "o80/robot/inline_robot.hpp"
+#include "robot/inline_robot.hpp"
 
-#include "o80/robot/library.hpp"
 #include "o80/runtime/typed_frontend.hpp"
+#include "robot/library.hpp"
 #include "robot/puppet.hpp"
 
 namespace o80::test {

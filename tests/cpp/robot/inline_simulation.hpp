@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
-#include "o80/robot/inline_robot.hpp"
 #include "o80/runtime/robot_types.hpp"
+#include "robot/inline_robot.hpp"
 
 namespace o80 {
 

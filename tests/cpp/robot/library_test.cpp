@@ -1,4 +1,4 @@
-#include "o80/robot/library.hpp"
+#include "robot/library.hpp"
 
 #include <cstdlib>
 #include <filesystem>

@@ -6,8 +6,8 @@
 #include <limits>
 #include <thread>
 
-#include "o80/memory/verb_word.hpp"
-#include "o80/robot/loop.hpp"
+#include "memory/verb_word.hpp"
+#include "robot/loop.hpp"
 #include "robot/puppet.hpp"
 
 namespace o80::test {

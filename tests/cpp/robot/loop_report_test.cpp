@@ -1,4 +1,4 @@
-#include "o80/robot/loop_report.hpp"
+#include "robot/loop_report.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,4 +1,4 @@
-#include "o80/robot/loop.hpp"
+#include "robot/loop.hpp"
 
 #include <atomic>
 

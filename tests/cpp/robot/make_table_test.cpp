@@ -1,9 +1,9 @@
 #include "o80/robot/make_table.hpp"
 
-#include "o80/robot/loop.hpp"
-#include "o80/robot/robot.hpp"
 #include "robot/inline_simulation.hpp"
+#include "robot/loop.hpp"
 #include "robot/puppet.hpp"
+#include "robot/robot.hpp"
 
 namespace o80::test {
 namespace {

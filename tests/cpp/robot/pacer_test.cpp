@@ -1,4 +1,4 @@
-#include "o80/robot/pacer.hpp"
+#include "robot/pacer.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "o80/robot/real_time.hpp"
+#include "robot/real_time.hpp"
 
 #include <gmock/gmock.h>
 #include <sched.h>
@@ -8,7 +8,7 @@
 #include <thread>
 
 #include "memory/child_process.hpp"
-#include "o80/robot/loop.hpp"
+#include "robot/loop.hpp"
 #include "robot/puppet.hpp"
 
 namespace o80::test {

@@ -8,8 +8,8 @@
 #include <memory>
 #include <thread>
 
-#include "o80/robot/loop.hpp"
 #include "o80/robot/make_table.hpp"
+#include "robot/loop.hpp"
 #include "runtime/station.hpp"
 
 namespace o80::test {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "o80/runtime/schedule.hpp"
 #include "runtime/liar.hpp"
+#include "runtime/schedule.hpp"
 #include "runtime/station.hpp"
 
 namespace o80::test {

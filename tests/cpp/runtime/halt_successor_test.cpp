@@ -4,9 +4,9 @@
 
 #include <optional>
 
+#include "control/batch_builder.hpp"
 #include "memory/child_process.hpp"
 #include "o80/base/error.hpp"
-#include "o80/control/batch_builder.hpp"
 #include "runtime/station.hpp"
 
 namespace o80::test {

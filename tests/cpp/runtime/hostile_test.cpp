@@ -8,9 +8,9 @@
 #include <random>
 #include <thread>
 
+#include "control/batch_builder.hpp"
 #include "memory/child_process.hpp"
-#include "o80/control/batch_builder.hpp"
-#include "o80/memory/lane.hpp"
+#include "memory/lane.hpp"
 #include "runtime/liar.hpp"
 #include "runtime/shared_scene.hpp"
 #include "runtime/station.hpp"

@@ -1,4 +1,4 @@
-#include "o80/runtime/ids_in_flight.hpp"
+#include "runtime/ids_in_flight.hpp"
 
 #include <gtest/gtest.h>
 

@@ -28,7 +28,7 @@ void iterate_for_ever(const ChildProcess::Ready& ready) {
 /// Kills the backend in the middle of a wait; the time until the error [ms].
 double time_to_the_error(ChildProcess& backend, UntypedFrontend& frontend) {
   std::int64_t killed = 0;
-  const Check kill_once = [&] {
+  const KeepWaiting kill_once = [&] {
     if (killed == 0) {
       killed = monotonic_now();
       ::kill(backend.pid(), SIGKILL);

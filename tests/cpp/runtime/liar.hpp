@@ -8,8 +8,8 @@
 #include <memory>
 #include <random>
 
-#include "o80/control/batch_builder.hpp"
-#include "o80/memory/lane.hpp"
+#include "control/batch_builder.hpp"
+#include "memory/lane.hpp"
 #include "runtime/station.hpp"
 
 namespace o80::test {

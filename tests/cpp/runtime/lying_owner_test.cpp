@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "memory/child_process.hpp"
-#include "o80/memory/lane.hpp"
+#include "memory/lane.hpp"
 #include "runtime/liar.hpp"
 #include "runtime/shared_scene.hpp"
 #include "runtime/station.hpp"

@@ -1,4 +1,4 @@
-#include "o80/runtime/overrun_limit.hpp"
+#include "runtime/overrun_limit.hpp"
 
 #include <gmock/gmock.h>
 

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <thread>
 
+#include "control/batch_builder.hpp"
 #include "o80/base/error.hpp"
-#include "o80/control/batch_builder.hpp"
 #include "runtime/station.hpp"
 
 namespace o80::test {

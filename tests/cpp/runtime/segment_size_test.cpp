@@ -4,8 +4,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "o80/control/record.hpp"
-#include "o80/memory/segment_name.hpp"
+#include "control/record.hpp"
+#include "memory/segment_name.hpp"
 #include "o80/runtime/backend.hpp"
 
 namespace o80 {

@@ -8,8 +8,9 @@
 #include <optional>
 
 #include "memory/child_process.hpp"
+#include "memory/liveness.hpp"
 #include "o80/base/time.hpp"
-#include "o80/memory/liveness.hpp"
+#include "o80/memory/segment_list.hpp"
 #include "runtime/station.hpp"
 
 namespace o80::test {

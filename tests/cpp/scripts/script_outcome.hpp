@@ -1,6 +1,6 @@
 #pragma once
 
-#include "o80/control/record.hpp"
+#include "control/record.hpp"
 
 namespace o80::test {
 

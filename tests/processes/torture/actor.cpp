@@ -12,8 +12,9 @@
 #include <string>
 #include <string_view>
 
-#include "o80/base/crash_point.hpp"
-#include "o80/memory/segment_name.hpp"
+#include "base/crash_point.hpp"
+#include "memory/segment_layout.hpp"
+#include "memory/segment_name.hpp"
 
 namespace torture {
 

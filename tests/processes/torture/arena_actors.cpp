@@ -9,7 +9,7 @@
 #include <cstdlib>
 #include <stdexcept>
 
-#include "o80/base/crash_point.hpp"
+#include "base/crash_point.hpp"
 #include "torture/arena.hpp"
 #include "torture/labels.hpp"
 

@@ -2,7 +2,8 @@
 #include <list>
 #include <map>
 
-#include "o80/describe/table.hpp"
+#include "describe/table.hpp"
+#include "runtime/link.hpp"
 #include "torture/actor.hpp"
 
 namespace torture {

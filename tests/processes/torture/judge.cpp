@@ -5,8 +5,8 @@
 #include <cstdio>
 #include <map>
 
-#include "o80/control/record.hpp"
-#include "o80/control/status.hpp"
+#include "control/record.hpp"
+#include "control/status_sink.hpp"
 
 namespace torture {
 

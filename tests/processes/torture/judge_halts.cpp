@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <set>
 
-#include "o80/control/status.hpp"
+#include "control/status_sink.hpp"
 #include "torture/judge.hpp"
 
 namespace torture {

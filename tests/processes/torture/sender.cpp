@@ -2,6 +2,8 @@
 
 #include <bit>
 
+#include "runtime/link.hpp"
+
 namespace torture {
 
 namespace {

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+#include "o80/base/time.hpp"
+
+namespace o80 {
+
+inline constexpr std::uint16_t kEveryActuator = 0xFFFF;
+inline constexpr Iteration kNow = -1;
+
+enum class Mode : std::uint8_t { queue, overwrite };
+enum class Pace : std::uint8_t { direct, duration, speed, until, iterations, fastest };
+enum class Profile : std::uint8_t { linear, minimum_jerk };
+/// Which state a command starts from.
+enum class Start : std::uint8_t { desired, observed };
+
+std::string_view to_text(Mode mode) noexcept;
+std::string_view to_text(Pace pace) noexcept;
+std::string_view to_text(Profile profile) noexcept;
+std::string_view to_text(Start start) noexcept;
+
+/// How to get to a target: made by direct(), duration(), speed(), until(), iterations() or
+/// fastest().
+struct PaceSpec {
+  Pace pace = Pace::direct;
+  std::int64_t amount = 0;
+  double per_second = 0;
+};
+
+/// At once, in one iteration.
+constexpr PaceSpec direct() { return {}; }
+constexpr PaceSpec duration(std::chrono::nanoseconds time) {
+  return {Pace::duration, time.count(), 0};
+}
+/// Peak speed of the first number of the state, in its unit [1/s].
+constexpr PaceSpec speed(double per_second) { return {Pace::speed, 0, per_second}; }
+/// There at this iteration.
+constexpr PaceSpec until(Iteration iteration) { return {Pace::until, iteration, 0}; }
+/// So many iterations (of a trajectory: for each of its rows).
+constexpr PaceSpec iterations(std::int64_t count) { return {Pace::iterations, count, 0}; }
+
+/// As fast as the limits allow, at rest at the end: the numbers that are commanded need limits of
+/// speed and acceleration.
+constexpr PaceSpec fastest() { return {Pace::fastest, 0, 0}; }
+
+/// What a direct command does that the limits do not let arrive in its iteration.
+enum class OnLimit : std::uint8_t {
+  end,   // it ends as limited, and its actuator comes to rest
+  go_on  // it goes on to its target, as fast as the limits allow
+};
+
+constexpr std::string_view to_text(OnLimit what) { return what == OnLimit::end ? "end" : "go_on"; }
+
+/// Everything about a command but its actuator and its target.
+struct CommandOptions {
+  PaceSpec pace = {};
+  Mode mode = Mode::queue;
+  /// By default linear; minimum_jerk for a command of an actuator that has acceleration limits.
+  std::optional<Profile> profile = {};
+  Start start = Start::desired;
+  OnLimit on_limit = OnLimit::end;
+};
+
+/// When a batch is to be taken, and what if that moment has passed.
+struct PulseOptions {
+  enum class Late : std::uint8_t { reject, now };
+  Iteration at = kNow;
+  Late late = Late::reject;
+};
+
+}  // namespace o80

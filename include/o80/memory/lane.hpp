@@ -1,4 +1,0 @@
-#pragma once
-
-#include "o80/memory/lane_receiver.hpp"
-#include "o80/memory/lane_sender.hpp"

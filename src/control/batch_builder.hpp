@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "control/record.hpp"
+
+namespace o80 {
+
+/// A batch while a frontend fills it, as the blocks that will cross its lane.
+///
+/// Each verb returns the place of its record in the batch; once the batch has its id, the record's
+/// is `record_id(batch, place)`.
+class BatchBuilder {
+ public:
+  BatchBuilder();
+
+  /// Adds a command. `head` says actuator, mode, pace, profile, start and amount; the rest is set
+  /// here. `mask` is empty or one bit a number of the state, `times` empty or one end a row [ns],
+  /// `states` holds `rows` states.
+  std::uint32_t command(const RecordHead& head, std::span<const std::uint64_t> mask,
+                        std::span<const std::int64_t> times, std::uint32_t rows,
+                        std::span<const std::byte> states);
+  std::uint32_t command(const RecordHead& head, std::span<const std::byte> state) {
+    return command(head, {}, {}, 1, state);
+  }
+  /// One command for several actuators. Heads as above, all alike but for the actuator; `times`
+  /// and `rows` are those of each member.
+  struct Member {
+    RecordHead head;
+    std::span<const std::uint64_t> mask;
+    std::span<const std::byte> states;
+  };
+  std::uint32_t group(std::span<const Member> members, std::span<const std::int64_t> times = {},
+                      std::uint32_t rows = 1);
+  std::uint32_t purge(std::uint16_t actuator_or_every);
+  /// Drops only what this lane sent.
+  std::uint32_t purge_own(std::uint16_t actuator_or_every);
+  std::uint32_t request(std::uint16_t index, std::span<const std::byte> payload);
+  std::uint32_t take_control();
+  std::uint32_t release_control();
+  /// Clears halts up to this number.
+  std::uint32_t resume(std::uint64_t number);
+
+  /// Completes the batch: `batch` says id, ticket, at, late_now, burst and flags. One of a few
+  /// purges and control orders, for now and without a burst, is marked as express.
+  std::span<const Block> seal(const BatchRecord& batch);
+  /// Sets the ticket of a sealed batch, drawn just before its commit.
+  void set_ticket(std::uint64_t ticket) noexcept;
+
+  void clear();
+  bool empty() const noexcept { return records_ == 0; }
+  std::uint32_t records() const noexcept { return records_; }
+  bool has_commands() const noexcept { return commands_ > 0; }
+  std::uint32_t requests() const noexcept { return requests_; }
+  std::uint32_t control_orders() const noexcept { return control_orders_; }
+  /// Blocks that the batch takes in its lane.
+  std::uint64_t blocks() const noexcept { return blocks_.size(); }
+
+ private:
+  std::byte* open(const RecordHead& head, std::uint64_t payload_bytes);
+  void add_command(const RecordHead& head, std::span<const std::uint64_t> mask,
+                   std::span<const std::int64_t> times, std::uint32_t rows,
+                   std::span<const std::byte> states);
+  std::size_t set_id(std::size_t block, CommandId id);
+  bool is_express(const BatchRecord& batch) const noexcept;
+
+  std::vector<Block> blocks_;  // the batch's own block first
+  std::uint32_t records_ = 0;
+  std::uint32_t commands_ = 0;
+  std::uint32_t requests_ = 0;
+  std::uint32_t control_orders_ = 0;
+};
+
+}  // namespace o80

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstdint>
+
+#include "control/pool.hpp"
+#include "control/record.hpp"
+
+namespace o80 {
+
+/// How a request, or the wish for exclusive control, ended.
+struct Outcome {
+  Status status = Status::completed;  // or rejected
+  Reason reason = Reason::none;
+  std::uint8_t aux = 0;
+};
+
+/// What the controller needs of its surroundings while it takes a batch.
+class BatchHandler {
+ public:
+  /// The iteration about to run; a fresh start inside `request` may move it on.
+  virtual Iteration iteration() const noexcept = 0;
+  /// Serves a request now; may call `Controller::restart`. `payload` holds the whole struct. The
+  /// request ends with the iteration at which it began: that of the fresh row, if it made one.
+  virtual Outcome request(std::uint32_t lane, CommandId id, std::uint32_t index,
+                          Cursor payload) noexcept = 0;
+  virtual Outcome take_control(std::uint32_t lane) noexcept = 0;
+  virtual Outcome release_control(std::uint32_t lane) noexcept = 0;
+  /// Clears halts up to this number; may call `Controller::restart`, as a request may.
+  virtual Outcome resume(std::uint32_t /*lane*/, CommandId /*id*/,
+                         std::uint64_t /*number*/) noexcept {
+    return {};
+  }
+
+ protected:
+  ~BatchHandler() = default;
+};
+
+}  // namespace o80

@@ -1,0 +1,134 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <vector>
+
+#include "control/record.hpp"
+#include "control/visit_block.hpp"
+
+namespace o80 {
+
+using BlockIndex = std::uint32_t;
+inline constexpr BlockIndex kNoBlock = 0xFFFFFFFF;
+
+/// A batch in the pool while it is copied there block by block.
+struct BlockChain {
+  BlockIndex first = kNoBlock;
+  BlockIndex last = kNoBlock;
+  std::uint32_t blocks = 0;
+};
+
+/// The backend's private blocks, in which queued commands live; mapped once, touched once.
+///
+/// Move-only owner of a mapping.
+/// Realtime: all but construction; nothing allocates, nothing can fail but an empty pool.
+class BlockPool {
+ public:
+  explicit BlockPool(std::uint32_t blocks);
+  BlockPool(BlockPool&& other) noexcept;
+  BlockPool& operator=(BlockPool&&) = delete;
+  ~BlockPool();
+
+  std::uint32_t size() const noexcept { return size_; }
+  std::uint32_t available() const noexcept { return available_; }
+
+  /// Copies one block to the end of a chain; false if the pool is empty.
+  bool append(BlockChain& chain, const void* block) noexcept {
+    const BlockIndex taken = free_;
+    if (taken == kNoBlock) return false;
+    free_ = next_[taken];
+    --available_;
+    std::memcpy(bytes(taken), block, kBlockBytes);
+    next_[taken] = kNoBlock;
+    (chain.first == kNoBlock ? chain.first : next_[chain.last]) = taken;
+    chain.last = taken;
+    ++chain.blocks;
+    ends_[chain.first] = {taken, chain.blocks};
+    return true;
+  }
+  /// Gives back the chain from `first` to `last`.
+  void release(BlockIndex first, BlockIndex last, std::uint32_t blocks) noexcept {
+    next_[last] = free_;
+    free_ = first;
+    available_ += blocks;
+  }
+  void release(const BlockChain& chain) noexcept {
+    if (chain.blocks > 0) release(chain.first, chain.last, chain.blocks);
+  }
+
+  BlockIndex next(BlockIndex block) const noexcept {
+    O80_VISIT_BLOCK(block);
+    return next_[block];
+  }
+  /// The chain that was appended from this first block on.
+  BlockChain chain(BlockIndex first) const noexcept {
+    return {first, ends_[first].last, ends_[first].blocks};
+  }
+  void link(BlockIndex block, BlockIndex next) noexcept { next_[block] = next; }
+  std::byte* bytes(BlockIndex block) noexcept {
+    O80_VISIT_BLOCK(block);
+    return blocks_ + std::size_t{block} * kBlockBytes;
+  }
+  const std::byte* bytes(BlockIndex block) const noexcept {
+    O80_VISIT_BLOCK(block);
+    return blocks_ + std::size_t{block} * kBlockBytes;
+  }
+  /// The batch record in the first block of a chain.
+  const BatchRecord& batch(BlockIndex block) const noexcept {
+    return *reinterpret_cast<const BatchRecord*>(bytes(block));
+  }
+  RecordHead& head(BlockIndex block) noexcept {
+    return *reinterpret_cast<RecordHead*>(bytes(block));
+  }
+  const RecordHead& head(BlockIndex block) const noexcept {
+    return *reinterpret_cast<const RecordHead*>(bytes(block));
+  }
+
+ private:
+  struct End {
+    BlockIndex last;
+    std::uint32_t blocks;
+  };
+
+  std::byte* blocks_ = nullptr;
+  std::uint32_t size_ = 0;
+  std::uint32_t available_ = 0;
+  BlockIndex free_ = kNoBlock;
+  std::vector<BlockIndex> next_;
+  std::vector<End> ends_;  // of the chain that begins there
+};
+
+/// Reads along the chain of a record's blocks; never past its end.
+class Cursor {
+ public:
+  Cursor() = default;
+  Cursor(const BlockPool& pool, BlockIndex block, std::uint32_t offset,
+         std::uint64_t bytes) noexcept
+      : pool_(&pool), block_(block), offset_(offset), left_(bytes) {}
+
+  std::uint64_t left() const noexcept { return left_; }
+  BlockIndex block() const noexcept { return block_; }
+  std::uint32_t offset() const noexcept { return offset_; }
+  /// Copies the next bytes; what is past the end reads as zero, and false is returned.
+  bool read(void* out, std::size_t bytes) noexcept {
+    if (bytes > left_ || bytes > kBlockBytes - offset_) return read_across(out, bytes);
+    if (bytes == 0) return true;  // `out` may be nothing then
+    std::memcpy(out, pool_->bytes(block_) + offset_, bytes);
+    offset_ += static_cast<std::uint32_t>(bytes);
+    left_ -= bytes;
+    return true;
+  }
+
+ private:
+  bool read_across(void* out, std::size_t bytes) noexcept;
+
+  const BlockPool* pool_ = nullptr;
+  BlockIndex block_ = kNoBlock;
+  std::uint32_t offset_ = 0;
+  std::uint64_t left_ = 0;
+};
+
+}  // namespace o80

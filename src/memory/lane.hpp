@@ -1,0 +1,4 @@
+#pragma once
+
+#include "memory/lane_receiver.hpp"
+#include "memory/lane_sender.hpp"
