@@ -140,7 +140,15 @@ struct SentBatch {
   std::int64_t sent_at;    // [ns], when it was out; 0: not told
 };
 
-enum class SentKind : std::uint32_t { command, mark, other, take_control, release_control, look };
+enum class SentKind : std::uint32_t {
+  command,
+  mark,
+  other,
+  take_control,
+  release_control,
+  look,
+  group  // one command for all actuators
+};
 
 struct SentCommand {
   std::uint64_t value;  // bits of the (last) target, or the mark of a request
@@ -153,6 +161,7 @@ struct SentCommand {
   std::uint64_t found_id;  // whose status stands in its place
   std::uint32_t found_reason;
   std::uint32_t arrives_early;  // a motion that fades out on its target, before its last iteration
+  std::array<std::uint64_t, kActuators> targets;  // of a group: bits of each member's target
 };
 
 /// A halt that an actor asked for.

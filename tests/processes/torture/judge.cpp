@@ -138,6 +138,7 @@ class Judge {
 
   void judge(const Slot& slot, const SentBatch& batch, const SentCommand& command) {
     const SentKind kind = command.kind;
+    if (kind == SentKind::group) return judge_group(slot, batch, command);
     if (kind != SentKind::command && kind != SentKind::mark && kind != SentKind::look) return;
     const Generation& life = round_.lives[batch.generation];
     std::vector<Done> done = deeds(batch.generation).of(command);
@@ -169,6 +170,55 @@ class Judge {
       add(Fault::falsely_told, slot, batch, command,
           "done at " + std::to_string(done[0].iteration) + ", and nobody was told" +
               told_of(slot, batch));
+  }
+
+  /// One member of a group, as if it had been sent by itself.
+  static SentCommand member_of(const SentCommand& group, std::uint32_t actuator) {
+    SentCommand member = group;
+    member.kind = SentKind::command;
+    member.value = group.targets[actuator];
+    member.actuator = actuator;
+    return member;
+  }
+
+  /// Members that the driver saw do not come twice, and a group that is completed is completed as a
+  /// whole, in one iteration. Where it ended otherwise, some members may have arrived before.
+  void judge_group(const Slot& slot, const SentBatch& batch, const SentCommand& group) {
+    const auto sent = static_cast<Sent>(batch.sent.load());
+    const bool told = has_ended(group.told);
+    const auto status = static_cast<Status>(told ? group.told : group.found);
+    const std::int64_t at = told ? group.told_at : group.found_at;
+    if (sent == Sent::sent && told && has_ended(group.found) &&
+        (group.told != group.found || group.told_at != group.found_at))
+      return add(Fault::falsely_told, slot, batch, group, "its end changed");
+    const bool ended = told || has_ended(group.found);
+    for (std::uint32_t i = 0; i < kActuators; ++i) {
+      const SentCommand member = member_of(group, i);
+      std::vector<Done> done = deeds(batch.generation).of(member);
+      if (is_limited(batch, member))
+        std::erase_if(done, [&](const Done& each) { return each.iteration != at; });
+      const std::string name = "member " + std::to_string(i) + " of a group: ";
+      if (done.size() > 1)
+        return add(Fault::doubled, slot, batch, group,
+                   name + "done at " + std::to_string(done[0].iteration) + " and " +
+                       std::to_string(done[1].iteration));
+      if (!done.empty() && (sent == Sent::refused || (ended && status == Status::rejected)))
+        return add(Fault::falsely_told, slot, batch, group, name + "refused, and done");
+      if (sent != Sent::sent || !ended) continue;
+      if (status == Status::completed && (done.empty() || done[0].iteration != at))
+        return add(
+            Fault::falsely_told, slot, batch, group,
+            name + (done.empty() ? "never done" : "done at " + std::to_string(done[0].iteration)));
+      if (!done.empty() && done[0].iteration > at)
+        return add(Fault::falsely_told, slot, batch, group,
+                   name + "done at " + std::to_string(done[0].iteration) + ", after the end");
+      if (status == Status::limited && round_.lives[batch.generation].limited == 0)
+        return add(Fault::falsely_told, slot, batch, group, name + "nothing limits it");
+    }
+    const Generation& life = round_.lives[batch.generation];
+    const bool forgotten = static_cast<Status>(group.found) == Status::forgotten;
+    if (sent == Sent::sent && !ended && !forgotten && batch.lane != kNoLane && life.drained != 0)
+      add(Fault::lost, slot, batch, group, "it never ended");
   }
 
   bool is_limited(const SentBatch& batch, const SentCommand& command) const {
@@ -237,15 +287,19 @@ class Judge {
       if (batch.at >= 0) continue;
       for (std::uint32_t k = 0; k < batch.commands; ++k) {
         const SentCommand& command = slot.sent_commands[batch.first_command + k];
-        if (command.kind != SentKind::command ||
+        const bool is_group = command.kind == SentKind::group;
+        if ((command.kind != SentKind::command && !is_group) ||
             static_cast<Status>(command.told) != Status::completed)
           continue;
-        const auto place = std::pair(batch.generation, command.actuator);
-        const auto before = last.find(place);
-        if (before != last.end() && before->second >= command.told_at)
-          add(Fault::doubled, slot, batch, command,
-              "the one before it ended at " + std::to_string(before->second));
-        last[place] = command.told_at;
+        for (std::uint32_t actuator = 0; actuator < kActuators; ++actuator) {
+          if (!is_group && actuator != command.actuator) continue;
+          const auto place = std::pair(batch.generation, actuator);
+          const auto before = last.find(place);
+          if (before != last.end() && before->second >= command.told_at)
+            add(Fault::doubled, slot, batch, command,
+                "the one before it ended at " + std::to_string(before->second));
+          last[place] = command.told_at;
+        }
       }
     }
   }

@@ -221,7 +221,8 @@ class HaltedLife {
            std::to_string(batch.id) + ", ended as halted, and nothing was");
     if (told != Status::completed) return;
     // requests are served early in a step; a halt may come later in the same one
-    const bool late = command.kind == SentKind::command && command.told_at >= halted_from;
+    const bool moves = command.kind == SentKind::command || command.kind == SentKind::group;
+    const bool late = moves && command.told_at >= halted_from;
     if (late || (command.kind == SentKind::mark && command.told_at > halted_from))
       fail("a command of actor " + text_of(&slot - round_.slots.data()) + ", batch " +
            std::to_string(batch.id) + ", completed in iteration " + text_of(command.told_at) +

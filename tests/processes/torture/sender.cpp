@@ -78,6 +78,37 @@ void Sender::add_command() {
   frontend_.add_command(actuator, bytes_of(target), options);
 }
 
+void Sender::add_group() {
+  Chance& chance = actor_.chance;
+  std::array<std::uint32_t, kActuators> actuators{};
+  std::array<double, kActuators> targets{};
+  for (std::uint32_t i = 0; i < kActuators; ++i) {
+    actuators[i] = i;
+    targets[i] = unique_target(chance.bits());
+  }
+  o80::CommandOptions options;
+  switch (chance.below(5)) {
+    case 0:
+      options.pace = o80::iterations(chance.between(1, 20));
+      break;
+    case 1:
+      options.pace = o80::duration(std::chrono::nanoseconds(chance.between(0, 3'000'000)));
+      break;
+    case 2:
+      options.pace = o80::speed(static_cast<double>(chance.between(20, 200)));
+      break;
+    default:
+      break;
+  }
+  if (chance.percent(20)) options.mode = o80::Mode::overwrite;
+  if (chance.percent(20)) options.profile = o80::Profile::minimum_jerk;
+  if (chance.percent(20)) options.start = o80::Start::observed;
+  SentCommand& sent = note(SentKind::group, 0, 0);
+  sent.targets = std::bit_cast<std::array<std::uint64_t, kActuators>>(targets);
+  sent.arrives_early = 1;
+  frontend_.add_commands(actuators, std::as_bytes(std::span(targets)), options);
+}
+
 void Sender::add_trajectory() {
   Chance& chance = actor_.chance;
   const auto actuator = static_cast<std::uint32_t>(chance.below(kActuators));
@@ -112,8 +143,10 @@ void Sender::add_some() {
   Chance& chance = actor_.chance;
   for (std::int64_t n = chance.between(1, 5); n > 0; --n) {
     const std::uint64_t kind = chance.below(100);
-    if (kind < 70) {
+    if (kind < 55) {
       add_command();
+    } else if (kind < 70) {
+      add_group();
     } else if (kind < 80) {
       add_trajectory();
     } else if (kind < 82) {

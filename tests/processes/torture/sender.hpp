@@ -54,6 +54,7 @@ class Sender {
 
   SentCommand& note(SentKind kind, std::uint64_t value, std::uint32_t actuator);
   void add_command();
+  void add_group();
   void add_trajectory();
   void add_outside();
   bool send(std::int64_t at, bool late_now, std::int64_t burst, bool until_ended,
