@@ -1,0 +1,87 @@
+// An arm that is not there: it answers on the loopback as the real one would.
+//
+//   fake_arm [--port 5700] [--frequency 100] [--timeout TICKS] [--faults "drop 50-52, late 60"]
+
+#include <getopt.h>
+#include <time.h>
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <stdexcept>
+#include <string>
+
+#include "fake_arm.hpp"
+
+namespace {
+
+using namespace udp_arm;
+
+const char* name_of(Mode mode) {
+  switch (mode) {
+    case Mode::ready:
+      return "ready";
+    case Mode::moving:
+      return "moving";
+    case Mode::timed_out:
+      return "timed out: no command came";
+    default:
+      return "failed";
+  }
+}
+
+double positive(const char* text) {
+  char* end = nullptr;
+  const double value = std::strtod(text, &end);
+  if (*end != 0 || !(value > 0))
+    throw std::invalid_argument(std::string(text) + " is not positive");
+  return value;
+}
+
+FakeArm::Options parse(int argc, char** argv) {
+  const option known[] = {{"port", required_argument, nullptr, 'p'},
+                          {"frequency", required_argument, nullptr, 'f'},
+                          {"timeout", required_argument, nullptr, 't'},
+                          {"faults", required_argument, nullptr, 'x'},
+                          {nullptr, 0, nullptr, 0}};
+  FakeArm::Options options{.port = 5700};
+  for (int chosen = 0; (chosen = getopt_long(argc, argv, "", known, nullptr)) != -1;) {
+    if (chosen == 'p') options.port = std::atoi(optarg);
+    if (chosen == 'f') options.period = std::llround(1e9 / positive(optarg));
+    if (chosen == 't') options.command_timeout = static_cast<std::uint64_t>(positive(optarg));
+    if (chosen == 'x') options.faults = LinkFaults(optarg);
+    if (chosen == '?') throw std::invalid_argument("see the first lines of fake_arm.cpp");
+  }
+  return options;
+}
+
+[[noreturn]] void run(FakeArm& arm, std::int64_t period) {
+  Mode before = arm.mode();
+  for (std::int64_t due = now() + period;; due += period) {
+    const timespec until{due / 1'000'000'000, due % 1'000'000'000};
+    while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) != 0) {
+    }
+    arm.tick();
+    if (arm.mode() == before) continue;
+    before = arm.mode();
+    std::printf("tick %llu: %s\n", static_cast<unsigned long long>(arm.state().tick),
+                name_of(before));
+    std::fflush(stdout);
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    const FakeArm::Options options = parse(argc, argv);
+    FakeArm arm(options);
+    std::printf("an arm listens on 127.0.0.1:%d\n", arm.port());
+    std::fflush(stdout);
+    run(arm, options.period);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "fake_arm: %s\n", error.what());
+    return 1;
+  }
+}

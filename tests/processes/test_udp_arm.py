@@ -1,0 +1,187 @@
+"""The arm over UDP of examples/udp_arm as processes: a robot that paces the loop, and its fake."""
+
+import contextlib
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import o80
+
+WAIT = 60.0  # [s] longer than any wait should take
+NEVER = "1000000"  # ticks: a busy machine is no reason for a halt
+
+
+@pytest.fixture
+def segment() -> str:
+    """A name of this session; `robot` removes what is left of it."""
+    return f"test-{os.getpid()}-udp-arm"
+
+
+@dataclass
+class Fake:
+    """The arm's side, as a process."""
+
+    process: subprocess.Popen[str]
+    port: str
+
+    def says(self, words: str) -> None:
+        """Waits for a line that holds these words."""
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            if words in line:
+                return
+        pytest.fail(f"the fake arm ended before it said '{words}'")
+
+
+@contextmanager
+def fake_arm(prefix: Path, *options: str) -> Iterator[Fake]:
+    command = [str(prefix / "bin" / "fake_arm"), "--port", "0", "--timeout", NEVER, *options]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    try:
+        yield Fake(process, process.stdout.readline().strip().rpartition(":")[2])
+    finally:
+        process.kill()
+        process.wait()
+        process.stdout.close()
+
+
+@contextmanager
+def robot(prefix: Path, segment: str, fake: Fake, *options: str) -> Iterator[subprocess.Popen[str]]:
+    command = [
+        str(prefix / "bin" / "o80-run"), str(prefix / "lib" / "examples" / "udp_arm.so"),
+        "--segment", segment, "--frequency", "100", "--port", fake.port, *options,
+    ]  # fmt: skip
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    try:
+        yield process
+    finally:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()
+        with contextlib.suppress(o80.Error):
+            o80.clean(segment)
+
+
+def moved(arm: o80.Frontend) -> None:
+    """Moves the arm there and back, the arm itself included."""
+    for target in (0.2, 0.0):
+        arm.add_command(None, [target] * 6, fastest=True)
+        arm.pulse_and_wait(timeout=WAIT)
+        end = time.monotonic() + WAIT
+        while np.abs(arm.latest().observed - target).max() > 1e-3:
+            assert time.monotonic() < end
+            arm.wait_for_next(timeout=WAIT)
+
+
+def resumed(arm: o80.Frontend) -> None:
+    """Resumes as an operator would: again, until the arm is ready."""
+    end = time.monotonic() + WAIT
+    while (halt := arm.halted) is not None:
+        assert time.monotonic() < end
+        with contextlib.suppress(o80.Error):
+            arm.resume(halt.number, timeout=1.0)
+
+
+def test_lost_late_repeated_and_reordered_packets_are_tolerated_and_counted(
+    build_prefix: Path, segment: str
+) -> None:
+    script = "drop 20-22, late 30, twice 40, swap 50"
+    with (
+        fake_arm(build_prefix, "--faults", script) as fake,
+        robot(build_prefix, segment, fake, "--tolerated", NEVER) as process,
+        o80.Frontend(segment) as arm,
+    ):
+        arm.wait_for(80, timeout=WAIT)
+        moved(arm)
+        rows = arm.history(10_000)
+        link = rows.extended
+        assert link["missed"][-1] >= 5
+        assert link["repeated"][-1] >= 2
+        # a tick without a packet keeps the reading and counts as an overrun
+        missed = np.flatnonzero(np.diff(link["missed"]) > 0) + 1
+        assert (rows.overruns[missed] > rows.overruns[missed - 1]).all()
+        assert (link["tick"][1:] >= link["tick"][:-1]).all()
+        assert arm.halted is None
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(WAIT) == 0
+
+
+def test_a_restart_of_the_arm_halts_the_robot_and_resume_goes_on(
+    build_prefix: Path, segment: str
+) -> None:
+    with (
+        fake_arm(build_prefix, "--faults", "restart 50-90") as fake,
+        robot(build_prefix, segment, fake, "--tolerated", "10"),
+        o80.Frontend(segment) as arm,
+    ):
+        end = time.monotonic() + WAIT
+        while arm.latest().extended["restarts"] == 0:
+            assert time.monotonic() < end
+            arm.wait_for_next(timeout=WAIT)
+        arm.wait_for_next(timeout=WAIT)
+        halt = arm.halted
+        assert halt is not None
+        assert halt.cause == "driver"
+        assert "the arm" in halt.text
+        arm.add_command("joint1", 0.1, duration=0.1)
+        batch = arm.pulse()
+        batch.wait(WAIT)
+        assert batch.statuses == [o80.Status.REJECTED]
+        resumed(arm)
+        moved(arm)
+
+
+def test_an_arm_whose_driver_stands_still_stops_by_itself_and_the_robot_halts(
+    build_prefix: Path, segment: str
+) -> None:
+    with (
+        fake_arm(build_prefix, "--timeout", "50") as fake,
+        robot(build_prefix, segment, fake, "--tolerated", NEVER) as process,
+        o80.Frontend(segment) as arm,
+    ):
+        fake.says("moving")
+        process.send_signal(signal.SIGSTOP)
+        fake.says("timed out")
+        process.send_signal(signal.SIGCONT)
+        end = time.monotonic() + WAIT
+        while arm.halted is None:
+            assert time.monotonic() < end
+            arm.wait_for_next(timeout=WAIT)
+        assert "no command reached it" in arm.halted.text
+        resumed(arm)
+
+
+def test_an_arm_that_never_comes_back_is_a_fault_that_frontends_raise(
+    build_prefix: Path, segment: str
+) -> None:
+    with (
+        fake_arm(build_prefix) as fake,
+        robot(build_prefix, segment, fake, "--give-up", "0.5") as process,
+        o80.Frontend(segment) as arm,
+    ):
+        arm.wait_for(10, timeout=WAIT)
+        fake.process.kill()
+        with pytest.raises(o80.BackendFailed, match="give-up"):
+            arm.wait_for(10**9, timeout=WAIT)
+        assert process.wait(WAIT) == 1
+
+
+def test_an_arm_that_does_not_answer_is_refused_at_the_start(
+    build_prefix: Path, segment: str
+) -> None:
+    with fake_arm(build_prefix) as fake:
+        fake.process.kill()
+        fake.process.wait()
+        with robot(build_prefix, segment, fake) as process:
+            _, said = process.communicate(timeout=WAIT)
+            assert process.returncode == 1
+            assert "is the arm switched on" in said
