@@ -11,6 +11,7 @@
 #include "memory/futex.hpp"
 #include "o80/base/time.hpp"
 #include "o80/runtime/frontend.hpp"
+#include "robot/service_manager.hpp"
 
 namespace o80 {
 
@@ -19,6 +20,12 @@ constexpr std::int64_t kReportPeriod = 1'000'000'000;   // between two looks [ns
 constexpr std::int64_t kBetweenLines = 10'000'000'000;  // about late iterations [ns]
 
 void say(const std::string& text) { std::fprintf(stderr, "o80: %s\n", text.c_str()); }
+
+/// What lasts, so that it is the status of the service too.
+void say_state(const std::string& text) {
+  say(text);
+  tell_service_manager("STATUS=" + text);
+}
 
 std::string words_for(const Halt& halt) {
   std::string text = "halted in iteration " + std::to_string(halt.iteration) + " (halt " +
@@ -71,8 +78,8 @@ void LoopReport::run() noexcept {
       if (const auto line = overruns.look(watcher.latest().head(), monotonic_now())) say(*line);
       const std::optional<Halt> halt = watcher.halted();
       const std::uint64_t now = halt ? halt->number : 0;
-      if (now != halted && halt) say(words_for(*halt));
-      if (now != halted && !halt) say("resumed");
+      if (now != halted && halt) say_state(words_for(*halt));
+      if (now != halted && !halt) say_state("resumed");
       halted = now;
       futex_wait(stop_, 0, kReportPeriod);
     }

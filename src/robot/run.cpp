@@ -14,12 +14,14 @@
 #include <mutex>
 #include <thread>
 
+#include "base/printable.hpp"
 #include "control/number_name.hpp"
 #include "o80/base/error.hpp"
 #include "robot/loop.hpp"
 #include "robot/loop_report.hpp"
 #include "robot/real_time.hpp"
 #include "robot/run_options.hpp"
+#include "robot/service_manager.hpp"
 
 namespace o80 {
 
@@ -184,9 +186,15 @@ int run_robot(const RobotTable& table, const RunOptions& options) {
     complain(refused.c_str());
   }
   announce(table, loop->backend());
-  const LoopReport report(loop->backend().name());
-  const Ended ended = loop->run();
+  tell_service_manager("READY=1\nSTATUS=runs on segment '" + loop->backend().name() + "'");
+  Ended ended;
+  {
+    const LoopReport report(loop->backend().name());
+    ended = loop->run();
+  }
   if (!ended.in_order) complain(ended.fault.c_str());
+  tell_service_manager("STOPPING=1\nSTATUS=" +
+                       (ended.in_order ? "stopped" : printable(ended.fault)));
   return ended.in_order ? 0 : 1;
 }
 
