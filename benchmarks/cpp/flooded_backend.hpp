@@ -22,7 +22,8 @@ namespace o80::flood {
 
 inline constexpr std::uint32_t kLanes = 8;
 
-/// A robot of so many actuators of one number each. Its request 0 starts it afresh, 1 does nothing.
+/// A robot of so many actuators of one number each. Its request 0 starts it afresh, 1 does nothing,
+/// 2 runs for an iteration, with progress, and then starts it afresh.
 class Robot final : private RequestServer {
  public:
   explicit Robot(const std::string& segment, std::uint32_t actuators,
@@ -34,7 +35,12 @@ class Robot final : private RequestServer {
   }
 
   void iterate() {
-    if (backend.try_step() == Step::run) backend.publish();
+    if (backend.try_step() != Step::run) return;
+    if (backend.runs(2)) {
+      backend.show_progress(2, backend.iteration() % 2 == 0 ? "even" : "odd");
+      backend.end_request(2, Served::start_afresh());
+    }
+    backend.publish();
   }
 
   std::uint32_t served = 0;  // requests so far
@@ -49,10 +55,12 @@ class Robot final : private RequestServer {
     const auto nothing = schema.add_type("Nothing", {});
     schema.add_request("restart", nothing, "starts afresh");
     schema.add_request("nothing", nothing, "does nothing");
+    schema.add_request("run", nothing, "takes an iteration");
     return schema;
   }
   Served serve(std::uint32_t request, std::span<const std::byte> /*payload*/) noexcept override {
     ++served;
+    if (request == 2) return Served::running("begins");
     return request == 0 ? Served::start_afresh() : Served::done();
   }
   bool read_fresh(FreshReading& /*reading*/) noexcept override { return true; }
@@ -152,6 +160,12 @@ inline std::vector<Load> heaviest_loads() {
     } while (to.send());
     to.batch.clear();
   };
+  const auto running_requests = [](Sender& to, std::uint32_t, Iteration) {
+    do {
+      for (int i = 0; i < 8; ++i) to.batch.request(2, {});
+    } while (to.send());
+    to.batch.clear();
+  };
   const auto scheduled = [](Sender& to, std::uint32_t actuators, Iteration at) {
     std::uint32_t i = 0;
     do {
@@ -214,6 +228,7 @@ inline std::vector<Load> heaviest_loads() {
           {"8 lanes x 16 367 purges of all", 8, purges},
           {"16 367 requests with a fresh start in a batch", 1, requests},
           {"8 lanes full of batches of 8 such requests", 8, few_requests},
+          {"8 lanes full of batches of 8 requests that take time", 8, running_requests},
           {"8 lanes full of the dearest batches", 8, dearest},
           {"8 lanes x 8183 batches of one overwrite, same at", 8, scheduled},
           {"8 lanes x 16 367 purges, same at", 8, scheduled_purges}};

@@ -47,7 +47,8 @@ class Backend final : public o80::RequestServer {
   const nb::bytearray& observed() const { return observed_; }
   const nb::bytearray& extended() const { return extended_; }
   const nb::bytearray& fresh_desired() const { return fresh_desired_; }
-  /// Called with index and payload; gives None, a text (rejected), or True (start afresh).
+  /// Called with index and payload; gives None, a text (rejected), a text in a tuple (it runs), or
+  /// True (start afresh).
   nb::object serve_with = nb::none();
 
   /// Throws Closed or UsedAfterFork.
@@ -66,6 +67,12 @@ class Backend final : public o80::RequestServer {
     throw o80::Error("the backend of segment '" + name_ +
                      "' is inside of step: use it in one thread, and not from the handler of a "
                      "request (stop and close may be called from anywhere)");
+  }
+
+  /// For what the handler of a request may do too. Throws Error in another thread.
+  o80::UntypedBackend& in_its_thread() const {
+    const bool is_handler = stepping_ && stepping_thread_ == std::this_thread::get_id();
+    return is_handler ? checked() : between_steps();
   }
 
   void publish() {
@@ -185,6 +192,9 @@ class Backend final : public o80::RequestServer {
       if (answer.is_none()) return o80::Served::done();
       if (nb::isinstance<nb::str>(answer)) {
         return o80::Served::rejected(nb::cast<std::string>(answer));
+      }
+      if (nb::isinstance<nb::tuple>(answer)) {
+        return o80::Served::running(nb::cast<std::string>(answer[0]));
       }
       return o80::Served::start_afresh();
     } catch (nb::python_error& error) {
@@ -309,6 +319,25 @@ void bind_backend(nb::module_& m) {
             self.between_steps().interrupt(actuator);
           },
           "actuator"_a)
+      .def(
+          "runs",
+          [](const Backend& self, std::uint32_t request) { return self.checked().runs(request); },
+          "request"_a)
+      .def(
+          "show_progress",
+          [](const Backend& self, std::uint32_t request, const std::string& text) {
+            self.in_its_thread().show_progress(request, text);
+          },
+          "request"_a, "text"_a)
+      .def(
+          "end_request",
+          [](const Backend& self, std::uint32_t request, bool afresh,
+             const std::optional<std::string>& rejected) {
+            self.in_its_thread().end_request(request, rejected ? o80::Served::rejected(*rejected)
+                                                      : afresh ? o80::Served::start_afresh()
+                                                               : o80::Served::done());
+          },
+          "request"_a, "afresh"_a, "rejected"_a.none())
       .def(
           "halt",
           [](const Backend& self, const std::string& text) {

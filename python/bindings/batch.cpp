@@ -32,9 +32,13 @@ o80::Iteration reached(o80::Iteration iteration, const char* not_yet) {
 
 /// A handle that was pickled.
 Handle* handle_of(o80::CommandId id, int status, int reason, o80::Iteration iteration,
-                  std::string text) {
-  return new Handle{id, static_cast<o80::Status>(status), static_cast<o80::Reason>(reason),
-                    iteration, std::move(text)};
+                  std::string text, std::string progress) {
+  return new Handle{id,
+                    static_cast<o80::Status>(status),
+                    static_cast<o80::Reason>(reason),
+                    iteration,
+                    std::move(text),
+                    std::move(progress)};
 }
 
 std::string text_of(const Handle& handle) {
@@ -42,6 +46,7 @@ std::string text_of(const Handle& handle) {
       "<o80.Handle " + std::to_string(handle.id) + ": " + std::string(o80::to_text(handle.status));
   if (handle.iteration >= 0) text += " at iteration " + std::to_string(handle.iteration);
   if (!handle.text.empty()) text += ", " + handle.text;
+  if (!handle.progress.empty()) text += ", " + handle.progress;
   return text + ">";
 }
 
@@ -57,15 +62,16 @@ nb::list statuses_of(const Batch& batch) {
 
 void bind_batch(nb::module_& m) {
   nb::class_<Handle>(m, "Handle", "What became of one command or request, when it was asked.")
-      .def(nb::new_(&handle_of), "id"_a, "status"_a, "reason"_a, "iteration"_a, "text"_a)
+      .def(nb::new_(&handle_of), "id"_a, "status"_a, "reason"_a, "iteration"_a, "text"_a,
+           "progress"_a)
       .def(
           "__reduce__",
           [](nb::handle self) {
             const auto* handle = nb::inst_ptr<Handle>(self);
             return nb::make_tuple(
-                self.type(),
-                nb::make_tuple(handle->id, static_cast<int>(handle->status),
-                               static_cast<int>(handle->reason), handle->iteration, handle->text));
+                self.type(), nb::make_tuple(handle->id, static_cast<int>(handle->status),
+                                            static_cast<int>(handle->reason), handle->iteration,
+                                            handle->text, handle->progress));
           },
           nb::sig("def __reduce__(self) -> tuple[typing.Any, ...]"))
       .def_ro("id", &Handle::id, "Names it within its frontend.")
@@ -79,6 +85,7 @@ void bind_batch(nb::module_& m) {
           "iteration", [](const Handle& self) { return known(self.iteration); },
           "The iteration at which the status changed; None while it is queued.")
       .def_ro("text", &Handle::text, "Why it was rejected or dropped, in words.")
+      .def_ro("progress", &Handle::progress, "What the driver says of a request that runs.")
       .def_prop_ro(
           "ended", [](const Handle& self) { return o80::is_end(self.status); },
           "Whether the status changes no more.")

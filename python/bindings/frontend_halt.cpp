@@ -40,6 +40,15 @@ void resume(const Frontend& self, std::uint64_t number, std::optional<double> ti
   frontend->resume(number, timeout_of(timeout), Waiting::keep_waiting);
 }
 
+/// Name, iteration, who, progress.
+nb::list running_requests(const Frontend& self) {
+  nb::list all;
+  for (const o80::RequestUnderWay& each : self.untyped().running_requests()) {
+    all.append(nb::make_tuple(each.name, each.since, each.who, each.progress));
+  }
+  return all;
+}
+
 /// The driver verb that has not returned, and for how long [s].
 std::optional<std::tuple<std::string, double>> slow_verb(const Frontend& self) {
   const o80::SlowVerb slow = o80::slow_verb(self.untyped().link()->segment.view());
@@ -66,6 +75,8 @@ nothing moves again until `resume`. Acts in the first iteration begun after it, 
 
 Returns the number of the halt. Raises ReadOnly, BackendGone.)")
       .def_prop_ro("_halted", &halted)
+      .def_prop_ro("_running_requests", &running_requests,
+                   nb::sig("def _running_requests(self) -> list[tuple[str, int, str, str]]"))
       .def("_resume", &resume, "number"_a, "timeout"_a.none())
       .def_prop_ro("_slow_verb", &slow_verb)
       .def(

@@ -12,6 +12,7 @@
 #include "batch.hpp"
 #include "buffer.hpp"
 #include "control/batch_builder.hpp"
+#include "control/limits.hpp"
 #include "frontend.hpp"
 #include "waiting.hpp"
 #include "words.hpp"
@@ -165,13 +166,23 @@ std::uint16_t purged(const Frontend& self, nb::handle actuator) {
                             : static_cast<std::uint16_t>(self.actuator(actuator));
 }
 
+/// Bursting, the backend runs until the request has ended.
 Batch send_request(const Frontend& self, std::string_view name, nb::handle fields) {
   const auto frontend = self.shared();
   const std::uint32_t index = frontend->request_index(name);
   const std::vector<std::byte> payload = self.request_bytes(index, fields);
   frontend->command_check().request(index, payload);
-  return send_alone(self, [&](o80::BatchBuilder& batch) {
-    batch.request(static_cast<std::uint16_t>(index), payload);
+  o80::BatchBuilder batch;
+  batch.request(static_cast<std::uint16_t>(index), payload);
+  const Waiting waiting;
+  return frontend->pulse_to_end(batch);
+}
+
+void wait_until_ended(const Frontend& self, const Batch& batch, Seconds timeout) {
+  const auto frontend = self.shared();
+  carrying(batch, [&] {
+    const Waiting waiting;
+    frontend->wait_until_ended(batch, timeout_of(timeout), Waiting::keep_waiting);
   });
 }
 
@@ -267,6 +278,7 @@ Needs no pulse; what was added and not pulsed stays added.)")
            })
       .def("_index", &Frontend::actuator, "named"_a)
       .def("_send_request", &send_request, "name"_a, "fields"_a)
+      .def("_wait_until_ended", &wait_until_ended, "batch"_a, "timeout"_a.none())
       .def_prop_ro(
           "added", [](const Frontend& self) { return self.untyped().added(); },
           "How many commands, requests and purges were added and not pulsed.")

@@ -3,7 +3,7 @@
 from o80 import robots
 from o80._core import Batch, Burst, Handle, Observation, Stream, version
 from o80.actuator import Actuator, Number
-from o80.backend import Backend, StartAfresh
+from o80.backend import Backend, Running, StartAfresh
 from o80.burst_group import BurstGroup, burst
 from o80.errors import (
     BackendFailed,
@@ -38,6 +38,7 @@ from o80.installation import prefix
 from o80.limits import Limits
 from o80.prepared_burst import PreparedBurst
 from o80.record import Record
+from o80.running_request import RunningRequest
 from o80.segment_list import Segment, clean, segments
 from o80.stopping import stop
 from o80.words import Mode, Profile, Reason, Start, Status
@@ -80,6 +81,8 @@ __all__ = [
     "Record",
     "RequestRejected",
     "RowOverwritten",
+    "Running",
+    "RunningRequest",
     "SchemaMismatch",
     "Segment",
     "SegmentError",

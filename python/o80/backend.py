@@ -30,7 +30,17 @@ class StartAfresh:
     desired: Any = None
 
 
-Handler = Callable[[Record], StartAfresh | None]
+@dataclass(frozen=True)
+class Running:
+    """What the handler of a request returns if it takes time: `Backend.end_request` ends it.
+
+    progress: what frontends see meanwhile; `Backend.progress` changes it.
+    """
+
+    progress: str = ""
+
+
+Handler = Callable[[Record], StartAfresh | Running | None]
 
 
 class Backend:
@@ -128,6 +138,7 @@ class Backend:
         self._layout = Layout(native.description)
         self._segment = segment
         self._handlers: dict[str, Handler] = {}
+        self._fresh_start: StartAfresh | None = None  # of a request that has ended
         self._halt_handlers: dict[str, Callable[[], None]] = {}
         self._observed = self._states(native.observed)
         self._fresh_desired = self._states(native.fresh_desired)
@@ -175,6 +186,9 @@ class Backend:
         with a number that is NaN or infinite, as InvalidArgument.
         """
         native = self._open
+        if self._fresh_start is not None:
+            fresh, self._fresh_start = self._fresh_start, None
+            self._read_afresh(fresh)
         if not native.step(timeout):
             return None
         states = self._states(native.desired())
@@ -185,15 +199,57 @@ class Backend:
     def on(self, request: str, handler: Handler) -> None:
         """Sets who serves a request: called between two iterations with its fields.
 
-        It returns None, or StartAfresh if the robot jumped; it raises RequestRejected, whose text
-        the sender reads.
+        It returns None, StartAfresh if the robot jumped, or Running if it takes time; it raises
+        RequestRejected, whose text the sender reads.
         """
+        self._index_of(request)
+        self._open.check()
+        self._handlers[request] = handler
+
+    def running(self, request: str) -> bool:
+        """Whether a request was answered with Running and has not ended.
+
+        A halt ends it, unless it is one of `while_halted`: the robot is to stop doing it then.
+        """
+        return self._open.runs(self._index_of(request))
+
+    def progress(self, request: str, text: str) -> None:
+        """What frontends see of a request while it runs: 247 bytes at most."""
+        self._open.show_progress(self._index_of(request), text)
+
+    def end_request(
+        self, request: str, answer: StartAfresh | None = None, *, rejected: str | None = None
+    ) -> None:
+        """Ends a request that was answered with Running.
+
+        answer: None, or StartAfresh if the robot is elsewhere now: it starts afresh in the next
+            step, and the request ends with the row of that.
+        rejected: why it failed, which its sender reads.
+
+        It ends with the row that is published next. If it does not run any more, nothing happens.
+        """
+        index = self._index_of(request)
+        if answer is not None and not isinstance(answer, StartAfresh):
+            raise InvalidArgument(
+                f"a request ends with None, with o80.StartAfresh(...), or with rejected='why', "
+                f"not with {answer!r}"
+            )
+        if answer is not None and rejected is not None:
+            raise InvalidArgument("a request that is rejected does not start afresh: give one")
+        if not self._open.runs(index):
+            return
+        self._fresh_start = answer or self._fresh_start
+        self._open.end_request(index, answer is not None, rejected)
+
+    def _index_of(self, request: str) -> int:
         known = [row["name"] for row in self._layout.schema["requests"]]
         if request not in known:
             there = ", ".join(known) or "none"
             raise InvalidArgument(f"there is no request '{request}'; there are: {there}")
-        self._open.check()
-        self._handlers[request] = handler
+        return known.index(request)
+
+    def _read_afresh(self, answer: StartAfresh) -> None:
+        read_afresh(answer, self._observed, self._extended, self._fresh_desired)
 
     def on_halt(self, handler: Callable[[], None]) -> None:
         """Sets who is told when a halt begins: commands have ended, desired states brake."""
@@ -309,7 +365,8 @@ class Server:
         self._extended = backend._extended
         self._desired = backend._fresh_desired
 
-    def __call__(self, index: int, payload: bytes) -> str | bool | None:
+    def __call__(self, index: int, payload: bytes) -> str | bool | tuple[str] | None:
+        """None: done; a text: rejected; a text in a tuple: it runs; True: start afresh."""
         row = self._rows[index]
         handler = self._handlers.get(row["name"])
         if handler is None:
@@ -322,12 +379,14 @@ class Server:
             return str(why) or "the handler gave no reason"
         if answer is None:
             return None
-        fill(self._observed, answer.observed, "observed")
-        if answer.extended is not None:
-            fill(self._extended, answer.extended, "extended")
-        self._desired[...] = self._observed
-        if answer.desired is not None:
-            fill(self._desired, answer.desired, "desired")
+        if isinstance(answer, Running):
+            return (answer.progress,)
+        if not isinstance(answer, StartAfresh):
+            raise InvalidArgument(
+                f"the handler of '{row['name']}' returned {answer!r}: it is to return None, "
+                f"o80.StartAfresh(...) or o80.Running(...), or to raise o80.RequestRejected"
+            )
+        read_afresh(answer, self._observed, self._extended, self._desired)
         return True
 
     def halt(self) -> None:
@@ -346,6 +405,21 @@ class Server:
         except RequestRejected as why:
             return str(why) or "the handler gave no reason"
         return None
+
+
+def read_afresh(
+    answer: StartAfresh,
+    observed: NDArray[Any],
+    extended: NDArray[Any],
+    desired: NDArray[Any],
+) -> None:
+    """Writes what a fresh start reads into the memory of a row."""
+    fill(observed, answer.observed, "observed")
+    if answer.extended is not None:
+        fill(extended, answer.extended, "extended")
+    desired[...] = observed
+    if answer.desired is not None:
+        fill(desired, answer.desired, "desired")
 
 
 def fill(block: NDArray[Any], values: Any, what: str) -> None:

@@ -16,6 +16,7 @@ from o80.actuator import Actuator, actuators_of
 from o80.checked import whole, whole_or_none
 from o80.errors import (
     BackendGone,
+    BackendHalted,
     Closed,
     ControlTaken,
     Error,
@@ -23,12 +24,14 @@ from o80.errors import (
     NotBursting,
     RequestRejected,
     SchemaMismatch,
+    TimeoutError,
     UsedAfterFork,
 )
 from o80.halts import Halt
 from o80.history import History
 from o80.layout import Layout
 from o80.prepared_burst import PreparedBurst, checked_count
+from o80.running_request import RunningRequest
 from o80.trajectory import common_type, states_of, times_of
 from o80.words import Status
 
@@ -166,15 +169,30 @@ class Frontend(_core.Frontend):
         """Sends a request to the driver at once and waits for its answer.
 
         name: of the request; `requests` lists them.
-        timeout: for the answer [s].
+        timeout: for the answer, and, if the request takes time, for its end [s].
         fields: of the request; those that have a default may be left out.
 
-        It needs no pulse; what was added and not pulsed stays added. Raises RequestRejected with
-        the driver's text, TimeoutError, BackendGone. `add_request` makes one part of a pulse.
+        It needs no pulse; what was added and not pulsed stays added. A bursting backend runs until
+        the request has ended. Raises RequestRejected with the driver's text, BackendHalted if a
+        halt ended it, BackendGone, and TimeoutError, whose `batch` can be waited for again: the
+        request goes on. `add_request` makes one part of a pulse, and waits for nothing.
         """
         batch = self._send_request(name, fields)
-        batch.wait(timeout)
+        try:
+            self._wait_until_ended(batch, timeout)
+        except TimeoutError as error:
+            handle = batch.handles[0]
+            if handle.status != Status.ACTIVE:
+                raise
+            progress = f" ({handle.progress})" if handle.progress else ""
+            raise TimeoutError(
+                f"'{name}' of '{self.segment}' still runs{progress}, and goes on: give it more "
+                f"time, or wait for the `batch` of this error",
+                batch,
+            ) from error
         handle = batch.handles[0]
+        if handle.status == Status.HALTED:
+            raise BackendHalted(f"'{name}' of '{self.segment}' was ended: {handle.text}")
         if handle.status != Status.COMPLETED:
             raise RequestRejected(f"'{self.segment}' did not serve '{name}': {handle.text}")
 
@@ -393,6 +411,11 @@ class Frontend(_core.Frontend):
     def requests(self) -> dict[str, str]:
         """The requests that the driver serves, each with its help."""
         return {request["name"]: request["help"] for request in self.schema["requests"]}
+
+    @property
+    def running_requests(self) -> list[RunningRequest]:
+        """The requests that take time and have not ended, oldest first, whoever sent them."""
+        return [RunningRequest(*fields) for fields in self._running_requests]
 
     @property
     def enums(self) -> dict[str, Any]:

@@ -1,9 +1,19 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <string_view>
 
 #include "o80/o80.hpp"
+
+/// A request that takes time: the robot moves by itself until its joints are at 0.
+struct Home {
+  static constexpr std::string_view kHelp = "moves the joints to 0, one after the other";
+  double speed = 1.0;
+};
+O80_DESCRIBE(Home, (speed, "[rad/s]"));
 
 /// The tutorial robot: two simulated joints, each of which follows what is asked with a lag.
 class TwoJoints {
@@ -17,7 +27,7 @@ class TwoJoints {
   };
   using Actuators = std::array<double, 2>;  // positions [rad]
   using Extended = Sensors;
-  using Requests = o80::Requests<o80::Reset, o80::Snapshot, o80::Restore>;
+  using Requests = o80::Requests<o80::Reset, o80::Snapshot, o80::Restore, Home>;
 
   explicit TwoJoints(const Config& config) : config_(config) {}
 
@@ -30,6 +40,8 @@ class TwoJoints {
   void start() {}
 
   void write(const o80::Desired<TwoJoints>& desired) {
+    if (now_.mode == Mode::homes) move_home(desired.period());
+    if (now_.mode != Mode::follows) return;
     const double share = 1.0 - std::exp(-config_.gain * desired.period());
     for (std::size_t i = 0; i < 2; ++i) {
       now_.effort[i] = desired[i] - now_.position[i];
@@ -41,7 +53,9 @@ class TwoJoints {
   void read(o80::Reading<TwoJoints>& reading) {
     reading.observed = now_.position;
     reading.extended.effort = now_.effort;
-    reading.go_on_from(now_.desired);  // heard after a reset or a restore only
+    tell_of_home(reading);
+    if (reading.fresh()) now_.mode = Mode::follows;  // what is asked begins where it is
+    reading.go_on_from(now_.desired);                // heard after a reset or a restore only
   }
 
   o80::Served on(const o80::Reset&) {
@@ -59,14 +73,56 @@ class TwoJoints {
     return o80::Served::start_afresh();
   }
 
+  o80::Served on(const Home& home) {
+    if (!(home.speed > 0)) return o80::Served::rejected("speed must be above 0");
+    now_.mode = Mode::homes;
+    now_.speed = home.speed;
+    now_.effort = {};
+    return o80::Served::running("begins");
+  }
+
   void stop() noexcept {}
 
  private:
+  enum class Mode : std::uint8_t {
+    follows,  // what is asked
+    homes,    // moves by itself
+    stays     // where it has moved by itself, until it starts afresh
+  };
   struct State {
     std::array<double, 2> position{};
     std::array<double, 2> effort{};
     std::array<double, 2> desired{};
+    Mode mode = Mode::follows;
+    double speed = 0;  // of homing [rad/s]
   };
+
+  void move_home(double period) {
+    for (double& position : now_.position) {
+      if (position == 0) continue;
+      position -= std::clamp(position, -now_.speed * period, now_.speed * period);
+      return;
+    }
+  }
+
+  void tell_of_home(o80::Reading<TwoJoints>& reading) {
+    const bool is_home = now_.position == std::array<double, 2>{};
+    if (!reading.runs<Home>()) {
+      if (now_.mode == Mode::homes) stay();  // a halt has ended it
+    } else if (now_.mode != Mode::homes) {
+      reading.ended<Home>(o80::Served::rejected("a reset or a restore has ended it"));
+    } else if (is_home) {
+      stay();
+      reading.ended<Home>(o80::Served::start_afresh());
+    } else {
+      reading.progress<Home>(now_.position[0] != 0 ? "the shoulder moves" : "the elbow moves");
+    }
+  }
+
+  void stay() {
+    now_.mode = Mode::stays;
+    now_.desired = now_.position;
+  }
 
   Config config_;
   State now_;

@@ -9,7 +9,7 @@ namespace o80 {
 
 /// How a request, or the wish for exclusive control, ended.
 struct Outcome {
-  Status status = Status::completed;  // or rejected
+  Status status = Status::completed;  // or rejected; of a request that ends later, active
   Reason reason = Reason::none;
   std::uint8_t aux = 0;
 };
@@ -20,8 +20,9 @@ class BatchHandler {
   /// The iteration about to run; a fresh start inside `request` may move it on.
   virtual Iteration iteration() const noexcept = 0;
   /// Serves a request now; may call `Controller::restart`. `payload` holds the whole struct. The
-  /// request ends with the iteration at which it began: that of the fresh row, if it made one.
-  virtual Outcome request(std::uint32_t lane, CommandId id, std::uint32_t index,
+  /// request ends with the iteration at which it began: that of the fresh row, if it made one. If
+  /// the outcome is active, `Controller::end` ends the record later.
+  virtual Outcome request(std::uint32_t lane, CommandId id, BlockIndex record, std::uint32_t index,
                           Cursor payload) noexcept = 0;
   virtual Outcome take_control(std::uint32_t lane) noexcept = 0;
   virtual Outcome release_control(std::uint32_t lane) noexcept = 0;

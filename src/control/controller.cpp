@@ -224,9 +224,12 @@ void Controller::Body::take_step(const Taking& from, BlockIndex record,
     case RecordKind::purge:
       purge(from, head, now);
       return end({});
-    case RecordKind::request:
-      return end(handler.request(from.lane, head.id, head.actuator,
-                                 Cursor(pool, record, sizeof(RecordHead), head.payload_bytes)));
+    case RecordKind::request: {
+      const Cursor payload(pool, record, sizeof(RecordHead), head.payload_bytes);
+      const Outcome outcome = handler.request(from.lane, head.id, record, head.actuator, payload);
+      if (outcome.status == Status::active) return ledger.activate(record, now);
+      return end(outcome);
+    }
     case RecordKind::take_control:
       return end(handler.take_control(from.lane));
     case RecordKind::release_control:
@@ -387,6 +390,10 @@ void Controller::reject(std::uint32_t lane, BlockIndex batch, Reason reason, std
                         Iteration iteration, Status status) noexcept {
   body_->planner.forget(lane, batch);
   body_->ledger.reject(lane, batch, reason, aux, iteration, status);
+}
+
+void Controller::end(BlockIndex request, const Outcome& outcome, Iteration iteration) noexcept {
+  body_->ledger.end(request, outcome.status, outcome.reason, outcome.aux, iteration);
 }
 
 void Controller::step(Iteration iteration, const std::byte* observed) noexcept {

@@ -57,6 +57,9 @@ class Controller {
   void reject(std::uint32_t lane, BlockIndex batch, Reason reason, std::uint8_t aux,
               Iteration iteration, Status status = Status::rejected) noexcept;
 
+  /// Ends a request that was left active when its batch was taken.
+  void end(BlockIndex request, const Outcome& outcome, Iteration iteration) noexcept;
+
   /// Commands => desired. `observed` is the last row's.
   void step(Iteration iteration, const std::byte* observed) noexcept;
 

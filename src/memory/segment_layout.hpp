@@ -25,12 +25,13 @@ namespace o80 {
 
 inline constexpr std::uint64_t kSegmentMagic = 0x0a67'6573'2030'386fULL;   // "o80 seg\n"
 inline constexpr std::uint64_t kCommandsMagic = 0x0a64'6d63'2030'386fULL;  // "o80 cmd\n"
-inline constexpr std::uint32_t kSegmentVersion = 2;                        // of both files
+inline constexpr std::uint32_t kSegmentVersion = 3;                        // of both files
 inline constexpr std::size_t kLineBytes = 64;                              // of a cache
 inline constexpr std::size_t kBlockSize = 64;                              // of a lane [B]
 inline constexpr std::size_t kMessages = 64;                               // kept for a lane
 inline constexpr std::size_t kBurstsKept = 256;                            // for a lane
 inline constexpr std::size_t kHaltsKept = 8;                               // whose reasons are kept
+inline constexpr std::size_t kMostRunning = 8;                 // requests that run at a time
 inline constexpr std::uint32_t kMostLanes = 256;               // a status names a lane in 8 bits
 inline constexpr std::uint64_t kMostSkippedIds = 1ULL << 28;   // by the owners of a lane
 inline constexpr std::uint64_t kMostUnmetOwners = 1ULL << 20;  // of a lane, between two looks at it
@@ -72,6 +73,17 @@ struct HaltSlot {
   std::atomic<std::uint64_t> text[31];
 };
 
+/// A request that the driver serves over several iterations.
+struct RunningSlot {
+  alignas(kLineBytes) std::atomic<std::uint64_t> number;  // 0: unused, or being written
+  std::atomic<std::uint64_t> id;                          // within its lane
+  std::atomic<std::int64_t> since;                        // iteration in which it was taken
+  std::atomic<std::uint32_t> lane;
+  std::atomic<std::uint32_t> request;       // its place in the schema
+  std::atomic<std::uint64_t> who[8];        // text: the process that sent it
+  std::atomic<std::uint64_t> progress[31];  // text
+};
+
 struct Counters {
   alignas(kLineBytes) std::atomic<std::int64_t> begun;  // row being written, or published
   std::atomic<std::int64_t> published;                  // newest row, -1 before the first
@@ -84,9 +96,12 @@ struct Counters {
   std::atomic<std::uint64_t> slow_verb;  // `verb` as the helper thread has seen it before
   std::atomic<std::int64_t> slow_since;  // and since when [ns]
   HaltSlot halt;                         // the halt that acts
+  RunningSlot running[kMostRunning];
 };
 static_assert(sizeof(HaltSlot) == 6 * kLineBytes);
-static_assert(sizeof(Counters) == 3 * kLineBytes + 1024 + sizeof(HaltSlot));
+static_assert(sizeof(RunningSlot) == 6 * kLineBytes);
+static_assert(sizeof(Counters) ==
+              3 * kLineBytes + 1024 + sizeof(HaltSlot) + kMostRunning * sizeof(RunningSlot));
 
 struct CommandsHeader {
   std::uint64_t magic;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "memory/futex.hpp"
+#include "memory/signal.hpp"
 #include "o80/base/error.hpp"
 
 namespace o80 {

@@ -20,7 +20,8 @@ Loop::Loop(std::unique_ptr<Robot> robot, const BackendOptions& options)
       backend_(robot_->describe(options.period), options, this),
       pacer_(backend_.schema().head.period),
       paced_(!options.bursting),
-      interrupted_(backend_.layout().mask_words + 1) {
+      interrupted_(backend_.layout().mask_words + 1),
+      reports_(backend_.schema().requests.size()) {
   fault_.reserve(1024);
 }
 
@@ -120,13 +121,8 @@ bool Loop::read() noexcept {
   ReadingView view{};
   view.observed = backend_.observed();
   view.extended = backend_.extended();
-  view.interrupted = interrupted_.data();
-  view.iteration = backend_.iteration();
-  view.time = backend_.time();
-  if (!calls(Verb::read, [&] { return robot_->read(view); })) return failed("read");
-  finished_ = finished_ || view.finished != 0;
+  if (!read_into(view)) return false;
   if (paced_ && view.missed != 0) backend_.set_timing(pacer_.missed());
-  note_halt(view);
   for (std::uint32_t word = 0; word < interrupted_.size(); ++word) {
     for (std::uint64_t bits = interrupted_[word]; bits != 0; bits &= bits - 1) {
       const auto actuator = word * 64 + static_cast<std::uint32_t>(std::countr_zero(bits));
@@ -134,6 +130,34 @@ bool Loop::read() noexcept {
     }
   }
   return true;
+}
+
+bool Loop::read_into(ReadingView& view) noexcept {
+  view.interrupted = interrupted_.data();
+  view.iteration = backend_.iteration();
+  view.time = backend_.time();
+  view.requests = reports_.data();
+  for (std::uint32_t i = 0; i < reports_.size(); ++i) {
+    reports_[i].runs = backend_.runs(i) ? 1 : 0;
+    reports_[i].changed = 0;
+  }
+  if (!calls(Verb::read, [&] { return robot_->read(view); })) return failed("read");
+  finished_ = finished_ || view.finished != 0;
+  note_halt(view);
+  if (view.reported != 0) note_requests(view);
+  return true;
+}
+
+void Loop::note_requests(const ReadingView& view) noexcept {
+  for (std::uint32_t i = 0; i < reports_.size(); ++i) {
+    const RequestReport& report = view.requests[i];
+    if (report.changed == 0) continue;
+    const Served how = Robot::served(report);
+    backend_.end_request(i, how);
+    if (how.kind == Served::Kind::failed) {
+      failed(backend_.schema().requests[i].name.chars.data(), how.why());
+    }
+  }
 }
 
 /// Its ticks come so fast that no limit of a speed holds any more.
@@ -150,13 +174,15 @@ bool Loop::failed_to_wait() noexcept {
   return false;
 }
 
-bool Loop::failed(const char* verb) noexcept {
+bool Loop::failed(const char* verb) noexcept { return failed(verb, robot_->fault()); }
+
+bool Loop::failed(const char* verb, std::string_view why) noexcept {
   fault_ = "'";
   fault_ += robot_->table().name;
   fault_ += "' failed in ";
   fault_ += verb;
   fault_ += ": ";
-  fault_ += robot_->fault();
+  fault_ += why;
   return false;
 }
 
@@ -174,12 +200,7 @@ bool Loop::read_fresh(FreshReading& reading) noexcept {
   view.observed = reading.observed;
   view.extended = reading.extended;
   view.desired = reading.desired;
-  view.interrupted = interrupted_.data();
-  view.iteration = backend_.iteration();
-  view.time = backend_.time();
-  if (!calls(Verb::read, [&] { return robot_->read(view); })) return failed("read");
-  finished_ = finished_ || view.finished != 0;
-  note_halt(view);
+  if (!read_into(view)) return false;
   reading.has_desired = view.has_desired != 0;
   return true;
 }

@@ -58,6 +58,8 @@ class Loop final : public RequestServer {
   bool pace() noexcept;
   bool iterate() noexcept;
   void brake() noexcept;
+  bool read_into(ReadingView& view) noexcept;
+  void note_requests(const ReadingView& view) noexcept;
   void note_halt(const ReadingView& view) noexcept;
   bool begin();
   /// Calls into the driver; observers see which verb has not returned.
@@ -69,6 +71,7 @@ class Loop final : public RequestServer {
     return result;
   }
   bool failed(const char* verb) noexcept;
+  bool failed(const char* verb, std::string_view why) noexcept;
   bool failed_to_wait() noexcept;
 
   std::unique_ptr<Robot> robot_;
@@ -81,6 +84,7 @@ class Loop final : public RequestServer {
   bool ended_ = false;
   std::string fault_;  // reserved before the loop runs
   std::vector<std::uint64_t> interrupted_;
+  std::vector<RequestReport> reports_;  // of each request
 };
 
 }  // namespace o80

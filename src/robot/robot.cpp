@@ -103,9 +103,27 @@ Served Robot::served(RequestAnswer answer, const FaultText& text) noexcept {
       return Served::rejected(text.text);
     case RequestAnswer::start_afresh:
       return Served::start_afresh();
+    case RequestAnswer::running:
+      return Served::running(text.text);
     default:
       std::copy_n(text.text, sizeof text.text, fault_.text);
       return Served::failed(text.text);
+  }
+}
+
+Served Robot::served(const RequestReport& report) noexcept {
+  const std::string_view text(report.text, strnlen(report.text, sizeof report.text));
+  switch (report.answer) {
+    case RequestAnswer::done:
+      return Served::done();
+    case RequestAnswer::rejected:
+      return Served::rejected(text);
+    case RequestAnswer::start_afresh:
+      return Served::start_afresh();
+    case RequestAnswer::running:
+      return Served::running(text);
+    default:
+      return Served::failed(text);
   }
 }
 

@@ -49,6 +49,8 @@ class Robot {
   Served resume() noexcept;
   /// Once, and only if a start was tried.
   void stop() noexcept;
+  /// What the driver said of a request in its reading.
+  static Served served(const RequestReport& report) noexcept;
   const char* fault() const noexcept { return fault_.text; }
 
  private:

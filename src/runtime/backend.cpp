@@ -117,6 +117,7 @@ UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, Reques
       staging(lanes, pool, controller),
       schedule(lanes.size()),
       halts(segment.view()),
+      running(schema, segment.view()),
       verbs(segment.view()),
       server_(server),
       lives_(lanes.size()),
@@ -147,6 +148,7 @@ Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
   while (true) {
     look_at_lives();
     watch_halt();
+    start_afresh_after_request();
     if (stop.load(std::memory_order_relaxed)) return Step::ended;
     share_ = {};
     if (!granted()) {
@@ -237,7 +239,9 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
     std::memcpy(row() + layout.braking, controller.braking_mask(), layout.mask_words * 8);
   }
   history.publish(current, row());
-  if (begun_ && !fresh) watch_errors();
+  // a robot that starts afresh is expected to be elsewhere
+  if (begun_ && !fresh && running.wanting_fresh_start() == nullptr) watch_errors();
+  tell_ended_requests(fresh);
 
   // whoever waits for it
   if (!fresh) {
@@ -261,6 +265,7 @@ void UntypedBackend::Body::end(State state, std::string_view text) noexcept {
   reject_all(Reason::stopped);
   tell_of_the_row(false);
   controller.purge(kEveryActuator, current, Reason::stopped);
+  drop_running({Status::purged, Reason::stopped});
   while (!controller.finish_pending()) {
   }
   wake(lanes.announce(), false);
@@ -314,6 +319,16 @@ void UntypedBackend::halt(HaltCause cause, std::string_view text) noexcept {
   body_->ask_to_halt(cause, text);
 }
 const Halt& UntypedBackend::halted() const noexcept { return body_->halts.halt(); }
+
+void UntypedBackend::end_request(std::uint32_t request, const Served& how) noexcept {
+  body_->end_request(request, how);
+}
+void UntypedBackend::show_progress(std::uint32_t request, std::string_view text) noexcept {
+  body_->running.show_progress(request, text);
+}
+bool UntypedBackend::runs(std::uint32_t request) const noexcept {
+  return body_->running.runs(request);
+}
 
 void UntypedBackend::interrupt(std::uint32_t actuator) noexcept {
   body_->controller.interrupt(actuator, body_->current);

@@ -73,48 +73,7 @@ void UntypedBackend::Body::fail(std::string_view text) noexcept {
   stop.store(true, std::memory_order_relaxed);
 }
 
-// ------------------------------------------------------------------------------ requests
-
-Outcome UntypedBackend::Body::request(std::uint32_t lane, CommandId id, std::uint32_t index,
-                                      Cursor payload) noexcept {
-  const std::size_t size = schema.types[schema.requests[index].type].size;
-  const auto reject = [&](std::string_view why) {
-    lanes[lane].set_message(id, why);
-    return Outcome{Status::rejected, Reason::driver, 0};
-  };
-  payload.read(payload_.data(), size);
-  if (server_ == nullptr) return reject("nobody serves requests in this backend");
-
-  const Served served = server_->serve(index, {payload_.data(), size});
-  if (served.kind == Served::Kind::done) return {};
-  if (served.kind == Served::Kind::rejected) return reject(served.why());
-  if (served.kind == Served::Kind::failed) {
-    fail(served.why());
-    return reject(served.why());
-  }
-  return start_afresh(lane, id);
-}
-
-/// Reads the robot anew and publishes a row of its own.
-Outcome UntypedBackend::Body::start_afresh(std::uint32_t lane, CommandId id) noexcept {
-  auto* desired = reinterpret_cast<std::byte*>(fresh_desired_.data());
-  FreshReading reading{row() + layout.observed, row() + layout.extended, desired};
-  bool reads = server_->read_fresh(reading);
-  if (!reads) note_failure("the robot could not be read in a fresh start");
-  reads = reads && can_begin(reading.observed, "the reading of a fresh start");
-  if (reads && reading.has_desired) {
-    reads = can_begin(reading.desired, "the desired states of a fresh start");
-  }
-  if (!reads) {
-    unreadable = true;
-    stop.store(true, std::memory_order_relaxed);
-    lanes[lane].set_message(id, failure.data());
-    return {Status::rejected, Reason::driver, 0};
-  }
-  controller.restart(reading.observed, reading.has_desired ? reading.desired : nullptr, current);
-  publish(true);
-  return {};
-}
+// ------------------------------------------------------------------------------ control
 
 Outcome UntypedBackend::Body::take_control(std::uint32_t lane) noexcept {
   // a batch of somebody else never comes here while somebody has control; who has left the lane

@@ -23,6 +23,7 @@
 #include "o80/base/time.hpp"
 #include "o80/runtime/backend.hpp"
 #include "runtime/overrun_limit.hpp"
+#include "runtime/running_requests.hpp"
 #include "runtime/schedule.hpp"
 #include "runtime/staging.hpp"
 
@@ -49,7 +50,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
 
   // BatchHandler: what a batch can ask of the backend itself
   Iteration iteration() const noexcept override { return current; }
-  Outcome request(std::uint32_t lane, CommandId id, std::uint32_t index,
+  Outcome request(std::uint32_t lane, CommandId id, BlockIndex record, std::uint32_t index,
                   Cursor payload) noexcept override;
   Outcome take_control(std::uint32_t lane) noexcept override;
   Outcome release_control(std::uint32_t lane) noexcept override;
@@ -67,8 +68,9 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   void stop_burst(BurstEnd end = BurstEnd::done) noexcept;
   void end(State state, std::string_view text) noexcept;
   void ask_to_halt(HaltCause cause, std::string_view text) noexcept;
+  void end_request(std::uint32_t request, const Served& how) noexcept;
   Step brake() noexcept;
-  bool acts() const noexcept { return shown_acts_ != 0 || controller.active(); }
+  bool acts() const noexcept { return shown_acts_ != 0 || controller.active() || running.moves(); }
   void set_timing(const Timing& now) noexcept;
   std::int64_t time() const noexcept {
     return schema.head.bursting != 0 ? current * schema.head.period : monotonic_now();
@@ -87,6 +89,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   Staging staging;
   Schedule schedule;
   HaltLatch halts;
+  RunningRequests running;
   VerbWord verbs;
   Timing timing;
   std::atomic<bool> stop{false};
@@ -125,7 +128,14 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   void end_scheduled() noexcept;
   bool suits_halt(const StagedBatch& sent) noexcept;
   bool ends_for_silence(const StagedBatch& sent) noexcept;
+
+  // requests
+  Outcome reject_request(std::uint32_t lane, CommandId id, std::string_view why) noexcept;
   Outcome start_afresh(std::uint32_t lane, CommandId id) noexcept;
+  void start_afresh_after_request() noexcept;
+  void end_running(RunningRequests::Entry& entry, const Outcome& outcome) noexcept;
+  void tell_ended_requests(bool fresh) noexcept;
+  void drop_running(const Outcome& outcome) noexcept;
 
   // what the helper thread saw
   void look_at_lives() noexcept;

@@ -41,8 +41,8 @@ void UntypedBackend::Body::watch_halt() noexcept {
 void UntypedBackend::Body::show_acts() noexcept {
   if (schema.head.bursting != 0) return;
   const std::uint64_t* active = controller.active_mask();
-  const bool moves =
-      std::any_of(active, active + layout.mask_words, [](std::uint64_t word) { return word != 0; });
+  const bool moves = running.moves() || std::any_of(active, active + layout.mask_words,
+                                                    [](std::uint64_t word) { return word != 0; });
   const bool stays = moves || holder_ != kNobody || (shown_acts_ != 0 && controller.holds());
   const std::uint32_t acts = stays ? 1 : 0;
   if (acts == shown_acts_) return;
@@ -67,6 +67,7 @@ Step UntypedBackend::Body::brake() noexcept {
     if (unreadable) return Step::ended;  // where it is nobody knows
     const bool acted = acts();
     controller.purge(kEveryActuator, current, Reason::stopped);
+    drop_running({Status::purged, Reason::stopped});
     if (!acted) return Step::ended;
   } else if (!controller.braking()) {
     return Step::ended;
@@ -95,6 +96,7 @@ void UntypedBackend::Body::begin_halt() noexcept {
   halted_below_ = segment.view().bell().tickets.load(std::memory_order_seq_cst);  // sync tickets
   schedule.set_aside();
   controller.halt(current);
+  drop_running({Status::halted, Reason::halted});
   stop_burst(BurstEnd::cut);
   if (!driver_halted_ && server_ != nullptr && !server_->halt()) {
     fail("the robot failed when it was told that a halt begins");
@@ -164,7 +166,10 @@ Outcome UntypedBackend::Body::resume(std::uint32_t lane, CommandId id,
 
   // the robot may refuse; a halt that comes meanwhile wins
   if (server_ != nullptr) {
-    const Served served = server_->resume();
+    Served served = server_->resume();
+    if (served.kind == Served::Kind::running) {
+      served = Served::rejected("the robot is not ready: resume it again when it is");
+    }
     if (served.kind == Served::Kind::failed) fail(served.why());
     if (served.kind == Served::Kind::failed || served.kind == Served::Kind::rejected) {
       return refuse(served.why(), Reason::driver);

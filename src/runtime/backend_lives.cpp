@@ -83,7 +83,7 @@ void UntypedBackend::Body::watch_silence() noexcept {
     last_life_[i] = std::max(last_life_[i], std::min(lanes[i].life(), current - 1));
     if (current - last_life_[i] <= silence_) continue;
     const bool bursts = granted() && burst_lane_ == i;
-    const bool acts = holder_ == i || controller.acts(i);
+    const bool acts = holder_ == i || controller.acts(i) || running.moves(i);
     if (bursts || !acts) {
       last_life_[i] = current;
       continue;

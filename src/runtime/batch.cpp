@@ -5,6 +5,7 @@
 
 #include "base/printable.hpp"
 #include "memory/atomic_words.hpp"
+#include "memory/running_slot.hpp"
 #include "o80/base/error.hpp"
 #include "runtime/link.hpp"
 #include "runtime/sent.hpp"
@@ -104,7 +105,12 @@ Handle Batch::ask(CommandId id) const {
   handle.status = static_cast<Status>(answer.word.status);
   handle.reason = static_cast<Reason>(answer.word.reason);
   handle.iteration = answer.word.iteration;
-  if (!is_end(handle.status)) return handle;
+  if (!is_end(handle.status)) {
+    if (const auto running = running_request(link_->segment.view(), lane_->lane(), id)) {
+      handle.progress = printable(running->progress_text());
+    }
+    return handle;
+  }
   const bool has_message = handle.reason == Reason::driver || handle.reason == Reason::halted;
   if (has_message) handle.text = lane_->message(id).value_or("");
   if (handle.text.empty()) handle.text = words_for(*link_, handle, answer.word.aux);

@@ -38,20 +38,24 @@ UntypedObservation UntypedFrontend::pulse_and_wait(Timeout timeout, const PulseO
 UntypedObservation UntypedFrontend::wait_for_end(const Batch& batch, Timeout timeout,
                                                  const KeepWaiting& keep_waiting) const {
   UntypedObservation observation(link_->description);
-  Iteration last = -1;
-  if (batch.id() != 0 && bursting()) {
-    CancelUnlessDone rest(batch.lane_.get(), batch.id());
-    last = Burst(link_, batch).wait_done(timeout, keep_waiting);
-    rest.done();
-    link_->check_usable();
-  } else {
-    batch.wait(timeout, keep_waiting);
-    last = batch.last_iteration();
-  }
+  const Iteration last = wait_until_ended(batch, timeout, keep_waiting);
   if (!batch.rejection().empty()) throw_rejected(*link_, "batch", batch);
   throw_if_halted(*link_, batch);
   if (last < 0 || !link_->history.read(last, observation.bytes())) latest(observation.bytes());
   return observation;
+}
+
+Iteration UntypedFrontend::wait_until_ended(const Batch& batch, Timeout timeout,
+                                            const KeepWaiting& keep_waiting) const {
+  if (batch.id() == 0 || !bursting()) {
+    batch.wait(timeout, keep_waiting);
+    return batch.last_iteration();
+  }
+  CancelUnlessDone rest(batch.lane_.get(), batch.id());
+  const Iteration last = Burst(link_, batch).wait_done(timeout, keep_waiting);
+  rest.done();
+  link_->check_usable();
+  return last;
 }
 
 void UntypedFrontend::refuse_burst(std::int64_t iterations) const {

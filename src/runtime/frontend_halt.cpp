@@ -1,5 +1,7 @@
-// How a frontend halts, resumes and shows life.
+// How a frontend halts, resumes, shows life and sees what runs.
 
+#include "base/printable.hpp"
+#include "memory/running_slot.hpp"
 #include "memory/segment_file.hpp"
 #include "o80/runtime/frontend.hpp"
 #include "runtime/link.hpp"
@@ -86,6 +88,17 @@ void UntypedFrontend::wait_for_rest(std::uint64_t number, const Deadline& deadli
                          ": give resume more time");
     }
   }
+}
+
+std::vector<RequestUnderWay> UntypedFrontend::running_requests() const {
+  link_->check_usable();
+  std::vector<RequestUnderWay> all;
+  for (const RunningRequest& each : o80::running_requests(link_->segment.view())) {
+    if (each.request >= schema().requests.size()) continue;  // garbage
+    all.push_back({schema().requests[each.request].name.str(), each.since,
+                   printable(each.who_text()), printable(each.progress_text())});
+  }
+  return all;
 }
 
 void UntypedFrontend::keep_alive() {

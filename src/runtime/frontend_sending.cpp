@@ -406,4 +406,11 @@ Batch UntypedFrontend::pulse_to_end(const PulseOptions& options) {
   return pulse(options, bursting() ? kBurstUntilEnded : std::uint16_t{0});
 }
 
+Batch UntypedFrontend::pulse_to_end(BatchBuilder& batch) {
+  link_->check_usable();
+  BatchRecord record;
+  if (bursting()) record.flags = kBurstUntilEnded;
+  return batch.empty() ? Batch() : Batch(link_, send(batch, record));
+}
+
 }  // namespace o80

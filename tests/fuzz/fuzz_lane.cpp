@@ -91,6 +91,7 @@ class Plant final : private RequestServer {
     const auto gear = std::to_integer<int>(hand[offsetof(Hand, gear)]);
     must(gear <= 1 || gear == 7);
     last_ = now;
+    for (std::uint32_t request = 0; request < 3; ++request) end(request);
     backend.publish();
   }
 
@@ -99,14 +100,25 @@ class Plant final : private RequestServer {
  private:
   Served serve(std::uint32_t request, std::span<const std::byte> payload) noexcept override {
     must(request < 3);
-    switch (request == 0 ? unpack<Reset>(payload.data()).seed % 3 : request) {
+    must(!backend.runs(request));
+    switch (request == 0 ? unpack<Reset>(payload.data()).seed % 4 : request) {
       case 0:
         return Served::done();
+      case 3:
+        return Served::running("takes its time");
       case 1:
         return Served::rejected("no");
       default:
         return Served::start_afresh();
     }
+  }
+  /// Now and then, what runs ends.
+  void end(std::uint32_t request) {
+    if (!backend.runs(request)) return;
+    const Iteration now = backend.iteration();
+    if (now % 3 == 0) backend.show_progress(request, now % 2 == 0 ? "even" : "odd");
+    if (now % 5 == 0) backend.end_request(request, Served::done());
+    if (now % 7 == 0) backend.end_request(request, Served::start_afresh());
   }
   bool read_fresh(FreshReading& reading) noexcept override {
     last_ = {};

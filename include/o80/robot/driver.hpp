@@ -111,6 +111,24 @@ class Reading {
   void interrupt(std::size_t actuator) {
     view_.interrupted[actuator / 64] |= std::uint64_t{1} << (actuator % 64);
   }
+  // requests that `on` answered with `Served::running`
+  /// One of this kind runs. A halt may have ended it: then the robot is to stop doing it.
+  template <class Request>
+  bool runs() const {
+    return report<Request>().runs != 0;
+  }
+  /// What frontends see of it while it runs; at most 247 characters.
+  template <class Request>
+  void progress(std::string_view text) {
+    tell(report<Request>(), RequestAnswer::running, text);
+  }
+  /// It ends with this row: done, rejected (its sender reads why), failed (the loop ends), or
+  /// start_afresh (with the row of that). If none of this kind runs, nothing happens.
+  template <class Request>
+  void ended(const Served& how) {
+    tell(report<Request>(), static_cast<RequestAnswer>(how.kind), how.why());
+  }
+
   /// True in the reading of a fresh start, which may also give the desired states to go on from.
   bool fresh() const { return view_.desired != nullptr; }
   template <class Actuators>
@@ -136,6 +154,25 @@ class Reading {
   }
 
  private:
+  template <class Request>
+  RequestReport& report() const {
+    constexpr std::uint32_t kIndex = index_of_request<Request>(RequestsOf<D>{});
+    static_assert(kIndex != kNoRequest, "this struct is not among the Requests of the driver");
+    return view_.requests[kIndex];
+  }
+  /// An end stands, whatever is said after it.
+  void tell(RequestReport& report, RequestAnswer answer, std::string_view text) {
+    if (report.runs == 0 || (report.changed != 0 && report.answer != RequestAnswer::running))
+      return;
+    const std::size_t size =
+        text.size() < sizeof report.text ? text.size() : sizeof report.text - 1;
+    if (size > 0) std::memcpy(report.text, text.data(), size);
+    report.text[size] = 0;
+    report.answer = answer;
+    report.changed = 1;
+    view_.reported = 1;
+  }
+
   ReadingView& view_;
   FaultText fault_;
   bool faulty_ = false;
@@ -144,7 +181,8 @@ class Reading {
 /// The class an engineer writes; there is no base class.
 ///
 /// Its constructor touches no hardware. Optional: `describe(Schema&) const`, `Extended`,
-/// `Requests` with `on(const Each&)` (returning void or Served), `wait(std::int64_t due)`, `halt()`
+/// `Requests` with `on(const Each&)` (returning void or Served, which may say that it runs: see
+/// `Reading::ended`), `wait(std::int64_t due)`, `halt()`
 /// (a halt begins), `resume()` (one is to be cleared; returning void or Served, which may refuse).
 template <class D>
 concept Driver = requires(D& driver, const Desired<D>& desired, Reading<D>& reading) {

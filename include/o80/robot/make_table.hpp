@@ -77,7 +77,8 @@ static_assert(static_cast<int>(RequestAnswer::rejected) ==
                   static_cast<int>(Served::Kind::rejected) &&
               static_cast<int>(RequestAnswer::start_afresh) ==
                   static_cast<int>(Served::Kind::start_afresh) &&
-              static_cast<int>(RequestAnswer::failed) == static_cast<int>(Served::Kind::failed));
+              static_cast<int>(RequestAnswer::failed) == static_cast<int>(Served::Kind::failed) &&
+              static_cast<int>(RequestAnswer::running) == static_cast<int>(Served::Kind::running));
 
 }  // namespace driving
 

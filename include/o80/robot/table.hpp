@@ -57,23 +57,39 @@ struct DesiredView {
   std::int64_t period;  // [ns]
 };
 
+/// How a request ended, or that it runs and ends later.
+enum class RequestAnswer : std::uint32_t {
+  done = 0,
+  rejected = 1,
+  start_afresh = 2,
+  failed = 3,
+  running = 4
+};
+
+/// What a driver says of a request of one kind in its reading.
+struct RequestReport {
+  std::uint32_t runs;     // 1: it was answered `running` and has not ended
+  std::uint32_t changed;  // set it: `answer` says how it ended, or that it runs on
+  RequestAnswer answer;
+  char text[248];  // why it ended so, or its progress
+};
+
 /// Where a driver's reading goes; observed and extended hold the last one.
 struct ReadingView {
   std::byte* observed;
   std::byte* extended;
   std::byte* desired;          // in a fresh start; else null
   std::uint64_t* interrupted;  // one bit an actuator, zero
+  RequestReport* requests;     // one for each kind, in the order of the schema
   std::int64_t iteration;
   std::int64_t time;          // [ns]
   std::uint32_t finished;     // set it to end the loop in order
   std::uint32_t has_desired;  // set it if `desired` was filled
   std::uint32_t missed;       // set it if this tick of the robot brought no reading
   std::uint32_t halted;       // set it to halt the backend
-  FaultText halt_text;        // and say why
+  std::uint32_t reported;     // set it if a request has changed
+  FaultText halt_text;        // why it is to be halted
 };
-
-/// How a request ended.
-enum class RequestAnswer : std::uint32_t { done = 0, rejected = 1, start_afresh = 2, failed = 3 };
 
 /// A robot, as functions. Those that return int give 0, or 1 and fill the fault.
 struct RobotTable {

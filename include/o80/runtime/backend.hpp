@@ -111,6 +111,16 @@ class UntypedBackend {
   /// The halt that acts; number 0 if none does. For the thread of the loop.
   const Halt& halted() const noexcept;
 
+  // requests that the server answered with `running`, by their place in the schema; for the thread
+  // of the loop
+  /// The request ends with the row under way: done, rejected or failed; or starts the robot afresh
+  /// in the next step, and ends with the row of that. One that does not run: nothing happens.
+  void end_request(std::uint32_t request, const Served& how) noexcept;
+  /// What frontends see of the request while it runs.
+  void show_progress(std::uint32_t request, std::string_view text) noexcept;
+  /// It was answered `running` and has not ended: a halt ends it, unless it is served in halts.
+  bool runs(std::uint32_t request) const noexcept;
+
   /// Ends the commands of an actuator as interrupted, in the iteration under way.
   void interrupt(std::uint32_t actuator) noexcept;
 

@@ -24,6 +24,7 @@ struct Handle {
   Reason reason = Reason::none;
   Iteration iteration = -1;  // at which the status changed; -1 while it is queued
   std::string text;          // of a rejection: why, in words
+  std::string progress;      // of a request that runs: what the driver says of it
 };
 
 /// What one pulse sent: to be waited for, and asked what became of it.

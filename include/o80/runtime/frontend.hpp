@@ -30,6 +30,14 @@ class LaneSender;
 struct BatchRecord;
 struct RecordHead;
 
+/// A request that has begun and not ended.
+struct RequestUnderWay {
+  std::string name;
+  Iteration since = -1;  // iteration in which it was taken
+  std::string who;       // the process that sent it
+  std::string progress;  // what the driver says of it
+};
+
 struct FrontendOptions {
   Timeout timeout = std::chrono::seconds(5);  // to wait for the backend
   Access access = Access::read_write;
@@ -110,9 +118,14 @@ class UntypedFrontend {
   Batch pulse(BatchBuilder& batch);
   /// Sends what was added; bursting, lets the backend run until all of it has ended.
   Batch pulse_to_end(const PulseOptions& options = {});
+  /// The same with a batch of the caller's own making; what was added stays added.
+  Batch pulse_to_end(BatchBuilder& batch);
   /// Waits for the end of such a batch and returns the row of its last iteration.
   UntypedObservation wait_for_end(const Batch& batch, Timeout timeout,
                                   const KeepWaiting& keep_waiting = {}) const;
+  /// The same, however it ended; that iteration, or -1 if the batch was rejected.
+  Iteration wait_until_ended(const Batch& batch, Timeout timeout,
+                             const KeepWaiting& keep_waiting = {}) const;
   /// Both at once.
   UntypedObservation pulse_and_wait(Timeout timeout, const PulseOptions& options = {},
                                     const KeepWaiting& keep_waiting = {});
@@ -127,6 +140,9 @@ class UntypedFrontend {
   /// One iteration for each row that `rows` can hold, and all these rows; that of the last one.
   Iteration burst_rows(std::span<std::byte> rows, Timeout timeout,
                        const KeepWaiting& keep_waiting = {}, const PulseOptions& options = {});
+
+  /// The requests that the driver serves over several iterations, oldest first.
+  std::vector<RequestUnderWay> running_requests() const;
 
   // halts
   /// Halts the backend, whoever has control and whatever its lanes are doing; the number of the

@@ -11,9 +11,9 @@
 
 namespace o80 {
 
-/// How a request was served.
+/// How a request was served, or has ended.
 struct Served {
-  enum class Kind : std::uint8_t { done, rejected, start_afresh, failed };
+  enum class Kind : std::uint8_t { done, rejected, start_afresh, failed, running };
   Kind kind = Kind::done;
   std::array<char, 248> text{};
 
@@ -25,6 +25,11 @@ struct Served {
   /// The loop ends: the driver can go on no more.
   static Served failed(std::string_view why) { return with(Kind::failed, why); }
 
+  /// It takes time: it ends later, and its sender sees the progress meanwhile. At most one request
+  /// of a kind runs: another one is rejected before its handler is asked.
+  static Served running(std::string_view progress = {}) { return with(Kind::running, progress); }
+
+  /// Of a rejection or a failure; the progress of one that runs.
   std::string_view why() const { return {text.data(), strnlen(text.data(), text.size())}; }
 
  private:

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -50,6 +51,16 @@ template <class R>
 using RequestsOf = typename robot_types::RequestsIn<R>::Type;
 template <class R>
 inline constexpr bool kIsRunTime = std::is_same_v<ActuatorsOf<R>, RunTimeActuators>;
+
+inline constexpr std::uint32_t kNoRequest = 0xFFFFFFFF;
+
+/// A struct's place among the requests of a robot.
+template <class Request, class... Each>
+consteval std::uint32_t index_of_request(Requests<Each...>) {
+  std::uint32_t place = 0;
+  const bool found = ((std::is_same_v<Request, Each> || (++place, false)) || ...);
+  return found ? place : kNoRequest;
+}
 
 /// A request's name: that of its struct in snake_case, "Home" => "home", "LaunchBall" =>
 /// "launch_ball".

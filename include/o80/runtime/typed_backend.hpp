@@ -33,16 +33,25 @@ class Backend final : private RequestServer {
   /// Serves a request between two iterations.
   template <Shareable Request>
   void on(std::function<Served(const Request&)> serve) {
-    const std::string name = request_name<Request>();
-    const auto& rows = backend_.schema().requests;
-    for (std::uint32_t i = 0; i < rows.size(); ++i) {
-      if (rows[i].name.view() != name) continue;
-      servers_[i] = [serve = std::move(serve)](const std::byte* payload) {
-        return serve(unpack<Request>(payload));
-      };
-      return;
-    }
-    throw InvalidArgument("request '" + name + "' is not among the Requests of the robot");
+    servers_[index_of<Request>()] = [serve = std::move(serve)](const std::byte* payload) {
+      return serve(unpack<Request>(payload));
+    };
+  }
+  /// A request of this kind was answered `running` and has not ended; a halt may have ended it.
+  template <Shareable Request>
+  bool runs() const {
+    return backend_.runs(index_of<Request>());
+  }
+  /// What frontends see of it while it runs.
+  template <Shareable Request>
+  void progress(std::string_view text) {
+    backend_.show_progress(index_of<Request>(), text);
+  }
+  /// It ends with the row that is published next, or, if it starts afresh, in the next step. If
+  /// none of this kind runs, nothing happens.
+  template <Shareable Request>
+  void ended(const Served& how) {
+    backend_.end_request(index_of<Request>(), how);
   }
   /// Reads the robot anew after a request answered `start_afresh`.
   void on_fresh_start(std::function<void(Actuators&, Extended&)> read) { read_ = std::move(read); }
@@ -73,6 +82,12 @@ class Backend final : private RequestServer {
   UntypedBackend& untyped() { return backend_; }
 
  private:
+  template <Shareable Request>
+  static constexpr std::uint32_t index_of() {
+    constexpr std::uint32_t kIndex = index_of_request<Request>(RequestsOf<R>{});
+    static_assert(kIndex != kNoRequest, "this struct is not among the Requests of the robot");
+    return kIndex;
+  }
   static Schema schema_of(const BackendOptions& options, const Describe& describe) {
     Schema schema;
     schema.head.robot = NameText(options.segment);

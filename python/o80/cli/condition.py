@@ -24,6 +24,17 @@ def halt_text(frontend: o80.Frontend) -> str:
     )
 
 
+def running_texts(frontend: o80.Frontend) -> list[str]:
+    """The requests that take time and have not ended."""
+    if not frontend.alive:
+        return []
+    return [
+        f"request '{request.name}' of {request.who} has been running since iteration "
+        f"{request.since}" + (f": {request.progress}" if request.progress else "")
+        for request in frontend.running_requests
+    ]
+
+
 def start_text(started_at: int) -> str:
     """What is wrong with a backend that is starting since then [s since 1970]; or nothing."""
     age = time.time() - started_at

@@ -9,7 +9,7 @@ from rich.markup import escape
 from rich.table import Table
 
 import o80
-from o80.cli.condition import halt_text, loop_text, watchdog_text
+from o80.cli.condition import halt_text, loop_text, running_texts, watchdog_text
 from o80.cli.screen import out, print_json
 
 
@@ -30,7 +30,8 @@ def info(
             f"rows {frontend.oldest} to {frontend.published}, "
             f"{schema['row']['size']} bytes a row"
         )
-        for said in (halt_text(frontend), loop_text(frontend), watchdog_text(schema)):
+        conditions = halt_text(frontend), loop_text(frontend), watchdog_text(schema)
+        for said in (*conditions, *running_texts(frontend)):
             if said:
                 out.print(escape(said), soft_wrap=True)
         if schema["actuators"]:

@@ -10,7 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 import o80
-from o80.cli.condition import halt_text, loop_text, start_text
+from o80.cli.condition import halt_text, loop_text, running_texts, start_text
 from o80.cli.screen import out, print_json
 
 
@@ -41,7 +41,7 @@ def list_segments(
         )
     out.print(table)
     for row in rows:
-        for said in (row["halted"], row["state_of_loop"]):
+        for said in (row["halted"], row["state_of_loop"], *row["running"]):
             if said:
                 out.print(f"[yellow]{row['segment']}[/]: {escape(said)}", soft_wrap=True)
         if row["problem"]:
@@ -66,6 +66,7 @@ def _row(entry: o80.Segment) -> dict[str, Any]:
         "iteration": None,
         "state_of_loop": None,
         "halted": None,
+        "running": [],
     }
     if not entry.readable:
         return row
@@ -80,6 +81,7 @@ def _row(entry: o80.Segment) -> dict[str, Any]:
             row["iteration"] = frontend.published
             row["state_of_loop"] = loop_text(frontend)
             row["halted"] = halt_text(frontend)
+            row["running"] = running_texts(frontend)
     except o80.Error:
         pass  # it went while we looked
     return row

@@ -199,7 +199,7 @@ void fill(Sender& to, const Mix& mix, std::uint32_t actuators, std::mt19937& ran
           random() % 2 == 0 ? to.batch.take_control() : to.batch.release_control();
           break;
         default:
-          to.batch.request(random() % 2, {});
+          to.batch.request(random() % 3, {});
       }
     }
     const bool later = mix.later_in > 0 && random() % mix.later_in == 0;

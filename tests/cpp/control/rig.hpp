@@ -202,9 +202,10 @@ class Rig : public BatchHandler {
 
   // what a backend does of a batch's requests
   Iteration iteration() const noexcept override { return next; }
-  Outcome request(std::uint32_t lane, CommandId id, std::uint32_t index,
+  Outcome request(std::uint32_t lane, CommandId id, BlockIndex record, std::uint32_t index,
                   Cursor payload) noexcept override {
     requests.push_back({lane, id, index, payload.left()});
+    last_request = record;
     if (fresh_start) {
       controller.restart(observed.data(), nullptr, next);
       ++next;
@@ -220,6 +221,7 @@ class Rig : public BatchHandler {
     return outcome;
   }
 
+  BlockIndex last_request = kNoBlock;
   struct Request {
     std::uint32_t lane;
     CommandId id;

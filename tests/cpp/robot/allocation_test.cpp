@@ -78,6 +78,11 @@ TEST_F(AllocationTest, AnIterationTakesNothingWithCommandsRequestsBurstsAndWaite
   long total = 0;
   Puppet::on_read = [](Reading<Puppet>& reading) {
     if (reading.iteration() % 17 == 0) reading.interrupt(1);
+    reading.progress<Poke>(reading.iteration() % 2 == 0 ? "one way" : "the other way");
+    if (reading.iteration() % 5 == 0) {
+      reading.ended<Poke>(reading.iteration() % 2 == 0 ? Served::start_afresh()
+                                                       : Served::rejected("not now"));
+    }
   };
   for (int round = 0; round < 200; ++round) {
     // a batch that is larger than an iteration takes, rejected ones, dropped ones, requests
@@ -86,6 +91,7 @@ TEST_F(AllocationTest, AnIterationTakesNothingWithCommandsRequestsBurstsAndWaite
     }
     add(one, 1, round, {.pace = until(round)});
     add_request(one, Poke{static_cast<std::uint32_t>(round % 3)});
+    add_request(one, Poke{.how = 5});
     one.pulse();
     add(two, 1, 0.5 * round,
         {.pace = duration(std::chrono::milliseconds(3)), .profile = Profile::minimum_jerk});

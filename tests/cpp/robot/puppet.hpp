@@ -22,7 +22,7 @@ namespace o80::test {
 
 /// A request that the puppet serves as it is told to.
 struct Poke {
-  std::uint32_t how = 0;  // 0 done, 1 rejected, 2 fresh start, 3 failed, 4 throws
+  std::uint32_t how = 0;  // 0 done, 1 rejected, 2 fresh start, 3 failed, 4 throws, 5 runs
 };
 O80_DESCRIBE(Poke, how);
 
@@ -113,6 +113,8 @@ class Puppet {
         return Served::start_afresh();
       case 3:
         return Served::failed("poked too hard");
+      case 5:
+        return Served::running("feels the poke");
       default:
         throw std::runtime_error("ouch");
     }

@@ -134,15 +134,5 @@ TEST_F(TypedBackendTest, IsNotResumedWhileItsReadingIsNoNumber) {
   EXPECT_EQ(frontend.latest().desired()[0], 1.5);
 }
 
-TEST_F(TypedBackendTest, RefusesAServerForARequestThatIsNotListed) {
-  struct Sensor {
-    using Actuators = NoActuators;
-  };
-  Backend<Sensor> backend({.segment = "sensor"});
-  EXPECT_THAT(message_of<InvalidArgument>(
-                  [&] { backend.on<Reset>([](const Reset&) { return Served::done(); }); }),
-              HasSubstr("'reset'"));
-}
-
 }  // namespace
 }  // namespace o80::test

@@ -1,0 +1,119 @@
+// How a backend serves requests, at once or over several iterations, and starts afresh.
+
+#include <cstring>
+
+#include "runtime/backend_body.hpp"
+
+namespace o80 {
+
+Outcome UntypedBackend::Body::request(std::uint32_t lane, CommandId id, BlockIndex record,
+                                      std::uint32_t index, Cursor payload) noexcept {
+  const std::size_t size = schema.types[schema.requests[index].type].size;
+  payload.read(payload_.data(), size);
+  if (server_ == nullptr) {
+    return reject_request(lane, id, "nobody serves requests in this backend");
+  }
+  ShortText<248> why;
+  if (!running.may_begin(index, why)) return reject_request(lane, id, why.view());
+
+  const Served served = server_->serve(index, {payload_.data(), size});
+  switch (served.kind) {
+    case Served::Kind::done:
+      return {};
+    case Served::Kind::rejected:
+      return reject_request(lane, id, served.why());
+    case Served::Kind::start_afresh:
+      return start_afresh(lane, id);
+    case Served::Kind::running:
+      running.begin(index, lane, id, record, current, served.why());
+      return {.status = Status::active};
+    case Served::Kind::failed:
+      break;
+  }
+  fail(served.why());
+  return reject_request(lane, id, served.why());
+}
+
+Outcome UntypedBackend::Body::reject_request(std::uint32_t lane, CommandId id,
+                                             std::string_view why) noexcept {
+  lanes[lane].set_message(id, why);
+  return {Status::rejected, Reason::driver, 0};
+}
+
+/// Reads the robot anew and publishes a row of its own.
+Outcome UntypedBackend::Body::start_afresh(std::uint32_t lane, CommandId id) noexcept {
+  auto* desired = reinterpret_cast<std::byte*>(fresh_desired_.data());
+  FreshReading reading{row() + layout.observed, row() + layout.extended, desired};
+  bool reads = server_->read_fresh(reading);
+  if (!reads) note_failure("the robot could not be read in a fresh start");
+  reads = reads && can_begin(reading.observed, "the reading of a fresh start");
+  if (reads && reading.has_desired) {
+    reads = can_begin(reading.desired, "the desired states of a fresh start");
+  }
+  if (!reads) {
+    unreadable = true;
+    stop.store(true, std::memory_order_relaxed);
+    return reject_request(lane, id, failure.data());
+  }
+  controller.restart(reading.observed, reading.has_desired ? reading.desired : nullptr, current);
+  publish(true);
+  return {};
+}
+
+// ------------------------------------------------------------------------------ over several
+// iterations
+
+void UntypedBackend::Body::end_running(RunningRequests::Entry& entry,
+                                       const Outcome& outcome) noexcept {
+  const BlockIndex record = entry.record;
+  running.forget(entry);
+  controller.end(record, outcome, current);
+}
+
+/// Requests that the driver has ended, when the row that shows it is out. Those that want a fresh
+/// start end with the row of that.
+void UntypedBackend::Body::tell_ended_requests(bool fresh) noexcept {
+  running.each([&](RunningRequests::Entry& entry) {
+    if (!entry.end) return;
+    const Served how = *entry.end;
+    const RunningRequest& sent = entry.shown;
+    switch (how.kind) {
+      case Served::Kind::start_afresh:
+        if (fresh) end_running(entry, {});
+        return;
+      case Served::Kind::rejected:
+        return end_running(entry, reject_request(sent.lane, sent.id, how.why()));
+      case Served::Kind::failed:
+        fail(how.why());
+        return end_running(entry, reject_request(sent.lane, sent.id, how.why()));
+      default:
+        return end_running(entry, {});
+    }
+  });
+}
+
+/// A request that has ended wants a fresh start: it comes before anything else is taken.
+void UntypedBackend::Body::start_afresh_after_request() noexcept {
+  const RunningRequests::Entry* entry = running.wanting_fresh_start();
+  if (entry == nullptr) return;
+  const Outcome outcome = start_afresh(entry->shown.lane, entry->shown.id);
+  if (outcome.status == Status::completed) return;  // told with the fresh row
+  running.each([&](RunningRequests::Entry& each) {
+    if (&each == entry) end_running(each, outcome);
+  });
+}
+
+/// Ends what runs without asking the driver; at a halt, what is served in halts goes on.
+void UntypedBackend::Body::drop_running(const Outcome& outcome) noexcept {
+  const bool is_halt = outcome.status == Status::halted;
+  running.each([&](RunningRequests::Entry& entry) {
+    if (!is_halt || !running.is_while_halted(entry)) end_running(entry, outcome);
+  });
+}
+
+void UntypedBackend::Body::end_request(std::uint32_t request, const Served& how) noexcept {
+  if (how.kind == Served::Kind::running) return running.show_progress(request, how.why());
+  running.note_end(request, how);
+}
+
+}  // namespace o80

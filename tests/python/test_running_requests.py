@@ -1,0 +1,256 @@
+"""Requests that take time."""
+
+import threading
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+import o80
+
+WAIT = 30.0  # [s] longer than any wait should take
+
+
+@pytest.fixture
+def backend(segment: str) -> Iterator[o80.Backend]:
+    """Two joints that home, in bursting mode; row 0 is out."""
+    requests = {"home": {"speed": float}, "calibrate": None, "abandon": None}
+    with o80.Backend(
+        segment, ["a", "b"], requests=requests, while_halted=["calibrate"], bursting=True
+    ) as made:
+        made.on("home", lambda _: o80.Running("looks for the index of joint 1"))
+        made.on("calibrate", lambda _: o80.Running())
+        made.publish([1.0, 2.0])
+        yield made
+
+
+def iterate(backend: o80.Backend, frontend: o80.Frontend, iterations: int = 1) -> None:
+    """Both sides of a burst, in this thread."""
+    frontend.burst(iterations, wait=False)
+    for _ in range(iterations):
+        assert backend.step(WAIT) is not None
+        backend.publish()
+
+
+def home(frontend: o80.Frontend) -> o80.Batch:
+    frontend.add_request("home", speed=0.5)
+    return frontend.pulse()
+
+
+def test_it_is_active_with_its_progress_until_it_ends(backend: o80.Backend, segment: str) -> None:
+    with o80.Frontend(segment) as frontend:
+        batch = home(frontend)
+        iterate(backend, frontend, 2)
+        assert batch.handles[0].status == o80.Status.ACTIVE
+        assert batch.handles[0].progress == "looks for the index of joint 1"
+        assert "looks for the index" in repr(batch.handles[0])
+        assert not batch.ended
+
+        backend.progress("home", "looks for the index of joint 2")
+        assert batch.handles[0].progress == "looks for the index of joint 2"
+        assert backend.running("home")
+
+        backend.end_request("home")
+        assert batch.handles[0].status == o80.Status.ACTIVE, "its row is not out"
+        iterate(backend, frontend)
+        assert batch.statuses == [o80.Status.COMPLETED]
+        assert batch.handles[0].progress == ""
+        assert not backend.running("home")
+
+
+def test_who_may_only_read_sees_what_runs(backend: o80.Backend, segment: str) -> None:
+    with o80.Frontend(segment) as frontend, o80.Frontend(segment, read_only=True) as observer:
+        assert observer.running_requests == []
+        home(frontend)
+        iterate(backend, frontend, 3)
+        (seen,) = observer.running_requests
+        assert (seen.name, seen.since) == ("home", 1)
+        assert seen.progress == "looks for the index of joint 1"
+        assert "pid" in seen.who
+
+
+def test_it_may_end_as_rejected(backend: o80.Backend, segment: str) -> None:
+    with o80.Frontend(segment) as frontend:
+        batch = home(frontend)
+        iterate(backend, frontend)
+        backend.end_request("home", rejected="no index pulse within 20 s")
+        iterate(backend, frontend)
+        assert batch.handles[0].status == o80.Status.REJECTED
+        assert batch.handles[0].text == "no index pulse within 20 s"
+
+
+def test_it_may_end_with_a_fresh_start(backend: o80.Backend, segment: str) -> None:
+    with o80.Frontend(segment) as frontend:
+        batch = home(frontend)
+        iterate(backend, frontend)
+        backend.end_request("home", o80.StartAfresh([0.0, 0.0]))
+        iterate(backend, frontend)
+        assert batch.statuses == [o80.Status.COMPLETED]
+        fresh = frontend.wait_for(batch.last_iteration)
+        assert fresh.fresh
+        assert fresh.desired.tolist() == [0.0, 0.0]
+
+
+def test_another_request_may_end_it(backend: o80.Backend, segment: str) -> None:
+    def abandon(_: o80.Record) -> None:
+        backend.end_request("home", rejected="abandoned")
+
+    backend.on("abandon", abandon)
+    with o80.Frontend(segment) as frontend:
+        batch = home(frontend)
+        iterate(backend, frontend)
+        frontend.add_request("abandon")
+        frontend.pulse()
+        iterate(backend, frontend)
+        assert batch.handles[0].text == "abandoned"
+
+
+def test_a_second_one_is_rejected_with_a_sentence(backend: o80.Backend, segment: str) -> None:
+    with o80.Frontend(segment) as frontend:
+        home(frontend)
+        iterate(backend, frontend)
+        second = home(frontend)
+        iterate(backend, frontend)
+        assert second.handles[0].text == (
+            "'home' has been running since iteration 1: wait for its end"
+        )
+
+
+def test_a_halt_ends_it_unless_it_is_served_in_halts(backend: o80.Backend, segment: str) -> None:
+    with o80.Frontend(segment) as frontend:
+        homing = home(frontend)
+        frontend.add_request("calibrate")
+        calibrating = frontend.pulse()
+        iterate(backend, frontend)
+        frontend.halt("a hand in the cell")
+        iterate(backend, frontend)
+        assert homing.handles[0].status == o80.Status.HALTED
+        assert "a hand in the cell" in homing.handles[0].text
+        assert not backend.running("home")
+        assert calibrating.handles[0].status == o80.Status.ACTIVE
+        assert [each.name for each in frontend.running_requests] == ["calibrate"]
+
+
+def test_what_is_no_answer_or_no_end_is_refused(backend: o80.Backend, segment: str) -> None:
+    with pytest.raises(o80.InvalidArgument, match="home, calibrate, abandon"):
+        backend.end_request("hom")
+    with pytest.raises(o80.InvalidArgument, match="ends with None"):
+        backend.end_request("home", o80.Running())  # type: ignore[arg-type]
+    with pytest.raises(o80.InvalidArgument, match="give one"):
+        backend.end_request("home", o80.StartAfresh([0, 0]), rejected="why")
+    backend.end_request("home")  # it does not run: nothing happens
+
+    backend.on("abandon", lambda _: "soon")  # type: ignore[arg-type, return-value]
+    with o80.Frontend(segment) as frontend:
+        frontend.add_request("abandon")
+        frontend.burst(1, wait=False)
+        with pytest.raises(o80.InvalidArgument, match=r"'abandon' returned 'soon'.*o80\.Running"):
+            backend.step(WAIT)
+
+
+# ---------------------------------------------------------------------- the tutorial robot
+
+
+def test_a_request_waits_for_its_end(arm: o80.Frontend) -> None:
+    arm.add_command(None, [0.5, 0.3])
+    arm.burst(1000)
+    before = arm.published
+
+    arm.request("home", speed=1.0)
+
+    taken = arm.published - before
+    assert 750 < taken < 850, "0.8 rad at 1 rad/s and 1000 Hz, and its fresh row"
+    assert arm.latest().fresh
+    assert arm.latest().observed.tolist() == [0.0, 0.0]
+    assert arm.latest().desired.tolist() == [0.0, 0.0]
+    assert arm.running_requests == []
+
+
+def test_a_request_that_ends_at_once_runs_no_iteration(arm: o80.Frontend) -> None:
+    before = arm.published
+    arm.request("snapshot")
+    assert arm.published == before
+
+
+def test_desired_states_are_not_followed_while_it_runs(arm: o80.Frontend) -> None:
+    arm.add_command(None, [0.5, 0.3])
+    arm.burst(1000)
+    arm.add_request("home", speed=0.1)
+    batch = arm.pulse()
+    arm.add_command(0, 2.0, duration=0.5)
+    arm.burst(200)
+    assert batch.handles[0].progress == "the shoulder moves"
+    np.testing.assert_allclose(arm.latest().observed[0], 0.5 - 0.1 * 0.2, atol=1e-3)
+
+
+def test_a_halt_leaves_the_robot_where_it_is(arm: o80.Frontend) -> None:
+    arm.add_command(None, [0.5, 0.3])
+    arm.burst(1000)
+    arm.add_request("home", speed=0.1)
+    batch = arm.pulse()
+    arm.burst(100)
+    number = arm.halt()
+    arm.burst(1)
+    assert batch.statuses == [o80.Status.HALTED]
+    place = arm.latest().observed.tolist()
+    arm.burst(100)
+    assert arm.latest().observed.tolist() == place
+    arm.resume(number)
+    arm.burst(100)
+    assert arm.latest().observed.tolist() == place
+    arm.add_command(0, 1.0)
+    arm.burst(1000)
+    assert arm.latest().observed[0] > 0.9, "it follows again"
+
+
+def test_a_request_that_a_halt_ends_raises(process: o80.robots.Process) -> None:
+    with process.frontend() as arm, process.frontend() as other:
+        arm.add_command(None, [2.0, 2.0])
+        arm.pulse_and_wait(timeout=WAIT)
+        raised: list[Exception] = []
+
+        def ask() -> None:
+            try:
+                arm.request("home", speed=1e-3, timeout=WAIT)
+            except o80.Error as error:
+                raised.append(error)
+
+        thread = threading.Thread(target=ask)
+        thread.start()
+        while not other.running_requests:
+            other.wait_for_next(timeout=WAIT)
+        other.halt("stop that")
+        thread.join(WAIT)
+        assert isinstance(raised[0], o80.BackendHalted)
+        assert "stop that" in str(raised[0])
+
+
+def test_a_timeout_says_that_it_goes_on(process: o80.robots.Process) -> None:
+    with process.frontend() as arm:
+        arm.add_command(None, [2.0, 2.0])
+        arm.pulse_and_wait(timeout=WAIT)
+        while arm.latest().observed[0] < 1.0:
+            arm.wait_for_next(timeout=WAIT)
+        with pytest.raises(o80.TimeoutError, match=r"'home' of .* still runs") as raised:
+            arm.request("home", speed=1e-3, timeout=0.2)
+        batch = raised.value.batch
+        assert batch is not None
+        assert not batch.ended
+        arm.request("reset")
+        batch.wait(WAIT)
+        assert "a reset or a restore has ended it" in batch.handles[0].text
+
+
+def test_a_reset_in_the_middle_is_repeated_bit_for_bit(arm: o80.Frontend) -> None:
+    def run() -> list[list[float]]:
+        arm.request("reset")
+        first = arm.published
+        arm.add_command(None, [0.5, 0.3])
+        arm.burst(300)
+        arm.add_request("home")
+        arm.pulse()
+        arm.burst(100)
+        rows: list[list[float]] = arm.history(since=first).observed.tolist()
+        return rows
+
+    assert run() == run()
