@@ -1,4 +1,4 @@
-// How a burst is granted, counted and ended.
+// How a burst is granted, counted and ended. See ARCHITECTURE.md, Bursting.
 
 #include "runtime/backend_body.hpp"
 
@@ -13,7 +13,7 @@ void UntypedBackend::Body::grant(const StagedBatch& sent, const BatchRecord& bat
   if (sent.had_left || is_called_off()) stop_burst();
 }
 
-/// Its own sender has cancelled it, or closed.
+/// True if the sender of the burst has cancelled it or has closed its lane.
 bool UntypedBackend::Body::is_called_off() const noexcept {
   const LaneReceiver& lane = lanes[burst_lane_];
   return lane.is_cancelled(burst_id_) || lane.closed() >= burst_incarnation_;
@@ -30,7 +30,7 @@ void UntypedBackend::Body::end_burst(Iteration row, BurstEnd end) noexcept {
   burst_lane_ = kNobody;
 }
 
-/// Ends the burst after the iteration under way, or at once if none is.
+/// Ends the burst after the current iteration; between two iterations, at once.
 void UntypedBackend::Body::stop_burst(BurstEnd end) noexcept {
   if (!granted()) return;
   burst_left_ = under_way_ ? 1 : 0;

@@ -12,20 +12,22 @@ std::optional<CommandId> IdsInFlight::draw(CommandId next, std::uint64_t n,
 std::optional<CommandId> IdsInFlight::draw_kept(CommandId next, std::uint64_t n,
                                                 const HasEnded& has_ended) {
   if (const auto first = draw_up_to(next, n, places_, has_ended)) return first;
-  // ids are left out up to the places kept
+  // skip ids up to the reserved slots
   const std::uint64_t begin = places_ - kept_;
   const CommandId first = next + (begin + places_ - next % places_) % places_;
   return draw_up_to(first, n, places_, has_ended, From::exactly_here);
 }
 
-/// Moves on to the next revolution if n ids from `first` on reach beyond its places.
+/// `first`, or the start of the next revolution if n ids from `first` on do not fit before
+/// `places_end`.
 CommandId IdsInFlight::fit(CommandId first, std::uint64_t n,
                            std::uint64_t places_end) const noexcept {
   if (places_end == places_ || first % places_ + n <= places_end) return first;
   return first + places_ - first % places_;
 }
 
-/// Uses only the places before `places_end`; a batch for all of them may go on over their end.
+/// Draws from the slots before `places_end` of each revolution. If that is all of them, ids may
+/// continue into the next revolution.
 std::optional<CommandId> IdsInFlight::draw_up_to(CommandId next, std::uint64_t n,
                                                  std::uint64_t places_end,
                                                  const HasEnded& has_ended, From from) {
@@ -34,7 +36,7 @@ std::optional<CommandId> IdsInFlight::draw_up_to(CommandId next, std::uint64_t n
   const CommandId revolution = first + places_;
   first = fit(first, n, places_end);
   std::size_t moved = 0;
-  // the places of the oldest come round first
+  // the slots of the oldest batch are reused first
   while (!runs_.empty() && runs_.front().begin + places_ < first + n) {
     Run run = runs_.front();
     runs_.pop_front();
@@ -51,7 +53,7 @@ std::optional<CommandId> IdsInFlight::draw_up_to(CommandId next, std::uint64_t n
   return first;
 }
 
-/// Nothing was drawn: the places of the last `moved` come round as before.
+/// Undoes the last `moved` skips, because nothing was drawn.
 void IdsInFlight::go_back(std::size_t moved) {
   for (; moved > 0; --moved) {
     Run run = runs_.back();

@@ -9,26 +9,25 @@
 
 namespace o80 {
 
-/// Gives ids to batches so that no status of a batch that has not ended is lost.
+/// Draws ids for batches so that no batch loses its statuses before it has ended.
 ///
-/// A lane keeps the statuses of its last `places` ids, each at the place id modulo `places`. Ids
-/// pass over the places of a batch that still runs when they come round again. The last `kept`
-/// places of each revolution are left to batches without commands, which end soon: what runs may
-/// leave nothing but gaps too narrow for a purge.
+/// A lane has `places` status slots; id i uses slot i modulo `places`. Drawing skips the slots of
+/// batches that have not ended. The last `kept` slots of each revolution are reserved for batches
+/// without commands, which end soon: otherwise running batches could leave only gaps that are too
+/// small for a purge.
 class IdsInFlight {
  public:
-  /// Whether the batch whose last status is that of this id has ended.
+  /// True if the batch whose last status has this id has ended.
   using HasEnded = std::function<bool(CommandId)>;
 
   explicit IdsInFlight(std::uint64_t places, std::uint64_t kept = 0)
       : places_(places), kept_(kept) {}
 
-  /// The first of n ids in a row, not before `next`; none if the batches that have not ended leave
-  /// no such row.
+  /// The first of n consecutive ids from `next` on; nothing if running batches leave no such gap.
   std::optional<CommandId> draw(CommandId next, std::uint64_t n, const HasEnded& has_ended);
   /// The same for a batch without commands.
   std::optional<CommandId> draw_kept(CommandId next, std::uint64_t n, const HasEnded& has_ended);
-  /// The batch with these ids was sent.
+  /// Records that a batch with these ids was sent.
   void sent(CommandId first, std::uint64_t n) { runs_.push_back({first, n, first + 1}); }
 
  private:
@@ -39,9 +38,9 @@ class IdsInFlight {
   void go_back(std::size_t moved);
 
   struct Run {
-    std::uint64_t begin;  // where its places come round: its first id, plus revolutions
+    std::uint64_t begin;  // its first id, plus the revolutions for which its slots were skipped
     std::uint64_t count;
-    CommandId end_id;  // of the status that tells its end
+    CommandId end_id;  // the id whose status reports the end of the batch
   };
 
   std::uint64_t places_;

@@ -2,15 +2,15 @@
 
 namespace o80 {
 
-/// Runs the iterations that a frontend asks for in the frontend's own thread (an inline robot).
+/// Runs the iterations that a frontend requests in the thread of that frontend (an inline robot).
 class InlineRunner {
  public:
   virtual ~InlineRunner() = default;
-  /// Runs until the backend stands still. Throws DriverError.
+  /// Runs iterations until none is granted. Throws DriverError.
   virtual void run() = 0;
-  /// Throws Error in a thread that is inside `run` (a handler of a signal, say).
+  /// Throws Error if this thread is inside `run`, for example in a signal handler.
   virtual void refuse_nested() const = 0;
-  /// This thread is inside `run`.
+  /// True if this thread is inside `run`.
   virtual bool runs_here() const noexcept = 0;
 };
 

@@ -15,7 +15,7 @@ std::shared_ptr<const Description> describe(const AttachedSegment& segment) {
   if (description->layout.size != segment.header().shape.row_bytes) {
     throw SegmentError("segment '" + segment.name() + "' has rows of " +
                        std::to_string(segment.header().shape.row_bytes) +
-                       " bytes, its schema says " + std::to_string(description->layout.size) +
+                       " bytes, but its schema needs " + std::to_string(description->layout.size) +
                        ": the file is damaged; start its backend again");
   }
   return description;
@@ -29,7 +29,7 @@ Link::Link(AttachedSegment attached, std::shared_ptr<InlineRunner> inline_runner
       history(segment.view()),
       rows(segment),
       runner(std::move(inline_runner)),
-      // two statuses a block: of those, too, commands leave as many as of the blocks
+      // two status slots for each block; commands leave the same share of both free
       ids(2 * std::uint64_t{segment.view().shape.lane_blocks},
           2 * std::uint64_t{kept_free(segment.view().shape.lane_blocks)}) {}
 
@@ -38,7 +38,7 @@ std::shared_ptr<LaneSender> Link::lane() {
   if (!lane_) {
     segment.throw_if_gone();
     lane_ = std::make_shared<LaneSender>(segment);
-    // a quarter, so that a wait that is delayed three times still shows life in time
+    // a sign of life every quarter of the silence limit, so that three late ones are tolerated
     const SchemaHead& head = description->schema.head;
     const std::int64_t most = kSlice * 4 / std::max<std::int64_t>(1, head.period);
     if (head.silence > 0) lane_->show_life_every(std::min(head.silence, most) * head.period / 4);
@@ -72,7 +72,8 @@ std::optional<Halt> Link::halt() const {
 }
 
 std::string Link::halt_text(Iteration iteration) const {
-  // every resume takes an iteration, so that no halt before this one can have begun in between
+  // A resume takes one iteration, so the halt in force is the one that ended something in
+  // `iteration` exactly if it began at or before that iteration.
   const std::optional<Halt> acting = shown_halt(segment.view());
   if (!acting || acting->iteration < 0 || acting->iteration > iteration) return "";
   std::string text = "it is halted since iteration " + std::to_string(acting->iteration) +

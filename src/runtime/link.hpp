@@ -22,33 +22,35 @@
 
 namespace o80 {
 
-/// Blocks of a lane that commands leave free, so that there is room for a burst, a purge, a
-/// request.
+/// Number of blocks in a lane that commands must leave free, so that a burst, a purge or a request
+/// can still be sent.
 constexpr std::uint32_t kept_free(std::uint32_t blocks) noexcept {
   return blocks < 8 ? 0 : std::clamp(blocks / 16, 2U, 16U);
 }
 
-/// What a frontend, its batches and its bursts share: the attached segment and the lane.
+/// State shared by a frontend, its batches and its bursts: the attached segment and the lane.
 ///
 /// Writer / Readers: any threads; `sending` guards what is sent.
 struct Link {
   Link(AttachedSegment attached, std::shared_ptr<InlineRunner> inline_runner);
 
-  /// The lane, taken at the first call. Throws NoLane, ReadOnly, Closed.
+  /// The lane of this frontend, acquired at the first call. Throws NoLane, ReadOnly, Closed.
   std::shared_ptr<LaneSender> lane();
-  /// The same if it was taken, else null.
+  /// The lane if this frontend has one, else null.
   std::shared_ptr<LaneSender> lane_if_taken() const;
   /// Throws Closed or UsedAfterFork.
   void check_usable() const;
-  /// Held while something is added or sent. Throws Closed or UsedAfterFork: in a forked child a
-  /// thread that does not exist there may hold it for ever.
+  /// Locks `sending` to add or send something. Throws Closed, or UsedAfterFork: the mutex of a
+  /// forked child may be held by a thread that exists in the parent only.
   std::unique_lock<std::mutex> lock_to_send() const;
-  /// The halt that acts; if this frontend may write, also one that was asked for and does not yet.
+  /// The halt in force. A frontend with write access also sees a halt that was requested and is not
+  /// yet in force.
   std::optional<Halt> halt() const;
-  /// "it is halted since iteration 7 (halt 3, cause frontend, asked for by pid 5 (python)): why" of
-  /// the halt that ended something in this iteration, or nothing if that one no longer acts.
+  /// Describes the halt that ended a command or burst in `iteration`: "it is halted since iteration
+  /// 7 (halt 3, cause frontend, asked for by pid 5 (python)): why". Empty if it is no longer in
+  /// force.
   std::string halt_text(Iteration iteration) const;
-  /// The caller's check, which also ends waits on a closed frontend.
+  /// `keep_waiting`, extended to throw Closed when the frontend is closed during a wait.
   KeepWaiting guarded(const KeepWaiting& keep_waiting) const;
 
   AttachedSegment segment;
@@ -56,16 +58,16 @@ struct Link {
   CommandCheck command_check;
   HistoryReader history;
   RowWaiter rows;
-  std::shared_ptr<InlineRunner> runner;       // guarded by `sending`, gone when closed
-  BatchBuilder builder;                       // what the next pulse sends; guarded by `sending`
-  std::vector<BatchBuilder::Member> members;  // of the group that is being added; likewise
+  std::shared_ptr<InlineRunner> runner;       // guarded by `sending`; null after close
+  BatchBuilder builder;                       // records for the next pulse; guarded by `sending`
+  std::vector<BatchBuilder::Member> members;  // of the group being added; guarded by `sending`
   IdsInFlight ids;                            // guarded by `sending`
   /// A batch sent for a later iteration.
   struct Scheduled {
     Iteration at;
     CommandId id;
   };
-  std::deque<Scheduled> scheduled;  // guarded by `sending`; some of them may have been taken
+  std::deque<Scheduled> scheduled;  // guarded by `sending`; may hold batches already taken
   mutable std::mutex sending;
   std::atomic<bool> closed{false};
 

@@ -5,21 +5,22 @@
 
 namespace o80 {
 
-/// Notices when too many iterations are late within a second, counted exactly.
+/// Detects too many late iterations within one second. The count is exact: it keeps the time of
+/// each late iteration.
 ///
-/// Realtime: yes, but for construction.
+/// Realtime: exceeded(); the constructor allocates.
 class OverrunLimit {
  public:
-  /// `most` late iterations within a second are too many; 0: there is no limit.
+  /// `most`: number of late iterations within a second that is too many; 0: no limit.
   explicit OverrunLimit(std::uint32_t most) : times_(most, -kSecond) {}
 
   std::uint32_t most() const noexcept { return static_cast<std::uint32_t>(times_.size()); }
-  /// An iteration was late, now [ns]; true if that is one too many.
+  /// Records an iteration that was late at `now` [ns]; true if the limit is reached.
   bool exceeded(std::int64_t now) noexcept {
     if (times_.empty()) return false;
     times_[next_] = now;
     next_ = (next_ + 1) % times_.size();
-    // the oldest of so many
+    // times_[next_] is the oldest recorded time
     return count_ + 1 >= times_.size() ? now - times_[next_] < kSecond : (++count_, false);
   }
 

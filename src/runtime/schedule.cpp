@@ -5,7 +5,7 @@
 namespace o80 {
 
 namespace {
-/// Turns the standard heap, largest first, into one with the earliest first.
+/// Order for the standard heap functions, which keep the largest first: the earliest is on top.
 bool later(const StagedBatch& a, const StagedBatch& b) noexcept {
   return a.at != b.at ? a.at > b.at : a.ticket > b.ticket;
 }
@@ -38,7 +38,7 @@ void Schedule::drop_next() noexcept {
 }
 
 void Schedule::set_aside() noexcept {
-  // what is left of an earlier time stays; beyond that, a batch is judged when it is due
+  // no room beside the batches of an earlier halt: these stay scheduled and are checked when due
   if (aside_.size() + heap_.size() > aside_.capacity()) return;
   aside_.insert(aside_.end(), heap_.begin(), heap_.end());
   heap_.clear();

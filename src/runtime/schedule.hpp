@@ -8,42 +8,43 @@
 
 namespace o80 {
 
-// batches that one lane may have waiting for later iterations; `pulse` refuses more
+// most batches of one lane that may wait for later iterations; `pulse` refuses more
 inline constexpr std::uint32_t kMostScheduled = 256;
 inline constexpr std::uint32_t kMostScheduledAt = 16;  // for the same iteration
 
-/// A batch that is complete in the pool.
+/// A batch that is complete in the pool and was checked.
 struct StagedBatch {
   Iteration at = kNow;
   std::uint64_t ticket = 0;
   BlockIndex batch = kNoBlock;
   std::uint32_t lane = 0;
-  std::uint64_t incarnation = 0;  // of the lane when its staging began
-  bool had_left = false;          // its sender no longer had the lane then
+  std::uint64_t incarnation = 0;  // owner of the lane when staging began
+  bool had_left = false;          // the sender had closed or lost the lane by then
   bool of_dead = false;           // and was known to be dead
   bool late_now = false;
-  bool silent = false;  // its sender has fallen silent since
+  bool silent = false;  // the watchdog has found the sender silent since
 };
 
-/// Batches sent for a later iteration, the next one first.
+/// Batches sent for a later iteration, ordered by iteration and ticket.
 ///
 /// Writer:   the backend's thread.
-/// Realtime: yes: a heap in memory reserved for as many as all lanes may have.
+/// Realtime: everything but construction, which reserves room for all batches of all lanes.
 class Schedule {
  public:
   explicit Schedule(std::uint32_t lanes);
 
   bool empty() const noexcept { return heap_.empty(); }
   const StagedBatch& next() const noexcept { return heap_.front(); }
-  /// Whether a lane may have one more for this iteration.
+  /// True if the lane may schedule one more batch for this iteration.
   bool has_room(std::uint32_t lane, Iteration at) const noexcept;
-  /// To be asked only if there is room.
+  /// Call only if has_room().
   void add(const StagedBatch& batch) noexcept;
   void drop_next() noexcept;
 
-  /// All that is there is no longer scheduled, but waits to be judged one by one (after a halt).
+  /// After a halt: moves all batches to the `aside` list, from which the backend checks them one by
+  /// one and ends them or schedules them again.
   void set_aside() noexcept;
-  /// The same for what one lane has there, whose sender has fallen silent; O(batches).
+  /// The same for the batches of one lane whose sender is silent; O(batches).
   void set_aside_of_silent(std::uint32_t lane) noexcept;
   bool has_aside() const noexcept { return !aside_.empty(); }
   StagedBatch take_aside() noexcept;
@@ -55,7 +56,7 @@ class Schedule {
 
   std::vector<StagedBatch> heap_;
   std::vector<StagedBatch> aside_;
-  std::vector<Iteration> iterations_;  // of each lane's batches, in no order
+  std::vector<Iteration> iterations_;  // of each lane's batches, unordered
   std::vector<std::uint32_t> counts_;  // of each lane
 };
 

@@ -10,24 +10,24 @@
 
 namespace o80 {
 
-/// What has just been sent.
+/// Result of send().
 struct Sent {
   std::shared_ptr<LaneSender> lane;
   CommandId id = 0;
   std::uint32_t records = 0;
-  std::uint32_t quiet = 0;  // the lane's events before
+  std::uint32_t quiet = 0;  // event count of the lane before the batch was sent
 };
 
-/// Waits until the last iteration of a burst just sent, or sent before, is done; its row, or -1 if
-/// its batch was rejected. Throws TimeoutError, BackendGone, BackendHalted if it was cut,
-/// Cancelled.
+/// Waits until burst `id` is done; returns its last row, or -1 if its batch was rejected. `quiet`:
+/// the event count before it was sent, if it has just been sent. Throws TimeoutError, BackendGone,
+/// Cancelled, and BackendHalted if a halt cut the burst.
 Iteration wait_for_burst(const Link& link, LaneSender& lane, CommandId id, Timeout timeout,
                          const KeepWaiting& keep_waiting, std::optional<std::uint32_t> quiet = {});
-/// Throws BackendHalted if a halt ended some command of a batch that has ended.
+/// Throws BackendHalted if a halt ended a command of this batch, which must have ended.
 void throw_if_halted(const Link& link, const Batch& batch);
 /// Throws Error, or BackendHalted, with the reason why a batch was rejected.
 [[noreturn]] void throw_rejected(const Link& link, const char* what, const Batch& batch);
-/// Copies the row that this returned.
+/// Copies the row that wait_for_burst returned. Throws RowOverwritten.
 void read_last_row(const Link& link, Iteration row, UntypedObservation& observation);
 
 }  // namespace o80

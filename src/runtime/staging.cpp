@@ -20,7 +20,7 @@ bool Staging::begin(std::uint32_t lane, std::uint32_t& budget) noexcept {
   const std::uint64_t kind = from.peek_word(offsetof(BatchRecord, kind)) & 0xFF;
   const auto blocks = static_cast<std::uint32_t>(from.peek_word(offsetof(BatchRecord, blocks)));
   if (kind != kBatch || blocks == 0 || blocks > from.available_of_one()) {
-    // whoever writes garbage faster than it is thrown away must not keep the loop here
+    // invalid blocks cost budget too, so that a flood of them cannot hold up the loop
     --budget;
     from.reset();
     return false;
@@ -30,7 +30,7 @@ bool Staging::begin(std::uint32_t lane, std::uint32_t& budget) noexcept {
   stage.left = blocks;
   stage.chain = {};
   stage.sender = {kNoBlock, from.owner_of_next() == 0, from.next_is_of_dead(), from.incarnation()};
-  // a ticket that nobody drew yet is the sender's own invention
+  // a ticket that was not drawn yet is invalid: use the ticket counter instead
   stage.ticket = std::min(from.peek_word(offsetof(BatchRecord, ticket)), lanes_.tickets_drawn());
   note_ticket(lane);
   return true;
@@ -45,7 +45,7 @@ bool Staging::go_on(std::uint32_t lane, std::uint32_t& budget) noexcept {
   return true;
 }
 
-/// False when the budget ended before; garbage is dropped.
+/// False when the budget ended first. An invalid batch is dropped.
 bool Staging::copy_and_check(std::uint32_t lane, std::uint32_t& budget) noexcept {
   Stage& stage = stages_[lane];
   LaneReceiver& from = lanes_[lane];
@@ -65,7 +65,7 @@ bool Staging::copy_and_check(std::uint32_t lane, std::uint32_t& budget) noexcept
   return stage.left == 0 && controller_.check(lane, stage.chain.first, budget);
 }
 
-/// What there is of the batch is garbage, or the lane was reset under us.
+/// Discards a batch that is invalid or whose lane was reset.
 void Staging::drop(std::uint32_t lane, std::uint32_t blocks_outside) noexcept {
   Stage& stage = stages_[lane];
   lanes_[lane].free(stage.chain.blocks + blocks_outside);
@@ -75,11 +75,11 @@ void Staging::drop(std::uint32_t lane, std::uint32_t blocks_outside) noexcept {
   note_ticket(lane);
 }
 
-/// The batch that was copied and checked.
+/// Ends the copying of a batch; returns its first block.
 BlockIndex Staging::complete(std::uint32_t lane) noexcept {
   Stage& stage = stages_[lane];
   const BlockIndex batch = stage.chain.first;
-  // its ticket was read before its blocks were
+  // the sender may have changed the record since: use the ticket that was read first
   auto& record = *reinterpret_cast<BatchRecord*>(pool_.bytes(batch));
   record.ticket = stage.ticket;
   lanes_[lane].set_staged(record.id,
@@ -109,7 +109,7 @@ bool Staging::next_is_express(std::uint32_t lane) const noexcept {
 }
 
 std::optional<StagedBatch> Staging::express(std::uint32_t lane) noexcept {
-  std::uint32_t budget = 4 * (1 + kMostExpressRecords);  // more than it can need
+  std::uint32_t budget = 4 * (1 + kMostExpressRecords);  // enough for any express batch
   if (!begin(lane, budget) || !copy_and_check(lane, budget) || !stages_[lane].copying) {
     return std::nullopt;
   }
@@ -119,7 +119,8 @@ std::optional<StagedBatch> Staging::express(std::uint32_t lane) noexcept {
   return std::nullopt;
 }
 
-/// Whether a batch is what it says. Control is not let go of before what was sent under it.
+/// True if a batch that claims to be express is. A release of control does not overtake staged
+/// batches of its lane, because these were sent under that control.
 bool Staging::overtakes(std::uint32_t lane, BlockIndex batch) const noexcept {
   const BatchRecord& record = pool_.batch(batch);
   const Effort effort = controller_.effort(batch);
@@ -149,7 +150,7 @@ void Staging::pop(std::uint32_t lane) noexcept {
   note_ticket(lane);
 }
 
-/// The ticket of the oldest batch that was begun.
+/// Updates the ticket of the lane's oldest batch that is half copied or staged.
 void Staging::note_ticket(std::uint32_t lane) noexcept {
   const Stage& stage = stages_[lane];
   const bool was_begun = tickets_[lane] != kNoTicket;

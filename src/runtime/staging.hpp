@@ -12,38 +12,40 @@
 
 namespace o80 {
 
-/// Copies batches from the lanes into the pool and has them checked there, each lane by itself.
+/// Copies batches from the lanes into the pool, where the controller checks them. Lanes are
+/// independent of each other.
 ///
-/// A lane's staged batches wait in the order in which they were sent until they are popped.
+/// The staged batches of a lane wait in the order in which they were sent until they are popped.
 ///
 /// Writer:   the backend's thread.
-/// Realtime: everything but construction; every step is paid from a budget.
+/// Realtime: everything but construction; each step takes its cost off a budget.
 class Staging {
  public:
   Staging(LaneReceivers& lanes, BlockPool& pool, Controller& controller);
 
-  /// Goes on with a lane's next batch, for `budget` blocks, which it takes off. True when that
-  /// batch is staged, or was garbage; false when the budget ended before.
+  /// Copies and checks the next batch of a lane and takes its blocks off `budget`. True when that
+  /// batch is staged or was dropped as invalid; false when the budget ended first.
   bool go_on(std::uint32_t lane, std::uint32_t& budget) noexcept;
-  /// The lane's next block begins a batch.
+  /// True if no batch of this lane is half copied.
   bool is_between_batches(std::uint32_t lane) const noexcept { return !stages_[lane].copying; }
-  /// The lane's next batch says that it is express; to be asked between batches, if there is one.
+  /// True if the next batch of the lane claims to be express. Call only between batches, if the
+  /// lane has one.
   bool next_is_express(std::uint32_t lane) const noexcept;
-  /// Copies and checks that batch whole. Gives it, if it may be taken before the lane's others;
-  /// else it waits behind them.
+  /// Copies and checks the whole express batch. Returns it if it may overtake the staged batches of
+  /// its lane; otherwise it is staged behind them.
   std::optional<StagedBatch> express(std::uint32_t lane) noexcept;
 
-  /// Something is copied in part, or staged and not popped.
+  /// True if a batch is half copied, or staged and not popped.
   bool busy() const noexcept { return begun_ != 0; }
-  /// The tickets of the lanes' oldest batches that were begun and not popped, or kNoTicket.
+  /// For each lane the ticket of its oldest batch that is half copied or staged, or kNoTicket.
   std::span<const std::uint64_t> tickets() const noexcept { return tickets_; }
   bool has_staged(std::uint32_t lane) const noexcept { return stages_[lane].first != kNoBlock; }
-  /// The oldest of them.
+  /// The oldest staged batch of a lane.
   StagedBatch front(std::uint32_t lane) const noexcept { return staged(lane, stages_[lane].first); }
   void pop(std::uint32_t lane) noexcept;
 
  private:
-  /// What is known of a staged batch beside its record, by its first block.
+  /// Data of a staged batch that are not in its record; indexed by its first block.
   struct Waiting {
     BlockIndex next = kNoBlock;
     bool had_left = false;
@@ -51,13 +53,13 @@ class Staging {
     std::uint64_t incarnation = 0;
   };
   struct Stage {
-    // the batch under way
+    // the batch being copied
     bool copying = false;
     std::uint32_t left = 0;  // blocks to copy
     BlockChain chain;
     Waiting sender;
     std::uint64_t ticket = 0;
-    // those that are complete
+    // the complete batches
     BlockIndex first = kNoBlock;
     BlockIndex last = kNoBlock;
   };

@@ -19,7 +19,7 @@ struct Description {
   RowLayout layout;
 };
 
-/// One row of a history, in bytes: what was asked in an iteration and what came of it.
+/// One row of a history, in bytes: desired, observed and extended values of one iteration.
 class UntypedObservation {
  public:
   explicit UntypedObservation(std::shared_ptr<const Description> description)
@@ -38,12 +38,13 @@ class UntypedObservation {
   const std::byte* desired() const { return bytes() + layout().desired; }
   const std::byte* observed() const { return bytes() + layout().observed; }
   const std::byte* extended() const { return bytes() + layout().extended; }
-  /// A command gave the desired state of this actuator.
+  /// True if a command or braking gave the desired state of this actuator.
   bool active(std::uint32_t actuator) const { return bit(layout().active, actuator); }
-  /// The limits changed it.
+  /// True if the limits changed that state.
   bool clamped(std::uint32_t actuator) const { return bit(layout().clamped, actuator); }
+  /// True if the actuator comes to rest without a command.
   bool braking(std::uint32_t actuator) const { return bit(layout().braking, actuator); }
-  /// The same of any actuator.
+  /// True if any actuator brakes.
   bool any_braking() const {
     for (std::uint32_t word = 0; word < layout().mask_words; ++word) {
       if (unpack<std::uint64_t>(bytes() + layout().braking + word * 8) != 0) return true;
@@ -60,7 +61,7 @@ class UntypedObservation {
   std::vector<std::uint64_t> row_;
 };
 
-/// Neighbouring rows of a history, packed.
+/// Consecutive rows of a history, packed.
 struct Rows {
   Iteration first = 0;
   std::size_t count = 0;

@@ -14,11 +14,11 @@
 
 namespace o80 {
 
-/// Throws SchemaMismatch, showing the difference, unless the types laid out in `expected` are those
-/// of `found`; names, limits and texts are the backend's own affair.
+/// Throws SchemaMismatch with the difference if the types in `expected` and `found` are laid out
+/// differently. Names, limits and help texts may differ.
 void check_types(const Schema& expected, const Schema& found, const std::string& segment);
 
-/// A frontend that knows the robot's types; `Frontend<>` knows none.
+/// A frontend with the robot's types; `Frontend<>` has none and works on bytes.
 template <class R = void>
 class Frontend : public UntypedFrontend {
  public:
@@ -26,7 +26,7 @@ class Frontend : public UntypedFrontend {
       : UntypedFrontend(segment, options) {
     compare();
   }
-  /// A frontend whose bursts run in its own thread.
+  /// A frontend of an inline robot: its bursts run in the calling thread.
   Frontend(const std::string& segment, std::shared_ptr<InlineRunner> runner)
       : UntypedFrontend(segment, std::move(runner)) {
     compare();
@@ -68,7 +68,7 @@ class Frontend : public UntypedFrontend {
     return add_commands(std::span(names.begin(), names.size()),
                         std::span<const State>(targets.begin(), targets.size()), options);
   }
-  /// One command through all rows, `options.pace` for each.
+  /// Adds one command through all rows, with `options.pace` for each row.
   template <Shareable State>
   std::uint32_t add_trajectory(std::string_view name, std::span<const State> rows,
                                const CommandOptions& options = {.pace = iterations(1)}) {
@@ -106,15 +106,15 @@ class Frontend : public UntypedFrontend {
       for (const ActuatorRow& row : expected.actuators) states_.push_back(expected.keys[row.type]);
     }
   }
-  /// States of one size may still be of different types.
+  /// Throws InvalidArgument if State is not the state type of the actuator.
   template <class State>
   void check_state(std::uint32_t index) const {
     if (index >= states_.size() || states_[index] == &describing::kKey<State>) return;
     throw InvalidArgument("the target of actuator '" + schema().actuators[index].name.str() +
-                          "' of '" + segment() + "' must be of its own state type");
+                          "' of '" + segment() + "' must have the state type of that actuator");
   }
 
-  std::vector<const void*> states_;  // of each actuator: which C++ type its state is
+  std::vector<const void*> states_;  // of each actuator: key of the C++ type of its state
 };
 
 template <>
