@@ -8,8 +8,8 @@
 #include <sstream>
 #include <string>
 
-#include "empty_robot.hpp"
 #include "control/record.hpp"
+#include "empty_robot.hpp"
 #include "memory/segment_name.hpp"
 #include "sample.hpp"
 

@@ -30,11 +30,12 @@ Value parse(nb::handle word, const std::array<Value, N>& values, const char* nam
                              nb::cast<std::string>(nb::repr(word)) + ": it is one of " + there);
 }
 
-/// Looked up once and kept for the life of the process.
-template <class Value, std::size_t N>
+/// The member of a Python enumeration, looked up once and kept for the life of the process.
+/// `count`: of the values; any other means the first one.
+template <std::size_t count, class Value>
 nb::object member(Value value, const char* type) {
-  static std::array<PyObject*, N> known{};
-  const auto index = static_cast<std::size_t>(value) < N ? static_cast<std::size_t>(value) : 0;
+  static std::array<PyObject*, count> known{};
+  const auto index = static_cast<std::size_t>(value) < count ? static_cast<std::size_t>(value) : 0;
   if (known[index] == nullptr) {
     const std::string_view text = o80::to_text(value);
     known[index] = nb::module_::import_("o80.words")
@@ -67,5 +68,5 @@ o80::OnLimit on_limit_of(nb::handle word) {
   return parse(word, std::array{end, go_on}, "on_limit");
 }
 
-nb::object python_word(o80::Status status) { return member<o80::Status, 11>(status, "Status"); }
-nb::object python_word(o80::Reason reason) { return member<o80::Reason, 11>(reason, "Reason"); }
+nb::object python_word(o80::Status status) { return member<o80::kStatuses>(status, "Status"); }
+nb::object python_word(o80::Reason reason) { return member<o80::kReasons>(reason, "Reason"); }

@@ -1,4 +1,4 @@
-#include "robot/real_time.hpp"
+#include "o80/robot/real_time.hpp"
 
 #include <alloca.h>
 #include <sched.h>

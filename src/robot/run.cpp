@@ -17,9 +17,9 @@
 #include "base/printable.hpp"
 #include "control/number_name.hpp"
 #include "o80/base/error.hpp"
+#include "o80/robot/real_time.hpp"
 #include "robot/loop.hpp"
 #include "robot/loop_report.hpp"
-#include "robot/real_time.hpp"
 #include "robot/run_options.hpp"
 #include "robot/service_manager.hpp"
 

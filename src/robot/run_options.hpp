@@ -2,8 +2,8 @@
 
 #include <string>
 
+#include "o80/robot/real_time.hpp"
 #include "o80/runtime/backend.hpp"
-#include "robot/real_time.hpp"
 #include "robot/robot.hpp"
 
 namespace o80 {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string_view>
 
@@ -22,6 +23,7 @@ enum class Status : std::uint8_t {
   forgotten,  // asked too late: only a frontend says so
   halted
 };
+inline constexpr std::size_t kStatuses = static_cast<std::size_t>(Status::halted) + 1;
 
 /// Why a status is what it is.
 enum class Reason : std::uint8_t {
@@ -38,6 +40,7 @@ enum class Reason : std::uint8_t {
   halted,
   full  // more of its kind wait already than one lane may have
 };
+inline constexpr std::size_t kReasons = static_cast<std::size_t>(Reason::full) + 1;
 
 std::string_view to_text(Status status) noexcept;
 std::string_view to_text(Reason reason) noexcept;
