@@ -10,6 +10,7 @@ FOLDERS = ("apps", "benchmarks", "docs", "examples", "models", "robots", "simula
 PAGES = sorted([*ROOT.glob("*.md"), *(page for f in FOLDERS for page in (ROOT / f).rglob("*.md"))])
 LINK = re.compile(r"\]\(([^)#\s]*)(?:#([^)\s]+))?\)")
 SOURCE = re.compile(r"`([\w/]+\.(?:cpp|hpp|py))`")
+PAGE = re.compile(r"((?:\b(?:docs|models|benchmarks)/\w+|\b[A-Z]+)\.md)(?:#([\w-]+))?")
 SOURCES = [
     path
     for folder in ("apps", "include", "models", "python", "robots", "simulators", "src", "tests")
@@ -50,3 +51,15 @@ def test_every_source_that_a_page_names_exists(name: str) -> None:
     named = set(SOURCE.findall(without_code(ROOT / name)))
     assert named
     assert not [path for path in named if not any(file.endswith(f"/{path}") for file in there)]
+
+
+def test_every_page_and_section_that_a_source_names_exists() -> None:
+    broken = []
+    for source in SOURCES:
+        if source.suffix not in {".hpp", ".cpp", ".py"} or source == Path(__file__):
+            continue
+        for name, anchor in PAGE.findall(source.read_text()):
+            page = ROOT / name
+            if not page.exists() or (anchor and anchor not in anchors(page)):
+                broken.append(f"{source.relative_to(ROOT)}: {name}#{anchor}")
+    assert not broken

@@ -1,5 +1,6 @@
-// The pace `fastest` on random limits and targets: retargeted in any iteration, and with several
-// numbers (rule 19). tests/processes/test_fastest.py compares its durations with ruckig's.
+// The pace `fastest` (docs/commands.md#one-command) on random limits and targets: retargeted in any
+// iteration, and with several numbers. tests/processes/test_fastest.py compares its durations with
+// ruckig's.
 #include <gtest/gtest.h>
 
 #include <algorithm>

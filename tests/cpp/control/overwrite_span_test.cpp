@@ -1,5 +1,5 @@
-// What overwrites a minimum jerk continues its motion without leaving the span of the places that
-// the two motions are about (rule 7). The numbers are those of faults that were seen.
+// What overwrites a minimum jerk continues its motion without leaving the span of the two motions
+// (docs/commands.md#one-command). The numbers are those of faults that were seen.
 #include <gtest/gtest.h>
 
 #include <algorithm>

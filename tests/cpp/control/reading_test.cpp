@@ -1,4 +1,5 @@
-// What a robot reads may be nonsense, or outside its limits: neither reaches desired (rule 10).
+// What a robot reads may be nonsense, or outside its limits: neither reaches desired
+// (docs/commands.md#limits).
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,5 +1,5 @@
 // A field that rests, a velocity or a torque, does not keep its last value when no command is left
-// (rule 4).
+// (docs/commands.md#with-no-command-left).
 #include <gtest/gtest.h>
 
 #include "control/rig.hpp"

@@ -8,7 +8,8 @@
 namespace o80::test {
 
 /// What holds when a command has ended: a completed one is on its target bit for bit, and without
-/// a command a number stays, rests (rule 4), follows or brakes, as the row says.
+/// a command a number stays, rests, follows or brakes, as the row says
+/// (docs/commands.md#with-no-command-left).
 class EndWatch {
  public:
   std::optional<Failure> step(const ScriptWorld& world) const;

@@ -7,7 +7,8 @@
 
 namespace o80::test {
 
-/// Where a motion without limits may be (rule 7), and how fast a speed pace may go (rule 5).
+/// Where a motion without limits may be, and how fast a speed pace may go
+/// (docs/commands.md#one-command).
 ///
 /// The span of a motion is that of its present place, its targets, and, if it overwrote another
 /// motion, of the former target and of every place where the former motion could have come to

@@ -8,7 +8,7 @@
 
 namespace o80::test {
 
-/// When commands end (rule 5).
+/// When commands end (docs/commands.md#one-command).
 ///
 /// A duration ends at the rounding of its exact end. The exact time of a queue begins with its
 /// first command, runs on through all paces, and starts anew at an `until`; a command takes at
