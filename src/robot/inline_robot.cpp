@@ -15,7 +15,7 @@ namespace o80 {
 namespace {
 
 constexpr std::uint32_t kMostAtOnce = 64;          // iterations between looks at the clock
-constexpr std::int64_t kLongAtOnce = kSlice / 10;  // [ns] they take less than that
+constexpr std::int64_t kLongAtOnce = kSlice / 10;  // [ns] longest time between these looks
 
 BackendOptions bursting(BackendOptions options) {
   options.bursting = true;
@@ -23,7 +23,7 @@ BackendOptions bursting(BackendOptions options) {
 }
 }  // namespace
 
-/// The right to run iterations: one thread at a time. Waiting for it asks `keep_waiting`.
+/// Lock for running iterations, one thread at a time. A waiting thread calls `keep_waiting`.
 class InlineRobot::Turn {
  public:
   Turn(InlineRobot& robot, const KeepWaiting& keep_waiting) : robot_(robot) {
@@ -33,7 +33,7 @@ class InlineRobot::Turn {
       while (turn.exchange(2, std::memory_order_acquire) != 0) {              // sync turn
         futex_wait(turn, 2, kSlice);
         if (keep_waiting && !keep_waiting()) {
-          throw Cancelled("the wait for '" + robot.segment() + "' was cut by its caller");
+          throw Cancelled("the wait for '" + robot.segment() + "' was cancelled by the caller");
         }
       }
     }
@@ -67,18 +67,19 @@ void InlineRobot::run() {
   while (!stopping_ && (step = loop_.run_granted(at_once_)) == Step::run) look_around();
   if (stopping_) {
     loop_.stop();
-    throw Closed("the inline robot of '" + segment() + "' was closed while it ran");
+    throw Closed("the inline robot of '" + segment() + "' was closed during a burst");
   }
   if (step == Step::ended && !loop_.fault().empty()) throw DriverError(loop_.fault());
 }
 
 void InlineRobot::refuse_nested() const {
   if (!runs_here()) return;
-  throw Error("a burst of '" + segment() +
-              "' runs in this very thread: send to it when that is done, or from another thread");
+  throw Error("this thread already runs a burst of '" + segment() +
+              "' (is this a signal handler?): send after the burst, or from another thread");
 }
 
-/// Asks the check every slice of time; the slower the robot, the fewer iterations lie between.
+/// Calls `keep_waiting` once every kSlice. The slower the robot, the fewer iterations run between
+/// looks at the clock.
 void InlineRobot::look_around() {
   if (!keep_waiting_) return;
   const std::int64_t now = monotonic_now();
@@ -87,7 +88,9 @@ void InlineRobot::look_around() {
   if (now < look_at_) return;
   look_at_ = now + kSlice;
   try {
-    if (!keep_waiting_()) throw Cancelled("the burst of '" + segment() + "' was cut by its caller");
+    if (!keep_waiting_()) {
+      throw Cancelled("the burst of '" + segment() + "' was cancelled by the caller");
+    }
   } catch (...) {
     loop_.cut_burst();
     throw;
@@ -95,9 +98,9 @@ void InlineRobot::look_around() {
 }
 
 void InlineRobot::stop() noexcept {
-  if (guard_.forked()) return;  // the hardware and the turns are the parent's
+  if (guard_.forked()) return;  // the hardware belongs to the parent
   stopping_ = true;
-  if (runs_here()) return;  // the burst that asked stops it
+  if (runs_here()) return;  // called from `keep_waiting`: run() stops the loop
   const Turn turn(*this, {});
   loop_.stop();
 }

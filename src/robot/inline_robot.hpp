@@ -11,24 +11,24 @@
 
 namespace o80 {
 
-/// A bursting robot inside the caller's process: bursts run in the thread that asks for them.
+/// A bursting robot inside the caller's process: a burst runs in the thread that requests it.
 ///
-/// Others may attach to its segment, watch it and command it; what they send is taken when the
-/// owner next bursts or pulses.
+/// Other processes may attach to its segment, observe it and send commands. Their batches are taken
+/// when the owner bursts or pulses next.
 class InlineRobot final : public InlineRunner {
  public:
-  /// Starts the robot. `keep_waiting` is asked now and then in a burst; if it is false or throws,
-  /// the rest of the burst is not run. Throws as Loop.
+  /// Starts the robot. `keep_waiting` is called about every 50 ms of a burst; if it returns false
+  /// or throws, the rest of the burst is cancelled. Throws as Loop.
   InlineRobot(std::unique_ptr<Robot> robot, BackendOptions options, KeepWaiting keep_waiting = {});
 
-  /// Threads run one after the other. Throws DriverError, Closed if `stop` cut it.
+  /// Runs granted iterations; threads take turns. Throws DriverError, and Closed after `stop`.
   void run() override;
   void refuse_nested() const override;
   bool runs_here() const noexcept override {
     return runner_.load(std::memory_order_relaxed) == std::this_thread::get_id();
   }
-  /// Stops the robot, at the next iteration of a burst that runs; its frontends see a backend that
-  /// stopped. From any thread, also from within `keep_waiting`; does nothing in a forked child.
+  /// Stops the robot, during a burst before its next iteration; frontends then raise
+  /// BackendStopped. From any thread, also from within `keep_waiting`; no effect in a forked child.
   void stop() noexcept;
   const std::string& segment() const noexcept { return loop_.backend().name(); }
 
@@ -36,13 +36,13 @@ class InlineRobot final : public InlineRunner {
   class Turn;
   void look_around();
 
-  std::atomic<std::uint32_t> turn_{0};     // taken by Turn: 0 free, 1 taken, 2 taken and waited for
-  std::atomic<std::thread::id> runner_{};  // who runs iterations: each thread asks for itself only
+  std::atomic<std::uint32_t> turn_{0};     // futex lock of Turn: 0 free, 1 held, 2 contended
+  std::atomic<std::thread::id> runner_{};  // the thread that runs iterations
   std::atomic<bool> stopping_{false};
   ForkGuard guard_;
   KeepWaiting keep_waiting_;
-  std::int64_t look_at_ = 0;    // when `keep_waiting` is asked next [ns]
-  std::int64_t looked_at_ = 0;  // the clock, last [ns]
+  std::int64_t look_at_ = 0;    // time of the next call of `keep_waiting` [ns]
+  std::int64_t looked_at_ = 0;  // time of the last look at the clock [ns]
   std::uint32_t at_once_;       // iterations between looks at the clock
   Loop loop_;
 };

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// The folder of the robots that come with o80: beside the library this code stands in.
+/// The folder of the robots that come with o80, beside the library that contains this code.
 fs::path bundled_folder() {
   Dl_info info{};
   if (dladdr(reinterpret_cast<void*>(&bundled_folder), &info) == 0) return {};
@@ -26,8 +26,8 @@ fs::path bundled_folder() {
   return library.parent_path() / "o80" / "robots";
 }
 
-/// Other versions of a shared library ("libx.so.4.0.1") where a wheel would put it: in the package
-/// "x" beside the one that the robot belongs to.
+/// Installed versions of a missing shared library ("libx.so.4.0.1"). A wheel puts it into package
+/// "x", beside the package of the robot.
 std::string other_versions(const fs::path& robot, const std::string& missing) {
   const std::string::size_type end = missing.find(".so");
   if (end == std::string::npos || missing.rfind("lib", 0) != 0) return {};
@@ -115,7 +115,7 @@ RobotLibrary RobotLibrary::load(const std::string& name_or_path) {
   auto* function = reinterpret_cast<RobotTableFunction>(dlsym(handle, kRobotSymbol));
   if (function == nullptr) {
     throw DriverError("'" + library.path +
-                      "' is no robot library: it has no O80_ROBOT(name, Driver)");
+                      "' is not a robot library: its sources have no O80_ROBOT(name, Driver)");
   }
   library.table = function();
   check_table(*library.table, library.path);

@@ -8,21 +8,21 @@
 
 namespace o80 {
 
-/// A robot library that is loaded; it stays loaded until the process ends.
+/// A loaded robot library; it stays loaded until the process ends.
 struct RobotLibrary {
   std::string path;
   const RobotTable* table = nullptr;
 
   /// Loads a robot by path, or by name from robot_folders().
-  /// Throws DriverError, whose text lists what there is.
+  /// Throws DriverError with the known robots in its text.
   static RobotLibrary load(const std::string& name_or_path);
 };
 
-/// Where robots are found by name: O80_ROBOT_PATH (folders parted by ':'), then the folder of the
-/// robots that come with o80.
+/// The folders in which robots are found by name: those of O80_ROBOT_PATH (separated by ':'), then
+/// the folder of the robots that come with o80.
 std::vector<std::string> robot_folders();
 
-/// Name and path of every robot library there.
+/// Name and path of a robot library in these folders.
 struct RobotFile {
   std::string name;
   std::string path;

@@ -29,7 +29,8 @@ Loop::~Loop() {
   if (!guard_.forked()) {
     static_cast<void>(stop());
   } else {
-    [[maybe_unused]] Robot* of_the_parent = robot_.release();  // so is its hardware
+    // in a forked child the robot and its hardware belong to the parent
+    [[maybe_unused]] Robot* of_the_parent = robot_.release();
   }
 }
 
@@ -63,8 +64,8 @@ Ended Loop::run() noexcept {
   return stop();
 }
 
-/// An end in order in real time: the actuators come to rest first, within a second at most. Only a
-/// failed verb leaves no time for that.
+/// Before an end in order in real time: brakes all actuators, for at most one second. Not after a
+/// failed function of the driver.
 void Loop::brake() noexcept {
   if (!paced_ || !fault_.empty()) return;
   const std::int64_t end = monotonic_now() + kLongestBraking;
@@ -95,7 +96,7 @@ bool Loop::write() noexcept {
   return calls(Verb::write, [&] { return robot_->write(view); }) || failed("write");
 }
 
-/// Real time waits here, for the clock or for the robot's own tick.
+/// In real time: waits for the end of the period, or in the driver's wait() for the robot's tick.
 bool Loop::pace() noexcept {
   if (!paced_) return true;
   const bool in_time = pacer_.in_time(monotonic_now());
@@ -104,8 +105,8 @@ bool Loop::pace() noexcept {
     backend_.set_timing(pacer_.tick(monotonic_now()));
     return !pacer_.runs_ahead() || failed_to_wait();
   }
-  // a signal may come just before the sleep, and wake nobody: a long one is cut into slices. A
-  // motion is not hurried by a stop: the robot would be asked to do the step in less time
+  // A signal may arrive just before the sleep, so a long sleep is cut into slices. While the robot
+  // moves, a stop does not shorten the period: the robot would have to move faster.
   bool over = !in_time;
   const bool moves = backend_.acts() && backend_.schema().head.period <= kLongestBraking;
   while (!over && (moves || braking_ || !backend_.stop_asked())) {
@@ -160,7 +161,7 @@ void Loop::note_requests(const ReadingView& view) noexcept {
   }
 }
 
-/// Its ticks come so fast that no limit of a speed holds any more.
+/// Reports ticks that came so fast that speed limits, which count iterations, no longer hold.
 bool Loop::failed_to_wait() noexcept {
   const double period = static_cast<double>(backend_.schema().head.period) * 1e-6;
   const Pacer::FastTicks& fast = pacer_.fast_ticks();

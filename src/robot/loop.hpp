@@ -17,30 +17,32 @@ struct Ended {
   std::string fault;  // empty if in order
 };
 
-/// The one loop: a robot and its backend, in every way of pacing.
+/// The loop of a robot and its backend, in real time, bursting and inline.
+/// See ARCHITECTURE.md, One iteration.
 ///
 /// Writer:   one thread; `ask_to_stop` any thread or signal handler.
-/// Realtime: run, but for its end.
+/// Realtime: run, except for its end.
 class Loop final : public RequestServer {
  public:
-  /// Takes the name, describes the robot, publishes the segment as starting.
+  /// Describes the robot, takes the segment's name, publishes the segment as starting.
   /// Throws SegmentTaken, SegmentError, InvalidArgument, DriverError.
   Loop(std::unique_ptr<Robot> robot, const BackendOptions& options);
   Loop(const Loop&) = delete;
   Loop& operator=(const Loop&) = delete;
   ~Loop();
 
-  /// Starts the hardware and publishes row 0; if that fails, the fault stands in the segment and
-  /// DriverError is thrown.
+  /// Starts the hardware and publishes row 0. If that fails, it stores the fault in the segment and
+  /// throws DriverError.
   void start();
-  /// Iterates until the end, at the period or by bursts. Never throws a driver's fault.
+  /// Iterates until the end, paced by the clock, the robot or bursts. Returns the fault of a driver
+  /// instead of throwing it.
   Ended run() noexcept;
-  /// Bursting only: iterates in this thread until nothing is granted, at most so often; `run` if
-  /// more is granted.
+  /// Bursting only: runs at most `most` granted iterations in this thread; `Step::run` if more are
+  /// granted.
   Step run_granted(std::uint32_t most) noexcept;
-  /// What is left of the burst under way is not run.
+  /// Cancels the rest of the current burst.
   void cut_burst() noexcept { backend_.cut_burst(); }
-  /// Stops the robot and tells the frontends. Called by run() and the destructor.
+  /// Stops the robot and ends the backend. Called by run() and the destructor.
   Ended stop() noexcept;
 
   void ask_to_stop() noexcept { backend_.ask_to_stop(); }
@@ -62,7 +64,8 @@ class Loop final : public RequestServer {
   void note_requests(const ReadingView& view) noexcept;
   void note_halt(const ReadingView& view) noexcept;
   bool begin();
-  /// Calls into the driver; observers see which verb has not returned.
+  /// Calls a function of the driver. Observers see which one has not returned
+  /// (memory/verb_word.hpp).
   template <class Call>
   auto calls(Verb verb, Call&& call) noexcept {
     backend_.enter(verb);
@@ -78,11 +81,11 @@ class Loop final : public RequestServer {
   ForkGuard guard_;
   UntypedBackend backend_;
   Pacer pacer_;
-  bool paced_;             // by the clock
-  bool braking_ = false;   // before the end
-  bool finished_ = false;  // the driver said so
+  bool paced_;             // real time: by the clock or by the driver's wait()
+  bool braking_ = false;   // the actuators come to rest before the end
+  bool finished_ = false;  // by Reading::finish()
   bool ended_ = false;
-  std::string fault_;  // reserved before the loop runs
+  std::string fault_;  // capacity reserved, so that run() does not allocate
   std::vector<std::uint64_t> interrupted_;
   std::vector<RequestReport> reports_;  // of each request
 };

@@ -69,7 +69,7 @@ LoopReport::~LoopReport() {
 
 void LoopReport::run() noexcept {
   try {
-    // the loop may have ended before this thread began: nobody waits for a backend that never comes
+    // the loop may have ended before this thread began: then stop waiting for its segment
     const KeepWaiting goes_on = [this] { return stop_.load(std::memory_order_acquire) == 0; };
     const UntypedFrontend watcher(segment_, {.access = Access::read_only, .keep_waiting = goes_on});
     OverrunReport overruns;

@@ -11,10 +11,10 @@
 
 namespace o80 {
 
-/// Decides what a robot's process says about late iterations, at a limited rate.
+/// Makes the report lines about late iterations, at a limited rate.
 class OverrunReport {
  public:
-  /// The newest row, now [ns] => a line, if there is something to say.
+  /// The newest row, now [ns] => a line if there are new late iterations.
   std::optional<std::string> look(const RowHead& row, std::int64_t now);
 
  private:

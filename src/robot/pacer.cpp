@@ -24,13 +24,13 @@ const Timing& Pacer::next(std::int64_t now) noexcept {
 
 const Timing& Pacer::tick(std::int64_t now) noexcept {
   timing_.lateness = now - due_;
-  // the robot's clock is its own: a tick counts as the one that was nearest
+  // the robot has a clock of its own: a tick counts for the nearest period
   if (timing_.lateness > 0) {
     const auto missed = static_cast<std::uint32_t>((timing_.lateness + period_ / 2) / period_);
     timing_.skipped += missed;
     if (missed > 0) count_overrun();
   }
-  // late ticks take back what early ones gained
+  // late ticks compensate early ones
   ahead_ -= timing_.lateness + period_ / kClockTolerance;
   if (ahead_ > 0) {
     ++fast_.ticks;

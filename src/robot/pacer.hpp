@@ -6,57 +6,58 @@
 
 namespace o80 {
 
-/// Keeps the account of a loop's periods; the caller tells it the time.
+/// Computes due times, lateness, overruns and skipped periods from the times that the caller
+/// passes.
 ///
-/// An iteration whose work or wake-up comes too late is counted once; the periods it missed are
-/// left out, so that no burst of late iterations follows.
+/// An iteration whose work or wake-up is late counts as one overrun. Missed periods are skipped, so
+/// that late iterations are not made up for in a rush.
 ///
 /// Realtime: arithmetic only.
 class Pacer {
  public:
   explicit Pacer(std::int64_t period) : period_(period) {}
 
-  /// The first period begins now.
+  /// Begins the first period.
   void begin(std::int64_t now) noexcept { due_ = now + period_; }
-  /// When the period under way ends [ns].
+  /// End of the current period [ns].
   std::int64_t due() const noexcept { return due_; }
-  /// The work of the period is done; false, and counted, if the period was over before.
+  /// The work of the period is done. False, and an overrun, if the period had already ended.
   bool in_time(std::int64_t now) noexcept;
-  /// The period is over by the clock: measures how late, and sets the next one. Woken a whole
-  /// period late, or more, is an overrun too.
+  /// Woken by the clock: measures the lateness and begins the next period. A lateness of a whole
+  /// period or more is an overrun.
   const Timing& next(std::int64_t now) noexcept;
-  /// The period is over because the robot ticked: the next one is measured from here.
+  /// Woken by the robot's tick: measures the lateness and begins the next period at `now`.
   const Timing& tick(std::int64_t now) noexcept;
-  /// The tick of the period that has just ended brought no reading: an overrun, unless the period
-  /// counted as one already.
+  /// The last tick brought no reading: counts an overrun, unless this period has one already.
   const Timing& missed() noexcept;
-  /// Ticks have come so much faster than the period says that no limit of a speed holds any more.
+  /// True if ticks are more than kMostPeriodsAhead periods ahead of the clock. Speed limits, which
+  /// are applied per iteration, then no longer hold.
   bool runs_ahead() const noexcept { return ahead_ > kMostPeriodsAhead * period_; }
-  /// The ticks that came too fast, since they last came in time.
+  /// The ticks since the ticks were last in time with the clock.
   struct FastTicks {
     std::int64_t ticks = 0;
-    std::int64_t time = 0;  // in which they came [ns]
+    std::int64_t time = 0;  // from the first to the last of them [ns]
   };
   const FastTicks& fast_ticks() const noexcept { return fast_; }
 
  private:
-  /// Ticks that were late may be caught up at once: so many, however long they were missing.
+  /// After a gap, late ticks may arrive together; more than this many are too fast.
   static constexpr std::int64_t kMostPeriodsAhead = 10;
-  /// The robot's clock may be faster than this one by one part in so many, for ever.
+  /// The robot's clock may always be faster than this one by 1 part in 50.
   static constexpr std::int64_t kClockTolerance = 50;
 
-  /// Once a period.
+  /// At most one overrun a period.
   void count_overrun() noexcept;
 
   std::int64_t period_;
   std::int64_t due_ = 0;
-  bool overrun_ = false;    // counted in this period
-  std::int64_t ahead_ = 0;  // of the clock, by the ticks [ns]
+  bool overrun_ = false;    // one was counted in this period
+  std::int64_t ahead_ = 0;  // time by which the ticks are ahead of the clock [ns]
   FastTicks fast_;
   Timing timing_;
 };
 
-/// Sleeps until a moment of the monotonic clock [ns]; false if a signal came first.
+/// Sleeps until `due` on the monotonic clock [ns]; false if a signal interrupted it.
 ///
 /// Realtime: one system call.
 bool sleep_until(std::int64_t due) noexcept;

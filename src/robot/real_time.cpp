@@ -19,7 +19,7 @@ constexpr const char* kAllowPriority =
     "Allow it with `ulimit -r 99`, for good with a line `@robot - rtprio 99` in "
     "/etc/security/limits.conf";
 
-/// Touches so much of the stack that the loop never meets a page for the first time.
+/// Touches the pages of the stack, so that the loop causes no page fault there.
 __attribute__((noinline)) void touch_stack(std::size_t bytes) {
   auto* stack = static_cast<volatile char*>(alloca(bytes));
   for (std::size_t i = 0; i < bytes; i += kPage) stack[i] = 0;
@@ -42,7 +42,7 @@ void set_policy(const RealTimeOptions& options, std::vector<std::string>& refuse
                       std::strerror(errno) + "). " + kAllowPriority);
     return;
   }
-  // what a loop rests on may not wait for it, nor for another one like it
+  // the liveness helper must not wait for this loop or another one: it gets a higher priority
   const int why = LaneLiveness::run_above(options.priority);
   if (why == 0) return;
   refused.push_back("real-time priority " + std::to_string(options.priority + 1) +
@@ -69,7 +69,7 @@ void set_processors(const RealTimeOptions& options, std::vector<std::string>& re
   if (sched_setaffinity(0, sizeof set, &set) != 0) {
     why = std::strerror(errno);
   } else if (sched_getaffinity(0, sizeof set, &set) == 0) {
-    // the kernel takes a list in which one is there, and says nothing of the rest
+    // the kernel accepts a list if one processor exists, and silently drops the others
     std::erase_if(missing, [&](int processor) { return is_in(processor, set); });
   }
   if (missing.empty()) return;

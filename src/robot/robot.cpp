@@ -51,7 +51,8 @@ Robot::Robot(const RobotTable& table, const OptionValues& options) : table_(tabl
   const std::vector<OptionValue> values = plain(options);
   driver_ = table.create(values.data(), static_cast<std::uint32_t>(values.size()), &fault_);
   if (driver_ == nullptr) {
-    throw DriverError("robot '" + std::string(table.name) + "' cannot be made: " + fault_.text);
+    throw DriverError("robot '" + std::string(table.name) +
+                      "' cannot be constructed: " + fault_.text);
   }
 }
 

@@ -12,21 +12,21 @@
 
 namespace o80 {
 
-/// Name and text of each value that a robot is started with.
+/// Name and text of each option with which a robot is started.
 using OptionValues = std::vector<std::pair<std::string, std::string>>;
 
-/// The options a robot knows, from its table.
+/// The options of a robot, from its table.
 std::vector<Option> options_of(const RobotTable& table);
 
-/// Throws DriverError if a table was made by another version of o80.
+/// Throws DriverError if the table was built with another version of o80.
 void check_table(const RobotTable& table, const std::string& where);
 
-/// Throws InvalidArgument if the robot has no such option, or one cannot have that text.
+/// Throws InvalidArgument for an unknown option or an invalid value.
 void check_options(const RobotTable& table, const OptionValues& options);
 
-/// One living driver behind its table.
+/// One driver object behind its table of functions.
 ///
-/// Move-only. The driver is stopped and destroyed with it.
+/// Not copyable. The destructor stops and destroys the driver.
 class Robot {
  public:
   /// Constructs the driver, which touches no hardware. Throws InvalidArgument, DriverError.
@@ -36,10 +36,10 @@ class Robot {
   ~Robot();
 
   const RobotTable& table() const { return table_; }
-  /// `period`: that the user asks for [ns]; 0 if none was asked for. Throws DriverError.
+  /// `period`: the period that the user requested [ns]; 0: none. Throws DriverError.
   Schema describe(std::int64_t period = 0) const;
 
-  // the driver's verbs; false: `fault()` says why
+  // the functions of the driver; false: `fault()` has the reason
   bool start() noexcept;
   bool wait(std::int64_t due) noexcept;
   bool write(const DesiredView& desired) noexcept;
@@ -47,7 +47,7 @@ class Robot {
   Served request(std::uint32_t index, const std::byte* payload) noexcept;
   bool halt() noexcept;
   Served resume() noexcept;
-  /// Once, and only if a start was tried.
+  /// Calls the driver's stop() once, and only after a call of start().
   void stop() noexcept;
   /// What the driver said of a request in its reading.
   static Served served(const RequestReport& report) noexcept;

@@ -29,16 +29,16 @@ namespace {
 
 std::atomic<bool> stop_asked{false};
 std::atomic<Loop*> running_loop{nullptr};
-std::mutex ending;  // held by the input's thread while it speaks to the loop
+std::mutex ending;  // held by the thread of watch_input() while it uses the loop
 
-/// In a signal handler: only what a handler may do.
+/// Runs in a signal handler: async-signal-safe operations only.
 void stop_on_signal(int) {
   stop_asked.store(true);
   if (Loop* loop = running_loop.load()) loop->ask_to_stop();
 }
 
-/// SIGINT, SIGTERM and SIGHUP stop in order while this lives; a closed terminal or pipe kills
-/// nothing.
+/// While this object exists, SIGINT, SIGTERM and SIGHUP stop the loop in order, and SIGPIPE is
+/// ignored.
 class StopSignals {
  public:
   StopSignals() {
@@ -47,7 +47,7 @@ class StopSignals {
     for (std::size_t i = 0; i < std::size(kStops); ++i) {
       action.sa_handler = stop_on_signal;
       sigaction(kStops[i], nullptr, &before_[i]);
-      // started with nohup, a robot outlives its terminal
+      // started with nohup: a robot continues after its terminal has closed
       if (kStops[i] == SIGHUP && before_[i].sa_handler == SIG_IGN) continue;
       sigaction(kStops[i], &action, nullptr);
     }
@@ -69,7 +69,7 @@ class StopSignals {
   struct sigaction pipe_before_{};
 };
 
-/// The loop that signals stop, as long as this lives.
+/// While this object exists, signals stop this loop.
 class Running {
  public:
   explicit Running(Loop& loop) {
@@ -84,7 +84,7 @@ class Running {
   }
 };
 
-/// Stops the loop when whoever started the process has gone: its standard input ends.
+/// Stops the loop at the end of the standard input, that is, when the starting process has ended.
 void watch_input() {
   // signals are for the loop's thread
   sigset_t every;
@@ -102,13 +102,14 @@ void watch_input() {
   pthread_sigmask(SIG_SETMASK, &before, nullptr);
 }
 
-/// On the standard error, behind all that the driver printed before.
+/// Prints to the standard error, after what the driver has printed so far.
 void complain(const char* text) {
   std::fflush(stdout);
   std::fprintf(stderr, "o80: %s\n", text);
 }
 
-/// A robot that cannot be made leaves its fault where others wait for it to attach.
+/// Publishes the fault of a robot that cannot be constructed in a small segment, so that waiting
+/// frontends raise it.
 void leave_fault(const BackendOptions& options, const char* why) noexcept {
   try {
     BackendOptions least;
@@ -136,8 +137,8 @@ std::unique_ptr<Loop> make_loop(const RobotTable& table, const RunOptions& optio
   }
 }
 
-/// The numbers that a halt or stop brings to rest in one iteration, as nothing limits their
-/// acceleration: a few of them, and how many more.
+/// The names of the numbers without an acceleration limit, which a halt or stop brings to rest in
+/// one iteration: at most three, and how many more there are.
 std::string stops_at_once(const Schema& schema) {
   constexpr std::uint32_t kNamed = 3;
   std::string names;

@@ -22,8 +22,8 @@ TrustedLibrary::TrustedLibrary(const std::string& path) : path_(path) {
     ::close(descriptor_);
     throw DriverError("the robot library '" + path +
                       "' is not loaded: this program has privileges of its own (set-user-ID or "
-                      "`setcap`), and others than root can write the library. Take them from the "
-                      "program (`chmod u-s`, `setcap -r`) and allow real-time priorities by a "
+                      "`setcap`), and users other than root can write the library. Remove the "
+                      "privileges (`chmod u-s`, `setcap -r`) and allow real-time priorities by a "
                       "line `@robot - rtprio 99` in /etc/security/limits.conf");
   }
   path_ = "/proc/self/fd/" + std::to_string(descriptor_);

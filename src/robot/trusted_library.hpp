@@ -4,11 +4,11 @@
 
 namespace o80 {
 
-/// Neither movable nor copyable: a library file that may be loaded into this process.
+/// A library file that may be loaded into this process. Neither movable nor copyable.
 ///
-/// A process with privileges that its starter lacks (set-user-ID, file capabilities) would lend
-/// them to whatever library it loads: there only files are accepted that root owns and nobody else
-/// can write. Throws DriverError.
+/// In a process with privileges that its user lacks (set-user-ID, file capabilities), only files
+/// that root owns and only root can write are accepted: code of the library would get these
+/// privileges. Throws DriverError.
 class TrustedLibrary {
  public:
   explicit TrustedLibrary(const std::string& path);
@@ -16,7 +16,7 @@ class TrustedLibrary {
   TrustedLibrary& operator=(const TrustedLibrary&) = delete;
   ~TrustedLibrary();
 
-  /// For dlopen: of the very file that was looked at.
+  /// Path for dlopen: it leads to the same file that was checked.
   const std::string& path() const { return path_; }
 
  private:

@@ -15,13 +15,13 @@
 
 namespace o80 {
 
-/// A value's place in a block whose layout is known at run time only.
+/// Offset of a value in a row whose layout is known at run time only.
 template <class T>
 struct Place {
   std::uint32_t offset = 0;
 };
 
-/// What a driver is to do: the desired states of an iteration.
+/// The desired states of one iteration, which the driver sends to the hardware in `write`.
 template <class D>
 class Desired {
  public:
@@ -31,7 +31,7 @@ class Desired {
     }
   }
 
-  ActuatorsOf<D> states;  // all of them, as the driver's own type
+  ActuatorsOf<D> states;  // of all actuators
 
   const auto& operator[](std::size_t actuator) const { return states[actuator]; }
   /// A value of a layout known at run time only.
@@ -39,21 +39,22 @@ class Desired {
   T at(Place<T> place) const {
     return unpack<T>(view_.states + place.offset);
   }
-  /// A command gave this state; else it is held, or follows the observed one.
+  /// True if a command or braking gave this state; otherwise it is held or follows the observed
+  /// state (when_idle).
   bool active(std::size_t actuator) const {
     return (view_.active[actuator / 64] >> (actuator % 64) & 1) != 0;
   }
   std::int64_t iteration() const { return view_.iteration; }
   /// On the backend's clock [ns].
   std::int64_t time() const { return view_.time; }
-  /// How long an iteration lasts [s].
+  /// Duration of an iteration [s].
   double period() const { return static_cast<double>(view_.period) * 1e-9; }
 
  private:
   DesiredView view_;
 };
 
-/// What came of it: a driver fills it in `read`.
+/// The reading of one iteration; the driver fills it in `read`.
 template <class D>
 class Reading {
  public:
@@ -66,8 +67,8 @@ class Reading {
     }
   }
 
-  ActuatorsOf<D> observed;  // holds the last reading
-  ExtendedOf<D> extended;   // likewise
+  ActuatorsOf<D> observed;  // initially the last reading
+  ExtendedOf<D> extended;   // initially the last reading
 
   /// Values of a layout known at run time only.
   template <class T>
@@ -85,7 +86,7 @@ class Reading {
   /// On the backend's clock [ns].
   std::int64_t time() const { return view_.time; }
 
-  /// The robot cannot go on: the loop ends, frontends raise the text.
+  /// Ends the loop as failed; frontends raise BackendFailed with this text.
   void fault(std::string_view text) {
     const std::size_t size =
         text.size() < sizeof fault_.text ? text.size() : sizeof fault_.text - 1;
@@ -93,8 +94,8 @@ class Reading {
     fault_.text[size] = 0;
     faulty_ = true;
   }
-  /// Nothing may move until somebody resumes: the backend halts, in the next iteration. May be
-  /// repeated with each reading; while it acts that changes nothing.
+  /// Halts the backend in the next iteration: the actuators brake, and nothing moves until a
+  /// frontend resumes. A driver may call it in each reading: the same text again is the same halt.
   void halt(std::string_view why) {
     const std::size_t size =
         why.size() < sizeof view_.halt_text.text ? why.size() : sizeof view_.halt_text.text - 1;
@@ -102,12 +103,13 @@ class Reading {
     view_.halt_text.text[size] = 0;
     view_.halted = 1;
   }
-  /// This tick of the robot brought no reading (a packet was lost): the last one stays, and the
-  /// iteration counts as an overrun. Nothing in bursting.
+  /// This tick of the robot brought no reading, for example because a packet was lost: the last
+  /// reading stays and the iteration counts as an overrun. No effect in bursting mode.
   void missed() { view_.missed = 1; }
-  /// The robot is done: the loop ends in order after this row.
+  /// Ends the loop in order after this row. In real time the actuators brake first: `write` and
+  /// `read` continue for at most 1 s.
   void finish() { view_.finished = 1; }
-  /// The commands of this actuator end as interrupted, in this iteration.
+  /// Ends the commands of this actuator as interrupted, in this iteration.
   void interrupt(std::size_t actuator) {
     view_.interrupted[actuator / 64] |= std::uint64_t{1} << (actuator % 64);
   }
@@ -129,8 +131,11 @@ class Reading {
     tell(report<Request>(), static_cast<RequestAnswer>(how.kind), how.why());
   }
 
-  /// True in the reading of a fresh start, which may also give the desired states to go on from.
+  /// True in the reading of a fresh start: after a request that answered start_afresh, and after
+  /// each resume.
   bool fresh() const { return view_.desired != nullptr; }
+  /// Sets the desired states from which a fresh start continues; without it, the observed states.
+  /// No effect in other readings.
   template <class Actuators>
   void go_on_from(const Actuators& desired) {
     if (!fresh()) return;
@@ -142,10 +147,10 @@ class Reading {
     return view_.desired;
   }
 
-  // for the caller of the driver
+  // for o80, which calls the driver
   bool faulty() const { return faulty_; }
   const FaultText& fault_text() const { return fault_; }
-  /// Puts the typed values where the row is made.
+  /// Copies the typed values into the row.
   void store() {
     if constexpr (!kIsRunTime<D>) {
       if constexpr (!std::is_same_v<ActuatorsOf<D>, NoActuators>) pack(observed, view_.observed);

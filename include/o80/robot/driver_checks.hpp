@@ -10,14 +10,14 @@
 #include "o80/runtime/request_server.hpp"
 #include "o80/runtime/robot_types.hpp"
 
-// A part of a driver that is missing, has another signature or nearly the right name is an error
-// with one sentence when the driver is compiled. Without these checks an optional part with such a
-// mistake would silently not be used.
+// Compile-time checks of a driver class. A part that is missing, has a wrong signature or a
+// misspelled name gives one error with one sentence. Without these checks the compiler would
+// silently ignore an optional part with such a mistake.
 
 namespace o80::driver_checks {
 
-// Whether a class has a member of a name, of whatever kind, private ones included: a class that
-// inherits another such member too cannot tell which one is meant.
+// has_name<D>(): true if D has a member of that name, of any kind, also a private one. Method: a
+// class that inherits the name from D and from another class has an ambiguous member.
 // NOLINTBEGIN(readability-identifier-naming)
 #define O80_MEMBER(name)                                               \
   struct With_##name {                                                 \
@@ -80,10 +80,10 @@ consteval bool serves_all() {
 template <class D>
 consteval bool config_is_described() {
   if constexpr (O80_TYPE(Config)) return DescribedStruct<typename D::Config>;
-  return true;  // there is none: said before
+  return true;  // a missing Config is an error of its own
 }
 
-/// What every driver has.
+/// The required types of a driver.
 template <class D>
 struct Parts {
   static_assert(O80_TYPE(Config), "a driver needs a public `struct Config`, empty or with fields");
@@ -97,7 +97,7 @@ struct Parts {
   static constexpr bool kPassed = true;
 };
 
-/// The verbs of every driver. They have the signature that is called: an answer would be ignored.
+/// The required functions of a driver. They must return void, because o80 would ignore a result.
 template <class D>
 struct NeededVerbs {
   static_assert(std::constructible_from<D, const typename D::Config&>,
@@ -114,7 +114,7 @@ struct NeededVerbs {
       requires(D& driver, Reading<D>& reading) {
         { driver.read(reading) } -> std::same_as<void>;
       },
-      "a driver needs `void read(o80::Reading<Arm>& reading)`, public; it tells a failure by "
+      "a driver needs `void read(o80::Reading<Arm>& reading)`, public; it reports a failure by "
       "`reading.fault(text)`");
   static_assert(
       requires(D& driver) {
@@ -123,14 +123,14 @@ struct NeededVerbs {
   static constexpr bool kPassed = true;
 };
 
-/// The optional verbs: those that are there have the signature that is called.
+/// The optional functions: a driver that has one must give it the expected signature.
 template <class D>
 struct Verbs {
   static_assert(
       !has_describe<D>() || requires(const D& driver, Schema& schema) {
         { driver.describe(schema) } -> std::same_as<void>;
       }, "a driver's describe must be `void describe(o80::Schema& schema) const`, and public");
-  // braces: a number that loses digits on its way is none
+  // braces refuse a parameter type that is too narrow for nanoseconds
   static_assert(
       !has_wait<D>() ||
           requires(D& driver, std::int64_t due) {
@@ -149,18 +149,20 @@ struct Verbs {
 
   static_assert(has_describe<D>() || !(has_Describe<D>() || has_describes<D>() ||
                                        has_descibe<D>() || has_desribe<D>() || has_discribe<D>()),
-                "a driver's verb is called `describe`: this one has another name");
+                "this driver has `Describe`, `describes`, `descibe`, `desribe` or `discribe`: "
+                "rename it to `describe`");
   static_assert(has_wait<D>() || !(has_Wait<D>() || has_waits<D>()),
-                "a driver's verb is called `wait`: this one has another name");
+                "this driver has `Wait` or `waits`: rename it to `wait`");
   static_assert(has_halt<D>() || !(has_Halt<D>() || has_on_halt<D>() || has_onHalt<D>()),
-                "a driver's verb is called `halt`: this one has another name");
+                "this driver has `Halt`, `on_halt` or `onHalt`: rename it to `halt`");
   static_assert(has_resume<D>() || !(has_Resume<D>() || has_on_resume<D>() || has_onResume<D>() ||
                                      has_resme<D>() || has_reusme<D>()),
-                "a driver's verb is called `resume`: this one has another name");
+                "this driver has `Resume`, `on_resume`, `onResume`, `resme` or `reusme`: rename it "
+                "to `resume`");
   static constexpr bool kPassed = true;
 };
 
-/// The optional types: those that are there can be used, and no other was meant to be one.
+/// The optional types: a driver that has one must be able to use it, and no name is misspelled.
 template <class D>
 struct Types {
   static_assert(!has_Requests<D>() || O80_TYPE(Requests), "a driver's Requests must be public");
@@ -174,13 +176,13 @@ struct Types {
   static_assert(has_Requests<D>() ||
                     !(O80_TYPE(Request) || O80_TYPE(requests) || O80_TYPE(Requets) ||
                       O80_TYPE(Reqests) || O80_TYPE(Requsets) || O80_TYPE(Reqeusts)),
-                "a driver's requests are listed as `using Requests = o80::Requests<...>`: this "
-                "type has another name");
+                "a driver lists its requests as `using Requests = o80::Requests<...>`: rename this "
+                "type to `Requests`");
   static_assert(has_Extended<D>() ||
                     !(O80_TYPE(Extension) || O80_TYPE(Extensions) || O80_TYPE(Extend) ||
                       O80_TYPE(Extends) || O80_TYPE(extended) || O80_TYPE(Extented)),
-                "a driver's sensor values are named by `using Extended = ...`: this type has "
-                "another name");
+                "a driver names its sensor values by `using Extended = ...`: rename this type to "
+                "`Extended`");
   static constexpr bool kPassed = true;
 };
 #undef O80_TYPE
@@ -188,7 +190,7 @@ struct Types {
 template <class D>
 struct Handlers {
   static_assert(has_Requests<D>() || !has_on<D>(),
-                "a driver with `on(...)` lists its requests: `using Requests = "
+                "a driver with `on(...)` must list its requests: `using Requests = "
                 "o80::Requests<Home>;`");
   static_assert(serves_all<D>(),
                 "each struct in a driver's Requests needs `void on(const Each&)` or `o80::Served "

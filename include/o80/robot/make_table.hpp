@@ -31,7 +31,7 @@ inline void set_fault(FaultText* fault, const char* text) {
   fault->text[size] = 0;
 }
 
-/// Runs a piece of a driver; what it throws becomes a fault and the result `failed`.
+/// Calls the driver. An exception is stored as the fault, and the result is `failed`.
 template <class Result, class Call>
 Result guarded(FaultText* fault, Result failed, Call&& call) noexcept {
   try {
@@ -39,7 +39,7 @@ Result guarded(FaultText* fault, Result failed, Call&& call) noexcept {
   } catch (const std::exception& error) {
     set_fault(fault, error.what());
   } catch (...) {
-    set_fault(fault, "the driver threw something that is no std::exception");
+    set_fault(fault, "the driver threw something that is not a std::exception");
   }
   return failed;
 }

@@ -11,8 +11,9 @@ int run(const RobotTable& table, int argc, char** argv);
 /// "arm" for "build/arm".
 const char* program_name(const char* path) noexcept;
 
-/// One's own main: `int main(int argc, char** argv) { return o80::run<Arm>(argc, argv); }`
-/// The robot is called as the program, unless a name is given.
+/// Runs a robot from a main of its own:
+/// `int main(int argc, char** argv) { return o80::run<Arm>(argc, argv); }`
+/// The robot takes the name of the program unless a name is given.
 template <class D>
 int run(int argc, char** argv, const char* name = nullptr) {
   return run(*robot_table<D>(name == nullptr ? program_name(argv[0]) : name), argc, argv);

@@ -6,19 +6,20 @@
 #include "o80/describe/hooks.hpp"
 #include "o80/describe/rows.hpp"
 
-// What crosses the border between a robot library and o80: plain structs and functions that
-// neither throw nor know a C++ type of the other side. Both sides compare versions and sizes.
+// Interface between a robot library and o80: plain structs and functions. Functions do not throw
+// and pass no C++ class. o80 compares versions and sizes before it uses a library. See
+// ARCHITECTURE.md, From a driver class to a robot.
 
 namespace o80 {
 
 inline constexpr std::uint32_t kRobotTableVersion = 4;
 
-/// Why a call failed.
+/// Reason for the failure of a call.
 struct FaultText {
   char text[512];
 };
 
-/// One value a robot can be started with.
+/// One option with which a robot can be started.
 struct OptionRow {
   const char* name;
   const char* kind;
@@ -48,7 +49,7 @@ struct SchemaRows {
       request_count, default_count;
 };
 
-/// What a driver is to write.
+/// The desired states that a driver writes.
 struct DesiredView {
   const std::byte* states;      // the desired block
   const std::uint64_t* active;  // one bit an actuator
@@ -91,20 +92,20 @@ struct ReadingView {
   FaultText halt_text;        // why it is to be halted
 };
 
-/// A robot, as functions. Those that return int give 0, or 1 and fill the fault.
+/// A robot as a table of functions. Those that return int return 0, or 1 and fill the fault.
 struct RobotTable {
   std::uint32_t version;
   std::uint32_t size;          // of this struct
-  std::uint32_t row_sizes;     // of all schema rows, summed: another layout cannot be read
-  std::uint32_t paces_itself;  // the driver's own `wait` says when an iteration begins
+  std::uint32_t row_sizes;     // sum of the sizes of all schema rows; must be that of o80
+  std::uint32_t paces_itself;  // 1: the driver has `wait`, which ends each iteration
   const char* name;
-  const char* built_with;  // versions of o80 and of what it links
+  const char* built_with;  // versions of o80 and of the libraries it links
 
   void (*options)(void* context, void (*each)(void* context, const OptionRow* row));
-  /// Whether a robot can be created with these options: their names and texts are known.
+  /// Checks names and values of the options without creating the robot.
   int (*accepts)(const OptionValue* values, std::uint32_t count, FaultText* fault);
   void* (*create)(const OptionValue* values, std::uint32_t count, FaultText* fault);
-  /// `period`: that the user asks for [ns]; 0 if none was asked for.
+  /// `period`: the period that the user requested [ns]; 0: none.
   int (*describe)(void* robot, std::int64_t period, void* context,
                   void (*rows)(void* context, const SchemaRows* rows), FaultText* fault);
   int (*start)(void* robot, FaultText* fault);
@@ -113,9 +114,10 @@ struct RobotTable {
   int (*read)(void* robot, ReadingView* reading, FaultText* fault);
   RequestAnswer (*request)(void* robot, std::uint32_t index, const std::byte* payload,
                            FaultText* text);
-  /// A halt begins; null if the driver has no such verb.
+  /// Called when a halt begins; null if the driver has no `halt`.
   int (*halt)(void* robot, FaultText* fault);
-  /// A halt is to be cleared: done, rejected (the text says why) or failed; null likewise.
+  /// Called before a halt is cleared: done, rejected (with a text) or failed; null if the driver
+  /// has no `resume`.
   RequestAnswer (*resume)(void* robot, FaultText* text);
   void (*stop)(void* robot);
   void (*destroy)(void* robot);
@@ -125,7 +127,7 @@ inline constexpr std::uint32_t kSchemaRowSizes =
     sizeof(SchemaHead) + sizeof(TypeRow) + sizeof(FieldRow) + sizeof(LabelRow) + sizeof(GroupRow) +
     sizeof(ActuatorRow) + sizeof(LimitRow) + sizeof(RequestRow);
 
-/// The one symbol of a robot library.
+/// The only symbol that a robot library exports.
 inline constexpr const char* kRobotSymbol = "o80_robot_table";
 using RobotTableFunction = const RobotTable* (*)();
 

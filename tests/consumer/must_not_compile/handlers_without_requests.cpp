@@ -1,4 +1,4 @@
-// error: a driver with `on(...)` lists its requests
+// error: a driver with `on(...)` must list its requests
 #include "arm.hpp"
 
 class Arm {

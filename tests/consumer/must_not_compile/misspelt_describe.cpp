@@ -1,4 +1,4 @@
-// error: a driver's verb is called `describe`
+// error: rename it to `describe`
 #include "arm.hpp"
 
 class Arm {

@@ -1,4 +1,4 @@
-// error: a driver's sensor values are named by `using Extended
+// error: a driver names its sensor values by `using Extended
 #include "arm.hpp"
 
 class Arm {

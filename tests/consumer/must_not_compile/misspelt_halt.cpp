@@ -1,4 +1,4 @@
-// error: a driver's verb is called `halt`
+// error: rename it to `halt`
 #include "arm.hpp"
 
 class Arm {

@@ -1,4 +1,4 @@
-// error: a driver's requests are listed as
+// error: a driver lists its requests as
 #include "arm.hpp"
 
 class Arm {

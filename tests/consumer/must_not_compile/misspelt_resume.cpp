@@ -1,4 +1,4 @@
-// error: a driver's verb is called `resume`
+// error: rename it to `resume`
 #include "arm.hpp"
 
 class Arm {

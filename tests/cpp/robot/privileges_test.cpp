@@ -80,7 +80,7 @@ TEST_F(PrivilegedTest, LoadOnlyRobotsThatNobodyButRootCanWrite) {
 
   fs::permissions(folder_ / "joints.so", fs::perms(0666));
   EXPECT_EQ(run_joints(), 1);
-  EXPECT_THAT(said_, HasSubstr("others than root can write the library"));
+  EXPECT_THAT(said_, HasSubstr("users other than root can write the library"));
 
   fs::permissions(folder_ / "joints.so", fs::perms(0644));
   ASSERT_EQ(chown((folder_ / "joints.so").c_str(), kNobody, kNobody), 0);
