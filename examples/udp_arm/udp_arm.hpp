@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string>
 
-#include "o80/o80.hpp"
+#include "o80/robot.hpp"
 #include "protocol.hpp"
 #include "udp_socket.hpp"
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "o80/o80.hpp"
+#include "o80/robot.hpp"
 #include "robots/pam/plant.hpp"
 
 namespace o80::pam {

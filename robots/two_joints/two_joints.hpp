@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "o80/o80.hpp"
+#include "o80/robot.hpp"
 
 /// A request that takes time: the robot moves by itself until its joints are at 0.
 struct Home {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "o80/o80.hpp"
+#include "o80/robot.hpp"
 #include "simulators/mujoco/simulation.hpp"
 
 namespace o80::mujoco {

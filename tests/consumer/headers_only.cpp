@@ -1,7 +1,7 @@
 #include <cstdio>
 #include <stdexcept>
 
-#include "o80/o80.hpp"
+#include "o80/robot.hpp"
 
 struct Reading {
   double weight;

@@ -18,7 +18,7 @@ DRIVER = """
 #include <unistd.h>
 #include <array>
 #include <string>
-#include "o80/o80.hpp"
+#include "o80/robot.hpp"
 
 class Hanging {
  public:

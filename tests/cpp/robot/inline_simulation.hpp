@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "o80/runtime/robot_types.hpp"
+#include "o80/runtime/typed_frontend.hpp"
 #include "robot/inline_robot.hpp"
 
 namespace o80 {
