@@ -14,7 +14,7 @@ namespace {
 struct Motor {
   double speed;
 };
-O80_DESCRIBE(Motor, (speed, "[rad/s]", o80::rests_at(0)));  // to 0 when no command drives it
+O80_DESCRIBE(Motor, (speed, "[rad/s]", o80::rests_at(0)));  // 0 unless a command names it
 
 struct Mixer {
   using Actuators = std::array<Motor, 3>;
@@ -39,7 +39,7 @@ int main(int argc, char** argv) try {
   for (long i = 0; i < iterations; ++i) {
     const auto desired = backend.step();
     if (!desired) break;
-    motors = *desired;  // this mixer's motors do what they are told
+    motors = *desired;  // simulated: the motors follow at once
     std::this_thread::sleep_until(next += 2ms);
     backend.publish(motors);
   }

@@ -1,5 +1,5 @@
-// A bursting backend inside a simulation: it stands still until a frontend asks for iterations.
-// The frontend here lives in a thread; it could be any process.
+// A bursting backend inside a simulation: it waits until a frontend requests iterations.
+// Here the frontend is in a thread of this process; it could be in any process.
 
 #include <cstdio>
 #include <thread>
@@ -44,7 +44,7 @@ int main() try {
     learn();
     backend.untyped().ask_to_stop();
   });
-  while (const auto desired = backend.step()) {  // waits until iterations are granted
+  while (const auto desired = backend.step()) {  // waits until a frontend requests iterations
     carts = *desired;
     backend.publish(carts);
   }

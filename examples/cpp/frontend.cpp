@@ -9,7 +9,7 @@ using namespace std::chrono_literals;
 
 namespace {
 
-// what the robot's library says of its types; the driver itself is not needed here
+// the types of the robot; its driver is not needed here
 struct Sensors {
   std::array<double, 2> effort;
 };
@@ -37,7 +37,7 @@ int main() try {
   std::printf("blocking: asked for %.3f rad at iteration %ld, at %.3f rad\n", there.desired()[1],
               there.iteration(), there.observed()[1]);
 
-  // not blocking; what overwrites ends what runs
+  // not blocking; overwriting drops what runs
   arm.add_command("elbow", 1.0, {.pace = o80::duration(10s)});
   const o80::Batch slow = arm.pulse();
   arm.add_command("elbow", 0.0,
@@ -47,7 +47,7 @@ int main() try {
   std::printf("the slow command was %s, the quick one %s at iteration %ld\n",
               words(slow.handle(0).status), words(quick.handle(0).status), quick.last_iteration());
 
-  // the history: every iteration, as far back as it is kept
+  // the history: every iteration that is still kept
   const o80::Rows rows = arm.history(100);
   std::printf("read %zu rows from iteration %ld on\n", rows.count, rows.first);
   return 0;

@@ -1,4 +1,4 @@
-// Mirrors a robot that runs by the clock in a simulation that steps in lock-step with it.
+// Mirrors a real-time robot in a simulation that steps once for each of its rows.
 // Start `o80 run two_joints` and `o80 run two_joints --segment twin --bursting` first.
 
 #include <cstdio>

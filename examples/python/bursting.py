@@ -1,4 +1,4 @@
-"""A simulator in lock-step with a learner: in a process of its own, in this one, and in groups."""
+"""Step a simulator from a learner: in a process of its own, in this process, and in groups."""
 
 import numpy as np
 
@@ -19,7 +19,7 @@ with robot.inline() as simulation:
     inside = simulation.burst(10)
 print("the same to the last bit:", np.array_equal(separate.observed, inside.observed))
 
-# a group: all are granted first, then all are waited for
+# a group: all bursts start first, then all are waited for
 with (
     robot.start(bursting=True, segment="left") as a,
     robot.start(bursting=True, segment="right") as b,

@@ -1,4 +1,4 @@
-"""A backend inside a Python program that has a loop of its own; anybody may command it."""
+"""Put a backend into a Python program with a loop of its own; any frontend may command it."""
 
 import threading
 import time
@@ -27,7 +27,7 @@ with o80.Backend("gripper", ["left", "right"], MOTOR, frequency=200) as backend:
     due = time.monotonic()
     while commander.is_alive():
         desired = backend.step()
-        fingers[:] = desired  # these fingers go where they are told
+        fingers[:] = desired  # simulated: the fingers follow at once
         due += 0.005
         time.sleep(max(0.0, due - time.monotonic()))
         backend.publish(fingers)

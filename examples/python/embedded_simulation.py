@@ -1,4 +1,4 @@
-"""A bursting backend inside a Python simulation: it stands still until it is asked to step."""
+"""Put a bursting backend into a Python simulation: it waits until a frontend requests steps."""
 
 import threading
 from collections.abc import Callable
@@ -27,7 +27,7 @@ with o80.Backend("pendulum", ["torque"], extended=SENSORS, frequency=500, bursti
     backend.publish([0.0], (angle, speed))
     learner = threading.Thread(target=learn, args=(backend.stop,))
     learner.start()
-    while (desired := backend.step()) is not None:  # waits until iterations are granted
+    while (desired := backend.step()) is not None:  # waits until a frontend requests iterations
         speed += 0.002 * (desired[0] - 9.81 * np.sin(angle))
         angle += 0.002 * speed
         backend.publish(desired, (angle, speed))

@@ -1,4 +1,4 @@
-"""Every iteration can be read back, as one array a field."""
+"""Read back every iteration, as one array for each field."""
 
 import numpy as np
 

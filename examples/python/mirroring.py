@@ -1,4 +1,4 @@
-"""A robot that runs by the clock, mirrored in a simulation that steps once for each of its rows."""
+"""Mirror a real-time robot in a simulation that steps once for each of its rows."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""A MuJoCo model whose own motor is commanded: a cart that balances its pole."""
+"""Command the motor of a MuJoCo model: a cart that balances its pole."""
 
 from pathlib import Path
 

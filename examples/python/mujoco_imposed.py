@@ -1,4 +1,4 @@
-"""A MuJoCo model whose joint is put where it is asked to be, and a ball that flies and bounces."""
+"""Impose the joint positions of a MuJoCo model; a ball flies and bounces."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ MODEL = Path(__file__).parent / "models" / "paddle.xml"
 with o80.robots.load("mujoco").inline(
     model=MODEL, balls="ball", racket="blade", floor="floor"
 ) as robot:
-    # the ball hangs where it is told to, until nobody tells it any more
+    # the ball stays at its commanded position as long as the command is active
     robot.add_command("ball", {"position": [0.0, 0.0, 1.2], "velocity": [0.0, 0.0, 0.0]})
     robot.burst(1)
     # the paddle meets it on its way down

@@ -1,4 +1,4 @@
-"""Pictures of what a MuJoCo robot did, drawn from its history.
+"""Draw pictures of what a MuJoCo robot did, from its history.
 
 Needs `pip install "o80[rendering]"`, and EGL or OSMesa (Debian: libegl1 or libosmesa6).
 """
@@ -21,7 +21,7 @@ with o80.robots.load("mujoco").inline(model=MODEL) as robot:
     last = robot.burst(500).iteration
     rows = robot.history(since=0, until=last)
 
-# the same model again, posed as the rows say
+# the same model again, with the positions of the rows
 model = mujoco.MjModel.from_xml_path(str(MODEL))
 data = mujoco.MjData(model)
 places = [int(model.joint(actuator.name).qposadr[0]) for actuator in robot.actuators]

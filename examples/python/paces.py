@@ -1,4 +1,4 @@
-"""How to get to a target: at once, in a time, at a speed, by an iteration, in so many."""
+"""Send commands with every pace: at once, duration, speed, until an iteration, iterations."""
 
 from typing import Any
 
@@ -7,7 +7,7 @@ import o80
 with o80.robots.load("two_joints").inline(frequency=1000) as arm:
 
     def took(**pace: Any) -> int:
-        """Iterations from zero to one radian and, at once, back."""
+        """How many iterations a command to 1 rad takes; then goes back to 0 at once."""
         arm.add_command("shoulder", 1.0, **pace)
         batch = arm.pulse()
         while not batch.ended:

@@ -1,4 +1,4 @@
-"""Two frontends command one arm while a third, in a process of its own, logs every row."""
+"""Command one arm from two frontends; a third one, in a process of its own, logs every row."""
 
 import multiprocessing
 
@@ -6,7 +6,7 @@ import o80
 
 
 def log(segment: str, rows: int, ready: "multiprocessing.synchronize.Event", report: str) -> None:
-    """Reads `rows` rows in order and says how many it missed."""
+    """Reads `rows` rows in order and reports how many it missed."""
     missed = 0
     with o80.Frontend(segment, read_only=True) as reader, open(report, "w") as out:
         ready.set()
@@ -33,7 +33,7 @@ def main(report: str = "/dev/null") -> None:
             second.wait(10.0)
             print(f"both ended: {first.statuses[0].name}, {second.statuses[0].name}")
 
-            # one of them may keep the others out for a while
+            # exclusive control keeps other frontends out for a while
             with upper.control():
                 lower.add_command("elbow", 0.0)
                 refused = lower.pulse()

@@ -1,4 +1,4 @@
-"""Requests to the driver itself: keep a state, go on, go back, and repeat it bit for bit."""
+"""Keep a state of a simulator, go on, restore it, and repeat the motion bit for bit."""
 
 from typing import Any
 
