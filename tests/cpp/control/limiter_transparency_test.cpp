@@ -1,5 +1,6 @@
-// A motion that keeps the limits is not touched by them (docs/commands.md#limits): whatever comes to
-// rest within its own largest speed, acceleration and jerk, and within its own span, passes as it is.
+// A motion that keeps the limits is not touched by them (docs/commands.md#limits): whatever comes
+// to rest within its own largest speed, acceleration and jerk, and within its own span, passes as
+// it is.
 #include <gtest/gtest.h>
 
 #include <algorithm>
