@@ -30,14 +30,14 @@ std::string rate_text(std::int64_t period) {
   return text.str();
 }
 
-/// The period that was asked for, the robot's own, or 1 ms.
+/// The requested period, the robot's own, or 1 ms.
 std::int64_t period_of(const Schema& schema, const BackendOptions& options) {
   const std::int64_t own = schema.head.period;
   if (options.period < 0) {
     throw InvalidArgument("the period must be positive, got " + std::to_string(options.period) +
                           " ns");
   }
-  // a printed frequency is rounded: 166.667 Hz are meant to be 6 ms
+  // printed frequencies are rounded: 166.667 Hz means 6 ms
   const bool same = std::abs(options.period - own) * kPeriodRounding <= own;
   if (options.period > 0 && own > 0 && !same) {
     throw InvalidArgument("robot '" + std::string(schema.head.robot.view()) + "' runs at " +
@@ -130,15 +130,15 @@ UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, Reques
       last_life_(lanes.size()),
       errors_(schema),
       overruns_(options.max_overruns) {
-  // completed and late commands, and their batches
+  // ends of commands in one step: completed and late ones, and those of their batches
   untold_.reserve(2 * (schema.actuators.size() + 2 * Controller::kStatusesPerIteration));
   express_lanes_.reserve(lanes.size());
   for (std::uint32_t i = 0; i < lanes.size(); ++i) lives_[i] = liveness.lane(i);
 }
 
-// ------------------------------------------------------------------------------ the two verbs
+// ------------------------------------------------------------------------------ step, publish
 
-/// Waits for a grant so long [ns] at most.
+/// In bursting mode waits at most `at_most` [ns] for a burst.
 Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
   const std::int64_t give_up =
       at_most > 0 && at_most < kForEver ? monotonic_now() + at_most : at_most;
@@ -162,11 +162,12 @@ Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
       watch_halt();
       if (schema.head.bursting == 0 || granted()) break;
     }
-    // standing still: everybody is told before anybody waits
+    // before waiting, report all pending statuses
     const bool all_told = controller.finish_pending();
     wake(lanes.announce(), false);
     if (staging.busy() || !all_told) continue;
-    // garbage may have used up a look; who sends it without end must not keep us here
+    // invalid blocks may have used up the budget of this scan: scan again, a limited number of
+    // times
     if (lanes.has_pending() && ++looks < most_looks) continue;
     const std::int64_t left =
         give_up > 0 && give_up < kForEver ? give_up - monotonic_now() : give_up;
@@ -174,8 +175,8 @@ Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
     bell.wait(lanes.bell_seen(), std::min(left, kSlice));
   }
   O80_CRASH_POINT("backend.after_take");
-  // dropped members leave their groups when they are told: a burst must not begin differently
-  // depending on how long the backend has stood before
+  // A group command waits until its dropped members are reported. Report all of them first, so that
+  // a burst does not depend on how long the backend has waited before.
   while (stands && !controller.finish_pending()) {
   }
   if (granted()) {
@@ -192,14 +193,14 @@ Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
   return Step::run;
 }
 
-/// The one place that refuses readings: what a robot begins with, or begins afresh with, has to be
-/// numbers, for nothing could be commanded from there. True if some are not; `why` names the first.
+/// Finds NaN or infinity in the first reading or in a fresh start, which are refused because no
+/// command could start from there. True if there is one; `why` names the first.
 bool UntypedBackend::Body::name_not_finite(const std::byte* states, std::string_view what,
                                            ShortText<248>& why) const noexcept {
   const std::optional<NotFinite> found = controller.not_finite(states);
   if (!found) return false;
   name_number(schema, found->actuator, found->number, why);
-  why.add(" is no number (NaN or infinite) in ").add(what);
+  why.add(" is NaN or infinite in ").add(what);
   return true;
 }
 
@@ -211,7 +212,7 @@ bool UntypedBackend::Body::can_begin(const std::byte* states, std::string_view w
 
 bool UntypedBackend::Body::publish_first() noexcept {
   if (!can_begin(row() + layout.observed, "the first reading")) return false;
-  if (!stop.load(std::memory_order_relaxed)) failure[0] = 0;  // of one that was refused before
+  if (!stop.load(std::memory_order_relaxed)) failure[0] = 0;  // that of a row 0 refused before
   publish(false);
   return true;
 }
@@ -222,7 +223,7 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
     watch_halt();
   }
 
-  // head, desired and masks join observed and extended, which are there
+  // observed and extended are in the row already: add head, desired and masks
   RowHead head;
   head.iteration = current;
   head.time = time();
@@ -243,7 +244,7 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
   if (begun_ && !fresh && running.wanting_fresh_start() == nullptr) watch_errors();
   tell_ended_requests(fresh);
 
-  // whoever waits for it
+  // report statuses, then wake waiting processes
   if (!fresh) {
     tell_of_the_row(true);
     controller.finish_pending();
@@ -258,9 +259,9 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
 }
 
 void UntypedBackend::Body::end(State state, std::string_view text) noexcept {
-  if (guard_.forked()) return;  // it is the parent's to end
+  if (guard_.forked()) return;  // only the parent ends its backend
   if (segment.state() != State::starting && segment.state() != State::running) return;
-  // the burst under way has no last row: whoever waits for it learns that the backend is gone
+  // the current burst gets no last row: its waiter raises BackendGone
   burst_left_ = 0;
   reject_all(Reason::stopped);
   tell_of_the_row(false);

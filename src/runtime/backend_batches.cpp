@@ -1,4 +1,5 @@
-// How batches come from the lanes to the controller, and statuses go back.
+// How batches reach the controller from the lanes, and statuses go back.
+// See ARCHITECTURE.md, The life of a command.
 
 #include <algorithm>
 #include <cstring>
@@ -21,20 +22,22 @@ void UntypedBackend::Body::tell(const StatusChange& change) noexcept {
 }
 
 void UntypedBackend::Body::changed(const StatusChange& change) noexcept {
-  // nothing is completed before its row is out: whoever is killed until then has not done it
+  // Completion is reported only after the row is published, so that a killed backend has never
+  // reported a command whose row is missing.
   const bool waits = stepping_ && is_end(change.status) && untold_.size() < untold_.capacity();
   if (waits) {
     untold_.push_back(change);
   } else {
     tell(change);
   }
-  // a burst that runs until its batch has ended
+  // a burst that runs until its batch has ended (pulse_to_end)
   if (burst_left_ == kUntilEnded && change.lane == burst_lane_ && change.id == burst_id_ + 1) {
     stop_burst();
   }
 }
 
-/// What ended in the step of the row that was published, or never will be.
+/// Reports the ends of commands in the last step. If its row will never be published, completed
+/// commands are reported as purged (stopped).
 void UntypedBackend::Body::tell_of_the_row(bool published) noexcept {
   for (StatusChange& change : untold_) {
     if (!published && (change.status == Status::completed || change.status == Status::limited)) {
@@ -50,7 +53,7 @@ void UntypedBackend::Body::freed(std::uint32_t lane, std::uint32_t blocks) noexc
   lanes[lane].free(blocks);
 }
 
-/// Whoever waits is woken by one system call at most.
+/// Wakes readers and senders with at most one system call.
 void UntypedBackend::Body::wake(bool lanes_wait, bool reader_waits) noexcept {
   Wakes& wakes = segment.view().wakes();
   if (lanes_wait && reader_waits) {
@@ -76,8 +79,8 @@ void UntypedBackend::Body::fail(std::string_view text) noexcept {
 // ------------------------------------------------------------------------------ control
 
 Outcome UntypedBackend::Body::take_control(std::uint32_t lane) noexcept {
-  // a batch of somebody else never comes here while somebody has control; who has left the lane
-  // meanwhile would have lost it at once
+  // Batches of other lanes are rejected while a lane has control, so they do not get here. A sender
+  // that has closed or lost its lane does not get control.
   if (taking_owner_ == 0 || taking_owner_ != lanes[lane].incarnation()) return {};
   holder_ = lane;
   holder_incarnation_ = taking_owner_;
@@ -96,14 +99,14 @@ void UntypedBackend::Body::take_due() noexcept {
   while (!schedule.empty() && schedule.next().at <= current) {
     const StagedBatch due = schedule.next();
     const Effort effort = controller.effort(due.batch);
-    if (!affords(effort)) return;  // the next iteration rejects it as late, unless it may be late
+    if (!affords(effort)) return;  // the next iteration rejects it as late, or takes it (late_now)
     spend(effort);
     schedule.drop_next();
     if (admit(due)) take(due);
   }
 }
 
-/// What the lanes hold, as far as the work of one iteration may go.
+/// Takes batches from the lanes within the budget of one iteration.
 void UntypedBackend::Body::take_batches() noexcept {
   if (!lanes.look()) return;
   if (lanes.tickets_were_put_back()) {
@@ -120,9 +123,9 @@ void UntypedBackend::Body::take_batches() noexcept {
   }
 }
 
-/// Batches in the order of their tickets; false if the share of this iteration ended before them.
+/// Takes batches in the order of their tickets; false if the budget ended first.
 bool UntypedBackend::Body::take_in_order() noexcept {
-  // nothing sent after a burst acts in it
+  // batches sent after a burst are taken after it
   while (!granted()) {
     const std::optional<std::uint32_t> lane = lanes.next(staging.tickets());
     if (!lane) return true;
@@ -132,7 +135,8 @@ bool UntypedBackend::Body::take_in_order() noexcept {
   return true;
 }
 
-/// A little of what lies in each lane, whosever turn it is, so that purges behind it are found.
+/// Stages a few blocks of every lane ahead of its turn, so that express batches behind other
+/// batches are found.
 void UntypedBackend::Body::stage_ahead() noexcept {
   std::uint32_t left = kWorkAheadOfAll;
   for (std::uint32_t i = 0; i < lanes.size() && left > 0; ++i) {
@@ -147,7 +151,7 @@ void UntypedBackend::Body::stage_ahead() noexcept {
   }
 }
 
-/// Purges and control orders that would wait for other lanes' batches.
+/// Takes express batches, which would otherwise wait for batches of other lanes.
 void UntypedBackend::Body::take_express() noexcept {
   std::uint32_t work = 0;
   do {
@@ -171,9 +175,9 @@ void UntypedBackend::Body::take_express() noexcept {
   } while (!express_lanes_.empty() && work < kExpressWork);
 }
 
-/// Goes on with a lane's next batch; false if the budget ended before it was complete.
+/// Stages the next batch of a lane; false if the budget ended first.
 bool UntypedBackend::Body::stage(std::uint32_t lane, std::uint32_t& budget) noexcept {
-  // a dead owner is dealt with before the first batch of its successor
+  // the death of an owner is handled before the first batch of its successor
   if (staging.is_between_batches(lane)) mourn(lane, lanes[lane].dead_predecessor());
   return staging.go_on(lane, budget);
 }
@@ -197,7 +201,7 @@ void UntypedBackend::Body::spend(const Effort& effort) noexcept {
   share_.requests -= effort.requests;
 }
 
-/// A batch whose turn it is: takes it, puts it off to its iteration, or rejects it.
+/// Takes a batch, schedules it for its iteration, or rejects it.
 void UntypedBackend::Body::accept(const StagedBatch& sent) noexcept {
   break_silence(sent.lane);
   if (!suits_halt(sent)) return;
@@ -206,7 +210,8 @@ void UntypedBackend::Body::accept(const StagedBatch& sent) noexcept {
   const bool is_for_later = sent.at > current;
   StagedBatch due = sent;
   if (due.at < 0) due.at = current;
-  // who may command is decided when a batch acts; its burst acts now
+  // Control is checked when a batch is taken. The burst of a scheduled batch starts now, so it is
+  // checked now as well.
   if (!is_for_later || bursts) {
     if (!admit(due)) return;
   } else if (stale_ == Stale::purge && is_of_dead(due)) {
@@ -228,20 +233,20 @@ void UntypedBackend::Body::accept(const StagedBatch& sent) noexcept {
 void UntypedBackend::Body::take(const StagedBatch& sent) noexcept {
   O80_COUNT(batch_taken);
   taking_owner_ = sent.had_left ? 0 : sent.incarnation;
-  // the count of tickets may have been put back since the batch was staged: a purge would end what
-  // is sent from now on
+  // if the ticket counter was reset since the batch was staged, a purge with the old ticket would
+  // end batches that are sent from now on
   auto* record = reinterpret_cast<BatchRecord*>(pool.bytes(sent.batch));
   record->ticket = lanes.drawn_at_most(sent.ticket);
   controller.take(sent.lane, sent.batch, *this);
 }
 
-/// Whether a batch may be taken in this iteration; else it ends as rejected.
+/// True if a batch may be taken in this iteration; otherwise ends it.
 bool UntypedBackend::Body::admit(const StagedBatch& sent) noexcept {
   if (!suits_halt(sent) || ends_for_silence(sent)) return false;
   watch_holder();
   const std::uint64_t sender = sent.had_left ? 0 : sent.incarnation;
   const bool is_holders = holder_ == sent.lane && holder_incarnation_ == sender;
-  // control is about commands: whoever may halt may resume
+  // control covers commands only: any commander may resume
   const bool is_free = holder_ == kNobody || controller.effort(sent.batch).resumes;
   if (!is_free && !is_holders) return reject(sent, Reason::exclusive, holder_);
   if (sent.at < current && !sent.late_now) return reject(sent, Reason::late);

@@ -30,17 +30,18 @@
 namespace o80 {
 
 inline constexpr std::uint32_t kNobody = 0xFFFFFFFF;
-/// What an iteration spends on batches: one for each block copied or checked, more for each step of
-/// taking a batch. The last batch taken may go beyond.
+/// Budget of an iteration for batches: 1 for each block copied or checked, more for each step of
+/// taking a batch. The last batch taken may exceed it.
 inline constexpr std::uint32_t kWorkPerIteration = 1024;
-// of the lanes whose turn it is not, so that their purges are reached; for each lane, for all
+// budget for staging ahead, so that purges behind other batches are found: of a lane, of all lanes
 inline constexpr std::uint32_t kWorkAhead = 64;
 inline constexpr std::uint32_t kWorkAheadOfAll = 512;
-/// Express batches: one of each lane is taken in an iteration, further ones up to this work.
+/// Budget for express batches; in each iteration every lane may have one taken in any case.
 inline constexpr std::uint32_t kExpressWork = 512;
 inline constexpr std::int64_t kUntilEnded = -1;
 
-/// The parts of a backend, and the order in which batches reach the controller.
+/// Implementation of UntypedBackend: its parts, and the order in which batches reach the
+/// controller.
 class UntypedBackend::Body final : public StatusSink, public BatchHandler {
  public:
   Body(Schema&& given, const BackendOptions& options, RequestServer* server);
@@ -48,7 +49,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   Body& operator=(const Body&) = delete;
   virtual ~Body() = default;
 
-  // BatchHandler: what a batch can ask of the backend itself
+  // BatchHandler: requests and orders of a batch to the backend itself
   Iteration iteration() const noexcept override { return current; }
   Outcome request(std::uint32_t lane, CommandId id, BlockIndex record, std::uint32_t index,
                   Cursor payload) noexcept override;
@@ -94,8 +95,8 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   Timing timing;
   std::atomic<bool> stop{false};
   std::array<char, 248> failure{};
-  bool unreadable = false;  // the robot could not begin afresh
-  Iteration current = 0;    // under way, or about to be
+  bool unreadable = false;  // a fresh start failed
+  Iteration current = 0;    // the current iteration; between two iterations, the next one
 
  private:
   // batches => controller
@@ -137,7 +138,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   void tell_ended_requests(bool fresh) noexcept;
   void drop_running(const Outcome& outcome) noexcept;
 
-  // what the helper thread saw
+  // deaths and silence of commanders
   void look_at_lives() noexcept;
   void mourn(std::uint32_t lane, std::uint64_t incarnation) noexcept;
   void watch_holder() noexcept;
@@ -160,42 +161,43 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   ForkGuard guard_;
   RequestServer* server_;
   std::vector<LaneLife> lives_;
-  std::vector<std::uint64_t> mourned_;  // last owner of each lane whose death was dealt with
-  std::vector<std::uint64_t> row_;      // 8-byte words: the row under way
+  std::vector<std::uint64_t> mourned_;  // of each lane: last incarnation whose death was handled
+  std::vector<std::uint64_t> row_;      // 8-byte words: the current row
   std::vector<std::byte> payload_;
   std::vector<std::uint64_t> fresh_desired_;
   Stale stale_;
   std::int64_t silence_;              // [iterations], 0: no watchdog
-  std::vector<Iteration> last_life_;  // of each lane
+  std::vector<Iteration> last_life_;  // of each lane: last sign of life of its owner
   std::uint32_t seen_changes_ = 0;
   std::uint32_t seen_rounds_ = 0;
-  bool begun_ = false;      // row 0 is out
-  bool under_way_ = false;  // from step to publish: what ends now ends in this iteration
-  bool stepping_ = false;   // what the controller says now is told when the row is out
+  bool begun_ = false;      // row 0 is published
+  bool under_way_ = false;  // true from step to publish
+  bool stepping_ = false;   // ends of commands are reported after the row is published
   std::vector<StatusChange> untold_;
 
-  // what is left of this iteration's share of work
+  // the rest of this iteration's budget
   struct Share {
     std::uint32_t work = kWorkPerIteration;
     std::uint32_t requests = kMostRequests;
   };
   Share share_;
-  std::uint32_t ahead_from_ = 0;              // lane that is staged ahead first
-  std::vector<std::uint32_t> express_lanes_;  // in the order of their tickets
+  std::uint32_t ahead_from_ = 0;              // last lane that was staged ahead
+  std::vector<std::uint32_t> express_lanes_;  // by ticket
 
   std::uint32_t holder_ = kNobody;  // lane with exclusive control
   std::uint64_t holder_incarnation_ = 0;
-  std::uint64_t taking_owner_ = 0;  // who sent the batch that is being taken
+  std::uint64_t taking_owner_ = 0;  // incarnation that sent the batch being taken
 
-  // the text of the last halt that this process asked for, for each cause; 0: none since a resume
+  // for each cause: hash of the text of the last halt that this process requested; 0: none since
+  // a resume
   std::array<std::atomic<std::uint64_t>, kHaltCauses> own_halts_{};
-  std::uint64_t halted_below_ = 0;  // tickets: what was sent before the last halt
-  std::uint32_t shown_acts_ = 0;
-  bool reason_missing_ = false;  // of the halt that acts: its asker has not written it
+  std::uint64_t halted_below_ = 0;  // batches with lower tickets were sent before the last halt
+  std::uint32_t shown_acts_ = 0;    // as in Counters::acts
+  bool reason_missing_ = false;     // the requester of the halt has not written its reason yet
   ErrorWatch errors_;
   OverrunLimit overruns_;
-  bool stopping_ = false;       // brakes before its end
-  bool driver_halted_ = false;  // the driver was told that a halt begins
+  bool stopping_ = false;       // braking before an end in order
+  bool driver_halted_ = false;  // the driver's halt() was called
 
   std::int64_t burst_left_ = 0;  // iterations, or kUntilEnded
   std::uint32_t burst_lane_ = kNobody;

@@ -1,5 +1,5 @@
-// How a backend halts and resumes. A halt is a word in shared memory (memory/halt_word.hpp) that
-// the loop looks at in each step; here is what follows from it.
+// How a backend halts and resumes. The loop checks the words of memory/halt_word.hpp in each step.
+// See ARCHITECTURE.md, Halts.
 
 #include <algorithm>
 
@@ -9,9 +9,9 @@
 namespace o80 {
 
 namespace {
-constexpr std::uint32_t kScheduledPerIteration = 256;  // batches that end before they are due
+constexpr std::uint32_t kScheduledPerIteration = 256;  // scheduled batches that a halt ends
 
-/// Tells texts apart (FNV-1a); never 0.
+/// Hash of a text (FNV-1a); never 0.
 std::uint64_t fingerprint(std::string_view text) noexcept {
   std::uint64_t print = 0xCBF29CE484222325;
   for (const char c : text) print = (print ^ static_cast<unsigned char>(c)) * 0x100000001B3;
@@ -19,8 +19,9 @@ std::uint64_t fingerprint(std::string_view text) noexcept {
 }
 }  // namespace
 
-/// Asks for a halt in the backend's own name. A driver may repeat a halt with each reading: the
-/// same text again is the same halt, so that `resume` can name it. Another text is another halt.
+/// Requests a halt on behalf of this process. A driver may repeat a halt with each reading: the
+/// same text again is the same halt and keeps its number for `resume`; another text is another
+/// halt.
 void UntypedBackend::Body::ask_to_halt(HaltCause cause, std::string_view text) noexcept {
   std::atomic<std::uint64_t>& last = own_halts_[static_cast<std::size_t>(cause)];
   const std::uint64_t print = fingerprint(text);
@@ -37,7 +38,8 @@ void UntypedBackend::Body::watch_halt() noexcept {
   end_scheduled();
 }
 
-/// What a successor must know if this backend is killed now; before the desired states are written.
+/// Updates Counters::acts before the desired states are written. If this backend is killed while
+/// commands act, its successor starts halted.
 void UntypedBackend::Body::show_acts() noexcept {
   if (schema.head.bursting != 0) return;
   const std::uint64_t* active = controller.active_mask();
@@ -50,7 +52,7 @@ void UntypedBackend::Body::show_acts() noexcept {
   segment.view().counters().acts.store(acts, std::memory_order_relaxed);
 }
 
-/// What the row that was published shows: a robot that is not where it should be.
+/// Halts if the published row exceeds an error limit.
 void UntypedBackend::Body::watch_errors() noexcept {
   if (halts.acts()) return;
   const auto excess = errors_.find(controller.desired(), row() + layout.observed);
@@ -60,11 +62,11 @@ void UntypedBackend::Body::watch_errors() noexcept {
   ask_to_halt(HaltCause::error, text.view());
 }
 
-/// An end in order: every command ends, every actuator brakes.
+/// One iteration before an end in order: commands have ended, actuators brake.
 Step UntypedBackend::Body::brake() noexcept {
   if (!stopping_) {
     stopping_ = true;
-    if (unreadable) return Step::ended;  // where it is nobody knows
+    if (unreadable) return Step::ended;  // the position is unknown, so the robot cannot brake
     const bool acted = acts();
     controller.purge(kEveryActuator, current, Reason::stopped);
     drop_running({Status::purged, Reason::stopped});
@@ -89,23 +91,24 @@ void UntypedBackend::Body::set_timing(const Timing& now) noexcept {
   ask_to_halt(HaltCause::overruns, text.view());
 }
 
-/// All that was sent until now ends, every actuator brakes.
+/// Ends all commands and makes every actuator brake.
 void UntypedBackend::Body::begin_halt() noexcept {
   reason_missing_ = !halts.show(current);
-  // what has drawn its ticket and not been committed yet ends when it comes
+  // batches with a lower ticket that are committed later were sent before the halt: they end as
+  // halted when they are taken
   halted_below_ = segment.view().bell().tickets.load(std::memory_order_seq_cst);  // sync tickets
   schedule.set_aside();
   controller.halt(current);
   drop_running({Status::halted, Reason::halted});
   stop_burst(BurstEnd::cut);
   if (!driver_halted_ && server_ != nullptr && !server_->halt()) {
-    fail("the robot failed when it was told that a halt begins");
+    fail("the robot failed in the call that begins a halt");
   }
   driver_halted_ = true;
 }
 
-/// Batches that wait for a later iteration end now, if a halt or the watchdog wants it: a bounded
-/// number in each iteration.
+/// Checks the scheduled batches that a halt or the watchdog has set aside, a bounded number in each
+/// iteration: ends them or schedules them again.
 void UntypedBackend::Body::end_scheduled() noexcept {
   for (std::uint32_t i = 0; i < kScheduledPerIteration && schedule.has_aside(); ++i) {
     const StagedBatch sent = schedule.take_aside();
@@ -119,15 +122,15 @@ void UntypedBackend::Body::end_scheduled() noexcept {
   }
 }
 
-/// Whether a batch ends because its sender has fallen silent since.
+/// Ends a scheduled batch whose sender has become silent since; false if it has not.
 bool UntypedBackend::Body::ends_for_silence(const StagedBatch& sent) noexcept {
   if (!sent.silent) return false;
   controller.reject(sent.lane, sent.batch, Reason::silence, 0, current, Status::purged);
   return true;
 }
 
-/// Whether a batch may be taken for all that halts say; else it ends. Batches that were sent before
-/// a halt end as halted, whenever they are seen; those that come while it acts are rejected.
+/// True if halts permit the batch. Otherwise ends it: as halted if it was sent before the halt, as
+/// rejected if it was sent while the halt is in force.
 bool UntypedBackend::Body::suits_halt(const StagedBatch& sent) noexcept {
   const bool before = sent.ticket < halted_below_;
   if ((!before && !halts.acts()) || !controller.effort(sent.batch).moves) return true;
@@ -146,17 +149,18 @@ Outcome UntypedBackend::Body::resume(std::uint32_t lane, CommandId id,
   ShortText<200> why;
   const std::uint64_t acting = halts.halt().number;
   if (number < acting) {
-    why.add("halt ").add(acting).add(" came after it: look at it, then resume that one");
+    why.add("halt ").add(acting).add(" came after it: read its reason, then resume halt ");
+    why.add(acting);
     return refuse(why.view());
   }
   if (number > acting) {
-    why.add("there is no halt ").add(number).add(": halt ").add(acting).add(" acts");
+    why.add("there is no halt ").add(number).add(": halt ").add(acting).add(" is in force");
     return refuse(why.view());
   }
   if (controller.braking() || schedule.has_aside()) {
     return refuse(schema.head.bursting == 0
                       ? "the robot still brakes: resume when it has come to rest"
-                      : "the robot still brakes: let it come to rest in a burst, then resume");
+                      : "the robot still brakes: burst until it is at rest, then resume");
   }
 
   ShortText<248> unread;
@@ -164,7 +168,7 @@ Outcome UntypedBackend::Body::resume(std::uint32_t lane, CommandId id,
     return refuse(unread.view(), Reason::driver);
   }
 
-  // the robot may refuse; a halt that comes meanwhile wins
+  // the robot may refuse; a halt requested meanwhile stays
   if (server_ != nullptr) {
     Served served = server_->resume();
     if (served.kind == Served::Kind::running) {
@@ -176,7 +180,9 @@ Outcome UntypedBackend::Body::resume(std::uint32_t lane, CommandId id,
     }
   }
   driver_halted_ = false;
-  if (!halts.clear()) return refuse("another halt came at the same moment");
+  if (!halts.clear()) {
+    return refuse("another halt was requested meanwhile: read its reason, then resume that one");
+  }
   for (auto& last : own_halts_) last.store(0, std::memory_order_relaxed);
   reason_missing_ = false;
   if (server_ != nullptr) return start_afresh(lane, id);

@@ -1,4 +1,5 @@
-// What a backend does about frontends that die or fall silent.
+// How a backend handles frontends that die or become silent.
+// See ARCHITECTURE.md, Lanes and their owners; Halts.
 
 #include <array>
 #include <iterator>
@@ -12,7 +13,7 @@ namespace o80 {
 void UntypedBackend::Body::stale(std::uint32_t lane, Reason reason) noexcept {
   if (stale_ == Stale::purge) controller.purge_lane(lane, kEveryActuator, current, reason);
   const bool silent = reason == Reason::silence;
-  // what a dead one scheduled is known by its lane when it is due
+  // scheduled batches of a dead owner are rejected when they are due (is_of_dead)
   if (silent) schedule.set_aside_of_silent(lane);
   const std::string_view why = silent ? "a commanding frontend showed no life for longer than is "
                                         "allowed: see silence and stale"
@@ -31,7 +32,7 @@ void UntypedBackend::Body::stale(std::uint32_t lane, Reason reason) noexcept {
 void UntypedBackend::Body::look_at_lives() noexcept {
   if (granted()) mourn(burst_lane_, lanes[burst_lane_].dead_predecessor());
   if (granted() && is_called_off()) stop_burst();
-  // the bell stands where every frontend writes: whatever it says, lanes are looked at now and then
+  // any frontend can corrupt the bell, so all lanes are scanned after each round of the helper
   const std::uint32_t rounds = liveness.rounds();
   if (rounds != seen_rounds_) lanes.look_again();
   seen_rounds_ = rounds;
@@ -47,17 +48,17 @@ void UntypedBackend::Body::look_at_lives() noexcept {
   }
 }
 
-/// Does what is to be done when an owner of a lane has died, once.
+/// Handles the death of a lane's owner, once for each incarnation.
 void UntypedBackend::Body::mourn(std::uint32_t lane, std::uint64_t incarnation) noexcept {
   if (incarnation <= mourned_[lane]) return;
   mourned_[lane] = incarnation;
   stale(lane, Reason::dead_frontend);
   if (granted() && burst_lane_ == lane && burst_incarnation_ <= incarnation) stop_burst();
-  // it may have died before it rang
+  // it may have died between its commit and the bell
   lanes.look_again();
 }
 
-/// Control falls with its holder: closed, dead, or its lane in other hands.
+/// Releases control if its holder has closed, has died, or no longer owns the lane.
 void UntypedBackend::Body::watch_holder() noexcept {
   if (holder_ == kNobody) return;
   const LaneLife life = liveness.lane(holder_);
@@ -68,18 +69,18 @@ void UntypedBackend::Body::watch_holder() noexcept {
   }
 }
 
-/// The owner of a lane has sent something.
+/// Counts a batch as a sign of life of its sender.
 void UntypedBackend::Body::break_silence(std::uint32_t lane) noexcept {
   last_life_[lane] = current;
 }
 
-/// The watchdog: applies the policy to commanders that showed no life for too long while something
-/// of theirs acts.
+/// The watchdog: applies the policy to commanders that gave no sign of life for too long while they
+/// hold control or one of their commands acts.
 void UntypedBackend::Body::watch_silence() noexcept {
   if (silence_ == 0 || halts.acts()) return;
   for (std::uint32_t i = 0; i < lanes.size(); ++i) {
     if (current - last_life_[i] <= silence_) continue;
-    // it may have shown life without a batch; nobody lives in the future
+    // a sign of life without a batch; clamped, because a frontend may write any number
     last_life_[i] = std::max(last_life_[i], std::min(lanes[i].life(), current - 1));
     if (current - last_life_[i] <= silence_) continue;
     const bool bursts = granted() && burst_lane_ == i;

@@ -11,7 +11,8 @@ Outcome UntypedBackend::Body::request(std::uint32_t lane, CommandId id, BlockInd
   const std::size_t size = schema.types[schema.requests[index].type].size;
   payload.read(payload_.data(), size);
   if (server_ == nullptr) {
-    return reject_request(lane, id, "nobody serves requests in this backend");
+    return reject_request(lane, id,
+                          "this backend serves no requests: it was made without a RequestServer");
   }
   ShortText<248> why;
   if (!running.may_begin(index, why)) return reject_request(lane, id, why.view());
@@ -40,7 +41,7 @@ Outcome UntypedBackend::Body::reject_request(std::uint32_t lane, CommandId id,
   return {Status::rejected, Reason::driver, 0};
 }
 
-/// Reads the robot anew and publishes a row of its own.
+/// Makes a fresh start: reads the robot again and publishes the reading as a row of its own.
 Outcome UntypedBackend::Body::start_afresh(std::uint32_t lane, CommandId id) noexcept {
   auto* desired = reinterpret_cast<std::byte*>(fresh_desired_.data());
   FreshReading reading{row() + layout.observed, row() + layout.extended, desired};
@@ -60,8 +61,7 @@ Outcome UntypedBackend::Body::start_afresh(std::uint32_t lane, CommandId id) noe
   return {};
 }
 
-// ------------------------------------------------------------------------------ over several
-// iterations
+// ------------------------------------------------------------------------------ running
 
 void UntypedBackend::Body::end_running(RunningRequests::Entry& entry,
                                        const Outcome& outcome) noexcept {
@@ -70,8 +70,8 @@ void UntypedBackend::Body::end_running(RunningRequests::Entry& entry,
   controller.end(record, outcome, current);
 }
 
-/// Requests that the driver has ended, when the row that shows it is out. Those that want a fresh
-/// start end with the row of that.
+/// Reports requests that the driver has ended, after the row with their end is published. A request
+/// that needs a fresh start is reported with the row of that.
 void UntypedBackend::Body::tell_ended_requests(bool fresh) noexcept {
   running.each([&](RunningRequests::Entry& entry) {
     if (!entry.end) return;
@@ -92,18 +92,19 @@ void UntypedBackend::Body::tell_ended_requests(bool fresh) noexcept {
   });
 }
 
-/// A request that has ended wants a fresh start: it comes before anything else is taken.
+/// Makes the fresh start that an ended request needs, before any batch is taken.
 void UntypedBackend::Body::start_afresh_after_request() noexcept {
   const RunningRequests::Entry* entry = running.wanting_fresh_start();
   if (entry == nullptr) return;
   const Outcome outcome = start_afresh(entry->shown.lane, entry->shown.id);
-  if (outcome.status == Status::completed) return;  // told with the fresh row
+  if (outcome.status == Status::completed) return;  // reported with the fresh row
   running.each([&](RunningRequests::Entry& each) {
     if (&each == entry) end_running(each, outcome);
   });
 }
 
-/// Ends what runs without asking the driver; at a halt, what is served in halts goes on.
+/// Ends running requests without the driver. At a halt, requests that are served during halts
+/// continue.
 void UntypedBackend::Body::drop_running(const Outcome& outcome) noexcept {
   const bool is_halt = outcome.status == Status::halted;
   running.each([&](RunningRequests::Entry& entry) {

@@ -12,7 +12,7 @@
 
 namespace o80 {
 
-/// End statuses that were seen, so that they outlive the segment's memory of them.
+/// End statuses that were read once; kept because the segment reuses their slots.
 struct Batch::Kept {
   std::mutex mutex;
   std::unordered_map<CommandId, Handle> ended;
@@ -27,7 +27,7 @@ Batch::Batch(std::shared_ptr<Link> link, Sent sent)
 
 namespace {
 
-/// Who holds a lane, in words.
+/// Describes the owner of a lane.
 std::string owner_of(const Link& link, std::uint32_t lane) {
   const SegmentView& view = link.segment.view();
   if (lane >= view.shape.lanes) return "another frontend";
@@ -41,7 +41,7 @@ bool is_rejected(const LaneSender& lane, CommandId batch) noexcept {
          static_cast<Status>(answer.word.status) == Status::rejected;
 }
 
-/// Which limit kept a command from its target; as Limited::packed() has it.
+/// Describes the limit that kept a command from its target; `packed` as in Limited::packed().
 std::string limited_by(std::uint8_t packed) {
   constexpr const char* kLimits[] = {
       "a limit",       "its minimum", "its maximum", "its speed limit", "its acceleration limit",
@@ -56,19 +56,20 @@ std::string limited_by(std::uint8_t packed) {
 std::string words_for(const Link& link, const Handle& handle, std::uint8_t aux) {
   switch (handle.reason) {
     case Reason::late:
-      return "it came after the iteration it was meant for";
+      return "it came after the iteration for which it was sent";
     case Reason::exclusive:
       return owner_of(link, aux) + " has exclusive control";
     case Reason::invalid:
-      return "the backend could not read it";
+      return "the record was invalid: it was built by another version of o80, or the lane was "
+             "corrupted";
     case Reason::limits:
       return limited_by(aux);
     case Reason::fresh_start:
-      return "the robot started afresh";
+      return "the robot made a fresh start (reset, restore or resume)";
     case Reason::dead_frontend:
       return "its frontend died";
     case Reason::silence:
-      return "its frontend showed no life for longer than the watchdog (silence) allows";
+      return "its frontend gave no sign of life for longer than the watchdog (silence) allows";
     case Reason::stopped:
       return "the backend stopped";
     case Reason::full:
@@ -166,11 +167,13 @@ void Batch::wait(Timeout timeout, const KeepWaiting& keep_waiting) const {
   const auto ended = [&] { return is_end(ask(id_ + 1).status); };
   if (lane_->wait_until(ended, deadline, guarded) == Waited::timed_out) {
     throw TimeoutError("the batch sent to '" + link_->segment.name() +
-                       "' has not ended in time: give more time, purge, or ask its handles");
+                       "' has not ended in time: look at its handles, pass a longer timeout, or "
+                       "purge");
   }
   const Handle last = ask(id_ + 1);
   if (last.iteration <= link_->history.published()) return;
-  // a bursting backend may stand still before that row; one that ended never makes it, and says so
+  // a bursting backend may wait for a burst before that row; a backend that has ended never
+  // publishes it, and the wait for the row raises that
   const auto is_cut = [](const Handle& handle) { return handle.reason == Reason::stopped; };
   const bool paced = link_->description->schema.head.bursting == 0;
   if ((last.status == Status::completed && paced) || is_cut(last) ||
@@ -201,16 +204,16 @@ Iteration wait_for_burst(const Link& link, LaneSender& lane, CommandId id, Timeo
   if (lane.wait_until(over, Deadline(timeout), link.guarded(keep_waiting), quiet) ==
       Waited::timed_out) {
     throw TimeoutError("the burst of '" + link.segment.name() +
-                       "' was not done in time: give more time, or see whether another "
-                       "frontend's burst comes before it");
+                       "' was not done in time: pass a longer timeout, or see whether the burst of "
+                       "another frontend comes first");
   }
   if (answer.known == LaneSender::Known::forgotten) {
     throw RowOverwritten("this burst of '" + link.segment.name() +
-                         "' is no longer remembered: wait for a burst before sending many more");
+                         "' was overwritten by later bursts: wait for it before sending many more");
   }
   if (answer.known != LaneSender::Known::yes) return -1;
   if (answer.end == BurstEnd::cut) {
-    // it ended before the iteration in which the halt began
+    // the halt began in the iteration after its last row
     const std::string halt = link.halt_text(answer.row + 1);
     throw BackendHalted("the burst of '" + link.segment.name() + "' ended in iteration " +
                         std::to_string(answer.row) + ": " + (halt.empty() ? "it was cut" : halt));
@@ -219,7 +222,7 @@ Iteration wait_for_burst(const Link& link, LaneSender& lane, CommandId id, Timeo
 }
 
 void throw_if_halted(const Link& link, const Batch& batch) {
-  // who was never halted is not asked for each handle
+  // skip the handles if the backend was never halted
   if (link.segment.view().counters().halt.number.load(std::memory_order_relaxed) == 0) return;
   for (const Handle& handle : batch.handles()) {
     if (handle.status != Status::halted) continue;
@@ -240,7 +243,7 @@ Iteration Burst::wait_done(Timeout timeout, const KeepWaiting& keep_waiting) con
 }
 
 void Burst::throw_if_failed() const {
-  // what is done is done, whatever became of the backend
+  // a burst that is done does not fail, even if the backend has gone since
   const bool gone = link_->segment.gone();
   if (done()) {
     if (wait_done(std::chrono::nanoseconds(0)) < 0) throw_rejected(*link_, "burst", batch_);
@@ -258,7 +261,7 @@ void read_last_row(const Link& link, Iteration row, UntypedObservation& observat
 }
 
 UntypedObservation Burst::wait(Timeout timeout, const KeepWaiting& keep_waiting) const {
-  UntypedObservation observation(link_->description);  // made while the backend works
+  UntypedObservation observation(link_->description);  // allocated while the backend works
   const Iteration row = wait_done(timeout, keep_waiting);
   if (row < 0) throw_rejected(*link_, "burst", batch_);
   read_last_row(*link_, row, observation);

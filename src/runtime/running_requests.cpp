@@ -50,7 +50,7 @@ void RunningRequests::show(Entry& entry, std::string_view progress) noexcept {
 void RunningRequests::show_progress(std::uint32_t request, std::string_view progress) noexcept {
   Entry* entry = find(request);
   if (entry == nullptr) return;
-  // a driver may repeat it with each reading
+  // a driver may repeat the same text with each reading
   if (entry->shown.progress_text() == progress.substr(0, entry->shown.progress.size() - 1)) return;
   show(*entry, progress);
 }

@@ -14,8 +14,8 @@
 
 namespace o80 {
 
-/// The requests that the driver answered with `running` and has not ended: one of a kind at most,
-/// kMostRunning in all. Their progress is shown in the segment.
+/// The requests that the driver answered with `running` and has not ended: at most one of a kind
+/// and kMostRunning in all. The segment shows their progress.
 ///
 /// Writer:   the backend's thread.
 /// Realtime: everything but construction.
@@ -25,38 +25,38 @@ class RunningRequests {
     bool runs = false;
     BlockIndex record = kNoBlock;
     RunningRequest shown;
-    std::optional<Served> end;  // what the driver said, until it is told
+    std::optional<Served> end;  // set by the driver, not yet reported to the sender
   };
 
   RunningRequests(const Schema& schema, const SegmentView& view) : schema_(schema), view_(view) {}
 
-  /// False if another of its kind runs, or too many do; `why` says which.
+  /// False if a request of the same kind runs, or kMostRunning run; `why` gets the reason.
   bool may_begin(std::uint32_t request, ShortText<248>& why) const noexcept;
   void begin(std::uint32_t request, std::uint32_t lane, std::uint64_t id, BlockIndex record,
              Iteration now, std::string_view progress) noexcept;
   bool runs(std::uint32_t request) const noexcept { return find(request) != nullptr; }
   void show_progress(std::uint32_t request, std::string_view progress) noexcept;
-  /// Notes how a request ended, for the row under way. Of one that does not run: nothing.
+  /// Records how a request ended in the current row. No effect if it does not run.
   void note_end(std::uint32_t request, const Served& how) noexcept;
-  /// The place is free again.
+  /// Frees the entry.
   void forget(Entry& entry) noexcept;
 
-  /// Calls `visit(Entry&)` for each that runs; it may be forgotten there.
+  /// Calls `visit(Entry&)` for each running request; `visit` may call forget().
   template <class Visit>
   void each(Visit&& visit) noexcept {
     for (Entry& entry : entries_) {
       if (entry.runs) visit(entry);
     }
   }
-  /// One that has ended and wants a fresh start; null if there is none.
+  /// A request that has ended and needs a fresh start; null if there is none.
   const Entry* wanting_fresh_start() const noexcept;
-  /// Goes on while the backend is halted.
+  /// True if the request continues during a halt.
   bool is_while_halted(const Entry& entry) const noexcept {
     return schema_.requests[entry.shown.request].while_halted != 0;
   }
-  /// One runs that a halt would end.
+  /// True if a request runs that a halt would end.
   bool moves() const noexcept;
-  /// The same, sent by this lane.
+  /// The same for requests of one lane.
   bool moves(std::uint32_t lane) const noexcept;
 
  private:
