@@ -15,9 +15,10 @@ void UntypedBackend::Body::stale(std::uint32_t lane, Reason reason) noexcept {
   const bool silent = reason == Reason::silence;
   // scheduled batches of a dead owner are rejected when they are due (is_of_dead)
   if (silent) schedule.set_aside_of_silent(lane);
-  const std::string_view why = silent ? "a commanding frontend showed no life for longer than is "
-                                        "allowed: see silence and stale"
-                                      : "a commanding frontend died";
+  const std::string_view why = silent
+                                   ? "a commanding frontend gave no sign of life for longer than "
+                                     "the watchdog (silence) allows"
+                                   : "a commanding frontend died";
   if (stale_ == Stale::stop) fail(why);
   if (stale_ == Stale::halt) {
     ShortText<248> text;

@@ -22,7 +22,7 @@ UntypedFrontend::UntypedFrontend(const std::string& segment, std::shared_ptr<Inl
 
 UntypedFrontend::UntypedFrontend(UntypedFrontend&&) noexcept = default;
 UntypedFrontend& UntypedFrontend::operator=(UntypedFrontend&& other) noexcept {
-  // what was here closes with `other`
+  // the destructor of `other` closes the former link
   std::swap(link_, other.link_);
   return *this;
 }
@@ -77,7 +77,8 @@ void UntypedFrontend::latest(std::byte* row) const {
   link_->check_usable();
   if (link_->history.latest(row) < 0) {
     if (link_->history.is_damaged()) throw damaged();
-    throw Error("'" + segment() + "' has no row yet");
+    throw Error("'" + segment() +
+                "' has published no row yet, its robot is still starting: use wait_for(0)");
   }
 }
 
@@ -94,7 +95,7 @@ SegmentError UntypedFrontend::damaged() const {
 
 void UntypedFrontend::missing(Iteration k) const {
   throw RowOverwritten("row " + std::to_string(k) + " of '" + segment() +
-                       "' is no longer there: the oldest one is " +
+                       "' was overwritten: the oldest one is " +
                        std::to_string(link_->history.oldest()) + " (the history keeps " +
                        std::to_string(link_->history.rows()) + " rows)");
 }
@@ -107,9 +108,9 @@ void UntypedFrontend::wait_for(Iteration k, std::byte* row, Timeout timeout,
     const Deadline deadline(timeout);
     if (link_->rows.wait_for_row(k, deadline, link_->guarded(keep_waiting)) == Waited::timed_out) {
       throw TimeoutError("row " + std::to_string(k) + " of '" + segment() +
-                         "' was not there in time: it is at row " +
+                         "' was not published in time: it is at row " +
                          std::to_string(link_->history.published()) +
-                         (bursting() ? ", and stands still until it is burst" : ""));
+                         (bursting() ? " and waits for a burst" : ""));
     }
   }
   if (!link_->history.read(k, row)) missing(k);
@@ -154,7 +155,7 @@ std::int64_t UntypedFrontend::wait_for_next(Iteration& position, std::byte* row,
     if (link_->rows.wait_for_row(wanted, deadline, link_->guarded(keep_waiting)) ==
         Waited::timed_out) {
       throw TimeoutError("row " + std::to_string(wanted) + " of '" + segment() +
-                         "' was not there in time");
+                         "' was not published in time");
     }
   }
   Iteration next = wanted;
@@ -168,10 +169,10 @@ std::int64_t UntypedFrontend::wait_for_next(Iteration& position, std::byte* row,
 
 void UntypedFrontend::close() {
   link_->closed.store(true, std::memory_order_relaxed);
-  // a thread that does not exist here may hold the lock, and the lane is the parent's
+  // a forked child: a thread of the parent may hold the lock, and the lane belongs to the parent
   if (link_->segment.forked()) return;
   const std::scoped_lock lock(link_->sending);
-  // batches that are still asked keep their statuses, not the lane
+  // batches still read their statuses, but the lane is released
   if (link_->lane_) link_->lane_->give_back();
   link_->lane_.reset();
   link_->builder.clear();

@@ -1,4 +1,4 @@
-// How a frontend asks for iterations, of one backend or of several.
+// How a frontend requests iterations, of one backend or of several. See ARCHITECTURE.md, Bursting.
 
 #include <algorithm>
 #include <limits>
@@ -12,7 +12,7 @@ namespace o80 {
 
 namespace {
 
-/// Cancels what is left of a burst whose caller leaves without its last row.
+/// Cancels the rest of a burst if its caller leaves without the last row.
 class CancelUnlessDone {
  public:
   CancelUnlessDone(LaneSender* lane, CommandId id) : lane_(lane), id_(id) {}
@@ -62,11 +62,11 @@ void UntypedFrontend::refuse_burst(std::int64_t iterations) const {
   link_->check_usable();
   if (!bursting()) {
     throw NotBursting("'" + segment() +
-                      "' runs by its own clock and cannot be burst: start it with bursting");
+                      "' runs in real time and cannot be burst: start it with bursting");
   }
   if (iterations < 1) {
-    throw InvalidArgument("a burst of " + std::to_string(iterations) + " iterations of '" +
-                          segment() + "': at least 1 is needed");
+    throw InvalidArgument("the iterations of a burst of '" + segment() +
+                          "' must be at least 1, got " + std::to_string(iterations));
   }
 }
 
@@ -84,15 +84,14 @@ Burst UntypedFrontend::start_burst(std::int64_t iterations, const PulseOptions& 
 UntypedObservation UntypedFrontend::burst(std::int64_t iterations, Timeout timeout,
                                           const KeepWaiting& keep_waiting,
                                           const PulseOptions& options) {
-  // as start_burst(iterations).wait(timeout, keep_waiting), without what only a later question
-  // needs
+  // start_burst(iterations).wait(timeout, keep_waiting) without the allocations of a Burst
   const Sent sent = send_burst(iterations, options);
   CancelUnlessDone rest(sent.lane.get(), sent.id);
   UntypedObservation observation(link_->description);  // made while the backend works
   const Iteration row =
       wait_for_burst(*link_, *sent.lane, sent.id, timeout, keep_waiting, sent.quiet);
   rest.done();
-  link_->check_usable();  // its close ends a burst too
+  link_->check_usable();  // a close of this frontend ends its burst too
   if (row < 0) return Burst(link_, Batch(link_, sent)).wait(timeout, keep_waiting);  // says why
   read_last_row(*link_, row, observation);
   return observation;
@@ -124,7 +123,7 @@ Iteration UntypedFrontend::burst_rows(std::span<std::byte> rows, Timeout timeout
 
 // ------------------------------------------------------------------------------ groups
 
-/// Throws what start_burst would throw, and if the backend has gone, as far as can be known.
+/// Throws what start_burst would throw, or if the backend has gone, as far as it can be known now.
 void UntypedFrontend::refuse_unless_ready(std::int64_t iterations) {
   refuse_burst(iterations);
   const auto lock = link_->lock_to_send();
@@ -142,7 +141,7 @@ std::vector<Burst> start_bursts(std::span<const BurstMember> group) {
     frontend->refuse_unless_ready(iterations);
     if (!seen.insert(frontend->link_.get()).second) {
       throw InvalidArgument("the frontend of '" + frontend->segment() +
-                            "' is in the group twice: give each its iterations once");
+                            "' is in the group twice: give each frontend once");
     }
   }
   std::vector<Burst> bursts;
@@ -152,7 +151,7 @@ std::vector<Burst> start_bursts(std::span<const BurstMember> group) {
       bursts.push_back(frontend->start_burst(iterations));
     }
   } catch (...) {
-    // another thread has taken the room, or a backend has just gone
+    // another thread has used the free blocks, or a backend has just gone
     std::ranges::for_each(bursts, &Burst::cancel);
     throw;
   }
@@ -167,7 +166,7 @@ std::vector<UntypedObservation> wait_for(std::span<const Burst> bursts, Timeout 
                          deadline.left(std::numeric_limits<std::int64_t>::max())))
                    : Timeout();
   };
-  // a member may fail while an earlier one runs on
+  // a later member may fail during the wait for an earlier one
   const auto look_at_all = [&] { std::ranges::for_each(bursts, &Burst::throw_if_failed); };
   const KeepWaiting watch = [&] {
     look_at_all();
@@ -180,7 +179,7 @@ std::vector<UntypedObservation> wait_for(std::span<const Burst> bursts, Timeout 
       try {
         observations.push_back(burst.wait(left(), watch));
       } catch (const TimeoutError&) {
-        look_at_all();  // a failure says more
+        look_at_all();  // prefer a failure over the timeout
         throw;
       }
     }

@@ -18,15 +18,15 @@ Timeout left_of(const Deadline& deadline, Timeout timeout) {
 std::uint64_t UntypedFrontend::halt(std::string_view reason) {
   link_->check_usable();
   if (link_->segment.access() != Access::read_write) {
-    throw ReadOnly("'" + segment() +
-                   "' was attached to read only: attach again without it to halt");
+    throw ReadOnly("'" + segment() + "' was attached with read_only: attach without it to halt");
   }
   link_->segment.throw_if_gone();
   const std::uint64_t number =
       ask_for_halt(link_->segment.view(), HaltCause::frontend, own_process(), reason);
-  // a successor that has not inherited this halt has superseded the segment before
+  // A successor inherits this halt, or it had marked the segment as superseded before: then throw.
+  // See ARCHITECTURE.md, How a backend takes a name.
   link_->segment.throw_if_gone();
-  // an inline robot latches it now, unless a burst in this very thread is about to
+  // an inline robot begins the halt now, unless this thread is inside a burst, which does it
   std::shared_ptr<InlineRunner> runner;
   {
     const std::scoped_lock lock(link_->sending);
@@ -52,7 +52,7 @@ void UntypedFrontend::resume(std::uint64_t number, Timeout timeout,
     batch.wait(left_of(deadline, timeout), keep_waiting);
     const Handle handle = batch.handle(0);
     if (handle.status == Status::completed) return;
-    // at rest, the backend may still have to end what was scheduled before the halt
+    // at rest, the backend may still have scheduled batches to end
     const std::optional<Halt> acting = link_->halt();
     const bool is_early = !bursting() && handle.reason == Reason::halted && acting &&
                           acting->number == number && !deadline.over();
@@ -63,13 +63,13 @@ void UntypedFrontend::resume(std::uint64_t number, Timeout timeout,
   }
 }
 
-/// In real time: until the halt is latched and the robot has come to rest, as rows tell. Returns at
-/// once if another halt acts, or none: the backend knows what to say.
+/// In real time: waits until the rows show that the halt is in force and no actuator brakes.
+/// Returns at once if another halt, or none, is in force: the backend then answers with the reason.
 void UntypedFrontend::wait_for_rest(std::uint64_t number, const Deadline& deadline,
                                     const KeepWaiting& keep_waiting) {
   link_->check_usable();
   if (bursting()) return;
-  // rows may come faster than a wait for one of them looks around
+  // rows may come so fast that wait_for_row never calls keep_waiting: call it here
   const KeepWaiting goes_on = link_->guarded(keep_waiting);
   while (true) {
     const bool is_called_off = !goes_on();
@@ -84,8 +84,8 @@ void UntypedFrontend::wait_for_rest(std::uint64_t number, const Deadline& deadli
     }
     if (is_called_off || link_->rows.wait_for_row(next, deadline, goes_on) == Waited::timed_out) {
       throw TimeoutError("halt " + std::to_string(number) + " of '" + segment() + "' " +
-                         (is_latched ? "still brakes the robot" : "does not act yet") +
-                         ": give resume more time");
+                         (is_latched ? "still brakes the robot" : "is not in force yet") +
+                         ": pass a longer timeout to resume");
     }
   }
 }
@@ -117,7 +117,7 @@ std::uint64_t halt(const std::string& segment, std::string_view reason, Timeout 
         AttachedSegment::attach(segment, Access::read_write, deadline, options);
     const std::uint64_t number =
         ask_for_halt(attached.view(), HaltCause::frontend, own_process(), reason);
-    // its successor has the name now, or is about to
+    // a successor is taking the name: halt that one
     if (attached.life() == Life::superseded) continue;
     attached.throw_if_gone();
     return number;

@@ -1,4 +1,5 @@
-// What a frontend adds to a batch, and how it sends it.
+// How a frontend adds records to a batch and sends it.
+// See ARCHITECTURE.md, The life of a command.
 
 #include <algorithm>
 #include <limits>
@@ -49,7 +50,7 @@ void check_pace(const PaceSpec& pace, std::uint32_t rows) {
   }
 }
 
-/// Options that would say nothing, or say two things.
+/// Refuses options that have no effect or contradict each other.
 void check_options(const CommandOptions& options) {
   const bool goes_on = options.on_limit == OnLimit::go_on;
   if (goes_on && options.pace.pace != Pace::direct) {
@@ -153,7 +154,7 @@ std::uint32_t UntypedFrontend::add_commands(std::span<const std::uint32_t> actua
     states = states.subspan(state.size());
     masks = masks.subspan(mask.size());
   }
-  // they move in one way: smoothly if one of them does
+  // all members use one profile: minimum_jerk if one of them needs it
   for (BatchBuilder::Member& member : link_->members) member.head.profile = profile;
   if (link_->members.size() == 1) {
     const BatchBuilder::Member& only = link_->members.front();
@@ -162,7 +163,7 @@ std::uint32_t UntypedFrontend::add_commands(std::span<const std::uint32_t> actua
   return link_->builder.group(link_->members);
 }
 
-/// Checks a trajectory; its options, with the pace that follows from its times.
+/// Checks a trajectory; returns its options with the pace that follows from its times.
 CommandOptions UntypedFrontend::checked_trajectory(std::uint32_t actuator, std::uint32_t rows,
                                                    std::span<const std::byte> states,
                                                    const CommandOptions& options,
@@ -171,7 +172,7 @@ CommandOptions UntypedFrontend::checked_trajectory(std::uint32_t actuator, std::
   if (rows == 0) throw InvalidArgument("the trajectory has no row");
   link_->command_check.targets(index, states);
   CommandOptions paced = options;
-  // no trajectory is direct: its last state does not stay
+  // a trajectory always has a pace
   if (paced.pace.pace == Pace::direct) paced.pace = iterations(1);
   if (!times.empty()) {
     check_times(times, rows);
@@ -261,12 +262,12 @@ void UntypedFrontend::forget_added() {
 
 namespace {
 
-/// Whether a batch may stay in the lane for long.
+/// True if a batch may stay in the lane for long.
 bool does_stay(const BatchBuilder& builder, const BatchRecord& wanted) {
   return builder.has_commands() || wanted.at != kNow;
 }
 
-/// Whether a batch was taken, or rejected.
+/// True if a batch was taken or rejected.
 bool has_begun(const LaneSender& lane, CommandId batch) {
   return lane.status(batch).known != LaneSender::Known::not_yet;
 }
@@ -275,7 +276,7 @@ bool has_begun(const LaneSender& lane, CommandId batch) {
 
 BatchRecord UntypedFrontend::batch_of(const PulseOptions& options) {
   if (options.at != kNow && options.at < 0) {
-    throw InvalidArgument("a batch cannot be taken at iteration " + std::to_string(options.at));
+    throw InvalidArgument("at must be an iteration from 0 on, got " + std::to_string(options.at));
   }
   BatchRecord record;
   record.at = options.at;
@@ -283,7 +284,8 @@ BatchRecord UntypedFrontend::batch_of(const PulseOptions& options) {
   return record;
 }
 
-/// What one batch may hold, so that an iteration that takes it stays short.
+/// Refuses a batch with too many requests or orders, which would make the iteration that takes it
+/// too long.
 void UntypedFrontend::refuse_if_too_much(const BatchBuilder& builder) const {
   const auto refuse = [&](std::uint32_t count, std::uint32_t most, const char* what) {
     if (count <= most) return;
@@ -296,7 +298,7 @@ void UntypedFrontend::refuse_if_too_much(const BatchBuilder& builder) const {
   refuse(builder.control_orders(), kMostControlOrders, "orders to take or release control");
 }
 
-/// What may wait for later iterations.
+/// Refuses a batch for a later iteration if too many of them wait already.
 void UntypedFrontend::refuse_if_too_many_wait(Iteration at, const LaneSender& lane) {
   if (at == kNow) return;
   std::erase_if(link_->scheduled, [&](const Link::Scheduled& sent) {
@@ -314,11 +316,12 @@ void UntypedFrontend::refuse_if_too_many_wait(Iteration at, const LaneSender& la
   refuse(link_->scheduled.size(), kMostScheduled, "later iterations");
 }
 
-/// Before anything is used up: ids that are drawn and never sent would age the statuses of others.
+/// Refuses a batch that does not fit into the lane. Checked before ids are drawn: ids that are
+/// never sent would overwrite the statuses of other batches.
 void UntypedFrontend::refuse_if_full(const BatchBuilder& builder, const BatchRecord& wanted,
                                      const LaneSender& lane) const {
   const std::uint64_t needed = builder.blocks();
-  // what stays in the lane leaves room for what lets it go on: a burst, a purge, a request
+  // commands leave some blocks free for a burst, a purge or a request
   const bool stays = does_stay(builder, wanted);
   const std::uint32_t most = lane.blocks() - (stays ? kept_free(lane.blocks()) : 0);
   const std::uint32_t sent = lane.blocks() - lane.free_blocks();
@@ -337,7 +340,7 @@ void UntypedFrontend::refuse_if_full(const BatchBuilder& builder, const BatchRec
   }
 }
 
-/// Passes over the statuses of batches that still run.
+/// Draws ids whose status slots are free.
 CommandId UntypedFrontend::draw_ids(LaneSender& lane, std::uint64_t n, bool stays) {
   const auto has_ended = [&](CommandId id) {
     const LaneSender::StatusAnswer answer = lane.status(id);
@@ -349,8 +352,7 @@ CommandId UntypedFrontend::draw_ids(LaneSender& lane, std::uint64_t n, bool stay
                                                : link_->ids.draw_kept(lane.next_id(), n, has_ended);
   if (!first) {
     throw LaneFull("the batches in the lane of '" + segment() +
-                   "' that have not ended leave no room for the statuses of " +
-                   std::to_string(n - 2) +
+                   "' that have not ended leave no status slots for " + std::to_string(n - 2) +
                    " more records. Nothing was sent, all stays added: wait for a batch, purge, or "
                    "start the backend with larger lanes (lane_blocks)");
   }

@@ -17,19 +17,20 @@ class LaneSender;
 struct Link;
 struct Sent;
 
-/// What became of one command or request.
+/// Status of one command or request, at the moment it was read.
 struct Handle {
   CommandId id = 0;
   Status status = Status::none;
   Reason reason = Reason::none;
   Iteration iteration = -1;  // at which the status changed; -1 while it is queued
-  std::string text;          // of a rejection: why, in words
-  std::string progress;      // of a request that runs: what the driver says of it
+  std::string text;          // the reason in words
+  std::string progress;      // of a running request: the driver's text
 };
 
-/// What one pulse sent: to be waited for, and asked what became of it.
+/// The commands, requests and purges that one pulse sent: wait for their end, or read their
+/// statuses.
 ///
-/// Copies mean the same batch. Statuses once seen as ended are kept.
+/// Copies refer to the same batch. End statuses are kept once they were read.
 class Batch {
  public:
   Batch() = default;
@@ -38,20 +39,20 @@ class Batch {
   CommandId id() const { return id_; }
   std::size_t size() const { return records_; }
   bool empty() const { return records_ == 0; }
-  /// What became of the record at this place (in the order in which they were added).
+  /// Status of the record with this index, in the order in which records were added.
   Handle handle(std::size_t place) const;
   std::vector<Handle> handles() const;
-  /// Every record has an end status.
+  /// True if every record has an end status.
   bool ended() const;
-  /// The iteration at which the batch was taken; -1 if it was not yet.
+  /// The iteration in which the batch was taken; -1 if it was not taken yet.
   Iteration first_iteration() const;
-  /// The iteration at which the last of its commands ended; -1 if it has not yet.
+  /// The iteration in which the last of its records ended; -1 if some have not ended.
   Iteration last_iteration() const;
-  /// Why the batch as a whole was rejected, in words; empty if it was not.
+  /// The reason, in words, why the whole batch was rejected; empty if it was not.
   std::string rejection() const;
   Reason rejected_by() const;
   /// Waits until every record has an end status and, in real time, the row of that iteration is
-  /// there (a bursting backend may stand still before it).
+  /// published. (A bursting backend may need another burst to publish it.)
   /// Throws TimeoutError, BackendGone, Cancelled.
   void wait(Timeout timeout, const KeepWaiting& keep_waiting = {}) const;
 
@@ -68,7 +69,7 @@ class Batch {
   std::shared_ptr<Kept> kept_;
 };
 
-/// A burst under way.
+/// A burst that was requested.
 class Burst {
  public:
   Burst() = default;
@@ -76,20 +77,20 @@ class Burst {
       : link_(std::move(link)), batch_(std::move(batch)) {}
 
   const Batch& batch() const { return batch_; }
-  /// Its last iteration is done, or its batch was rejected.
+  /// True if its last iteration is done or its batch was rejected.
   bool done() const;
-  /// The backend stands still again after the iteration under way; a burst that has not begun runs
-  /// none. What was sent with it stays queued. From any thread.
+  /// Ends the burst after the current iteration; a burst that has not begun runs no iteration.
+  /// Commands sent with it stay queued. From any thread.
   void cancel() const;
-  /// Waits until the last iteration of the burst is done; its row, or -1 if the batch was rejected.
-  /// Throws TimeoutError, BackendGone, Cancelled.
+  /// Waits until the last iteration of the burst is done; returns its row, or -1 if the batch was
+  /// rejected. Throws TimeoutError, BackendGone, BackendHalted, Cancelled.
   Iteration wait_done(Timeout timeout, const KeepWaiting& keep_waiting = {}) const;
-  /// Waits for the last iteration of the burst and returns its row. It may be waited for again
-  /// after a timeout.
-  /// Throws TimeoutError, BackendGone, Cancelled, Error if the batch was rejected.
+  /// Waits until the last iteration of the burst is done and returns its observation. After a
+  /// timeout it may be called again.
+  /// Throws TimeoutError, BackendGone, BackendHalted, Cancelled, Error if the batch was rejected.
   UntypedObservation wait(Timeout timeout, const KeepWaiting& keep_waiting = {}) const;
-  /// Throws what `wait` would throw for a burst that can no longer be done: BackendHalted,
-  /// BackendGone, Closed, Error if its batch was rejected. Does not wait.
+  /// Throws, without waiting, if the burst cannot be done any more: BackendHalted, BackendGone,
+  /// Closed, Error if its batch was rejected.
   void throw_if_failed() const;
 
  private:

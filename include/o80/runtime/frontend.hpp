@@ -35,14 +35,14 @@ struct RequestUnderWay {
   std::string name;
   Iteration since = -1;  // iteration in which it was taken
   std::string who;       // the process that sent it
-  std::string progress;  // what the driver says of it
+  std::string progress;  // the driver's text
 };
 
 struct FrontendOptions {
   Timeout timeout = std::chrono::seconds(5);  // to wait for the backend
   Access access = Access::read_write;
   bool dead = false;              // attach also to a backend that is gone, to read its history
-  KeepWaiting keep_waiting = {};  // asked in every wait; false ends it
+  KeepWaiting keep_waiting = {};  // called during the wait for the backend; false ends it
 };
 
 class UntypedFrontend;
@@ -51,14 +51,14 @@ using BurstMember = std::pair<UntypedFrontend*, std::int64_t>;
 
 /// The side that commands and reads, in bytes.
 ///
-/// Move-only. Takes a lane with its first pulse; a pure reader takes none.
+/// Move-only. Acquires a lane with its first pulse; a frontend that only reads needs none.
 ///
 /// Writer / Readers: any threads of one process.
 class UntypedFrontend {
  public:
   /// Waits for the backend, up to the timeout. Throws TimeoutError, SegmentError, BackendFailed.
   explicit UntypedFrontend(const std::string& segment, const FrontendOptions& options = {});
-  /// A frontend whose bursts run in its own thread.
+  /// A frontend of an inline robot: its bursts run in the calling thread.
   UntypedFrontend(const std::string& segment, std::shared_ptr<InlineRunner> runner);
   UntypedFrontend(UntypedFrontend&&) noexcept;
   UntypedFrontend& operator=(UntypedFrontend&&) noexcept;
@@ -75,28 +75,28 @@ class UntypedFrontend {
   Life life() const;
   std::uint32_t actuator(std::string_view name) const;
   std::uint32_t request_index(std::string_view name) const;
-  /// Refuses what the robot cannot follow, as the verbs below do.
+  /// The checks of the functions below: whether the robot can follow a command.
   const CommandCheck& command_check() const;
 
-  // what the next pulse sends; each returns its place in the batch
+  // The add functions append to the next pulse and return the index in its batch.
   /// Adds a command. `mask` has a bit for each number of the state that is given; empty: all.
   std::uint32_t add_command(std::uint32_t actuator, std::span<const std::byte> state,
                             const CommandOptions& options = {},
                             std::span<const std::uint64_t> mask = {});
-  /// One command for several actuators: they begin together when all their queues have come to it,
-  /// take as many iterations as the slowest of them, and have one status. `states` holds their
+  /// Adds one command for several actuators. They begin together, when it is the next command of
+  /// all of them, take as many iterations as the slowest, and have one status. `states` holds their
   /// states one after the other, `masks` a mask for each, or nothing.
   std::uint32_t add_commands(std::span<const std::uint32_t> actuators,
                              std::span<const std::byte> states, const CommandOptions& options = {},
                              std::span<const std::uint64_t> masks = {});
-  /// One command through `rows` states. With `times` (ends of the rows since its start [ns]),
-  /// which needs no pace, or at options.pace for each row.
+  /// Adds one command through `rows` states: at `times` (when each row is reached, since the start
+  /// [ns]; options.pace is then ignored), or with options.pace for each row.
   std::uint32_t add_trajectory(std::uint32_t actuator, std::uint32_t rows,
                                std::span<const std::byte> states,
                                const CommandOptions& options = {.pace = iterations(1)},
                                std::span<const std::int64_t> times = {});
-  /// One command through `rows` states for several actuators, as above; `states` holds the rows
-  /// of the first actuator, then those of the second...
+  /// The same for several actuators; `states` holds all rows of the first actuator, then all rows
+  /// of the second, and so on.
   std::uint32_t add_trajectories(std::span<const std::uint32_t> actuators, std::uint32_t rows,
                                  std::span<const std::byte> states,
                                  const CommandOptions& options = {.pace = iterations(1)},
@@ -107,56 +107,57 @@ class UntypedFrontend {
   std::uint32_t add_request(std::uint32_t request, std::span<const std::byte> payload);
   std::uint32_t add_take_control();
   std::uint32_t add_release_control();
-  /// Records added and not pulsed.
+  /// Number of records that were added and not sent.
   std::size_t added() const;
   void forget_added();
 
-  /// Sends what was added as one batch. Throws LaneFull (nothing is sent, all stays added), NoLane,
-  /// ReadOnly, BackendGone.
+  /// Sends the added records as one batch. Throws LaneFull (nothing is sent, all stays added),
+  /// NoLane, ReadOnly, BackendGone.
   Batch pulse(const PulseOptions& options = {}) { return pulse(options, 0); }
-  /// Sends a batch of the caller's own making; what was added stays added.
+  /// Sends the records of `batch`; added records stay added.
   Batch pulse(BatchBuilder& batch);
-  /// Sends what was added; bursting, lets the backend run until all of it has ended.
+  /// As `pulse`; a bursting backend also runs until all records have ended.
   Batch pulse_to_end(const PulseOptions& options = {});
-  /// The same with a batch of the caller's own making; what was added stays added.
+  /// The same for the records of `batch`; added records stay added.
   Batch pulse_to_end(BatchBuilder& batch);
-  /// Waits for the end of such a batch and returns the row of its last iteration.
+  /// Waits for the end of a batch of pulse_to_end and returns the row of its last iteration. Throws
+  /// Error if the batch was rejected, BackendHalted if a halt ended a command of it.
   UntypedObservation wait_for_end(const Batch& batch, Timeout timeout,
                                   const KeepWaiting& keep_waiting = {}) const;
-  /// The same, however it ended; that iteration, or -1 if the batch was rejected.
+  /// Waits for that end and returns its iteration, or -1 if the batch was rejected.
   Iteration wait_until_ended(const Batch& batch, Timeout timeout,
                              const KeepWaiting& keep_waiting = {}) const;
-  /// Both at once.
+  /// pulse_to_end and wait_for_end.
   UntypedObservation pulse_and_wait(Timeout timeout, const PulseOptions& options = {},
                                     const KeepWaiting& keep_waiting = {});
-  /// Sends what was added and lets a bursting backend run n iterations, from now on also if the
-  /// batch is to be taken later: at an iteration of the burst, say.
+  /// Sends the added records and requests n iterations. The burst starts now, even if the batch is
+  /// scheduled (`at`) for a later iteration of it.
   Burst start_burst(std::int64_t iterations, const PulseOptions& options = {});
-  /// The same, and waits. When the wait ends without the last row (a timeout, `keep_waiting` is
-  /// false) the rest of the burst is cancelled; so it is with the calls below and with
-  /// pulse_and_wait.
+  /// The same, and waits. If the wait ends without the last row (timeout, `keep_waiting` returned
+  /// false), the rest of the burst is cancelled. So do burst_rows and pulse_and_wait.
   UntypedObservation burst(std::int64_t iterations, Timeout timeout,
                            const KeepWaiting& keep_waiting = {}, const PulseOptions& options = {});
-  /// One iteration for each row that `rows` can hold, and all these rows; that of the last one.
+  /// Bursts one iteration for each row that `rows` can hold, fills `rows`, and returns the
+  /// iteration of the last row.
   Iteration burst_rows(std::span<std::byte> rows, Timeout timeout,
                        const KeepWaiting& keep_waiting = {}, const PulseOptions& options = {});
 
   /// The requests that the driver serves over several iterations, oldest first.
   std::vector<RequestUnderWay> running_requests() const;
 
-  // halts
-  /// Halts the backend, whoever has control and whatever its lanes are doing; the number of the
-  /// halt. Acts in the first iteration begun after it. Throws ReadOnly, BackendGone (also when the
-  /// backend went meanwhile: its successor may not be halted).
+  // halts: see ARCHITECTURE.md, Halts
+  /// Halts the backend and returns the number of the halt. Needs no lane and no control. In force
+  /// from the first iteration begun after it. Throws ReadOnly, and BackendGone also if the backend
+  /// ended meanwhile: its successor may not be halted.
   std::uint64_t halt(std::string_view reason);
-  /// The halt that acts, or was asked for last (`iteration` is -1 until it acts); nothing if none.
+  /// The halt in force, or the last one requested (`iteration` is -1 until it is in force).
   std::optional<Halt> halted() const;
-  /// Clears halts up to this number: the robot starts afresh from where it is, in a row of its own.
-  /// In real time it waits until that halt acts and the robot has come to rest. Needs a lane, but
-  /// no control. Throws BackendHalted if it is refused (another halt came after it, the robot
-  /// refuses, or still brakes and bursts), TimeoutError, NoLane, BackendGone.
+  /// Clears halts up to this number; the robot makes a fresh start. In real time it first waits
+  /// until the halt is in force and the robot is at rest. Needs a lane, but no control. Throws
+  /// BackendHalted if it is refused (another halt came after it, the robot refuses, or, in bursting
+  /// mode, it still brakes), TimeoutError, NoLane, BackendGone.
   void resume(std::uint64_t number, Timeout timeout, const KeepWaiting& keep_waiting = {});
-  /// Tells the backend's watchdog that this frontend lives, as a pulse or a wait for a batch does.
+  /// A sign of life for the backend's watchdog, as a pulse or a wait for a batch is.
   void keep_alive();
 
   // observations
@@ -166,21 +167,21 @@ class UntypedFrontend {
   UntypedObservation latest() const;
   /// Fills a row of this frontend's size; throws as latest().
   void latest(std::byte* row) const;
-  /// Row k, as soon as it is there. Throws RowOverwritten, TimeoutError, BackendGone.
+  /// Row k; waits until it is published. Throws RowOverwritten, TimeoutError, BackendGone.
   UntypedObservation wait_for(Iteration k, Timeout timeout,
                               const KeepWaiting& keep_waiting = {}) const;
   void wait_for(Iteration k, std::byte* row, Timeout timeout,
                 const KeepWaiting& keep_waiting = {}) const;
-  /// As many of the rows first..last as there are.
+  /// The rows from first to last that the history holds.
   Rows history(Iteration first, Iteration last) const;
-  /// The last n.
+  /// The last n rows.
   Rows history(std::size_t n) const;
-  /// The next row in sequence for a position of the caller's own: waits for row `position`; if it
-  /// is overwritten, jumps to the oldest one there. Returns how many were missed.
+  /// Reads rows in sequence: waits for row `position`, or takes the oldest row if that one is
+  /// overwritten, and moves `position` behind it. Returns the number of rows that were skipped.
   std::int64_t wait_for_next(Iteration& position, std::byte* row, Timeout timeout,
                              const KeepWaiting& keep_waiting = {}) const;
 
-  /// Gives the lane back; every further use throws Closed. Sent motion goes on.
+  /// Releases the lane. Sent commands continue. Later calls throw Closed.
   void close();
   bool closed() const;
   std::shared_ptr<Link> link() const { return link_; }
@@ -215,19 +216,20 @@ class UntypedFrontend {
   std::shared_ptr<Link> link_;
 };
 
-/// Halts the backend of a segment, also one that is still starting; the number of the halt.
-/// Throws TimeoutError if there is none in time, SegmentError, BackendGone.
+/// Halts the backend of a segment, also one that is still starting; returns the number of the halt.
+/// Throws TimeoutError if there is no backend within `timeout`, SegmentError, BackendGone.
 std::uint64_t halt(const std::string& segment, std::string_view reason,
                    Timeout timeout = std::chrono::seconds(0), const KeepWaiting& keep_waiting = {});
 
-/// Lets several backends run at once, each its number of iterations, and returns at once. Nothing
-/// is granted unless all of them are alive, burst, and have a lane and room for what was added.
+/// Starts bursts of several backends that run at the same time; does not wait. No burst starts
+/// unless all backends are alive, bursting, and have a lane with room for the added records.
 std::vector<Burst> start_bursts(std::span<const BurstMember> group);
 
-/// The same, and waits for all: as UntypedFrontend::burst, for the group as a whole.
+/// start_bursts and wait_for.
 std::vector<UntypedObservation> burst(std::span<const BurstMember> group, Timeout timeout,
                                       const KeepWaiting& keep_waiting = {});
-/// Waits for bursts that were started together; cancels what is left of them if it cannot.
+/// Waits for bursts that were started together and returns the last row of each. If it throws, the
+/// rest of all of them is cancelled.
 std::vector<UntypedObservation> wait_for(std::span<const Burst> bursts, Timeout timeout,
                                          const KeepWaiting& keep_waiting = {});
 

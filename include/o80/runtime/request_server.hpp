@@ -20,16 +20,17 @@ struct Served {
   static Served done() { return {}; }
   /// The sender reads `why`.
   static Served rejected(std::string_view why) { return with(Kind::rejected, why); }
-  /// Queues are purged, the robot is read anew, desired = observed, in a row of its own.
+  /// Makes a fresh start: drops all queues, reads the robot again, and publishes an extra row with
+  /// desired = observed.
   static Served start_afresh() { return with(Kind::start_afresh, {}); }
-  /// The loop ends: the driver can go on no more.
+  /// Ends the loop as failed.
   static Served failed(std::string_view why) { return with(Kind::failed, why); }
 
-  /// It takes time: it ends later, and its sender sees the progress meanwhile. At most one request
-  /// of a kind runs: another one is rejected before its handler is asked.
+  /// The request runs and ends in a later iteration; its sender sees `progress` meanwhile. At most
+  /// one request of a kind runs: another one is rejected without a call of its handler.
   static Served running(std::string_view progress = {}) { return with(Kind::running, progress); }
 
-  /// Of a rejection or a failure; the progress of one that runs.
+  /// The reason of a rejection or failure, or the progress of a running request.
   std::string_view why() const { return {text.data(), strnlen(text.data(), text.size())}; }
 
  private:
@@ -42,23 +43,24 @@ struct Served {
   }
 };
 
-/// Where a fresh reading of the robot goes; the blocks are laid out as the schema says.
+/// Memory for the reading of a fresh start, laid out as in the schema.
 struct FreshReading {
   std::byte* observed;
   std::byte* extended;
-  std::byte* desired;  // holds a copy of `observed` only if it is left alone
+  std::byte* desired;  // used if has_desired is set; otherwise desired = observed
   bool has_desired = false;
 };
 
-/// Who serves requests between two iterations: the driver, or the owner of an embedded backend.
+/// Serves requests between two iterations: the driver, or the program with an embedded backend.
 class RequestServer {
  public:
   virtual Served serve(std::uint32_t request, std::span<const std::byte> payload) noexcept = 0;
-  /// Reads the robot anew after `start_afresh`; false if it failed.
+  /// Reads the robot for a fresh start; false if that failed.
   virtual bool read_fresh(FreshReading& reading) noexcept = 0;
-  /// A halt begins: commands have ended, the actuators brake. False if the robot failed.
+  /// Called when a halt begins: commands have ended, the actuators brake. False if the robot
+  /// failed.
   virtual bool halt() noexcept { return true; }
-  /// A halt is to be cleared; `rejected` keeps it, and its sender reads why.
+  /// Called before a halt is cleared; `rejected` keeps the halt, and the sender reads the reason.
   virtual Served resume() noexcept { return Served::done(); }
 
  protected:

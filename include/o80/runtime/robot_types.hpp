@@ -9,7 +9,8 @@
 
 namespace o80 {
 
-/// The layout is known only at run time: `describe` adds actuators and sensors, and gets places.
+/// The layout is known only at run time: `describe` adds actuators and sensors and stores the
+/// offsets that it gets (Place).
 struct RunTimeActuators {};
 
 /// The requests a robot serves.
@@ -42,7 +43,7 @@ struct RequestsIn<R> {
 
 }  // namespace robot_types
 
-/// The types of a robot: of its driver class, or of any struct that names them alike.
+/// The types of a robot: members of its driver class, or of any struct with the same members.
 template <class R>
 using ActuatorsOf = typename R::Actuators;
 template <class R>
@@ -54,7 +55,7 @@ inline constexpr bool kIsRunTime = std::is_same_v<ActuatorsOf<R>, RunTimeActuato
 
 inline constexpr std::uint32_t kNoRequest = 0xFFFFFFFF;
 
-/// A struct's place among the requests of a robot.
+/// Index of a struct among the requests of a robot.
 template <class Request, class... Each>
 consteval std::uint32_t index_of_request(Requests<Each...>) {
   std::uint32_t place = 0;
@@ -88,8 +89,8 @@ constexpr std::string_view request_help() {
   }
 }
 
-/// Whether a request is served while the backend is halted: `static constexpr bool kWhileHalted` of
-/// its struct, if it has one.
+/// True if a request is served during a halt: `static constexpr bool kWhileHalted` of its struct,
+/// if it has one.
 template <Shareable Request>
 constexpr bool request_while_halted() {
   if constexpr (requires { bool{Request::kWhileHalted}; }) {
@@ -99,7 +100,7 @@ constexpr bool request_while_halted() {
   }
 }
 
-/// Describes what the types of a robot say: actuators, sensor values, requests.
+/// Adds the types of a robot to a schema: actuators, sensor values, requests.
 template <class R>
 void describe_types(Schema& schema) {
   if constexpr (!kIsRunTime<R>) describe_actuators<ActuatorsOf<R>>(schema);

@@ -13,9 +13,9 @@
 
 namespace o80 {
 
-/// A backend inside one's own program: `publish` row 0, then `step` and `publish` for ever.
+/// A backend inside a C++ program. Call `publish` for row 0, then `step` and `publish` in turn.
 ///
-/// R is any struct that names Actuators and, if there are, Extended and Requests.
+/// R is any struct with a member type Actuators and, optionally, Extended and Requests.
 ///
 /// Writer:   one thread.
 /// Realtime: step and publish.
@@ -26,45 +26,47 @@ class Backend final : private RequestServer {
   using Extended = ExtendedOf<R>;
   using Describe = std::function<void(Schema&)>;
 
-  /// Takes the name; `describe` may give names, limits and when_idle.
+  /// Takes the segment's name; `describe` may set names, limits and when_idle.
   explicit Backend(const BackendOptions& options, const Describe& describe = {})
       : backend_(schema_of(options, describe), options, this) {}
 
-  /// Serves a request between two iterations.
+  /// Sets the handler of a request, which `step` calls between two iterations.
   template <Shareable Request>
   void on(std::function<Served(const Request&)> serve) {
     servers_[index_of<Request>()] = [serve = std::move(serve)](const std::byte* payload) {
       return serve(unpack<Request>(payload));
     };
   }
-  /// A request of this kind was answered `running` and has not ended; a halt may have ended it.
+  /// True if a request of this kind was answered `running` and neither `ended` nor a halt has ended
+  /// it.
   template <Shareable Request>
   bool runs() const {
     return backend_.runs(index_of<Request>());
   }
-  /// What frontends see of it while it runs.
+  /// Sets the text that frontends see while it runs.
   template <Shareable Request>
   void progress(std::string_view text) {
     backend_.show_progress(index_of<Request>(), text);
   }
-  /// It ends with the row that is published next, or, if it starts afresh, in the next step. If
-  /// none of this kind runs, nothing happens.
+  /// Ends it with the row that is published next; `start_afresh` ends it in the next step. No
+  /// effect if none of this kind runs.
   template <Shareable Request>
   void ended(const Served& how) {
     backend_.end_request(index_of<Request>(), how);
   }
-  /// Reads the robot anew after a request answered `start_afresh`.
+  /// Sets the function that reads the robot for a fresh start.
   void on_fresh_start(std::function<void(Actuators&, Extended&)> read) { read_ = std::move(read); }
 
-  /// Told when a halt begins: commands have ended, the desired states brake.
+  /// Sets a function that is called when a halt begins: commands have ended, the desired states
+  /// brake.
   void on_halt(std::function<void()> halt) { halt_ = std::move(halt); }
-  /// Asked before a halt is cleared; `Served::rejected` keeps it.
+  /// Sets a function that is called before a halt is cleared; `Served::rejected` keeps the halt.
   void on_resume(std::function<Served()> resume) { resume_ = std::move(resume); }
-  /// Halts in the program's own name, as a driver's reading may.
+  /// Halts on behalf of the program, as a driver does in its reading.
   void halt(std::string_view why) noexcept { backend_.halt(HaltCause::driver, why); }
 
-  /// Publishes what was observed in the iteration under way; the first call makes row 0. That one
-  /// throws InvalidArgument if a number of it is NaN or infinite; none after it throws.
+  /// Publishes the reading of the current iteration; the first call publishes row 0. Only that one
+  /// throws: InvalidArgument if a number is NaN or infinite.
   void publish(const Actuators& observed, const Extended& extended = {}) {
     if constexpr (!std::is_same_v<Actuators, NoActuators>) pack(observed, backend_.observed());
     if constexpr (!std::is_same_v<Extended, NoExtended>) pack(extended, backend_.extended());
@@ -73,8 +75,8 @@ class Backend final : private RequestServer {
                             "' cannot begin: " + std::string(backend_.failure()));
     }
   }
-  /// The desired states of the next iteration; empty when a stop was asked for, or when it failed:
-  /// `untyped().failure()` says why. Bursting, waits for a grant.
+  /// The desired states of the next iteration. Nothing when the backend must end, after a stop or a
+  /// failure: see `untyped().failure()`. In bursting mode it waits for a burst.
   std::optional<Actuators> step() noexcept {
     if (backend_.step() != Step::run) return std::nullopt;
     return unpack<Actuators>(backend_.desired());
@@ -97,17 +99,20 @@ class Backend final : private RequestServer {
   }
   Served serve(std::uint32_t request, std::span<const std::byte> payload) noexcept override {
     const auto server = servers_.find(request);
-    if (server == servers_.end()) return Served::rejected("nobody serves this request");
+    if (server == servers_.end()) {
+      return Served::rejected("this request has no handler: call on<Request>(...)");
+    }
     try {
       return server->second(payload.data());
     } catch (const std::exception& error) {
       return Served::failed(error.what());
     } catch (...) {
-      return Served::failed("a request's server threw");
+      return Served::failed(
+          "the handler of a request threw something that is not a std::exception");
     }
   }
   bool read_fresh(FreshReading& reading) noexcept override {
-    if (!read_) return true;  // what was observed last holds
+    if (!read_) return true;  // keeps the last reading
     try {
       Actuators observed = unpack<Actuators>(reading.observed);
       Extended extended = unpack<Extended>(reading.extended);
@@ -134,7 +139,7 @@ class Backend final : private RequestServer {
     } catch (const std::exception& error) {
       return Served::failed(error.what());
     } catch (...) {
-      return Served::failed("the handler of a resume threw");
+      return Served::failed("the handler of a resume threw something that is not a std::exception");
     }
   }
 

@@ -25,7 +25,7 @@ TEST_F(BurstTest, RunsExactlyAsManyIterationsAndReturnsTheLastRow) {
   EXPECT_EQ(frontend.burst(7, kPatience).iteration(), 8);
   EXPECT_EQ(frontend.published(), 8);
   EXPECT_THAT(message_of<TimeoutError>([&] { frontend.wait_for(9, kAtOnce); }),
-              HasSubstr("stands still until it is burst"));
+              HasSubstr("waits for a burst"));
 }
 
 TEST_F(BurstTest, WhatIsSentWithItActsFromItsFirstIteration) {

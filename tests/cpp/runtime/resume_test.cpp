@@ -185,7 +185,7 @@ TEST_F(ResumeTest, OfAFrontendSaysWhatItWaitsFor) {
   station.run(20);
   const std::uint64_t number = frontend.halt("");
   EXPECT_THAT(message_of<TimeoutError>([&] { frontend.resume(number, kAtOnce); }),
-              HasSubstr("does not act yet"));
+              HasSubstr("is not in force yet"));
   station.run(1);
   EXPECT_THAT(message_of<TimeoutError>([&] { frontend.resume(number, kAtOnce); }),
               HasSubstr("still brakes"));

@@ -68,7 +68,7 @@ TEST_F(TypedBackendTest, ServesRequestsAndReadsAfresh) {
   EXPECT_EQ(fresh.desired()[1], 8);
   EXPECT_EQ(fresh.extended().total, 9);
   EXPECT_EQ(batch.handle(1).text, "no");
-  EXPECT_THAT(batch.handle(2).text, HasSubstr("nobody serves this request"));
+  EXPECT_THAT(batch.handle(2).text, HasSubstr("this request has no handler"));
 }
 
 TEST_F(TypedBackendTest, ARequestThatThrowsEndsItAsFailed) {
