@@ -9,12 +9,14 @@ ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = ("apps", "benchmarks", "docs", "examples", "models", "robots", "simulators")
 PAGES = sorted([*ROOT.glob("*.md"), *(page for f in FOLDERS for page in (ROOT / f).rglob("*.md"))])
 LINK = re.compile(r"\]\(([^)#\s]*)(?:#([^)\s]+))?\)")
+NAME = re.compile(r"`(?:(\w+)::)?(\w+)`")
 SOURCE = re.compile(r"`([\w/]+\.(?:cpp|hpp|py))`")
 PAGE = re.compile(r"((?:\b(?:docs|models|benchmarks)/\w+|\b[A-Z]+)\.md)(?:#([\w-]+))?")
 SOURCES = [
     path
     for folder in ("apps", "include", "models", "python", "robots", "simulators", "src", "tests")
-    for path in (ROOT / folder).rglob("*.[chp]*")
+    for path in (ROOT / folder).rglob("*")
+    if path.suffix in {".hpp", ".cpp", ".py"} and path != Path(__file__)
 ]
 
 
@@ -53,11 +55,16 @@ def test_every_source_that_a_page_names_exists(name: str) -> None:
     assert not [path for path in named if not any(file.endswith(f"/{path}") for file in there)]
 
 
+def test_every_member_and_constant_that_the_architecture_names_exists() -> None:
+    words = set(re.findall(r"\w+", "".join(source.read_text() for source in SOURCES)))
+    named = NAME.findall(without_code(ROOT / "ARCHITECTURE.md"))
+    assert len(named) >= 20
+    assert not {name for pair in named for name in pair if name} - words
+
+
 def test_every_page_and_section_that_a_source_names_exists() -> None:
     broken = []
     for source in SOURCES:
-        if source.suffix not in {".hpp", ".cpp", ".py"} or source == Path(__file__):
-            continue
         for name, anchor in PAGE.findall(source.read_text()):
             page = ROOT / name
             if not page.exists() or (anchor and anchor not in anchors(page)):
