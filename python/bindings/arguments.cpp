@@ -13,7 +13,7 @@ using o80::InvalidArgument;
 
 bool truth_of(nb::handle value, const char* name) {
   if (!PyBool_Check(value.ptr())) {
-    throw InvalidArgument(std::string(name) + " is True or False, not " +
+    throw InvalidArgument(std::string(name) + " must be True or False, got " +
                           nb::cast<std::string>(nb::repr(value)));
   }
   return value.ptr() == Py_True;
@@ -21,7 +21,7 @@ bool truth_of(nb::handle value, const char* name) {
 
 std::string string_of(nb::handle value, const char* name) {
   if (!PyUnicode_Check(value.ptr())) {
-    throw InvalidArgument(std::string(name) + " is a text, not " +
+    throw InvalidArgument(std::string(name) + " must be a string, got " +
                           nb::cast<std::string>(nb::repr(value)));
   }
   return nb::cast<std::string>(value);
@@ -31,7 +31,7 @@ double number_of(nb::handle value, const char* name) {
   const double number = PyFloat_AsDouble(value.ptr());
   if ((number == -1.0 && PyErr_Occurred() != nullptr) || std::isnan(number)) {
     PyErr_Clear();
-    throw InvalidArgument(std::string(name) + " is a number, not " +
+    throw InvalidArgument(std::string(name) + " must be a number, got " +
                           nb::cast<std::string>(nb::repr(value)));
   }
   return number;
@@ -42,7 +42,7 @@ std::int64_t count_of(nb::handle value, const char* name) {
   std::int64_t number = 0;
   if (!index.is_valid() || !nb::try_cast<std::int64_t>(index, number)) {
     PyErr_Clear();
-    throw InvalidArgument(std::string(name) + " is a whole number, not " +
+    throw InvalidArgument(std::string(name) + " must be a whole number, got " +
                           nb::cast<std::string>(nb::repr(value)));
   }
   return number;
@@ -52,8 +52,8 @@ std::chrono::nanoseconds nanoseconds_of(nb::handle value, const char* name) {
   const double seconds = number_of(value, name);
   const double limit = static_cast<double>(o80::kLongestDuration) * 1e-9;
   if (std::abs(seconds) > limit) {
-    throw InvalidArgument(std::string(name) + " of " + std::to_string(seconds) +
-                          " s is too long to be counted");
+    throw InvalidArgument(std::string(name) + " must be at most " + std::to_string(limit) +
+                          " s, got " + std::to_string(seconds));
   }
   return std::chrono::nanoseconds(std::llround(seconds * 1e9));
 }
@@ -88,8 +88,7 @@ o80::PulseOptions::Late late_of(nb::handle word) {
   };
   if (is("reject")) return o80::PulseOptions::Late::reject;
   if (is("now")) return o80::PulseOptions::Late::now;
-  throw InvalidArgument("late cannot be '" + std::string(text.c_str()) +
-                        "': it is 'reject' or 'now'");
+  throw InvalidArgument("late must be 'reject' or 'now', got '" + std::string(text.c_str()) + "'");
 }
 
 }  // namespace
@@ -98,9 +97,9 @@ o80::PulseOptions pulse_options(nb::handle at, nb::handle late) {
   o80::PulseOptions options;
   if (!at.is_none()) {
     options.at = count_of(at, "at");
-    // -1 means now to the core, and nothing to a user
+    // -1 (kNow) is valid inside of o80 only
     if (options.at < 0) {
-      throw InvalidArgument("a batch cannot be taken at iteration " + std::to_string(options.at));
+      throw InvalidArgument("at must be an iteration from 0 on, got " + std::to_string(options.at));
     }
   }
   options.late = late_of(late);

@@ -8,8 +8,7 @@
 
 #include "o80/control/command.hpp"
 
-// Arguments of Python calls as what the core takes; each throws InvalidArgument naming the
-// argument.
+// Conversions of Python arguments to C++. Each throws InvalidArgument with the argument's name.
 
 bool truth_of(nanobind::handle value, const char* name);
 std::string string_of(nanobind::handle value, const char* name);

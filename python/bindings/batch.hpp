@@ -9,13 +9,13 @@
 #include "o80/runtime/batch.hpp"
 #include "observation.hpp"
 
-/// A burst under way and the way to read its row.
+/// A requested burst, and the decoder of its row.
 struct PendingBurst {
   o80::Burst burst;
   std::shared_ptr<const Decoder> decoder;
 };
 
-/// Waits for (something of) a batch; an o80.TimeoutError carries the batch.
+/// Calls `wait`; an o80.TimeoutError gets the batch as its member.
 template <class Wait>
 auto carrying(const o80::Batch& batch, Wait&& wait) {
   try {

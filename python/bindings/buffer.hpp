@@ -16,7 +16,7 @@ struct Bytes {
   std::span<const std::byte> span() const {
     return {static_cast<const std::byte*>(view.buf), static_cast<std::size_t>(view.len)};
   }
-  /// Of a buffer asked for with PyBUF_WRITABLE.
+  /// Only for a buffer requested with PyBUF_WRITABLE.
   std::span<std::byte> writable() const {
     return {static_cast<std::byte*>(view.buf), static_cast<std::size_t>(view.len)};
   }

@@ -10,7 +10,7 @@ namespace nb = nanobind;
 
 namespace {
 
-/// Raises the class of o80.errors that has the name of the C++ one.
+/// Raises the class of o80.errors with the name of the C++ class.
 void translate(const std::exception_ptr& thrown, void*) {
 #define O80_TRANSLATE(Name)                       \
   catch (const o80::Name& error) {                \
@@ -48,7 +48,7 @@ void translate(const std::exception_ptr& thrown, void*) {
 nb::object python_error(const char* name) { return nb::module_::import_("o80.errors").attr(name); }
 
 void set_error(const nb::object& type, const char* text) {
-  // a text may come from memory that others write: what is no UTF-8 must not hide the error
+  // the text may come from memory that other processes write: invalid UTF-8 must not hide the error
   const auto length = static_cast<Py_ssize_t>(std::strlen(text));
   const nb::object decoded = nb::steal(PyUnicode_DecodeUTF8(text, length, "replace"));
   if (decoded.is_valid()) PyErr_SetObject(type.ptr(), decoded.ptr());

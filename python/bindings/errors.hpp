@@ -6,6 +6,6 @@
 
 /// A class of o80.errors.
 nanobind::object python_error(const char* name);
-/// Sets it as the error that Python will see; it stays to be thrown.
+/// Sets the error indicator of Python; the caller throws nanobind::python_error.
 void set_error(const nanobind::object& type, const char* text);
 [[noreturn]] void raise_python(const char* name, const std::string& text);

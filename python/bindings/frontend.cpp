@@ -22,7 +22,7 @@ using o80::UntypedFrontend;
 
 namespace {
 
-/// Of a list, tuple or array of targets; -1 for anything else.
+/// Length of a list, tuple or array of targets; -1 for other types.
 Py_ssize_t length_of(nb::handle targets) {
   if (PySequence_Check(targets.ptr()) == 0 || PyUnicode_Check(targets.ptr()) != 0) return -1;
   const Py_ssize_t length = PyObject_Size(targets.ptr());
@@ -30,7 +30,7 @@ Py_ssize_t length_of(nb::handle targets) {
   return length;
 }
 
-/// Adds so many bytes; where they are.
+/// Appends `size` bytes; returns the first of them.
 std::byte* grown(std::vector<std::byte>& bytes, std::size_t size) {
   bytes.resize(bytes.size() + size);
   return bytes.data() + bytes.size() - size;
@@ -40,7 +40,7 @@ std::byte* grown(std::vector<std::byte>& bytes, std::size_t size) {
 
 Frontend::Frontend(const Attachment& attachment, std::shared_ptr<Decoder> decoder)
     : untyped_(attachment.frontend), robot_(attachment.robot), decoder_(std::move(decoder)) {
-  const o80::Schema& schema = decoder_->description->schema;  // it stays when `untyped_` changes
+  const o80::Schema& schema = decoder_->description->schema;  // valid also after a reattach
   for (std::uint32_t i = 0; i < schema.actuators.size(); ++i) {
     const auto name = schema.actuators[i].name.view();
     indices_[nb::str(name.data(), name.size())] = i;
@@ -60,7 +60,7 @@ std::uint32_t Frontend::actuator(nb::handle named) const {
   if (PyBool_Check(named.ptr()) || !index.is_valid() ||
       !nb::try_cast<std::int64_t>(index, number)) {
     PyErr_Clear();
-    throw InvalidArgument("an actuator is given by its index or its name, not by " +
+    throw InvalidArgument("an actuator must be given by its index or its name, got " +
                           nb::cast<std::string>(nb::repr(named)));
   }
   return frontend->command_check().actuator(number);
@@ -104,7 +104,7 @@ void Frontend::add_commands(nb::handle named, nb::handle targets,
   const o80::Schema& schema = decoder_->description->schema;
   if (length_of(targets) != static_cast<Py_ssize_t>(chosen.size())) {
     throw InvalidArgument("a command for " + std::to_string(chosen.size()) +
-                          " actuators needs a target for each, in their order: not " +
+                          " actuators needs a target for each, in their order, got " +
                           nb::cast<std::string>(nb::repr(targets)));
   }
   std::vector<std::byte> states;
@@ -150,7 +150,7 @@ void Frontend::close() {
 void Frontend::reattach(const Attachment& attachment) {
   untyped_->link()->check_usable();
   untyped_ = attachment.frontend;
-  next = -1;  // iterations begin anew
+  next = -1;  // a new run has other iterations
 }
 
 std::string Frontend::name_of(std::uint32_t index) const {

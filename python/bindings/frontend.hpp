@@ -12,7 +12,7 @@
 #include "observation.hpp"
 #include "robot/inline_robot.hpp"
 
-/// A frontend before Python has made a class of it: attached, or that of an inline robot.
+/// A native frontend that no Python object owns yet: attached, or of an inline robot.
 struct Attachment {
   std::shared_ptr<o80::UntypedFrontend> frontend;
   std::shared_ptr<o80::InlineRobot> robot;
@@ -20,8 +20,8 @@ struct Attachment {
 
 /// The compiled half of o80.Frontend.
 ///
-/// Its own members are guarded by the GIL. Python code may let other threads run, and `reattach`
-/// replace the core's frontend: who calls Python, or lets go of the GIL, takes a `shared()` first.
+/// Its own members are guarded by the GIL. Another thread may `reattach`, which replaces the core's
+/// frontend: copy `shared()` before you call Python code or release the GIL.
 class Frontend {
  public:
   Frontend(const Attachment& attachment, std::shared_ptr<Decoder> decoder);
@@ -35,15 +35,15 @@ class Frontend {
   std::uint32_t actuator(nanobind::handle named) const;
   void add_command(nanobind::handle named, nanobind::handle target,
                    const o80::CommandOptions& options) const;
-  /// One command for several actuators (None: for all), a target for each.
+  /// Adds one command for several actuators (None: all), with a target for each.
   void add_commands(nanobind::handle named, nanobind::handle targets,
                     const o80::CommandOptions& options) const;
   std::vector<std::byte> request_bytes(std::uint32_t index, nanobind::handle fields) const;
   Observation blank() const { return Observation(decoder_); }
 
-  /// Gives the lane back and stops an inline robot.
+  /// Releases the lane and stops an inline robot.
   void close();
-  /// Throws Closed if that came before.
+  /// Throws Closed after close().
   void reattach(const Attachment& attachment);
 
   o80::Iteration next = -1;  // of wait_for_next; -1: not asked yet

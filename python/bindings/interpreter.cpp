@@ -9,7 +9,7 @@
 namespace {
 
 std::atomic<bool> ended{false};
-thread_local PyThreadState* released = nullptr;  // by this thread; null: it has the GIL
+thread_local PyThreadState* released = nullptr;  // null: this thread has the GIL
 
 void take(PyThreadState* state) noexcept {
   if (ended.load(std::memory_order_relaxed)) stay();
@@ -36,6 +36,6 @@ WithGil::~WithGil() {
 
 void bind_interpreter(nanobind::module_&) {
   if (Py_AtExit([] { ended.store(true, std::memory_order_relaxed); }) != 0) {
-    throw o80::Error("Python cannot tell o80 when it ends");
+    throw o80::Error("o80 cannot register its exit handler: Python has no free slot (Py_AtExit)");
   }
 }

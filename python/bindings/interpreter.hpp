@@ -6,13 +6,14 @@
 
 #include <utility>
 
-/// Waits until the process is gone.
+/// Sleeps until the process ends.
 [[noreturn]] void stay() noexcept;
 
-/// Around calls of Python code from C++.
+/// Calls Python code from C++.
 ///
-/// A daemon thread that wants the interpreter back when it ends is unwound by Python before 3.14,
-/// which no frame of C++ survives. It stays where it is instead, as Python does it since.
+/// At interpreter exit, Python before 3.14 ends a daemon thread that requests the GIL by forced
+/// unwinding, which C++ frames do not survive. Such a thread sleeps for ever instead, as in Python
+/// 3.14.
 template <class Call>
 auto call_python(Call&& call) {
   try {
@@ -22,7 +23,7 @@ auto call_python(Call&& call) {
   }
 }
 
-/// Lets go of the GIL until it is destroyed.
+/// Releases the GIL until it is destroyed.
 class WithoutGil {
  public:
   WithoutGil();
@@ -31,10 +32,10 @@ class WithoutGil {
   ~WithoutGil();
 
  private:
-  PyThreadState* around_;  // what another one of this thread let go of
+  PyThreadState* around_;  // released by an outer WithoutGil of this thread
 };
 
-/// Has the GIL until it is destroyed, whether this thread let go of it or not.
+/// Holds the GIL until it is destroyed, also if this thread had it already.
 class WithGil {
  public:
   WithGil();
@@ -43,8 +44,8 @@ class WithGil {
   ~WithGil();
 
  private:
-  PyThreadState* taken_;  // null: it was not let go of
+  PyThreadState* taken_;  // null: this thread had the GIL already
 };
 
-/// From here on threads stay when the interpreter has ended.
+/// From this call on, threads that request the GIL after the interpreter has ended sleep for ever.
 void bind_interpreter(nanobind::module_& module);

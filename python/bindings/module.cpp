@@ -10,7 +10,7 @@ namespace nb = nanobind;
 
 NB_MODULE(_core, m) {
   m.doc() = "The compiled part of o80.";
-  // a frontend that lives until the interpreter ends is no leak
+  // a frontend that is alive at the end of the interpreter is not a leak
   nb::set_leak_warnings(
       PyObject_IsTrue(nb::module_::import_("sys").attr("flags").attr("dev_mode").ptr()) == 1);
   m.def(

@@ -7,7 +7,7 @@
 
 #include "o80/runtime/observation.hpp"
 
-/// How rows of one robot become arrays: the methods of an o80.layout.Layout, looked up once.
+/// Converts rows of one robot to arrays: the methods of its o80.layout.Layout, looked up once.
 struct Decoder {
   Decoder(std::shared_ptr<const o80::Description> description, nanobind::object layout);
 
@@ -15,7 +15,7 @@ struct Decoder {
   nanobind::object layout, desired, observed, extended, active, clamped, braking, flat, text;
 };
 
-/// A row and the way to read it. Python sees its bytes as a buffer.
+/// A row and its decoder. Python sees the bytes as a buffer.
 struct Observation {
   explicit Observation(std::shared_ptr<const Decoder> how)
       : decoder(std::move(how)), row(decoder->description) {}

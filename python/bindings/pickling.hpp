@@ -4,7 +4,8 @@
 
 #include <string>
 
-/// The `__reduce__` of what lives in this process only: raises TypeError, saying what to send.
+/// Makes objects of a class refuse to be pickled: `__reduce__` raises TypeError and says what to
+/// send instead.
 template <class T>
 void refuse_to_pickle(nanobind::class_<T>& type, const char* what, const char* instead) {
   type.def(

@@ -1,4 +1,4 @@
-// A burst that is made again and again: what stays the same is checked and looked up once.
+// A burst that is repeated: its options are checked and its buffers looked up once.
 
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/vector.h>
@@ -18,7 +18,7 @@ using namespace nb::literals;
 
 namespace {
 
-/// Where its targets come from and its rows go to, in memory of the caller.
+/// The options of the burst, and the caller's memory for its targets and rows.
 class PreparedBurst {
  public:
   PreparedBurst(std::vector<std::uint32_t> actuators, std::uint32_t steps, nb::handle each,

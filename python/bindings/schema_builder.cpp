@@ -24,7 +24,8 @@ o80::Kind kind_of(const std::string& name) {
   for (std::size_t i = 0; i < std::size(kNames); ++i) {
     if (name == kNames[i]) return static_cast<Kind>(i);
   }
-  throw InvalidArgument("numbers of kind '" + name + "' cannot be described");
+  throw InvalidArgument("a field must be a number, a boolean, an enum or a struct, got '" + name +
+                        "'");
 }
 
 }  // namespace
@@ -63,7 +64,7 @@ void SchemaBuilder::add_labels(o80::FieldRow& field, const nb::dict& labels) {
 }
 
 void bind_schema_builder(nb::module_& m) {
-  nb::class_<SchemaBuilder>(m, "SchemaBuilder", "A robot while it is described.")
+  nb::class_<SchemaBuilder>(m, "SchemaBuilder", "The schema of a robot under construction.")
       .def(nb::init<const std::string&>(), "robot"_a)
       .def("add_type", &SchemaBuilder::add_type, "name"_a, "fields"_a,
            nb::sig("def add_type(self, name: str, fields: list[typing.Any]) -> int"))

@@ -9,13 +9,13 @@
 
 #include "o80/describe/schema.hpp"
 
-/// A schema while Python describes it.
+/// A schema that Python code fills.
 struct SchemaBuilder {
   o80::Schema schema;
 
   explicit SchemaBuilder(const std::string& robot) { schema.head.robot = o80::NameText(robot); }
 
-  /// A type from its fields: (name, kind, shape, text, labels or None, type).
+  /// Adds a type with these fields: (name, kind, shape, text, labels or None, type).
   std::uint32_t add_type(const std::string& name, const nanobind::list& fields);
 
   std::uint32_t add_actuators(const std::string& group, std::uint32_t type, std::uint32_t count,
@@ -44,7 +44,7 @@ struct SchemaBuilder {
     return names;
   }
 
-  /// Of a field, or of the first number if it is empty: as o80::Limits has them, in its order.
+  /// Sets the limits of a field (empty: the first number), in the order of o80::Limits.
   void set_limits(std::uint32_t actuator, const std::string& field,
                   const std::array<double, 6>& given) {
     const o80::Limits limits{given[0], given[1], given[2], given[3], given[4], given[5]};

@@ -11,8 +11,7 @@ namespace nb = nanobind;
 
 void bind_segment_list(nb::module_& m) {
   using o80::SegmentEntry;
-  nb::class_<SegmentEntry>(m, "SegmentEntry",
-                           "A file in shared memory that bears a segment's name.")
+  nb::class_<SegmentEntry>(m, "SegmentEntry", "A file in shared memory with a segment's name.")
       .def_ro("name", &SegmentEntry::name)
       .def_prop_ro("life",
                    [](const SegmentEntry& entry) { return std::string(name_of(entry.life)); })
@@ -24,7 +23,7 @@ void bind_segment_list(nb::module_& m) {
       .def_ro("program", &SegmentEntry::program)
       .def_ro("epoch", &SegmentEntry::epoch)
       .def_ro("size", &SegmentEntry::bytes)
-      .def_ro("problem", &SegmentEntry::problem, "Why it is not readable.");
+      .def_ro("problem", &SegmentEntry::problem, "Reason why it is not readable.");
   m.def("list_segments", [] {
     const Waiting waiting;
     return o80::list_segments();

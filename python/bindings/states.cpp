@@ -21,7 +21,7 @@ std::string text_of(nb::handle value) { return nb::cast<std::string>(nb::repr(va
 
 [[noreturn]] void refuse(const std::string& what, const std::string& needed, nb::handle value) {
   PyErr_Clear();
-  throw InvalidArgument(what + " is " + needed + ", not " + text_of(value));
+  throw InvalidArgument(what + " must be " + needed + ", got " + text_of(value));
 }
 
 template <class T>
@@ -29,7 +29,7 @@ void store(std::byte* to, T value) {
   std::memcpy(to, &value, sizeof value);
 }
 
-/// Any Python number that is a whole one.
+/// The value as a Python int if it is a whole number, otherwise null.
 nb::object whole_number(nb::handle value) {
   if (PyFloat_Check(value.ptr())) {
     const double number = PyFloat_AS_DOUBLE(value.ptr());
@@ -52,8 +52,8 @@ void write_integer(nb::handle value, std::byte* to, const std::string& what) {
   T number{};
   if (!nb::try_cast<T>(whole, number)) {
     PyErr_Clear();
-    throw InvalidArgument(what + " holds " + std::to_string(kLeast) + " to " +
-                          std::to_string(kMost) + ", not " + text_of(value));
+    throw InvalidArgument(what + " must be " + std::to_string(kLeast) + " to " +
+                          std::to_string(kMost) + ", got " + text_of(value));
   }
   store(to, number);
 }
@@ -79,7 +79,7 @@ void write_boolean(nb::handle value, std::byte* to, const std::string& what) {
   if (whole.is_valid()) {
     if (!nb::try_cast<std::int64_t>(whole, number)) PyErr_Clear();
   } else if (nb::hasattr(value, "dtype")) {
-    number = PyObject_IsTrue(value.ptr());  // numpy.bool is no index
+    number = PyObject_IsTrue(value.ptr());  // numpy.bool has no __index__
   }
   if (number != 0 && number != 1) refuse(what, "True or False", value);
   store(to, static_cast<std::uint8_t>(number));
@@ -116,7 +116,7 @@ void write_label(const Schema& schema, const FieldRow& field, nb::handle value, 
     }
   }
   if (!known) refuse(what, "one of " + labels_of(schema, field), value);
-  std::memcpy(to, &number, field.size);  // little end first
+  std::memcpy(to, &number, field.size);  // little-endian
 }
 
 std::string fields_of(const Schema& schema, const o80::TypeRow& row) {
@@ -127,13 +127,13 @@ std::string fields_of(const Schema& schema, const o80::TypeRow& row) {
   return there.empty() ? "it has no fields" : "its fields are " + there;
 }
 
-/// Fills a struct, number after number.
+/// Writes a Python value into the bytes of a struct.
 class Writer {
  public:
   Writer(const Schema& schema, StateBytes& state, Missing missing)
       : schema_(schema), state_(state), missing_(missing) {}
 
-  /// `number` is the place of the struct's first number in the whole state.
+  /// `number`: index of the struct's first number in the whole state.
   void write(std::uint32_t type, nb::handle value, std::byte* to, std::uint32_t number,
              const std::string& what) {
     if (const FieldRow* alone = plain_number(schema_, type)) {
@@ -179,7 +179,7 @@ class Writer {
       place += numbers_in(member);
     }
     if (missing_ == Missing::kept && row.fields > 0 && nb::len(names) == 0) {
-      throw InvalidArgument(what + " gives no field: " + fields_of(schema_, row));
+      throw InvalidArgument(what + " names no field: " + fields_of(schema_, row));
     }
     if (found == nb::len(names)) return;
     for (nb::handle name : names) {

@@ -9,15 +9,15 @@
 
 #include "o80/describe/schema.hpp"
 
-/// The index of the number that is alone in a type, or nothing for a type with names.
+/// The field of a type that is a plain number; null for a type with named fields.
 const o80::FieldRow* plain_number(const o80::Schema& schema, std::uint32_t type);
 
 /// Writes one number; `what` names it in the error.
 void write_number(const o80::Schema& schema, const o80::FieldRow& field, nanobind::handle value,
                   std::byte* to, const std::string& what);
 
-/// What becomes of the fields of a struct that a mapping leaves out: they stay as they are, or get
-/// their default, and it is an error if they have none.
+/// Fields that a mapping leaves out keep their value, or get their default (an error if they have
+/// none).
 enum class Missing : std::uint8_t { kept, by_default };
 
 /// A described struct from Python: a number, a mapping, a record, or a sequence of all its fields.
@@ -26,7 +26,7 @@ struct StateBytes {
   std::vector<std::uint64_t> mask;  // a bit for each number that was given
   bool whole = true;
 
-  /// Throws InvalidArgument, naming `owner`, the field and what there is.
+  /// Throws InvalidArgument with `owner`, the field and the known fields.
   StateBytes(const o80::Schema& schema, std::uint32_t type, nanobind::handle value,
              const std::string& owner, Missing missing = Missing::kept);
 };

@@ -11,7 +11,7 @@ namespace nb = nanobind;
 
 namespace {
 
-/// The value whose text is `word`; the error lists what there is.
+/// The value whose text is `word`; the error lists all values.
 template <class Value, std::size_t N>
 Value parse(nb::handle word, const std::array<Value, N>& values, const char* name) {
   Py_ssize_t size = 0;
@@ -26,12 +26,12 @@ Value parse(nb::handle word, const std::array<Value, N>& values, const char* nam
     there += (there.empty() ? "'" : ", '") + std::string(known) + "'";
   }
   PyErr_Clear();
-  throw o80::InvalidArgument(std::string(name) + " cannot be " +
-                             nb::cast<std::string>(nb::repr(word)) + ": it is one of " + there);
+  throw o80::InvalidArgument(std::string(name) + " must be one of " + there + ", got " +
+                             nb::cast<std::string>(nb::repr(word)));
 }
 
-/// The member of a Python enumeration, looked up once and kept for the life of the process.
-/// `count`: of the values; any other means the first one.
+/// The member of a Python enumeration, looked up once and kept until the process ends.
+/// `count`: number of values; a value beyond them becomes the first one.
 template <std::size_t count, class Value>
 nb::object member(Value value, const char* type) {
   static std::array<PyObject*, count> known{};

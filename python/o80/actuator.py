@@ -1,4 +1,4 @@
-"""The things that can be commanded, as a robot describes them."""
+"""The actuators of a robot and their numbers, as its segment describes them."""
 
 import itertools
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ class Number:
     unit: str
     help: str
     limits: Limits
-    rest: float | None  #: where it goes when no command drives it
+    rest: float | None  #: value to which it goes without a command; None: it holds or follows
 
     @property
     def minimum(self) -> float:
@@ -39,7 +39,7 @@ class Number:
 
 @dataclass(frozen=True, kw_only=True)
 class Actuator:
-    """One thing that can be commanded."""
+    """One actuator."""
 
     index: int
     name: str
@@ -49,7 +49,7 @@ class Actuator:
 
     @property
     def limits(self) -> Limits:
-        """Those of the first number."""
+        """The limits of the first number."""
         return self.numbers[0].limits
 
     @property

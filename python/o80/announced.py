@@ -1,4 +1,4 @@
-"""What installed packages announce to o80 by entry points."""
+"""Entry points by which installed packages register robots and frontends."""
 
 import os
 import sys
@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 def announced(group: str) -> "dict[str, EntryPoint]":
     """The entry points of a group, by name.
 
-    The standard library takes milliseconds to read those of all packages, and as long to be
-    imported, so it is asked only if a package names the group.
+    importlib.metadata takes milliseconds to import and to read all packages, so it is used only if
+    a package has an entry point of this group.
     """
     if not any(_names_group(folder or os.curdir, group.encode()) for folder in sys.path):
         return {}
@@ -24,11 +24,11 @@ def announced(group: str) -> "dict[str, EntryPoint]":
 
 
 def _names_group(place: str, group: bytes) -> bool:
-    """Whether a package in a folder of sys.path may have such an entry point."""
+    """True if a package in a folder of sys.path may have an entry point of the group."""
     try:
         names = os.listdir(place)
     except NotADirectoryError:
-        return True  # an archive: only the standard library looks into it
+        return True  # an archive: importlib.metadata reads it
     except OSError:
         return False
     for name in names:

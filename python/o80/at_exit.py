@@ -1,4 +1,4 @@
-"""What was not closed when the interpreter ends is closed then: segments, lanes, processes."""
+"""Closes segments, lanes and processes that are still open when the interpreter ends."""
 
 import atexit
 import os
@@ -9,23 +9,23 @@ from weakref import WeakKeyDictionary
 
 
 class Owner(Protocol):
-    """Whatever is to be given back."""
+    """An object that is closed when the interpreter ends."""
 
     def _close_at_exit(self) -> None: ...
 
 
-_open: WeakKeyDictionary[Owner, int] = WeakKeyDictionary()  # and the process it lives in
-_workers: set[int] = set()  # processes of multiprocessing whose end is watched
+_open: WeakKeyDictionary[Owner, int] = WeakKeyDictionary()  # with the process that opened it
+_workers: set[int] = set()  # multiprocessing workers that have the exit handler
 
 
 def close_later(owner: Owner) -> None:
-    """Closes it at the end, unless that was done before; what was opened last is closed first."""
+    """Closes `owner` at exit, unless it is closed before. The last one opened is closed first."""
     _open[owner] = os.getpid()
     _watch_worker()
 
 
 def _watch_worker() -> None:
-    """A forked worker of multiprocessing leaves without asking atexit."""
+    """Registers the exit handler in a forked multiprocessing worker, which skips atexit."""
     process = sys.modules.get("multiprocessing.process")
     if process is None or process.parent_process() is None or os.getpid() in _workers:
         return
@@ -38,9 +38,9 @@ def _watch_worker() -> None:
 @atexit.register
 def _close_all() -> None:
     for owner, process in reversed(list(_open.items())):
-        if process != os.getpid():  # a forked child leaves it to its parent
+        if process != os.getpid():  # a forked child: the parent closes it
             continue
         try:
             owner._close_at_exit()
         except Exception:
-            traceback.print_exc()  # the others are closed all the same
+            traceback.print_exc()  # and close the others

@@ -9,23 +9,23 @@ from o80.frontend import Frontend
 
 
 class BurstGroup:
-    """The bursts of a group under way, made by `o80.burst(members, wait=False)`."""
+    """The bursts of a group, made by `o80.burst(members, wait=False)`."""
 
     def __init__(self, bursts: dict[Frontend, _core.Burst]) -> None:
         self._bursts = bursts
 
     @property
     def bursts(self) -> Mapping[Frontend, _core.Burst]:
-        """The burst of each member, to be asked or waited for by itself."""
+        """The burst of each member."""
         return MappingProxyType(self._bursts)
 
     @property
     def done(self) -> bool:
-        """Whether the last iteration of every member is done."""
+        """True if the last iteration of every member is done."""
         return all(burst.done for burst in self._bursts.values())
 
     def cancel(self) -> None:
-        """Each member stands still after the iteration under way."""
+        """Cancels all bursts: each backend stops after its current iteration."""
         for burst in self._bursts.values():
             burst.cancel()
 

@@ -1,4 +1,4 @@
-"""Arguments of calls: each error names the argument and what is expected."""
+"""Checks of arguments. Each error names the argument, what it must be, and what it is."""
 
 import operator
 from collections.abc import Mapping, Sequence
@@ -14,16 +14,16 @@ def whole(value: Any, name: str, least: int | None = None) -> int:
     try:
         number = operator.index(value)
     except TypeError:
-        raise InvalidArgument(f"{name} is a whole number, not {value!r}") from None
+        raise InvalidArgument(f"{name} must be a whole number, got {value!r}") from None
     if isinstance(value, bool):
-        raise InvalidArgument(f"{name} is a whole number, not {value!r}")
+        raise InvalidArgument(f"{name} must be a whole number, got {value!r}")
     if least is not None and number < least:
         raise InvalidArgument(f"{name} must be at least {least}, got {number}")
     return number
 
 
 def whole_or_none(value: Any, name: str, least: int | None = None) -> int | None:
-    """The same, or None."""
+    """A whole number, or None. Raises InvalidArgument."""
     return None if value is None else whole(value, name, least)
 
 
@@ -32,12 +32,12 @@ def mapping(value: Any, name: str, holds: str) -> Mapping[Any, Any]:
     if value is None:
         return {}
     if not isinstance(value, Mapping):
-        raise InvalidArgument(f"{name} is a mapping from {holds}, not {value!r}")
+        raise InvalidArgument(f"{name} must be a mapping from {holds}, got {value!r}")
     return value
 
 
 def sequence(value: Any, name: str, example: str) -> Sequence[Any]:
-    """A list or the like, but no text. Raises InvalidArgument."""
+    """A sequence that is not a string, as a list. Raises InvalidArgument."""
     if isinstance(value, str) or not isinstance(value, (Sequence, np.ndarray)):
-        raise InvalidArgument(f"{name} is a list such as {example}, not {value!r}")
+        raise InvalidArgument(f"{name} must be a list such as {example}, got {value!r}")
     return list(value)

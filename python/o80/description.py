@@ -1,4 +1,4 @@
-"""A robot described from Python: NumPy dtypes become the schema of its segment."""
+"""Makes the schema of a segment from NumPy dtypes, for backends in Python."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from enum import IntEnum
@@ -17,14 +17,14 @@ FieldRow = tuple[str, str, list[int], str, dict[str, int] | None, int]
 
 
 class SchemaWriter:
-    """Fills a schema from what Python says of a robot."""
+    """Fills a schema from Python values."""
 
     def __init__(self, robot: str, units: Mapping[str, str]) -> None:
         self.builder = _core.SchemaBuilder(robot)
         self._units = units
 
     def add_actuators(self, actuators: Any, dtype: Described) -> None:
-        """Names, a number of actuators, or a mapping from groups to what they are made of."""
+        """Adds actuators: their names, their number, or a mapping from groups to their members."""
         if isinstance(actuators, Mapping):
             for group, members in actuators.items():
                 self._add_group(group, members)
@@ -40,12 +40,12 @@ class SchemaWriter:
                 self._add_named("", actuators, dtype)
         else:
             raise InvalidArgument(
-                f"actuators are names, a number of them, or a mapping from groups to dtypes, "
-                f"not {actuators!r}"
+                f"actuators must be a list of names, a number, or a mapping from groups to dtypes, "
+                f"got {actuators!r}"
             )
 
     def _add_group(self, group: str, members: Any) -> None:
-        """One actuator of a type, (type, how many), or (type, names)."""
+        """Adds a group. members: a type (one actuator), (type, how many), or (type, names)."""
         if not (isinstance(members, tuple) and len(members) == 2):
             self.builder.add_actuators(group, self._type(group, members), 1, False)
             return
@@ -62,14 +62,14 @@ class SchemaWriter:
             self.builder.name_actuator(first + i, name)
 
     def set_extended(self, extended: Described) -> None:
-        """Further sensor values: a structured dtype, or a mapping."""
+        """Sets the type of further sensor values: a structured dtype, or a mapping."""
         index = self._type("Extended", extended)
         self.builder.set_extended(index)
 
     def add_requests(
         self, requests: Mapping[str, Described | None], while_halted: Sequence[str] = ()
     ) -> None:
-        """Requests, each with its fields (None: it has none)."""
+        """Adds requests, each with its fields (None: no fields)."""
         for name in while_halted:
             if name not in requests:
                 raise InvalidArgument(f"while_halted: there is no request '{name}'")
@@ -78,20 +78,20 @@ class SchemaWriter:
             self.builder.add_request(name, described, "", name in while_halted)
 
     def set_limits(self, limits: Mapping[Any, Limit | Mapping[str, Limit]]) -> None:
-        """Limits of the first number of actuators, or of their fields."""
+        """Sets limits of actuators: of their first number, or a mapping from fields to limits."""
         for named, given in limits.items():
             actuator = self._index(named)
             for field, limit in given.items() if isinstance(given, Mapping) else [("", given)]:
                 self.builder.set_limits(actuator, field, list(Limits.of(limit).numbers()))
 
     def set_rests(self, rests: Mapping[Any, Mapping[str, float]]) -> None:
-        """Where fields of actuators go when no command drives them."""
+        """Sets the values to which fields of actuators go without a command."""
         for named, fields in rests.items():
             for field, value in fields.items():
                 self.builder.rests_at(self._index(named), field, value)
 
     def set_idle(self, when_idle: str | Mapping[Any, str]) -> None:
-        """ "hold" or "follow", for all actuators or for each."""
+        """Sets "hold" or "follow" for all actuators, or for each."""
         words = (
             when_idle
             if isinstance(when_idle, Mapping)
@@ -99,7 +99,7 @@ class SchemaWriter:
         )
         for named, word in words.items():
             if word not in ("hold", "follow"):
-                raise InvalidArgument(f"when_idle cannot be {word!r}: it is 'hold' or 'follow'")
+                raise InvalidArgument(f"when_idle must be 'hold' or 'follow', got {word!r}")
             if word == "follow":
                 self.builder.set_follow(self._index(named))
 
@@ -145,8 +145,8 @@ class SchemaWriter:
             return name, "struct", list(shape), text, None, self._type(name, element)
         if element.kind not in "biuf" or element.itemsize > 8 or element == np.dtype(np.float16):
             raise InvalidArgument(
-                f"'{name or owner}' cannot be of dtype {element}: numbers of 1 to 8 bytes, "
-                f"booleans and enums can be shared"
+                f"'{name or owner}' must be a number of 1 to 8 bytes, a boolean or an enum, "
+                f"got dtype {element}"
             )
         return name, element.name, list(shape), text, None, 0
 

@@ -1,4 +1,4 @@
-"""What o80 raises: one class a cause, with the cure in its text."""
+"""Exceptions of o80: one class for each cause. The text says what to do."""
 
 import builtins
 from typing import TYPE_CHECKING, Any, Optional
@@ -10,17 +10,17 @@ if TYPE_CHECKING:
 
 
 class Error(Exception):
-    """Base of everything o80 raises."""
+    """Base class of all exceptions of o80."""
 
 
 class InvalidArgument(Error, ValueError):
-    """A value that was given cannot be used."""
+    """An argument has a value that cannot be used."""
 
 
 class TimeoutError(Error, builtins.TimeoutError):
-    """A wait ended without its result.
+    """A wait ended by its timeout.
 
-    `batch` is what was waited for, if it was a batch: wait again, or ask its `handles`.
+    `batch` is the batch that was waited for, or None: wait again, or look at its `handles`.
     """
 
     def __init__(
@@ -32,24 +32,24 @@ class TimeoutError(Error, builtins.TimeoutError):
 
     @property
     def handles(self) -> "Sequence[Handle]":
-        """Of what was waited for, with their statuses; none if it was no batch."""
+        """The handles of that batch, with their statuses; empty if there is no batch."""
         return list(self._handles) if self.batch is None else self.batch.handles
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # in another process there is no batch to wait for, but there is what became of it
+        # another process cannot wait for the batch: keep its statuses
         return type(self), (str(self), None, self.handles)
 
 
 class SegmentTaken(Error):
-    """The name already has a living backend."""
+    """A living backend has the segment's name."""
 
 
 class SegmentError(Error):
-    """The file cannot be a segment of this o80, or cannot be made."""
+    """A file is not a segment of this version of o80, or cannot be created."""
 
 
 class SchemaMismatch(Error):
-    """The robot is not described as it was expected."""
+    """The robot is described differently than expected."""
 
 
 class BackendGone(Error):
@@ -57,7 +57,7 @@ class BackendGone(Error):
 
 
 class BackendHalted(Error):
-    """The backend is halted: commands end or are refused until somebody resumes it."""
+    """The backend is halted: commands end or are rejected until a frontend resumes it."""
 
 
 class BackendStopped(BackendGone):
@@ -73,7 +73,7 @@ class BackendKilled(BackendGone):
 
 
 class BackendSuperseded(BackendGone):
-    """A new backend took the name: `reattach`, or open a new frontend."""
+    """A new backend has taken the name: call `reattach`, or open a new frontend."""
 
 
 class RowOverwritten(Error, LookupError):
@@ -81,19 +81,19 @@ class RowOverwritten(Error, LookupError):
 
 
 class LaneFull(Error):
-    """Too much is in flight; nothing was sent."""
+    """The lane has no room for the batch; nothing was sent."""
 
 
 class NoLane(Error):
-    """As many frontends command as the segment has lanes."""
+    """All lanes of the segment are in use by other frontends."""
 
 
 class NotBursting(Error, RuntimeError):
-    """A burst was asked of a backend that runs by the clock."""
+    """A burst was requested from a backend that runs in real time."""
 
 
 class ReadOnly(Error, RuntimeError):
-    """The frontend was opened to read only."""
+    """The frontend was opened with read_only=True."""
 
 
 class UsedAfterFork(Error, RuntimeError):
@@ -105,7 +105,7 @@ class Closed(Error, RuntimeError):
 
 
 class Cancelled(Error):
-    """A wait was ended by its caller."""
+    """A wait was cancelled by its caller."""
 
 
 class DriverError(Error, RuntimeError):
@@ -113,9 +113,9 @@ class DriverError(Error, RuntimeError):
 
 
 class RequestRejected(Error):
-    """A request was not served; the text says why.
+    """A request was rejected; the text is the reason.
 
-    Raised by a handler of an embedded backend, it is what the sender reads.
+    The handler of an embedded backend raises it to reject a request; the sender reads the text.
     """
 
 

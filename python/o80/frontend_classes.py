@@ -1,4 +1,4 @@
-"""Which robot has a Frontend class of its own."""
+"""Frontend classes for single robots."""
 
 from typing import TYPE_CHECKING
 
@@ -13,9 +13,9 @@ _registered: dict[str, type["Frontend"]] = {}
 
 
 def register_frontend(robot: str, cls: type["Frontend"]) -> None:
-    """Makes `o80.Frontend` return a subclass for segments of that robot.
+    """Registers a subclass that `o80.Frontend(...)` returns for segments of this robot.
 
-    A package does the same with an entry point of the group "o80.frontends".
+    A package can do the same with an entry point of the group "o80.frontends".
     """
     _registered[robot] = cls
 

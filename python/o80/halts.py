@@ -1,4 +1,4 @@
-"""The halt of a backend: a latched stop that anybody who may command can ask for."""
+"""The halt of a backend: every commander can request it, and it stays until it is resumed."""
 
 from dataclasses import dataclass
 
@@ -7,18 +7,18 @@ from o80 import _core
 
 @dataclass(frozen=True)
 class Halt:
-    """Why a backend is halted."""
+    """A halt that is in force, or requested."""
 
-    number: int  #: what `Frontend.resume` names
+    number: int  #: argument of `Frontend.resume`
     cause: str  #: frontend, driver, silence, dead_frontend, error, overruns or predecessor
-    iteration: int | None  #: in which it began to act; None if it was asked for a moment ago
-    who: str  #: the process that asked for it; empty if the backend did
+    iteration: int | None  #: in which it began; None if it is requested and not yet in force
+    who: str  #: the process that requested it; empty if the backend did
     text: str  #: the reason in words
 
 
 def halt(segment: str, reason: str = "", timeout: float | None = 0.0) -> int:
-    """Halts the backend of a segment, also one that is still starting; the number of the halt.
+    """Halts the backend of a segment, also one that is still starting; returns the halt's number.
 
-    timeout: how long to wait for a backend [s]. Raises TimeoutError, SegmentError, BackendGone.
+    timeout: how long to wait for the backend [s]. Raises TimeoutError, SegmentError, BackendGone.
     """
     return _core.halt(segment, reason, timeout)

@@ -1,4 +1,4 @@
-"""Where o80 was installed."""
+"""The folder in which o80 is installed."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""How the rows of a robot become NumPy arrays."""
+"""Conversion of a robot's rows to NumPy arrays."""
 
 import json
 from collections.abc import Iterator
@@ -35,13 +35,13 @@ def dtype_of_field(field: dict[str, Any]) -> np.dtype[Any]:
 
 
 def is_plain(described: dict[str, Any]) -> bool:
-    """Whether a described type is a plain number."""
+    """True if a described type is a plain number."""
     fields = described["fields"]
     return len(fields) == 1 and not fields[0]["name"]
 
 
 def dtype_of_type(described: dict[str, Any]) -> np.dtype[Any]:
-    """The dtype of a described struct, or of the plain number it is."""
+    """The dtype of a described struct or plain number."""
     fields = described["fields"]
     if is_plain(described):
         return np.dtype((dtype_of_field(fields[0]), tuple(fields[0]["shape"])))
@@ -74,7 +74,7 @@ def dtype_of_block(groups: list[dict[str, Any]], size: int) -> np.dtype[Any]:
 
 
 def fields_of(described: dict[str, Any]) -> Iterator[tuple[dict[str, Any], dict[str, Any]]]:
-    """Every field of a described type, nested ones included, with the struct it is in."""
+    """Every field of a described type, also nested ones, with its struct."""
     for field in described["fields"]:
         yield described, field
         if field["kind"] == "struct":
@@ -103,7 +103,7 @@ def runs_of(dtype: np.dtype[Any], offset: int) -> Iterator[tuple[np.dtype[Any], 
 def joined(
     runs: Iterator[tuple[np.dtype[Any], int, int]],
 ) -> list[tuple[np.dtype[Any], int, int]]:
-    """The same, neighbours of one kind made one."""
+    """The same runs; adjacent runs of one kind are joined."""
     result: list[tuple[np.dtype[Any], int, int]] = []
     for kind, offset, count in runs:
         if result:
@@ -172,7 +172,7 @@ class Layout:
     def enums(self) -> dict[str, type[IntEnum]]:
         """An enum for each enumerated field: by its name, and by "Type.field".
 
-        That of a state which is nothing but an enum: by the name of its group, or "state".
+        If a state is a plain enum, its enum is named after the group, or "state".
         """
         found: dict[str, type[IntEnum]] = {}
         ambiguous: set[str] = set()
@@ -276,6 +276,6 @@ class Layout:
 
 @lru_cache(maxsize=64)
 def decoder_of(table: bytes) -> _core.Decoder:
-    """How to read rows that were pickled: a robot's description as it stands in a segment."""
+    """The decoder of pickled rows; `table` is the description in the format of a segment."""
     description = _core.Description(table)
     return _core.Decoder(description, Layout(description))

@@ -1,4 +1,4 @@
-"""What a number of an actuator's state may do."""
+"""Limits of the numbers of an actuator's state."""
 
 import math
 from collections.abc import Sequence
@@ -9,9 +9,9 @@ from o80.errors import InvalidArgument
 
 @dataclass(frozen=True, kw_only=True)
 class Limits:
-    """Limits of one number, in the unit of its field; what is not given is not limited.
+    """Limits of one number, in the unit of its field; the default is no limit.
 
-    An acceleration needs a speed, a jerk needs an acceleration.
+    A limit of acceleration needs one of speed; a limit of jerk needs one of acceleration.
     """
 
     minimum: float = -math.inf
@@ -19,21 +19,21 @@ class Limits:
     speed: float = math.inf  #: [unit/s]
     acceleration: float = math.inf  #: [unit/s^2]
     jerk: float = math.inf  #: [unit/s^3]
-    error: float = math.inf  #: desired and observed further apart than that halt the backend
+    error: float = math.inf  #: a larger difference of desired and observed halts the backend
 
     @classmethod
     def of(cls, given: "Limits | Sequence[float | None]") -> "Limits":
-        """The same; or from (minimum, maximum, ...), in the order of the fields."""
+        """Limits from Limits, or from (minimum, maximum, ...) in the order of the fields."""
         if isinstance(given, Limits):
             return given
         names = ("minimum", "maximum", "speed", "acceleration", "jerk", "error")
         if not isinstance(given, (tuple, list)) or len(given) > len(names):
             raise InvalidArgument(
-                f"limits cannot be {given!r}: give o80.Limits({', '.join(n + '=' for n in names)})"
+                f"limits must be o80.Limits({', '.join(n + '=' for n in names)}), got {given!r}"
             )
         pairs = zip(names, given, strict=False)
         return cls(**{name: value for name, value in pairs if value is not None})
 
     def numbers(self) -> tuple[float, ...]:
-        """All of them, in the order of the fields."""
+        """All limits, in the order of the fields."""
         return astuple(self)

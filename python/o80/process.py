@@ -1,4 +1,4 @@
-"""A robot that runs as a process of its own."""
+"""Starts a robot in a process of its own, and stops it."""
 
 import contextlib
 import os
@@ -25,62 +25,64 @@ from o80.frontend import Frontend
 from o80.installation import prefix
 
 GRACE = 5.0  # [s] for a robot to stop
-LOOK = 0.002  # [s] between looks at a robot that starts
+LOOK = 0.002  # [s] between checks of a robot that starts
 BAD_OPTIONS = 2  # exit code
 
 
 class Process:
     """A robot's process. Leaving a `with` block stops it; it also ends when this process does.
 
-    However this process ends, also killed, the robot notices and stops in order. To let it live
-    on, start it by `o80 run`. Stopped by nobody until it is collected, it is stopped with a
-    ResourceWarning. May be used from several threads; in a forked child only `frontend` may.
+    The robot stops in order when this process ends in any way, also by a kill. Start it with
+    `o80 run` if it must continue. If it is garbage collected while it runs, it is stopped with a
+    ResourceWarning. May be used from several threads; a forked child may call only `frontend`.
     """
 
     def __init__(self, popen: subprocess.Popen[bytes], segment: str, output: IO[bytes]) -> None:
         self._popen = popen
         self._output = output
         self._owner = os.getpid()
-        self.segment = segment  #: the name to attach to
+        self.segment = segment  #: name of its segment
         _started.add(self)
         at_exit.close_later(self)
 
     @property
     def pid(self) -> int:
-        """Of the process."""
+        """The process id."""
         return self._own.pid
 
     @property
     def alive(self) -> bool:
-        """Whether it runs."""
+        """True while the process runs."""
         return self._own.poll() is None
 
     @property
     def output(self) -> str:
-        """All that it printed so far."""
+        """Everything it has printed so far."""
         self._check_process()
         printed = self._output.fileno()
         text = b""
-        # not by seeking: the robot writes where the file's position is
+        # pread, not seek: the robot writes at the position of this open file
         while part := os.pread(printed, 1 << 16, len(text)):
             text += part
         return text.decode(errors="replace")
 
     def frontend(self, timeout: float | None = 5.0, **options: Any) -> Frontend:
-        """A frontend of it; takes what Frontend takes."""
+        """A frontend attached to the robot; takes the arguments of Frontend."""
         return Frontend(self.segment, timeout, **options)
 
     def wait(self, timeout: float | None = None) -> int:
-        """Waits for its end and gives the exit code: 0 if it ended in order.
+        """Waits until the process ends and returns its exit code: 0 for an end in order.
 
         Raises TimeoutError after `timeout` [s].
         """
         if not self._ends_within(timeout):
-            raise TimeoutError(f"the robot of '{self.segment}' still runs")
+            raise TimeoutError(
+                f"the robot of '{self.segment}' did not end within {timeout} s: stop() ends it"
+            )
         return self._popen.wait()
 
     def stop(self, timeout: float = GRACE) -> None:
-        """Stops it in order; after `timeout` [s] it is killed.
+        """Stops the robot in order; kills it after `timeout` [s].
 
         A `wait` in another thread returns.
         """
@@ -97,8 +99,8 @@ class Process:
     def _check_process(self) -> None:
         if self._owner != os.getpid():
             raise UsedAfterFork(
-                f"the robot of '{self.segment}' was started before this process was forked and is "
-                f"its parent's to stop; attach to it by o80.Frontend({self.segment!r})"
+                f"the robot of '{self.segment}' was started by the parent of this process, which "
+                f"alone can stop it; attach to it by o80.Frontend({self.segment!r})"
             )
 
     @property
@@ -107,12 +109,12 @@ class Process:
         return self._popen
 
     def _ends_within(self, timeout: float | None) -> bool:
-        """Waits for its end; Ctrl-C ends that at once, which Popen.wait delays."""
+        """True if it ends within `timeout`. Ctrl-C ends this wait at once, unlike Popen.wait."""
         if self._own.poll() is not None:
             return True
         try:
             life = os.pidfd_open(self._popen.pid)
-        except ProcessLookupError:  # another thread has waited for it meanwhile
+        except ProcessLookupError:  # another thread has collected its exit code meanwhile
             return True
         try:
             end = select.poll()
@@ -122,7 +124,7 @@ class Process:
             os.close(life)
 
     def _let_go(self) -> None:
-        """In a forked child: the robot ends with the parent, and is not waited for here."""
+        """In a forked child: forgets the process, which ends with the parent."""
         if self._popen.stdin is not None:
             self._popen.stdin.close()
         self._popen.returncode = 0
@@ -170,7 +172,7 @@ _started: WeakSet[Process] = WeakSet()
 
 
 def _let_go_of_all() -> None:
-    """A child would keep the robots of a parent that was killed."""
+    """Closes the inherited pipes: else robots of a killed parent would run as long as the child."""
     for process in list(_started):
         process._let_go()
     _started.clear()
@@ -192,9 +194,9 @@ def start_process(
             stdin=subprocess.PIPE,
             stdout=output,
             stderr=subprocess.STDOUT,
-            # Ctrl-C is for the program, which stops the robot in order. Not a session of its own:
-            # on a loaded machine the kernel shares processors out between sessions first, and all
-            # the programs that read the robot would weigh as much as the robot alone
+            # A process group of its own: Ctrl-C reaches only this program, which stops the robot in
+            # order. Not a session of its own: the kernel divides processor time between sessions
+            # first, so the robot alone would get as much as all programs that read it.
             process_group=0,
         )
     except BaseException:
@@ -219,8 +221,8 @@ def _wait_until_running(process: Process, timeout: float | None) -> None:
             raise _why_it_ended(process)
         if end is not None and time.monotonic() > end:
             raise TimeoutError(
-                f"the robot of '{process.segment}' was not running after {timeout} s: give it "
-                f"more time, or see what it printed:\n{process.output}"
+                f"the robot of '{process.segment}' was not running after {timeout} s: pass a "
+                f"longer timeout, or read what it printed:\n{process.output}"
             )
         time.sleep(LOOK)
 
@@ -234,7 +236,7 @@ def _runs(process: Process) -> bool:
 
 def _why_it_ended(process: Process) -> Error:
     code = process.wait()
-    # what o80 says last, without what the driver printed before
+    # the last message of o80, without the output of the driver before it
     text = process.output.strip().rpartition("\no80: ")[2].removeprefix("o80: ")
     text = text or f"it ended with exit code {code}"
     if code == BAD_OPTIONS:

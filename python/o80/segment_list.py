@@ -1,4 +1,4 @@
-"""The segments there are on this computer."""
+"""The segments on this computer."""
 
 from dataclasses import dataclass
 
@@ -7,28 +7,28 @@ from o80 import _core
 
 @dataclass(frozen=True, kw_only=True)
 class Segment:
-    """What stands in shared memory under one name."""
+    """One segment in shared memory."""
 
     name: str
     life: str  #: starting, running, stopped, failed, superseded or killed
-    readable: bool  #: False: made by another version, or not ours to read or to trust
+    readable: bool  #: False: of another version, or this user may not read or trust it
     pid: int
-    process_start: int  #: tells its process from a later one of the same pid
+    process_start: int  #: distinguishes its process from a later one with the same pid
     user: str
     program: str
     started_at: int  #: [s] since 1970
     bytes: int
-    epoch: int  #: names this run of the backend
-    problem: str = ""  #: why it is not readable
+    epoch: int  #: identifies this run of the backend
+    problem: str = ""  #: reason why it is not readable
 
     @property
     def alive(self) -> bool:
-        """Whether its backend lives."""
+        """True while its backend runs or starts."""
         return self.life in ("starting", "running")
 
 
 def segments() -> list[Segment]:
-    """All segments, by name, living and dead."""
+    """All segments, alive and dead, sorted by name."""
     return [
         Segment(
             name=entry.name,
@@ -48,9 +48,9 @@ def segments() -> list[Segment]:
 
 
 def clean(name: str | None = None) -> list[str]:
-    """Removes a dead segment (None: all of them) and gives the names of those removed.
+    """Removes a dead segment (None: all dead ones) and returns the names of the removed segments.
 
-    Raises SegmentTaken if the backend of that name lives.
+    Raises SegmentTaken if the backend of that segment is alive.
     """
     if name is None:
         return _core.clean_dead()

@@ -1,4 +1,4 @@
-"""Ends backends that other processes run."""
+"""Stops backends in other processes."""
 
 import contextlib
 import os
@@ -10,14 +10,14 @@ from o80 import _core
 from o80.errors import InvalidArgument, SegmentError, TimeoutError
 from o80.segment_list import Segment, segments
 
-LOOK = 0.01  # [s] between looks at a backend that stops
+LOOK = 0.01  # [s] between checks of a backend that stops
 
 
 def stop(name: str, timeout: float = 5.0) -> None:
-    """Stops the backend of a segment in order, whoever started it: its process gets SIGTERM.
+    """Stops the backend of a segment in order: its process gets SIGTERM.
 
-    Returns when the backend has stopped. Raises InvalidArgument if none of that name runs,
-    SegmentError if it cannot be signalled from here, TimeoutError if it still runs after `timeout`
+    Returns when the backend has stopped. Raises InvalidArgument if no backend of that name runs,
+    SegmentError if this process may not signal it, TimeoutError if it still runs after `timeout`
     [s].
     """
     running = {entry.name: entry for entry in segments() if entry.alive}
@@ -28,7 +28,7 @@ def stop(name: str, timeout: float = 5.0) -> None:
 
 
 def stop_entry(entry: Segment, timeout: float) -> None:
-    """The same for one run of a backend; does nothing if that run is over."""
+    """Stops one run of a backend; does nothing if that run has ended."""
     with _process_of(entry) as process:
         if process is None or not _runs(entry):
             return
@@ -45,19 +45,18 @@ def stop_entry(entry: Segment, timeout: float) -> None:
     while _runs(entry):
         if time.monotonic() > end:
             raise TimeoutError(
-                f"'{entry.name}' (pid {entry.pid}) did not stop in {timeout:g} s: its driver may "
-                f"hang; give it more time, or end it with `kill -9 {entry.pid}`"
+                f"'{entry.name}' (pid {entry.pid}) did not stop in {timeout:g} s, its driver may "
+                f"hang: pass a longer timeout, or end it with `kill -9 {entry.pid}`"
             )
         time.sleep(LOOK)
 
 
 @contextlib.contextmanager
 def _process_of(entry: Segment) -> Iterator[int | None]:
-    """A descriptor of the backend's process, or None if it is gone.
+    """A descriptor of the backend's process, or None if the process has ended.
 
-    A process id may belong to another process by now, or to one of another container. The
-    descriptor stays with the process it was opened for, and is used only if that one began when the
-    backend's did.
+    A process id may be reused, or belong to another container. A descriptor refers to one process;
+    it is used only if the start time of that process is the one in the segment.
     """
     try:
         process = os.pidfd_open(entry.pid)

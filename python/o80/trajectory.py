@@ -1,4 +1,4 @@
-"""Targets of many rows, from Python values to the bytes of each actuator."""
+"""Converts targets of trajectories from Python values to bytes of each actuator."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -16,7 +16,7 @@ def states_of(
     single: bool,
     layout: Layout,
 ) -> tuple[NDArray[np.uint8], int]:
-    """Bytes of the rows of the first actuator, then of the next..., and how many rows."""
+    """Bytes of all rows of the first actuator, then of the second, and so on; number of rows."""
     kind = common_type(actuators, layout)
     if isinstance(targets, Mapping):
         array = _from_fields(targets, kind)
@@ -36,7 +36,7 @@ def states_of(
 
 
 def common_type(actuators: Sequence[int], layout: Layout) -> np.dtype[Any]:
-    """The state that all of them have."""
+    """The state type of all these actuators. Raises InvalidArgument if they differ."""
     schema = layout.schema
     groups = {schema["actuators"][actuator]["group"] for actuator in actuators}
     kinds = {dtype_of_type(schema["groups"][group]["type"]) for group in groups}

@@ -14,17 +14,17 @@ import o80
     ("call", "text"),
     [
         (lambda arm: arm.resume(-1), "number of a halt must be at least 1, got -1"),
-        (lambda arm: arm.resume("x"), "number of a halt is a whole number, not 'x'"),
-        (lambda arm: arm.halt(None), "reason of a halt is a text, not None"),
-        (lambda arm: arm.history("x"), "observations, is a whole number, not 'x'"),
-        (lambda arm: arm.history(since="x"), "since is a whole number, not 'x'"),
-        (lambda arm: arm.prepared_burst("x"), "iterations of a burst is a whole number, not 'x'"),
+        (lambda arm: arm.resume("x"), "number of a halt must be a whole number, got 'x'"),
+        (lambda arm: arm.halt(None), "reason of a halt must be a string, got None"),
+        (lambda arm: arm.history("x"), "observations, must be a whole number, got 'x'"),
+        (lambda arm: arm.history(since="x"), "since must be a whole number, got 'x'"),
+        (lambda arm: arm.prepared_burst("x"), "a burst must be a whole number, got 'x'"),
         (lambda arm: arm.add_trajectory([[0, 0]], times="abc"), "times .* not 'abc'"),
-        (lambda arm: arm.add_command(0, 0.1, mode=None), "mode cannot be None"),
-        (lambda arm: arm.add_command(0, 0.1, start=None), "start cannot be None"),
-        (lambda arm: arm.add_command(0, 0.1, on_limit=None), "on_limit cannot be None"),
-        (lambda arm: arm.add_command(0, 0.1, fastest=1), "fastest is True or False, not 1"),
-        (lambda arm: arm.add_command(True, 0.1), "index or its name, not by True"),
+        (lambda arm: arm.add_command(0, 0.1, mode=None), "mode must be one of .*, got None"),
+        (lambda arm: arm.add_command(0, 0.1, start=None), "start must be one of .*, got None"),
+        (lambda arm: arm.add_command(0, 0.1, on_limit=None), "on_limit must be one of"),
+        (lambda arm: arm.add_command(0, 0.1, fastest=1), "fastest must be True or False, got 1"),
+        (lambda arm: arm.add_command(True, 0.1), "index or its name, got True"),
         (
             lambda arm: arm.add_command(0, 0.1, on_limit="go_on", duration=1.0),
             "on_limit .* without a pace",
@@ -50,14 +50,14 @@ def test_a_frontend_says_which_argument_is_wrong(
     [
         ({"permission": 644}, r"permission must be an octal mode.*octal 1204"),
         ({"permission": 0}, "permission must be an octal mode"),
-        ({"permission": "640"}, "permission is a whole number, not '640'"),
+        ({"permission": "640"}, "permission must be a whole number, got '640'"),
         ({"actuators": -1}, "number of actuators must be at least 0, got -1"),
         ({"lane_blocks": 1}, "lane_blocks must be at least 16, got 1"),
         ({"lanes": 0}, "lanes must be at least 1, got 0"),
-        ({"silence": 1.5, "stale": "halt"}, "silence is a whole number, not 1.5"),
+        ({"silence": 1.5, "stale": "halt"}, "silence must be a whole number, got 1.5"),
         ({"history": -1}, "history must be at least 1, got -1"),
-        ({"requests": ["home"]}, r"requests is a mapping from names .*, not \['home'\]"),
-        ({"limits": [1.0]}, "limits is a mapping from actuators"),
+        ({"requests": ["home"]}, r"requests must be a mapping from names .*, got \['home'\]"),
+        ({"limits": [1.0]}, "limits must be a mapping from actuators"),
     ],
 )
 def test_a_backend_says_which_argument_is_wrong(
@@ -72,8 +72,8 @@ def test_a_backend_says_which_argument_is_wrong(
 @pytest.mark.parametrize(
     ("wrong", "text"),
     [
-        ({"cpus": 3}, r"cpus is a list such as \[2, 3\], not 3"),
-        ({"permission": "640"}, "permission is a whole number, not '640'"),
+        ({"cpus": 3}, r"cpus must be a list such as \[2, 3\], got 3"),
+        ({"permission": "640"}, "permission must be a whole number, got '640'"),
         ({"permission": 644}, "permission"),
         ({"priority": 90}, "--priority needs --policy fifo or rr"),
     ],
@@ -90,6 +90,6 @@ def test_a_target_that_gives_no_field_is_refused(segment: str) -> None:
     with o80.Backend(segment, ["a"], fields) as backend:
         backend.publish()
         with o80.Frontend(segment) as frontend:
-            with pytest.raises(o80.InvalidArgument, match=r"gives no field.*position"):
+            with pytest.raises(o80.InvalidArgument, match=r"names no field.*position"):
                 frontend.add_command("a", {})
             assert frontend.added == 0

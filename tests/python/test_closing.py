@@ -171,9 +171,9 @@ def test_a_group_with_one_that_is_closed_does_not_begin(segment: str) -> None:
 
 def test_a_burst_is_of_a_whole_number_of_iterations(arm: o80.Frontend) -> None:
     for wrong in (1.5, "many", None):
-        with pytest.raises(o80.InvalidArgument, match="burst is a whole number"):
+        with pytest.raises(o80.InvalidArgument, match="burst must be a whole number"):
             arm.burst(wrong)  # type: ignore[call-overload]
-        with pytest.raises(o80.InvalidArgument, match="burst is a whole number"):
+        with pytest.raises(o80.InvalidArgument, match="burst must be a whole number"):
             o80.burst({arm: wrong})  # type: ignore[dict-item]
     assert arm.burst(np.int32(2)).iteration == 2  # type: ignore[call-overload]
 

@@ -339,7 +339,7 @@ def test_a_trajectory_across_types_is_refused(robot: Robot) -> None:
 def test_the_only_number_of_a_struct_needs_no_name(robot: Robot) -> None:
     assert robot.desired("drive", 2.0).drive.speed == 2.0
     assert robot.desired("drive", {"speed": 3.0}).drive.speed == 3.0
-    with pytest.raises(o80.InvalidArgument, match="'drive' is a number, not 'fast'"):
+    with pytest.raises(o80.InvalidArgument, match="'drive' must be a number, got 'fast'"):
         robot.frontend.add_command("drive", "fast")
 
 
