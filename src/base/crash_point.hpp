@@ -1,10 +1,11 @@
 #pragma once
 
-/// A named place at which a test may kill or stop the process, to prove that nothing breaks there.
+/// A labelled place at which a test kills or stops the process, to prove that the others survive.
 ///
-/// Compiles to nothing unless O80_CRASH_POINTS is defined. Then the process sends itself a signal
-/// when it passes the point of its crash plan, which is empty unless armed: by the program, or by
-/// the environment variable O80_CRASH_AT, "label" or "label:n" for the n-th passage (SIGKILL).
+/// Compiles to nothing unless O80_CRASH_POINTS is defined. With it, the process sends itself a
+/// signal at the label of its crash plan. A plan comes from the program, or from the environment
+/// variable O80_CRASH_AT: "label", or "label:n" for the n-th passage (SIGKILL). Without a plan
+/// nothing happens.
 #ifdef O80_CRASH_POINTS
 
 #include <signal.h>
@@ -18,10 +19,10 @@ namespace o80 {
 
 struct CrashPlan {
   std::string label{};
-  std::atomic<long> passages_left{0};  // 0: nothing is planned
+  std::atomic<long> passages_left{0};  // 0: no plan
   int signal = SIGKILL;
-  void (*before)() = nullptr;  // told just before the signal
-  void (*after)() = nullptr;   // and when a stopped process goes on
+  void (*before)() = nullptr;  // called just before the signal
+  void (*after)() = nullptr;   // called when a stopped process continues
 
   CrashPlan() {
     const char* target = secure_getenv("O80_CRASH_AT");

@@ -5,8 +5,8 @@
 
 namespace o80 {
 
-/// A text from memory that others write, fit for a terminal: bytes that are no printable ASCII
-/// become question marks.
+/// Makes a text from shared memory safe for a terminal: bytes other than printable ASCII become
+/// question marks.
 inline std::string printable(std::string_view text) {
   std::string clean(text);
   for (char& c : clean)

@@ -10,7 +10,7 @@
 
 namespace o80 {
 
-/// A text that is put together where nothing may be allocated; what does not fit is cut.
+/// A text buffer of fixed size, for code that must not allocate; excess characters are dropped.
 ///
 /// Realtime: yes.
 template <std::size_t Size>
@@ -22,7 +22,7 @@ class ShortText {
     size_ += count;
     return *this;
   }
-  /// The shortest text that is read back as the same number.
+  /// Adds the shortest text that parses to the same number.
   template <class Number>
     requires std::integral<Number> || std::floating_point<Number>
   ShortText& add(Number number) noexcept {

@@ -5,34 +5,35 @@
 
 namespace o80 {
 
-/// Turns durations into whole numbers of iterations such that their sum never drifts.
+/// Converts durations to whole numbers of iterations, so that their sum does not drift.
 ///
-/// What rounding added or took away is carried to the next duration of an unbroken queue; so is the
-/// debt of durations too short for the iteration that each takes at least.
+/// The rounding of each duration is carried to the next duration of the same queue. So is the
+/// excess of durations that are rounded up to one iteration.
 class DurationCarry {
  public:
   explicit DurationCarry(std::int64_t period = 1) noexcept : period_(period > 0 ? period : 1) {}
 
-  /// Iterations of the next duration [ns], at least 1.
+  /// Number of iterations of the next duration [ns], at least 1.
   std::int64_t iterations(std::int64_t duration) noexcept {
     const std::int64_t rounded = whole(duration);
     carry_ += duration - std::max<std::int64_t>(1, rounded) * period_;
     return std::max<std::int64_t>(1, rounded);
   }
-  /// A duration that is over before the next iteration would be; then it is counted, and takes
-  /// none.
+  /// True if the duration ends before the next iteration. It is then added to the carry and takes
+  /// no iteration.
   bool pass(std::int64_t duration) noexcept {
     if (whole(duration) >= 1) return false;
     carry_ += duration;
     return true;
   }
   void reset() noexcept { carry_ = 0; }
-  /// What is carried [ns], and the carry of another queue in its place: theirs go on together.
+  /// The carry [ns].
   std::int64_t carried() const noexcept { return carry_; }
+  /// Replaces the carry, by that of the other queues of a group command.
   void carry(std::int64_t nanoseconds) noexcept { carry_ = nanoseconds; }
 
  private:
-  /// Iterations until the exact end of a duration, rounded; not above 0 if that has passed.
+  /// Iterations until the exact end of a duration, rounded; 0 or less if that has passed.
   std::int64_t whole(std::int64_t duration) const noexcept {
     const std::int64_t exact = carry_ + duration;
     std::int64_t rounded = exact / period_;
@@ -45,7 +46,7 @@ class DurationCarry {
   }
 
   std::int64_t period_;     // [ns]
-  std::int64_t carry_ = 0;  // exact end of the queue after the rounded one [ns]
+  std::int64_t carry_ = 0;  // exact end of the last command minus its rounded end [ns]
 };
 
 }  // namespace o80

@@ -25,7 +25,7 @@ std::optional<ErrorWatch::Excess> ErrorWatch::find(const std::byte* desired,
     const StateLayout& layout = *layouts_[each.type];
     const double wanted = layout.number(each.number, desired + each.offset);
     const double found = layout.number(each.number, observed + each.offset);
-    // not "is greater": a comparison with NaN is false
+    // `<=`, because a comparison with NaN is false: NaN must count as an excess
     if (std::abs(wanted - found) <= each.limit) continue;
     return Excess{each.actuator, each.number, wanted, found, each.limit};
   }

@@ -7,13 +7,13 @@
 namespace o80 {
 namespace {
 
-// no iteration more for what rounds
+// rounding must not add an iteration
 constexpr double kTimeRounding = 1e-12;
 constexpr int kMostTries = 60;
 constexpr int kMostCorrections = 8;
 
-/// Where a function that grows from below 0 at `low` to 0 or more at `high` crosses 0, or comes as
-/// near as `tolerance`; by the Illinois method, with halvings where that is slow.
+/// The root of an increasing function between `low` and `high`, up to a function value of
+/// `tolerance`; by the Illinois method, with a bisection in every fourth step.
 template <class Function>
 double root(Function&& function, double low, double high, double tolerance) noexcept {
   double at_low = function(low);
@@ -70,7 +70,7 @@ FastestMotion::FastestMotion(double position, double speed, double acceleration,
     distance_ = -distance_;
   }
 
-  // the speed once the present acceleration has gone: below it, it would slow down and go on
+  // the speed after the present acceleration has faded out: the lowest cruising speed
   const double size = std::abs(start_acceleration_);
   const double steps = size > 0.0 ? std::floor(size / rates_.jerk) : 0.0;
   const double fading =
@@ -80,12 +80,12 @@ FastestMotion::FastestMotion(double position, double speed, double acceleration,
   const double most = std::ceil(time_to(rates_.speed) * (1.0 - kTimeRounding));
   const double at_most = distance(rates_.speed, most) - distance_;
   if (at_most <= 0.0) {
-    // at full speed for as long as it takes
+    // the target is farther: cruise at full speed
     cruise_ = rates_.speed;
     before_ = static_cast<std::int64_t>(most +
                                         std::ceil(-at_most / rates_.speed * (1.0 - kTimeRounding)));
   } else {
-    // no longer than it takes to get to the cruising speed
+    // the target is nearer: reduce the cruising speed until there is no time to cruise
     const auto beyond_at = [&](double cruise) {
       return distance(cruise, time_to(cruise)) - distance_;
     };
@@ -112,8 +112,10 @@ FastestMotion::Stop FastestMotion::stop_after(std::int64_t eased) const noexcept
   return stop;
 }
 
-/// Between two ways to rest that let go of the brake for one iteration more or less; beyond the
-/// last of them, between it and the slowest cruise. Sums of positions are linear, limits convex.
+/// The target lies between the ends of two stops that reduce the deceleration for k and k + 1
+/// iterations; or between the farthest of these stops and the slowest cruise. The motion is the
+/// weighted mean of the two: it reaches the target because positions are linear in the
+/// accelerations, and keeps the limits because they are convex.
 void FastestMotion::mix(double lowest) noexcept {
   mixed_ = true;
   cruise_ = lowest;
@@ -180,7 +182,7 @@ void FastestMotion::stretch(std::int64_t iterations) noexcept {
     cruise_ = cruise_for(static_cast<double>(before_), 0.0, cruise_);
     settle();
   }
-  // early rather than late, and only on a way that there is
+  // keep the shortest motion if the stretched one is too long or has no time to get to its cruise
   if (iterations_ > iterations || to_cruise_.steps() > before_) *this = shortest;
 }
 

@@ -6,34 +6,35 @@
 
 namespace o80 {
 
-/// The time-optimal motion of one number from the motion under way to rest at a target.
+/// The time-optimal motion of one number from its present motion to rest at a target.
 ///
 /// It changes its speed to a cruising speed, cruises, and slows down to rest at the target, in
-/// whole iterations. Where even the way to rest overshoots the target, it comes back. Compare
+/// whole iterations. If even the shortest stop overshoots the target, it returns to it. See
 /// Kroeger, "On-Line Trajectory Generation in Robotic Systems" (2010), type III.
 ///
 /// Realtime: yes, bounded time.
 class FastestMotion {
  public:
   FastestMotion() = default;
-  /// Speed and acceleration limits must be finite; `speed` and `acceleration` are the present ones.
+  /// `position`, `speed` and `acceleration` are the present ones. The limits of speed and
+  /// acceleration must be finite.
   FastestMotion(double position, double speed, double acceleration, double target,
                 const Rates& rates) noexcept;
 
-  /// Until it rests at the target, at least 1.
+  /// Number of iterations until it rests at the target, at least 1.
   std::int64_t iterations() const noexcept { return iterations_; }
-  /// Takes so many iterations instead, if it can: not if they are fewer, nor if the way to rest is
-  /// all there is.
+  /// Stretches the motion to `iterations`. No effect if that is shorter, or if the motion is only a
+  /// stop.
   void stretch(std::int64_t iterations) noexcept;
-  /// The position of the next iteration; the target, bit for bit, at the last and after.
+  /// The position in the next iteration; from the last iteration on the exact target.
   double next() noexcept;
 
  private:
-  /// A way to rest that first lets go of the brake for some iterations.
+  /// A stop that first reduces the deceleration for `eased` iterations.
   struct Stop {
-    double start = 0.0;      // acceleration before it
-    double jerk = 0.0;       // while it lets go
-    std::int64_t eased = 0;  // iterations of that
+    double start = 0.0;  // acceleration before the stop
+    double jerk = 0.0;   // jerk in the first `eased` iterations
+    std::int64_t eased = 0;
     double distance = 0.0;
     VelocityChange rest;
     double acceleration(std::int64_t i) const noexcept {
@@ -44,14 +45,14 @@ class FastestMotion {
 
   Stop stop_after(std::int64_t eased) const noexcept;
   void mix(double lowest) noexcept;
-  /// Distance with so many iterations before it slows down from `cruise`.
+  /// Distance of a motion that slows down from the speed `cruise` after `before` iterations.
   double distance(double cruise, double before) const noexcept;
   std::int64_t steps_to(double cruise) const noexcept;
   double time_to(double cruise) const noexcept;
   double cruise_for(double before, double low, double high) const noexcept;
   void settle() noexcept;
 
-  // mirrored such that the target lies beyond the way to rest
+  // mirrored by sign_, so that the target lies beyond the shortest stop
   double sign_ = 1.0;
   double start_speed_ = 0.0;
   double start_acceleration_ = 0.0;
@@ -59,21 +60,21 @@ class FastestMotion {
   Rates rates_{};
 
   double target_ = 0.0;
-  // as it goes on: sums over many iterations, whose rounding must not be seen at the end
+  // the present state; long double, because sums over many iterations must not show their rounding
   long double position_ = 0.0;
-  long double speed_ = 0.0;  // mirrored
+  long double speed_ = 0.0;  // mirrored by sign_
   std::int64_t done_ = 0;
   double cruise_ = 0.0;
-  std::int64_t before_ = 0;  // iterations before it slows down
+  std::int64_t before_ = 0;  // iterations before the motion slows down
   std::int64_t iterations_ = 1;
   VelocityChange to_cruise_;
   VelocityChange to_rest_;
-  // where the target lies little beyond the way to rest: the mean of two ways
+  // if the target lies a little beyond the shortest stop: the mean of two motions
   bool mixed_ = false;
   Stop nearer_;
-  Stop farther_;  // unless that is the way over the cruising speed
-  bool cruises_ = true;
-  double share_ = 0.0;  // of the nearer one
+  Stop farther_;         // unused if `cruises_`
+  bool cruises_ = true;  // the farther one is the motion at the cruising speed
+  double share_ = 0.0;   // weight of the nearer one
 };
 
 }  // namespace o80

@@ -6,7 +6,7 @@
 namespace o80 {
 namespace {
 
-// a speed may be missed by no more than rounding
+// rounding must not add an iteration
 constexpr double kSpeedRounding = 1e-12;
 
 std::int64_t at_least_one(double iterations) noexcept {
@@ -25,7 +25,7 @@ Fading Fading::of(const Moment& start, double most, double up, double down) noex
   if ((v == 0.0 && a == 0.0) || !(room > 0.0)) return {};
 
   double time = most;
-  if (a < 0.0) time = std::min(time, 3.0 * v / -a);  // else it would turn
+  if (a < 0.0) time = std::min(time, 3.0 * v / -a);  // a longer time would reverse it
   // time (v / 2 + a time / 12) <= room
   const double discriminant = v * v / 4.0 + a * room / 3.0;
   if (discriminant > 0.0) {

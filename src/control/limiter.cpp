@@ -13,7 +13,7 @@ namespace o80 {
 namespace {
 
 constexpr double kUnlimited = std::numeric_limits<double>::infinity();
-// what a step in a limiter and in its motion may differ by
+// relative tolerance between a step of the limiter and of its motion
 constexpr double kStepRounding = 1e-9;
 
 template <class T>
@@ -25,7 +25,7 @@ void store_integer(std::byte* at, double value) noexcept {
   std::memcpy(at, &whole, sizeof whole);
 }
 
-/// What numbers of a kind can be: nothing else may be asked of them on the way to rest either.
+/// Range of the values of a kind. It also bounds the motion to rest.
 std::pair<double, double> range_of(Kind kind) noexcept {
   return visit_number(kind, []<class T>(T) {
     using Range = std::numeric_limits<T>;
@@ -33,7 +33,7 @@ std::pair<double, double> range_of(Kind kind) noexcept {
   });
 }
 
-/// The nearest value of a kind that is not beyond `low` or `high`.
+/// The nearest float from `low` to `high`.
 float nearest_float(double value, double low, double high) noexcept {
   auto narrow = static_cast<float>(value);
   if (narrow > high) narrow = std::nextafter(narrow, -HUGE_VALF);
@@ -78,12 +78,12 @@ void Limiter::begin() noexcept {
   for (Number& each : numbers_) each.limiter.begin();
 }
 
-/// The state of one number, rounded to its kind.
+/// Writes one number to the state, rounded to its kind.
 void Limiter::publish(const Number& number, std::byte* state) const noexcept {
   const NumberPlace& place = layout_.numbers()[number.number];
   std::byte* at = state + place.offset;
   const double value = number.limiter.position();
-  // a number outside its bounds stays there until it moves inward
+  // a number outside its bounds may stay there
   const double low = std::min(number.limiter.minimum(), value);
   const double high = std::max(number.limiter.maximum(), value);
   visit_number(place.kind, [&]<class T>(T) {
@@ -108,7 +108,7 @@ bool Limiter::Number::brake() noexcept {
   return was_away || limiter.position() != before || !limiter.at_rest();
 }
 
-/// A number that no command moves any more comes to rest.
+/// Brakes a number that the present command does not move.
 void Limiter::leave_out(Number& number, std::byte* state) noexcept {
   number.brake();
   publish(number, state);
@@ -124,11 +124,11 @@ Limited Limiter::follow(const Motion& motion, std::byte* state, const std::uint6
       continue;
     }
     const double speed = each.number == one ? most : kUnlimited;
-    // a motion may round to just outside of what its kind can hold
+    // rounding of the motion may leave the range of the kind
     const auto [lowest, highest] = range_of(layout_.numbers()[each.number].kind);
     const double wanted = std::clamp(motion.number(each.number), lowest, highest);
     const Limit limit = each.limiter.follow(wanted, speed);
-    // the target itself stands there, bit for bit
+    // `state` already holds the exact target
     if (limit == Limit::none && arrived) continue;
     publish(each, state);
     if (limit != Limit::none && result.limit == Limit::none) result = {limit, each.number};
@@ -173,7 +173,8 @@ void Limiter::keep_moving(Motion& motion, const std::byte* state,
   if (!std::isfinite(limiter.rates().acceleration)) {
     return motion.keep_moving(state, number.number, {}, limiter.position(), 0);
   }
-  // a cubic speed fades to rest within the limits in twice the time that the limits would need
+  // a Fading motion (a cubic velocity) within the limits needs twice the time and distance of the
+  // shortest stop
   const VelocityChange stop(-limiter.speed(), limiter.acceleration(), limiter.rates());
   const double place = std::clamp(limiter.position() + 2.0 * stop.displacement(),
                                   std::min(limiter.minimum(), limiter.position()),
@@ -184,7 +185,7 @@ void Limiter::keep_moving(Motion& motion, const std::byte* state,
 
 void Limiter::keep_lagging(Motion& motion, const std::byte* state) const noexcept {
   for (const Number& each : numbers_) {
-    // one that was at a bound until now has not moved as its motion has
+    // a number that a bound has held back moves slower than its motion
     const bool held_back = !std::isfinite(each.limiter.rates().acceleration) &&
                            std::abs(each.limiter.speed()) <
                                std::abs(motion.kept_step(each.number)) * (1.0 - kStepRounding);

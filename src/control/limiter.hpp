@@ -13,74 +13,77 @@
 
 namespace o80 {
 
-/// What a limit did to a state.
+/// The limit that changed a state, if any.
 struct Limited {
   Limit limit = Limit::none;
-  std::uint32_t number = 0;  // of the state, the first one that was held back
+  std::uint32_t number = 0;  // the first number of the state that it changed
 
-  /// As a status carries it.
+  /// As the detail of a status: the limit in 3 bits, the number (at most 31) above.
   std::uint8_t packed() const noexcept {
     return static_cast<std::uint8_t>(static_cast<std::uint32_t>(limit) | (number < 31 ? number : 31)
                                                                              << 3);
   }
 };
 
-/// Keeps the desired state of one actuator within its limits, last of all, and brings it to rest.
+/// Applied after interpolation: keeps the desired state of one actuator within its limits, and
+/// brakes it to rest.
 ///
-/// Its numbers keep position, speed and acceleration of their own; the published state is their
-/// rounding, inward at the bounds.
+/// For each number it keeps position, speed and acceleration as double. The published state is
+/// their rounding, inward at the bounds.
 ///
 /// Realtime: everything but construction.
 class Limiter {
  public:
   Limiter(const Schema& schema, const ActuatorRow& actuator, const StateLayout& layout);
 
-  /// Something is limited or rests.
+  /// True if a number has a limit or a rest value.
   bool any() const noexcept { return !numbers_.empty(); }
-  /// At rest in this state.
+  /// Sets all numbers to this state, at rest.
   void restart(const std::byte* state) noexcept;
-  /// A motion begins where the state is now.
+  /// A motion begins at the present state.
   void begin() noexcept;
 
-  /// What a motion asks of the numbers of `mask` (null: all) => what the limits admit, for one
-  /// iteration; the others come to rest, resting ones where they rest. One number catches up no
-  /// faster than `most`.
+  /// One iteration: follows the motion with the numbers of `mask` (null: all), as far as the limits
+  /// allow. The other numbers brake, those with a rest value to that value. `one`: the number whose
+  /// command has a speed; it catches up at most at `most` [1/iteration].
   Limited follow(const Motion& motion, std::byte* state, const std::uint64_t* mask,
                  std::uint32_t one, double most) noexcept;
-  /// One iteration towards rest; resting numbers go where they rest, unless they are held. True
-  /// while anything moves.
+  /// One iteration of braking. Numbers with a rest value go to it, unless they are held. True while
+  /// a number moves.
   bool brake(std::byte* state) noexcept;
-  /// The same where the others are what was observed, which is in `state`.
+  /// The same, but only for numbers with a rest value; the others follow `state`, the observed one.
   bool brake_resting(std::byte* state) noexcept;
-  /// Resting numbers of `mask` (null: all) stay where they are until `release`.
+  /// Holds the numbers of `mask` (null: all) that have a rest value where they are, until
+  /// release().
   void hold(const std::uint64_t* mask) noexcept;
   void release() noexcept;
-  /// Some number is held away from where it rests.
+  /// True if a number is held away from its rest value.
   bool holds() const noexcept {
     return std::ranges::any_of(numbers_, [](const Number& each) {
       return each.held && each.limiter.position() != *each.rest;
     });
   }
-  /// Braking would move nothing.
+  /// True if braking would change nothing.
   bool at_rest() const noexcept {
     return std::ranges::all_of(numbers_, [](const Number& each) { return each.at_rest(); });
   }
-  /// The same of resting numbers.
+  /// The same, for numbers with a rest value.
   bool resting_at_rest() const noexcept {
     return std::ranges::all_of(
         numbers_, [](const Number& each) { return !each.rest.has_value() || each.at_rest(); });
   }
-  /// Tells a motion how the numbers move that lag behind it ...
+  /// Passes to a motion the speeds of the numbers that lag behind it, for the command that
+  /// overwrites it.
   void keep_lagging(Motion& motion, const std::byte* state) const noexcept;
-  /// ... or that move without any motion, and where all of them are.
+  /// Passes to a new motion the exact positions of all numbers, and the speeds of those that move.
   void hand_over(Motion& motion, const std::byte* state) const noexcept;
 
-  /// Plans the fastest motion to `target` for the numbers of `mask` (null: all), ending together;
-  /// its iterations.
+  /// Plans the fastest motion to `target` for the numbers of `mask` (null: all), which end
+  /// together. Returns its number of iterations.
   std::int64_t plan_fastest(const std::byte* target, const std::uint64_t* mask) noexcept;
-  /// The same, taking so many instead.
+  /// Stretches the planned motion to `iterations`.
   void stretch_fastest(std::int64_t iterations) noexcept;
-  /// One iteration of it.
+  /// One iteration of the planned motion.
   Limited follow_fastest(std::byte* state) noexcept;
 
  private:
@@ -90,7 +93,7 @@ class Limiter {
     std::optional<double> rest;
     FastestMotion fastest;
     bool planned = false;  // part of the fastest motion
-    bool held = false;     // stays away from where it rests
+    bool held = false;     // does not go to its rest value
 
     bool away() const noexcept { return rest && !held && limiter.position() != *rest; }
     bool at_rest() const noexcept { return limiter.at_rest() && !away(); }

@@ -17,7 +17,7 @@ std::string text_of(double value) {
   return std::string(text, end);
 }
 
-/// A number of a state in words: its path of names and its field.
+/// The name of a number of a state for messages: its path of field names, and its field.
 struct NumberName {
   std::string path;  // empty for a plain number
   const FieldRow* field = nullptr;
@@ -149,14 +149,14 @@ void CommandCheck::targets(std::uint32_t index, std::span<const std::byte> state
   const std::uint32_t known = actuator(std::int64_t{index});
   const StateLayout& layout = *layouts_[schema_.actuators[known].type];
   if (states.empty() || states.size() % layout.size() != 0) {
-    throw InvalidArgument(
-        "a target of " + of_actuator(schema_, known) + " has " + std::to_string(layout.size()) +
-        " bytes: " + std::to_string(states.size()) + " bytes hold no whole number of them");
+    throw InvalidArgument("targets of " + of_actuator(schema_, known) + " must be a multiple of " +
+                          std::to_string(layout.size()) + " bytes, got " +
+                          std::to_string(states.size()));
   }
   const std::size_t words = mask_words(static_cast<std::uint32_t>(layout.numbers().size()));
   if (!mask.empty() && mask.size() != words) {
-    throw InvalidArgument("a mask for " + of_actuator(schema_, known) + " has " +
-                          std::to_string(words) + " words, not " + std::to_string(mask.size()));
+    throw InvalidArgument("a mask for " + of_actuator(schema_, known) + " must have " +
+                          std::to_string(words) + " words, got " + std::to_string(mask.size()));
   }
   const std::uint64_t* bits = mask.empty() ? nullptr : mask.data();
   for (std::size_t at = 0; at < states.size(); at += layout.size()) {
@@ -173,7 +173,7 @@ void CommandCheck::refuse(std::uint32_t actuator, const std::byte* state,
     const NumberName name = name_at(schema_, row.type, layout.numbers()[i].offset);
     if (!layout.proper_number(i, state)) {
       throw InvalidArgument("the target of " + of_number(schema_, actuator, name) +
-                            " is none of its values: " + labels_of(schema_, *name.field));
+                            " must be one of: " + labels_of(schema_, *name.field));
     }
     if (!layout.numbers()[i].moves()) continue;
     const double value = layout.number(i, state);
@@ -189,7 +189,7 @@ void CommandCheck::refuse(std::uint32_t actuator, const std::byte* state,
                             with_unit(text_of(limit.maximum), name.field));
     }
   }
-  throw InvalidArgument("the target of " + of_actuator(schema_, actuator) + " cannot be used");
+  throw InvalidArgument("the target of " + of_actuator(schema_, actuator) + " is invalid");
 }
 
 void CommandCheck::direct(std::uint32_t actuator, std::span<const std::byte> state,
@@ -228,7 +228,7 @@ void CommandCheck::speed(std::uint32_t index, double speed,
   const std::string unit = " [" + (of_field.empty() ? "1" : of_field) + "/s]";
   const std::string what =
       "speed " + text_of(speed) + unit + " for " + of_number(schema_, known, name);
-  if (!positive) throw InvalidArgument(what + " is not a positive, finite number");
+  if (!positive) throw InvalidArgument(what + " must be positive and finite");
   throw InvalidArgument(what + " is above its maximum: " + text_of(highest) + unit);
 }
 
@@ -240,9 +240,9 @@ void CommandCheck::fastest(std::uint32_t index, std::span<const std::uint64_t> m
     if (!masked(mask.empty() ? nullptr : mask.data(), i) || !layout.numbers()[i].moves()) continue;
     if (std::isfinite(schema_.limits[row.first_limit + i].acceleration)) continue;
     const NumberName name = name_at(schema_, row.type, layout.numbers()[i].offset);
-    throw InvalidArgument("no fastest way is known for " + of_number(schema_, known, name) +
-                          ": its driver gives it no limits of speed and acceleration. Give a "
-                          "duration or a speed instead, or leave that field out.");
+    throw InvalidArgument("the fastest motion of " + of_number(schema_, known, name) +
+                          " is unknown: its driver sets no limits of speed and acceleration. Give "
+                          "a duration or a speed instead, or leave that field out.");
   }
 }
 
@@ -270,8 +270,8 @@ void CommandCheck::request(std::uint32_t index, std::span<const std::byte> paylo
   const RequestRow& row = schema_.requests[index];
   const std::size_t size = row.type == kNoType ? 0 : layouts_[row.type]->size();
   if (payload.size() != size) {
-    throw InvalidArgument("request '" + row.name.str() + "' has " + std::to_string(size) +
-                          " bytes, not " + std::to_string(payload.size()));
+    throw InvalidArgument("request '" + row.name.str() + "' must have " + std::to_string(size) +
+                          " bytes, got " + std::to_string(payload.size()));
   }
   if (size == 0) return;
   const StateLayout& layout = *layouts_[row.type];
@@ -279,7 +279,7 @@ void CommandCheck::request(std::uint32_t index, std::span<const std::byte> paylo
     if (layout.proper_number(i, payload.data())) continue;
     const NumberName name = name_at(schema_, row.type, layout.numbers()[i].offset);
     throw InvalidArgument("'" + name.path + "' of request '" + row.name.str() +
-                          "' is none of its values: " + labels_of(schema_, *name.field));
+                          "' must be one of: " + labels_of(schema_, *name.field));
   }
 }
 

@@ -13,38 +13,40 @@
 
 namespace o80 {
 
-/// Refuses a command that a robot cannot follow, when it is added and not later.
+/// Checks a command when it is added to a batch.
 ///
-/// Each verb throws InvalidArgument, whose text names the actuator, the field, the value and what
-/// is allowed. The schema must outlive it. `mask` is empty (the whole state) or a bit a number.
+/// Each function throws InvalidArgument with the actuator, the field, the value and the allowed
+/// values. The schema must outlive it. `mask` is empty (all numbers) or has one bit for each
+/// number.
 class CommandCheck {
  public:
   explicit CommandCheck(const Schema& schema);
 
   /// Index of an actuator by its name.
   std::uint32_t actuator(std::string_view name) const;
-  /// The index itself, if there is such an actuator.
+  /// The same index, if there is such an actuator.
   std::uint32_t actuator(std::int64_t index) const;
-  /// Words of a mask of its numbers.
+  /// Number of 64-bit words of a mask for this actuator.
   std::uint32_t words_of_mask(std::uint32_t actuator) const;
-  /// Targets, one state after the other.
+  /// Checks one or several targets, one state after the other.
   void targets(std::uint32_t actuator, std::span<const std::byte> states,
                std::span<const std::uint64_t> mask = {}) const;
-  /// A direct target: in real time, without a watchdog, no number may be kept away from its rest.
+  /// Checks a direct target: in real time without a watchdog, it must not move a number away from
+  /// its rest value.
   void direct(std::uint32_t actuator, std::span<const std::byte> state,
               std::span<const std::uint64_t> mask = {}) const;
-  /// A pace of so much of the first number that is commanded [1/s].
+  /// Checks the pace of a command: the speed of the first commanded number [1/s].
   void speed(std::uint32_t actuator, double speed, std::span<const std::uint64_t> mask = {}) const;
-  /// The fastest way: what is commanded has limits of speed and acceleration.
+  /// Checks that all commanded numbers have limits of speed and acceleration.
   void fastest(std::uint32_t actuator, std::span<const std::uint64_t> mask = {}) const;
-  /// That of a command that names none.
+  /// Default profile of a command.
   Profile profile(std::uint32_t actuator) const;
-  /// A request's struct: its booleans and enumerations are ones.
+  /// Checks the struct of a request: booleans are 0 or 1, enumerations have a label.
   void request(std::uint32_t index, std::span<const std::byte> payload) const;
 
  private:
   struct Range {
-    double lowest;  // finite: what has no limit cannot be infinite either
+    double lowest;  // finite: an infinite target is refused even without a limit
     double highest;
   };
 

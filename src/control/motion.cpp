@@ -10,7 +10,7 @@
 namespace o80 {
 namespace {
 
-/// `share` of the way, never outside it, whatever rounding or overflow would do.
+/// The fraction `share` between `from` and `to`, never outside, despite rounding and overflow.
 double between(double from, double to, double distance, double share) noexcept {
   const double value = from + distance * share;
   const double low = std::min(from, to);
@@ -18,7 +18,7 @@ double between(double from, double to, double distance, double share) noexcept {
   if (value >= low && value <= high) return value;
   if (value < low && std::isfinite(distance)) return low;
   if (value > high && std::isfinite(distance)) return high;
-  // the distance overflowed, or the way starts from no number
+  // the distance has overflowed, or `from` is not finite
   const double weighed = from * (1.0 - share) + to * share;
   return std::isfinite(weighed) ? weighed : to;
 }
@@ -40,7 +40,7 @@ T to_integer(Real value) noexcept {
   return static_cast<T>(rounded);
 }
 
-/// Integers that a double cannot hold go their way in long double.
+/// For integers that a double cannot hold: interpolates in long double.
 template <class T>
 T moved_wide(T from, T to, double share) noexcept {
   const auto start = static_cast<long double>(from);
@@ -70,7 +70,7 @@ void Motion::begin(Iteration first, std::int64_t iterations, Profile profile, Pa
   continues_ = moving_ && profile == Profile::minimum_jerk && pace != Pace::fastest;
   moving_ = false;
   measured_ = false;
-  if (iterations > 1) measure();  // else nothing lies between
+  if (iterations > 1) measure();  // else there is nothing to interpolate
   start_at_from();
 }
 
@@ -92,8 +92,8 @@ double Motion::start_of(std::size_t number) const noexcept {
   return std::isnan(exact_[number]) ? layout_.number(number, from) : exact_[number];
 }
 
-/// The ways of all numbers; asked for as late as possible, for most rows of one iteration need
-/// none.
+/// Computes start, target and way of each number. Not called before they are needed: most commands
+/// of one iteration do not need them.
 void Motion::measure() noexcept {
   measured_ = true;
   const auto& numbers = layout_.numbers();
@@ -105,8 +105,8 @@ void Motion::measure() noexcept {
   }
 }
 
-/// What was kept fades within the span of the present place, the former stopping place and target,
-/// and the new target, in no more time than the old motion had left.
+/// The overwritten motion fades to rest within the time that it had left, inside the span of its
+/// present position, stopping position and target, and the new target.
 Motion::Way Motion::way(std::size_t number, double iterations) const noexcept {
   const Kept& kept = kept_[number];
   const double start = start_of(number);
@@ -129,7 +129,7 @@ void Motion::state(Iteration iteration, std::byte* out) noexcept {
   if (layout_.hooks().blend != nullptr) {
     std::byte* blended = to() + stride_;
     layout_.hooks().blend(blended, from(), to(), share_of(time));
-    // a hook that divides by zero gives no state
+    // a blend() that divides by zero gives an invalid state: keep the last one
     if (layout_.finite(blended)) layout_.copy(out, blended);
   } else if (layout_.plain() && !continues_) {
     plain_state(share_of(time), out);
@@ -249,7 +249,7 @@ std::int64_t Motion::iterations_at(std::size_t number, double speed) noexcept {
   const double target = target_of(number);
   if (!moving_) return minimum_jerk_iterations(target - start, speed);
 
-  // an acceleration that would raise the speed further is dropped
+  // drop an acceleration that would raise the speed further
   Kept& kept = kept_[number];
   Moment& moment = kept.moment;
   if (moment.velocity * moment.acceleration > 0.0 && std::abs(moment.velocity) > speed) {

@@ -10,63 +10,66 @@
 
 namespace o80 {
 
-/// The way of one actuator from one state to the next.
+/// Interpolates the state of one actuator from one state to the next.
 ///
 /// Realtime: everything but construction.
 class Motion {
  public:
   explicit Motion(const StateLayout& layout);
 
-  /// The two ends, to be filled before `begin`.
+  /// Start and target. Fill both before begin().
   std::byte* from() noexcept { return reinterpret_cast<std::byte*>(ends_.data()); }
   std::byte* to() noexcept { return from() + stride_; }
 
-  /// Where one number really is, which `from` rounds to its kind; to be said before `begin`.
+  /// Sets the exact start of one number, which `from` holds rounded to its kind. Call it before
+  /// begin().
   void start_at(std::size_t number, double value) noexcept { exact_[number] = value; }
-  /// Nothing of that: all of it starts at `from`.
+  /// Discards exact starts: all numbers start at `from`.
   void start_at_from() noexcept;
-  /// How far one number has to go.
+  /// Distance of one number from start to target.
   double distance(std::size_t number) const noexcept;
-  /// Sets out at `first` for `iterations`; a minimum jerk continues what `keep_moving` kept.
+  /// Begins at iteration `first` for `iterations`. A minimum-jerk motion continues the motion
+  /// stored by keep_moving().
   void begin(Iteration first, std::int64_t iterations, Profile profile, Pace pace) noexcept;
-  /// The state at an iteration: the target, bit for bit, from the last one on.
+  /// Writes the state at an iteration; from the last iteration on the exact target.
   void state(Iteration iteration, std::byte* out) noexcept;
-  /// One number of the state just given, before it is rounded to its kind.
+  /// One number of the last state(), not rounded to its kind.
   double number(std::size_t number) const noexcept;
   Iteration last() const noexcept { return last_; }
-  /// The state just given is the target.
+  /// True if the last state() was the target.
   bool arrived() const noexcept { return now_ >= last_; }
 
-  /// Remembers how the state just given moves, for what overwrites it. It would have gone on
-  /// through so many rows more, to the one `ahead` (or to its target).
+  /// Stores velocity and acceleration at the last state(), for the command that overwrites this
+  /// one. `rows`: further waypoints of the overwritten trajectory; `ahead`: the last of them, or
+  /// its target.
   void keep_moving(const std::byte* ahead, std::int64_t rows) noexcept;
-  /// The same for one number of `state` that did not go its way: how it moves, where it would stop,
-  /// and in how many iterations.
+  /// The same for one number of `state` that has left its motion because of a limit: its velocity
+  /// and acceleration, and the position at which it would stop after `iterations`.
   void keep_moving(const std::byte* state, std::size_t number, const Moment& moment, double stop,
                    std::int64_t iterations) noexcept;
-  /// How far one number went in the last iteration before `keep_moving`.
+  /// Step of one number in the last iteration before keep_moving().
   double kept_step(std::size_t number) const noexcept { return moving_ ? kept_[number].step : 0.0; }
-  /// The numbers whose bits are not set do not move on.
+  /// Discards the stored motion of the numbers whose bits are not set.
   void leave_out(const std::uint64_t* mask) noexcept;
-  /// What comes next starts at rest.
+  /// Discards the stored motion: the next one starts at rest.
   void rest() noexcept { moving_ = false; }
 
-  /// Iterations of a minimum jerk at whose start `number` moves as was kept, and that is never
-  /// faster than `speed` [1/iteration], or than it was if that is faster.
+  /// Iterations of a minimum-jerk motion of `number` that continues its stored motion and is never
+  /// faster than `speed` [1/iteration], or than the stored motion if that is faster.
   std::int64_t iterations_at(std::size_t number, double speed) noexcept;
 
  private:
-  /// How one number was moving when it was overwritten.
+  /// The motion of one number when it was overwritten.
   struct Kept {
     Moment moment;
-    double step = 0.0;    // what it went in the last iteration
-    double stop = 0.0;    // where it would have come to rest ...
-    double target = 0.0;  // ... before it had gone on to its target
+    double step = 0.0;    // step in the last iteration
+    double stop = 0.0;    // its stopping position
+    double target = 0.0;  // its last target
   };
-  /// A fading motion, and a minimum jerk from where it ends.
+  /// A fading motion plus a minimum-jerk motion over the remaining distance.
   struct Way {
     Fading fading;
-    double low = 0.0;  // the span that is never left
+    double low = 0.0;  // the sum is clamped to low .. high
     double high = 0.0;
   };
 
@@ -84,22 +87,22 @@ class Motion {
   const StateLayout& layout_;
   std::size_t stride_;               // [bytes]
   std::vector<std::uint64_t> ends_;  // from, to, and a state to blend into
-  std::vector<double> exact_;        // one for each number: where it starts, or NaN
+  std::vector<double> exact_;        // exact start of each number, or NaN
   std::vector<double> starts_;
   std::vector<double> targets_;
-  std::vector<double> values_;  // of the state just given
-  std::vector<Way> ways_;       // of a motion that sets out with a velocity
+  std::vector<double> values_;  // numbers of the last state()
+  std::vector<Way> ways_;       // valid if `continues_`
   std::vector<Kept> kept_;
-  double left_ = 0.0;  // iterations that what was overwritten had left
+  double left_ = 0.0;  // iterations that the overwritten motion had left
   Iteration first_ = 0;
   Iteration last_ = 0;
   Iteration now_ = 0;
   double iterations_ = 1.0;
   Profile profile_ = Profile::linear;
   Pace pace_ = Pace::direct;
-  bool continues_ = false;  // sets out with a velocity
-  bool moving_ = false;     // something is kept
-  bool measured_ = false;   // starts and targets are known
+  bool continues_ = false;  // starts with the velocities of `kept_`
+  bool moving_ = false;     // `kept_` is valid
+  bool measured_ = false;   // `starts_` and `targets_` are valid
 };
 
 }  // namespace o80

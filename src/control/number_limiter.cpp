@@ -6,12 +6,12 @@
 namespace o80 {
 namespace {
 
-// what interpolation rounds is no excess
+// rounding of the interpolation does not exceed a limit
 constexpr double kLimitRounding = 1e-9;
 constexpr int kHalvings = 16;
 
-/// The highest speed after which a number that slows down by `acceleration` an iteration stops
-/// within `room`, the iteration at that speed included.
+/// The highest speed from which a number stops within the distance `room`, if it slows down by
+/// `acceleration` in each iteration. The iteration at that speed is included.
 double speed_for(double room, double acceleration) noexcept {
   if (room <= 0.0) return 0.0;
   if (!std::isfinite(acceleration) || !std::isfinite(room)) return room;
@@ -21,7 +21,7 @@ double speed_for(double room, double acceleration) noexcept {
 
 }  // namespace
 
-/// A next state, and how it would stop.
+/// A possible next state and its shortest stop.
 struct NumberLimiter::Candidate {
   double position;
   double speed;
@@ -37,7 +37,7 @@ void NumberLimiter::restart(double position) noexcept {
   stopped_ = 0;
 }
 
-/// What the sums of a motion round.
+/// Rounding of the sums of a motion.
 double NumberLimiter::rounding() const noexcept {
   return 8.0 * std::numeric_limits<double>::epsilon() *
          std::max({scale_, std::abs(position_), std::abs(wanted_)});
@@ -60,7 +60,7 @@ void NumberLimiter::move(double speed) noexcept {
   speed_ = speed;
 }
 
-/// A speed that is nothing but rounding is rest.
+/// Treats a speed within rounding as 0.
 void NumberLimiter::forget_rounding() noexcept {
   const double nothing = slack() / 100.0 + 2.0 * rounding();
   const bool steady = !std::isfinite(rates_.jerk) || std::abs(acceleration_) <= nothing;
@@ -80,17 +80,18 @@ Limit NumberLimiter::follow(double wanted, double most) noexcept {
 }
 
 Limit NumberLimiter::follow_with_acceleration(double step, double lag, double most) noexcept {
-  // what is wanted: to be there, or, further behind, to close in such that it could stop there
+  // the wanted speed: reach the wanted position, or, from farther away, approach it at the highest
+  // speed from which it can stop there
   const double closing = speed_for(std::abs(lag), rates_.acceleration);
   const bool within_reach = closing >= std::abs(lag);
   double speed = within_reach ? wanted_ - position_ : step - std::copysign(closing, lag);
-  // without an acceleration limit it never has to catch up
+  // without an acceleration limit it never lags, so `most` does not apply
   const double fastest =
       std::isfinite(rates_.acceleration) ? std::max(most, std::abs(speed_)) : rates_.acceleration;
   const bool exact = within_reach && std::abs(speed) <= fastest + slack();
   if (!exact) speed = std::clamp(speed, -fastest, fastest);
 
-  // what is allowed
+  // the allowed speeds
   const double up = speed_for(std::max(0.0, maximum_ - position_), rates_.acceleration);
   const double down = speed_for(std::max(0.0, position_ - minimum_), rates_.acceleration);
   const double highest = std::min({speed_ + rates_.acceleration, rates_.speed, up});
@@ -114,7 +115,7 @@ NumberLimiter::Candidate NumberLimiter::candidate(double acceleration) const noe
   return {position_ + speed, speed, acceleration, VelocityChange(-speed, acceleration, rates_)};
 }
 
-/// Which limit a way to rest from there would break.
+/// The limit that a candidate or its stop violates.
 Limit NumberLimiter::violated(const Candidate& next, double most) const noexcept {
   const double tolerance = slack();
   const double fastest = std::max(std::abs(next.speed), std::abs(next.speed + next.stop.detour()));
@@ -122,7 +123,7 @@ Limit NumberLimiter::violated(const Candidate& next, double most) const noexcept
   const double end = next.position + next.stop.displacement();
   const double turn = next.position + next.stop.run_before_turn(next.speed);
   const double rounding = this->rounding();
-  // outside the bounds it never turns outward again
+  // outside the bounds it must not turn outward again
   const double highest = std::max(maximum_, std::min(next.position, turn));
   const double lowest = std::min(minimum_, std::max(next.position, turn));
   if (next.position > std::max(maximum_, position_) + rounding ||
@@ -138,8 +139,8 @@ Limit NumberLimiter::violated(const Candidate& next, double most) const noexcept
   return Limit::none;
 }
 
-/// The acceleration that closes in on what is followed as fast as possible without overshoot, as
-/// seen by somebody who moves with it.
+/// The acceleration that approaches the wanted position as fast as possible without overshoot,
+/// computed in the frame that moves with the wanted position (by `step` in each iteration).
 double NumberLimiter::goal(double step, double lag, double low, double high) const noexcept {
   const auto overshoot = [&](double acceleration) {
     const double speed = speed_ + acceleration - step;
@@ -166,10 +167,10 @@ Limit NumberLimiter::follow_with_jerk(double step, double lag, double most) noex
   const double tolerance = slack();
   const double low = std::max(acceleration_ - rates_.jerk, -rates_.acceleration);
   const double high = std::min(acceleration_ + rates_.jerk, rates_.acceleration);
-  // a motion that is faster than asked keeps the way to rest that it has
+  // a number that is already faster may use the peak speed of its present stop
   const double fastest = std::min(rates_.speed, std::max(most, peak_));
 
-  // there, and able to stay there
+  // reach the wanted position exactly, if it can stay there
   const double wanted = wanted_ - position_ - speed_;
   const double relative = wanted_ - position_ - step;
   const bool tracked = lag == 0.0;
@@ -186,7 +187,7 @@ Limit NumberLimiter::follow_with_jerk(double step, double lag, double most) noex
     }
   }
 
-  // as near as the limits let it come; the way to rest that it has is always there
+  // else come as near as the limits allow; the stop from the last state is always possible
   const double best = tracked ? std::clamp(wanted, low, high) : goal(step, lag, low, high);
   Candidate next = candidate(best);
   Limit reason = violated(next, fastest);

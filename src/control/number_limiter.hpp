@@ -8,15 +8,15 @@
 
 namespace o80 {
 
-/// Which limit gave a number less than was wanted.
+/// The limit that kept a number from its wanted position.
 enum class Limit : std::uint8_t { none, minimum, maximum, speed, acceleration, jerk };
 
-/// Keeps one number within its limits, whatever it is asked to follow.
+/// Keeps one number within its limits while it follows a wanted position.
 ///
-/// It keeps position, speed and acceleration of its own, in iterations. It admits only states from
-/// which it can stop inside minimum and maximum, so there is always a next one. A position outside
-/// the bounds may stay or move inward, never outward. What it follows and has lost it catches up
-/// with as fast as the limits allow, without overshoot.
+/// It keeps position, speed and acceleration, per iteration. It admits only states from which it
+/// can stop between minimum and maximum, so a next state always exists. A position outside the
+/// bounds may stay or move inward, never outward. If it lags behind, it catches up as fast as the
+/// limits allow, without overshoot.
 ///
 /// Realtime: yes, bounded time.
 class NumberLimiter {
@@ -30,25 +30,25 @@ class NumberLimiter {
   double position() const noexcept { return position_; }
   double speed() const noexcept { return speed_; }
   double acceleration() const noexcept { return acceleration_; }
-  /// Without an acceleration limit it rests whenever nothing moves it.
+  /// True if braking would not move it. Without an acceleration limit it stops at once.
   bool at_rest() const noexcept {
     return (speed_ == 0.0 && acceleration_ == 0.0) || !std::isfinite(rates_.acceleration);
   }
-  /// It is where it was asked to be.
+  /// True if it is at the position wanted last.
   bool tracks() const noexcept { return position_ == wanted_; }
 
-  /// At rest, there; also outside the bounds.
+  /// Sets the position, at rest; it may be outside the bounds.
   void restart(double position) noexcept;
-  /// A motion begins that starts where the number is now.
+  /// A motion begins at the present position.
   void begin() noexcept {
     wanted_ = position_;
     scale_ = std::abs(position_);
   }
 
-  /// One iteration towards `wanted`; says what held it back. It catches up no faster than `most`,
-  /// or than it was.
+  /// One iteration towards `wanted`; returns the limit that kept it from there. It catches up at
+  /// most at `most`, or at its present speed if that is higher.
   Limit follow(double wanted, double most = std::numeric_limits<double>::infinity()) noexcept;
-  /// One iteration towards rest, as fast as the limits allow.
+  /// One iteration of braking, as fast as the limits allow.
   void brake() noexcept;
 
  private:
@@ -73,11 +73,11 @@ class NumberLimiter {
   double position_ = 0.0;
   double speed_ = 0.0;
   double acceleration_ = 0.0;
-  double wanted_ = 0.0;       // what it was asked for last
-  double scale_ = 0.0;        // how far from 0 it was since the motion began
-  VelocityChange stop_;       // with a jerk limit: how it can stop from here
-  std::int64_t stopped_ = 0;  // iterations of that which are done
-  double peak_ = 0.0;         // the highest speed on that way
+  double wanted_ = 0.0;       // position wanted last
+  double scale_ = 0.0;        // largest |position| since the motion began
+  VelocityChange stop_;       // with a jerk limit: the stop from the last accepted state
+  std::int64_t stopped_ = 0;  // iterations of `stop_` that are done
+  double peak_ = 0.0;         // highest speed of `stop_`
 };
 
 }  // namespace o80

@@ -17,7 +17,7 @@ StateLayout::StateLayout(const Schema& schema, std::uint32_t type)
     if ((size != 1 && size != 2 && size != 4 && size != 8) || offset + size > size_) {
       throw InvalidArgument("field '" + field.name.str() + "' of '" +
                             schema.types[type].name.str() +
-                            "' cannot cross a loop: only numbers, booleans and enumerations can");
+                            "' must be a number, a boolean or an enumeration");
     }
     NumberPlace place{offset, size, field.kind, field.is_signed != 0, 0, 0};
     if (field.kind == Kind::enumeration) {

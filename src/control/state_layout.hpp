@@ -10,16 +10,16 @@
 
 namespace o80 {
 
-/// Where one number of a state lies and what it is.
+/// Position and kind of one number of a state.
 struct NumberPlace {
   std::uint32_t offset = 0;  // [bytes]
   std::uint32_t size = 0;    // [bytes]
   Kind kind = Kind::float64;
-  bool is_signed = false;         // of an enumeration
-  std::uint32_t first_label = 0;  // of an enumeration, in the layout's own list
+  bool is_signed = false;         // for an enumeration
+  std::uint32_t first_label = 0;  // for an enumeration: index in the list of the layout
   std::uint32_t labels = 0;
 
-  /// Interpolated; booleans and enumerations switch instead.
+  /// True if the number is interpolated; booleans and enumerations switch.
   bool moves() const noexcept { return kind != Kind::boolean && kind != Kind::enumeration; }
 };
 
@@ -30,19 +30,19 @@ T load(const std::byte* bytes) noexcept {
   return value;
 }
 
-/// The numbers of a described struct, ready for the loop.
+/// The numbers of a described struct, for use in the loop.
 class StateLayout {
  public:
-  /// Throws InvalidArgument for a type with text: that cannot cross a loop.
+  /// Throws InvalidArgument for a type with a text field.
   StateLayout(const Schema& schema, std::uint32_t type);
 
   std::uint32_t size() const noexcept { return size_; }
   const std::vector<NumberPlace>& numbers() const noexcept { return numbers_; }
   const TypeHooks& hooks() const noexcept { return hooks_; }
-  /// Nothing but float64, side by side.
+  /// True if the state is an array of float64 without padding.
   bool plain() const noexcept { return plain_; }
 
-  /// Copies the numbers; padding stays as it is.
+  /// Copies the numbers, not the padding.
   void copy(std::byte* to, const std::byte* from) const noexcept {
     if (size_ == sizeof(double) && !padded_) {  // most states: no call
       std::memcpy(to, from, sizeof(double));
@@ -55,22 +55,23 @@ class StateLayout {
   /// Copies the numbers whose bits are set.
   void copy(std::byte* to, const std::byte* from, const std::uint64_t* mask) const noexcept;
 
-  /// Copies the numbers whose bits are set, but for those that are infinite or NaN.
+  /// Copies the numbers whose bits are set and that are finite.
   void copy_finite(std::byte* to, const std::byte* from,
                    const std::uint64_t* mask = nullptr) const noexcept;
 
   static constexpr std::uint32_t kNoNumber = 0xFFFFFFFF;
-  /// The first number that moves, of those whose bits are set; or kNoNumber.
+  /// The first number whose bit is set and that is interpolated; or kNoNumber.
   std::uint32_t first_commanded(const std::uint64_t* mask) const noexcept;
   /// The first number that is infinite or NaN, or kNoNumber.
   std::uint32_t first_not_finite(const std::byte* state) const noexcept;
 
-  /// Each boolean is 0 or 1 and each enumeration has a label; with `mask`, only those set there.
+  /// True if each boolean is 0 or 1 and each enumeration has a label; with `mask`, only numbers
+  /// whose bits are set are checked.
   bool proper(const std::byte* state, const std::uint64_t* mask = nullptr) const noexcept;
-  /// Proper, and neither NaN nor infinite.
+  /// True if proper(), and no number is NaN or infinite.
   bool finite(const std::byte* state, const std::uint64_t* mask = nullptr) const noexcept;
   bool proper_number(std::size_t number, const std::byte* state) const noexcept;
-  /// A number as a double (a large integer rounded).
+  /// A number as double (large integers are rounded).
   double number(std::size_t number, const std::byte* state) const noexcept;
 
  private:
@@ -85,7 +86,7 @@ class StateLayout {
   bool padded_ = false;
 };
 
-/// Whether the bit of a number is set; no mask sets all.
+/// True if the bit of a number is set; a null mask means all.
 inline bool masked(const std::uint64_t* mask, std::size_t number) noexcept {
   return mask == nullptr || (mask[number / 64] >> (number % 64) & 1) != 0;
 }

@@ -7,9 +7,9 @@
 namespace o80 {
 namespace {
 
-// no motion takes longer than this; keeps sums of squares within a double
+// longest motion; keeps sums of squares within the range of a double
 constexpr double kMostSteps = 1e12;
-// a limit may be exceeded by what rounds, rather than take an iteration more
+// a limit may be exceeded by rounding; rounding must not add an iteration
 constexpr double kChangeRounding = 1e-12;
 
 double share_between(double wanted, double at_zero, double at_one) noexcept {
@@ -29,7 +29,7 @@ VelocityChange::VelocityChange(double change, double acceleration, const Rates& 
   }
 }
 
-/// Full acceleration, and what is left in the last iteration.
+/// Full acceleration, and the remainder in the last iteration.
 void VelocityChange::plan_without_jerk(double change) noexcept {
   if (change == 0.0) return;
   sign_ = change < 0.0 ? 1.0 : -1.0;
@@ -45,19 +45,19 @@ void VelocityChange::plan_without_jerk(double change) noexcept {
                ? 0.0
                : share_between(size, static_cast<double>(steps_) * acceleration_, before);
   if (!std::isfinite(acceleration_)) acceleration_ = size;
-  // v(i) - v(steps) for i = 1 ... : the sums of what is still to come
+  // sum over i of v(i) - v(steps)
   const double rest = size - before;
   const auto n = static_cast<double>(shorter_);
   displacement_ = sign_ * (acceleration_ * n * (n - 1.0) / 2.0 + rest * n);
 }
 
-/// The acceleration of iteration i on the deepest way down and up to 0 in so many steps.
+/// The acceleration of iteration i on the deepest trapezoid that ends at 0 after so many steps.
 double VelocityChange::trough(double i, double steps) const noexcept {
   if (i >= steps) return 0.0;
   return std::max({-acceleration_, start_ - i * jerk_, -(steps - i) * jerk_});
 }
 
-/// Of that way, piece by piece: down, along the limit, up.
+/// The sums of trough(), for its three parts: down, along the limit, up.
 VelocityChange::Sums VelocityChange::sums(double steps) const noexcept {
   if (steps <= 0.0) return {};
   const double meet = std::floor((start_ / jerk_ + steps) / 2.0);
@@ -87,13 +87,13 @@ void VelocityChange::plan_with_jerk(double change) noexcept {
   if (change == 0.0 && start_ == 0.0) return;
   const double fewest = std::ceil(std::abs(start_) / jerk_ * (1.0 - kChangeRounding));
 
-  // which side of the straight way to acceleration 0, and its mirror image, does the change lie?
+  // compare the change with that of the direct way to acceleration 0, and of its mirror image
   Sums straight = sums(fewest);
   if (change >= straight.change) {
     start_ = -start_;
     const Sums crest = sums(fewest);
     if (change <= -crest.change) {
-      // neither: between the two ways of fewest steps
+      // in between: the mean of the two ways of fewest steps
       start_ = -start_;
       steps_ = shorter_ = static_cast<std::int64_t>(fewest);
       crest_ = true;
@@ -106,7 +106,7 @@ void VelocityChange::plan_with_jerk(double change) noexcept {
     straight = crest;
   }
 
-  // the fewest steps whose trough is deep enough: by a continuous estimate, then exactly
+  // the fewest steps whose trough is deep enough: a continuous estimate, then a search
   const double missing = start_ * start_ / (2.0 * jerk_) - change;
   const double depth = std::sqrt(std::max(0.0, missing * jerk_));
   double steps = depth <= acceleration_
@@ -124,7 +124,7 @@ void VelocityChange::plan_with_jerk(double change) noexcept {
     steps = std::min(steps + stride, kMostSteps);
     own = sums(steps);
   }
-  bool first = true;  // the estimate is seldom off by more than one
+  bool first = true;  // try one step less first: the estimate is seldom off by more than one
   while (steps - low > 1.0) {
     const double tried =
         std::exchange(first, false) ? steps - 1.0 : std::floor((low + steps) / 2.0);

@@ -4,44 +4,44 @@
 
 namespace o80 {
 
-/// What one number may do in an iteration: bounds on the differences of its positions.
-///
-/// Units are those of the number and of iterations. Infinity: not limited.
+/// Limits of one number per iteration, for positions p(i). Infinity: no limit.
 struct Rates {
-  double speed;         // of p(i) - p(i-1)
-  double acceleration;  // of the difference of two speeds
-  double jerk;          // of the difference of two accelerations
+  double speed;         // limit of v(i) = p(i) - p(i-1)
+  double acceleration;  // limit of a(i) = v(i) - v(i-1)
+  double jerk;          // limit of a(i) - a(i-1)
 };
 
 /// The shortest change of a speed by `change` that ends with acceleration 0, in whole iterations.
 ///
 /// The plan is a sequence of accelerations a(1) ... a(steps) with a(steps) = 0 (with a jerk limit),
 /// |a(i)| <= acceleration, |a(i) - a(i-1)| <= jerk, and the sum `change`. It is a trapezoid: from
-/// a(0) down to a trough and up to 0, or the mirror image of that. The trough of fewest steps is
-/// deeper than needed, so the plan is the mean, weighted by `share_`, of that trapezoid and the
-/// next shorter one: the constraints are convex.
+/// a(0) down to a trough and up to 0, or the mirror image of that (a crest).
 ///
-/// Realtime: yes. Construction and all questions take a bounded time.
+/// The shortest trapezoid with whole steps changes the speed by more than `change`, the next
+/// shorter one by less. The plan is their mean with the weights 1 - share_ and share_. It keeps the
+/// limits because these are convex.
+///
+/// Realtime: yes. Construction and all functions take a bounded time.
 class VelocityChange {
  public:
   VelocityChange() = default;
-  /// `acceleration` is the present one, a(0), within its limit.
+  /// `acceleration`: the present one, a(0), within its limit.
   VelocityChange(double change, double acceleration, const Rates& rates) noexcept;
 
   /// Iterations until the change is done; 0 if there is nothing to do.
   std::int64_t steps() const noexcept { return steps_; }
-  /// The same without rounding up to whole iterations.
+  /// The same time, not rounded up to whole iterations.
   double time() const noexcept { return static_cast<double>(steps_) - (crest_ ? 0.0 : share_); }
   /// The acceleration of iteration i, 1 to `steps()`; 0 after.
   double acceleration(std::int64_t i) const noexcept;
-  /// How far the number gets within `steps()` beyond what the final speed alone gives: the sum over
-  /// i of v(i) - v(steps).
+  /// Displacement within steps() minus that of the final speed: the sum over i of
+  /// v(i) - v(steps).
   double displacement() const noexcept { return displacement_; }
-  /// How far the speed first moves away from its target before it comes to it: in the direction of
-  /// the present acceleration, signed; 0 if it does not.
+  /// Largest change of the speed away from its target, in the direction of the present
+  /// acceleration, signed; 0 if there is none.
   double detour() const noexcept { return detour_; }
-  /// From a start at `speed`: how far the position moves before the speed changes sign for the
-  /// first time, if the detour takes it through zero; else 0.
+  /// For a start at `speed`: displacement until the speed changes its sign for the first time, if
+  /// the detour() takes it through zero; else 0.
   double run_before_turn(double speed) const noexcept;
 
  private:
@@ -55,15 +55,15 @@ class VelocityChange {
   double trough(double i, double steps) const noexcept;
   Sums sums(double steps) const noexcept;
 
-  // mirrored such that the trough is negative
+  // mirrored by sign_, so that the trough is negative
   double sign_ = 1.0;
   double start_ = 0.0;  // a(0)
   double acceleration_ = 0.0;
   double jerk_ = 0.0;
   std::int64_t steps_ = 0;
   std::int64_t shorter_ = 0;  // steps of the other trapezoid
-  bool crest_ = false;        // the other one is the crest of as many steps
-  double share_ = 0.0;        // of the other one
+  bool crest_ = false;        // the other one is the crest with as many steps
+  double share_ = 0.0;        // weight of the other one
   double displacement_ = 0.0;
   double detour_ = 0.0;
 };

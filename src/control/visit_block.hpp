@@ -2,16 +2,16 @@
 
 #include <cstdint>
 
-/// Work that tests count, to prove how little an iteration does: looks at blocks of the pool, and
-/// what stands in Work.
+/// Counters for tests that check the work of an iteration: visited blocks of the pool, and the
+/// operations of Work.
 ///
-/// Compiles to nothing unless O80_COUNT_BLOCKS is defined; then the test defines the functions.
+/// Compiles to nothing unless O80_COUNT_BLOCKS is defined. With it, the test defines the functions.
 #ifdef O80_COUNT_BLOCKS
 namespace o80 {
 enum class Work : std::uint8_t {
   batch_taken,
   status_told,
-  queue_dropped  // of one actuator
+  queue_dropped  // the queue of one actuator
 };
 void visit_block(std::uint32_t block) noexcept;
 void count(Work work) noexcept;

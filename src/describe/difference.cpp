@@ -8,7 +8,7 @@ namespace o80 {
 
 namespace {
 
-using Lines = std::map<std::string, std::string>;  // by what they speak of
+using Lines = std::map<std::string, std::string>;  // property => value
 
 std::string number(double value) {
   std::ostringstream text;
@@ -86,7 +86,7 @@ void add_fields(Lines& lines, const std::string& of, const Schema& schema, std::
   }
 }
 
-/// What compiled code relies on.
+/// The properties that compiled code depends on.
 Lines layout_lines(const Schema& schema) {
   Lines lines;
   lines["size of a row's states"] = std::to_string(round_up(schema.head.block, 8));
@@ -106,7 +106,7 @@ Lines layout_lines(const Schema& schema) {
   return lines;
 }
 
-/// A whole schema, but for its helps.
+/// All properties of a schema, without help texts.
 Lines lines_of(const Schema& schema) {
   Lines lines = layout_lines(schema);
   lines["robot"] = schema.head.robot.str();
@@ -139,8 +139,7 @@ std::string compare(const Lines& expected, const Lines& found) {
   return text;
 }
 
-/// Drops the lines that only one side has, where that is no contradiction: units, and requests
-/// that a program does not know.
+/// Drops lines that may be missing on one side: units, and requests that the program does not use.
 void forgive(Lines& expected, Lines& found) {
   std::erase_if(expected, [&](const auto& line) {
     return line.first.ends_with(kUnit) && !found.contains(line.first);
@@ -154,7 +153,7 @@ void forgive(Lines& expected, Lines& found) {
 }  // namespace
 
 std::string difference(const Schema& expected, const Schema& found) {
-  // a watchdog that is set otherwise makes no other robot
+  // watchdog settings may differ
   Schema same = found;
   same.head.stale = expected.head.stale;
   same.head.silence = expected.head.silence;

@@ -25,7 +25,7 @@ T number_at(const std::byte* from) {
 /// An integer of 1 to 8 bytes.
 void write_integer(JsonWriter& json, const std::byte* from, std::uint32_t size, bool is_signed) {
   std::uint64_t bits = 0;
-  std::memcpy(&bits, from, size);  // little end first
+  std::memcpy(&bits, from, size);  // little-endian
   if (!is_signed) return json.value(bits);
   const std::uint32_t unused = 64 - 8 * size;
   json.value(static_cast<std::int64_t>(bits << unused) >> unused);
@@ -60,7 +60,7 @@ void write_element(JsonWriter& json, const Schema& schema, const FieldRow& field
   }
 }
 
-/// What a field holds, arrays as such.
+/// The value of a field; an array field becomes a JSON array.
 void write_value(JsonWriter& json, const Schema& schema, const FieldRow& field,
                  const std::byte* from) {
   if (field.rows == 0) return write_element(json, schema, field, from);

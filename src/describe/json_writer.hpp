@@ -9,7 +9,7 @@
 
 namespace o80 {
 
-/// Writes JSON; commas are set where they belong.
+/// Writes JSON and sets the commas.
 class JsonWriter {
  public:
   void open(char bracket) {

@@ -14,7 +14,8 @@ namespace {
 
 constexpr std::uint64_t kMagic = 0x616D656863533038;  // "80Schema"
 constexpr std::uint32_t kMostRows = 1U << 20;
-constexpr std::uint32_t kMostActuators = 0xFFFF;  // a record names one, or all, in 16 bits
+constexpr std::uint32_t kMostActuators =
+    0xFFFF;  // a record has 16 bits for an actuator; one value means all
 constexpr std::uint32_t kLargestType = 1U << 28;
 constexpr std::uint32_t kMostNested = 16;
 
@@ -24,7 +25,7 @@ struct TableHead {
   std::uint32_t sizes[8] = {};
 };
 
-/// Calls `visit` for every table of rows of a schema, in the order of the bytes.
+/// Calls `visit` for every table of a schema, in the order of to_bytes().
 template <class SchemaLike, class Visit>
 void each_table(SchemaLike& schema, Visit&& visit) {
   visit(0, schema.types);
@@ -38,11 +39,10 @@ void each_table(SchemaLike& schema, Visit&& visit) {
 }
 
 [[noreturn]] void refuse(const std::string& why) {
-  throw InvalidArgument("the description cannot be used: " + why);
+  throw InvalidArgument("invalid description: " + why);
 }
 
-/// Whether other programs can read it as text: no byte out of place, no character twice as long as
-/// it needs, none that is no character.
+/// True for valid UTF-8: no stray byte, no overlong form, no surrogate, nothing above 0x10FFFF.
 bool is_utf8(std::string_view text) {
   for (std::size_t i = 0; i < text.size();) {
     const auto first = static_cast<unsigned char>(text[i]);
@@ -71,11 +71,11 @@ template <class Row>
 void check_text(const Row& text, const char* what) {
   for (const char c : text.view()) {
     if (static_cast<unsigned char>(c) < 32 || c == 127) {
-      refuse(std::string(what) + " holds a control character");
+      refuse(std::string(what) + " contains a control character");
     }
   }
-  if (text.chars.back() != 0) refuse(std::string(what) + " has no end");
-  if (!is_utf8(text.view())) refuse(std::string(what) + " is no UTF-8");
+  if (text.chars.back() != 0) refuse(std::string(what) + " is not terminated");
+  if (!is_utf8(text.view())) refuse(std::string(what) + " is not valid UTF-8");
 }
 
 void check_field(const Schema& schema, std::uint32_t type_index, const FieldRow& field) {
@@ -88,35 +88,37 @@ void check_field(const Schema& schema, std::uint32_t type_index, const FieldRow&
       std::uint64_t{field.rows == 0 ? 1 : field.rows} * (field.columns == 0 ? 1 : field.columns);
   if (elements > kLargestType) refuse(name + "has too many elements");
   if (field.offset + field.size * elements > type.size) refuse(name + "lies outside its struct");
-  if (field.rows == 0 && field.columns != 0) refuse(name + "has columns but no rows");
+  if (field.rows == 0 && field.columns != 0) refuse(name + "has columns without rows");
   const bool moves = field.kind != Kind::structure && field.kind != Kind::boolean &&
                      field.kind != Kind::enumeration;
   if (field.resting > 1 || !std::isfinite(field.rest) || (field.resting == 1 && !moves)) {
-    refuse(name + "cannot rest: rests_at() needs a number and a finite value");
+    refuse(name + "cannot rest: rests_at() needs a numeric field and a finite value");
   }
   switch (field.kind) {
     case Kind::structure:
-      // a nested type stands before its owner, so there is no circle
-      if (field.type >= type_index) refuse(name + "nests a type that is not described before");
-      if (field.size != schema.types[field.type].size) refuse(name + "has not its type's size");
+      // a nested type comes before the type that contains it, so there is no cycle
+      if (field.type >= type_index) refuse(name + "nests a type that comes after its own");
+      if (field.size != schema.types[field.type].size)
+        refuse(name + "differs in size from its type");
       break;
     case Kind::enumeration:
       if (field.size != 1 && field.size != 2 && field.size != 4 && field.size != 8) {
-        refuse(name + "has the size of no enumeration");
+        refuse(name + "is an enumeration of " + std::to_string(field.size) +
+               " bytes, not 1, 2, 4 or 8");
       }
       if (std::uint64_t{field.first_label} + field.labels > schema.labels.size()) {
-        refuse(name + "has labels that are not there");
+        refuse(name + "refers to missing labels");
       }
       break;
     default:
       if (static_cast<int>(field.kind) > static_cast<int>(Kind::float64)) {
-        refuse(name + "is of a kind that cannot be shared");
+        refuse(name + "has a kind that a segment cannot hold");
       }
-      if (field.size != size_of(field.kind)) refuse(name + "has not its kind's size");
+      if (field.size != size_of(field.kind)) refuse(name + "differs in size from its kind");
   }
 }
 
-/// Numbers of each type, nested ones included.
+/// Checks all types; returns the count of numbers of each type and its nested types.
 std::vector<std::uint64_t> check_types(const Schema& schema) {
   std::vector<std::uint64_t> numbers;
   std::vector<std::uint32_t> depths;
@@ -127,14 +129,14 @@ std::vector<std::uint64_t> check_types(const Schema& schema) {
     if (type.size > kLargestType) refuse(name + "is too large");
     if (type.alignment == 0 || type.alignment > 64 ||
         (type.alignment & (type.alignment - 1)) != 0) {
-      refuse(name + "has no alignment");
+      refuse(name + "has the invalid alignment " + std::to_string(type.alignment));
     }
     if (std::uint64_t{type.first_field} + type.fields > schema.fields.size()) {
-      refuse(name + "has fields that are not there");
+      refuse(name + "refers to missing fields");
     }
     const bool has_value = type.first_default != kNoType;
     if (has_value && std::uint64_t{type.first_default} + type.size > schema.defaults.size()) {
-      refuse(name + "has defaults that are not there");
+      refuse(name + "refers to missing default values");
     }
     std::set<std::string_view> names;
     std::uint64_t count = 0;
@@ -143,7 +145,7 @@ std::vector<std::uint64_t> check_types(const Schema& schema) {
       const FieldRow& field = schema.fields[type.first_field + f];
       check_field(schema, i, field);
       if (field.has_default > (has_value ? 1 : 0)) {
-        refuse(name + "has no default for '" + field.name.str() + "'");
+        refuse(name + "lacks the default value of '" + field.name.str() + "'");
       }
       if (!names.insert(field.name.view()).second) {
         refuse(name + "has two fields '" + field.name.str() + "'");
@@ -153,14 +155,14 @@ std::vector<std::uint64_t> check_types(const Schema& schema) {
       if (count > kLargestType) refuse(name + "has too many numbers");
       if (nested) depth = std::max(depth, depths[field.type] + 1);
     }
-    if (depth > kMostNested) refuse(name + "nests too deep");
+    if (depth > kMostNested) refuse(name + "is nested too deeply");
     numbers.push_back(count);
     depths.push_back(depth);
   }
   return numbers;
 }
 
-/// A number of this kind can be where it is to rest.
+/// True if a field of this kind can hold the rest value.
 bool can_rest(const FieldRow& field, double rest) {
   if (field.kind == Kind::boolean || field.kind == Kind::enumeration) return false;
   return visit_number(field.kind, [rest]<class T>(T) {
@@ -176,46 +178,46 @@ void check_limit(const ActuatorRow& actuator, const FieldRow& field, const Limit
     const std::string name = field.name.view().empty() ? "" : "'" + field.name.str() + "' of ";
     refuse(name + "actuator '" + actuator.name.str() + "' cannot rest at " +
            std::to_string(limit.rest) +
-           ": rests_at() needs a value that its kind can hold, and no "
-           "boolean or enumeration");
+           ": rests_at() needs a numeric field and a value that the "
+           "field can hold");
   }
-  const std::string of = "the limits of actuator '" + actuator.name.str() + "' ";
+  const std::string of = "limits of actuator '" + actuator.name.str() + "': ";
   if (std::isnan(limit.minimum) || std::isnan(limit.maximum) || limit.minimum > limit.maximum) {
-    refuse(of + "are from " + std::to_string(limit.minimum) + " to " +
-           std::to_string(limit.maximum) + ": minimum <= maximum is needed");
+    refuse(of + "the minimum must not exceed the maximum, got " + std::to_string(limit.minimum) +
+           " to " + std::to_string(limit.maximum));
   }
   const auto positive = [&](double value, const char* what) {
     if (!(value > 0)) {
-      refuse(of + "have " + what + " " + std::to_string(value) + ": it must be above 0");
+      refuse(of + what + " must be positive, got " + std::to_string(value));
     }
   };
   if (limit.resting > 1 || !std::isfinite(limit.rest) ||
       (limit.resting == 1 && (limit.rest < limit.minimum || limit.rest > limit.maximum))) {
-    refuse(of + "are from " + std::to_string(limit.minimum) + " to " +
-           std::to_string(limit.maximum) + ", and it rests at " + std::to_string(limit.rest) +
-           ": a place to rest lies between them");
+    refuse(of + "the rest value must be from " + std::to_string(limit.minimum) + " to " +
+           std::to_string(limit.maximum) + ", got " + std::to_string(limit.rest));
   }
   positive(limit.speed, "speed");
   positive(limit.acceleration, "acceleration");
   positive(limit.jerk, "jerk");
   positive(limit.error, "error");
   if (std::isfinite(limit.jerk) && !std::isfinite(limit.acceleration)) {
-    refuse(of + "have a jerk without an acceleration: give both");
+    refuse(of + "jerk without an acceleration; set both");
   }
   if (std::isfinite(limit.acceleration) && !std::isfinite(limit.speed)) {
-    refuse(of + "have an acceleration without a speed: give both");
+    refuse(of + "acceleration without a speed; set both");
   }
 }
 
 void check_actuators(const Schema& schema, const std::vector<std::uint64_t>& numbers) {
-  if (schema.actuators.size() >= kMostActuators) refuse("there are too many actuators");
+  if (schema.actuators.size() >= kMostActuators) refuse("too many actuators");
   std::set<std::string_view> names;
   for (const ActuatorRow& actuator : schema.actuators) {
     const std::string name = "actuator '" + actuator.name.str() + "' ";
     check_text(actuator.name, "an actuator's name");
     if (actuator.name.view().empty()) refuse("an actuator has no name");
-    if (!names.insert(actuator.name.view()).second) refuse("there are two " + name);
-    if (actuator.type >= schema.types.size()) refuse(name + "has no type");
+    if (!names.insert(actuator.name.view()).second)
+      refuse("two actuators are called '" + actuator.name.str() + "'");
+    if (actuator.type >= schema.types.size()) refuse(name + "refers to a missing type");
     const TypeRow& type = schema.types[actuator.type];
     if (std::uint64_t{actuator.offset} + type.size > schema.head.block) {
       refuse(name + "lies outside the row");
@@ -223,13 +225,13 @@ void check_actuators(const Schema& schema, const std::vector<std::uint64_t>& num
     if (type.alignment > 1 && actuator.offset % type.alignment != 0) {
       refuse(name + "is not aligned");
     }
-    if (actuator.group >= schema.groups.size()) refuse(name + "has no group");
+    if (actuator.group >= schema.groups.size()) refuse(name + "refers to a missing group");
     if (static_cast<int>(actuator.when_idle) > static_cast<int>(WhenIdle::follow)) {
-      refuse(name + "has no when_idle");
+      refuse(name + "has an unknown when_idle");
     }
     if (std::uint64_t{actuator.first_limit} + actuator.limits > schema.limits.size() ||
         actuator.limits != numbers[actuator.type]) {
-      refuse(name + "has not one limit for each number");
+      refuse(name + "must have one limit for each number of its state");
     }
     const LimitRow* limit = schema.limits.data() + actuator.first_limit;
     schema.each_scalar(actuator.type, [&](std::uint32_t, const FieldRow& field) {
@@ -243,22 +245,23 @@ void check_groups(const Schema& schema) {
   for (const GroupRow& group : schema.groups) {
     check_text(group.name, "a group's name");
     if (group.type >= schema.types.size()) {
-      refuse("group '" + group.name.str() + "' has no type");
+      refuse("group '" + group.name.str() + "' refers to a missing type");
     }
     if (group.first_actuator != next || next + group.count > schema.actuators.size()) {
-      refuse("group '" + group.name.str() + "' has actuators that are not there");
+      refuse("group '" + group.name.str() + "' refers to missing actuators");
     }
-    if (group.is_array == 0 && group.count != 1) refuse("a group of one has not one actuator");
+    if (group.is_array == 0 && group.count != 1)
+      refuse("a group without an array must have one actuator");
     next += group.count;
     for (std::uint32_t i = 0; i < group.count; ++i) {
       const ActuatorRow& actuator = schema.actuators[group.first_actuator + i];
       if (actuator.type != group.type ||
           actuator.offset != group.offset + std::uint64_t{i} * schema.types[group.type].size) {
-        refuse("the actuators of group '" + group.name.str() + "' are no array");
+        refuse("the actuators of group '" + group.name.str() + "' do not form an array");
       }
     }
   }
-  if (next != schema.actuators.size()) refuse("an actuator stands in no group");
+  if (next != schema.actuators.size()) refuse("an actuator belongs to no group");
 }
 
 }  // namespace
@@ -271,32 +274,32 @@ void check(const Schema& schema) {
     refuse("the clock is unknown");
   }
   if (schema.head.stale > Stale::halt || schema.head.silence < 0) {
-    refuse("the policy for silent frontends is unknown");
+    refuse("the watchdog settings are invalid");
   }
   const std::vector<std::uint64_t> numbers = check_types(schema);
   if (schema.head.extended != kNoType && schema.head.extended >= schema.types.size()) {
-    refuse("the extended type is not there");
+    refuse("the extended type is missing");
   }
   for (const LabelRow& label : schema.labels) check_text(label.name, "a label");
   check_actuators(schema, numbers);
-  // also of those that belong to no actuator: a schema equals itself
+  // also limits that belong to no actuator: with a NaN a schema would not equal itself
   for (const LimitRow& limit : schema.limits) {
     for (const double value : {limit.minimum, limit.maximum, limit.speed, limit.acceleration,
                                limit.jerk, limit.error, limit.rest}) {
-      if (std::isnan(value)) refuse("a limit is not a number");
+      if (std::isnan(value)) refuse("a limit is NaN");
     }
   }
   check_groups(schema);
-  if (schema.requests.size() >= kMostActuators) refuse("there are too many requests");
+  if (schema.requests.size() >= kMostActuators) refuse("too many requests");
   std::set<std::string_view> names;
   for (const RequestRow& request : schema.requests) {
     check_text(request.name, "a request's name");
     check_text(request.help, "a help");
     if (request.type >= schema.types.size()) {
-      refuse("request '" + request.name.str() + "' has no type");
+      refuse("request '" + request.name.str() + "' refers to a missing type");
     }
     if (!names.insert(request.name.view()).second) {
-      refuse("there are two requests '" + request.name.str() + "'");
+      refuse("two requests are called '" + request.name.str() + "'");
     }
   }
 }
@@ -333,12 +336,12 @@ Schema schema_from_bytes(std::span<const std::byte> bytes) {
   Schema schema;
   if (bytes.size() < sizeof head + sizeof schema.head) throw foreign("too short");
   std::memcpy(&head, bytes.data(), sizeof head);
-  if (head.magic != kMagic) throw foreign("no schema");
+  if (head.magic != kMagic) throw foreign("it has no schema");
   std::memcpy(&schema.head, bytes.data() + sizeof head, sizeof schema.head);
   std::size_t at = sizeof head + sizeof schema.head;
   each_table(schema, [&]<class Row>(int i, std::vector<Row>& rows) {
-    if (head.sizes[i] != sizeof(Row)) throw foreign("rows of another size");
-    if (head.counts[i] > kMostRows) throw foreign("too many rows");
+    if (head.sizes[i] != sizeof(Row)) throw foreign("entries of another size");
+    if (head.counts[i] > kMostRows) throw foreign("too many entries");
     const std::size_t count = head.counts[i] * sizeof(Row);
     if (count > bytes.size() - at) throw foreign("too short");
     rows.resize(head.counts[i]);

@@ -6,8 +6,8 @@
 
 namespace o80 {
 
-/// Calls `visit(T{})` with the C++ type of a number of this kind; a boolean is a byte, and what has
-/// no such type (enumerations, structures) is taken for one.
+/// Calls `visit(T{})` with the C++ type of a number of this kind. Kinds without such a type
+/// (boolean, enumeration, structure) are passed as a byte.
 template <class Visit>
 constexpr decltype(auto) visit_number(Kind kind, Visit&& visit) {
   switch (kind) {

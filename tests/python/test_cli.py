@@ -187,7 +187,7 @@ def test_errors_name_the_cure(folder: Path) -> None:
     assert "--frequency cannot be 'fast'" in o80(
         folder, "run", "two_joints", "--frequency", "fast", fails=True
     )
-    assert "option 'reach' cannot be 'far': expected is number" in o80(
+    assert "option 'reach' must be a number, got 'far'" in o80(
         folder, "run", "two_joints", "--reach", "far", fails=True
     )
     assert "o80 run" in o80(folder, "echo", "nobody", "--timeout", "0.1", fails=True)

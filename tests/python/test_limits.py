@@ -137,7 +137,7 @@ def test_the_fastest_way_needs_limits(loop: Loop) -> None:
     [
         (o80.Limits(acceleration=1.0), "without a speed"),
         (o80.Limits(speed=1.0, jerk=1.0), "without an acceleration"),
-        (o80.Limits(minimum=1.0, maximum=-1.0), "minimum <= maximum"),
+        (o80.Limits(minimum=1.0, maximum=-1.0), "minimum must not exceed the maximum"),
         (o80.Limits(speed=0.0), "speed"),
     ],
 )

@@ -5,7 +5,7 @@
 
 namespace o80 {
 
-/// Everything o80 throws; the text says what happened, to what, and what to do.
+/// Base of all exceptions that o80 throws; the text says what happened, to what, and what to do.
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -20,22 +20,22 @@ class Error : public std::runtime_error {
 O80_ERROR(InvalidArgument, Error);          // a value the caller gave cannot be used
 O80_ERROR(TimeoutError, Error);             // a wait ended without its result
 O80_ERROR(SegmentTaken, Error);             // the name already has a living backend
-O80_ERROR(SegmentError, Error);             // the file cannot be a segment of this o80
-O80_ERROR(SchemaMismatch, Error);           // the robot is not described as the caller expects
+O80_ERROR(SegmentError, Error);             // the file is not a segment of this version of o80
+O80_ERROR(SchemaMismatch, Error);           // the robot's description differs from the caller's
 O80_ERROR(BackendGone, Error);              // the backend no longer iterates
-O80_ERROR(BackendStopped, BackendGone);     // it ended in order
+O80_ERROR(BackendStopped, BackendGone);     // it stopped without a fault
 O80_ERROR(BackendFailed, BackendGone);      // its driver reported a fault
 O80_ERROR(BackendKilled, BackendGone);      // its process died
 O80_ERROR(BackendSuperseded, BackendGone);  // a new backend took its name
-O80_ERROR(BackendHalted, Error);            // commands end or are refused until it is resumed
+O80_ERROR(BackendHalted, Error);            // commands are refused until the backend is resumed
 O80_ERROR(RowOverwritten, Error);           // the history no longer holds that iteration
-O80_ERROR(LaneFull, Error);                 // too much is in flight, nothing was sent
-O80_ERROR(NoLane, Error);                   // as many frontends command as the segment has lanes
-O80_ERROR(NotBursting, Error);              // a burst was asked of a backend that runs by the clock
+O80_ERROR(LaneFull, Error);                 // too many commands are in flight; nothing was sent
+O80_ERROR(NoLane, Error);                   // all lanes of the segment have an owner
+O80_ERROR(NotBursting, Error);              // a burst was requested from a real-time backend
 O80_ERROR(ReadOnly, Error);                 // the frontend may read only
 O80_ERROR(UsedAfterFork, Error);            // the object belongs to the parent process
 O80_ERROR(Closed, Error);                   // the object was closed
-O80_ERROR(Cancelled, Error);                // the caller's own check ended a wait
+O80_ERROR(Cancelled, Error);                // the caller's KeepWaiting returned false
 O80_ERROR(DriverError, Error);              // a robot library or its driver failed
 
 #undef O80_ERROR

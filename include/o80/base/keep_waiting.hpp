@@ -4,7 +4,8 @@
 
 namespace o80 {
 
-/// Asked now and then in every wait; false ends the wait with Cancelled. Empty: never asked.
+/// Called about every 50 ms during a wait; return false to end the wait with Cancelled. An empty
+/// function never ends a wait.
 using KeepWaiting = std::function<bool()>;
 
 }  // namespace o80

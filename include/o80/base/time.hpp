@@ -6,23 +6,23 @@
 
 namespace o80 {
 
-/// The count of backend loops: the clock of everything.
+/// Number of an iteration of a backend, from 0. Rows, commands and statuses refer to it.
 using Iteration = std::int64_t;
 
-/// Nanoseconds of the monotonic clock [ns].
+/// The monotonic clock [ns].
 std::int64_t monotonic_now() noexcept;
-/// The same clock as of the last tick of the kernel, some milliseconds late but a load away [ns].
+/// The coarse monotonic clock: up to some milliseconds old, but cheap to read [ns].
 std::int64_t monotonic_roughly_now() noexcept;
 
-/// How long a caller is ready to wait; empty is for ever.
+/// Longest duration of a wait; empty: no timeout.
 using Timeout = std::optional<std::chrono::nanoseconds>;
 
-/// The moment at which a wait gives up.
+/// The moment at which a wait times out.
 class Deadline {
  public:
   explicit Deadline(Timeout timeout) noexcept;
   bool over() const noexcept;
-  /// What is left [ns], never below 0, at most `cap`.
+  /// Time until the deadline [ns], from 0 to `cap`.
   std::int64_t left(std::int64_t cap) const noexcept;
 
  private:

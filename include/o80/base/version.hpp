@@ -2,7 +2,8 @@
 
 #include <string_view>
 
-/// Of these headers, "major.minor.patch"; CMake reads it here, pyproject.toml says the same.
+/// Version of these headers, "major.minor.patch". CMake reads it from this line; pyproject.toml
+/// must have the same.
 #define O80_VERSION "0.1.0"
 
 namespace o80 {

@@ -31,41 +31,41 @@ struct PaceSpec {
   double per_second = 0;
 };
 
-/// At once, in one iteration.
+/// Reaches the target in one iteration (a jump).
 constexpr PaceSpec direct() { return {}; }
 constexpr PaceSpec duration(std::chrono::nanoseconds time) {
   return {Pace::duration, time.count(), 0};
 }
 /// Peak speed of the first number of the state, in its unit [1/s].
 constexpr PaceSpec speed(double per_second) { return {Pace::speed, 0, per_second}; }
-/// There at this iteration.
+/// Reaches the target at this iteration.
 constexpr PaceSpec until(Iteration iteration) { return {Pace::until, iteration, 0}; }
-/// So many iterations (of a trajectory: for each of its rows).
+/// Reaches the target in `count` iterations (a trajectory: each of its waypoints).
 constexpr PaceSpec iterations(std::int64_t count) { return {Pace::iterations, count, 0}; }
 
-/// As fast as the limits allow, at rest at the end: the numbers that are commanded need limits of
-/// speed and acceleration.
+/// As fast as the limits allow, at rest at the end. Every commanded number needs a speed limit and
+/// an acceleration limit.
 constexpr PaceSpec fastest() { return {Pace::fastest, 0, 0}; }
 
-/// What a direct command does that the limits do not let arrive in its iteration.
+/// What happens to a direct command whose target the limits do not allow in one iteration.
 enum class OnLimit : std::uint8_t {
-  end,   // it ends as limited, and its actuator comes to rest
-  go_on  // it goes on to its target, as fast as the limits allow
+  end,   // the command ends as limited, and its actuator brakes
+  go_on  // the command continues to its target, as fast as the limits allow
 };
 
 constexpr std::string_view to_text(OnLimit what) { return what == OnLimit::end ? "end" : "go_on"; }
 
-/// Everything about a command but its actuator and its target.
+/// Options of a command, besides its actuator and its target.
 struct CommandOptions {
   PaceSpec pace = {};
   Mode mode = Mode::queue;
-  /// By default linear; minimum_jerk for a command of an actuator that has acceleration limits.
+  /// Default: minimum_jerk for an actuator with acceleration limits, else linear.
   std::optional<Profile> profile = {};
   Start start = Start::desired;
   OnLimit on_limit = OnLimit::end;
 };
 
-/// When a batch is to be taken, and what if that moment has passed.
+/// The iteration at which a batch acts, and what happens if that iteration has begun.
 struct PulseOptions {
   enum class Late : std::uint8_t { reject, now };
   Iteration at = kNow;

@@ -7,9 +7,9 @@
 
 #include "o80/describe/described.hpp"
 
-// Which fields of a described struct have a default: read from an object without an initialiser
-// while the program is compiled. A field without a default member initialiser has no value there,
-// and reading it is no constant expression.
+// Finds, at compile time, the fields of a described struct that have a default. It reads each field
+// of an object without an initialiser: a field without a default member initialiser has no value,
+// so reading it is not a constant expression.
 
 namespace o80::describing {
 
@@ -39,7 +39,7 @@ constexpr bool read_field() {
   return all;
 }
 
-/// Field I has a default member initialiser, of constants, for each of its numbers.
+/// True if each number of field I has a constant default member initialiser.
 template <class T, std::size_t I>
 concept HasDefault = requires { typename std::bool_constant<read_field<T, I>()>; };
 

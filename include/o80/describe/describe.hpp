@@ -14,7 +14,7 @@
 #include "o80/describe/described.hpp"
 #include "o80/describe/schema.hpp"
 
-// Described structs as rows of a schema, and their values as bytes.
+// Turns described structs into entries of a schema, and their values into bytes.
 
 namespace o80 {
 
@@ -37,12 +37,13 @@ template <class T>
 void add_defaults(Schema& schema, TypeRow& row, std::vector<FieldRow>& members);
 
 template <class T>
-inline constexpr char kKey = 0;  // its address tells types apart
+inline constexpr char kKey = 0;  // has a unique address for each type
 
 template <Shareable T>
 std::uint32_t type_of(Schema& schema);
 
-/// The row of one field of type T (arrays taken apart); nested types are added first.
+/// The entry of one field of type T; an array becomes its element and a shape. Nested types are
+/// added first.
 template <class T>
 FieldRow field_row(Schema& schema, std::string_view name, std::size_t offset,
                    std::string_view text) {
@@ -127,7 +128,7 @@ std::uint32_t type_of(Schema& schema) {
   return static_cast<std::uint32_t>(schema.types.size() - 1);
 }
 
-/// Bytes of T that are numbers; less than sizeof(T) if there is padding.
+/// Size of T without padding [bytes].
 template <class T>
 constexpr std::size_t payload() {
   if constexpr (ArrayOf<T>::value) {
@@ -144,8 +145,8 @@ constexpr std::size_t payload() {
 
 }  // namespace describing
 
-/// Copies a value without its padding: those bytes of `out` stay as they are (zero in a row).
-/// A struct without fields has nothing to copy, and `out` may be null.
+/// Copies a value without its padding: padding bytes of `out` keep their value (zero in a row).
+/// For a struct without fields `out` may be null.
 template <class T>
 void pack(const T& value, std::byte* out) {
   if constexpr (std::is_empty_v<T>) {
@@ -174,7 +175,7 @@ T unpack(const std::byte* from) {
 
 namespace describing {
 
-/// Marks the fields that have a default, and keeps their values.
+/// Marks the fields that have a default, and stores their values.
 template <class T>
 void add_defaults(Schema& schema, TypeRow& row, std::vector<FieldRow>& members) {
   constexpr auto kHasDefault = defaults_of<T>(std::make_index_sequence<field_count<T>()>());
@@ -191,13 +192,13 @@ void add_defaults(Schema& schema, TypeRow& row, std::vector<FieldRow>& members) 
 
 }  // namespace describing
 
-/// A robot without actuators: a pure sensor.
+/// The Actuators type of a robot without actuators (a pure sensor).
 struct NoActuators {};
-/// No sensor values beside the states.
+/// The Extended type of a robot without sensor values beside its states.
 struct NoExtended {};
 
-/// Adds the actuators of a std::array of states, or of a described struct (each field an actuator,
-/// an array field many).
+/// Adds the actuators of a std::array of states, or of a described struct: one actuator for each
+/// field, and one for each element of an array field.
 template <class Actuators>
 void describe_actuators(Schema& schema) {
   if constexpr (std::is_same_v<Actuators, NoActuators>) {

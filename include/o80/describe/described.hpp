@@ -14,8 +14,8 @@
 /// Describes a struct: O80_DESCRIBE(Joint, (position, "[rad]"), (velocity, "[rad/s]",
 /// o80::rests_at(0))), at namespace scope.
 ///
-/// A text may hold a unit in brackets and a help. A field of an actuator's state that rests goes
-/// there when no command drives it. Every field must be named: a forgotten one does not compile.
+/// A text may hold a help and a unit in brackets. `rests_at(value)`: the field goes to that value
+/// when no command drives its actuator. Every field must be named; a missing one does not compile.
 #define O80_DESCRIBE(Type, ...)                                                                  \
   static_assert(std::is_aggregate_v<Type>, #Type " must be a plain struct to be described");     \
   static_assert(::o80::field_count<Type>() == (0 O80_FOR_EACH(O80_PLUS_ONE, ~, __VA_ARGS__)),    \
@@ -49,11 +49,11 @@
 
 namespace o80 {
 
-/// Carries a type to the functions that O80_DESCRIBE makes, which are found by its namespace.
+/// Passes a type to the functions that O80_DESCRIBE defines (found by argument-dependent lookup).
 template <class T>
 struct Tag {};
 
-/// What O80_DESCRIBE says about a field: a text, and where it rests.
+/// What O80_DESCRIBE gives for a field: a text, and the value at which it rests.
 struct FieldNote {
   std::string_view text;
   std::optional<RestsAt> rest;
@@ -109,12 +109,12 @@ template <class T>
 concept Number = std::is_arithmetic_v<T> && !std::is_same_v<T, char> &&
                  !std::is_same_v<T, wchar_t> && !std::is_same_v<T, long double>;
 
-/// What may be the state of an actuator, sensor values or the body of a request.
+/// Types that can be the state of an actuator, the sensor values or the fields of a request.
 template <class T>
 concept Shareable =
     Number<T> || DescribedEnum<T> || (DescribedStruct<T> && std::is_trivially_copyable_v<T>);
 
-/// A state type with its own way to interpolate: `static T blend(const T&, const T&, double)`.
+/// A state type with its own interpolation: `static T blend(const T&, const T&, double)`.
 template <class T>
 concept Blending = requires(const T& state, double share) {
   { T::blend(state, state, share) } -> std::same_as<T>;

@@ -16,7 +16,7 @@
   macro(fixed, first) __VA_OPT__(O80_FOR_EACH_AGAIN O80_PARENS(macro, fixed, __VA_ARGS__))
 #define O80_FOR_EACH_AGAIN() O80_FOR_EACH_STEP
 
-// 1 if the argument stands in parentheses, else 0
+// 1 if the argument is in parentheses, else 0
 #define O80_IS_GROUP(x) O80_SECOND(O80_IS_GROUP_PROBE x, 0, ~)
 #define O80_IS_GROUP_PROBE(...) ~, 1
 #define O80_SECOND(...) O80_SECOND_OF(__VA_ARGS__)

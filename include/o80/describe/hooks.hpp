@@ -2,9 +2,10 @@
 
 namespace o80 {
 
-/// A state type's own way to interpolate; null where the default serves.
+/// Functions of a state type; null: the default is used.
 struct TypeHooks {
-  /// `out` becomes the state at `share` (0 to 1) of the way from `from` to `to`.
+  /// Interpolates: writes to `out` the state at the fraction `share` (0 to 1) between `from` and
+  /// `to`.
   void (*blend)(void* out, const void* from, const void* to, double share) = nullptr;
 };
 

@@ -7,26 +7,26 @@
 
 namespace o80 {
 
-/// What begins every row of a history.
+/// The first part of every history row.
 struct RowHead {
   std::int64_t iteration = 0;
-  std::int64_t time = 0;       // [ns], of the clock that the schema names
-  std::int64_t lateness = 0;   // how long after its due moment the iteration began [ns]
-  std::uint32_t overruns = 0;  // iterations so far that were not done in time
-  std::uint32_t skipped = 0;   // periods so far that were left out to catch up
-  std::uint32_t fresh = 0;     // 1: the robot started afresh in this row
+  std::int64_t time = 0;       // [ns], on the clock of the schema
+  std::int64_t lateness = 0;   // delay of the begin of the iteration after its due time [ns]
+  std::uint32_t overruns = 0;  // iterations so far that ended after their period
+  std::uint32_t skipped = 0;   // periods so far that were skipped to catch up
+  std::uint32_t fresh = 0;     // 1: fresh start (reset, restore or resume) in this row
   std::uint32_t halted = 0;    // 1: the backend was halted in this iteration
 };
 static_assert(sizeof(RowHead) == 40 && std::is_trivially_copyable_v<RowHead>);
 
-/// Where the parts of a row lie: offsets from its start [bytes].
+/// Offsets of the parts of a row from its start [bytes].
 struct RowLayout {
   std::uint32_t desired = 0;
   std::uint32_t observed = 0;
   std::uint32_t extended = 0;
-  std::uint32_t active = 0;   // one bit an actuator, whole 8-byte words
-  std::uint32_t clamped = 0;  // likewise
-  std::uint32_t braking = 0;  // likewise
+  std::uint32_t active = 0;   // mask: one bit for each actuator, in 8-byte words
+  std::uint32_t clamped = 0;  // mask
+  std::uint32_t braking = 0;  // mask
   std::uint32_t size = 0;
   std::uint32_t mask_words = 0;
   std::uint32_t block = 0;

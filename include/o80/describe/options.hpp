@@ -10,7 +10,7 @@
 
 namespace o80 {
 
-/// One value a robot can be started with: from its described Config.
+/// One option of a robot: a field of its described Config.
 struct Option {
   std::string name;
   std::string kind;  // "number", "integer", "boolean", "text", "one of: a, b"
@@ -68,7 +68,13 @@ std::string option_text(const T& value) {
   }
 }
 
-/// Reads a text into a value; false if it is no such value.
+/// "an integer" for "integer"; "one of: a, b" and "3 x number" stay as they are.
+inline std::string with_article(const std::string& kind) {
+  if (kind.starts_with("one of") || (kind[0] >= '0' && kind[0] <= '9')) return kind;
+  return (kind == "integer" ? "an " : "a ") + kind;
+}
+
+/// Parses a text into `value`; false if the text is invalid.
 template <class T>
 bool parse_option(std::string_view text, T& value) {
   if constexpr (std::is_same_v<T, bool>) {
@@ -104,7 +110,7 @@ bool parse_option(std::string_view text, T& value) {
 
 }  // namespace describing
 
-/// The options that a described Config stands for.
+/// The options of a described Config.
 template <class Config>
 std::vector<Option> options_of() {
   std::vector<Option> options;
@@ -119,7 +125,7 @@ std::vector<Option> options_of() {
   return options;
 }
 
-/// Sets one field of a Config from its text; the error lists what there is.
+/// Sets one field of a Config from a text; the error for an unknown name lists the options.
 template <class Config>
 void set_option(Config& config, std::string_view name, std::string_view text) {
   bool known = false;
@@ -130,8 +136,9 @@ void set_option(Config& config, std::string_view name, std::string_view text) {
     if (field != name) return;
     known = true;
     if (!describing::parse_option(text, config.*member)) {
-      throw InvalidArgument("option '" + std::string(name) + "' cannot be '" + std::string(text) +
-                            "': expected is " + describing::option_kind<Field>());
+      throw InvalidArgument("option '" + std::string(name) + "' must be " +
+                            describing::with_article(describing::option_kind<Field>()) + ", got '" +
+                            std::string(text) + "'");
     }
   });
   if (!known) {

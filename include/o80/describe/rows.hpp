@@ -13,7 +13,7 @@
 
 namespace o80 {
 
-/// What one number of a described struct is.
+/// Kind of a field of a described struct.
 enum class Kind : std::uint8_t {
   boolean,
   int8,
@@ -28,13 +28,14 @@ enum class Kind : std::uint8_t {
   float64,
   enumeration,  // an integer of 1, 2, 4 or 8 bytes with labels
   structure,    // a nested described struct
-  text,         // a string: in options only, never in shared memory
+  text,         // a string; only in options, never in shared memory
 };
 
-/// What an actuator without commands does.
+/// What an actuator does without a command: hold its last desired state, or follow the observed
+/// one.
 enum class WhenIdle : std::uint8_t { hold, follow };
 
-/// A short text of fixed size, filled with zeros, that can stand in shared memory.
+/// A text of fixed size for shared memory, filled up with zeros.
 template <std::size_t Size>
 struct FixedText {
   std::array<char, Size> chars{};
@@ -64,15 +65,15 @@ struct FieldRow {
   NameText name;
   UnitText unit;
   HelpText help;
-  std::uint32_t type = kNoType;   // of a nested struct
+  std::uint32_t type = kNoType;   // index of the type of a nested struct
   std::uint32_t offset = 0;       // from the start of the struct [bytes]
-  std::uint32_t size = 0;         // of one element [bytes]
+  std::uint32_t size = 0;         // size of one element [bytes]
   std::uint32_t rows = 0;         // shape of an array field: 0 x 0 is a plain field,
   std::uint32_t columns = 0;      // n x 0 a vector, n x m a matrix
-  std::uint32_t first_label = 0;  // of an enumeration
+  std::uint32_t first_label = 0;  // labels of an enumeration
   std::uint32_t labels = 0;
   Kind kind = Kind::float64;
-  std::uint8_t is_signed = 0;    // of an enumeration
+  std::uint8_t is_signed = 0;    // 1: the underlying type of the enumeration is signed
   std::uint8_t resting = 0;      // 1: goes to `rest` when no command drives it
   std::uint8_t has_default = 0;  // 1: a request may leave it out
   double rest = 0.0;             // in the field's unit
@@ -81,14 +82,14 @@ struct FieldRow {
   bool operator==(const FieldRow&) const = default;
 };
 
-/// One described struct. A type of a single nameless field is a plain number.
+/// One described struct. A plain number is a type with a single field without a name.
 struct TypeRow {
   NameText name;
   std::uint32_t size = 0;
   std::uint32_t alignment = 1;
   std::uint32_t first_field = 0;
   std::uint32_t fields = 0;
-  std::uint32_t first_default = kNoType;  // a value of this struct, for fields that have a default
+  std::uint32_t first_default = kNoType;  // offset of the default values in Schema::defaults
   std::uint32_t reserved = 0;
   bool operator==(const TypeRow&) const = default;
 };
@@ -100,25 +101,25 @@ struct LabelRow {
   bool operator==(const LabelRow&) const = default;
 };
 
-/// Limits and rest of one number of an actuator's state, in the unit of its field.
+/// Limits and rest value of one number of an actuator's state, in the unit of its field.
 struct LimitRow {
   double minimum;
   double maximum;
   double speed;           // [1/s]
   double acceleration;    // [1/s^2]
   double jerk;            // [1/s^3]
-  double error;           // between desired and observed; more of it halts
-  double rest;            // where the number goes when no command drives it ...
-  std::uint64_t resting;  // ... if this is 1
+  double error;           // largest |desired - observed|; a larger one halts the backend
+  double rest;            // value without a command, if `resting` is 1
+  std::uint64_t resting;  // 1: the number goes to `rest` when no command drives it
   bool operator==(const LimitRow&) const = default;
 };
 
-/// One thing that can be commanded.
+/// One actuator.
 struct ActuatorRow {
   NameText name;
   std::uint32_t type = 0;
-  std::uint32_t offset = 0;       // in the desired and in the observed block [bytes]
-  std::uint32_t first_limit = 0;  // one limit for each number of the state
+  std::uint32_t offset = 0;       // offset in the desired and in the observed block [bytes]
+  std::uint32_t first_limit = 0;  // `limits` limits: one for each number of the state
   std::uint32_t limits = 0;
   std::uint32_t group = 0;
   WhenIdle when_idle = WhenIdle::hold;
@@ -126,7 +127,7 @@ struct ActuatorRow {
   bool operator==(const ActuatorRow&) const = default;
 };
 
-/// Neighbouring actuators of one type that a robot names together ("joints"); an array or a single.
+/// Consecutive actuators of one type under one name ("joints"): an array, or a single actuator.
 struct GroupRow {
   NameText name;  // empty: the robot is one array of actuators
   std::uint32_t type = 0;
@@ -137,7 +138,7 @@ struct GroupRow {
   bool operator==(const GroupRow&) const = default;
 };
 
-/// One message a driver understands.
+/// One request that a driver handles.
 struct RequestRow {
   NameText name;
   HelpText help;
@@ -146,13 +147,13 @@ struct RequestRow {
   bool operator==(const RequestRow&) const = default;
 };
 
-/// Which clock the times of a history come from.
+/// Clock of the times of a history.
 enum class Clock : std::uint8_t { monotonic, simulated };
 
-/// What happens to the commands of a frontend that dies or falls silent.
+/// Policy for the commands of a frontend that dies or gives no sign of life.
 enum class Stale : std::uint8_t {
-  hold,   // they are carried out
-  purge,  // they are dropped
+  hold,   // the commands keep running
+  purge,  // the commands are dropped
   stop,   // the backend stops
   halt    // the backend halts
 };
@@ -161,7 +162,7 @@ constexpr std::string_view name_of(Stale stale) {
   return kNames[static_cast<std::size_t>(stale)];
 }
 
-/// The policy of that name, if there is one.
+/// The policy with this name, if any.
 constexpr std::optional<Stale> stale_of(std::string_view name) {
   for (const Stale stale : {Stale::hold, Stale::purge, Stale::stop, Stale::halt}) {
     if (name_of(stale) == name) return stale;
@@ -169,17 +170,17 @@ constexpr std::optional<Stale> stale_of(std::string_view name) {
   return std::nullopt;
 }
 
-/// What holds for a whole robot.
+/// The properties of a whole robot.
 struct SchemaHead {
   NameText robot;
   std::int64_t period = 0;           // [ns]
-  std::uint32_t extended = kNoType;  // type of the sensor values
+  std::uint32_t extended = kNoType;  // index of the type of the sensor values
   std::uint32_t block = 0;           // size of the desired and of the observed block [bytes]
   Clock clock = Clock::monotonic;
   std::uint8_t bursting = 0;
   Stale stale = Stale::hold;
   std::array<std::uint8_t, 5> reserved{};
-  std::int64_t silence = 0;  // iterations without life until `stale` is applied; 0: no watchdog
+  std::int64_t silence = 0;  // iterations without a sign of life until `stale`; 0: no watchdog
   bool operator==(const SchemaHead&) const = default;
 };
 

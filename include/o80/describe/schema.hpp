@@ -13,14 +13,14 @@
 
 namespace o80 {
 
-/// Limits of one number of a state, as a driver gives them; what is not given is not limited.
+/// Limits of one number of a state, as a driver gives them. Default: no limit.
 struct Limits {
   double minimum = -std::numeric_limits<double>::infinity();
   double maximum = std::numeric_limits<double>::infinity();
   double speed = std::numeric_limits<double>::infinity();         // [1/s]
   double acceleration = std::numeric_limits<double>::infinity();  // [1/s^2], needs a speed
   double jerk = std::numeric_limits<double>::infinity();          // [1/s^3], needs an acceleration
-  /// Most that desired and observed may be apart; more than that halts the backend.
+  /// Largest allowed |desired - observed|; a larger one halts the backend.
   double error = std::numeric_limits<double>::infinity();
 
   LimitRow row(double rest = 0.0, bool resting = false) const {
@@ -28,7 +28,7 @@ struct Limits {
   }
 };
 
-/// A field that goes to `value` when no command drives it: a velocity to 0, say.
+/// A field goes to `value` when no command drives it (a velocity to 0, for example).
 struct RestsAt {
   double value;
 };
@@ -47,7 +47,7 @@ class ActuatorDescription {
   ActuatorDescription& limits(const Limits& limits);
   /// Limits of a named field of the state (of every element of an array field).
   ActuatorDescription& limits(std::string_view field, const Limits& limits);
-  /// Where a named field of this actuator rests (every element of an array field).
+  /// The rest value of a named field of this actuator (of every element of an array field).
   ActuatorDescription& rests_at(std::string_view field, double value);
 
  private:
@@ -59,9 +59,9 @@ class ActuatorDescription {
   std::uint32_t index_;
 };
 
-/// What a robot is made of, as a table of fixed-size rows that can stand in shared memory.
+/// The description of a robot as tables of fixed-size entries, which a segment holds as bytes.
 ///
-/// Header-only: a robot library describes itself without linking o80.
+/// Header-only, so that a robot library need not link o80.
 class Schema {
  public:
   SchemaHead head;
@@ -72,31 +72,31 @@ class Schema {
   std::vector<ActuatorRow> actuators;
   std::vector<LimitRow> limits;
   std::vector<RequestRow> requests;
-  std::vector<std::byte> defaults;  // values of structs of which a field has a default
-  std::vector<TypeHooks> hooks;     // one for each type; stays in the backend's process
-  std::vector<const void*> keys;    // one for each type: of which C++ type it came, or null
+  std::vector<std::byte> defaults;  // default values of the types that have some
+  std::vector<TypeHooks> hooks;     // one for each type; not in the segment
+  std::vector<const void*> keys;    // one for each type: identifies its C++ type, or null
 
-  // a driver's describe()
-  /// The period that the user asks for [ns]; 0 if none was asked for.
+  // for the describe() of a driver
+  /// The period requested by the user [ns]; 0: none.
   std::int64_t asked_period() const { return head.period; }
-  /// The period that this robot runs at [ns]. Without this call it runs at any.
+  /// Sets the period of this robot [ns]. Without this call the user chooses it.
   void period(std::int64_t own) { head.period = own; }
   ActuatorDescription actuator(std::uint32_t index);
   ActuatorDescription actuator(std::string_view name);
 
-  // layouts known only at run time; see also the typed description in describe.hpp
-  /// Adds a type from its fields (offsets and sizes are computed), gives its index.
+  // for layouts that are known only at run time; describe.hpp describes C++ types
+  /// Adds a type from its fields, computes offsets and sizes, and returns its index.
   std::uint32_t add_type(std::string_view name, std::vector<FieldRow> members);
-  /// Adds an array of actuators, or a single one, behind those there are; gives the group's index.
+  /// Appends an array of actuators, or a single one; returns the index of the new group.
   std::uint32_t add_actuators(std::string_view group, std::uint32_t type, std::uint32_t count,
                               bool is_array = true);
-  /// Adds a sensor value to the extended type; gives its offset in the extended block [bytes].
+  /// Adds a sensor value to the extended type; returns its offset in the extended block [bytes].
   std::uint32_t add_sensor(FieldRow sensor);
-  /// `while_halted`: the request moves nothing, and is served also while the backend is halted.
+  /// `while_halted`: serve the request also while the backend is halted; it must move nothing.
   std::uint32_t add_request(std::string_view name, std::uint32_t type, std::string_view help,
                             bool while_halted = false);
 
-  /// Calls `visit(offset, const FieldRow&)` for every number of a type, nested ones included.
+  /// Calls `visit(offset, const FieldRow&)` for every number of a type and of its nested types.
   template <class Visit>
   void each_scalar(std::uint32_t type, Visit&& visit, std::uint32_t base = 0) const;
   std::uint32_t scalar_count(std::uint32_t type) const;
@@ -107,7 +107,7 @@ class Schema {
            limits == other.limits && requests == other.requests && defaults == other.defaults;
   }
 
-  /// The place of an actuator that is described already; used by the typed description.
+  /// Adds a group of actuators at a given offset; used by describe_actuators().
   void place_group(std::string_view group, std::uint32_t type, std::uint32_t offset,
                    std::uint32_t count, bool is_array);
 };
@@ -139,7 +139,7 @@ constexpr std::uint32_t size_of(Kind kind) {
 FieldRow scalar_field(std::string_view name, Kind kind, std::string_view text = "",
                       std::uint32_t rows = 0, std::uint32_t columns = 0);
 
-/// Splits "of the loop [Nm/rad]" into unit and help.
+/// Splits "stiffness [Nm/rad]" into help and unit.
 void set_text(FieldRow& field, std::string_view text);
 
 inline constexpr std::uint32_t round_up(std::uint32_t value, std::uint32_t step) {
@@ -187,7 +187,7 @@ inline std::uint32_t Schema::add_type(std::string_view name, std::vector<FieldRo
                             "' has no size: give its kind (or, for an enumeration, its size)");
     }
     if (nested) field.size = types.at(field.type).size;
-    field.has_default = 0;  // the new type has no value
+    field.has_default = 0;  // add_type() stores no default values
     field.offset = round_up(end, alignment);
     end = field.offset + field.size * field.count();
     type.alignment = alignment > type.alignment ? alignment : type.alignment;
@@ -260,7 +260,8 @@ inline std::uint32_t Schema::add_actuators(std::string_view group, std::uint32_t
 }
 
 inline std::uint32_t Schema::add_sensor(FieldRow sensor) {
-  // fields of a type are neighbours, and nested types stand before it: it is built anew at the end
+  // the fields of a type must be consecutive, and nested types must come first: rebuild it at the
+  // end
   std::vector<FieldRow> members;
   if (head.extended != kNoType) {
     const TypeRow old = types.at(head.extended);

@@ -12,24 +12,24 @@ namespace o80 {
 /// Why a backend was halted.
 enum class HaltCause : std::uint32_t {
   none,
-  frontend,       // somebody asked for it
-  driver,         // the robot's own code did
-  silence,        // a commander showed no life for too long
+  frontend,       // a frontend or `o80 halt` requested it
+  driver,         // the driver requested it
+  silence,        // a commander gave no sign of life for longer than `silence`
   dead_frontend,  // a commander died
-  error,          // desired and observed states were too far apart
-  overruns,       // too many iterations were late
-  predecessor     // the backend before was halted, or died while commands acted
+  error,          // desired and observed states were further apart than an error limit
+  overruns,       // too many iterations overran
+  predecessor     // the former backend was halted, or died while commands were active
 };
 inline constexpr std::size_t kHaltCauses = 8;
 std::string_view to_text(HaltCause cause) noexcept;
 
-/// One halt: its number, and why it was asked for.
+/// One halt and its reason.
 struct Halt {
   std::uint64_t number = 0;  // from 1; 0: none
   HaltCause cause = HaltCause::none;
-  Iteration iteration = -1;      // in which it began to act, -1 before
-  std::array<char, 64> who{};    // asked: a process, or nothing if it was the backend
-  std::array<char, 248> text{};  // the reason in words
+  Iteration iteration = -1;      // the first halted iteration; -1: it has not begun
+  std::array<char, 64> who{};    // the requesting process; empty: the backend
+  std::array<char, 248> text{};  // the reason
 
   std::string_view who_text() const noexcept { return who.data(); }
   std::string_view reason() const noexcept { return text.data(); }

@@ -12,7 +12,7 @@ namespace o80 {
 struct SegmentEntry {
   std::string name;
   Life life = Life::killed;
-  bool readable = false;  // false: no segment of this version, or not ours to read or to trust
+  bool readable = false;  // false: another version, no permission, or an owner without trust
   int pid = 0;
   std::uint64_t process_start = 0;  // as process_start() gives it
   std::int64_t started_at = 0;      // [s] since 1970
@@ -23,13 +23,14 @@ struct SegmentEntry {
   std::string problem{};    // why it is not readable
 };
 
-/// All segments of the directory, by name.
+/// All segments of the directory, sorted by name.
 std::vector<SegmentEntry> list_segments();
 
 /// Removes a dead segment; false if there is none. Throws SegmentTaken if it is alive.
 bool clean(std::string_view name);
 
-/// Removes all dead segments and whatever killed starters and cleaners left; the names removed.
+/// Removes all dead segments, and the files that killed starters and cleaners have left. Returns
+/// the removed names.
 std::vector<std::string> clean_dead();
 
 }  // namespace o80

@@ -123,7 +123,8 @@ TEST_F(CommandCheckTest, ASpeedAboveTheMaximumIsRefused) {
       refusal_of([&] { check.speed(1, 2.5); }),
       AllOf(HasSubstr("2.5 [rad/s]"), HasSubstr("'elbow' (1)"), HasSubstr("maximum: 2 [rad/s]")));
   for (const double speed : {0.0, -1.0, std::nan(""), HUGE_VAL}) {
-    EXPECT_THAT(refusal_of([&] { check.speed(0, speed); }), HasSubstr("not a positive"));
+    EXPECT_THAT(refusal_of([&] { check.speed(0, speed); }),
+                HasSubstr("must be positive and finite"));
   }
 }
 
@@ -137,7 +138,7 @@ TEST_F(CommandCheckTest, EnumerationsAndBooleansAreWhatTheyMayBe) {
   EXPECT_THAT(refusal_of([&] { check.targets(2, gripper(1, 2)); }), HasSubstr("'hot'"));
   EXPECT_NO_THROW(check.request(0, gripper(1, 0)));
   EXPECT_THAT(refusal_of([&] { check.request(0, gripper(0, 0)); }), HasSubstr("'shake'"));
-  EXPECT_THAT(refusal_of([&] { check.request(0, {}); }), HasSubstr("2 bytes, not 0"));
+  EXPECT_THAT(refusal_of([&] { check.request(0, {}); }), HasSubstr("must have 2 bytes, got 0"));
   EXPECT_THAT(refusal_of([&] { check.request(1, {}); }), HasSubstr("has shake"));
 }
 

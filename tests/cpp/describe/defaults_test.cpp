@@ -100,10 +100,10 @@ TEST_F(DefaultsTest, ThatAreNotThereAreRefused) {
   };
   Schema without_bytes = schema_;
   without_bytes.defaults.clear();
-  EXPECT_THAT(why(without_bytes), HasSubstr("has defaults that are not there"));
+  EXPECT_THAT(why(without_bytes), HasSubstr("refers to missing default values"));
   Schema without_value = schema_;
   without_value.fields[type(2).first_field].has_default = 1;
-  EXPECT_THAT(why(without_value), HasSubstr("has no default for 'stiffness'"));
+  EXPECT_THAT(why(without_value), HasSubstr("lacks the default value of 'stiffness'"));
 }
 
 TEST_F(DefaultsTest, AreNotTakenOverByATypeMadeAtRunTime) {

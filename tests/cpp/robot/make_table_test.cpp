@@ -119,7 +119,7 @@ TEST_F(MakeTableTest, AnOptionThatIsNotThereListsThoseThatAre) {
   EXPECT_THAT(message_of<InvalidArgument>([] { Robot(table(), {{"gian", "2"}}); }),
               HasSubstr("there are: fails, gain, finish_at"));
   EXPECT_THAT(message_of<InvalidArgument>([] { Robot(table(), {{"gain", "much"}}); }),
-              HasSubstr("'gain' cannot be 'much'"));
+              HasSubstr("'gain' must be a number, got 'much'"));
 }
 
 TEST_F(MakeTableTest, ADriverIsStoppedOnceAndOnlyIfAStartWasTried) {

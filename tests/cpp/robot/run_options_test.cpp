@@ -100,8 +100,8 @@ TEST_F(RunOptionsTest, RefuseWhatIsNotAllowedNamingTheFlag) {
   EXPECT_THAT(refusal({"--gian", "2"}), HasSubstr("there is no flag --gian"));
   EXPECT_THAT(refusal({"stray"}), HasSubstr("'stray' is no flag"));
   EXPECT_THAT(refusal({"--gain", "fast"}),
-              HasSubstr("robot 'puppet': option 'gain' cannot be 'fast': expected is number"));
-  EXPECT_THAT(refusal({"--fails", "often"}), HasSubstr("'often': expected is one of: never"));
+              HasSubstr("robot 'puppet': option 'gain' must be a number, got 'fast'"));
+  EXPECT_THAT(refusal({"--fails", "often"}), HasSubstr("must be one of: never"));
   EXPECT_EQ(Puppet::calls.constructed, 0);
 }
 

@@ -202,7 +202,8 @@ TEST_F(RunTest, SaysWhatIsWrongWithItsFlags) {
         std::array{"--policy", "idle", "other, fifo or rr"},
         std::array{"--priority", "100", "from 1 to 99"},
         std::array{"--cpus", "two", "a number from 0 to 1023"},
-        std::array{"--reach", "far", "robot 'two_joints': option 'reach' cannot be 'far'"}}) {
+        std::array{"--reach", "far",
+                   "robot 'two_joints': option 'reach' must be a number, got 'far'"}}) {
     Program wrong(two_joints({flag, value}));
     const Outcome refused = wrong.end();
     EXPECT_EQ(refused.code, 2) << flag;
