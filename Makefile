@@ -1,5 +1,5 @@
 # Everything made lies in .venv and build/. Options go through ARGS="...".
-.PHONY: demo test scripts torture model fuzz rt bench growth stress format clean distclean
+.PHONY: demo test scripts torture model fuzz rt systemd bench growth stress format clean distclean
 ARGS ?=
 export PYTHONDONTWRITEBYTECODE := 1
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
@@ -54,6 +54,13 @@ rt:
 	@.venv/bin/cmake --preset rt > /dev/null
 	@.venv/bin/cmake --build --preset rt
 	@.venv/bin/python tools/rt.py $(ARGS)
+
+# a robot as a service, in a virtual machine whose first process is systemd
+systemd:
+	@tools/setup.sh test
+	@.venv/bin/cmake --preset dev > /dev/null
+	@.venv/bin/cmake --build --preset dev
+	@.venv/bin/python tools/systemd.py $(ARGS)
 
 format:
 	@tools/setup.sh test

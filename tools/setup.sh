@@ -74,7 +74,7 @@ case $purpose in
   test)
     need_packages g++ ccache libgtest-dev libgmock-dev googletest strace stress-ng rt-tests \
       clang-19 libclang-rt-19-dev llvm-19 relacy-dev spin \
-      qemu-user-static g++-aarch64-linux-gnu qemu-system-x86 busybox-static cpio
+      qemu-user-static g++-aarch64-linux-gnu qemu-system-x86 busybox-static cpio systemd
     ;;
   bench) need_packages g++ rt-tests stress-ng ;;
   *) say "unknown purpose '$purpose'"; exit 2 ;;

@@ -5,6 +5,7 @@
 #include <getopt.h>
 #include <time.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -58,7 +59,8 @@ FakeArm::Options parse(int argc, char** argv) {
 
 [[noreturn]] void run(FakeArm& arm, std::int64_t period) {
   Mode before = arm.mode();
-  for (std::int64_t due = now() + period;; due += period) {
+  // delayed, it leaves out ticks: an arm does not make up for them
+  for (std::int64_t due = now() + period;; due = std::max(due + period, now())) {
     const timespec until{due / 1'000'000'000, due % 1'000'000'000};
     while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) != 0) {
     }

@@ -41,8 +41,13 @@ def stage(root: Path, programs: list[Path]) -> None:
 
 def make_image(image: Path, programs: list[Path]) -> None:
     """Packs the folder beside it that bears its name."""
+    stage(image.with_suffix(""), programs)
+    pack(image)
+
+
+def pack(image: Path) -> None:
+    """Makes an initial file system of the folder beside it that bears its name."""
     root = image.with_suffix("")
-    stage(root, programs)
     names = "\n".join(str(path.relative_to(root)) for path in sorted(root.rglob("*")))
     with image.open("wb") as output:
         subprocess.run(
