@@ -74,7 +74,7 @@ def test_what_comes_late_is_rejected_or_taken_at_once(arm: o80.Frontend) -> None
     arm.burst(10)
     burst = arm.prepared_burst(2)
     burst.targets[...] = 0.5
-    with pytest.raises(o80.Error, match="after the iteration it was meant for"):
+    with pytest.raises(o80.Error, match="after the iteration for which it was sent"):
         burst.run(at=5)
     assert arm.latest().iteration == 10, "a rejected batch does not burst"
 

@@ -224,7 +224,7 @@ def test_a_handler_cannot_burst_within_a_burst(arm: o80.Frontend) -> None:
     finally:
         signal.signal(signal.SIGALRM, before)
 
-    assert "in this very thread" in str(refused[0])
+    assert "this thread already runs a burst" in str(refused[0])
     assert arm.added == 1
     arm.forget_added()
     reached = arm.published

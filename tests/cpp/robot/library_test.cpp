@@ -56,7 +56,7 @@ TEST_F(LibraryTest, RefusesWhatIsNoRobot) {
               HasSubstr("cannot be loaded"));
   // a library indeed, but not of a robot
   EXPECT_THAT(message_of<DriverError>([] { RobotLibrary::load(O80_TEST_PREFIX "/lib/libo80.so"); }),
-              HasSubstr("has no O80_ROBOT(name, Driver)"));
+              HasSubstr("have no O80_ROBOT(name, Driver)"));
 }
 
 }  // namespace

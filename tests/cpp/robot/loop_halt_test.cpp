@@ -86,7 +86,7 @@ TEST_F(LoopHaltTest, AFirstReadingThatIsNoNumberIsAFaultThatNamesIt) {
     reading.observed[1] = std::numeric_limits<double>::quiet_NaN();
   };
   EXPECT_THAT(message_of<DriverError>([] { bursting_loop(); }),
-              AllOf(HasSubstr("actuator 'right'"), HasSubstr("no number")));
+              AllOf(HasSubstr("actuator 'right'"), HasSubstr("is NaN or infinite")));
   EXPECT_EQ(Puppet::calls.stopped, 1);
 }
 

@@ -101,7 +101,7 @@ INSTANTIATE_TEST_SUITE_P(WhileItRuns, LoopBreaks,
                          ::testing::Values(std::pair("write", "failed in write: wire cut"),
                                            std::pair("read", "failed in read: went blind"),
                                            std::pair("fault", "failed in read: too hot"),
-                                           std::pair("odd", "no std::exception")));
+                                           std::pair("odd", "not a std::exception")));
 
 Batch poke(UntypedFrontend& frontend, std::uint32_t how) {
   add_request(frontend, Poke{how});

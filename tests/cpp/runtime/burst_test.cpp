@@ -46,7 +46,7 @@ TEST_F(BurstTest, WhatIsSentWithItMayActFromALaterIterationOfIt) {
   EXPECT_THAT(desired(frontend, 1, 4), ElementsAre(0, 0, 3, 3));
   add(frontend, 0, 5.0);
   EXPECT_THAT(message_of<Error>([&] { frontend.burst(4, kPatience, {}, {.at = 3}); }),
-              HasSubstr("after the iteration it was meant for"));
+              HasSubstr("after the iteration for which it was sent"));
   EXPECT_EQ(frontend.published(), 4) << "what is rejected does not burst";
 }
 

@@ -217,7 +217,7 @@ TEST_F(RunningRequestTest, AReadingThatIsNoNumberFailsItsFreshStart) {
   station.run(1);
   EXPECT_EQ(station.iterate(), Step::ended);
   EXPECT_EQ(batch.handle(0).status, Status::rejected);
-  EXPECT_THAT(batch.handle(0).text, HasSubstr("no number"));
+  EXPECT_THAT(batch.handle(0).text, HasSubstr("is NaN or infinite"));
 }
 
 TEST_F(RunningRequestTest, ASecondOfItsKindIsRejectedBeforeItsHandlerIsAsked) {
