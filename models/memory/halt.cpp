@@ -6,7 +6,7 @@
 //   - ring_bell(view);
 //   - write_halt(
 //   + write_halt(
-//   - // the backend may have looked for the reason in vain, and stand still since
+//   - // again: the backend may have read the slot before this reason and sleep since
 //   - ring_bell(view);
 //   +
 // mutant counted_not_added: src/memory/halt_word.cpp

@@ -9,8 +9,9 @@
 
 namespace o80 {
 
-// Shared memory that another process may be writing is copied in relaxed atomic words of 8 bytes.
-// `shared` is aligned to 8, `bytes` is a multiple of 8, the private side needs no alignment.
+// Copies between private and shared memory in relaxed atomic words of 8 bytes: another process may
+// write the shared side during the copy. `shared` is aligned to 8, `bytes` is a multiple of 8, the
+// private side needs no alignment.
 
 inline void store_words(std::byte* shared, const std::byte* from, std::size_t bytes) noexcept {
   auto* words = reinterpret_cast<std::uint64_t*>(shared);
@@ -19,7 +20,7 @@ inline void store_words(std::byte* shared, const std::byte* from, std::size_t by
     std::memcpy(&word, from + 8 * i, 8);
     std::atomic_ref(words[i]).store(word, std::memory_order_relaxed);
   };
-  // compilers do not unroll a loop over atomics, and every row is copied by these
+  // unrolled by hand, because compilers do not unroll loops over atomics: every row is copied here
   std::size_t i = 0;
   for (; i + 4 <= bytes / 8; i += 4) {
     copy(i);
@@ -36,7 +37,7 @@ inline void load_words(std::byte* to, const std::byte* shared, std::size_t bytes
     const std::uint64_t word = std::atomic_ref(words[i]).load(std::memory_order_relaxed);
     std::memcpy(to + 8 * i, &word, 8);
   };
-  // likewise, bulk reads live on it
+  // unrolled as above, for bulk reads
   std::size_t i = 0;
   for (; i + 4 <= bytes / 8; i += 4) {
     copy(i);
@@ -47,14 +48,14 @@ inline void load_words(std::byte* to, const std::byte* shared, std::size_t bytes
   for (std::size_t left = bytes / 8 % 4; left > 0; --left) copy(i++);
 }
 
-/// Writes a text, cut to what fits, with at least one zero behind it. Release: see `load_text`.
+/// Writes a text with a terminating zero; excess characters are dropped. Release: see `load_text`.
 void store_text(std::atomic<std::uint64_t>* words, std::size_t count,
                 std::string_view text) noexcept;
 
-/// Reads a text up to its zero; may be of mixed age, never out of bounds.
+/// Reads a text up to its zero, never out of bounds. During a write it may mix old and new words.
 std::string load_text(const std::atomic<std::uint64_t>* words, std::size_t count);
 
-/// The same into 8 * count bytes, which end in a zero.
+/// The same, into a buffer of 8 * count bytes with a terminating zero.
 void load_text(const std::atomic<std::uint64_t>* words, std::size_t count, char* to) noexcept;
 
 }  // namespace o80

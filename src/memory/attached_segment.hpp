@@ -21,23 +21,23 @@ namespace o80 {
 
 struct AttachOptions {
   enum class Dead { wait, accept };
-  Dead dead = Dead::wait;          // accept: also a stopped, failed or killed one, to read it
-  bool starting = false;           // also one that has not published row 0 yet
-  std::uint64_t ignore_epoch = 0;  // a segment of this epoch counts as not there
+  Dead dead = Dead::wait;          // accept: also attach to the segment of an ended backend
+  bool starting = false;           // true: also attach to a backend without row 0
+  std::uint64_t ignore_epoch = 0;  // ignore the segment of this epoch
   KeepWaiting keep_waiting = {};
 };
 
-/// Move-only: the segment of some backend, seen from a frontend.
+/// Move-only: the segment of a backend, as a frontend uses it.
 ///
-/// With Access::read_only it opens the segment file alone; with Access::read_write the commanders'
-/// file too. Mapped read-only but for the bell and the lane that a LaneSender takes. Copies the
-/// header first: what the file says later moves no bound.
+/// Access::read_only opens the segment file only, Access::read_write the commanders' file too. All
+/// is mapped read-only, except the bell and the lane that a LaneSender acquires. The header is
+/// copied first, so later changes of the file cannot change any bound.
 ///
 /// Writer / Readers: const calls from any thread.
 /// Realtime: view() only.
 class AttachedSegment {
  public:
-  /// Waits until a segment of that name is running. Throws TimeoutError (listing what there is),
+  /// Waits until a segment of that name is running. Throws TimeoutError (with the known segments),
   /// SegmentError, ReadOnly (this user may not command), BackendFailed, Cancelled,
   /// InvalidArgument.
   static AttachedSegment attach(std::string_view name, Access access, const Deadline& deadline,
@@ -53,34 +53,34 @@ class AttachedSegment {
   /// The schema, from the mapping.
   std::span<const std::byte> schema() const noexcept;
   const SegmentView& view() const noexcept { return view_; }
-  /// Of the segment file.
+  /// Descriptor of the segment file.
   int descriptor() const noexcept { return file_.descriptor(); }
-  /// Of the commanders' file, which bears no lock of ours; -1 with Access::read_only.
+  /// Descriptor of the commanders' file, without a lock; -1 with Access::read_only.
   int commands_descriptor() const noexcept { return commands_.descriptor(); }
-  /// Asks the kernel: 2 us. Once over, never starting or running again, although its successor
-  /// holds the lock of the dead for a moment before it says so.
+  /// Queries the lock of the backend (2 us). An end is final: during a take-over the successor
+  /// holds the lock of the dead backend for a moment, which does not make it running again
+  /// (ARCHITECTURE.md, How a backend takes a name).
   Life life() const noexcept;
-  /// Whether the backend, or its successor, has said that it is over: one load.
+  /// True if the stored state is an end: one load. Does not detect a killed backend.
   bool has_ended() const noexcept;
-  /// Neither starting nor running, for good.
+  /// True if the backend has ended or was killed; queries its lock, as life() does.
   bool gone() const noexcept;
   std::string fault() const;
-  /// Throws the fitting BackendGone unless starting or running; UsedAfterFork.
+  /// Throws the matching kind of BackendGone if the backend has ended; UsedAfterFork.
   void throw_if_gone() const;
-  /// The same, asking the kernel at most every 20 ms: a clock read otherwise.
+  /// The same, but queries the lock at most every 20 ms; in between it reads a clock only.
   void throw_if_known_gone() const;
   /// Throws UsedAfterFork.
   void check_process() const;
   bool forked() const noexcept { return guard_.forked(); }
-  /// Another open file of the same commanders' file, for the lock of a lane.
+  /// Opens the commanders' file once more, for the lock of a lane.
   LockFile open_commands_again() const;
 
  private:
   AttachedSegment() = default;
   friend class SegmentSearch;
   void throw_gone(Life life) const;
-  /// Nothing if it is not there, or not any more, and `reason` says so. Throws SegmentError,
-  /// ReadOnly.
+  /// Empty, with a `reason`, if there is no such segment now. Throws SegmentError, ReadOnly.
   static std::optional<AttachedSegment> open(std::string_view name, Access access,
                                              std::string& reason);
   bool open_commands(std::string& reason);
@@ -89,15 +89,15 @@ class AttachedSegment {
   std::string name_;
   std::string path_;
   Access access_ = Access::read_only;
-  mutable std::atomic<std::uint32_t> over_{0};  // a Life: how it ended, as seen so far
+  mutable std::atomic<std::uint32_t> over_{0};  // the Life with which it ended; 0 until then
   SegmentHeader header_{};
-  LockFile file_;      // mapped, holds nothing
-  LockFile commands_;  // the same; not open with Access::read_only
+  LockFile file_;      // mapped, without a lock
+  LockFile commands_;  // mapped, without a lock; not open with Access::read_only
   Mapping mapping_;
   Mapping commands_mapping_;
   SegmentView view_;
   ForkGuard guard_;
-  mutable std::atomic<std::int64_t> asked_{0};
+  mutable std::atomic<std::int64_t> asked_{0};  // time of the last query of the lock [ns]
 };
 
 }  // namespace o80

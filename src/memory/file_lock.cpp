@@ -27,7 +27,7 @@ bool is_byte_locked(int descriptor, std::uint64_t byte) noexcept {
 
 LockFile LockFile::open(const std::string& path, int flags, mode_t permission) {
   LockFile file;
-  // what bears the name may be a pipe or a device: opening it must neither wait nor take it over
+  // the path may name a pipe or a device: opening it must not block or make it the terminal
   file.descriptor_ =
       open_for_this_process(path.c_str(), flags | O_CLOEXEC | O_NONBLOCK | O_NOCTTY, permission);
   return file;

@@ -9,22 +9,24 @@
 
 namespace o80 {
 
-inline constexpr std::uint64_t kBackendByte = 0;     // of the commanders' file; and, for the
-                                                     // queries of observers, of the segment file
-inline constexpr std::uint64_t kFirstLaneByte = 16;  // of the commanders' file
+// The protocol is in ARCHITECTURE.md, Ownership by locks.
+inline constexpr std::uint64_t kBackendByte = 0;     // in both files; observers query the segment
+                                                     // file, all others the commanders' file
+inline constexpr std::uint64_t kFirstLaneByte = 16;  // in the commanders' file
 
-/// True if anybody, this process included, holds a write lock on that byte through another
-/// descriptor. Read locks do not count: whoever may only read a file can take them.
+/// True if a process (or this one, through another descriptor) holds a write lock on that byte.
+/// Read locks are ignored, because a process that may only read the file can place them.
 bool is_byte_locked(int descriptor, std::uint64_t byte) noexcept;
 
-/// Move-only: an open file that is never mapped and bears open-file-description locks.
+/// Move-only: an open file for open-file-description locks. Map a file only through a descriptor
+/// that has no lock.
 ///
-/// A forked child closes its copy at once, without unlocking: the lock dies with this process
-/// and with nothing else.
+/// A forked child closes its copy at once, without unlocking: the lock ends with this process and
+/// not with the child.
 class LockFile {
  public:
   LockFile() noexcept = default;
-  /// Opens close-on-exec; not open, with errno set, if that fails.
+  /// Opens close-on-exec; on failure the result is not open and errno is set.
   static LockFile open(const std::string& path, int flags, mode_t permission = 0);
   LockFile(LockFile&& other) noexcept;
   LockFile& operator=(LockFile&& other) noexcept;
@@ -32,7 +34,7 @@ class LockFile {
 
   bool is_open() const noexcept { return descriptor_ >= 0; }
   int descriptor() const noexcept { return descriptor_; }
-  /// True if the byte is now held through this file.
+  /// True if this file now holds the lock of the byte.
   bool try_lock(std::uint64_t byte) noexcept;
   void unlock(std::uint64_t byte) noexcept;
   void close() noexcept;

@@ -9,15 +9,15 @@ namespace o80 {
 /// The name of a user, or its number if it has none.
 std::string user_name(uid_t user);
 
-/// Why the file behind the descriptor is not to be believed, or an empty text.
+/// Why the owner of the file is not trusted; empty if it is.
 ///
-/// Anybody may create a file in the directory of segments, and so take the name of a robot first.
-/// Files of root, of this user and of the users named in the environment variable O80_TRUST
-/// (names or numbers with commas between them) are believed. So is a file that lets a group read
-/// it of which this user is a member: only members can create files of a group.
+/// Every user may create a file in the directory of segments under the name of a robot. Trusted
+/// are root, this user, the users in the environment variable O80_TRUST (names or numbers,
+/// separated by commas), and any owner of a file that a group of this user may read: only members
+/// can create files of a group. See ARCHITECTURE.md, Trust in files.
 std::string why_untrusted(int descriptor);
 
-/// The name of the user who owns the file of that path (a link itself, not its target).
+/// The name of the user that owns the file of that path (of a link, not of its target).
 std::string owner_of(const std::string& path);
 
 }  // namespace o80

@@ -19,7 +19,7 @@ namespace {
 
 std::atomic<std::uint64_t> generation{0};
 
-// leaked: objects of static lifetime may still let go of their files at exit
+// never destroyed: objects of static lifetime may close their files at exit
 std::vector<int>& lock_files() {
   static auto* files = new std::vector<int>;
   return *files;
@@ -29,7 +29,7 @@ void before_fork() { fork_mutex().lock(); }
 void after_fork_in_parent() { fork_mutex().unlock(); }
 
 void after_fork_in_child() {
-  // closing a copy leaves the lock with the parent; unlocking would take it away
+  // closing the copy keeps the parent's lock; unlocking would release it
   for (const int file : lock_files()) ::close(file);
   lock_files().clear();
   generation.fetch_add(1, std::memory_order_relaxed);
@@ -47,7 +47,7 @@ void watch_forks() noexcept {
 std::uint64_t process_generation() noexcept { return generation.load(std::memory_order_relaxed); }
 
 InheritingMutex& fork_mutex() noexcept {
-  // leaked: the same objects may still lock it at exit; without it no process can go on
+  // never destroyed, as above; no process can run without it
   static auto* mutex = new InheritingMutex;  // NOLINT(bugprone-unhandled-exception-at-new)
   return *mutex;
 }

@@ -9,18 +9,18 @@
 
 namespace o80 {
 
-/// How many forks lie between the first process and this one.
+/// Number of forks between the first process and this one.
 std::uint64_t process_generation() noexcept;
 
-/// Locked around every fork: registries of the process are whole in the child.
+/// Locked around every fork, so that process-wide lists are consistent in the child.
 InheritingMutex& fork_mutex() noexcept;
 
-/// open(2) of a file that the child of every fork closes at once; no fork falls in between.
+/// open(2) of a file that every forked child closes at once. No fork can happen during the call.
 int open_for_this_process(const char* path, int flags, mode_t permission);
-/// Closes it here.
+/// Closes such a file in this process.
 void close_in_this_process(int descriptor) noexcept;
 
-/// Remembers the process an object was made in.
+/// Remembers the process in which an object was constructed.
 class ForkGuard {
  public:
   ForkGuard() noexcept;

@@ -10,7 +10,7 @@ namespace o80 {
 
 namespace {
 
-constexpr int kReasonReadings = 1000;  // of a slot that is being written
+constexpr int kReasonReadings = 1000;  // retries while the slot is being written
 
 void write_halt(HaltSlot& slot, std::uint64_t number, HaltCause cause, Iteration iteration,
                 std::string_view who, std::string_view text) noexcept {
@@ -25,7 +25,7 @@ void write_halt(HaltSlot& slot, std::uint64_t number, HaltCause cause, Iteration
   slot.number.store(number, std::memory_order_release);  // sync halt_number
 }
 
-/// False if the slot is another halt's, or is being written.
+/// False if the slot belongs to another halt, or is being written.
 bool read_halt(const HaltSlot& slot, std::uint64_t number, Halt& halt) noexcept {
   if (slot.number.load(std::memory_order_acquire) != number) return false;     // sync halt_number
   const std::uint32_t cause = slot.cause.load(std::memory_order_acquire);      // sync halt_words
@@ -59,7 +59,7 @@ std::uint64_t ask_for_halt(const SegmentView& view, HaltCause cause, std::string
   O80_CRASH_POINT("halt.after_count");
   ring_bell(view);
   write_halt(bell.reasons[number % kHaltsKept], number, cause, -1, who, text);
-  // the backend may have looked for the reason in vain, and stand still since
+  // again: the backend may have read the slot before this reason and sleep since
   ring_bell(view);
   return number;
 }
@@ -102,7 +102,7 @@ std::optional<Halt> shown_halt(const SegmentView& view) noexcept {
     if (read_halt(counters.halt, number, halt)) return halt;
     halt.number = number;
   }
-  // its writer died in the middle: that it halted is certain
+  // the backend died while it wrote the slot: the number alone is valid
   return halt;
 }
 

@@ -9,13 +9,13 @@
 #include "o80/base/time.hpp"
 #include "o80/memory/halt.hpp"
 
-// The halt of a backend: a counter that anybody who may write raises, and the reasons beside it.
-// It needs no lane: a halt is asked for with one atomic addition, whatever the lanes are doing.
+// Halts: a counter that each requester increments, and slots for the reasons. A request is one
+// atomic addition and needs no lane. The protocol is in ARCHITECTURE.md, Halts.
 
 namespace o80 {
 
-/// Asks for a halt; its number. It acts from the addition on, even if the asker is killed before it
-/// has written the reason.
+/// Requests a halt and returns its number. The request is valid from the addition on, even if this
+/// process is killed before it has written the reason.
 ///
 /// Writer:   any thread of any process that maps the bell for writing, also in a signal handler.
 /// Readers:  HaltLatch.
@@ -23,9 +23,9 @@ namespace o80 {
 std::uint64_t ask_for_halt(const SegmentView& view, HaltCause cause, std::string_view who,
                            std::string_view text) noexcept;
 
-/// The backend's side: notices halts, and shows the one that acts to everybody.
+/// The backend's side: finds requested halts, and shows the halt in force to all processes.
 ///
-/// Any change of the counter counts as a halt, also one that no honest process makes.
+/// Any change of the counter counts as a halt, also an invalid one (a decrease).
 ///
 /// Writer:   the backend's thread.
 /// Readers:  shown_halt, in any process.
@@ -34,28 +34,29 @@ class HaltLatch {
  public:
   explicit HaltLatch(const SegmentView& view) noexcept;
 
-  /// True if a halt was asked for since the last look; it is then the one that acts.
+  /// True if a halt was requested since the last call; it is in force from now on.
   bool look() noexcept;
-  /// The halt that acts; number 0 if none does.
+  /// The halt in force; its number is 0 if there is none.
   const Halt& halt() const noexcept { return halt_; }
   bool acts() const noexcept { return halt_.number != 0; }
-  /// Shows the halt that acts, in this iteration; to be repeated until it is true: a reason may
-  /// come after its halt.
+  /// Shows the halt in force. Call it in each iteration until it returns true: the requester writes
+  /// the reason after the request.
   bool show(Iteration iteration) noexcept;
-  /// The halt that acts is over, unless another was asked for: then false.
+  /// Clears the halt in force; false, without an effect, if another halt was requested meanwhile.
   bool clear() noexcept;
 
  private:
   SegmentView view_;
-  std::uint64_t seen_ = 0;  // the counter at the last look
+  std::uint64_t seen_ = 0;  // the counter at the last look()
   Halt halt_;
 };
 
-/// The halt that acts as the backend shows it; nothing if none does. A read-only mapping is enough.
+/// The halt in force, as the backend shows it; empty if there is none. A read-only mapping is
+/// enough.
 std::optional<Halt> shown_halt(const SegmentView& view) noexcept;
 
-/// The same, or the halt that was asked for since and does not act yet (`iteration` is -1). Needs a
-/// mapping of the bell.
+/// The newest requested halt; its `iteration` is -1 until it is in force. Needs a mapping of the
+/// bell.
 std::optional<Halt> asked_halt(const SegmentView& view) noexcept;
 
 }  // namespace o80

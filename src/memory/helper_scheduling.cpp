@@ -44,7 +44,8 @@ int HelperScheduling::apply_priority(pthread_t helper) const noexcept {
   return refused;
 }
 
-/// Off the avoided processors: on others that its starter could use, else on any other.
+/// Prefers the processors of its starter without the avoided ones, then any processor that is not
+/// avoided, then those of its starter.
 void HelperScheduling::apply_processors(pthread_t helper) const noexcept {
   cpu_set_t any;
   CPU_ZERO(&any);

@@ -9,24 +9,24 @@ namespace o80 {
 
 /// Processors and priority of the helper thread of a process.
 ///
-/// The helper keeps off the loops' processors, where others remain. Beside real-time threads it
-/// runs one priority above them, so that one that never sleeps cannot keep it from running: it
-/// works for some 20 us every 20 ms. Without real-time threads it is an ordinary thread.
+/// The helper does not run on the loops' processors if others remain. With real-time threads in the
+/// process, it runs one priority above them (about 20 us every 20 ms), so that a real-time thread
+/// that never sleeps cannot block it. Without real-time threads it is an ordinary thread.
 ///
 /// Writer:   the holder of fork_mutex().
-/// Readers:  likewise.
+/// Readers:  the holder of fork_mutex().
 /// Realtime: no.
 class HelperScheduling {
  public:
-  /// The processors that the calling thread may use.
+  /// Uses the processors of the calling thread.
   void start_from_caller() noexcept;
   void avoid(const std::vector<int>& processors) { avoided_ = processors; }
-  /// Runs above this real-time priority, and above those named before; 0 is an ordinary thread.
+  /// Runs above this real-time priority and above those of earlier calls; 0: an ordinary thread.
   void run_above(int priority) noexcept;
-  /// Returns 0, or why the priority was refused: the helper then runs at the next lower one that
-  /// is granted.
+  /// Returns 0, or the error number with which the priority was refused: the helper then has the
+  /// next lower priority that is granted.
   int apply(pthread_t helper) const noexcept;
-  /// The same for a thread that ends at once: what a helper would be refused.
+  /// The same for a temporary thread, to find out in advance whether the priority is granted.
   int apply_to_trial() const;
 
  private:
@@ -38,7 +38,7 @@ class HelperScheduling {
   int above_ = 0;
 };
 
-/// Of the calling thread; 0 if it is not a real-time thread.
+/// Real-time priority of the calling thread; 0 for an ordinary thread.
 int real_time_priority() noexcept;
 
 }  // namespace o80

@@ -8,8 +8,8 @@
 #include "memory/atomic_words.hpp"
 #include "memory/prefetch.hpp"
 
-// The thread sanitizer does not model fences; every word they order is atomic, so it has nothing
-// to report either.
+// The thread sanitizer does not model fences. It reports nothing here, because every word that the
+// fences order is atomic.
 #if defined(__SANITIZE_THREAD__) && !defined(__clang__)
 #pragma GCC diagnostic ignored "-Wtsan"
 #endif
@@ -18,9 +18,10 @@ namespace o80 {
 
 namespace {
 
-// further than any backend comes; what a damaged file says is cut to it, and never overflows
+// above any iteration of a backend; counters of a damaged file are clamped to it, to exclude
+// overflows
 constexpr Iteration kFarthest = Iteration{1} << 60;
-constexpr int kReadings = 100;  // of a row that is overtaken without the writer moving on
+constexpr int kReadings = 100;  // attempts while `published` stands still
 
 }  // namespace
 
@@ -38,13 +39,13 @@ void HistoryWriter::publish(Iteration k, const std::byte* row) noexcept {
   O80_CRASH_POINT("history.before_row");
   store_words(slot, row, row_bytes_);
   O80_CRASH_POINT("history.before_published");
-  // sequentially consistent because RowSignal looks for waiters right after it
+  // sequentially consistent, because RowSignal loads `wanted` right after it
   counters_->published.store(k, std::memory_order_seq_cst);  // sync published
   O80_CRASH_POINT("history.after_published");
 }
 
 void HistoryWriter::expect(Iteration k) const noexcept {
-  constexpr std::size_t kMost = 512;  // from there on the processor sees where the stores go
+  constexpr std::size_t kMost = 512;  // further lines are prefetched by the processor
   prefetch_to_write(&counters_->begun);
   const std::byte* slot = slots_begin_ + static_cast<std::uint64_t>(k) % slots_ * row_bytes_;
   const std::size_t bytes = std::min(row_bytes_, kMost);
@@ -68,7 +69,7 @@ Iteration HistoryReader::begun() const noexcept {
 }
 
 bool HistoryReader::is_damaged() const noexcept {
-  // a writer is one row ahead at most; who reads both has to see it standing still
+  // `begun` is at most one row ahead of `published`; compare them only while `published` is stable
   for (int i = 0; i < kReadings; ++i) {
     const Iteration before = published();
     std::atomic_thread_fence(std::memory_order_seq_cst);
@@ -105,7 +106,7 @@ Iteration HistoryReader::latest(std::byte* to) const noexcept {
     if (k < 0) return -1;
     load_words(to, slot(k), row_bytes_);
     if (k >= first_true()) return k;
-    // overtaken: a living writer has published since
+    // the writer has overwritten the row during the copy: try again
     tries = k == last ? tries + 1 : 0;
     last = k;
   }
@@ -119,19 +120,19 @@ HistoryReader::Range HistoryReader::read_range(Iteration first, std::size_t coun
   if (count <= behind) return {0, 0};
   const Iteration begin = std::max(first, oldest());
   if (begin > newest) return {begin, 0};
-  // `count` may be anything: it is compared, not added
+  // compare `count`, do not add it: any value is possible
   const auto skipped = static_cast<std::uint64_t>(begin - std::max<Iteration>(first, 0)) + behind;
   if (count <= skipped) return {begin, 0};
   const auto there = static_cast<std::uint64_t>(newest - begin) + 1;
   const std::uint64_t rows = std::min<std::uint64_t>(there, count - skipped);
 
-  // two runs of slots at most
+  // slots => to, in two runs at most
   const std::uint64_t slot_of_begin = static_cast<std::uint64_t>(begin) % slots_;
   const std::uint64_t before_end = std::min(rows, slots_ - slot_of_begin);
   load_words(to, slot(begin), before_end * row_bytes_);
   load_words(to + before_end * row_bytes_, slots_begin_, (rows - before_end) * row_bytes_);
 
-  // what the writer reached meanwhile is dropped, the rest is true
+  // drop rows that the writer may have overwritten during the copy
   const Iteration kept = std::max(begin, first_true());
   const auto lost = static_cast<std::uint64_t>(kept - begin);
   if (lost >= rows) return {kept, 0};

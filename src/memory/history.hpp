@@ -8,7 +8,7 @@
 
 namespace o80 {
 
-/// Puts rows into the ring, 0, 1, 2, ...
+/// Writes rows 0, 1, 2, ... into the ring of the history.
 ///
 /// Writer:   one thread, wait-free.
 /// Readers:  HistoryReader, any number, any process.
@@ -18,9 +18,9 @@ class HistoryWriter {
   explicit HistoryWriter(const SegmentView& view) noexcept;
 
   std::size_t row_bytes() const noexcept { return row_bytes_; }
-  /// Row k = `row`, row_bytes of private memory; k is one more than the last.
+  /// Publishes row k, which must be one more than the last; `row` is private memory of row_bytes().
   void publish(Iteration k, const std::byte* row) noexcept;
-  /// Row k will follow soon: fetches what its publication writes.
+  /// Prefetches the cache lines that publish(k) will write.
   void expect(Iteration k) const noexcept;
 
  private:
@@ -30,41 +30,43 @@ class HistoryWriter {
   std::uint64_t slots_;
 };
 
-/// Reads rows by iteration; never a torn one, never waits.
+/// Reads rows by iteration. It never returns a torn row and never waits.
 ///
 /// Writer:   HistoryWriter.
 /// Readers:  const calls from any thread; a read-only mapping is enough.
-/// Realtime: single rows yes, bulk as long as it is.
+/// Realtime: yes; a range takes time in proportion to its rows.
 class HistoryReader {
  public:
   struct Range {
-    Iteration first;    // of the rows returned
-    std::size_t count;  // 0: none
+    Iteration first;    // first row
+    std::size_t count;  // number of rows
   };
 
   explicit HistoryReader(const SegmentView& view) noexcept;
 
   std::size_t row_bytes() const noexcept { return row_bytes_; }
-  /// Rows promised.
+  /// Number of rows that the history keeps.
   std::uint64_t rows() const noexcept { return slots_ - 1; }
-  /// The newest row, -1 before the first.
+  /// The newest row; -1 before row 0.
   Iteration published() const noexcept;
-  /// The oldest row still promised; 0 before the first.
+  /// The oldest row that the history still holds; 0 before row 0.
   Iteration oldest() const noexcept;
   /// Copies row k; false if not published yet or overwritten.
   bool read(Iteration k, std::byte* to) const noexcept;
-  /// Copies the newest row; its iteration, or -1 if there is none (or is_damaged()).
+  /// Copies the newest row and returns its iteration; -1 if there is none or is_damaged().
   Iteration latest(std::byte* to) const noexcept;
-  /// No backend leaves counters like these: no row can be told from one being overwritten.
+  /// True if the counters contradict each other. Then no row is trusted.
   bool is_damaged() const noexcept;
-  /// Copies rows first .. first + count - 1 as far as they are there, packed at the start of `to`.
+  /// Copies those of the rows first .. first + count - 1 that the history holds, packed at the
+  /// start of `to`.
   Range read_range(Iteration first, std::size_t count, std::byte* to) const noexcept;
 
  private:
   const std::byte* slot(Iteration k) const noexcept;
-  /// The row being written, or the newest.
+  /// The row that is being written; else the newest.
   Iteration begun() const noexcept;
-  /// Of what was copied before this call, rows from here on are whole.
+  /// The first intact row: rows from here on that were copied before this call were not overwritten
+  /// during the copy.
   Iteration first_true() const noexcept;
 
   const Counters* counters_;

@@ -4,8 +4,9 @@
 
 namespace o80 {
 
-/// Neither movable nor copyable: a mutex whose holder runs at the priority of the highest thread
-/// that waits for it, so that a real-time thread never waits for ordinary work on its processor.
+/// Neither movable nor copyable: a mutex with priority inheritance. Its holder gets the highest
+/// priority of the threads that wait for it, so that ordinary threads cannot delay a real-time
+/// thread that waits.
 class InheritingMutex {
  public:
   InheritingMutex() noexcept { initialise(); }
@@ -15,8 +16,9 @@ class InheritingMutex {
 
   void lock() noexcept { pthread_mutex_lock(&mutex_); }
   void unlock() noexcept { pthread_mutex_unlock(&mutex_); }
-  /// In a forked child, whose only thread is not the holder: a mutex that checks errors refuses the
-  /// unlocking before it asks the kernel, and tools that watch mutexes see it.
+  /// Unlocks it in a forked child. Its only thread does not hold the mutex, so unlock() is refused
+  /// without a system call (error-checking mutex); then the mutex is initialised anew. The call of
+  /// unlock() informs tools such as the thread sanitizer.
   void unlock_in_child() noexcept {
     unlock();
     initialise();

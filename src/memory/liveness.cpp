@@ -31,9 +31,9 @@ constexpr LaneLife unpack(std::uint64_t word) noexcept {
 
 }  // namespace
 
-/// Writer:   whoever holds fork_mutex().
+/// Writer:   the holder of fork_mutex().
 /// Readers:  the backend's thread.
-/// Realtime: the words may be read anywhere.
+/// Realtime: reading the atomic words.
 struct LaneLiveness::Watched {
   explicit Watched(const OwnedSegment& segment)
       : descriptor(segment.commands_descriptor()), view(segment.view()) {
@@ -63,9 +63,10 @@ struct LaneLiveness::Watched {
   }
 
   LaneLife ask_lane(std::uint32_t i, LaneLife last) noexcept {
-    // an owner counts itself once it holds the lock. So if it is not held now, this one is gone
+    // an owner stores its incarnation after it has the lock: if the lock is free below, this owner
+    // has ended
     const std::uint64_t before = owner_of(i);
-    // never owned, or nobody has come since the last owner was seen gone: no need to ask the kernel
+    // no query for a lane that had no owner, or no new one since the last end
     if (last.state != LaneState::alive && before == last.incarnation) return last;
     queries.fetch_add(1, std::memory_order_relaxed);
     if (!is_byte_locked(descriptor, kFirstLaneByte + i)) {
@@ -130,12 +131,12 @@ class LivenessThread {
 
   static Registry& registry() {
     static auto* all = new Registry;
-    // a thread does not survive a fork; its handle is left behind
+    // threads do not survive a fork: leave the handle of the helper behind
     if (all->guard.forked()) *all = Registry{};
     return *all;
   }
 
-  /// Returns 0, or why a priority was refused; with no helper yet, why it will be.
+  /// Returns 0, or the error number of a refused priority; without a helper, of a trial thread.
   static int reschedule() {
     const Registry& all = registry();
     if (all.helper == nullptr) return all.scheduling.apply_to_trial();
@@ -144,7 +145,7 @@ class LivenessThread {
 
   explicit LivenessThread(HelperScheduling& scheduling) {
     scheduling.start_from_caller();
-    // signals are for the program's own threads
+    // block all signals: they belong to the threads of the program
     sigset_t every, before;
     sigfillset(&every);
     pthread_sigmask(SIG_BLOCK, &every, &before);
@@ -159,7 +160,8 @@ class LivenessThread {
   }
 
   void run() noexcept {
-    // by itself: named by another, it would leave an entry below /proc for the kernel to take down
+    // set from inside: set by another thread, the name would create an entry below /proc that the
+    // kernel has to remove when the thread ends
     pthread_setname_np(pthread_self(), "o80-liveness");
     while (stop_.load(std::memory_order_acquire) == 0) {
       {

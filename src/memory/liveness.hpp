@@ -16,12 +16,12 @@ struct LaneLife {
   friend bool operator==(const LaneLife&, const LaneLife&) = default;
 };
 
-/// Move-only: knows for each lane of a segment whether its owner lives.
+/// Move-only: knows for each lane of a segment whether its owner is alive.
 ///
-/// One helper thread a process asks the kernel for all segments every 20 ms, off the processors
-/// that `avoid_processors` names. Ordinary scheduling, unless a real-time thread made a
-/// LaneLiveness or called `run_above`: then one priority above it, so that no busy loop keeps
-/// deaths unnoticed.
+/// One helper thread for each process queries the locks of all its segments every 20 ms. It does
+/// not run on the processors of avoid_processors(). It has ordinary scheduling, unless a real-time
+/// thread has constructed a LaneLiveness or called run_above(): then it runs one priority above
+/// that thread, so that a busy loop cannot delay it.
 ///
 /// Writer:   the helper thread.
 /// Readers:  the backend's thread.
@@ -33,21 +33,21 @@ class LaneLiveness {
   LaneLiveness& operator=(LaneLiveness&&) = delete;
   ~LaneLiveness();
 
-  /// Counts changes: nothing to look at while it stands still.
+  /// Number of changes of all lanes so far: no lane has changed while this is unchanged.
   std::uint32_t changes() const noexcept;
   LaneLife lane(std::uint32_t i) const noexcept;
-  /// Counts how often the helper has looked. Signals that any frontend could spoil are checked
-  /// when it has moved.
+  /// Number of rounds of the helper thread. The loop scans all lanes when it has changed, in case a
+  /// frontend has corrupted the bell.
   std::uint32_t rounds() const noexcept;
-  /// Counts the questions to the kernel, a system call each: none about a lane without an owner.
+  /// Number of queries so far, one system call each; a lane without an owner is not queried.
   std::uint64_t queries() const noexcept;
-  /// Asks now, in the calling thread. Not for the loop.
+  /// Queries all lanes now, in the calling thread. Not real-time.
   void refresh() noexcept;
 
-  /// Takes the helper off these processors, if others remain.
+  /// Excludes these processors for the helper thread, if others remain.
   static void avoid_processors(const std::vector<int>& processors);
-  /// Puts the helper above real-time threads of this priority. Returns 0, or the error number with
-  /// which the machine refused: the helper then has that priority itself, or none.
+  /// Runs the helper thread above real-time threads of this priority. Returns 0, or the error
+  /// number with which that was refused: the helper then has that same priority, or none.
   static int run_above(int priority);
 
  private:

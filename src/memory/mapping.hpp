@@ -5,7 +5,7 @@
 
 namespace o80 {
 
-/// Move-only: a file mapped whole into this process.
+/// Move-only: a mapping of a whole file.
 class Mapping {
  public:
   enum class Protection { read, read_write };
@@ -20,7 +20,7 @@ class Mapping {
 
   std::byte* data() const noexcept { return data_; }
   std::size_t bytes() const noexcept { return bytes_; }
-  /// Maps some of its pages again, writable, at the same place. Throws SegmentError.
+  /// Maps some pages of a mapping writable, at the same address. Throws SegmentError.
   static void make_writable(std::byte* base, int descriptor, std::uint64_t offset,
                             std::size_t bytes);
 

@@ -18,7 +18,7 @@ std::uint64_t process_start(int pid) noexcept {
   ::close(file);
   if (size <= 0) return 0;
   text[size] = 0;
-  // the second field is a name in parentheses, which may hold anything; this is the 22nd
+  // find field 22; field 2 is a name in parentheses that may contain spaces and parentheses
   const char* at = std::strrchr(text, ')');
   for (int field = 2; at != nullptr && field < 22; ++field) at = std::strchr(at + 1, ' ');
   return at == nullptr ? 0 : std::strtoull(at, nullptr, 10);

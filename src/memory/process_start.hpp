@@ -4,8 +4,8 @@
 
 namespace o80 {
 
-/// When a process began, in ticks since the machine did; 0 if there is no such process. With the
-/// process id it names a process for good: ids are used again.
+/// Start time of a process, in clock ticks since boot; 0 if there is no such process. Process ids
+/// are reused: id and start time together identify a process.
 std::uint64_t process_start(int pid) noexcept;
 
 }  // namespace o80

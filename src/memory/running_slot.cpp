@@ -9,7 +9,7 @@ namespace o80 {
 
 namespace {
 
-constexpr int kRunningReadings = 1000;  // of a slot that is being written
+constexpr int kRunningReadings = 1000;  // retries while the slot is being written
 
 enum class Reading : std::uint8_t { whole, unused, torn };
 
@@ -25,7 +25,7 @@ Reading read_running(const RunningSlot& slot, RunningRequest& request) noexcept 
   return slot.number.load(std::memory_order_relaxed) == number ? Reading::whole : Reading::torn;
 }
 
-/// Nothing if the slot is unused, or its writer was killed in the middle.
+/// Empty if the slot is unused, or if the backend was killed while it wrote the slot.
 std::optional<RunningRequest> whole_running(const RunningSlot& slot) noexcept {
   for (int i = 0; i < kRunningReadings; ++i) {
     RunningRequest request;

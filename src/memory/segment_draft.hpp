@@ -11,17 +11,17 @@
 
 namespace o80 {
 
-/// What the backend that had the name before left behind.
+/// What a new backend has to know of the former backend of its name.
 struct Predecessor {
-  bool was_halted = false;   // or a halt was asked for that it never saw
-  bool died_acting = false;  // it was killed while commands, control or a motion acted
+  bool was_halted = false;   // it was halted, or a halt was pending
+  bool died_acting = false;  // it was killed while commands, control or a motion were active
 };
 
-/// The two files of a segment that has no name yet: the commanders' file, locked and called after
-/// its epoch, and the segment file, locked and called a draft.
+/// The two files of a segment without a name (ARCHITECTURE.md, How a backend takes a name): the
+/// locked commanders' file of its epoch, and the locked segment file under a temporary name.
 ///
-/// Whoever dies with one leaves files that sweep_orphans() removes; so does the destructor, unless
-/// publish() gave the segment its name.
+/// The destructor removes both files unless publish() has succeeded. If the process dies before,
+/// sweep_orphans() removes them later.
 class SegmentDraft {
  public:
   /// Throws SegmentError.
@@ -33,17 +33,17 @@ class SegmentDraft {
   std::uint64_t epoch() const noexcept { return epoch_; }
   /// Reserves the memory of both files. Throws SegmentError.
   void reserve(const SegmentOffsets& offsets);
-  /// Read bits say who may observe, write bits who may command. Throws SegmentError.
+  /// Sets who may observe (read bits) and who may command (write bits). Throws SegmentError.
   void permit(mode_t permission);
-  /// Opens one of them again, for a mapping: the locks stay on descriptors that are never mapped.
+  /// Opens one of the files again, for a mapping: locked descriptors must not be mapped.
   LockFile open_segment() const { return open_again(path_); }
   LockFile open_commands() const { return open_again(commands_path_); }
-  /// Gives it its name, when complete; the segment of a dead backend is taken over, and `inherit`
-  /// is called before the name changes hands: a successor that is killed just after has inherited
-  /// too. Throws SegmentTaken, SegmentError.
+  /// Gives the complete segment its name, which it takes over from the segment of a dead backend.
+  /// Then `inherit` is called before the rename, so that a halt is kept if this process is killed
+  /// right after it. Throws SegmentTaken, SegmentError.
   void publish(const std::function<void(const Predecessor&)>& inherit);
 
-  // what the owner of the published segment keeps
+  // for the owner of the published segment
   const std::string& commands_path() const noexcept { return commands_path_; }
   LockFile take_segment_lock() noexcept { return std::move(segment_); }
   LockFile take_commands_lock() noexcept { return std::move(commands_); }
@@ -59,8 +59,8 @@ class SegmentDraft {
   std::uint64_t epoch_ = 0;
   std::string path_;
   std::string commands_path_;
-  LockFile segment_;   // holds byte 0
-  LockFile commands_;  // holds byte 0
+  LockFile segment_;   // holds the lock of byte 0
+  LockFile commands_;  // holds the lock of byte 0
   bool published_ = false;
 };
 

@@ -13,8 +13,8 @@ int count_processors() noexcept {
   return sched_getaffinity(0, sizeof processors, &processors) == 0 ? CPU_COUNT(&processors) : 2;
 }
 
-/// Asked before any thread of the process is pinned: a loop that keeps to one processor is still
-/// rung from another one.
+/// Counted before a thread of the process is pinned: the bell of a loop that is pinned to one
+/// processor is still rung from another.
 const int kProcessors = count_processors();
 
 }  // namespace

@@ -7,7 +7,7 @@
 
 namespace o80 {
 
-/// Tells the processor that this is a spin.
+/// The pause instruction of a spin loop.
 inline void pause_processor() noexcept {
 #if defined(__x86_64__) || defined(__i386__)
   __builtin_ia32_pause();
@@ -16,27 +16,28 @@ inline void pause_processor() noexcept {
 #endif
 }
 
-/// Decides whether spinning before a sleep is worth it, and how; one for each waiting object.
+/// Decides whether and how a wait spins before it sleeps; one object for each waiting object.
 ///
-/// Never if the process was given a single processor. Eight spins in a row without success stop
-/// it; from then on one wait in 64 probes; one success restores it.
+/// - With a single processor no wait spins.
+/// - After 8 failed spins in a row only one wait in 64 spins (a probe). A success restores it.
+/// - A spin longer than 4 us yields between its checks, because more threads may spin than there
+/// are
+///   processors (a learner, its arm and its twin on two). While yields let other threads run, spins
+///   yield from their beginning.
+/// - A probe does not yield. After a yield of more than 1 ms the next 1024 waits do not yield.
 ///
-/// More may spin than there are processors (a learner, its arm and its twin on two). So a spin that
-/// lasts lets others run in between, and while that helps somebody it does so from its beginning.
-/// A probe does not; nor does anyone for the next 1024 waits who was kept from running for long.
-///
-/// Writer / Readers: any threads of one process (an answer from a race is as good as another).
-/// Realtime: yes, up to `kLongest` a spin.
+/// Writer / Readers: any threads of one process; races between them are harmless.
+/// Realtime: yes; a spin takes up to `kLongest`.
 class Spinner {
  public:
-  static constexpr std::int64_t kLongest = 50'000;      // [ns]
-  static constexpr std::uint32_t kPatience = 8;         // spins
-  static constexpr std::uint32_t kProbe = 64;           // waits
-  static constexpr std::int64_t kAlone = 4'000;         // spun before others may run [ns]
-  static constexpr std::int64_t kSwitched = 900;        // letting nobody run takes less [ns]
-  static constexpr std::uint32_t kQuiet = 64;           // yields to nobody: it is alone
-  static constexpr std::int64_t kTooLong = 1'000'000;   // away in a yield [ns]
-  static constexpr std::uint32_t kYieldHoldoff = 1024;  // waits without a yield, after that
+  static constexpr std::int64_t kLongest = 50'000;      // longest spin [ns]
+  static constexpr std::uint32_t kPatience = 8;         // failed spins before only probes spin
+  static constexpr std::uint32_t kProbe = 64;           // waits from one probe to the next
+  static constexpr std::int64_t kAlone = 4'000;         // spin before the first yield [ns]
+  static constexpr std::int64_t kSwitched = 900;        // a shorter yield ran no other thread [ns]
+  static constexpr std::uint32_t kQuiet = 64;           // yields without effect: nobody competes
+  static constexpr std::int64_t kTooLong = 1'000'000;   // a longer yield stops yielding [ns]
+  static constexpr std::uint32_t kYieldHoldoff = 1024;  // waits without a yield after that
 
   Spinner() noexcept;
   /// With a given number of processors, for tests.
@@ -46,7 +47,7 @@ class Spinner {
   bool worth() noexcept;
   void ended(bool success) noexcept;
 
-  /// Spins until `done()` or for `kLongest`; true if done. Looks at least once.
+  /// Spins until done() is true, at most `kLongest`; true if done. Calls done() at least once.
   template <class Done>
   bool spin(Done&& done) noexcept {
     if (done()) return true;
@@ -70,19 +71,19 @@ class Spinner {
   }
 
  private:
-  /// How long to spin before others may run [ns].
+  /// How long to spin before the first yield [ns].
   std::int64_t patience() const noexcept {
     const bool hopeful = failures_.load(std::memory_order_relaxed) < kPatience;
     if (!hopeful || yield_holdoff_.load(std::memory_order_relaxed) > 0)
       return 2 * kLongest;  // never
     return quiet_.load(std::memory_order_relaxed) < kQuiet ? 0 : kAlone;
   }
-  /// Returns the time after it.
+  /// Yields; returns the time after it.
   std::int64_t let_others_run(std::int64_t now) noexcept;
 
   int processors_;
-  std::atomic<std::uint32_t> quiet_{kQuiet};     // yields in a row to nobody
-  std::atomic<std::uint32_t> yield_holdoff_{0};  // waits that are left without a yield
+  std::atomic<std::uint32_t> quiet_{kQuiet};     // yields without effect in a row
+  std::atomic<std::uint32_t> yield_holdoff_{0};  // remaining waits without a yield
   std::atomic<std::uint32_t> failures_{0};
   std::atomic<std::uint32_t> refused_{0};
 };

@@ -11,11 +11,11 @@ namespace o80 {
 enum class Verb : std::uint8_t { none, start, write, wait, read, request, halt, resume, stop };
 std::string_view to_text(Verb verb) noexcept;
 
-/// Says which driver verb is under way, so that one that hangs can be seen.
+/// Stores which driver verb is being called, so that a hanging call can be found.
 ///
 /// Writer:   the backend's thread.
 /// Readers:  note_slow_verb, in the helper thread.
-/// Realtime: yes; a store each.
+/// Realtime: yes; one store for each call.
 class VerbWord {
  public:
   explicit VerbWord(const SegmentView& view) noexcept : counters_(&view.counters()) {}
@@ -30,13 +30,13 @@ class VerbWord {
   std::uint64_t calls_ = 0;
 };
 
-/// Notes since when the verb under way has been under way; to be called again and again.
+/// Notes since when the present driver verb runs. The helper thread calls it periodically.
 void note_slow_verb(const SegmentView& view, std::int64_t now) noexcept;
 
-/// A driver verb that has not returned, as far as the helper thread has noticed.
+/// A driver verb that has not returned, as noted by the helper thread.
 struct SlowVerb {
   Verb verb = Verb::none;
-  std::int64_t since = 0;  // of the monotonic clock [ns]
+  std::int64_t since = 0;  // time on the monotonic clock [ns]
 };
 SlowVerb slow_verb(const SegmentView& view) noexcept;
 
