@@ -29,12 +29,12 @@ using o80::InvalidArgument;
 
 namespace {
 
-constexpr std::int64_t kLook = 50'000'000;  // between looks at signals [ns]
+constexpr std::int64_t kLook = 50'000'000;  // between checks of signals [ns]
 
 /// The compiled half of o80.Backend.
 ///
-/// Python fills `observed`, `extended` and `fresh_desired`, memory of its own; `publish` and a
-/// fresh start copy them into the row. Its own members are guarded by the GIL.
+/// Python fills the buffers `observed`, `extended` and `fresh_desired`; `publish` and a fresh start
+/// copy them into the row. Members are guarded by the GIL.
 class Backend final : public o80::RequestServer {
  public:
   Backend(const SchemaBuilder& builder, const o80::BackendOptions& options)
@@ -47,8 +47,8 @@ class Backend final : public o80::RequestServer {
   const nb::bytearray& observed() const { return observed_; }
   const nb::bytearray& extended() const { return extended_; }
   const nb::bytearray& fresh_desired() const { return fresh_desired_; }
-  /// Called with index and payload; gives None, a text (rejected), a text in a tuple (it runs), or
-  /// True (start afresh).
+  /// Called with index and payload of a request; returns None (done), a text (rejected), a text in
+  /// a tuple (running), or True (start afresh).
   nb::object serve_with = nb::none();
 
   /// Throws Closed or UsedAfterFork.
@@ -60,16 +60,17 @@ class Backend final : public o80::RequestServer {
     return *backend_;
   }
 
-  /// For what may not happen inside of `step`. Throws Error as well.
+  /// The backend for functions that must not be called during `step`. Throws Error then.
   o80::UntypedBackend& between_steps() const {
     o80::UntypedBackend& backend = checked();
     if (!stepping_) return backend;
     throw o80::Error("the backend of segment '" + name_ +
-                     "' is inside of step: use it in one thread, and not from the handler of a "
+                     "' is inside step: use it in one thread, and not from the handler of a "
                      "request (stop and close may be called from anywhere)");
   }
 
-  /// For what the handler of a request may do too. Throws Error in another thread.
+  /// The backend for functions that a handler of a request may call too. Throws Error during a
+  /// `step` of another thread.
   o80::UntypedBackend& in_its_thread() const {
     const bool is_handler = stepping_ && stepping_thread_ == std::this_thread::get_id();
     return is_handler ? checked() : between_steps();
@@ -85,7 +86,7 @@ class Backend final : public o80::RequestServer {
     begun_ = true;
   }
 
-  /// True if an iteration is under way, False if the backend is to end.
+  /// True if an iteration has begun, false if the backend must end.
   bool step(std::optional<double> timeout) {
     between_steps();
     if (!begun_) throw InvalidArgument("publish row 0 before the first step");
@@ -102,25 +103,26 @@ class Backend final : public o80::RequestServer {
     return step == o80::Step::run;
   }
 
-  /// Why the steps ended on their own; empty if they did not.
+  /// The reason why `step` returned false without a stop; empty if there is none.
   std::string failure() const {
     return backend_ && !guard_.forked() ? std::string(backend_->failure()) : "";
   }
 
-  /// Lets go of the name; a step under way raises Closed, and does that when it is left.
+  /// Ends the backend. A `step` in another thread raises Closed, and the backend ends when that
+  /// `step` returns.
   void end(bool failed, const std::string& text) {
     if (!backend_ || guard_.forked()) return;
     last_words_ = {failed ? o80::State::failed : o80::State::stopped, text};
     const std::shared_ptr<o80::UntypedBackend> ended = std::move(backend_);
     if (!stepping_) return finish(*ended);
     ended->ask_to_stop();
-    if (stepping_thread_ == std::this_thread::get_id()) return;  // a handler in it
+    if (stepping_thread_ == std::this_thread::get_id()) return;  // called from a handler
     const o80::Deadline deadline(kPatience);
     const Waiting waiting;
     while (stepping_) {
       if (deadline.over()) {
         throw o80::TimeoutError("the backend of segment '" + name_ +
-                                "' ends when the handler of a request returns, which it has not");
+                                "' has not ended: the handler of a request has not returned");
       }
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
       Waiting::keep_waiting();
@@ -140,7 +142,7 @@ class Backend final : public o80::RequestServer {
  private:
   static constexpr std::chrono::seconds kPatience{5};
 
-  /// While a step is under way; it keeps the backend.
+  /// Marks a step; keeps the backend alive until the step ends.
   struct Stepping {
     explicit Stepping(Backend& whose) : owner(whose), backend(whose.backend_) {
       owner.stepping_thread_ = std::this_thread::get_id();
@@ -177,8 +179,8 @@ class Backend final : public o80::RequestServer {
       const o80::Step step = backend.step_within(deadline.left(kLook));
       if (step != o80::Step::standing) return step;
       if (deadline.over()) {
-        throw o80::TimeoutError("nobody asked '" + name_ +
-                                "' for an iteration in time: it is bursting");
+        throw o80::TimeoutError("no frontend requested an iteration of '" + name_ +
+                                "' in time: it is bursting, call burst() in a frontend");
       }
       Waiting::keep_waiting();
     }
@@ -230,7 +232,7 @@ class Backend final : public o80::RequestServer {
     }
   }
 
-  /// The handler has read the robot anew.
+  /// Copies the reading that the handler of a request has put into the buffers.
   bool read_fresh(o80::FreshReading& reading) noexcept override {
     const WithGil locked;
     copy(observed_, reading.observed);

@@ -19,10 +19,10 @@ from o80.record import Record
 
 @dataclass(frozen=True)
 class StartAfresh:
-    """What the handler of a request returns if the robot jumped: what it reads now.
+    """Returned by the handler of a request after a jump of the robot, with its new reading.
 
-    All queues are purged, desired = observed (or `desired`), in a row of its own; the count of
-    iterations goes on.
+    The backend makes a fresh start: it drops all queues and publishes an extra row with this
+    reading and desired = observed (or `desired`). Iterations continue to count.
     """
 
     observed: Any
@@ -32,9 +32,9 @@ class StartAfresh:
 
 @dataclass(frozen=True)
 class Running:
-    """What the handler of a request returns if it takes time: `Backend.end_request` ends it.
+    """Returned by the handler of a request that runs until `Backend.end_request`.
 
-    progress: what frontends see meanwhile; `Backend.progress` changes it.
+    progress: text that frontends see meanwhile; `Backend.progress` changes it.
     """
 
     progress: str = ""
@@ -44,7 +44,7 @@ Handler = Callable[[Record], StartAfresh | Running | None]
 
 
 class Backend:
-    """A backend whose loop is a Python program's own.
+    """A backend whose loop runs in a Python program.
 
         with o80.Backend("arm", ["shoulder", "elbow"]) as backend:
             backend.publish(read())                    # row 0
@@ -59,11 +59,11 @@ class Backend:
         an IntEnum, or a mapping from field names to these.
     extended: dtype (or mapping) of further sensor values.
     requests: names of the requests it serves, each with the dtype of its fields, or None; see `on`.
-        Its fields have no defaults: who sends it gives all of them.
+        Its fields have no defaults: the sender must give all of them.
     limits: of actuators: o80.Limits, or (minimum, maximum, speed, ...), of the first number of the
         state, or a mapping from fields to these; None is no limit.
-    rests_at: of actuators: a mapping from fields to the values to which they go when no command
-        drives them (a velocity to 0).
+    rests_at: of actuators: a mapping from fields to the values to which they go without a command
+        (a velocity to 0).
     when_idle: "hold" or "follow", for all actuators or a mapping from each.
     units: of fields, by their name or by "group.field".
     frequency: iterations a second [1/s]. The program keeps the pace itself; bursting, it is that
@@ -71,7 +71,7 @@ class Backend:
     bursting: `step` waits until a frontend asks for iterations.
     robot: what it calls itself (None: as the segment).
     history: observations kept (None: as many as 16 MiB hold, 100000 at most).
-    while_halted: requests that are served while it is halted too: those that move nothing.
+    while_halted: requests that are served during a halt too, because they move nothing.
     lanes, lane_blocks, permission, stale, silence, resume: as for `o80.robots.Robot.start`.
 
     Leaving a `with` block by an exception ends it as failed: frontends raise its text.
@@ -158,14 +158,14 @@ class Backend:
             raise Closed(f"the backend of '{self._segment}' was closed: make a new one")
         return self._native
 
-    # ------------------------------------------------------------------ the two verbs
+    # ------------------------------------------------------------------ publish and step
 
     def publish(self, observed: Any = None, extended: Any = None) -> None:
-        """Publishes a row: what came of the iteration under way; the first one is row 0.
+        """Publishes the reading of the current iteration as a row; the first one is row 0.
 
         observed: an array (actuators,), or a mapping from groups to states.
-        extended: a mapping from fields to values, or a record. What is None, or no field of the
-            mapping, is as it was in the row before.
+        extended: a mapping from fields to values, or a record. None, and fields that the mapping
+            leaves out, keep the values of the row before.
 
         Raises InvalidArgument if row 0 has a number that is NaN or infinite: publish it again when
         the robot reads.
@@ -178,12 +178,13 @@ class Backend:
         native.publish()
 
     def step(self, timeout: float | None = None) -> Any:
-        """Begins an iteration: its desired states, a fresh array or record; None at the end.
+        """Begins an iteration and returns its desired states, a new array or record; None after
+        `stop`.
 
-        Bursting, it waits until a frontend asks for iterations; raises TimeoutError after
-        `timeout` [s]. None follows `stop`. Requests are served in here: what a handler raises
-        (other than RequestRejected) is raised, and the backend is to be closed. So is a StartAfresh
-        with a number that is NaN or infinite, as InvalidArgument.
+        In bursting mode it waits until a frontend requests iterations, and raises TimeoutError
+        after `timeout` [s]. It calls the handlers of requests. An exception of a handler (other
+        than RequestRejected) is raised here, and so is InvalidArgument for a StartAfresh with NaN
+        or infinite numbers: then close the backend.
         """
         native = self._open
         if self._fresh_start is not None:
@@ -194,27 +195,27 @@ class Backend:
         states = self._states(native.desired())
         return states if self._layout.states.subdtype is not None else Record(states)
 
-    # ------------------------------------------------------------------ around them
+    # ------------------------------------------------------------------ requests and halts
 
     def on(self, request: str, handler: Handler) -> None:
-        """Sets who serves a request: called between two iterations with its fields.
+        """Sets the handler of a request, which is called between two iterations with its fields.
 
-        It returns None, StartAfresh if the robot jumped, or Running if it takes time; it raises
-        RequestRejected, whose text the sender reads.
+        It returns None, StartAfresh if the robot jumped, or Running if it takes time. To reject the
+        request it raises RequestRejected; the sender reads the text.
         """
         self._index_of(request)
         self._open.check()
         self._handlers[request] = handler
 
     def running(self, request: str) -> bool:
-        """Whether a request was answered with Running and has not ended.
+        """True if a request was answered with Running and has not ended.
 
-        A halt ends it, unless it is one of `while_halted`: the robot is to stop doing it then.
+        A halt ends it, unless it is one of `while_halted`: the program must then stop the motion.
         """
         return self._open.runs(self._index_of(request))
 
     def progress(self, request: str, text: str) -> None:
-        """What frontends see of a request while it runs: 247 bytes at most."""
+        """Sets the text that frontends see while a request runs: at most 247 bytes."""
         self._open.show_progress(self._index_of(request), text)
 
     def end_request(
@@ -222,20 +223,20 @@ class Backend:
     ) -> None:
         """Ends a request that was answered with Running.
 
-        answer: None, or StartAfresh if the robot is elsewhere now: it starts afresh in the next
-            step, and the request ends with the row of that.
-        rejected: why it failed, which its sender reads.
+        answer: None, or StartAfresh if the robot jumped: the next step makes a fresh start, and the
+            request ends with the row of that.
+        rejected: the reason of its failure, for the sender.
 
-        It ends with the row that is published next. If it does not run any more, nothing happens.
+        It ends with the row that is published next. No effect if it does not run any more.
         """
         index = self._index_of(request)
         if answer is not None and not isinstance(answer, StartAfresh):
             raise InvalidArgument(
-                f"a request ends with None, with o80.StartAfresh(...), or with rejected='why', "
-                f"not with {answer!r}"
+                f"answer must be None or o80.StartAfresh(...), got {answer!r}; to reject the "
+                f"request, give rejected='why'"
             )
         if answer is not None and rejected is not None:
-            raise InvalidArgument("a request that is rejected does not start afresh: give one")
+            raise InvalidArgument("give either answer or rejected, not both")
         if not self._open.runs(index):
             return
         self._fresh_start = answer or self._fresh_start
@@ -252,14 +253,14 @@ class Backend:
         read_afresh(answer, self._observed, self._extended, self._fresh_desired)
 
     def on_halt(self, handler: Callable[[], None]) -> None:
-        """Sets who is told when a halt begins: commands have ended, desired states brake."""
+        """Sets a function to call when a halt begins: commands have ended, desired states brake."""
         self._open.check()
         self._halt_handlers["halt"] = handler
 
     def on_resume(self, handler: Callable[[], None]) -> None:
-        """Sets who is asked before a halt is cleared; it raises RequestRejected to keep it.
+        """Sets a function to call before a halt is cleared; it raises RequestRejected to keep it.
 
-        Desired states then begin at what was observed last.
+        Desired states then continue from the last observed states.
         """
         self._open.check()
         self._halt_handlers["resume"] = handler
@@ -267,13 +268,13 @@ class Backend:
     def halt(self, reason: str = "") -> None:
         """Halts: commands end, actuators brake, nothing moves until a frontend resumes.
 
-        Acts in the first `step` begun after it; from any thread. The same reason again is the same
-        halt, another reason is another one.
+        In force from the first `step` begun after it. May be called from any thread. The same
+        reason again is the same halt; another reason is another halt.
         """
         self._open.halt(reason)
 
     def interrupt(self, actuator: int | str) -> None:
-        """Ends the commands of an actuator as interrupted, in the iteration under way."""
+        """Ends the commands of an actuator as interrupted, in the current iteration."""
         rows = self._layout.schema["actuators"]
         names = [row["name"] for row in rows]
         if isinstance(actuator, str):
@@ -287,11 +288,11 @@ class Backend:
         self._open.interrupt(actuator)
 
     def stop(self) -> None:
-        """Makes `step` give None; from any thread."""
+        """Makes `step` return None. May be called from any thread."""
         self._open.ask_to_stop()
 
     def close(self, failure: str | None = None) -> None:
-        """Ends it, as failed if there is a failure: frontends raise its text.
+        """Ends the backend, as failed if `failure` is given: frontends raise it with this text.
 
         A `step` that waits in another thread raises Closed.
         """
@@ -314,28 +315,28 @@ class Backend:
 
     @property
     def active(self) -> NDArray[np.bool_]:
-        """Whether a command gives the desired state: bool (actuators,)."""
+        """True where a command or braking gives the desired state: bool (actuators,)."""
         bits = np.frombuffer(self._open.active(), np.uint8)
         return np.unpackbits(bits, count=self._layout.actuators, bitorder="little").view(np.bool_)
 
     @property
     def iteration(self) -> int:
-        """The iteration under way."""
+        """The current iteration."""
         return self._open.iteration
 
     @property
     def time(self) -> int:
-        """Of the iteration under way [ns]: of the monotonic clock, or simulated in bursting."""
+        """Time of the current iteration [ns]: monotonic clock, or simulated in bursting mode."""
         return self._open.time
 
     @property
     def segment(self) -> str:
-        """The name that frontends attach to."""
+        """The name of the segment, to which frontends attach."""
         return self._segment
 
     @property
     def schema(self) -> dict[str, Any]:
-        """All that frontends learn of the robot."""
+        """The description of the robot for frontends."""
         return self._layout.schema
 
     def __enter__(self) -> Self:
@@ -355,7 +356,7 @@ class Backend:
 
 
 class Server:
-    """Hands requests to their handlers; knows no more of the backend than its memory."""
+    """Calls the handlers of requests. Holds references to the backend's buffers only."""
 
     def __init__(self, backend: Backend) -> None:
         self._handlers = backend._handlers
@@ -366,11 +367,14 @@ class Server:
         self._desired = backend._fresh_desired
 
     def __call__(self, index: int, payload: bytes) -> str | bool | tuple[str] | None:
-        """None: done; a text: rejected; a text in a tuple: it runs; True: start afresh."""
+        """Returns None (done), a text (rejected), (text,) (running) or True (start afresh)."""
         row = self._rows[index]
         handler = self._handlers.get(row["name"])
         if handler is None:
-            return f"nobody serves '{row['name']}' in this backend"
+            return (
+                f"request '{row['name']}' has no handler: the backend's program must call "
+                f"Backend.on({row['name']!r}, handler)"
+            )
         fields = np.frombuffer(bytearray(payload), np.uint8)
         described = dtype_of_type(row["type"])
         try:
@@ -383,19 +387,19 @@ class Server:
             return (answer.progress,)
         if not isinstance(answer, StartAfresh):
             raise InvalidArgument(
-                f"the handler of '{row['name']}' returned {answer!r}: it is to return None, "
-                f"o80.StartAfresh(...) or o80.Running(...), or to raise o80.RequestRejected"
+                f"the handler of '{row['name']}' must return None, o80.StartAfresh(...) or "
+                f"o80.Running(...), or raise o80.RequestRejected; got {answer!r}"
             )
         read_afresh(answer, self._observed, self._extended, self._desired)
         return True
 
     def halt(self) -> None:
-        """A halt begins."""
+        """Called when a halt begins."""
         if handler := self._halt_handlers.get("halt"):
             handler()
 
     def resume(self) -> str | None:
-        """A halt is to be cleared; why it is not, or None."""
+        """Called before a halt is cleared; returns the reason to keep it, or None."""
         self._desired[...] = self._observed
         handler = self._halt_handlers.get("resume")
         if handler is None:
@@ -413,7 +417,7 @@ def read_afresh(
     extended: NDArray[Any],
     desired: NDArray[Any],
 ) -> None:
-    """Writes what a fresh start reads into the memory of a row."""
+    """Writes the reading of a fresh start into the buffers of a row."""
     fill(observed, answer.observed, "observed")
     if answer.extended is not None:
         fill(extended, answer.extended, "extended")
@@ -423,7 +427,7 @@ def read_afresh(
 
 
 def fill(block: NDArray[Any], values: Any, what: str) -> None:
-    """Writes states or sensor values into the memory of a row."""
+    """Writes states or sensor values into a buffer of a row."""
     names = block.dtype.names
     if isinstance(values, Record):
         block[...] = np.asarray(values)
@@ -442,5 +446,5 @@ def fill(block: NDArray[Any], values: Any, what: str) -> None:
         except (TypeError, ValueError) as error:
             raise InvalidArgument(f"{what} cannot be read as {block.dtype}: {error}") from error
         if array.shape != block.shape:
-            raise InvalidArgument(f"{what} has the shape {block.shape}, not {array.shape}")
+            raise InvalidArgument(f"{what} must have the shape {block.shape}, got {array.shape}")
         block[...] = array

@@ -277,7 +277,7 @@ def test_a_backend_is_used_by_one_thread(here: Place) -> None:
             here.stepping.publish([0.0])  # until it is in step
         except o80.Error as error:
             refused = error
-    assert "inside of step" in str(refused)
+    assert "inside step" in str(refused)
     here.stepping.stop()
 
     assert ended([thread]) == []
@@ -291,7 +291,7 @@ def test_a_handler_may_close_its_backend_but_not_publish(segment: str) -> None:
         backend.publish([0.0])
 
         def home(_fields: o80.Record) -> None:
-            with pytest.raises(o80.Error, match="inside of step") as raised:
+            with pytest.raises(o80.Error, match="inside step") as raised:
                 backend.publish([1.0])
             refused.append(raised.value)
 

@@ -80,7 +80,8 @@ TEST_F(SilenceTest, StopsIfToldSo) {
   send(frontend, 0, 100.0, {.pace = iterations(100)});
   for (int i = 0; i < 20 && station.iterate() == Step::run; ++i) {
   }
-  EXPECT_THAT(std::string(station.backend.failure()), HasSubstr("longer than the watchdog (silence) allows"));
+  EXPECT_THAT(std::string(station.backend.failure()),
+              HasSubstr("longer than the watchdog (silence) allows"));
   EXPECT_LE(station.last(), 8);
 }
 
