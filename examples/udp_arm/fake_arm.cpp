@@ -15,9 +15,8 @@
 
 #include "fake_arm.hpp"
 
+namespace udp_arm {
 namespace {
-
-using namespace udp_arm;
 
 const char* name_of(Mode mode) {
   switch (mode) {
@@ -32,11 +31,13 @@ const char* name_of(Mode mode) {
   }
 }
 
-double positive(const char* text) {
+double number(const char* text, double minimum) {
   char* end = nullptr;
   const double value = std::strtod(text, &end);
-  if (*end != 0 || !(value > 0))
-    throw std::invalid_argument(std::string(text) + " is not positive");
+  if (end == text || *end != 0 || !(value >= minimum)) {
+    throw std::invalid_argument(std::string("a value must be a number of at least ") +
+                                std::to_string(minimum) + ", got '" + text + "'");
+  }
   return value;
 }
 
@@ -48,9 +49,9 @@ FakeArm::Options parse(int argc, char** argv) {
                           {nullptr, 0, nullptr, 0}};
   FakeArm::Options options{.port = 5700};
   for (int chosen = 0; (chosen = getopt_long(argc, argv, "", known, nullptr)) != -1;) {
-    if (chosen == 'p') options.port = std::atoi(optarg);
-    if (chosen == 'f') options.period = std::llround(1e9 / positive(optarg));
-    if (chosen == 't') options.command_timeout = static_cast<std::uint64_t>(positive(optarg));
+    if (chosen == 'p') options.port = static_cast<int>(number(optarg, 0));
+    if (chosen == 'f') options.period = std::llround(1e9 / number(optarg, 1e-3));
+    if (chosen == 't') options.command_timeout = static_cast<std::uint64_t>(number(optarg, 1));
     if (chosen == 'x') options.faults = LinkFaults(optarg);
     if (chosen == '?') throw std::invalid_argument("see the first lines of fake_arm.cpp");
   }
@@ -74,14 +75,15 @@ FakeArm::Options parse(int argc, char** argv) {
 }
 
 }  // namespace
+}  // namespace udp_arm
 
 int main(int argc, char** argv) {
   try {
-    const FakeArm::Options options = parse(argc, argv);
-    FakeArm arm(options);
+    const udp_arm::FakeArm::Options options = udp_arm::parse(argc, argv);
+    udp_arm::FakeArm arm(options);
     std::printf("an arm listens on 127.0.0.1:%d\n", arm.port());
     std::fflush(stdout);
-    run(arm, options.period);
+    udp_arm::run(arm, options.period);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "fake_arm: %s\n", error.what());
     return 1;

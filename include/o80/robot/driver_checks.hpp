@@ -90,7 +90,7 @@ struct Parts {
   static_assert(
       config_is_described<D>(),
       "a driver's Config must be described: `O80_DESCRIBE(Arm::Config, (gain, \"help\"));`, or "
-      "`O80_DESCRIBE(Arm::Config);` if it is empty");
+      "`O80_DESCRIBE(Arm::Config);` if it is empty, in the namespace of Arm");
   static_assert(O80_TYPE(Actuators),
                 "a driver needs a public `using Actuators = std::array<Joint, 4>;`, a described "
                 "struct of actuators, o80::NoActuators or o80::RunTimeActuators");
@@ -172,7 +172,8 @@ struct Types {
   static_assert(!has_Extended<D>() || O80_TYPE(Extended), "a driver's Extended must be public");
   static_assert(std::is_same_v<ExtendedOf<D>, NoExtended> ||
                     (DescribedStruct<ExtendedOf<D>> && Shareable<ExtendedOf<D>>),
-                "a driver's Extended must be a struct of numbers that O80_DESCRIBE describes");
+                "a driver's Extended must be a struct of numbers that O80_DESCRIBE describes in "
+                "its namespace");
   static_assert(has_Requests<D>() ||
                     !(O80_TYPE(Request) || O80_TYPE(requests) || O80_TYPE(Requets) ||
                       O80_TYPE(Reqests) || O80_TYPE(Requsets) || O80_TYPE(Reqeusts)),
