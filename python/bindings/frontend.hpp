@@ -46,7 +46,7 @@ class Frontend {
   /// Throws Closed after close().
   void reattach(const Attachment& attachment);
 
-  o80::Iteration next = -1;  // of wait_for_next; -1: not asked yet
+  o80::Iteration next = -1;  // next row of wait_for_next; -1: not called yet
 
  private:
   std::string name_of(std::uint32_t index) const;

@@ -49,7 +49,7 @@ class Robot {
   Served resume() noexcept;
   /// Calls the driver's stop() once, and only after a call of start().
   void stop() noexcept;
-  /// What the driver said of a request in its reading.
+  /// The result that a driver reported for a request in its reading.
   static Served served(const RequestReport& report) noexcept;
   const char* fault() const noexcept { return fault_.text; }
 

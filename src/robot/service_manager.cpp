@@ -21,7 +21,7 @@ void tell_service_manager(const std::string& state) noexcept {
   if (*path == '@') address.sun_path[0] = 0;  // an abstract name
   const int socket = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   if (socket < 0) return;
-  // a service manager that does not listen is no reason to stop a robot
+  // errors are ignored: the robot continues without its service manager
   static_cast<void>(sendto(socket, state.data(), state.size(), MSG_NOSIGNAL | MSG_DONTWAIT,
                            reinterpret_cast<const sockaddr*>(&address),
                            static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + size)));

@@ -4,8 +4,8 @@
 
 namespace o80 {
 
-/// Tells the service manager that started this process how it is ("READY=1\nSTATUS=..."): the
-/// protocol of sd_notify, as systemd documents it. Nothing happens without NOTIFY_SOCKET.
+/// Sends a state ("READY=1\nSTATUS=...") to the service manager that started this process, by the
+/// protocol of sd_notify (systemd). No effect without NOTIFY_SOCKET.
 ///
 /// Realtime: no.
 void tell_service_manager(const std::string& state) noexcept;

@@ -240,7 +240,7 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
     std::memcpy(row() + layout.braking, controller.braking_mask(), layout.mask_words * 8);
   }
   history.publish(current, row());
-  // a robot that starts afresh is expected to be elsewhere
+  // before a fresh start the robot may be away from its desired states
   if (begun_ && !fresh && running.wanting_fresh_start() == nullptr) watch_errors();
   tell_ended_requests(fresh);
 

@@ -1,4 +1,4 @@
-// How a backend serves requests, at once or over several iterations, and starts afresh.
+// How a backend serves requests, at once or over several iterations, and makes fresh starts.
 
 #include <cstring>
 

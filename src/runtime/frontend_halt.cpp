@@ -1,4 +1,5 @@
-// How a frontend halts, resumes, shows life and sees what runs.
+// How a frontend halts, resumes, gives signs of life and reads running requests.
+// See ARCHITECTURE.md, Halts.
 
 #include "base/printable.hpp"
 #include "memory/running_slot.hpp"

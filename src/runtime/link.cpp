@@ -79,7 +79,7 @@ std::string Link::halt_text(Iteration iteration) const {
   std::string text = "it is halted since iteration " + std::to_string(acting->iteration) +
                      " (halt " + std::to_string(acting->number) + ", cause " +
                      std::string(to_text(acting->cause));
-  if (!acting->who_text().empty()) text += ", asked for by " + printable(acting->who_text());
+  if (!acting->who_text().empty()) text += ", requested by " + printable(acting->who_text());
   text += ")";
   if (!acting->reason().empty()) text += ": " + printable(acting->reason());
   return text;

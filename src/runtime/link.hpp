@@ -47,7 +47,7 @@ struct Link {
   /// yet in force.
   std::optional<Halt> halt() const;
   /// Describes the halt that ended a command or burst in `iteration`: "it is halted since iteration
-  /// 7 (halt 3, cause frontend, asked for by pid 5 (python)): why". Empty if it is no longer in
+  /// 7 (halt 3, cause frontend, requested by pid 5 (python)): why". Empty if it is no longer in
   /// force.
   std::string halt_text(Iteration iteration) const;
   /// `keep_waiting`, extended to throw Closed when the frontend is closed during a wait.

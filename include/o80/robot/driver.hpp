@@ -114,18 +114,19 @@ class Reading {
     view_.interrupted[actuator / 64] |= std::uint64_t{1} << (actuator % 64);
   }
   // requests that `on` answered with `Served::running`
-  /// One of this kind runs. A halt may have ended it: then the robot is to stop doing it.
+  /// True while a request of this kind runs. A halt may end it: the driver must then stop its
+  /// motion.
   template <class Request>
   bool runs() const {
     return report<Request>().runs != 0;
   }
-  /// What frontends see of it while it runs; at most 247 characters.
+  /// Sets the text that frontends see while it runs; at most 247 characters.
   template <class Request>
   void progress(std::string_view text) {
     tell(report<Request>(), RequestAnswer::running, text);
   }
-  /// It ends with this row: done, rejected (its sender reads why), failed (the loop ends), or
-  /// start_afresh (with the row of that). If none of this kind runs, nothing happens.
+  /// Ends it with this row: done, rejected (the sender reads the reason), failed (the loop ends) or
+  /// start_afresh (with the row of the fresh start). No effect if none of this kind runs.
   template <class Request>
   void ended(const Served& how) {
     tell(report<Request>(), static_cast<RequestAnswer>(how.kind), how.why());
@@ -165,7 +166,7 @@ class Reading {
     static_assert(kIndex != kNoRequest, "this struct is not among the Requests of the driver");
     return view_.requests[kIndex];
   }
-  /// An end stands, whatever is said after it.
+  /// The first end of a request in a reading counts.
   void tell(RequestReport& report, RequestAnswer answer, std::string_view text) {
     if (report.runs == 0 || (report.changed != 0 && report.answer != RequestAnswer::running))
       return;
@@ -183,12 +184,16 @@ class Reading {
   bool faulty_ = false;
 };
 
-/// The class an engineer writes; there is no base class.
+/// Requirements on a driver class. There is no base class.
 ///
-/// Its constructor touches no hardware. Optional: `describe(Schema&) const`, `Extended`,
-/// `Requests` with `on(const Each&)` (returning void or Served, which may say that it runs: see
-/// `Reading::ended`), `wait(std::int64_t due)`, `halt()`
-/// (a halt begins), `resume()` (one is to be cleared; returning void or Served, which may refuse).
+/// The constructor must not touch hardware. Optional members:
+/// - `describe(Schema&) const` names actuators and sets limits
+/// - `Extended`, the type of further sensor values
+/// - `Requests` with `on(const Each&)`, which returns void or Served; a request that is answered
+///   with `Served::running` ends by `Reading::ended`
+/// - `wait(std::int64_t due)` waits for the robot's tick instead of the clock
+/// - `halt()` is called when a halt begins
+/// - `resume()` is called before a halt is cleared; it returns void or Served and may refuse
 template <class D>
 concept Driver = requires(D& driver, const Desired<D>& desired, Reading<D>& reading) {
   typename D::Config;

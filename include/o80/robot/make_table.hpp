@@ -10,10 +10,11 @@
 #include "o80/robot/driver_checks.hpp"
 #include "o80/robot/table.hpp"
 
-/// Makes a shared library a robot: O80_ROBOT(arm, Arm), once, at global scope.
+/// Makes a shared library a robot. Write it once, at global scope: O80_ROBOT(arm, Arm). The first
+/// argument names the robot and its default segment.
 #define O80_ROBOT(robot, DriverType) O80_ROBOT_WITH(robot, DriverType, "")
 
-/// The same, naming what the library was built with besides o80 ("mujoco 4.0.1").
+/// The same, with the versions of other libraries that the robot was built with ("mujoco 4.0.1").
 #define O80_ROBOT_WITH(robot, DriverType, versions)                                             \
   static_assert(::o80::kDriverPassed<DriverType>);                                              \
   extern "C" __attribute__((visibility("default"))) const ::o80::RobotTable* o80_robot_table(); \

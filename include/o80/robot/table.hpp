@@ -58,7 +58,7 @@ struct DesiredView {
   std::int64_t period;  // [ns]
 };
 
-/// How a request ended, or that it runs and ends later.
+/// Result of a request; `running`: it ends in a later reading.
 enum class RequestAnswer : std::uint32_t {
   done = 0,
   rejected = 1,
@@ -67,15 +67,15 @@ enum class RequestAnswer : std::uint32_t {
   running = 4
 };
 
-/// What a driver says of a request of one kind in its reading.
+/// Report of a driver, in a reading, about its requests of one kind.
 struct RequestReport {
   std::uint32_t runs;     // 1: it was answered `running` and has not ended
-  std::uint32_t changed;  // set it: `answer` says how it ended, or that it runs on
-  RequestAnswer answer;
-  char text[248];  // why it ended so, or its progress
+  std::uint32_t changed;  // set it if `answer` or `text` is new
+  RequestAnswer answer;   // how it ended, or `running`
+  char text[248];         // the reason of its end, or its progress
 };
 
-/// Where a driver's reading goes; observed and extended hold the last one.
+/// Memory for a driver's reading; observed and extended initially hold the last reading.
 struct ReadingView {
   std::byte* observed;
   std::byte* extended;
@@ -89,7 +89,7 @@ struct ReadingView {
   std::uint32_t missed;       // set it if this tick of the robot brought no reading
   std::uint32_t halted;       // set it to halt the backend
   std::uint32_t reported;     // set it if a request has changed
-  FaultText halt_text;        // why it is to be halted
+  FaultText halt_text;        // the reason of that halt
 };
 
 /// A robot as a table of functions. Those that return int return 0, or 1 and fill the fault.

@@ -11,14 +11,14 @@
 
 namespace o80 {
 
-/// How a request was served, or has ended.
+/// Result of a request.
 struct Served {
   enum class Kind : std::uint8_t { done, rejected, start_afresh, failed, running };
   Kind kind = Kind::done;
   std::array<char, 248> text{};
 
   static Served done() { return {}; }
-  /// The sender reads `why`.
+  /// The request is rejected; the sender reads `why`.
   static Served rejected(std::string_view why) { return with(Kind::rejected, why); }
   /// Makes a fresh start: drops all queues, reads the robot again, and publishes an extra row with
   /// desired = observed.
