@@ -2,8 +2,10 @@
 
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
 
 #include <algorithm>
 #include <atomic>
@@ -17,6 +19,7 @@
 #include <utility>
 
 #include "bindings.hpp"
+#include "loop_options.hpp"
 #include "memory/fork.hpp"
 #include "o80/runtime/observation.hpp"
 #include "pickling.hpp"
@@ -42,7 +45,8 @@ class Backend final : public o80::RequestServer {
         name_(options.segment),
         observed_(zeros(backend_->layout().block)),
         extended_(zeros(backend_->layout().extended_size)),
-        fresh_desired_(zeros(backend_->layout().block)) {}
+        fresh_desired_(zeros(backend_->layout().block)),
+        watches_pace_(options.max_overruns > 0 && !options.bursting) {}
 
   const nb::bytearray& observed() const { return observed_; }
   const nb::bytearray& extended() const { return extended_; }
@@ -78,6 +82,7 @@ class Backend final : public o80::RequestServer {
 
   void publish() {
     o80::UntypedBackend& backend = between_steps();
+    if (watches_pace_) watch_pace(backend);
     copy(observed_, backend.observed());
     copy(extended_, backend.extended());
     if (!backend.publish()) {
@@ -242,9 +247,26 @@ class Backend final : public o80::RequestServer {
     return true;
   }
 
+  /// The program keeps the pace: a row that comes half a period late, or later, is an overrun.
+  void watch_pace(o80::UntypedBackend& backend) {
+    const std::int64_t now = o80::monotonic_now();
+    const std::int64_t period = backend.schema().head.period;
+    const std::int64_t late = now - due_;
+    due_ = now + period;
+    if (!begun_) return;
+    timing_.lateness = late;
+    const std::int64_t missed = std::max<std::int64_t>(0, (late + period / 2) / period);
+    timing_.skipped += static_cast<std::uint32_t>(missed);
+    if (missed > 0) ++timing_.overruns;
+    backend.set_timing(timing_);
+  }
+
   std::shared_ptr<o80::UntypedBackend> backend_;
   std::string name_;
   nb::bytearray observed_, extended_, fresh_desired_;
+  bool watches_pace_;
+  std::int64_t due_ = 0;  // of the next row [ns]
+  o80::Timing timing_;
   o80::ForkGuard guard_;
   std::exception_ptr raised_;
   bool begun_ = false;
@@ -257,26 +279,10 @@ PyType_Slot backend_slots[] = {{Py_tp_traverse, reinterpret_cast<void*>(&Backend
                                {Py_tp_clear, reinterpret_cast<void*>(&Backend::clear)},
                                {0, nullptr}};
 
-o80::Stale stale_called(const std::string& name) {
-  if (const auto stale = o80::stale_of(name)) return *stale;
-  throw InvalidArgument("stale must be 'hold', 'purge', 'halt' or 'stop', got '" + name + "'");
-}
-
-Backend* make(const SchemaBuilder& builder, const std::string& segment, std::int64_t period,
-              bool bursting, std::uint64_t history, std::uint32_t lanes, std::uint32_t lane_blocks,
-              std::uint32_t permission, const std::string& stale, std::int64_t silence,
-              bool resume) {
-  o80::BackendOptions options;
+Backend* make(const SchemaBuilder& builder, const std::string& segment,
+              const o80::OptionValues& loop) {
+  o80::BackendOptions options = loop_options_of(loop).backend;
   options.segment = segment;
-  options.period = period;
-  options.bursting = bursting;
-  options.history = history;
-  options.lanes = lanes;
-  options.lane_blocks = lane_blocks;
-  options.permission = permission;
-  options.stale = stale_called(stale);
-  options.silence = silence;
-  options.resume = resume;
   return new Backend(builder, options);
 }
 
@@ -288,9 +294,7 @@ void bind_backend(nb::module_& m) {
   nb::class_<Backend> bound(m, "Backend", nb::type_slots(backend_slots),
                             "The compiled half of o80.Backend.");
   refuse_to_pickle(bound, "a backend", "its segment's name, and open o80.Frontend(name) there");
-  bound
-      .def(nb::new_(&make), "builder"_a, "segment"_a, "period"_a, "bursting"_a, "history"_a,
-           "lanes"_a, "lane_blocks"_a, "permission"_a, "stale"_a, "silence"_a, "resume"_a)
+  bound.def(nb::new_(&make), "builder"_a, "segment"_a, "loop"_a)
       .def_rw("serve_with", &Backend::serve_with, nb::arg().none())
       .def_prop_ro("description",
                    [](const Backend& self) {

@@ -7,8 +7,10 @@
 
 #include "bindings.hpp"
 #include "frontend.hpp"
+#include "loop_options.hpp"
+#include "o80/base/error.hpp"
+#include "robot/inline_robot.hpp"
 #include "robot/library.hpp"
-#include "robot/run_options.hpp"
 #include "waiting.hpp"
 
 namespace nb = nanobind;
@@ -16,15 +18,32 @@ using namespace nb::literals;
 
 namespace {
 
+const char* name_of(o80::LoopOption::Kind kind) {
+  constexpr const char* kNames[] = {"text", "number", "integer", "boolean",
+                                    "word", "octal",  "list"};
+  return kNames[static_cast<std::size_t>(kind)];
+}
+
+/// Name, kind, what is allowed, what holds otherwise, help, and where it can be given.
+nb::list described_loop_options() {
+  using Option = o80::LoopOption;
+  nb::list all;
+  for (const Option& each : o80::loop_options()) {
+    all.append(nb::make_tuple(each.name, name_of(each.kind), each.allowed, each.otherwise,
+                              each.help, (each.scope & (Option::kProcess | Option::kFlag)) != 0,
+                              (each.scope & Option::kProcess) != 0,
+                              (each.scope & Option::kInline) != 0,
+                              (each.scope & Option::kEmbedded) != 0));
+  }
+  return all;
+}
+
 /// Starts a robot in this process; its bursts run in the thread that asks for them.
 Attachment start_inline(const o80::RobotLibrary& library, const std::string& segment,
-                        std::int64_t period, std::uint64_t history,
-                        const o80::OptionValues& options) {
+                        const o80::OptionValues& loop, const o80::OptionValues& options) {
   const Waiting waiting;
-  o80::BackendOptions backend;
+  o80::BackendOptions backend = loop_options_of(loop).backend;
   backend.segment = segment;
-  backend.period = period;
-  backend.history = history;
   auto robot =
       std::make_shared<o80::InlineRobot>(std::make_unique<o80::Robot>(*library.table, options),
                                          std::move(backend), Waiting::keep_waiting);
@@ -32,6 +51,16 @@ Attachment start_inline(const o80::RobotLibrary& library, const std::string& seg
 }
 
 }  // namespace
+
+o80::LoopOptions loop_options_of(const o80::OptionValues& values) {
+  o80::LoopOptions options;
+  for (const auto& [name, text] : values) {
+    const o80::LoopOption* option = o80::find_loop_option(name);
+    if (option == nullptr) throw o80::InvalidArgument("there is no option '" + name + "'");
+    o80::set_loop_option(options, *option, text, name);
+  }
+  return options;
+}
 
 void bind_robots(nb::module_& m) {
   nb::class_<o80::Option>(m, "Option", "One value a robot can be started with.")
@@ -49,7 +78,7 @@ void bind_robots(nb::module_& m) {
           [](const o80::RobotLibrary& self) { return std::string(self.table->built_with); })
       .def_prop_ro("options",
                    [](const o80::RobotLibrary& self) { return o80::options_of(*self.table); })
-      .def("start_inline", &start_inline, "segment"_a, "period"_a, "history"_a, "options"_a);
+      .def("start_inline", &start_inline, "segment"_a, "loop"_a, "options"_a);
   m.def("load_robot", &o80::RobotLibrary::load, "name_or_path"_a);
   m.def("unused_segment_name", &o80::unused_segment_name, "robot"_a);
   m.def("find_robots", [] {
@@ -58,16 +87,11 @@ void bind_robots(nb::module_& m) {
     return found;
   });
   m.def(
-      "run_flags",
-      [] {
-        std::size_t count = 0;
-        const o80::RunFlag* flags = o80::run_flags(count);
-        nb::list all;
-        for (std::size_t i = 0; i < count; ++i) {
-          all.append(nb::make_tuple(flags[i].name, flags[i].value, flags[i].help));
-        }
-        return all;
-      },
-      nb::sig("def run_flags() -> list[tuple[str, str | None, str]]"),
-      "Name, value and help of each flag of every robot's process.");
+      "loop_options", &described_loop_options,
+      nb::sig("def loop_options() -> list[tuple[str, str, str, str, str, bool, bool, bool, bool]]"),
+      "What can be set about every backend: name, kind, what is allowed, what holds otherwise, "
+      "help; and whether `o80 run`, `start`, `inline` and `Backend` take it.");
+  m.def(
+      "check_loop_options", [](const o80::OptionValues& loop) { loop_options_of(loop); }, "loop"_a,
+      "Raises InvalidArgument if one cannot have that text.");
 }

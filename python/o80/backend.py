@@ -1,6 +1,5 @@
 """The side that iterates, inside a Python program."""
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import TracebackType
@@ -10,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o80 import _core, at_exit
-from o80.checked import mapping, whole, whole_or_none
+from o80.checked import mapping
 from o80.description import Described, Limit, SchemaWriter
 from o80.errors import Closed, InvalidArgument, RequestRejected
 from o80.layout import Layout, dtype_of_type
+from o80.loop_options import loop_texts
 from o80.record import Record
 
 
@@ -66,13 +66,14 @@ class Backend:
         (a velocity to 0).
     when_idle: "hold" or "follow", for all actuators or a mapping from each.
     units: of fields, by their name or by "group.field".
-    frequency: iterations a second [1/s]. The program keeps the pace itself; bursting, it is that
-        of simulated time.
+    frequency: iterations a second [1/s] (None: 1000). The program keeps the pace itself; bursting,
+        it is that of simulated time.
     bursting: `step` waits until a frontend asks for iterations.
     robot: what it calls itself (None: as the segment).
     history: observations kept (None: as many as 16 MiB hold, 100000 at most).
     while_halted: requests that are served during a halt too, because they move nothing.
     lanes, lane_blocks, permission, stale, silence, resume: as for `o80.robots.Robot.start`.
+    max_overruns: halt when so many rows within a second come half a period late, or later.
 
     Leaving a `with` block by an exception ends it as failed: frontends raise its text.
     Used by one thread; `stop` and `close` may come from any. Raises SegmentTaken, SegmentError,
@@ -91,25 +92,33 @@ class Backend:
         rests_at: Mapping[Any, Mapping[str, float]] | None = None,
         when_idle: str | Mapping[Any, str] = "hold",
         units: Mapping[str, str] | None = None,
-        frequency: float = 1000.0,
+        frequency: float | None = None,
         bursting: bool = False,
         robot: str | None = None,
         history: int | None = None,
-        lanes: int = 8,
-        lane_blocks: int = 16384,
-        permission: int = 0o600,
-        stale: Literal["hold", "purge", "halt", "stop"] = "hold",
+        lanes: int | None = None,
+        lane_blocks: int | None = None,
+        permission: int | None = None,
+        stale: Literal["hold", "purge", "halt", "stop"] | None = None,
         silence: int | None = None,
+        max_overruns: int | None = None,
         resume: bool = False,
         while_halted: Sequence[str] = (),
     ) -> None:
-        if not (math.isfinite(frequency) and frequency > 0):
-            raise InvalidArgument(f"a frequency of {frequency} cannot be: it is above 0 [1/s]")
-        history = whole_or_none(history, "history", 1)
-        silence = whole_or_none(silence, "silence", 1)
-        lanes = whole(lanes, "lanes", 1)
-        lane_blocks = whole(lane_blocks, "lane_blocks", 16)
-        permission = whole(permission, "permission", 0)
+        loop = loop_texts(
+            {
+                "frequency": frequency,
+                "bursting": bursting,
+                "history": history,
+                "lanes": lanes,
+                "lane_blocks": lane_blocks,
+                "permission": permission,
+                "stale": stale,
+                "silence": silence,
+                "max_overruns": max_overruns,
+                "resume": resume,
+            }
+        )
         requests = mapping(requests, "requests", "names to dtypes or None")
         limits = mapping(limits, "limits", "actuators to limits")
         rests_at = mapping(rests_at, "rests_at", "actuators to fields and values")
@@ -122,19 +131,7 @@ class Backend:
         writer.set_rests(rests_at)
         writer.set_idle(when_idle)
         self._native: _core.Backend | None = None
-        native = _core.Backend(
-            writer.builder,
-            segment,
-            round(1e9 / frequency),
-            bursting,
-            history or 0,
-            lanes,
-            lane_blocks,
-            permission,
-            stale,
-            0 if silence is None else silence,
-            resume,
-        )
+        native = _core.Backend(writer.builder, segment, loop)
         self._layout = Layout(native.description)
         self._segment = segment
         self._handlers: dict[str, Handler] = {}

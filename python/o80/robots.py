@@ -8,7 +8,6 @@ with o80.robots.load("two_joints").inline() as arm:
 """
 
 import builtins
-import math
 import numbers
 import os
 from collections.abc import Mapping, Sequence
@@ -18,9 +17,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from o80 import _core
 from o80.announced import announced
-from o80.checked import sequence, whole
 from o80.errors import DriverError, InvalidArgument
 from o80.frontend import Frontend
+from o80.loop_options import did_you_mean, loop_options, loop_texts, text_of
 from o80.process import Process, start_process
 
 if TYPE_CHECKING:
@@ -128,14 +127,14 @@ class Robot:
         history: int | None = None,
         lanes: int | None = None,
         lane_blocks: int | None = None,
-        permission: int = 0o600,
-        stale: Literal["hold", "purge", "halt", "stop"] = "hold",
+        permission: int | None = None,
+        stale: Literal["hold", "purge", "halt", "stop"] | None = None,
         silence: int | None = None,
         max_overruns: int | None = None,
         resume: bool = False,
-        policy: Literal["other", "fifo", "rr"] = "other",
+        policy: Literal["other", "fifo", "rr"] | None = None,
         priority: int | None = None,
-        cpus: Sequence[int] = (),
+        cpus: Sequence[int] | None = None,
         lock_memory: bool = False,
         timeout: float | None = 30.0,
         **config: Any,
@@ -159,34 +158,36 @@ class Robot:
             warned about.
         timeout: for the robot to be running [s].
         config: its own options, see `options`.
+        What is None holds as docs/options.md says.
 
         Returns when it is running. Raises DriverError with the driver's fault, SegmentTaken,
         InvalidArgument, TimeoutError.
         """
-        flags: dict[str, Any] = {
-            "frequency": frequency,
-            "bursting": bursting,
-            "history": history,
-            "lanes": lanes,
-            "lane-blocks": lane_blocks,
-            "permission": f"{whole(permission, 'permission', 0):o}",
-            "stale": stale,
-            "silence": silence,
-            "max-overruns": max_overruns,
-            "resume": resume,
-            "policy": policy,
-            "priority": priority,
-            "cpus": ",".join(map(str, sequence(cpus, "cpus", "[2, 3]"))) or None,
-            "lock-memory": lock_memory,
-        }
-        words: builtins.list[str] = []
-        for name, value in flags.items():
-            if value is True:
-                words.append(f"--{name}")
-            elif value is not None and value is not False:
-                words.append(f"--{name}={value}")
-        for name, text in self._config(config):
-            words.append(f"--{name}={text}")
+        texts = loop_texts(
+            {
+                "frequency": frequency,
+                "bursting": bursting,
+                "history": history,
+                "lanes": lanes,
+                "lane_blocks": lane_blocks,
+                "permission": permission,
+                "stale": stale,
+                "silence": silence,
+                "max_overruns": max_overruns,
+                "resume": resume,
+                "policy": policy,
+                "priority": priority,
+                "cpus": cpus,
+                "lock_memory": lock_memory,
+            }
+        )
+        switches = {option.name for option in loop_options().values() if option.kind == "boolean"}
+        words = [
+            f"--{name.replace('_', '-')}" + ("" if name in switches else f"={text}")
+            for name, text in texts
+        ]
+        known = [option.name for option in loop_options().values() if option.of_start]
+        words += [f"--{name}={text}" for name, text in self._config(config, known)]
         return start_process(self._library.path, segment or self.name, words, timeout)
 
     def inline(
@@ -195,45 +196,59 @@ class Robot:
         *,
         frequency: float | None = None,
         history: int | None = None,
+        lanes: int | None = None,
+        lane_blocks: int | None = None,
+        permission: int | None = None,
+        stale: Literal["hold", "purge", "halt", "stop"] | None = None,
+        silence: int | None = None,
         **config: Any,
     ) -> Frontend:
         """Starts it inside this process: bursts of the frontend run in the thread that asks.
 
         segment: a name for others to attach to (None: an unused one).
-        frequency: iterations a second of simulated time [1/s]; None: the robot's own, or 1000.
-        history: observations kept (None: as many as 16 MiB hold, 100000 at most).
+        frequency, history, lanes, lane_blocks, permission, stale, silence: as for `start`.
         config: its own options, see `options`.
 
         Closing the frontend stops the robot. Raises DriverError, SegmentTaken, InvalidArgument.
         """
-        if frequency is not None and not (math.isfinite(frequency) and frequency > 0):
-            raise InvalidArgument(f"frequency must be positive, got {frequency} [1/s]")
-        if history is not None and history < 1:
-            raise InvalidArgument(f"a history of {history} observations: at least 1 is needed")
+        texts = loop_texts(
+            {
+                "frequency": frequency,
+                "history": history,
+                "lanes": lanes,
+                "lane_blocks": lane_blocks,
+                "permission": permission,
+                "stale": stale,
+                "silence": silence,
+            }
+        )
+        known = [option.name for option in loop_options().values() if option.of_inline]
+        own = self._config(config, known)
         name = segment or _core.unused_segment_name(self.name)
         try:
-            attachment = self._library.start_inline(
-                name, round(1e9 / frequency) if frequency else 0, history or 0, self._config(config)
-            )
+            attachment = self._library.start_inline(name, texts, own)
         except Exception:
             if segment is None:
                 _core.clean(name)  # nobody knows the name to read the fault by
             raise
         return Frontend._of(attachment, unnamed=segment is None)
 
-    def _config(self, config: Mapping[str, Any]) -> builtins.list[tuple[str, str]]:
-        """Names and texts of its options; the error lists what there is."""
+    def _config(
+        self, config: Mapping[str, Any], loop: Sequence[str]
+    ) -> builtins.list[tuple[str, str]]:
+        """Names and texts of its own options; those of the loop are known beside them."""
         kinds = {option.name: option.kind for option in self.options}
         texts = []
         for name, value in config.items():
             if name not in kinds:
-                there = f"its options are {', '.join(kinds)}" if kinds else "it has none"
-                raise InvalidArgument(f"robot '{self.name}' has no option '{name}': {there}")
+                near = did_you_mean(name, [*kinds, "segment", *loop])
+                own = f": its own are {', '.join([*kinds][:5])}" if kinds else ": it has none"
+                raise InvalidArgument(f"robot '{self.name}' has no option '{name}'{near or own}")
             if kinds[name] in ("number", "integer") and not isinstance(value, numbers.Real):
                 raise InvalidArgument(
                     f"option '{name}' of robot '{self.name}' is a {kinds[name]}, not {value!r}"
                 )
-            texts.append((name, _text_of(value)))
+            texts.append((name, text_of(value)))
         return texts
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -241,16 +256,3 @@ class Robot:
 
     def __repr__(self) -> str:
         return f"<o80.robots.Robot '{self.name}' of {self.path}>"
-
-
-def _text_of(value: Any) -> str:
-    """An option as the text that the robot reads."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, (str, os.PathLike)):
-        return os.fspath(value)
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    if isinstance(value, Sequence):
-        return ",".join(map(_text_of, value))
-    return str(value)

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <stdexcept>
+#include <string>
 #include <string_view>
 
 #include "o80/robot.hpp"
@@ -29,7 +31,10 @@ class TwoJoints {
   using Extended = Sensors;
   using Requests = o80::Requests<o80::Reset, o80::Snapshot, o80::Restore, Home>;
 
-  explicit TwoJoints(const Config& config) : config_(config) {}
+  explicit TwoJoints(const Config& config) : config_(config) {
+    refuse_unless_above_0("gain", config.gain);
+    refuse_unless_above_0("reach", config.reach);
+  }
 
   void describe(o80::Schema& schema) const {
     const o80::Limits limits{.minimum = -config_.reach, .maximum = config_.reach};
@@ -96,6 +101,11 @@ class TwoJoints {
     Mode mode = Mode::follows;
     double speed = 0;  // of homing [rad/s]
   };
+
+  static void refuse_unless_above_0(const std::string& option, double value) {
+    if (value > 0) return;
+    throw std::invalid_argument(option + " must be above 0, got " + std::to_string(value));
+  }
 
   void move_home(double period) {
     for (double& position : now_.position) {

@@ -17,7 +17,7 @@ COMPILERS = [name for name in ("g++", "clang++-19") if shutil.which(name)]
 NEEDED = """
 base/error base/nearest_name base/time base/version
 describe/defaults describe/describe describe/described describe/for_each describe/hooks
-describe/option_notes describe/options describe/rows describe/schema
+describe/options describe/rows describe/schema
 robot robot/driver robot/driver_checks robot/make_table robot/plant_requests robot/table
 runtime/request_server runtime/robot_types
 """
@@ -38,4 +38,5 @@ def test_a_robot_library_reads_only_what_a_robot_needs(compiler: str) -> None:
         if word.startswith(prefix)
     }
 
-    assert read == set(NEEDED.split())
+    assert "robot/make_table" in read
+    assert read - set(NEEDED.split()) == set()

@@ -182,7 +182,7 @@ def test_limits_idle_and_units_reach_the_frontend(segment: str) -> None:
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        ({"actuators": ["a", "a"]}, "two actuator 'a'"),
+        ({"actuators": ["a", "a"]}, "two actuators are called 'a'"),
         ({"actuators": "ab"}, "names"),
         ({"actuators": ["a"], "dtype": "U8"}, "dtype"),
         ({"actuators": ["a"], "dtype": np.float16}, "float16"),
@@ -192,7 +192,7 @@ def test_limits_idle_and_units_reach_the_frontend(segment: str) -> None:
         ({"actuators": ["a"], "when_idle": "rest"}, "'hold' or 'follow'"),
         ({"actuators": ["a"], "frequency": 0}, "frequency"),
         ({"actuators": ["a"], "frequency": float("nan")}, "frequency"),
-        ({"actuators": ["a"], "stale": "wait"}, "'hold', 'purge', 'halt' or 'stop'"),
+        ({"actuators": ["a"], "stale": "wait"}, "stale must be hold, purge, halt or stop"),
         ({"actuators": ["a"], "extended": {"m": (float, (2, 2, 2))}}, "at most 2"),
     ],
 )

@@ -184,7 +184,7 @@ def test_a_second_robot_of_the_same_name_is_refused(
 def test_errors_name_the_cure(folder: Path) -> None:
     assert "there are:" in o80(folder, "run", "no_such_robot", fails=True)
     assert "--help" in o80(folder, "run", "two_joints", "--no-such-flag", fails=True)
-    assert "--frequency cannot be 'fast'" in o80(
+    assert "--frequency must be a number from 0.001 to 1000000 [1/s], got 'fast'" in o80(
         folder, "run", "two_joints", "--frequency", "fast", fails=True
     )
     assert "option 'reach' must be a number, got 'far'" in o80(

@@ -142,7 +142,7 @@ def test_options_and_flags_reach_the_robot(segment: str) -> None:
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        ({"speed": 1.0}, "no option 'speed': its options are gain, reach"),
+        ({"speed": 1.0}, "no option 'speed': its own are gain, reach"),
         ({"gain": "fast"}, "gain"),
         ({"gain": None}, "gain"),
         ({"frequency": -1.0}, "frequency"),

@@ -1,5 +1,7 @@
 #include "robot/run_options.hpp"
 
+#include <algorithm>
+
 #include "robot/puppet.hpp"
 
 namespace o80::test {
@@ -91,7 +93,8 @@ TEST_F(RunOptionsTest, RefuseWhatIsNotAllowedNamingTheFlag) {
   EXPECT_THAT(refusal({"--frequency", "0"}), AllOf(HasSubstr("--frequency"), HasSubstr("from")));
   EXPECT_THAT(refusal({"--frequency", "fast"}), HasSubstr("'fast'"));
   EXPECT_THAT(refusal({"--frequency", "nan"}), HasSubstr("'nan'"));
-  EXPECT_THAT(refusal({"--lanes", "1.5"}), HasSubstr("it is a count"));
+  EXPECT_THAT(refusal({"--lanes", "1.5"}),
+              HasSubstr("must be a whole number from 1 to 256, got '1.5'"));
   EXPECT_THAT(refusal({"--permission", "999"}), HasSubstr("octal"));
   EXPECT_THAT(refusal({"--stale", "never"}), HasSubstr("hold, purge, halt or stop"));
   EXPECT_THAT(refusal({"--policy", "idle"}), HasSubstr("other, fifo or rr"));
@@ -109,10 +112,11 @@ TEST_F(RunOptionsTest, AreAllInTheHelp) {
   const std::string help = run_help(table());
   EXPECT_THAT(help, AllOf(HasSubstr("--gain number"), HasSubstr("of nothing [1/s] (default: 1.5)"),
                           HasSubstr("--finish-at"), HasSubstr("one of: never")));
-  std::size_t count = 0;
-  const RunFlag* flags = run_flags(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    EXPECT_THAT(help, HasSubstr("--" + std::string(flags[i].name)));
+  for (const LoopOption& option : loop_options()) {
+    std::string flag = option.name;
+    std::ranges::replace(flag, '_', '-');
+    EXPECT_THAT(help, HasSubstr("--" + flag));
+    EXPECT_THAT(help, HasSubstr(option.help));
   }
 }
 

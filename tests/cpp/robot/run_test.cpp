@@ -195,13 +195,14 @@ TEST_F(RunTest, SaysWhatIsWrongWithItsFlags) {
   Program program(two_joints({"--frequency", "never"}));
   const Outcome outcome = program.end();
   EXPECT_EQ(outcome.code, 2);
-  EXPECT_THAT(outcome.err, HasSubstr("--frequency cannot be 'never'"));
+  EXPECT_THAT(outcome.err,
+              HasSubstr("--frequency must be a number from 0.001 to 1000000 [1/s], got 'never'"));
   for (const auto& [flag, value, why] :
-       {std::array{"--frequency", "0", "from 0.001 to 1e+06"},
-        std::array{"--frequency", "1e9", "from 0.001 to 1e+06"},
+       {std::array{"--frequency", "0", "from 0.001 to 1000000"},
+        std::array{"--frequency", "1e9", "from 0.001 to 1000000"},
         std::array{"--policy", "idle", "other, fifo or rr"},
         std::array{"--priority", "100", "from 1 to 99"},
-        std::array{"--cpus", "two", "a number from 0 to 1023"},
+        std::array{"--cpus", "two", "a list of processors such as 2,3"},
         std::array{"--reach", "far",
                    "robot 'two_joints': option 'reach' must be a number, got 'far'"}}) {
     Program wrong(two_joints({flag, value}));
@@ -214,7 +215,7 @@ TEST_F(RunTest, SaysWhatIsWrongWithItsFlags) {
   Program helped(two_joints({"--help"}));
   const Outcome help = helped.end();
   EXPECT_EQ(help.code, 0);
-  EXPECT_THAT(help.out, AllOf(HasSubstr("--reach number"), HasSubstr("--frequency HZ")));
+  EXPECT_THAT(help.out, AllOf(HasSubstr("--reach number"), HasSubstr("--frequency number")));
 }
 
 TEST_F(RunTest, ReportsWhatTheMachineRefusesAndRunsOn) {

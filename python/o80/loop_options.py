@@ -1,0 +1,100 @@
+"""What can be set about every backend, whatever its robot.
+
+The one description is in src/robot/loop_options.cpp.
+"""
+
+import difflib
+import numbers
+import operator
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+from o80 import _core
+from o80.errors import InvalidArgument
+
+
+@dataclass(frozen=True)
+class LoopOption:
+    """A keyword of `Robot.start`, `Robot.inline` and `Backend`, and a flag of `o80 run`."""
+
+    name: str
+    kind: str  #: text, number, integer, boolean, word, octal or list
+    allowed: str  #: ends "lanes must be "
+    otherwise: str  #: what holds if it is not given
+    help: str
+    of_run: bool
+    of_start: bool
+    of_inline: bool
+    of_backend: bool
+
+
+@cache
+def loop_options() -> dict[str, LoopOption]:
+    """All of them, by their names, in the order of the help."""
+    return {fields[0]: LoopOption(*fields) for fields in _core.loop_options()}
+
+
+def loop_texts(given: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Names and texts of the options that were given; None is not given.
+
+    Raises InvalidArgument, which names the option and what is allowed.
+    """
+    texts = []
+    for name, value in given.items():
+        option = loop_options()[name]
+        is_empty = option.kind == "list" and hasattr(value, "__len__") and len(value) == 0
+        is_off = option.kind == "boolean" and value is False
+        if value is None or is_off or is_empty:
+            continue
+        texts.append((name, option_text(name, value, option.kind, option.allowed)))
+    _core.check_loop_options(texts)
+    return texts
+
+
+def option_text(name: str, value: Any, kind: str, allowed: str) -> str:
+    """An option as the text that is read in C++. Raises InvalidArgument."""
+    if not _is_a(kind, value):
+        raise InvalidArgument(f"{name} must be {allowed}, got {value!r}")
+    if kind != "octal":
+        return text_of(value)
+    mode = operator.index(value)
+    if not 0o400 <= mode <= 0o777:
+        raise InvalidArgument(f"{name} must be {allowed}, got {mode} (octal {mode:o})")
+    return f"{mode:o}"
+
+
+def _is_a(kind: str, value: Any) -> bool:
+    truth = isinstance(value, bool) or type(value).__name__ == "bool_"
+    if kind == "number":
+        return isinstance(value, numbers.Real) and not truth
+    if kind in ("integer", "octal"):
+        return hasattr(value, "__index__") and not truth
+    if kind == "boolean":
+        return truth
+    if kind == "word":
+        return isinstance(value, str)
+    if kind == "text":
+        return isinstance(value, (str, os.PathLike))
+    return not isinstance(value, str) and (isinstance(value, Sequence) or hasattr(value, "tolist"))
+
+
+def text_of(value: Any) -> str:
+    """A value as the text that is read in C++."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, (str, os.PathLike)):
+        return os.fspath(value)
+    if hasattr(value, "tolist"):
+        return text_of(value.tolist())
+    if isinstance(value, Sequence):
+        return ",".join(map(text_of, value))
+    return str(value)
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Ends an error about an unknown name, if another one is near."""
+    near = difflib.get_close_matches(name, known, n=1)
+    return f". Did you mean '{near[0]}'?" if near else ""

@@ -1,0 +1,163 @@
+#include "robot/loop_options.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include "o80/base/error.hpp"
+
+namespace o80 {
+
+namespace {
+
+using Kind = LoopOption::Kind;
+
+constexpr unsigned kProcess = LoopOption::kProcess;
+constexpr unsigned kInline = LoopOption::kInline;
+constexpr unsigned kEmbedded = LoopOption::kEmbedded;
+constexpr unsigned kEverywhere = kProcess | kInline | kEmbedded;
+
+/// Reads the whole text as a number; false if it is none.
+template <class Number, class... Base>
+bool read(std::string_view text, Number& number, Base... base) {
+  const char* end = text.data() + text.size();
+  const auto result = std::from_chars(text.data(), end, number, base...);
+  return result.ec == std::errc() && result.ptr == end;
+}
+
+bool set_stale(LoopOptions& options, std::string_view text, double /*number*/) {
+  const std::optional<Stale> stale = stale_of(text);
+  if (stale) options.backend.stale = *stale;
+  return stale.has_value();
+}
+
+bool set_permission(LoopOptions& options, std::string_view text, double /*number*/) {
+  mode_t mode = 0;
+  if (!read(text, mode, 8) || mode < 0400 || mode > 0777) return false;
+  options.backend.permission = mode;
+  return true;
+}
+
+bool set_policy(LoopOptions& options, std::string_view text, double /*number*/) {
+  using Policy = RealTimeOptions::Policy;
+  if (text != "other" && text != "fifo" && text != "rr") return false;
+  options.real_time.policy = text == "other"  ? Policy::other
+                             : text == "fifo" ? Policy::fifo
+                                              : Policy::round_robin;
+  return true;
+}
+
+bool set_processors(LoopOptions& options, std::string_view text, double /*number*/) {
+  std::vector<int> list;
+  while (true) {
+    const std::size_t comma = std::min(text.find(','), text.size());
+    int processor = 0;
+    if (!read(text.substr(0, comma), processor) || processor < 0 || processor > 1023) return false;
+    list.push_back(processor);
+    if (comma == text.size()) break;
+    text.remove_prefix(comma + 1);
+  }
+  options.real_time.processors = list;
+  return true;
+}
+
+/// A setter of one member, from the number that was read.
+#define O80_SET(member)                                             \
+  [](LoopOptions& options, std::string_view, double number) {       \
+    options.member = static_cast<decltype(options.member)>(number); \
+    return true;                                                    \
+  }
+
+constexpr std::array kOptions = {
+    LoopOption{"segment", Kind::text, "a name", 0, 0, "the robot's name",
+               "name that frontends attach to", LoopOption::kFlag,
+               [](LoopOptions& options, std::string_view text, double) {
+                 options.backend.segment = text;
+                 return true;
+               }},
+    LoopOption{"frequency", Kind::number, "a number from 0.001 to 1000000 [1/s]", 1e-3, 1e6,
+               "the robot's own, or 1000", "iterations a second; in bursting, of simulated time",
+               kEverywhere,
+               [](LoopOptions& options, std::string_view, double number) {
+                 options.backend.period = std::llround(1e9 / number);
+                 return true;
+               }},
+    LoopOption{"bursting", Kind::boolean, "true or false", 0, 1, "no",
+               "stand still until a frontend asks for iterations", kProcess | kEmbedded,
+               O80_SET(backend.bursting)},
+    LoopOption{"history", Kind::integer, "a whole number from 1 to 1000000000", 1, 1e9,
+               "as many as 16 MiB hold, at most 100000", "rows kept", kEverywhere,
+               O80_SET(backend.history)},
+    LoopOption{"lanes", Kind::integer, "a whole number from 1 to 256", 1, 256, "8",
+               "frontends that may command at once", kEverywhere, O80_SET(backend.lanes)},
+    LoopOption{"lane_blocks", Kind::integer, "a whole number from 16 to 4194304", 16, 1 << 22,
+               "16384", "blocks of 64 bytes that each of them may have in flight", kEverywhere,
+               O80_SET(backend.lane_blocks)},
+    LoopOption{"permission", Kind::octal, "an octal mode such as 600, 640 or 660", 0, 0, "600",
+               "read bits: who may observe, write bits: who may command", kEverywhere,
+               set_permission},
+    LoopOption{"stale", Kind::word, "hold, purge, halt or stop", 0, 0, "hold",
+               "what follows when a commander dies, or is silent for too long", kEverywhere,
+               set_stale},
+    LoopOption{"silence", Kind::integer, "a whole number from 1 to 1000000000000000", 1, 1e15,
+               "no watchdog",
+               "iterations that a commander may show no life while something of its acts",
+               kEverywhere, O80_SET(backend.silence)},
+    LoopOption{"max_overruns", Kind::integer, "a whole number from 1 to 100000", 1, 1e5,
+               "any number", "late iterations within a second that halt the robot",
+               kProcess | kEmbedded, O80_SET(backend.max_overruns)},
+    LoopOption{"resume", Kind::boolean, "true or false", 0, 1, "no",
+               "run although the backend before was halted, or died while commands acted",
+               kProcess | kEmbedded, O80_SET(backend.resume)},
+    LoopOption{"policy", Kind::word, "other, fifo or rr", 0, 0, "other",
+               "scheduling class of the loop", kProcess, set_policy},
+    LoopOption{"priority", Kind::integer, "a whole number from 1 to 99", 1, 99, "80",
+               "of the loop, with policy fifo and rr", kProcess, O80_SET(real_time.priority)},
+    LoopOption{"cpus", Kind::list, "a list of processors such as 2,3", 0, 0, "all",
+               "processors of the loop", kProcess, set_processors},
+    LoopOption{"lock_memory", Kind::boolean, "true or false", 0, 1, "no",
+               "keep all memory resident", kProcess, O80_SET(real_time.lock_memory)},
+    LoopOption{"until_eof", Kind::boolean, "true or false", 0, 1, "no",
+               "stop when the standard input ends", LoopOption::kFlag, O80_SET(until_eof)},
+    LoopOption{"help", Kind::boolean, "true or false", 0, 1, "no", "this text", LoopOption::kFlag,
+               O80_SET(help)}};
+#undef O80_SET
+
+/// Reads what the kind of the option asks for; false if the text is something else.
+bool read_number(const LoopOption& option, std::string_view text, double& number) {
+  switch (option.kind) {
+    case Kind::boolean:
+      number = text == "true" ? 1 : 0;
+      return text == "true" || text == "false";
+    case Kind::number:
+    case Kind::integer:
+      if (!read(text, number) || !(number >= option.minimum && number <= option.maximum)) {
+        return false;
+      }
+      return option.kind == Kind::number || number == std::floor(number);
+    default:
+      return true;
+  }
+}
+
+}  // namespace
+
+std::span<const LoopOption> loop_options() { return kOptions; }
+
+const LoopOption* find_loop_option(std::string_view name) {
+  const auto found = std::ranges::find(kOptions, name, &LoopOption::name);
+  return found == kOptions.end() ? nullptr : &*found;
+}
+
+void set_loop_option(LoopOptions& options, const LoopOption& option, std::string_view text,
+                     std::string_view spelled) {
+  double number = 0;
+  if (read_number(option, text, number) && option.set(options, text, number)) return;
+  throw InvalidArgument(std::string(spelled) + " must be " + option.allowed + ", got '" +
+                        std::string(text) + "'");
+}
+
+}  // namespace o80
