@@ -24,7 +24,7 @@ const char* name_of(o80::LoopOption::Kind kind) {
   return kNames[static_cast<std::size_t>(kind)];
 }
 
-/// Name, kind, what is allowed, what holds otherwise, help, and where it can be given.
+/// Name, kind, allowed values, default, help, and where the option can be given.
 nb::list described_loop_options() {
   using Option = o80::LoopOption;
   nb::list all;
@@ -38,7 +38,7 @@ nb::list described_loop_options() {
   return all;
 }
 
-/// Starts a robot in this process; its bursts run in the thread that asks for them.
+/// Starts a robot in this process; its bursts run in the thread that requests them.
 Attachment start_inline(const o80::RobotLibrary& library, const std::string& segment,
                         const o80::OptionValues& loop, const o80::OptionValues& options) {
   const Waiting waiting;
@@ -63,13 +63,13 @@ o80::LoopOptions loop_options_of(const o80::OptionValues& values) {
 }
 
 void bind_robots(nb::module_& m) {
-  nb::class_<o80::Option>(m, "Option", "One value a robot can be started with.")
+  nb::class_<o80::Option>(m, "Option", "One option with which a robot can be started.")
       .def_ro("name", &o80::Option::name)
       .def_ro("kind", &o80::Option::kind, "number, integer, boolean, text, or what is allowed")
       .def_ro("default", &o80::Option::default_text, "as text")
       .def_ro("help", &o80::Option::help)
       .def_ro("unit", &o80::Option::unit);
-  nb::class_<o80::RobotLibrary>(m, "RobotLibrary", "A robot library that is loaded.")
+  nb::class_<o80::RobotLibrary>(m, "RobotLibrary", "A loaded robot library.")
       .def_ro("path", &o80::RobotLibrary::path)
       .def_prop_ro("name",
                    [](const o80::RobotLibrary& self) { return std::string(self.table->name); })

@@ -1,4 +1,4 @@
-"""What can be set about every backend, whatever its robot.
+"""Options of a backend and its loop that every robot has.
 
 The one description is in src/robot/loop_options.cpp.
 """
@@ -22,8 +22,8 @@ class LoopOption:
 
     name: str
     kind: str  #: text, number, integer, boolean, word, octal or list
-    allowed: str  #: ends "lanes must be "
-    otherwise: str  #: what holds if it is not given
+    allowed: str  #: the allowed values, as the end of "lanes must be "
+    otherwise: str  #: the default, in words
     help: str
     of_run: bool
     of_start: bool
@@ -33,12 +33,12 @@ class LoopOption:
 
 @cache
 def loop_options() -> dict[str, LoopOption]:
-    """All of them, by their names, in the order of the help."""
+    """All options by name, in the order of the help."""
     return {fields[0]: LoopOption(*fields) for fields in _core.loop_options()}
 
 
 def loop_texts(given: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Names and texts of the options that were given; None is not given.
+    """Names and texts of the options that are not None.
 
     Raises InvalidArgument, which names the option and what is allowed.
     """
@@ -55,7 +55,7 @@ def loop_texts(given: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 def option_text(name: str, value: Any, kind: str, allowed: str) -> str:
-    """An option as the text that is read in C++. Raises InvalidArgument."""
+    """The text of an option's value for C++. Raises InvalidArgument."""
     if not _is_a(kind, value):
         raise InvalidArgument(f"{name} must be {allowed}, got {value!r}")
     if kind != "octal":

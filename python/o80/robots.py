@@ -1,4 +1,4 @@
-"""Robots: libraries that a process of their own runs, or this one.
+"""Robot libraries, which run in a process of their own or in this one.
 
 with o80.robots.load("two_joints").start(frequency=500, gain=2.0) as process:
     arm = process.frontend()
@@ -40,7 +40,7 @@ class RobotFile:
 
 @dataclass(frozen=True, kw_only=True)
 class Option:
-    """One value a robot can be started with, a field of its described Config."""
+    """One option of a robot, a field of its described Config."""
 
     name: str
     kind: str  #: number, integer, boolean, text, "one of: a, b", or "3 x number"
@@ -50,7 +50,7 @@ class Option:
 
 
 def list() -> builtins.list[RobotFile]:
-    """All robots that can be loaded by name: of O80_ROBOT_PATH, bundled, and of Python packages."""
+    """All robots with a name: in O80_ROBOT_PATH, bundled with o80, and in Python packages."""
     found = {name: Path(path) for name, path in _core.find_robots()}
     for name, point in announced(GROUP).items():
         if name not in found:
@@ -61,7 +61,7 @@ def list() -> builtins.list[RobotFile]:
 def load(name_or_path: str | os.PathLike[str]) -> "Robot":
     """Loads a robot, by its name or by the path of its library.
 
-    Raises DriverError, whose text lists what there is.
+    Raises DriverError with the known robots in its text.
     """
     text = os.fspath(name_or_path)
     if os.sep not in text:
@@ -84,29 +84,29 @@ def _path_of(point: "EntryPoint") -> Path:
 
 
 class Robot:
-    """A robot library that is loaded; no hardware is touched before it is started."""
+    """A loaded robot library. It does not touch hardware before it is started."""
 
     def __init__(self, library: _core.RobotLibrary) -> None:
         self._library = library
 
     @property
     def name(self) -> str:
-        """As it calls itself."""
+        """Name of the robot (from O80_ROBOT)."""
         return self._library.name
 
     @property
     def path(self) -> Path:
-        """Of its library."""
+        """Path of the library."""
         return Path(self._library.path)
 
     @property
     def built_with(self) -> str:
-        """Versions of o80 and of what it links."""
+        """Versions of o80 and of the libraries it links."""
         return self._library.built_with
 
     @property
     def options(self) -> builtins.list[Option]:
-        """What it can be started with, beyond what every robot can."""
+        """The robot's own options, besides those of every robot."""
         return [
             Option(
                 name=option.name,
@@ -139,29 +139,30 @@ class Robot:
         timeout: float | None = 30.0,
         **config: Any,
     ) -> Process:
-        """Starts it as a process of its own, which ends when this one does.
+        """Starts the robot in a process of its own, which ends when this process ends.
 
-        segment: the name to attach to (None: the robot's).
-        frequency: iterations a second [1/s]; bursting, of simulated time. None: the robot's own
-            (a simulator's model says it), or 1000.
-        bursting: stands still until a frontend asks for iterations.
-        history: observations kept (None: as many as 16 MiB hold, 100000 at most).
+        segment: name of its segment (None: the name of the robot).
+        frequency: iterations a second [1/s]; in bursting mode, of simulated time. None: the robot's
+            own (for simulators, that of the model), or 1000.
+        bursting: run only the iterations that frontends request.
+        history: number of observations kept (None: as many as 16 MiB hold, at most 100000).
         lanes, lane_blocks: frontends that may command at once, and blocks of 64 bytes that each
             may have in flight.
-        permission: read bits say who may observe, write bits who may command.
-        stale: what follows when a frontend dies, or shows no life for `silence` iterations while
-            something of its acts: nothing, its commands are dropped, the robot halts, or it stops.
-            A pulse, a wait for its own batch and `keep_alive` are signs of life, reading is none.
-        max_overruns: halt when so many iterations within a second are late.
-        resume: run although the process before was halted, or died while commands acted.
-        policy, priority, cpus, lock_memory: real-time scheduling; what the machine refuses is
-            warned about.
-        timeout: for the robot to be running [s].
-        config: its own options, see `options`.
-        What is None holds as docs/options.md says.
+        permission: the read bits permit users to observe, the write bits to command.
+        stale: policy for a frontend that dies, or gives no sign of life for `silence` iterations
+            while it has control or commands: "hold" does nothing, "purge" drops its commands,
+            "halt" halts the robot, "stop" stops it. Signs of life are a pulse, a wait for a batch
+            and `keep_alive`, but not reading.
+        max_overruns: number of late iterations within a second that halts the robot.
+        resume: start without a halt even if the previous process was halted, or was killed while
+            commands acted.
+        policy, priority, cpus, lock_memory: real-time scheduling; settings that the machine refuses
+            give a RuntimeWarning.
+        timeout: how long to wait until the robot runs [s].
+        config: the robot's own options, see `options`.
 
-        Returns when it is running. Raises DriverError with the driver's fault, SegmentTaken,
-        InvalidArgument, TimeoutError.
+        docs/options.md lists allowed values and defaults. Returns when the robot runs. Raises
+        DriverError with the driver's fault, SegmentTaken, InvalidArgument, TimeoutError.
         """
         texts = loop_texts(
             {
@@ -203,11 +204,11 @@ class Robot:
         silence: int | None = None,
         **config: Any,
     ) -> Frontend:
-        """Starts it inside this process: bursts of the frontend run in the thread that asks.
+        """Starts the robot in this process. A burst runs in the thread that requests it.
 
-        segment: a name for others to attach to (None: an unused one).
+        segment: name of its segment, to which others may attach (None: an unused name).
         frequency, history, lanes, lane_blocks, permission, stale, silence: as for `start`.
-        config: its own options, see `options`.
+        config: the robot's own options, see `options`.
 
         Closing the frontend stops the robot. Raises DriverError, SegmentTaken, InvalidArgument.
         """
@@ -229,14 +230,14 @@ class Robot:
             attachment = self._library.start_inline(name, texts, own)
         except Exception:
             if segment is None:
-                _core.clean(name)  # nobody knows the name to read the fault by
+                _core.clean(name)  # no other process can know this name
             raise
         return Frontend._of(attachment, unnamed=segment is None)
 
     def _config(
         self, config: Mapping[str, Any], loop: Sequence[str]
     ) -> builtins.list[tuple[str, str]]:
-        """Names and texts of its own options; those of the loop are known beside them."""
+        """Names and texts of the robot's own options. loop: other names, for the nearest one."""
         kinds = {option.name: option.kind for option in self.options}
         texts = []
         for name, value in config.items():
@@ -246,7 +247,7 @@ class Robot:
                 raise InvalidArgument(f"robot '{self.name}' has no option '{name}'{near or own}")
             if kinds[name] in ("number", "integer") and not isinstance(value, numbers.Real):
                 raise InvalidArgument(
-                    f"option '{name}' of robot '{self.name}' is a {kinds[name]}, not {value!r}"
+                    f"option '{name}' of robot '{self.name}' must be a {kinds[name]}, got {value!r}"
                 )
             texts.append((name, text_of(value)))
         return texts

@@ -20,7 +20,7 @@ constexpr unsigned kInline = LoopOption::kInline;
 constexpr unsigned kEmbedded = LoopOption::kEmbedded;
 constexpr unsigned kEverywhere = kProcess | kInline | kEmbedded;
 
-/// Reads the whole text as a number; false if it is none.
+/// Reads the whole text as a number; false if it is not one.
 template <class Number, class... Base>
 bool read(std::string_view text, Number& number, Base... base) {
   const char* end = text.data() + text.size();
@@ -86,7 +86,7 @@ constexpr std::array kOptions = {
                  return true;
                }},
     LoopOption{"bursting", Kind::boolean, "true or false", 0, 1, "no",
-               "stand still until a frontend asks for iterations", kProcess | kEmbedded,
+               "run only the iterations that frontends request", kProcess | kEmbedded,
                O80_SET(backend.bursting)},
     LoopOption{"history", Kind::integer, "a whole number from 1 to 1000000000", 1, 1e9,
                "as many as 16 MiB hold, at most 100000", "rows kept", kEverywhere,
@@ -100,22 +100,22 @@ constexpr std::array kOptions = {
                "read bits: who may observe, write bits: who may command", kEverywhere,
                set_permission},
     LoopOption{"stale", Kind::word, "hold, purge, halt or stop", 0, 0, "hold",
-               "what follows when a commander dies, or is silent for too long", kEverywhere,
+               "policy for a commander that dies, or is silent for too long", kEverywhere,
                set_stale},
     LoopOption{"silence", Kind::integer, "a whole number from 1 to 1000000000000000", 1, 1e15,
-               "no watchdog",
-               "iterations that a commander may show no life while something of its acts",
+               "no watchdog", "watchdog: iterations without a sign of life before stale applies",
                kEverywhere, O80_SET(backend.silence)},
-    LoopOption{"max_overruns", Kind::integer, "a whole number from 1 to 100000", 1, 1e5,
-               "any number", "late iterations within a second that halt the robot",
+    LoopOption{"max_overruns", Kind::integer, "a whole number from 1 to 100000", 1, 1e5, "no limit",
+               "number of late iterations within a second that halts the robot",
                kProcess | kEmbedded, O80_SET(backend.max_overruns)},
     LoopOption{"resume", Kind::boolean, "true or false", 0, 1, "no",
-               "run although the backend before was halted, or died while commands acted",
+               "start without a halt even if the previous backend was halted or killed",
                kProcess | kEmbedded, O80_SET(backend.resume)},
     LoopOption{"policy", Kind::word, "other, fifo or rr", 0, 0, "other",
                "scheduling class of the loop", kProcess, set_policy},
     LoopOption{"priority", Kind::integer, "a whole number from 1 to 99", 1, 99, "80",
-               "of the loop, with policy fifo and rr", kProcess, O80_SET(real_time.priority)},
+               "priority of the loop, with policy fifo and rr", kProcess,
+               O80_SET(real_time.priority)},
     LoopOption{"cpus", Kind::list, "a list of processors such as 2,3", 0, 0, "all",
                "processors of the loop", kProcess, set_processors},
     LoopOption{"lock_memory", Kind::boolean, "true or false", 0, 1, "no",
@@ -126,7 +126,7 @@ constexpr std::array kOptions = {
                O80_SET(help)}};
 #undef O80_SET
 
-/// Reads what the kind of the option asks for; false if the text is something else.
+/// Reads a number or a boolean; false if the text is invalid. Other kinds have no number.
 bool read_number(const LoopOption& option, std::string_view text, double& number) {
   switch (option.kind) {
     case Kind::boolean:

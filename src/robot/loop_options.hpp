@@ -10,7 +10,7 @@
 
 namespace o80 {
 
-/// All that can be set about a backend and its loop, whatever the robot.
+/// Options of a backend and its loop that every robot has.
 struct LoopOptions {
   BackendOptions backend;
   RealTimeOptions real_time;
@@ -18,8 +18,8 @@ struct LoopOptions {
   bool help = false;
 };
 
-/// One of them, described. The flags of `o80 run` and their help, the keywords in Python and their
-/// checks, and the table of docs/options.md follow from it.
+/// Description of one of these options. The flags of `o80 run` and their help, the keywords in
+/// Python and their checks, and the table in docs/options.md are made from it.
 struct LoopOption {
   enum class Kind : std::uint8_t { text, number, integer, boolean, word, octal, list };
   // where it can be given
@@ -33,17 +33,17 @@ struct LoopOption {
   const char* allowed;    // "stale must be hold, purge, halt or stop"
   double minimum;         // of numbers
   double maximum;         // of numbers
-  const char* otherwise;  // what holds if it is not given
+  const char* otherwise;  // the default, in words
   const char* help;
   unsigned scope;
-  /// Sets it; false if a text has another form than its kind asks for.
+  /// Sets the option; false if the text is invalid.
   bool (*set)(LoopOptions& options, std::string_view text, double number);
 
   bool is_switch() const { return kind == Kind::boolean; }
 };
 
 std::span<const LoopOption> loop_options();
-/// Null if there is none of this name.
+/// Null for an unknown name.
 const LoopOption* find_loop_option(std::string_view name);
 
 /// Sets an option from its text. Throws InvalidArgument: "`spelled` must be ..., got ...".

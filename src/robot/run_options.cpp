@@ -20,7 +20,7 @@ std::string dashed(std::string name) {
   return name;
 }
 
-/// What follows a flag in the help.
+/// The kind of value that follows a flag, for the help.
 std::string value_of(const LoopOption& option) {
   switch (option.kind) {
     case LoopOption::Kind::boolean:

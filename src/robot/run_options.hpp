@@ -7,15 +7,15 @@
 
 namespace o80 {
 
-/// What the command line of a robot's process says.
+/// Options from the command line of a robot's process.
 struct RunOptions : LoopOptions {
   OptionValues robot;
 };
 
-/// Throws InvalidArgument, whose text names the flag and what is allowed.
+/// Throws InvalidArgument with the flag and the allowed values.
 RunOptions parse_run_options(const RobotTable& table, int argc, char** argv);
 
-/// All flags of a robot's process, its own first.
+/// Help for all flags of a robot's process, those of the robot first.
 std::string run_help(const RobotTable& table);
 
 }  // namespace o80
