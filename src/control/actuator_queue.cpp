@@ -158,8 +158,8 @@ void ActuatorQueue::begin_command(Iteration iteration) noexcept {
   const BlockIndex record = queue_.front();
   const RecordHead& head = pool_->head(record);
   rows_ = Cursor(*pool_, record, sizeof(RecordHead), head.payload_bytes);
-  partial_ = head.partial != 0;
-  if (partial_) rows_.read(mask_.data(), mask_.size() * sizeof mask_.front());
+  masked_ = head.masked != 0;
+  if (masked_) rows_.read(mask_.data(), mask_.size() * sizeof mask_.front());
   timed_ = head.pace == Pace::duration && head.rows > 1;
   time_ = 0;
   if (timed_) {
@@ -208,7 +208,7 @@ void ActuatorQueue::plan_with_others(Iteration iteration, const std::byte* obser
 
 /// The next row of the command => to; false if there is none.
 bool ActuatorQueue::read_row() noexcept {
-  if (partial_) {
+  if (masked_) {
     auto* row = reinterpret_cast<std::byte*>(scratch_.data());
     rows_.read(row, layout_->size());
     layout_->copy(motion_.to(), motion_.from());
@@ -248,7 +248,7 @@ void ActuatorQueue::plan_row(Iteration iteration, const std::byte* observed) noe
     }
   }
   read_row();
-  if (partial_) motion_.leave_out(mask());
+  if (masked_) motion_.leave_out(mask());
   row_iterations_ = iterations(head, iteration);
 }
 

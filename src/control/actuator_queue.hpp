@@ -82,7 +82,7 @@ class ActuatorQueue {
   Moved come_to_rest(const std::byte* observed) noexcept;
   void keep_moving() noexcept;
   void end_motion() noexcept;
-  const std::uint64_t* mask() const noexcept { return partial_ ? mask_.data() : nullptr; }
+  const std::uint64_t* mask() const noexcept { return masked_ ? mask_.data() : nullptr; }
 
   const StateLayout* layout_;
   BlockPool* pool_;
@@ -106,7 +106,7 @@ class ActuatorQueue {
       std::numeric_limits<double>::infinity();  // speed of its first number [1/iteration]
   std::uint32_t first_number_ = 0;              // that it commands
   std::uint32_t rows_left_ = 0;
-  bool partial_ = false;
+  bool masked_ = false;
   bool timed_ = false;
   bool first_row_ = false;
   bool planned_ = false;             // its next row, with those of its group

@@ -9,11 +9,10 @@
 namespace o80 {
 namespace {
 
-RecordHead head_of(RecordKind kind, std::uint16_t actuator = 0, std::uint8_t partial = 0) {
+RecordHead head_of(RecordKind kind, std::uint16_t actuator = 0) {
   RecordHead head;
   head.kind = kind;
   head.actuator = actuator;
-  head.partial = partial;
   return head;
 }
 
@@ -71,7 +70,7 @@ std::uint32_t BatchBuilder::group(std::span<const Member> members,
   RecordHead head = members.front().head;
   head.kind = RecordKind::group;
   head.actuator = 0;
-  head.partial = 0;
+  head.masked = 0;
   head.rows = static_cast<std::uint32_t>(members.size());
   open(head, 0);
   try {
@@ -95,7 +94,7 @@ void BatchBuilder::add_command(const RecordHead& head, std::span<const std::uint
                                std::span<const std::byte> states) {
   assert(times.empty() || (times.size() == rows && head.pace == Pace::duration));
   RecordHead written = head;
-  written.partial = mask.empty() ? 0 : 1;
+  written.masked = mask.empty() ? 0 : 1;
   written.rows = rows;
   std::byte* bytes = open(written, mask.size_bytes() + times.size_bytes() + states.size_bytes());
   for (const auto part : {std::as_bytes(mask), std::as_bytes(times), states}) {
@@ -110,7 +109,9 @@ std::uint32_t BatchBuilder::purge(std::uint16_t actuator_or_every) {
 }
 
 std::uint32_t BatchBuilder::purge_own(std::uint16_t actuator_or_every) {
-  open(head_of(RecordKind::purge, actuator_or_every, 1), 0);
+  RecordHead head = head_of(RecordKind::purge, actuator_or_every);
+  head.only_own = 1;
+  open(head, 0);
   return records_ - 1;
 }
 
@@ -171,10 +172,6 @@ std::size_t BatchBuilder::set_id(std::size_t block, CommandId id) {
   head.id = id;
   std::memcpy(bytes, &head, sizeof head);
   return block + blocks_of(head.payload_bytes);
-}
-
-void BatchBuilder::set_ticket(std::uint64_t ticket) noexcept {
-  std::memcpy(blocks_.front().bytes.data() + offsetof(BatchRecord, ticket), &ticket, sizeof ticket);
 }
 
 void BatchBuilder::clear() {

@@ -46,8 +46,6 @@ class BatchBuilder {
   /// Completes the batch: `batch` says id, ticket, at, late_now, burst and flags. One of a few
   /// purges and control orders, for now and without a burst, is marked as express.
   std::span<const Block> seal(const BatchRecord& batch);
-  /// Sets the ticket of a sealed batch, drawn just before its commit.
-  void set_ticket(std::uint64_t ticket) noexcept;
 
   void clear();
   bool empty() const noexcept { return records_ == 0; }

@@ -11,7 +11,7 @@ namespace o80 {
 struct Outcome {
   Status status = Status::completed;  // or rejected; of a request that ends later, active
   Reason reason = Reason::none;
-  std::uint8_t aux = 0;
+  std::uint8_t detail = 0;
 };
 
 /// What the controller needs of its surroundings while it takes a batch.

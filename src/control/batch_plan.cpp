@@ -6,9 +6,8 @@
 namespace o80 {
 namespace {
 
-// what a plan writes into `BatchRecord::own`; its work takes the place of `blocks`, which the pool
-// knows too
-constexpr std::size_t kSteps = 0;
+// what a plan writes into `BatchRecord::own`, beside kFirstStep; its work takes the place of
+// `blocks`, which the pool knows too
 constexpr std::size_t kMissingFrom = 1;
 constexpr std::size_t kSpareFirst = 2;
 constexpr std::size_t kTraits = 3;
@@ -22,16 +21,7 @@ constexpr std::uint32_t kReleases = 1U << 9;
 constexpr std::uint32_t kMoves = 1U << 10;
 constexpr std::uint32_t kFirstGroupBit = 11;
 
-// what steps take of an iteration, next to copying a block: 1
-constexpr std::uint32_t kBatchWork = 6;
-constexpr std::uint32_t kStepWork = 2;
-constexpr std::uint32_t kRequestWork = 16;  // and one for each actuator: it may start afresh
-
-BatchRecord& record_of(BlockPool& pool, BlockIndex batch) noexcept {
-  return *reinterpret_cast<BatchRecord*>(pool.bytes(batch));
-}
-
-void spend(std::uint32_t& budget, std::uint32_t work) noexcept { budget -= std::min(budget, work); }
+constexpr std::uint32_t kBatchWork = 6;  // of an iteration; copying a block: 1
 
 }  // namespace
 
@@ -62,7 +52,7 @@ void BatchPlanner::begin(Lane& lane, BlockIndex batch) noexcept {
   lane.group = kNoBlock;
   lane.groups = 0;
   begin_part(lane);
-  record_of(pool_, batch).own = {kNoBlock, 0, kNoBlock, 0, 0};
+  pool_.batch(batch).own = {kNoBlock, 0, kNoBlock, 0, 0};
 }
 
 bool BatchPlanner::check(std::uint32_t lane_index, BlockIndex batch,
@@ -90,7 +80,7 @@ void BatchPlanner::complete(std::uint32_t lane_index, std::uint32_t& budget) noe
   end_part(lane_index, budget);
   Lane& lane = lanes_[lane_index];
   const BlockChain chain = pool_.chain(lane.batch);
-  BatchRecord& record = record_of(pool_, lane.batch);
+  BatchRecord& record = pool_.batch(lane.batch);
   const bool is_express = lane.effort.express && lane.place == record.records;
   const bool bursts = record.burst != 0 || (record.flags & kBurstUntilEnded) != 0;
   const bool only_resumes = lane.resumes > 0 && lane.resumes == record.records && !bursts;
@@ -225,7 +215,7 @@ void BatchPlanner::add_member(Lane& lane) noexcept {
   head.id = kMemberMark | lane.group;
   head.own = {kNoBlock, lane.batch, lane.last, kNoBlock};
   (lane.first_member == kNoBlock ? lane.first_member
-                                 : pool_.head(lane.last_member).own[Own::kOther]) = lane.cursor;
+                                 : pool_.head(lane.last_member).own[Own::kNextStep]) = lane.cursor;
   lane.last_member = lane.cursor;
   --lane.members_left;
 }
@@ -238,7 +228,7 @@ void BatchPlanner::complete_group(std::uint32_t lane_index, std::uint32_t& budge
   CommandGroups(pool_).at(lane.group) = group;
   for (BlockIndex member = lane.first_member; member != kNoBlock;) {
     const BlockIndex record = member;
-    member = std::exchange(pool_.head(record).own[Own::kOther], kNoBlock);
+    member = std::exchange(pool_.head(record).own[Own::kNextStep], kNoBlock);
     add(lane_index, record, budget);
     spend(budget, 1);
   }
@@ -274,176 +264,6 @@ bool BatchPlanner::is_one_too_many(Lane& lane, const RecordHead& head) const noe
   }
 }
 
-// ------------------------------------------------------------------------------ steps
-
-void BatchPlanner::add(std::uint32_t lane_index, BlockIndex record,
-                       std::uint32_t& budget) noexcept {
-  Lane& lane = lanes_[lane_index];
-  tails_[record] = record;
-  switch (pool_.head(record).kind) {
-    case RecordKind::command:
-      lane.effort.express = false;
-      lane.effort.moves = true;
-      return add_command(lane_index, record);
-    case RecordKind::purge:
-      return add_purge(lane_index, record, budget);
-    case RecordKind::request:
-      if (!while_halted_[pool_.head(record).actuator]) lane.effort.moves = true;
-      [[fallthrough]];
-    case RecordKind::resume:
-      if (pool_.head(record).kind == RecordKind::resume) ++lane.resumes;
-      // may start afresh too, and is never express: commands sent before it, while the robot was
-      // halted, are rejected and would act if it overtook them
-      lane.effort.express = false;
-      ++lane.effort.requests;
-      end_part(lane_index, budget);
-      return add_step(lane, record, kRequestWork + actuators_);
-    case RecordKind::release_control:
-      lane.effort.releases = true;
-      [[fallthrough]];
-    case RecordKind::take_control:
-      return add_step(lane, record, kStepWork);
-    default:
-      lane.effort.express = false;
-      add_to_end(lane, End::invalid, record);
-  }
-}
-
-void BatchPlanner::add_command(std::uint32_t lane_index, BlockIndex record) noexcept {
-  Lane& lane = lanes_[lane_index];
-  const RecordHead& head = pool_.head(record);
-  Target& to = target(lane_index, head.actuator);
-  list(lane_index, head.actuator);
-  if (head.mode == Mode::queue) {
-    if (to.list != kNoBlock) return join(to.list, record, record);
-    to.list = record;
-    to.list_is_step = false;
-    return;
-  }
-  drop_list(lane, to, End::overwritten);
-  to.list = record;
-  to.list_is_step = !to.done.empty;
-  if (to.list_is_step) add_step(lane, record, kStepWork);
-  to.done.empty = to.done.empty_own = true;
-}
-
-void BatchPlanner::add_purge(std::uint32_t lane_index, BlockIndex record,
-                             std::uint32_t& budget) noexcept {
-  const RecordHead& head = pool_.head(record);
-  const bool own = head.partial != 0;
-  const bool all = head.actuator == kEveryActuator;
-  const bool does_something =
-      all ? purge_all(lane_index, own, budget) : purge_one(lane_index, head.actuator, own);
-  Lane& lane = lanes_[lane_index];
-  if (!does_something) return add_to_end(lane, End::completed, record);
-  add_step(lane, record, kStepWork + (all ? actuators_ : 0));
-}
-
-/// True if it does something to the queue, beside dropping what this part would append.
-bool BatchPlanner::purge_one(std::uint32_t lane_index, std::uint32_t actuator, bool own) noexcept {
-  Target& to = target(lane_index, actuator);
-  drop_list(lanes_[lane_index], to, End::purged);
-  const Done before = to.done;
-  if (!own) {
-    to.done = {.empty = true, .empty_own = true, .at_rest = true, .purged = true};
-    return !before.purged;
-  }
-  to.done.empty_own = true;
-  to.done.at_rest = before.at_rest || before.empty;
-  return !before.empty_own || (before.empty && !before.at_rest);
-}
-
-bool BatchPlanner::purge_all(std::uint32_t lane_index, bool own, std::uint32_t& budget) noexcept {
-  Lane& lane = lanes_[lane_index];
-  bool does_something = own ? !lane.all.empty_own : !lane.all.purged;
-  for (const std::uint16_t actuator : listed(lane_index)) {
-    does_something = purge_one(lane_index, actuator, own) || does_something;
-    target(lane_index, actuator).listed = false;
-    spend(budget, 1);
-  }
-  lane.listed = 0;
-  lane.all.empty_own = true;
-  if (!own) {
-    lane.all = {.empty = true, .empty_own = true, .at_rest = true, .purged = true};
-    ++lane.epoch;  // the same holds for each of them
-  }
-  return does_something;
-}
-
-/// What has not been dropped is appended.
-void BatchPlanner::end_part(std::uint32_t lane_index, std::uint32_t& budget) noexcept {
-  Lane& lane = lanes_[lane_index];
-  for (const std::uint16_t actuator : listed(lane_index)) {
-    const Target& to = target(lane_index, actuator);
-    spend(budget, 1);
-    if (to.list == kNoBlock || to.list_is_step) continue;
-    pool_.head(to.list).mode = Mode::queue;  // there is nothing to overwrite
-    add_step(lane, to.list, kStepWork);
-  }
-  begin_part(lane);
-}
-
-void BatchPlanner::begin_part(Lane& lane) noexcept {
-  ++lane.epoch;
-  lane.listed = 0;
-  lane.all = {};
-  lane.ends.fill(kNoBlock);
-}
-
-void BatchPlanner::drop_list(Lane& lane, Target& to, End end) noexcept {
-  if (to.list == kNoBlock) return;
-  if (to.list_is_step) {
-    pool_.head(to.list).kind = end == End::overwritten ? RecordKind::overwriter_overwritten
-                                                       : RecordKind::overwriter_purged;
-  } else {
-    add_to_end(lane, end, to.list);
-  }
-  to.list = kNoBlock;
-}
-
-void BatchPlanner::add_to_end(Lane& lane, End end, BlockIndex list) noexcept {
-  constexpr std::array<RecordKind, 4> kKinds = {
-      RecordKind::invalid_list, RecordKind::overwritten_list, RecordKind::purged_list,
-      RecordKind::completed_list};
-  BlockIndex& first = lane.ends[static_cast<std::size_t>(end)];
-  if (first != kNoBlock) return join(first, list, tails_[list]);
-  first = list;
-  pool_.head(list).kind = kKinds[static_cast<std::size_t>(end)];
-  add_step(lane, list, kStepWork);
-}
-
-void BatchPlanner::add_step(Lane& lane, BlockIndex record, std::uint32_t work) noexcept {
-  lane.effort.work += work;
-  if (lane.last_step == kNoBlock) {
-    record_of(pool_, lane.batch).own[kSteps] = record;
-  } else {
-    pool_.head(lane.last_step).own[Own::kOther] = record;
-  }
-  lane.last_step = record;
-}
-
-void BatchPlanner::join(BlockIndex list, BlockIndex first, BlockIndex last) noexcept {
-  pool_.head(tails_[list]).own[Own::kNext] = first;
-  tails_[list] = last;
-}
-
-BatchPlanner::Target& BatchPlanner::target(std::uint32_t lane_index,
-                                           std::uint32_t actuator) noexcept {
-  const Lane& lane = lanes_[lane_index];
-  Target& to = targets_[std::size_t{lane_index} * actuators_ + actuator];
-  if (to.epoch != lane.epoch) to = {.epoch = lane.epoch, .done = lane.all};
-  return to;
-}
-
-void BatchPlanner::list(std::uint32_t lane_index, std::uint32_t actuator) noexcept {
-  Target& to = target(lane_index, actuator);
-  if (to.listed) return;
-  to.listed = true;
-  Lane& lane = lanes_[lane_index];
-  listed_[std::size_t{lane_index} * actuators_ + lane.listed++] =
-      static_cast<std::uint16_t>(actuator);
-}
-
 // ------------------------------------------------------------------------------ what was planned
 
 Effort BatchPlanner::effort(BlockIndex batch) const noexcept {
@@ -463,7 +283,7 @@ std::optional<Plan> BatchPlanner::plan(BlockIndex batch) noexcept {
   if (known != Known::plan) return std::nullopt;
   const auto& own = pool_.batch(batch).own;
   const BlockIndex last = pool_.chain(batch).last;
-  return Plan{own[kSteps],
+  return Plan{own[kFirstStep],
               own[kMissingFrom],
               {own[kSpareFirst], last, own[kSpareBlocks]},
               own[kTraits] >> kFirstGroupBit};

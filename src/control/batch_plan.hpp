@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -16,7 +17,7 @@ namespace o80 {
 
 /// What taking a checked batch comes to.
 struct Plan {
-  BlockIndex steps = kNoBlock;     // the first; the others follow by Own::kOther
+  BlockIndex steps = kNoBlock;     // the first; the others follow by Own::kNextStep
   std::uint32_t missing_from = 0;  // place of the first record that has no blocks
   BlockChain spare;                // blocks that no record uses
   std::uint32_t groups = 0;        // commands of several actuators
@@ -61,6 +62,8 @@ class BatchPlanner {
   BlockIndex tail(BlockIndex step) const noexcept { return tails_[step]; }
 
  private:
+  static constexpr std::size_t kFirstStep = 0;  // of BatchRecord::own
+
   enum class Known : std::uint8_t { nothing, plan, garbage };
   /// What a part of a batch has done to a queue so far.
   struct Done {
@@ -137,6 +140,9 @@ class BatchPlanner {
   void add_step(Lane& lane, BlockIndex record, std::uint32_t work) noexcept;
   void join(BlockIndex list, BlockIndex first, BlockIndex last) noexcept;
 
+  static void spend(std::uint32_t& budget, std::uint32_t work) noexcept {
+    budget -= std::min(budget, work);
+  }
   Target& target(std::uint32_t lane, std::uint32_t actuator) noexcept;
   void list(std::uint32_t lane, std::uint32_t actuator) noexcept;
   std::span<std::uint16_t> listed(std::uint32_t lane) noexcept {

@@ -23,7 +23,7 @@ struct CommandGroup {
   std::uint16_t arrived = 0;  // of them, first in their queues in the iteration of the stamp
   Status end = Status::none;  // the first one that is not completed
   Reason reason = Reason::none;
-  std::uint8_t aux = 0;
+  std::uint8_t detail = 0;
   std::uint8_t active : 1 = 0;   // reported as active
   std::uint8_t offered : 1 = 0;  // the stamp of offers is valid
 };

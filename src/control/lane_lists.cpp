@@ -12,7 +12,7 @@ constexpr std::uint32_t kNoTurn = 0xFFFFFFFF;
 void LaneLists::append(BlockIndex first, BlockIndex last, std::uint32_t lane) noexcept {
   if (next_turn_ == kNoTurn) next_turn_ = 0;
   const std::uint32_t turn = next_turn_++;
-  pool_->head(first).own[Own::kOther] = turn;
+  pool_->head(first).own[Own::kTurn] = turn;
   List& list = lists_[lane];
   if (list.first == kNoBlock) {
     list.first = first;
@@ -29,7 +29,7 @@ void LaneLists::pop() noexcept {
   List& list = lists_[front_];
   list.first = pool_->head(list.first).own[Own::kNext];
   if (list.first == kNoBlock) return leave(front_);
-  const std::uint32_t turn = pool_->head(list.first).own[Own::kOther];
+  const std::uint32_t turn = pool_->head(list.first).own[Own::kTurn];
   if (turn == kNoTurn) return;
   list.turn = turn;
   choose_front();

@@ -11,7 +11,7 @@ struct Ledger::TakenBatch {
   RecordKind kind = RecordKind::batch;
   Status end = Status::completed;  // of the batch
   Reason reason = Reason::none;    // of the records without blocks
-  std::uint8_t aux = 0;
+  std::uint8_t detail = 0;
   std::uint32_t records = 0;
   CommandId id = 0;
   Iteration last_end = 0;
@@ -51,18 +51,18 @@ void Ledger::enter(std::uint32_t lane, BlockIndex block, const BlockChain& spare
   sink_.changed({lane, taken.id, Status::active, Reason::none, 0, iteration});
 }
 
-void Ledger::reject_from(BlockIndex block, std::uint32_t place, Reason reason, std::uint8_t aux,
+void Ledger::reject_from(BlockIndex block, std::uint32_t place, Reason reason, std::uint8_t detail,
                          Iteration iteration) noexcept {
   TakenBatch& taken = batch(block);
   if (place >= taken.records) return;
   taken.told = place;
   taken.reason = reason;
-  taken.aux = aux;
+  taken.detail = detail;
   taken.rejected_at = iteration;
   append(block);
 }
 
-void Ledger::reject(std::uint32_t lane, BlockIndex block, Reason reason, std::uint8_t aux,
+void Ledger::reject(std::uint32_t lane, BlockIndex block, Reason reason, std::uint8_t detail,
                     Iteration iteration, Status status) noexcept {
   // how many blocks there really are decides how many records there can be
   BlockChain spare = pool_.chain(block);
@@ -72,7 +72,7 @@ void Ledger::reject(std::uint32_t lane, BlockIndex block, Reason reason, std::ui
   TakenBatch taken;
   taken.end = Status::rejected;
   taken.reason = reason;
-  taken.aux = aux;
+  taken.detail = detail;
   taken.records = std::min(record.records, spare.blocks);
   taken.id = record.id;
   taken.last_end = iteration;
@@ -81,8 +81,8 @@ void Ledger::reject(std::uint32_t lane, BlockIndex block, Reason reason, std::ui
   taken.spare = spare;
   taken.told_as = status;
   new (pool_.bytes(block)) TakenBatch(taken);
-  sink_.changed({lane, taken.id, Status::rejected, reason, aux, iteration});
-  reject_from(block, 0, reason, aux, iteration);
+  sink_.changed({lane, taken.id, Status::rejected, reason, detail, iteration});
+  reject_from(block, 0, reason, detail, iteration);
   close(block, iteration);
 }
 
@@ -99,7 +99,7 @@ void Ledger::activate(BlockIndex record, Iteration iteration) noexcept {
   sink_.changed({lane_of(record), id, Status::active, Reason::none, 0, iteration});
 }
 
-void Ledger::end(BlockIndex record, Status status, Reason reason, std::uint8_t aux,
+void Ledger::end(BlockIndex record, Status status, Reason reason, std::uint8_t detail,
                  Iteration iteration) noexcept {
   const RecordHead& head = pool_.head(record);
   const CommandId id = head.id;
@@ -108,27 +108,28 @@ void Ledger::end(BlockIndex record, Status status, Reason reason, std::uint8_t a
   const BlockIndex block = head.own[Own::kBatch];
   const auto blocks = static_cast<std::uint32_t>(blocks_of(head.payload_bytes));
   const std::uint32_t lane = batch(block).lane;
-  if (!of_group) sink_.changed({lane, id, status, reason, aux, iteration});
+  if (!of_group) sink_.changed({lane, id, status, reason, detail, iteration});
   pool_.release(record, head.own[Own::kLast], blocks);
   sink_.freed(lane, blocks);
-  if (of_group) return member_ended(group, status, reason, aux, iteration);
+  if (of_group) return member_ended(group, status, reason, detail, iteration);
   ended(block, iteration);
 }
 
-void Ledger::member_ended(BlockIndex record, Status status, Reason reason, std::uint8_t aux,
+void Ledger::member_ended(BlockIndex record, Status status, Reason reason, std::uint8_t detail,
                           Iteration iteration) noexcept {
   CommandGroup& group = groups_.at(record);
   group.last_end = std::max(group.last_end, iteration);
   if (status != Status::completed && group.end == Status::none) {
     group.end = status;
     group.reason = reason;
-    group.aux = aux;
+    group.detail = detail;
   }
   if (--group.open > 0) return;
   --open_groups_;
   const CommandGroup of = group;
   if (of.active == 0 || CommandGroups::agrees_on_rows(pool_.head(record))) --undecided_groups_;
-  end(record, of.end == Status::none ? Status::completed : of.end, of.reason, of.aux, of.last_end);
+  end(record, of.end == Status::none ? Status::completed : of.end, of.reason, of.detail,
+      of.last_end);
 }
 
 void Ledger::ended(BlockIndex block, Iteration iteration) noexcept {
@@ -137,8 +138,8 @@ void Ledger::ended(BlockIndex block, Iteration iteration) noexcept {
   if (--taken.open > 0) return;
 
   const Reason reason = taken.end == Status::rejected ? taken.reason : Reason::none;
-  const std::uint8_t aux = taken.end == Status::rejected ? taken.aux : std::uint8_t{0};
-  sink_.changed({taken.lane, taken.id + 1, taken.end, reason, aux, taken.last_end});
+  const std::uint8_t detail = taken.end == Status::rejected ? taken.detail : std::uint8_t{0};
+  sink_.changed({taken.lane, taken.id + 1, taken.end, reason, detail, taken.last_end});
   sink_.freed(taken.lane, 1 + taken.spare.blocks);
   pool_.release(taken.spare);
   pool_.release(block, block, 1);
@@ -146,7 +147,8 @@ void Ledger::ended(BlockIndex block, Iteration iteration) noexcept {
 
 BlockIndex& Ledger::link(BlockIndex group) noexcept {
   const auto kind = static_cast<RecordKind>(*pool_.bytes(group));
-  return kind == RecordKind::batch ? batch(group).next_group : pool_.head(group).own[Own::kOther];
+  return kind == RecordKind::batch ? batch(group).next_group
+                                   : pool_.head(group).own[Own::kNextDropped];
 }
 
 void Ledger::append(BlockIndex group) noexcept {
@@ -168,7 +170,7 @@ bool Ledger::tell_rejected(BlockIndex block, std::uint32_t& budget) noexcept {
   TakenBatch& taken = batch(block);
   while (taken.told < taken.records && budget > 0) {
     sink_.changed({taken.lane, record_id(taken.id, taken.told), taken.told_as, taken.reason,
-                   taken.aux, taken.rejected_at});
+                   taken.detail, taken.rejected_at});
     ++taken.told;
     --taken.open;
     --budget;
@@ -176,7 +178,7 @@ bool Ledger::tell_rejected(BlockIndex block, std::uint32_t& budget) noexcept {
   return taken.told == taken.records;
 }
 
-std::uint32_t Ledger::work(std::uint32_t most) noexcept {
+std::uint32_t Ledger::report_ends(std::uint32_t most) noexcept {
   std::uint32_t budget = most;
   while (true) {
     // the group at hand

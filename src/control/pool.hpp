@@ -77,6 +77,9 @@ class BlockPool {
     return blocks_ + std::size_t{block} * kBlockBytes;
   }
   /// The batch record in the first block of a chain.
+  BatchRecord& batch(BlockIndex block) noexcept {
+    return *reinterpret_cast<BatchRecord*>(bytes(block));
+  }
   const BatchRecord& batch(BlockIndex block) const noexcept {
     return *reinterpret_cast<const BatchRecord*>(bytes(block));
   }

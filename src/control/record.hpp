@@ -36,8 +36,6 @@ enum class RecordKind : std::uint8_t {
   overwriter_purged
 };
 
-std::string_view to_text(RecordKind kind) noexcept;
-
 /// No pace may reach further: a status holds 48 bits of an iteration.
 inline constexpr std::int64_t kMostIterations = std::int64_t{1} << 47;
 /// The longest duration [ns].
@@ -45,7 +43,7 @@ inline constexpr std::int64_t kLongestDuration = std::int64_t{1} << 61;
 
 /// Starts every record but a batch's; 16 bytes of payload follow in the same block.
 ///
-/// Payload of a command: if partial, the mask (one bit a number of the state, whole words); if a
+/// Payload of a command: if masked, the mask (one bit a number of the state, whole words); if a
 /// trajectory has its own times (pace duration, rows > 1), the end of each row since the start of
 /// the command (int64 [ns]); then the rows, each a state. Of a request: its struct.
 /// `iterations` is a pace for each row, so is `speed`; `until` has one row.
@@ -58,7 +56,10 @@ struct RecordHead {
   Pace pace = Pace::direct;
   Profile profile = Profile::linear;
   Start start = Start::desired;
-  std::uint8_t partial = 0;    // command: a mask comes first; purge: only what this lane sent
+  union {
+    std::uint8_t masked = 0;  // command: 1 if a mask comes first
+    std::uint8_t only_own;    // purge: 1 to drop only what this lane sent
+  };
   std::uint16_t actuator = 0;  // purge: or kEveryActuator; request: which request
   CommandId id = 0;            // the batch's, plus 2, plus its place in the batch
   std::uint32_t payload_bytes = 0;

@@ -9,8 +9,7 @@ namespace {
 
 bool known_enums(const RecordHead& head) noexcept {
   return head.mode <= Mode::overwrite && head.pace <= Pace::fastest &&
-         head.profile <= Profile::minimum_jerk && head.start <= Start::observed &&
-         head.partial <= 1;
+         head.profile <= Profile::minimum_jerk && head.start <= Start::observed && head.masked <= 1;
 }
 
 bool sane_pace(const RecordHead& head) noexcept {
@@ -82,7 +81,7 @@ RecordCheck::Verdict RecordCheck::begin(const BlockPool& pool, BlockIndex block,
     case RecordKind::request:
       return check_request(head, progress.payload);
     case RecordKind::purge:
-      return verdict(head.payload_bytes == 0 && head.partial <= 1 &&
+      return verdict(head.payload_bytes == 0 && head.only_own <= 1 &&
                      (head.actuator == kEveryActuator || head.actuator < actuator_types_.size()));
     case RecordKind::take_control:
     case RecordKind::release_control:
@@ -102,13 +101,13 @@ RecordCheck::Verdict RecordCheck::begin_command(const RecordHead& head,
   const StateLayout& layout = *layouts_[actuator_types_[head.actuator]];
   const auto numbers = static_cast<std::uint32_t>(layout.numbers().size());
   const bool timed = head.pace == Pace::duration && head.rows > 1;
-  const std::uint64_t mask_bytes = head.partial != 0 ? 8 * mask_words(numbers) : 0;
+  const std::uint64_t mask_bytes = head.masked != 0 ? 8 * mask_words(numbers) : 0;
   const std::uint64_t time_bytes = timed ? 8 * std::uint64_t{head.rows} : 0;
   const std::uint64_t row_bytes = std::uint64_t{head.rows} * layout.size();
   if (head.payload_bytes != mask_bytes + time_bytes + row_bytes) return Verdict::invalid;
 
   // the mask names no number that is not there
-  if (head.partial != 0) {
+  if (head.masked != 0) {
     progress.payload.read(mask_.data(), mask_bytes);
     if (numbers % 64 != 0 && mask_[numbers / 64] >> (numbers % 64) != 0) return Verdict::invalid;
   }
@@ -116,7 +115,7 @@ RecordCheck::Verdict RecordCheck::begin_command(const RecordHead& head,
   if (head.pace == Pace::fastest) {
     const std::uint32_t first = first_limits_[head.actuator];
     for (std::uint32_t i = 0; i < numbers; ++i) {
-      const bool commanded = masked(head.partial != 0 ? mask_.data() : nullptr, i);
+      const bool commanded = masked(head.masked != 0 ? mask_.data() : nullptr, i);
       if (commanded && !has_acceleration_[first + i]) return Verdict::invalid;
     }
   }
@@ -130,7 +129,7 @@ RecordCheck::Verdict RecordCheck::go_on(const BlockPool& pool, BlockIndex block,
   const RecordHead& head = pool.head(block);
   const StateLayout& layout = *layouts_[actuator_types_[head.actuator]];
   const std::uint64_t* mask = nullptr;
-  if (head.partial != 0) {
+  if (head.masked != 0) {
     const std::size_t mask_bytes =
         sizeof(std::uint64_t) * mask_words(static_cast<std::uint32_t>(layout.numbers().size()));
     Cursor(pool, block, sizeof(RecordHead), head.payload_bytes).read(mask_.data(), mask_bytes);

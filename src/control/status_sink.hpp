@@ -12,7 +12,7 @@ struct StatusChange {
   CommandId id = 0;
   Status status = Status::none;
   Reason reason = Reason::none;
-  std::uint8_t aux = 0;  // of exclusive: the lane that has control
+  std::uint8_t detail = 0;  // of exclusive: the lane that has control
   Iteration iteration = 0;
 };
 

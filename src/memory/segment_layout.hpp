@@ -164,7 +164,7 @@ static_assert(sizeof(MessageSlot) == 256);
 
 struct StatusSlot {
   std::atomic<std::uint64_t> id;
-  std::atomic<std::uint64_t> word;  // iteration 48 bit, status 4, reason 4, aux 8
+  std::atomic<std::uint64_t> word;  // iteration 48 bit, status 4, reason 4, detail 8
 };
 static_assert(sizeof(StatusSlot) == 16);
 

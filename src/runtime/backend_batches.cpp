@@ -17,7 +17,7 @@ void UntypedBackend::Body::tell(const StatusChange& change) noexcept {
   LaneReceiver& lane = lanes[change.lane];
   lane.set_status(change.id,
                   {static_cast<std::uint8_t>(change.status),
-                   static_cast<std::uint8_t>(change.reason), change.aux, change.iteration});
+                   static_cast<std::uint8_t>(change.reason), change.detail, change.iteration});
   if (is_end(change.status)) lane.flag();
 }
 
@@ -235,8 +235,7 @@ void UntypedBackend::Body::take(const StagedBatch& sent) noexcept {
   taking_owner_ = sent.had_left ? 0 : sent.incarnation;
   // if the ticket counter was reset since the batch was staged, a purge with the old ticket would
   // end batches that are sent from now on
-  auto* record = reinterpret_cast<BatchRecord*>(pool.bytes(sent.batch));
-  record->ticket = lanes.drawn_at_most(sent.ticket);
+  pool.batch(sent.batch).ticket = lanes.drawn_at_most(sent.ticket);
   controller.take(sent.lane, sent.batch, *this);
 }
 
@@ -261,8 +260,8 @@ bool UntypedBackend::Body::is_of_dead(const StagedBatch& sent) noexcept {
 }
 
 bool UntypedBackend::Body::reject(const StagedBatch& sent, Reason reason,
-                                  std::uint32_t aux) noexcept {
-  controller.reject(sent.lane, sent.batch, reason, static_cast<std::uint8_t>(aux), current);
+                                  std::uint32_t detail) noexcept {
+  controller.reject(sent.lane, sent.batch, reason, static_cast<std::uint8_t>(detail), current);
   return false;
 }
 

@@ -113,7 +113,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   bool affords(const Effort& effort) const noexcept;
   void spend(const Effort& effort) noexcept;
   void take(const StagedBatch& sent) noexcept;
-  bool reject(const StagedBatch& sent, Reason reason, std::uint32_t aux = 0) noexcept;
+  bool reject(const StagedBatch& sent, Reason reason, std::uint32_t detail = 0) noexcept;
   void reject_all(Reason reason) noexcept;
   void grant(const StagedBatch& sent, const BatchRecord& batch) noexcept;
   bool is_called_off() const noexcept;

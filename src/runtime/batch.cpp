@@ -53,17 +53,17 @@ std::string limited_by(std::uint8_t packed) {
          (number == 0 ? "" : " (number " + std::to_string(number) + " of its state)");
 }
 
-std::string words_for(const Link& link, const Handle& handle, std::uint8_t aux) {
+std::string words_for(const Link& link, const Handle& handle, std::uint8_t detail) {
   switch (handle.reason) {
     case Reason::late:
       return "it came after the iteration for which it was sent";
     case Reason::exclusive:
-      return owner_of(link, aux) + " has exclusive control";
+      return owner_of(link, detail) + " has exclusive control";
     case Reason::invalid:
       return "the record was invalid: it was built by another version of o80, or the lane was "
              "corrupted";
     case Reason::limits:
-      return limited_by(aux);
+      return limited_by(detail);
     case Reason::fresh_start:
       return "the robot made a fresh start (reset, restore or resume)";
     case Reason::dead_frontend:
@@ -114,7 +114,7 @@ Handle Batch::ask(CommandId id) const {
   }
   const bool has_message = handle.reason == Reason::driver || handle.reason == Reason::halted;
   if (has_message) handle.text = lane_->message(id).value_or("");
-  if (handle.text.empty()) handle.text = words_for(*link_, handle, answer.word.aux);
+  if (handle.text.empty()) handle.text = words_for(*link_, handle, answer.word.detail);
   const std::scoped_lock lock(kept_->mutex);
   kept_->ended.emplace(id, handle);
   return handle;

@@ -29,7 +29,7 @@ inline constexpr std::size_t kStatuses = static_cast<std::size_t>(Status::halted
 enum class Reason : std::uint8_t {
   none,
   late,
-  exclusive,  // another lane has control, aux says which
+  exclusive,  // another lane has control, detail says which
   invalid,    // garbage in the lane
   limits,
   driver,  // the text is the driver's

@@ -191,7 +191,7 @@ TEST(Controller, ARejectedBatchEndsWithAllItsRecords) {
     ASSERT_EQ(rig.witness.of(id, 3).size(), 1U);
     EXPECT_EQ(rig.witness.last(id, 3).status, Status::rejected);
     EXPECT_EQ(rig.witness.last(id, 3).reason, Reason::exclusive);
-    EXPECT_EQ(rig.witness.last(id, 3).aux, 5);
+    EXPECT_EQ(rig.witness.last(id, 3).detail, 5);
     EXPECT_EQ(rig.witness.last(id, 3).iteration, 7);
   }
   EXPECT_EQ(rig.witness.freed_blocks[3], blocks);

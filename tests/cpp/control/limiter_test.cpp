@@ -147,7 +147,7 @@ TEST(Limiter, AStatusSaysWhichLimitItWas) {
   rig.step();
   const StatusChange told = rig.witness.last(batch + 2);
   EXPECT_EQ(told.status, Status::limited);
-  EXPECT_EQ(told.aux, (Limited{Limit::speed, 1}.packed()));
+  EXPECT_EQ(told.detail, (Limited{Limit::speed, 1}.packed()));
 }
 
 TEST(Limiter, TheFastestWayIsFollowedToTheTargetAndRests) {

@@ -76,8 +76,8 @@ TEST(RecordCheck, EveryFieldOutOfItsRangeIsRefused) {
   EXPECT_TRUE(
       refused(direct(), [](RecordHead& h, double*) { h.profile = static_cast<Profile>(2); }));
   EXPECT_TRUE(refused(direct(), [](RecordHead& h, double*) { h.start = static_cast<Start>(2); }));
-  EXPECT_TRUE(refused(direct(), [](RecordHead& h, double*) { h.partial = 1; }));
-  EXPECT_TRUE(refused(direct(), [](RecordHead& h, double*) { h.partial = 2; }));
+  EXPECT_TRUE(refused(direct(), [](RecordHead& h, double*) { h.masked = 1; }));
+  EXPECT_TRUE(refused(direct(), [](RecordHead& h, double*) { h.masked = 2; }));
   EXPECT_TRUE(refused(direct(), [](RecordHead& h, double*) { h.id = 77; }));
   for (int kind = 0; kind < 256; ++kind) {
     if (kind == static_cast<int>(RecordKind::command)) continue;

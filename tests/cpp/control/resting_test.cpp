@@ -138,9 +138,9 @@ TEST(Resting, KeepsTheLimitsOnTheWay) {
 TEST(Resting, AFieldThatACommandDoesNotNameGoesToRestWhileItRuns) {
   const std::vector<std::uint64_t> position_only = {1};
   RecordHead partial = over(100);
-  partial.partial = 1;
+  partial.masked = 1;
   RecordHead partial_direct = direct();
-  partial_direct.partial = 1;
+  partial_direct.masked = 1;
   for (const RecordHead& successor : {partial, partial_direct}) {
     for (const RecordHead& first : {over(3), direct()}) {
       for (const Mode mode : {Mode::queue, Mode::overwrite}) {
@@ -167,7 +167,7 @@ TEST(Resting, ADirectValueOfAnotherThatLeavesItOutEndsIt) {
   rig.run(3);
   EXPECT_TRUE(rig.controller.acts(0));
   RecordHead head = direct();
-  head.partial = 1;
+  head.masked = 1;
   rig.add_rows(0, head, 1, {3.0, 0.0}, {}, {1});
   rig.pulse(1);
   rig.run(2);

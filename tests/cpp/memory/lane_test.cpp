@@ -295,7 +295,7 @@ TEST_F(LaneTest, TakesWhatAnHeirSentWherePartOfALaneWasTakenBack) {
 TEST_F(LaneTest, AnswersWhatBecameOfAnId) {
   LaneSender sender(attached_);
   EXPECT_EQ(sender.status(1).known, Known::not_yet);
-  const StatusWord word{.status = 2, .reason = 15, .aux = 255, .iteration = 123'456'789'012};
+  const StatusWord word{.status = 2, .reason = 15, .detail = 255, .iteration = 123'456'789'012};
   lanes_[0].set_status(1, word);
   EXPECT_EQ(sender.status(1).known, Known::yes);
   EXPECT_EQ(sender.status(1).word, word);
