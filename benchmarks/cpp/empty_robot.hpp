@@ -58,7 +58,8 @@ class Running {
  public:
   /// `processor`: where its thread stays; -1: anywhere.
   explicit Running(const std::string& name, int processor = -1)
-      : loop_(std::make_unique<Robot>(*robot_table<D>("empty"), OptionValues{}), options(name)) {
+      : loop_(std::make_unique<DriverInstance>(*robot_table<D>("empty"), OptionValues{}),
+              options(name)) {
     loop_.start();
     thread_ = std::thread([this, processor] {
       if (processor >= 0) pin(processor);

@@ -23,7 +23,7 @@ void measure(int rounds) {
 
   // the same calls, frontend's and backend's one after the other in one thread
   const auto inline_robot = std::make_shared<InlineRobot>(
-      std::make_unique<Robot>(*robot_table<TwoEmpty>("empty"), OptionValues{}),
+      std::make_unique<DriverInstance>(*robot_table<TwoEmpty>("empty"), OptionValues{}),
       BackendOptions{.segment = name + "-inline", .bursting = true});
   UntypedFrontend inline_frontend(name + "-inline", inline_robot);
 

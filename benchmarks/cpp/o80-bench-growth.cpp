@@ -157,7 +157,7 @@ void history(std::int64_t rows) {
 void bursts(int rounds) {
   const std::string name = segment_name("growth-burst");
   const auto robot = std::make_shared<InlineRobot>(
-      std::make_unique<Robot>(*robot_table<TwoEmpty>("empty"), OptionValues{}),
+      std::make_unique<DriverInstance>(*robot_table<TwoEmpty>("empty"), OptionValues{}),
       BackendOptions{.segment = name, .bursting = true, .history = 1000});
   UntypedFrontend frontend(name, robot);
   const auto patience = std::chrono::seconds(20);

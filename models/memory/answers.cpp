@@ -34,14 +34,16 @@ struct Answers : rl::test_suite<Answers, 3> {
 
   void thread(unsigned index) {
     if (index == 0) return answer();
-    lane->wait_until([&] { return lane->ended() >= index; }, o80::Deadline({}));
+    const auto has_ended = [&] { return lane->status(index).known == o80::LaneSender::Known::yes; };
+    lane->wait_until(has_ended, o80::Deadline({}));
   }
 
   void answer() {
     o80::LaneReceivers lanes(segment.view, 0);
     for (std::uint64_t id = 1; id <= kBatches; ++id) {
-      lanes[0].set_ended(id);
-      lanes.flush_events();
+      lanes[0].set_status(id, {.status = 3});
+      lanes[0].flag();
+      o80::wake_sleepers(segment.view, {.lanes = lanes.announce()});
     }
   }
 };

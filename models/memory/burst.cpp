@@ -68,7 +68,7 @@ struct Bursts : rl::test_suite<Bursts, 4> {
       const bool news = lanes.look();
       const std::optional<std::uint32_t> lane = news ? lanes.next() : std::nullopt;
       if (!lane) {
-        lanes.flush_events();
+        o80::wake_sleepers(segment.view, {.lanes = lanes.announce()});
         bell.wait(lanes.bell_seen());
         continue;
       }
@@ -78,8 +78,7 @@ struct Bursts : rl::test_suite<Bursts, 4> {
       history.publish(row, reinterpret_cast<const std::byte*>(&word));
       lanes[*lane].set_burst_done(id, row);
       lanes[*lane].free(1);
-      lanes.flush_events();
-      signal.wake_readers(row);
+      o80::wake_sleepers(segment.view, {.lanes = lanes.announce(), .rows = signal.announce(row)});
       lanes.look_again();
       ++row;
     }

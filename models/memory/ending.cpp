@@ -39,7 +39,10 @@ struct Ending : rl::test_suite<Ending, 3> {
       o80::LaneSender lane(attached);
       for (std::uint64_t id = 1; id < 3; ++id)
         model::check(told([&] {
-                       lane.wait_until([&] { return lane.ended() >= id; }, o80::Deadline({}));
+                       const auto has_ended = [&] {
+                         return lane.status(id).known == o80::LaneSender::Known::yes;
+                       };
+                       lane.wait_until(has_ended, o80::Deadline({}));
                      }) == (id == 2),
                      "the end came instead of an answer");
     }
@@ -61,10 +64,10 @@ struct Ending : rl::test_suite<Ending, 3> {
     o80::RowSignal signal(segment.view);
     const std::uint64_t row = 0;
     writer.publish(0, reinterpret_cast<const std::byte*>(&row));
-    lanes[0].set_ended(1);
-    lanes.flush_events();
-    signal.wake_readers(0);
-    o80::end_segment(segment.view, o80::State::stopped);
+    lanes[0].set_status(1, {.status = 3});
+    lanes[0].flag();
+    o80::wake_sleepers(segment.view, {.lanes = lanes.announce(), .rows = signal.announce(0)});
+    o80::end_segment(segment.view, o80::BackendState::stopped);
   }
 };
 

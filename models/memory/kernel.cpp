@@ -66,6 +66,13 @@ void futex_wake(const rl::atomic<std::uint32_t>& word, int count) noexcept {
   futex.wake(context, static_cast<rl::thread_id_t>(std::min(count, 64)), RL_INFO);
 }
 
+/// FUTEX_WAKE_OP: both in one system call.
+void futex_wake_both(const rl::atomic<std::uint32_t>& first, int count,
+                     const rl::atomic<std::uint32_t>& second) noexcept {
+  futex_wake(first, count);
+  futex_wake(second, kEverybody);
+}
+
 bool is_byte_locked(int, std::uint64_t) noexcept { return true; }
 
 LockFile LockFile::open(const std::string&, int, mode_t) {
@@ -124,7 +131,7 @@ AttachedSegment::AttachedSegment(AttachedSegment&& other) noexcept
     : access_(other.access_), view_(other.view_) {}
 bool AttachedSegment::has_ended() const noexcept {
   const auto state = static_cast<State>(view_.counters().state.load(rl::mo_acquire, RL_INFO));
-  return state != State::starting && state != State::running;
+  return state != BackendState::starting && state != BackendState::running;
 }
 bool AttachedSegment::gone() const noexcept { return has_ended(); }
 void AttachedSegment::throw_if_gone() const {

@@ -65,7 +65,7 @@ class Segment {
     current() = this;
     make(view.counters().begun, -1);
     make(view.counters().published, -1);
-    make(view.counters().state, static_cast<std::uint32_t>(o80::State::running));
+    make(view.counters().state, static_cast<std::uint32_t>(o80::BackendState::running));
     make(view.wakes().row_wake);
     make(view.wakes().lane_wake);
     make(view.wakes().sleeping);

@@ -65,7 +65,7 @@ struct Lanes : rl::test_suite<Lanes, 3> {
         taken.push_back(model::take(lanes[*lane]));
         lanes[*lane].free(static_cast<std::uint32_t>(lanes[*lane].in_flight() - before));
       }
-      lanes.flush_events();
+      o80::wake_sleepers(segment.view, {.lanes = lanes.announce()});
       if (taken.size() < 5) bell.wait(lanes.bell_seen());
     }
     const auto place = [&](std::uint64_t number) {

@@ -20,7 +20,7 @@
 //   - bell.wanted.store(kNoWish, std::memory_order_seq_cst);  // sync wanted
 //   +
 //   - O80_CRASH_POINT("rows.after_wake");
-//   + view_.bell().wanted.store(kNoWish, std::memory_order_seq_cst);
+//   + if (sleepers.rows) view.bell().wanted.store(kNoWish, std::memory_order_seq_cst);
 // mutant sleeps_on_a_later_value: src/memory/signal.cpp
 //   - futex_wait(wake, seen, at_most)
 //   + futex_wait(wake, wake.load(std::memory_order_seq_cst), at_most)
@@ -49,7 +49,7 @@ struct Rows : rl::test_suite<Rows, 4> {
     const std::uint64_t row = 0;
     for (o80::Iteration k = 0; k < kRows; ++k) {
       writer.publish(k, reinterpret_cast<const std::byte*>(&row));
-      signal.wake_readers(k);
+      o80::wake_sleepers(segment.view, {.rows = signal.announce(k)});
     }
   }
 };

@@ -82,7 +82,7 @@ struct Successors : rl::test_suite<Successors, 3> {
                      "the batch of a dead owner passes for its successor's");
         lanes[0].free(2);
       }
-      lanes.flush_events();
+      o80::wake_sleepers(segment.view, {.lanes = lanes.announce()});
       if (over) break;
       bell.wait(seen);
     }

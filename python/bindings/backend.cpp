@@ -117,7 +117,7 @@ class Backend final : public o80::RequestServer {
   /// `step` returns.
   void end(bool failed, const std::string& text) {
     if (!backend_ || guard_.forked()) return;
-    last_words_ = {failed ? o80::State::failed : o80::State::stopped, text};
+    last_words_ = {failed ? o80::BackendState::failed : o80::BackendState::stopped, text};
     const std::shared_ptr<o80::UntypedBackend> ended = std::move(backend_);
     if (!stepping_) return finish(*ended);
     ended->ask_to_stop();
@@ -272,7 +272,7 @@ class Backend final : public o80::RequestServer {
   bool begun_ = false;
   std::atomic<bool> stepping_{false};
   std::thread::id stepping_thread_;
-  std::pair<o80::State, std::string> last_words_;
+  std::pair<o80::BackendState, std::string> last_words_;
 };
 
 PyType_Slot backend_slots[] = {{Py_tp_traverse, reinterpret_cast<void*>(&Backend::traverse)},

@@ -7,10 +7,10 @@
 #include <optional>
 
 #include "bindings.hpp"
+#include "enums.hpp"
 #include "o80/base/error.hpp"
 #include "pickling.hpp"
 #include "waiting.hpp"
-#include "words.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;

@@ -13,9 +13,9 @@
 #include "buffer.hpp"
 #include "control/batch_builder.hpp"
 #include "control/limits.hpp"
+#include "enums.hpp"
 #include "frontend.hpp"
 #include "waiting.hpp"
-#include "words.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;

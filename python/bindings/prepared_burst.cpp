@@ -8,10 +8,10 @@
 #include "arguments.hpp"
 #include "bindings.hpp"
 #include "buffer.hpp"
+#include "enums.hpp"
 #include "frontend.hpp"
 #include "pickling.hpp"
 #include "waiting.hpp"
-#include "words.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;

@@ -44,9 +44,9 @@ Attachment start_inline(const o80::RobotLibrary& library, const std::string& seg
   const Waiting waiting;
   o80::BackendOptions backend = loop_options_of(loop).backend;
   backend.segment = segment;
-  auto robot =
-      std::make_shared<o80::InlineRobot>(std::make_unique<o80::Robot>(*library.table, options),
-                                         std::move(backend), Waiting::keep_waiting);
+  auto robot = std::make_shared<o80::InlineRobot>(
+      std::make_unique<o80::DriverInstance>(*library.table, options), std::move(backend),
+      Waiting::keep_waiting);
   return {std::make_shared<o80::UntypedFrontend>(robot->segment(), robot), robot};
 }
 

@@ -7,6 +7,7 @@
 #include <type_traits>
 
 #include "control/record.hpp"
+#include "describe/visit_number.hpp"
 #include "o80/base/error.hpp"
 
 namespace nb = nanobind;
@@ -58,7 +59,8 @@ void write_integer(nb::handle value, std::byte* to, const std::string& what) {
   store(to, number);
 }
 
-void write_float(Kind kind, nb::handle value, std::byte* to, const std::string& what) {
+template <class T>
+void write_float(nb::handle value, std::byte* to, const std::string& what) {
   double number = 0;
   if (PyFloat_CheckExact(value.ptr())) {
     number = PyFloat_AS_DOUBLE(value.ptr());
@@ -66,11 +68,7 @@ void write_float(Kind kind, nb::handle value, std::byte* to, const std::string& 
     number = PyFloat_AsDouble(value.ptr());
     if (number == -1.0 && PyErr_Occurred() != nullptr) refuse(what, "a number", value);
   }
-  if (kind == Kind::float64) {
-    store(to, number);
-  } else {
-    store(to, static_cast<float>(number));
-  }
+  store(to, static_cast<T>(number));
 }
 
 void write_boolean(nb::handle value, std::byte* to, const std::string& what) {
@@ -292,32 +290,23 @@ const FieldRow* plain_number(const Schema& schema, std::uint32_t type) {
 void write_number(const Schema& schema, const FieldRow& field, nb::handle value, std::byte* to,
                   const std::string& what) {
   switch (field.kind) {
-    case Kind::float32:
-    case Kind::float64:
-      return write_float(field.kind, value, to, what);
     case Kind::boolean:
       return write_boolean(value, to, what);
-    case Kind::int8:
-      return write_integer<std::int8_t>(value, to, what);
-    case Kind::int16:
-      return write_integer<std::int16_t>(value, to, what);
-    case Kind::int32:
-      return write_integer<std::int32_t>(value, to, what);
-    case Kind::int64:
-      return write_integer<std::int64_t>(value, to, what);
-    case Kind::uint8:
-      return write_integer<std::uint8_t>(value, to, what);
-    case Kind::uint16:
-      return write_integer<std::uint16_t>(value, to, what);
-    case Kind::uint32:
-      return write_integer<std::uint32_t>(value, to, what);
-    case Kind::uint64:
-      return write_integer<std::uint64_t>(value, to, what);
     case Kind::enumeration:
       return write_label(schema, field, value, to, what);
-    default:
+    case Kind::structure:
       throw InvalidArgument(what + " cannot be set from Python");
+    default:
+      break;
   }
+  o80::visit_number(field.kind, [&](auto zero) {
+    using Number = decltype(zero);
+    if constexpr (std::is_floating_point_v<Number>) {
+      write_float<Number>(value, to, what);
+    } else {
+      write_integer<Number>(value, to, what);
+    }
+  });
 }
 
 StateBytes::StateBytes(const Schema& schema, std::uint32_t type, nb::handle value,

@@ -199,9 +199,9 @@ Life AttachedSegment::life() const noexcept {
 }
 
 bool AttachedSegment::has_ended() const noexcept {
-  const auto state =
-      static_cast<State>(view_.counters().state.load(std::memory_order_acquire));  // sync state
-  return state != State::starting && state != State::running;
+  const auto state = static_cast<BackendState>(
+      view_.counters().state.load(std::memory_order_acquire));  // sync state
+  return state != BackendState::starting && state != BackendState::running;
 }
 
 bool AttachedSegment::gone() const noexcept { return is_over(life()); }

@@ -4,7 +4,6 @@
 
 #include "base/crash_point.hpp"
 #include "memory/atomic_words.hpp"
-#include "memory/futex.hpp"
 
 namespace o80 {
 
@@ -101,17 +100,11 @@ void LaneReceiver::set_message(std::uint64_t id, std::string_view text) noexcept
   slot.id.store(id, std::memory_order_release);  // sync message
 }
 
-void LaneReceiver::set_staged(std::uint64_t id, std::uint64_t ids_end) noexcept {
+void LaneReceiver::note_ids(std::uint64_t ids_end) noexcept {
   ids_ = std::max(ids_, ids_end);
-  feedback_->ids.store(ids_, std::memory_order_relaxed);
   O80_CRASH_POINT("staged.before");
-  feedback_->staged.store(id, std::memory_order_release);  // sync staged
+  feedback_->ids.store(ids_, std::memory_order_relaxed);
   O80_CRASH_POINT("staged.after");
-}
-
-void LaneReceiver::set_ended(std::uint64_t id) noexcept {
-  feedback_->ended.store(id, std::memory_order_release);  // sync ended
-  flag();
 }
 
 namespace {
@@ -246,10 +239,6 @@ bool LaneReceivers::announce() noexcept {
   // after the events: who read the old value before it raised its flag does not sleep on it
   if (sleepers) view_.wakes().lane_wake.fetch_add(1, std::memory_order_seq_cst);  // sync lane_wake
   return sleepers;
-}
-
-void LaneReceivers::flush_events() noexcept {
-  if (announce()) futex_wake(view_.wakes().lane_wake, kEverybody);
 }
 
 }  // namespace o80

@@ -59,10 +59,9 @@ class LaneReceiver {
   /// Whether a batch may have this id: ids grow, by limited steps. An owner that could choose any
   /// id could make the statuses of later owners unreadable.
   bool expects(std::uint64_t id) const noexcept { return id - ids_ <= kMostSkippedIds; }
-  /// Its ids end before `ids_end`.
-  void set_staged(std::uint64_t id, std::uint64_t ids_end) noexcept;
-  /// Both flag.
-  void set_ended(std::uint64_t id) noexcept;
+  /// A batch was staged whose ids end before `ids_end`; for the next owner, should this one die.
+  void note_ids(std::uint64_t ids_end) noexcept;
+  /// Flags.
   void set_burst_done(std::uint64_t id, Iteration row, BurstEnd end = BurstEnd::done) noexcept;
   /// Its sender wants the burst of the batch `id` to end. Of many cancelled at once only the newest
   /// are known.
@@ -160,8 +159,6 @@ class LaneReceivers {
   std::uint32_t bell_seen() const noexcept { return bell_seen_; }
   /// flush() on every lane; true if those who sleep on `lane_wake` are to be woken.
   bool announce() noexcept;
-  /// The same, and wakes them: one system call at most.
-  void flush_events() noexcept;
 
  private:
   /// 0 stands for one that nobody drew.

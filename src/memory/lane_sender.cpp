@@ -118,6 +118,20 @@ void LaneSender::give_back() noexcept {
   lock_.close();
 }
 
+LaneFull lane_full(std::string_view segment, std::uint64_t needed, std::uint32_t free,
+                   std::uint32_t most) {
+  const std::string takes = "the batch takes " + std::to_string(needed) + " blocks of 64 bytes, ";
+  const std::string lane = " lane of '" + std::string(segment) + "'";
+  if (needed > most) {
+    return LaneFull(takes + "a" + lane + " has " + std::to_string(most) +
+                    ": send it in parts, or start the backend with larger lanes (lane_blocks)");
+  }
+  return LaneFull(takes + std::to_string(free) + " of " + std::to_string(most) +
+                  " are free in the" + lane +
+                  ". Nothing was sent, all stays added: pulse again when earlier commands have "
+                  "ended, purge, or start the backend with larger lanes (lane_blocks)");
+}
+
 std::uint32_t LaneSender::free_blocks() const noexcept {
   const std::uint64_t in_flight =
       sent_ - feedback_->freed.load(std::memory_order_acquire);  // sync freed
@@ -143,12 +157,7 @@ std::uint64_t LaneSender::send(std::span<const std::byte> batch, std::size_t tic
         "the first");
   const std::uint64_t count = batch.size() / kBlockSize;
   const std::uint32_t free = free_blocks();
-  if (count > free)
-    throw LaneFull("segment '" + segment_->name() + "': the batch takes " + std::to_string(count) +
-                   " blocks, " + std::to_string(free) + " of the lane's " +
-                   std::to_string(blocks()) +
-                   " are free. Nothing was sent: wait until earlier commands have ended, purge, "
-                   "or send less at once.");
+  if (count > free) throw lane_full(segment_->name(), count, free, blocks());
 
   // batch => transport, in two runs at most
   const std::uint64_t begin = sent_ & (blocks() - 1);
@@ -240,14 +249,6 @@ LaneSender::BurstAnswer LaneSender::burst(std::uint64_t id) const noexcept {
   const std::uint64_t oldest = feedback_->recent_bursts[done % kBurstsKept].id.load(
       std::memory_order_acquire);  // sync burst
   return {oldest > id ? Known::forgotten : Known::not_yet, -1};
-}
-
-std::uint64_t LaneSender::staged() const noexcept {
-  return feedback_->staged.load(std::memory_order_acquire);  // sync staged
-}
-
-std::uint64_t LaneSender::ended() const noexcept {
-  return feedback_->ended.load(std::memory_order_acquire);  // sync ended
 }
 
 void LaneSender::sleep(std::uint32_t seen, std::int64_t at_most) {

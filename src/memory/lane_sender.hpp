@@ -6,15 +6,21 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "memory/attached_segment.hpp"
 #include "memory/signal.hpp"
 #include "memory/status_word.hpp"
+#include "o80/base/error.hpp"
 
 namespace o80 {
 
 inline constexpr std::int64_t kShortestSlice = 100'000;  // of a wait that shows life [ns]
+
+/// The error for a batch of `needed` blocks when only `free` of `most` may be used.
+LaneFull lane_full(std::string_view segment, std::uint64_t needed, std::uint32_t free,
+                   std::uint32_t most);
 
 /// Move-only: a lane taken by a frontend; given back by the destructor, or by the kernel.
 ///
@@ -74,9 +80,6 @@ class LaneSender {
   std::optional<std::string> message(std::uint64_t id) const;
   /// Whether the burst of the batch `id` is done.
   BurstAnswer burst(std::uint64_t id) const noexcept;
-  /// The last batch staged whole; the last batch ended.
-  std::uint64_t staged() const noexcept;
-  std::uint64_t ended() const noexcept;
 
   /// Tells the backend's watchdog that this frontend lives.
   void show_life() noexcept {

@@ -141,8 +141,9 @@ OwnedSegment::~OwnedSegment() { release(); }
 
 void OwnedSegment::release() noexcept {
   if (lock_.is_open() && !guard_.forked()) {
-    if (state() == State::starting || state() == State::running) end(State::stopped);
-    if (state() != State::failed) remove();
+    if (state() == BackendState::starting || state() == BackendState::running)
+      end(BackendState::stopped);
+    if (state() != BackendState::failed) remove();
   }
   mapping_ = Mapping();
   commands_mapping_ = Mapping();
@@ -151,18 +152,18 @@ void OwnedSegment::release() noexcept {
   commands_lock_.close();
 }
 
-State OwnedSegment::state() const noexcept {
-  return static_cast<State>(view_.counters().state.load(std::memory_order_relaxed));
+BackendState OwnedSegment::state() const noexcept {
+  return static_cast<BackendState>(view_.counters().state.load(std::memory_order_relaxed));
 }
 
-void OwnedSegment::set_state(State state) noexcept {
+void OwnedSegment::set_state(BackendState state) noexcept {
   O80_CRASH_POINT("segment.before_state");
   view_.counters().state.store(static_cast<std::uint32_t>(state),
                                std::memory_order_release);  // sync state
   O80_CRASH_POINT("segment.after_state");
 }
 
-void OwnedSegment::end(State stopped_or_failed, std::string_view text) noexcept {
+void OwnedSegment::end(BackendState stopped_or_failed, std::string_view text) noexcept {
   store_text(view_.counters().fault, std::size(view_.counters().fault), text);
   end_segment(view_, stopped_or_failed);
 }

@@ -55,11 +55,11 @@ class OwnedSegment {
   const SegmentView& view() const noexcept { return view_; }
   /// A descriptor of the commanders' file that bears no locks.
   int commands_descriptor() const noexcept { return query_.descriptor(); }
-  State state() const noexcept;
+  BackendState state() const noexcept;
   /// starting => running.
-  void set_state(State state) noexcept;
+  void set_state(BackendState state) noexcept;
   /// Says why and wakes everybody who waits for a row or on a lane.
-  void end(State stopped_or_failed, std::string_view text = {}) noexcept;
+  void end(BackendState stopped_or_failed, std::string_view text = {}) noexcept;
   /// Unlinks both files; the segment file only if the name still leads to it.
   void remove() noexcept;
   /// Throws UsedAfterFork.

@@ -44,13 +44,14 @@ Mapping map(const LockFile& file, std::uint64_t bytes) {
   return {file.descriptor(), bytes, Mapping::Protection::read_write, Mapping::Faults::later};
 }
 
-State state_of(const SegmentView& view) {
-  return static_cast<State>(view.counters().state.load(std::memory_order_acquire));  // sync state
+BackendState state_of(const SegmentView& view) {
+  return static_cast<BackendState>(
+      view.counters().state.load(std::memory_order_acquire));  // sync state
 }
 
 /// The view's backend is dead, and the view is marked as superseded. `state` is what stood there
 /// before; another starter may have marked it before it died too.
-Predecessor judge_predecessor(const SegmentView& view, State state) {
+Predecessor judge_predecessor(const SegmentView& view, BackendState state) {
   const Counters& counters = view.counters();
   Predecessor predecessor;
   predecessor.was_halted = counters.halted.load(std::memory_order_acquire) != 0;  // sync halted
@@ -60,7 +61,7 @@ Predecessor judge_predecessor(const SegmentView& view, State state) {
         view.bell().halts.fetch_add(0, std::memory_order_seq_cst) !=  // sync halts
         counters.cleared.load(std::memory_order_acquire);             // sync cleared
   predecessor.died_acting = counters.acts.load(std::memory_order_relaxed) != 0 &&
-                            state != State::stopped && state != State::failed;
+                            state != BackendState::stopped && state != BackendState::failed;
   return predecessor;
 }
 
@@ -85,8 +86,8 @@ Predecessor supersede(const NamedSegment& former) {
     commands_mapping = map(commands, view.offsets.commands_bytes);
     view.commands = commands_mapping.data();
   }
-  const State state = state_of(view);
-  end_segment(view, State::superseded);
+  const BackendState state = state_of(view);
+  end_segment(view, BackendState::superseded);
   return judge_predecessor(view, state);
 }
 

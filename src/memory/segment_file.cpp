@@ -112,22 +112,22 @@ const char* name_of(Life life) noexcept {
 Life judge_life(int descriptor, const std::atomic<std::uint32_t>& state) noexcept {
   // the lock first: an end in order is said before the lock falls
   const bool held = is_byte_locked(descriptor, kBackendByte);
-  switch (static_cast<State>(state.load(std::memory_order_acquire))) {  // sync state
-    case State::stopped:
+  switch (static_cast<BackendState>(state.load(std::memory_order_acquire))) {  // sync state
+    case BackendState::stopped:
       return Life::stopped;
-    case State::failed:
+    case BackendState::failed:
       return Life::failed;
-    case State::superseded:
+    case BackendState::superseded:
       return Life::superseded;
-    case State::starting:
+    case BackendState::starting:
       return held ? Life::starting : Life::killed;
-    case State::running:
+    case BackendState::running:
       break;
   }
   return held ? Life::running : Life::killed;
 }
 
-void end_segment(const SegmentView& view, State state) noexcept {
+void end_segment(const SegmentView& view, BackendState state) noexcept {
   Counters& counters = view.counters();
   O80_CRASH_POINT("segment.before_end");
   counters.state.store(static_cast<std::uint32_t>(state), std::memory_order_seq_cst);  // sync state

@@ -41,7 +41,7 @@ mode_t commanders_mode(mode_t permission) noexcept;
 Life judge_life(int descriptor, const std::atomic<std::uint32_t>& state) noexcept;
 
 /// Sets the state and wakes all who wait, if the view has the commanders' file.
-void end_segment(const SegmentView& view, State state) noexcept;
+void end_segment(const SegmentView& view, BackendState state) noexcept;
 
 /// "pid 4711, started 14:02 by ada".
 std::string describe_owner(const SegmentHeader& header);

@@ -171,14 +171,12 @@ static_assert(sizeof(StatusSlot) == 16);
 /// What the backend says to a lane; its statuses begin on the next page after it.
 struct LaneFeedback {
   // one line, so that whoever spins on it gets all of it in one transfer
-  alignas(kLineBytes) std::atomic<std::uint64_t> freed;   // blocks, ever
-  std::atomic<std::uint64_t> ended;                       // last batch whose commands have ended
-  BurstSlot burst;                                        // the newest
-  std::atomic<std::uint64_t> bursts;                      // done, ever
-  std::atomic<std::uint32_t> events;                      // changes at each flush
-  alignas(kLineBytes) std::atomic<std::uint64_t> staged;  // last batch staged whole
-  std::atomic<std::uint64_t> ids;                         // all below belong to batches taken
-  std::atomic<std::uint64_t> incarnation;                 // the last owner that the backend met
+  alignas(kLineBytes) std::atomic<std::uint64_t> freed;  // blocks, ever
+  BurstSlot burst;                                       // the newest
+  std::atomic<std::uint64_t> bursts;                     // done, ever
+  std::atomic<std::uint32_t> events;                     // changes at each flush
+  alignas(kLineBytes) std::atomic<std::uint64_t> ids;    // all below belong to batches taken
+  std::atomic<std::uint64_t> incarnation;                // the last owner that the backend met
   alignas(kLineBytes) BurstSlot recent_bursts[kBurstsKept];
   MessageSlot messages[kMessages];
 };

@@ -100,9 +100,16 @@ bool RowSignal::announce(Iteration k) noexcept {
   return true;
 }
 
-void RowSignal::wake_readers(Iteration k) noexcept {
-  if (!announce(k)) return;
-  futex_wake(view_.wakes().row_wake, 1);
+void wake_sleepers(const SegmentView& view, Sleepers sleepers) noexcept {
+  if (!sleepers.lanes && !sleepers.rows) return;
+  Wakes& wakes = view.wakes();
+  if (sleepers.lanes && sleepers.rows) {
+    futex_wake_both(wakes.row_wake, 1, wakes.lane_wake);
+  } else if (sleepers.lanes) {
+    futex_wake(wakes.lane_wake, kEverybody);
+  } else {
+    futex_wake(wakes.row_wake, 1);
+  }
   O80_CRASH_POINT("rows.after_wake");
 }
 

@@ -38,18 +38,16 @@ class RowWaiter {
   Spinner spinner_;
 };
 
-/// Wakes those who wait for rows.
+/// Knows who waits for rows; `wake_sleepers` wakes them.
 ///
 /// Writer:   the backend's thread, after HistoryWriter::publish.
 /// Readers:  RowWaiter.
-/// Realtime: one load when nobody waits, else one system call.
+/// Realtime: yes; one load when nobody waits.
 class RowSignal {
  public:
   explicit RowSignal(const SegmentView& view) noexcept : view_(view) {}
   /// True if one of those who sleep on `row_wake` is to be woken.
   bool announce(Iteration k) noexcept;
-  /// The same, and wakes it.
-  void wake_readers(Iteration k) noexcept;
 
  private:
   SegmentView view_;
@@ -73,6 +71,17 @@ class BellWaiter {
   SegmentView view_;
   Spinner spinner_;
 };
+
+/// Which of those who sleep are to be woken.
+struct Sleepers {
+  bool lanes = false;  // what LaneReceivers::announce said: all that wait with a lane
+  bool rows = false;   // what RowSignal::announce said: one that waits for a row
+};
+
+/// Wakes them with one system call at most.
+///
+/// Realtime: yes.
+void wake_sleepers(const SegmentView& view, Sleepers sleepers) noexcept;
 
 /// Rings the bell; a system call only if the backend sleeps.
 void ring_bell(const SegmentView& view) noexcept;

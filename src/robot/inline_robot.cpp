@@ -52,7 +52,7 @@ class InlineRobot::Turn {
   InlineRobot& robot_;
 };
 
-InlineRobot::InlineRobot(std::unique_ptr<Robot> robot, BackendOptions options,
+InlineRobot::InlineRobot(std::unique_ptr<DriverInstance> robot, BackendOptions options,
                          KeepWaiting keep_waiting)
     : keep_waiting_(std::move(keep_waiting)),
       at_once_(keep_waiting_ ? 1 : kMostAtOnce),

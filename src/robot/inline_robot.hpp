@@ -19,7 +19,8 @@ class InlineRobot final : public InlineRunner {
  public:
   /// Starts the robot. `keep_waiting` is called about every 50 ms of a burst; if it returns false
   /// or throws, the rest of the burst is cancelled. Throws as Loop.
-  InlineRobot(std::unique_ptr<Robot> robot, BackendOptions options, KeepWaiting keep_waiting = {});
+  InlineRobot(std::unique_ptr<DriverInstance> robot, BackendOptions options,
+              KeepWaiting keep_waiting = {});
 
   /// Runs granted iterations; threads take turns. Throws DriverError, and Closed after `stop`.
   void run() override;

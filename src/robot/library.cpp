@@ -8,7 +8,7 @@
 #include <sstream>
 
 #include "o80/base/error.hpp"
-#include "robot/robot.hpp"
+#include "robot/driver_instance.hpp"
 #include "robot/trusted_library.hpp"
 
 namespace o80 {

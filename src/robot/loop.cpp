@@ -15,7 +15,7 @@ namespace {
 constexpr std::int64_t kLongestBraking = 1'000'000'000;  // [ns]
 }
 
-Loop::Loop(std::unique_ptr<Robot> robot, const BackendOptions& options)
+Loop::Loop(std::unique_ptr<DriverInstance> robot, const BackendOptions& options)
     : robot_(std::move(robot)),
       backend_(robot_->describe(options.period), options, this),
       pacer_(backend_.schema().head.period),
@@ -30,7 +30,7 @@ Loop::~Loop() {
     static_cast<void>(stop());
   } else {
     // in a forked child the robot and its hardware belong to the parent
-    [[maybe_unused]] Robot* of_the_parent = robot_.release();
+    [[maybe_unused]] DriverInstance* of_the_parent = robot_.release();
   }
 }
 
@@ -153,7 +153,7 @@ void Loop::note_requests(const ReadingView& view) noexcept {
   for (std::uint32_t i = 0; i < reports_.size(); ++i) {
     const RequestReport& report = view.requests[i];
     if (report.changed == 0) continue;
-    const Served how = Robot::served(report);
+    const Served how = DriverInstance::served(report);
     backend_.end_request(i, how);
     if (how.kind == Served::Kind::failed) {
       failed(backend_.schema().requests[i].name.chars.data(), how.why());
@@ -230,7 +230,7 @@ Ended Loop::stop() noexcept {
       return true;
     });
     if (fault_.empty()) fault_ = backend_.failure();
-    backend_.end(fault_.empty() ? State::stopped : State::failed, fault_);
+    backend_.end(fault_.empty() ? BackendState::stopped : BackendState::failed, fault_);
   }
   return {fault_.empty(), fault_};
 }

@@ -6,8 +6,8 @@
 
 #include "memory/fork.hpp"
 #include "o80/runtime/backend.hpp"
+#include "robot/driver_instance.hpp"
 #include "robot/pacer.hpp"
-#include "robot/robot.hpp"
 
 namespace o80 {
 
@@ -26,7 +26,7 @@ class Loop final : public RequestServer {
  public:
   /// Describes the robot, takes the segment's name, publishes the segment as starting.
   /// Throws SegmentTaken, SegmentError, InvalidArgument, DriverError.
-  Loop(std::unique_ptr<Robot> robot, const BackendOptions& options);
+  Loop(std::unique_ptr<DriverInstance> robot, const BackendOptions& options);
   Loop(const Loop&) = delete;
   Loop& operator=(const Loop&) = delete;
   ~Loop();
@@ -77,7 +77,7 @@ class Loop final : public RequestServer {
   bool failed(const char* verb, std::string_view why) noexcept;
   bool failed_to_wait() noexcept;
 
-  std::unique_ptr<Robot> robot_;
+  std::unique_ptr<DriverInstance> robot_;
   ForkGuard guard_;
   UntypedBackend backend_;
   Pacer pacer_;

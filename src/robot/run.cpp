@@ -120,7 +120,7 @@ void leave_fault(const BackendOptions& options, const char* why) noexcept {
     least.lanes = 1;
     least.lane_blocks = 16;
     UntypedBackend backend(Schema(), least);
-    backend.end(State::failed, why);
+    backend.end(BackendState::failed, why);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "o80: who waits to attach cannot be told: %s\n", error.what());
   }
@@ -129,7 +129,8 @@ void leave_fault(const BackendOptions& options, const char* why) noexcept {
 std::unique_ptr<Loop> make_loop(const RobotTable& table, const RunOptions& options) {
   OwnedSegment::refuse_if_taken(options.backend.segment);
   try {
-    return std::make_unique<Loop>(std::make_unique<Robot>(table, options.robot), options.backend);
+    return std::make_unique<Loop>(std::make_unique<DriverInstance>(table, options.robot),
+                                  options.backend);
   } catch (const SegmentTaken&) {
     throw;
   } catch (const std::exception& error) {

@@ -2,8 +2,8 @@
 
 #include <string>
 
+#include "robot/driver_instance.hpp"
 #include "robot/loop_options.hpp"
-#include "robot/robot.hpp"
 
 namespace o80 {
 

@@ -121,17 +121,17 @@ UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, Reques
       verbs(segment.view()),
       server_(server),
       lives_(lanes.size()),
-      mourned_(lanes.size()),
+      handled_deaths_(lanes.size()),
       row_(layout.size / 8),
       payload_(largest_request(schema), std::byte{0}),
       fresh_desired_(layout.block / 8),
       stale_(options.stale),
       silence_(options.silence),
       last_life_(lanes.size()),
+      // ends of commands in one step: completed and late ones, and those of their batches
+      outbox_(lanes, 2 * (schema.actuators.size() + 2 * Controller::kStatusesPerIteration)),
       errors_(schema),
       overruns_(options.max_overruns) {
-  // ends of commands in one step: completed and late ones, and those of their batches
-  untold_.reserve(2 * (schema.actuators.size() + 2 * Controller::kStatusesPerIteration));
   express_lanes_.reserve(lanes.size());
   for (std::uint32_t i = 0; i < lanes.size(); ++i) lives_[i] = liveness.lane(i);
 }
@@ -144,27 +144,27 @@ Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
       at_most > 0 && at_most < kForEver ? monotonic_now() + at_most : at_most;
   const std::uint32_t most_looks = 2 + pool.size() / kWorkPerIteration;
   std::uint32_t looks = 0;
-  const bool stands = schema.head.bursting != 0 && !granted();
+  const bool stands = schema.head.bursting != 0 && !burst_.runs();
   while (true) {
     look_at_lives();
     watch_halt();
     start_afresh_after_request();
     if (stop.load(std::memory_order_relaxed)) return Step::ended;
     share_ = {};
-    if (!granted()) {
+    if (!burst_.runs()) {
       take_due();
       take_batches();
     }
     if (stop.load(std::memory_order_relaxed)) return Step::ended;
-    if (schema.head.bursting == 0 || granted()) {
+    if (schema.head.bursting == 0 || burst_.runs()) {
       // a pulse that came in this step is a sign of life; a halt may end the burst
       watch_silence();
       watch_halt();
-      if (schema.head.bursting == 0 || granted()) break;
+      if (schema.head.bursting == 0 || burst_.runs()) break;
     }
     // before waiting, report all pending statuses
     const bool all_told = controller.finish_pending();
-    wake(lanes.announce(), false);
+    wake_sleepers(segment.view(), {.lanes = lanes.announce()});
     if (staging.busy() || !all_told) continue;
     // invalid blocks may have used up the budget of this scan: scan again, a limited number of
     // times
@@ -179,15 +179,15 @@ Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
   // a burst does not depend on how long the backend has waited before.
   while (stands && !controller.finish_pending()) {
   }
-  if (granted()) {
+  if (burst_.runs()) {
     share_ = {};
     take_due();
   }
   under_way_ = true;
-  stepping_ = true;
-  if (burst_left_ == 1) history.expect(current);
+  outbox_.begin_step();
+  if (burst_.is_in_last_iteration()) history.expect(current);
   controller.step(current, row() + layout.observed);
-  stepping_ = false;
+  outbox_.end_step();
   show_acts();
   O80_CRASH_POINT("backend.after_step");
   return Step::run;
@@ -246,30 +246,30 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
 
   // report statuses, then wake waiting processes
   if (!fresh) {
-    tell_of_the_row(true);
+    outbox_.report_row();
     controller.finish_pending();
     under_way_ = false;
     count_burst();
   }
-  const bool lanes_wait = !fresh && lanes.announce();
-  wake(lanes_wait, row_signal.announce(current));
-  if (!begun_) segment.set_state(State::running);
+  wake_sleepers(segment.view(),
+                {.lanes = !fresh && lanes.announce(), .rows = row_signal.announce(current)});
+  if (!begun_) segment.set_state(BackendState::running);
   begun_ = true;
   ++current;
 }
 
-void UntypedBackend::Body::end(State state, std::string_view text) noexcept {
+void UntypedBackend::Body::end(BackendState state, std::string_view text) noexcept {
   if (guard_.forked()) return;  // only the parent ends its backend
-  if (segment.state() != State::starting && segment.state() != State::running) return;
+  if (segment.state() != BackendState::starting && segment.state() != BackendState::running) return;
   // the current burst gets no last row: its waiter raises BackendGone
-  burst_left_ = 0;
+  burst_.end();
   reject_all(Reason::stopped);
-  tell_of_the_row(false);
+  outbox_.report_no_row();
   controller.purge(kEveryActuator, current, Reason::stopped);
   drop_running({Status::purged, Reason::stopped});
   while (!controller.finish_pending()) {
   }
-  wake(lanes.announce(), false);
+  wake_sleepers(segment.view(), {.lanes = lanes.announce()});
   segment.view().counters().acts.store(0, std::memory_order_relaxed);
   segment.end(state, text);
 }
@@ -280,7 +280,7 @@ UntypedBackend::UntypedBackend(Schema schema, const BackendOptions& options, Req
     : body_(std::make_unique<Body>(std::move(schema), options, server)) {}
 
 UntypedBackend::~UntypedBackend() {
-  body_->end(failure().empty() ? State::stopped : State::failed, failure());
+  body_->end(failure().empty() ? BackendState::stopped : BackendState::failed, failure());
 }
 
 const Schema& UntypedBackend::schema() const noexcept { return body_->schema; }
@@ -345,7 +345,7 @@ bool UntypedBackend::stop_asked() const noexcept {
 std::string_view UntypedBackend::failure() const noexcept { return body_->failure.data(); }
 bool UntypedBackend::unreadable() const noexcept { return body_->unreadable; }
 
-void UntypedBackend::end(State stopped_or_failed, std::string_view text) noexcept {
+void UntypedBackend::end(BackendState stopped_or_failed, std::string_view text) noexcept {
   body_->end(stopped_or_failed, text);
 }
 

@@ -5,64 +5,20 @@
 #include <cstring>
 #include <optional>
 
-#include "memory/futex.hpp"
 #include "runtime/backend_body.hpp"
 
 namespace o80 {
 
 // ------------------------------------------------------------------------------ statuses out
 
-void UntypedBackend::Body::tell(const StatusChange& change) noexcept {
-  O80_COUNT(status_told);
-  LaneReceiver& lane = lanes[change.lane];
-  lane.set_status(change.id,
-                  {static_cast<std::uint8_t>(change.status),
-                   static_cast<std::uint8_t>(change.reason), change.detail, change.iteration});
-  if (is_end(change.status)) lane.flag();
-}
-
 void UntypedBackend::Body::changed(const StatusChange& change) noexcept {
-  // Completion is reported only after the row is published, so that a killed backend has never
-  // reported a command whose row is missing.
-  const bool waits = stepping_ && is_end(change.status) && untold_.size() < untold_.capacity();
-  if (waits) {
-    untold_.push_back(change);
-  } else {
-    tell(change);
-  }
+  outbox_.put(change);
   // a burst that runs until its batch has ended (pulse_to_end)
-  if (burst_left_ == kUntilEnded && change.lane == burst_lane_ && change.id == burst_id_ + 1) {
-    stop_burst();
-  }
-}
-
-/// Reports the ends of commands in the last step. If its row will never be published, completed
-/// commands are reported as purged (stopped).
-void UntypedBackend::Body::tell_of_the_row(bool published) noexcept {
-  for (StatusChange& change : untold_) {
-    if (!published && (change.status == Status::completed || change.status == Status::limited)) {
-      change.status = Status::purged;
-      change.reason = Reason::stopped;
-    }
-    tell(change);
-  }
-  untold_.clear();
+  if (burst_.ends_with(change.lane, change.id)) stop_burst();
 }
 
 void UntypedBackend::Body::freed(std::uint32_t lane, std::uint32_t blocks) noexcept {
   lanes[lane].free(blocks);
-}
-
-/// Wakes readers and senders with at most one system call.
-void UntypedBackend::Body::wake(bool lanes_wait, bool reader_waits) noexcept {
-  Wakes& wakes = segment.view().wakes();
-  if (lanes_wait && reader_waits) {
-    futex_wake_both(wakes.row_wake, 1, wakes.lane_wake);
-  } else if (lanes_wait) {
-    futex_wake(wakes.lane_wake, kEverybody);
-  } else if (reader_waits) {
-    futex_wake(wakes.row_wake, 1);
-  }
 }
 
 void UntypedBackend::Body::note_failure(std::string_view text) noexcept {
@@ -82,13 +38,12 @@ Outcome UntypedBackend::Body::take_control(std::uint32_t lane) noexcept {
   // Batches of other lanes are rejected while a lane has control, so they do not get here. A sender
   // that has closed or lost its lane does not get control.
   if (taking_owner_ == 0 || taking_owner_ != lanes[lane].incarnation()) return {};
-  holder_ = lane;
-  holder_incarnation_ = taking_owner_;
+  holder_.take(lane, taking_owner_);
   return {};
 }
 
 Outcome UntypedBackend::Body::release_control(std::uint32_t lane) noexcept {
-  if (holder_ == lane && holder_incarnation_ == taking_owner_) holder_ = kNobody;
+  if (holder_.is(lane, taking_owner_)) holder_.release();
   return {};
 }
 
@@ -99,8 +54,9 @@ void UntypedBackend::Body::take_due() noexcept {
   while (!schedule.empty() && schedule.next().at <= current) {
     const StagedBatch due = schedule.next();
     const Effort effort = controller.effort(due.batch);
-    if (!affords(effort)) return;  // the next iteration rejects it as late, or takes it (late_now)
-    spend(effort);
+    // the next iteration rejects it as late, or takes it (late_now)
+    if (!share_.affords(effort)) return;
+    share_.spend(effort);
     schedule.drop_next();
     if (admit(due)) take(due);
   }
@@ -114,8 +70,8 @@ void UntypedBackend::Body::take_batches() noexcept {
     halted_below_ = 0;
   }
   const bool all_taken = take_in_order();
-  if (granted()) {
-    lanes.look_again_after(burst_lane_);
+  if (burst_.runs()) {
+    lanes.look_again_after(burst_.lane());
     if (staging.busy()) lanes.look_again();
   } else if (!all_taken) {
     stage_ahead();
@@ -126,7 +82,7 @@ void UntypedBackend::Body::take_batches() noexcept {
 /// Takes batches in the order of their tickets; false if the budget ended first.
 bool UntypedBackend::Body::take_in_order() noexcept {
   // batches sent after a burst are taken after it
-  while (!granted()) {
+  while (!burst_.runs()) {
     const std::optional<std::uint32_t> lane = lanes.next(staging.tickets());
     if (!lane) return true;
     if (!staging.has_staged(*lane) && !stage(*lane, share_.work)) return false;
@@ -165,7 +121,7 @@ void UntypedBackend::Body::take_express() noexcept {
       return lanes[i].peek_word(offsetof(BatchRecord, ticket));
     });
     for (const std::uint32_t lane : express_lanes_) {
-      mourn(lane, lanes[lane].dead_predecessor());
+      on_owner_death(lane, lanes[lane].dead_predecessor());
       const std::optional<StagedBatch> batch = staging.express(lane);
       work += kMostExpressRecords;
       if (!batch) continue;
@@ -178,27 +134,18 @@ void UntypedBackend::Body::take_express() noexcept {
 /// Stages the next batch of a lane; false if the budget ended first.
 bool UntypedBackend::Body::stage(std::uint32_t lane, std::uint32_t& budget) noexcept {
   // the death of an owner is handled before the first batch of its successor
-  if (staging.is_between_batches(lane)) mourn(lane, lanes[lane].dead_predecessor());
+  if (staging.is_between_batches(lane)) on_owner_death(lane, lanes[lane].dead_predecessor());
   return staging.go_on(lane, budget);
 }
 
 bool UntypedBackend::Body::take_staged(std::uint32_t lane) noexcept {
   const StagedBatch next = staging.front(lane);
   const Effort effort = controller.effort(next.batch);
-  if (!affords(effort)) return false;
-  spend(effort);
+  if (!share_.affords(effort)) return false;
+  share_.spend(effort);
   staging.pop(lane);
   accept(next);
   return true;
-}
-
-bool UntypedBackend::Body::affords(const Effort& effort) const noexcept {
-  return share_.work > 0 && effort.requests <= share_.requests;
-}
-
-void UntypedBackend::Body::spend(const Effort& effort) noexcept {
-  share_.work -= std::min(share_.work, effort.work);
-  share_.requests -= effort.requests;
 }
 
 /// Takes a batch, schedules it for its iteration, or rejects it.
@@ -244,10 +191,10 @@ bool UntypedBackend::Body::admit(const StagedBatch& sent) noexcept {
   if (!suits_halt(sent) || ends_for_silence(sent)) return false;
   watch_holder();
   const std::uint64_t sender = sent.had_left ? 0 : sent.incarnation;
-  const bool is_holders = holder_ == sent.lane && holder_incarnation_ == sender;
+  const bool is_holders = holder_.is(sent.lane, sender);
   // control covers commands only: any commander may resume
-  const bool is_free = holder_ == kNobody || controller.effort(sent.batch).resumes;
-  if (!is_free && !is_holders) return reject(sent, Reason::exclusive, holder_);
+  const bool is_free = holder_.is_nobody() || controller.effort(sent.batch).resumes;
+  if (!is_free && !is_holders) return reject(sent, Reason::exclusive, holder_.lane());
   if (sent.at < current && !sent.late_now) return reject(sent, Reason::late);
   if (stale_ == Stale::purge && is_of_dead(sent)) return reject(sent, Reason::dead_frontend);
   return true;
@@ -255,7 +202,8 @@ bool UntypedBackend::Body::admit(const StagedBatch& sent) noexcept {
 
 bool UntypedBackend::Body::is_of_dead(const StagedBatch& sent) noexcept {
   const LaneLife& life = lives_[sent.lane];
-  return sent.of_dead || (sent.incarnation != 0 && sent.incarnation <= mourned_[sent.lane]) ||
+  return sent.of_dead ||
+         (sent.incarnation != 0 && sent.incarnation <= handled_deaths_[sent.lane]) ||
          (life.state == LaneState::died && life.incarnation == lanes[sent.lane].incarnation());
 }
 

@@ -22,23 +22,22 @@
 #include "memory/verb_word.hpp"
 #include "o80/base/time.hpp"
 #include "o80/runtime/backend.hpp"
+#include "runtime/burst_grant.hpp"
+#include "runtime/control_holder.hpp"
 #include "runtime/overrun_limit.hpp"
 #include "runtime/running_requests.hpp"
 #include "runtime/schedule.hpp"
 #include "runtime/staging.hpp"
+#include "runtime/status_outbox.hpp"
+#include "runtime/work_share.hpp"
 
 namespace o80 {
 
-inline constexpr std::uint32_t kNobody = 0xFFFFFFFF;
-/// Budget of an iteration for batches: 1 for each block copied or checked, more for each step of
-/// taking a batch. The last batch taken may exceed it.
-inline constexpr std::uint32_t kWorkPerIteration = 1024;
 // budget for staging ahead, so that purges behind other batches are found: of a lane, of all lanes
 inline constexpr std::uint32_t kWorkAhead = 64;
 inline constexpr std::uint32_t kWorkAheadOfAll = 512;
 /// Budget for express batches; in each iteration every lane may have one taken in any case.
 inline constexpr std::uint32_t kExpressWork = 512;
-inline constexpr std::int64_t kUntilEnded = -1;
 
 /// Implementation of UntypedBackend: its parts, and the order in which batches reach the
 /// controller.
@@ -67,7 +66,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   void publish(bool fresh) noexcept;
   Step step(std::int64_t at_most) noexcept;
   void stop_burst(BurstEnd end = BurstEnd::done) noexcept;
-  void end(State state, std::string_view text) noexcept;
+  void end(BackendState state, std::string_view text) noexcept;
   void ask_to_halt(HaltCause cause, std::string_view text) noexcept;
   void end_request(std::uint32_t request, const Served& how) noexcept;
   Step brake() noexcept;
@@ -110,14 +109,11 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   void accept(const StagedBatch& sent) noexcept;
   bool admit(const StagedBatch& sent) noexcept;
   bool is_of_dead(const StagedBatch& sent) noexcept;
-  bool affords(const Effort& effort) const noexcept;
-  void spend(const Effort& effort) noexcept;
   void take(const StagedBatch& sent) noexcept;
   bool reject(const StagedBatch& sent, Reason reason, std::uint32_t detail = 0) noexcept;
   void reject_all(Reason reason) noexcept;
   void grant(const StagedBatch& sent, const BatchRecord& batch) noexcept;
   bool is_called_off() const noexcept;
-  bool granted() const noexcept { return burst_left_ != 0; }
   void count_burst() noexcept;
   void end_burst(Iteration row, BurstEnd end = BurstEnd::done) noexcept;
 
@@ -140,7 +136,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
 
   // deaths and silence of commanders
   void look_at_lives() noexcept;
-  void mourn(std::uint32_t lane, std::uint64_t incarnation) noexcept;
+  void on_owner_death(std::uint32_t lane, std::uint64_t incarnation) noexcept;
   void watch_holder() noexcept;
   void watch_silence() noexcept;
   void break_silence(std::uint32_t lane) noexcept;
@@ -153,16 +149,11 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
                        ShortText<248>& why) const noexcept;
   bool can_begin(const std::byte* states, std::string_view what) noexcept;
 
-  void tell(const StatusChange& change) noexcept;
-  void tell_of_the_row(bool published) noexcept;
-
-  void wake(bool lanes_wait, bool reader_waits) noexcept;
-
   ForkGuard guard_;
   RequestServer* server_;
   std::vector<LaneLife> lives_;
-  std::vector<std::uint64_t> mourned_;  // of each lane: last incarnation whose death was handled
-  std::vector<std::uint64_t> row_;      // 8-byte words: the current row
+  std::vector<std::uint64_t> handled_deaths_;  // of each lane: the last one handled
+  std::vector<std::uint64_t> row_;             // 8-byte words: the current row
   std::vector<std::byte> payload_;
   std::vector<std::uint64_t> fresh_desired_;
   Stale stale_;
@@ -172,20 +163,13 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   std::uint32_t seen_rounds_ = 0;
   bool begun_ = false;      // row 0 is published
   bool under_way_ = false;  // true from step to publish
-  bool stepping_ = false;   // ends of commands are reported after the row is published
-  std::vector<StatusChange> untold_;
+  StatusOutbox outbox_;
 
-  // the rest of this iteration's budget
-  struct Share {
-    std::uint32_t work = kWorkPerIteration;
-    std::uint32_t requests = kMostRequests;
-  };
-  Share share_;
+  WorkShare share_;
   std::uint32_t ahead_from_ = 0;              // last lane that was staged ahead
   std::vector<std::uint32_t> express_lanes_;  // by ticket
 
-  std::uint32_t holder_ = kNobody;  // lane with exclusive control
-  std::uint64_t holder_incarnation_ = 0;
+  ControlHolder holder_;
   std::uint64_t taking_owner_ = 0;  // incarnation that sent the batch being taken
 
   // for each cause: hash of the text of the last halt that this process requested; 0: none since
@@ -199,10 +183,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   bool stopping_ = false;       // braking before an end in order
   bool driver_halted_ = false;  // the driver's halt() was called
 
-  std::int64_t burst_left_ = 0;  // iterations, or kUntilEnded
-  std::uint32_t burst_lane_ = kNobody;
-  CommandId burst_id_ = 0;
-  std::uint64_t burst_incarnation_ = 0;
+  BurstGrant burst_;
 };
 
 }  // namespace o80

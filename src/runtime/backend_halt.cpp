@@ -45,7 +45,7 @@ void UntypedBackend::Body::show_acts() noexcept {
   const std::uint64_t* active = controller.active_mask();
   const bool moves = running.moves() || std::any_of(active, active + layout.mask_words,
                                                     [](std::uint64_t word) { return word != 0; });
-  const bool stays = moves || holder_ != kNobody || (shown_acts_ != 0 && controller.holds());
+  const bool stays = moves || !holder_.is_nobody() || (shown_acts_ != 0 && controller.holds());
   const std::uint32_t acts = stays ? 1 : 0;
   if (acts == shown_acts_) return;
   shown_acts_ = acts;
@@ -75,9 +75,9 @@ Step UntypedBackend::Body::brake() noexcept {
     return Step::ended;
   }
   under_way_ = true;
-  stepping_ = true;
+  outbox_.begin_step();
   controller.step(current, row() + layout.observed);
-  stepping_ = false;
+  outbox_.end_step();
   return Step::run;
 }
 

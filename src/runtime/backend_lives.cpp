@@ -31,8 +31,10 @@ void UntypedBackend::Body::stale(std::uint32_t lane, Reason reason) noexcept {
 }
 
 void UntypedBackend::Body::look_at_lives() noexcept {
-  if (granted()) mourn(burst_lane_, lanes[burst_lane_].dead_predecessor());
-  if (granted() && is_called_off()) stop_burst();
+  if (burst_.runs()) {
+    on_owner_death(burst_.lane(), lanes[burst_.lane()].dead_predecessor());
+  }
+  if (burst_.runs() && is_called_off()) stop_burst();
   // any frontend can corrupt the bell, so all lanes are scanned after each round of the helper
   const std::uint32_t rounds = liveness.rounds();
   if (rounds != seen_rounds_) lanes.look_again();
@@ -45,28 +47,29 @@ void UntypedBackend::Body::look_at_lives() noexcept {
     lanes[i].meet_owner();
     lives_[i] = liveness.lane(i);
     const bool died = lives_[i].state == LaneState::died;
-    mourn(i, died ? lives_[i].incarnation : lanes[i].dead_predecessor());
+    on_owner_death(i, died ? lives_[i].incarnation : lanes[i].dead_predecessor());
   }
 }
 
 /// Handles the death of a lane's owner, once for each incarnation.
-void UntypedBackend::Body::mourn(std::uint32_t lane, std::uint64_t incarnation) noexcept {
-  if (incarnation <= mourned_[lane]) return;
-  mourned_[lane] = incarnation;
+void UntypedBackend::Body::on_owner_death(std::uint32_t lane, std::uint64_t incarnation) noexcept {
+  if (incarnation <= handled_deaths_[lane]) return;
+  handled_deaths_[lane] = incarnation;
   stale(lane, Reason::dead_frontend);
-  if (granted() && burst_lane_ == lane && burst_incarnation_ <= incarnation) stop_burst();
+  if (burst_.runs_for(lane) && burst_.incarnation() <= incarnation) stop_burst();
   // it may have died between its commit and the bell
   lanes.look_again();
 }
 
 /// Releases control if its holder has closed, has died, or no longer owns the lane.
 void UntypedBackend::Body::watch_holder() noexcept {
-  if (holder_ == kNobody) return;
-  const LaneLife life = liveness.lane(holder_);
-  const bool died = life.state == LaneState::died && life.incarnation == holder_incarnation_;
-  if (died || lanes[holder_].closed() >= holder_incarnation_ ||
-      lanes[holder_].incarnation() != holder_incarnation_) {
-    holder_ = kNobody;
+  if (holder_.is_nobody()) return;
+  const LaneReceiver& lane = lanes[holder_.lane()];
+  const LaneLife life = liveness.lane(holder_.lane());
+  const bool died = life.state == LaneState::died && life.incarnation == holder_.incarnation();
+  if (died || lane.closed() >= holder_.incarnation() ||
+      lane.incarnation() != holder_.incarnation()) {
+    holder_.release();
   }
 }
 
@@ -84,14 +87,14 @@ void UntypedBackend::Body::watch_silence() noexcept {
     // a sign of life without a batch; clamped, because a frontend may write any number
     last_life_[i] = std::max(last_life_[i], std::min(lanes[i].life(), current - 1));
     if (current - last_life_[i] <= silence_) continue;
-    const bool bursts = granted() && burst_lane_ == i;
-    const bool acts = holder_ == i || controller.acts(i) || running.moves(i);
+    const bool bursts = burst_.runs_for(i);
+    const bool acts = holder_.lane() == i || controller.acts(i) || running.moves(i);
     if (bursts || !acts) {
       last_life_[i] = current;
       continue;
     }
     stale(i, Reason::silence);
-    if (holder_ == i) holder_ = kNobody;
+    if (holder_.lane() == i) holder_.release();
     last_life_[i] = current;
   }
 }

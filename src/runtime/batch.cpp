@@ -194,14 +194,15 @@ void Burst::cancel() const {
 }
 
 Iteration wait_for_burst(const Link& link, LaneSender& lane, CommandId id, Timeout timeout,
-                         const KeepWaiting& keep_waiting, std::optional<std::uint32_t> quiet) {
+                         const KeepWaiting& keep_waiting,
+                         std::optional<std::uint32_t> events_before_send) {
   link.segment.check_process();
   LaneSender::BurstAnswer answer{};
   const auto over = [&] {
     answer = lane.burst(id);
     return answer.known != LaneSender::Known::not_yet || is_rejected(lane, id);
   };
-  if (lane.wait_until(over, Deadline(timeout), link.guarded(keep_waiting), quiet) ==
+  if (lane.wait_until(over, Deadline(timeout), link.guarded(keep_waiting), events_before_send) ==
       Waited::timed_out) {
     throw TimeoutError("the burst of '" + link.segment.name() +
                        "' was not done in time: pass a longer timeout, or see whether the burst of "

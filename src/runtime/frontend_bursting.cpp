@@ -89,7 +89,7 @@ UntypedObservation UntypedFrontend::burst(std::int64_t iterations, Timeout timeo
   CancelUnlessDone rest(sent.lane.get(), sent.id);
   UntypedObservation observation(link_->description);  // made while the backend works
   const Iteration row =
-      wait_for_burst(*link_, *sent.lane, sent.id, timeout, keep_waiting, sent.quiet);
+      wait_for_burst(*link_, *sent.lane, sent.id, timeout, keep_waiting, sent.events_before_send);
   rest.done();
   link_->check_usable();  // a close of this frontend ends its burst too
   if (row < 0) return Burst(link_, Batch(link_, sent)).wait(timeout, keep_waiting);  // says why
@@ -109,7 +109,7 @@ Iteration UntypedFrontend::burst_rows(std::span<std::byte> rows, Timeout timeout
   const Sent sent = send_burst(static_cast<std::int64_t>(count), options);
   CancelUnlessDone rest(sent.lane.get(), sent.id);
   const Iteration last =
-      wait_for_burst(*link_, *sent.lane, sent.id, timeout, keep_waiting, sent.quiet);
+      wait_for_burst(*link_, *sent.lane, sent.id, timeout, keep_waiting, sent.events_before_send);
   rest.done();
   link_->check_usable();
   if (last < 0) Burst(link_, Batch(link_, sent)).wait(timeout, keep_waiting);  // says why

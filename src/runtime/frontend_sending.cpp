@@ -325,19 +325,8 @@ void UntypedFrontend::refuse_if_full(const BatchBuilder& builder, const BatchRec
   const bool stays = does_stay(builder, wanted);
   const std::uint32_t most = lane.blocks() - (stays ? kept_free(lane.blocks()) : 0);
   const std::uint32_t sent = lane.blocks() - lane.free_blocks();
-  const auto takes = [&] {
-    return "the batch takes " + std::to_string(needed) + " blocks of 64 bytes, ";
-  };
-  if (needed > most) {
-    throw LaneFull(takes() + "a lane of '" + segment() + "' has " + std::to_string(most) +
-                   ": send it in parts, or start the backend with larger lanes (lane_blocks)");
-  }
-  if (const std::uint32_t free = most - std::min(sent, most); needed > free) {
-    throw LaneFull(takes() + std::to_string(free) + " of " + std::to_string(most) +
-                   " are free in the lane of '" + segment() +
-                   "'. Nothing was sent, all stays added: pulse again when earlier commands have "
-                   "ended, purge, or start the backend with larger lanes (lane_blocks)");
-  }
+  const std::uint32_t free = most - std::min(sent, most);
+  if (needed > free) throw lane_full(segment(), needed, free, most);
 }
 
 /// Draws ids whose status slots are free.
@@ -376,7 +365,7 @@ Sent UntypedFrontend::send(BatchBuilder& builder, const BatchRecord& wanted) {
     refuse_if_full(builder, wanted, *lane);
     BatchRecord record = wanted;
     const std::uint32_t records = builder.records();
-    sent.quiet = lane->events();
+    sent.events_before_send = lane->events();
     record.id = draw_ids(*lane, std::uint64_t{records} + 2, does_stay(builder, wanted));
     lane->send(std::as_bytes(builder.seal(record)), offsetof(BatchRecord, ticket));
     builder.clear();

@@ -15,14 +15,15 @@ struct Sent {
   std::shared_ptr<LaneSender> lane;
   CommandId id = 0;
   std::uint32_t records = 0;
-  std::uint32_t quiet = 0;  // event count of the lane before the batch was sent
+  std::uint32_t events_before_send = 0;  // event count of the lane before the batch was sent
 };
 
-/// Waits until burst `id` is done; returns its last row, or -1 if its batch was rejected. `quiet`:
-/// the event count before it was sent, if it has just been sent. Throws TimeoutError, BackendGone,
-/// Cancelled, and BackendHalted if a halt cut the burst.
+/// Waits until burst `id` is done; returns its last row, or -1 if its batch was rejected.
+/// `events_before_send`: the event count before it was sent, if it has just been sent. Throws
+/// TimeoutError, BackendGone, Cancelled, and BackendHalted if a halt cut the burst.
 Iteration wait_for_burst(const Link& link, LaneSender& lane, CommandId id, Timeout timeout,
-                         const KeepWaiting& keep_waiting, std::optional<std::uint32_t> quiet = {});
+                         const KeepWaiting& keep_waiting,
+                         std::optional<std::uint32_t> events_before_send = {});
 /// Throws BackendHalted if a halt ended a command of this batch, which must have ended.
 void throw_if_halted(const Link& link, const Batch& batch);
 /// Throws Error, or BackendHalted, with the reason why a batch was rejected.

@@ -80,10 +80,9 @@ BlockIndex Staging::complete(std::uint32_t lane) noexcept {
   Stage& stage = stages_[lane];
   const BlockIndex batch = stage.chain.first;
   // the sender may have changed the record since: use the ticket that was read first
-  auto& record = *reinterpret_cast<BatchRecord*>(pool_.bytes(batch));
+  BatchRecord& record = pool_.batch(batch);
   record.ticket = stage.ticket;
-  lanes_[lane].set_staged(record.id,
-                          record_id(record.id, std::min(record.records, stage.chain.blocks)));
+  lanes_[lane].note_ids(record_id(record.id, std::min(record.records, stage.chain.blocks)));
   waiting_[batch] = stage.sender;
   stage.copying = false;
   note_ticket(lane);

@@ -5,7 +5,7 @@
 namespace o80 {
 
 /// What the backend says of itself (superseded is said by its successor).
-enum class State : std::uint32_t { starting, running, stopped, failed, superseded };
+enum class BackendState : std::uint32_t { starting, running, stopped, failed, superseded };
 
 /// What is true of it: the word above and the kernel's lock together.
 enum class Life { starting, running, stopped, failed, superseded, killed };

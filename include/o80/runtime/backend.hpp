@@ -138,7 +138,7 @@ class UntypedBackend {
   /// True if the backend ended because a fresh start failed, for example by a NaN in its reading.
   bool unreadable() const noexcept;
   /// Ends the backend: frontends learn that no row follows. `text`: the fault of a failed one.
-  void end(State stopped_or_failed, std::string_view text = {}) noexcept;
+  void end(BackendState stopped_or_failed, std::string_view text = {}) noexcept;
 
  private:
   class Body;

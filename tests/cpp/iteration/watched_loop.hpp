@@ -131,7 +131,7 @@ class WatchedLoop {
  public:
   explicit WatchedLoop(BackendOptions options, const OptionValues& values = {})
       : bursting_(options.bursting),
-        loop_(std::make_unique<Robot>(*robot_table<Subject>("subject"), values),
+        loop_(std::make_unique<DriverInstance>(*robot_table<Subject>("subject"), values),
               with_defaults(options)) {
     account_.bursting = bursting_;
     Subject::account = &account_;

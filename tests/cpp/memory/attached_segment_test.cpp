@@ -52,7 +52,7 @@ TEST_F(AttachedSegmentTest, WaitsForABackendThatComesLaterAndStartsSlowly) {
     OwnedSegment segment = OwnedSegment::create(small_spec());
     const int seen = checks;
     while (checks < seen + 2) std::this_thread::yield();
-    segment.set_state(State::running);
+    segment.set_state(BackendState::running);
     looked.get_future().wait();
   });
   const KeepWaiting count = [&] {
@@ -70,14 +70,14 @@ TEST_F(AttachedSegmentTest, WaitsForABackendThatComesLaterAndStartsSlowly) {
 
 TEST_F(AttachedSegmentTest, RaisesTheFaultOfABackendThatCouldNotStart) {
   OwnedSegment owner = OwnedSegment::create(small_spec());
-  owner.end(State::failed, "the arm does not answer at 10.0.0.2");
+  owner.end(BackendState::failed, "the arm does not answer at 10.0.0.2");
 
   EXPECT_THAT(message_of<BackendFailed>([] { attach(); }),
               HasSubstr("the arm does not answer at 10.0.0.2"));
 }
 
 TEST_F(AttachedSegmentTest, CanIgnoreTheFailureOfAnEarlierBackend) {
-  running_segment().end(State::failed, "old");
+  running_segment().end(BackendState::failed, "old");
   const std::uint64_t old = list_segments().at(0).epoch;
 
   EXPECT_THROW(AttachedSegment::attach("arm", Access::read_only, soon(), {.ignore_epoch = old}),
@@ -110,7 +110,7 @@ TEST_F(AttachedSegmentTest, RefusesForeignFilesAtOnce) {
 
 TEST_F(AttachedSegmentTest, RefusesTruncatedAndOtherVersions) {
   const std::string path = directory_.file_of("arm");
-  running_segment().end(State::failed);
+  running_segment().end(BackendState::failed);
   const std::vector<char> whole = read_all(path);
 
   for (const std::size_t size : {9UL, 100UL, 4096UL, whole.size() - 4096}) {
@@ -126,7 +126,7 @@ TEST_F(AttachedSegmentTest, RefusesTruncatedAndOtherVersions) {
 
 TEST_F(AttachedSegmentTest, RefusesEveryCorruptedHeaderWithoutCrashing) {
   const std::string path = directory_.file_of("arm");
-  running_segment().end(State::failed);
+  running_segment().end(BackendState::failed);
   const std::vector<char> whole = read_all(path);
   // whatever the numbers say, either it is refused or all of it lies within the file
   for (std::size_t i = 0; i < offsetof(SegmentHeader, started_at); ++i)
@@ -154,13 +154,13 @@ TEST_F(AttachedSegmentTest, RefusesEveryCorruptedHeaderWithoutCrashing) {
 TEST_F(AttachedSegmentTest, KnowsHowItsBackendEnded) {
   OwnedSegment owner = running_segment();
   const AttachedSegment segment = attach();
-  owner.end(State::stopped);
+  owner.end(BackendState::stopped);
   EXPECT_EQ(segment.life(), Life::stopped);
   EXPECT_THAT(message_of<BackendStopped>([&] { segment.throw_if_gone(); }),
               AllOf(HasSubstr("'arm'"), HasSubstr("stopped"), HasSubstr("attach anew")));
   EXPECT_THROW(segment.throw_if_known_gone(), BackendStopped);
 
-  owner.end(State::failed, "joint 2 is too hot");
+  owner.end(BackendState::failed, "joint 2 is too hot");
   EXPECT_THAT(message_of<BackendFailed>([&] { segment.throw_if_gone(); }),
               HasSubstr("joint 2 is too hot"));
   EXPECT_EQ(segment.fault(), "joint 2 is too hot");
@@ -169,15 +169,15 @@ TEST_F(AttachedSegmentTest, KnowsHowItsBackendEnded) {
 TEST_F(AttachedSegmentTest, CutsAFaultThatIsTooLong) {
   OwnedSegment owner = running_segment();
   const AttachedSegment segment = attach();
-  owner.end(State::failed, std::string(5000, 'x'));
+  owner.end(BackendState::failed, std::string(5000, 'x'));
   EXPECT_EQ(segment.fault(), std::string(1023, 'x'));
 }
 
 TEST_F(AttachedSegmentTest, WaitsPastAStoppedSegmentUnlessItIsToBeRead) {
-  running_segment().end(State::failed);
+  running_segment().end(BackendState::failed);
   {
     const LockFile file = LockFile::open(directory_.file_of("arm"), O_RDWR);
-    const auto stopped = static_cast<std::uint32_t>(State::stopped);
+    const auto stopped = static_cast<std::uint32_t>(BackendState::stopped);
     const auto where =
         static_cast<off_t>(AttachedSegment::attach("arm", Access::read_only, soon(),
                                                    {.dead = AttachOptions::Dead::accept})

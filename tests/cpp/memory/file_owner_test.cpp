@@ -68,7 +68,7 @@ TEST_F(FileOwnerTest, OfASquattedNameIsNamedToTheBackendThatWantsIt) {
   EXPECT_THAT(message_of<SegmentError>([] { OwnedSegment::refuse_if_taken("arm"); }), wanted);
   EXPECT_THAT(message_of<SegmentError>([] { OwnedSegment::create(small_spec()); }), wanted);
   // dead or alive
-  segment->end(State::failed);
+  segment->end(BackendState::failed);
   segment.reset();
   EXPECT_THAT(message_of<SegmentError>([] { OwnedSegment::create(small_spec()); }), wanted);
   EXPECT_TRUE(clean("arm"));

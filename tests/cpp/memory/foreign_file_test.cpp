@@ -90,7 +90,7 @@ TEST_F(ForeignFileTest, ThatIsALinkIsNotFollowed) {
 
 TEST_F(ForeignFileTest, CutAnywhereIsRefused) {
   const std::string path = directory_.file_of("arm");
-  running_segment().end(State::failed);
+  running_segment().end(BackendState::failed);
   const std::vector<char> whole = read_all(path);
   std::vector<std::size_t> sizes{0, 1, 7, 8, 9, 183, 184, 185, whole.size() - 1};
   for (std::size_t page = 4096; page < whole.size(); page += 4096)
@@ -105,7 +105,7 @@ TEST_F(ForeignFileTest, CutAnywhereIsRefused) {
 
 TEST_F(ForeignFileTest, ThatGrewIsRefused) {
   const std::string path = directory_.file_of("arm");
-  running_segment().end(State::failed);
+  running_segment().end(BackendState::failed);
   std::vector<char> longer = read_all(path);
   for (const std::size_t more : {1U, 4096U}) {
     longer.resize(longer.size() + more);
@@ -116,7 +116,7 @@ TEST_F(ForeignFileTest, ThatGrewIsRefused) {
 
 TEST_F(ForeignFileTest, OfAnotherVersionIsRefusedWithBothVersionsAndTheCure) {
   const std::string path = directory_.file_of("arm");
-  running_segment().end(State::failed);
+  running_segment().end(BackendState::failed);
   poke(path, offsetof(SegmentHeader, version), std::uint32_t{77});
   EXPECT_THAT(refusal(), AllOf(HasSubstr("version 77"),
                                HasSubstr("version " + std::to_string(kSegmentVersion)),

@@ -84,7 +84,7 @@ TEST_F(ForkTest, LeavesFileLockAndLaneToTheParentWhenTheChildEndsInOrder) {
   EXPECT_EQ(segment.life(), Life::running);
   EXPECT_TRUE(std::filesystem::exists(directory_.file_of("arm")));
   EXPECT_TRUE(is_byte_locked(segment.commands_descriptor(), kFirstLaneByte));
-  EXPECT_EQ(owner.state(), State::running);
+  EXPECT_EQ(owner.state(), BackendState::running);
 }
 
 TEST_F(ForkTest, DoesNotKeepADeadBackendAliveInItsChild) {

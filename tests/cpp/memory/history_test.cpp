@@ -107,7 +107,7 @@ TEST_F(HistoryTest, GivesWhatThereIsOfARangeThatIsNot) {
 
 TEST_F(HistoryTest, OutlivesItsBackend) {
   publish(0, 12);
-  segment_.end(State::failed);
+  segment_.end(BackendState::failed);
   {
     const OwnedSegment gone = std::move(segment_);
   }

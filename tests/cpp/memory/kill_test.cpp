@@ -28,7 +28,7 @@ void publish(const OwnedSegment& segment, Iteration rows) {
   for (Iteration k = 0; k < rows; ++k) {
     const std::vector<Iteration> row(8, k);
     writer.publish(k, reinterpret_cast<const std::byte*>(row.data()));
-    signal.wake_readers(k);
+    wake_sleepers(segment.view(), {.rows = signal.announce(k)});
   }
 }
 

@@ -26,9 +26,10 @@ class LaneTest : public SegmentTest {
     while (const auto lane = lanes_.next()) numbers.push_back(take_batch(lanes_[*lane]));
     return numbers;
   }
+  void flush() { wake_sleepers(segment_.view(), {.lanes = lanes_.announce()}); }
   void give_back(std::uint32_t lane) {
     lanes_[lane].free(static_cast<std::uint32_t>(lanes_[lane].in_flight()));
-    lanes_.flush_events();
+    flush();
   }
 
   OwnedSegment segment_ = running_segment();  // 2 lanes of 16 blocks
@@ -121,8 +122,8 @@ TEST_F(LaneTest, TakesWhatOneProcessCausedAnotherToSendAfterItsCause) {
       send(sender, number);
       sent = number;
     }
-    EXPECT_EQ(sender.wait_until([&] { return sender.ended() >= kRounds; }, patient()),
-              Waited::ready);
+    const auto all_ended = [&] { return sender.status(kRounds).known == Known::yes; };
+    EXPECT_EQ(sender.wait_until(all_ended, patient()), Waited::ready);
   };
   std::thread ping([&] { play(attached_, 0); });
   std::thread pong([&] { play(other, 1); });
@@ -133,8 +134,11 @@ TEST_F(LaneTest, TakesWhatOneProcessCausedAnotherToSendAfterItsCause) {
     give_back(0);
     give_back(1);
   }
-  for (std::uint32_t i = 0; i < 2; ++i) lanes_[i].set_ended(kRounds);
-  lanes_.flush_events();
+  for (std::uint32_t i = 0; i < 2; ++i) {
+    lanes_[i].set_status(kRounds, {.status = 3});
+    lanes_[i].flag();
+  }
+  flush();
   ping.join();
   pong.join();
 
@@ -215,7 +219,7 @@ TEST_F(LaneTest, IsResetWhenItsCountersAreImpossible) {
   EXPECT_EQ(lanes_[0].resets(), 3U);
 
   // the next owner goes on from there
-  lanes_.flush_events();
+  flush();
   const AttachedSegment other = attach();
   {
     const LaneSender moved = std::move(sender);
@@ -242,7 +246,7 @@ TEST_F(LaneTest, ForgetsGarbageWhenToldTo) {
   ASSERT_TRUE(lanes_.look());
   ASSERT_TRUE(lanes_.next());
   lanes_[0].reset();
-  lanes_.flush_events();
+  flush();
   EXPECT_FALSE(lanes_.next());
   EXPECT_EQ(sender.free_blocks(), 16U);
   send(sender, 2);
@@ -284,7 +288,7 @@ TEST_F(LaneTest, TakesWhatAnHeirSentWherePartOfALaneWasTakenBack) {
     LaneSender heir(attached_);
     // no room until the backend has seen whose lane it is
     lanes_[0].meet_owner();
-    lanes_.flush_events();
+    flush();
     EXPECT_EQ(heir.free_blocks(), 16U);
     send(heir, 7, blocks);
     EXPECT_THAT(take_all(), ElementsAre(7)) << blocks;
@@ -380,7 +384,7 @@ TEST_F(LaneTest, WakesThoseWhoWaitForABurst) {
     });
   while (segment_.view().lane(0).waiting.load() == 0) std::this_thread::yield();
   lanes_[0].set_burst_done(2, 99);
-  lanes_.flush_events();
+  flush();
   for (std::thread& waiter : waiters) waiter.join();
   EXPECT_EQ(row, 99);
 }
@@ -388,12 +392,11 @@ TEST_F(LaneTest, WakesThoseWhoWaitForABurst) {
 TEST_F(LaneTest, MovesItsEventsOnceAFlushAndOnlyWithCause) {
   const std::atomic<std::uint32_t>& events = segment_.view().feedback(0).events;
   lanes_[0].set_status(1, {.status = 2});
-  lanes_.flush_events();
+  flush();
   EXPECT_EQ(events.load(), 0U);
-  lanes_[0].set_ended(1);
   lanes_[0].set_burst_done(2, 0);
   lanes_[0].flag();
-  lanes_.flush_events();
+  flush();
   EXPECT_EQ(events.load(), 1U);
   EXPECT_EQ(segment_.view().feedback(1).events.load(), 0U);
 }
@@ -406,7 +409,7 @@ TEST_F(LaneTest, EndsAWaitInTime) {
   EXPECT_THROW(sender.wait_until(never, patient(), [] { return false; }), Cancelled);
 
   std::thread waiter([&] { EXPECT_THROW(sender.wait_until(never, patient()), BackendStopped); });
-  segment_.end(State::stopped);
+  segment_.end(BackendState::stopped);
   waiter.join();
   EXPECT_THROW(sender.wait_until(never, Deadline(Timeout(0))), BackendStopped);
   EXPECT_EQ(sender.wait_until([] { return true; }, Deadline(Timeout(0))), Waited::ready);

@@ -79,13 +79,13 @@ TEST_F(OwnedSegmentTest, DoesNotRefuseANameThatNobodyHas) {
 TEST_F(OwnedSegmentTest, KeepsItsFileWhenItFailedAndLetsItBeTakenOver) {
   {
     OwnedSegment segment = running_segment();
-    segment.end(State::failed, "no hardware");
+    segment.end(BackendState::failed, "no hardware");
   }
   EXPECT_EQ(directory_.files(), 2U);
 
   const OwnedSegment next = OwnedSegment::create(small_spec());
   EXPECT_EQ(directory_.files(), 2U);
-  EXPECT_EQ(next.state(), State::starting);
+  EXPECT_EQ(next.state(), BackendState::starting);
 }
 
 TEST_F(OwnedSegmentTest, TakesOverWhateverFileNobodyHolds) {
@@ -97,7 +97,7 @@ TEST_F(OwnedSegmentTest, TakesOverWhateverFileNobodyHolds) {
 }
 
 TEST_F(OwnedSegmentTest, TellsThoseAttachedToItsPredecessorThatItIsSuperseded) {
-  running_segment().end(State::failed);
+  running_segment().end(BackendState::failed);
   AttachedSegment old = AttachedSegment::attach("arm", Access::read_only, soon(),
                                                 {.dead = AttachOptions::Dead::accept});
   const OwnedSegment next = running_segment();
@@ -110,7 +110,7 @@ TEST_F(OwnedSegmentTest, TellsThoseAttachedToItsPredecessorThatItIsSuperseded) {
 TEST_F(OwnedSegmentTest, IsWonByExactlyOneOfManyStarters) {
   for (int round = 0; round < 20; ++round) {
     // every other round there is a dead one to take over
-    if (round % 2 == 1) running_segment().end(State::failed);
+    if (round % 2 == 1) running_segment().end(BackendState::failed);
     std::atomic<int> won{0}, refused{0}, decided{0};
     std::vector<std::thread> starters;
     starters.reserve(4);
@@ -181,7 +181,7 @@ TEST_F(OwnedSegmentTest, CanBeMoved) {
 
   EXPECT_FALSE(std::filesystem::exists(directory_.file_of("first")));
   EXPECT_TRUE(std::filesystem::exists(directory_.file_of("second")));
-  EXPECT_EQ(second.state(), State::running);
+  EXPECT_EQ(second.state(), BackendState::running);
 }
 
 TEST_F(OwnedSegmentTest, DoesNotTakeAwayTheFileOfASuccessor) {

@@ -18,7 +18,7 @@ using SegmentListTest = SegmentTest;
 TEST_F(SegmentListTest, ShowsEverySegmentByNameWithItsLife) {
   const OwnedSegment starting = OwnedSegment::create(small_spec("b"));
   const OwnedSegment running = running_segment(small_spec("a"));
-  running_segment(small_spec("c")).end(State::failed);
+  running_segment(small_spec("c")).end(BackendState::failed);
   std::ofstream(directory_.file_of("d")) << "foreign";
   std::ofstream(directory_.path() + "/other") << "no segment at all";
 
@@ -52,7 +52,7 @@ TEST_F(SegmentListTest, IsEmptyWhereThereIsNothing) {
 
 TEST_F(SegmentListTest, CleansTheDeadAndRefusesTheLiving) {
   const OwnedSegment alive = running_segment(small_spec("alive"));
-  running_segment(small_spec("dead")).end(State::failed);
+  running_segment(small_spec("dead")).end(BackendState::failed);
 
   EXPECT_THROW(clean("alive"), SegmentTaken);
   EXPECT_TRUE(clean("dead"));
@@ -62,15 +62,15 @@ TEST_F(SegmentListTest, CleansTheDeadAndRefusesTheLiving) {
 
 TEST_F(SegmentListTest, CleansAllTheDeadButNothingForeign) {
   const OwnedSegment alive = running_segment(small_spec("alive"));
-  running_segment(small_spec("x")).end(State::failed);
-  running_segment(small_spec("y")).end(State::failed);
+  running_segment(small_spec("x")).end(BackendState::failed);
+  running_segment(small_spec("y")).end(BackendState::failed);
   std::ofstream(directory_.file_of("foreign")) << "not ours";
   std::ofstream(directory_.file_of("x.new-0011223344556677")) << "a draft nobody holds";
   std::ofstream(directory_.file_of("z.commanders-0011223344556677")) << "without its segment";
 
   EXPECT_THAT(clean_dead(), ElementsAre("x", "y"));
   EXPECT_EQ(directory_.files(), 3U);
-  EXPECT_EQ(alive.state(), State::running);
+  EXPECT_EQ(alive.state(), BackendState::running);
 }
 
 }  // namespace

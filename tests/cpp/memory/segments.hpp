@@ -18,7 +18,7 @@ inline SegmentSpec small_spec(const std::string& name = "arm") {
 
 inline OwnedSegment running_segment(const SegmentSpec& spec = small_spec()) {
   OwnedSegment segment = OwnedSegment::create(spec);
-  segment.set_state(State::running);
+  segment.set_state(BackendState::running);
   return segment;
 }
 

@@ -20,7 +20,7 @@ class SignalTest : public SegmentTest {
     const std::vector<std::byte> row(64);
     for (Iteration k = from; k <= to; ++k) {
       writer_.publish(k, row.data());
-      signal_.wake_readers(k);
+      wake_sleepers(segment_.view(), {.rows = signal_.announce(k)});
     }
   }
   Iteration wanted() const { return segment_.view().bell().wanted.load(); }
@@ -99,13 +99,13 @@ TEST_F(SignalTest, RaisesTheFaultForThoseWhoWait) {
     EXPECT_THROW(waiter.wait_for_row(5, patient()), BackendFailed);
   });
   wait_until_wanted(5);
-  segment_.end(State::failed, "no power");
+  segment_.end(BackendState::failed, "no power");
   sleeper.join();
 }
 
 TEST_F(SignalTest, GivesRowsThatCameBeforeTheEnd) {
   publish(0, 5);
-  segment_.end(State::stopped);
+  segment_.end(BackendState::stopped);
   RowWaiter waiter(attached_);
   EXPECT_EQ(waiter.wait_for_row(5, patient()), Waited::ready);
   EXPECT_THROW(waiter.wait_for_row(6, patient()), BackendStopped);
@@ -116,7 +116,7 @@ TEST_F(SignalTest, RaisesTheEndHoweverShortTheWait) {
   RowWaiter waiter(attached_);
   EXPECT_EQ(waiter.wait_for_row(1, Deadline(Timeout(0))), Waited::timed_out);
 
-  segment_.end(State::stopped);
+  segment_.end(BackendState::stopped);
 
   EXPECT_EQ(waiter.wait_for_row(0, Deadline(Timeout(0))), Waited::ready);
   EXPECT_THROW(waiter.wait_for_row(1, Deadline(Timeout(0))), BackendStopped);

@@ -34,7 +34,7 @@ class StressTest : public SegmentTest {
   void publish(Iteration k) {
     NarrowRow row = narrow_row(k);
     writer_.publish(k, bytes_of(row));
-    signal_.wake_readers(k);
+    wake_sleepers(segment_.view(), {.rows = signal_.announce(k)});
   }
 
   OwnedSegment segment_ = running_segment({.name = "arm",
@@ -116,8 +116,8 @@ TEST_F(StressTest, SendersThatComeAndGoLoseNothing) {
                     Waited::ready);
           send(sender, number, count);
         }
-        ASSERT_EQ(sender.wait_until([&] { return sender.ended() == number; }, patient()),
-                  Waited::ready);
+        const auto all_taken = [&] { return sender.free_blocks() == sender.blocks(); };
+        ASSERT_EQ(sender.wait_until(all_taken, patient()), Waited::ready);
       }
       --left;
       ring_bell(segment_.view());
@@ -142,9 +142,9 @@ TEST_F(StressTest, SendersThatComeAndGoLoseNothing) {
       newest = number;
       ++taken;
       lanes[*lane].free(static_cast<std::uint32_t>(count));
-      lanes[*lane].set_ended(number);
+      lanes[*lane].flag();
     }
-    lanes.flush_events();
+    wake_sleepers(segment_.view(), {.lanes = lanes.announce()});
     if (over) break;
     bell.wait(lanes.bell_seen());
   }
@@ -170,7 +170,7 @@ TEST_F(StressTest, WhoeverWaitsIsToldOfTheEnd) {
     });
   Iteration k = 0;
   while (told < 3) publish(k++);
-  segment_.end(State::stopped);
+  segment_.end(BackendState::stopped);
 }
 
 TEST_F(StressTest, ANameIsTakenOverWhileOthersFollowIt) {
@@ -218,7 +218,7 @@ TEST_F(StressTest, ANameIsTakenOverWhileOthersFollowIt) {
           for (Iteration k = 0; k < 20; ++k) {
             NarrowRow row = narrow_row(k);
             writer.publish(k, bytes_of(row));
-            signal.wake_readers(k);
+            wake_sleepers(own.view(), {.rows = signal.announce(k)});
           }
           ++reigns;
         } catch (const SegmentTaken&) {

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "memory/private_directory.hpp"
+#include "robot/driver_instance.hpp"
 #include "robot/inline_simulation.hpp"
-#include "robot/robot.hpp"
 
 namespace o80::pam {
 namespace {

@@ -55,7 +55,7 @@ TEST_F(AllocationTest, TheCountCounts) {
 }
 
 TEST_F(AllocationTest, AnIterationTakesNothingWithCommandsRequestsBurstsAndWaiters) {
-  Loop loop(std::make_unique<Robot>(table(), OptionValues{}),
+  Loop loop(std::make_unique<DriverInstance>(table(), OptionValues{}),
             {.segment = "puppet", .bursting = true, .lane_blocks = 4096});
   loop.start();
   UntypedFrontend one("puppet");

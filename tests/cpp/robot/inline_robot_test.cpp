@@ -11,9 +11,9 @@ using ::testing::HasSubstr;
 
 class InlineRobotTest : public PuppetTest {};
 
-std::unique_ptr<Robot> two_joints() {
+std::unique_ptr<DriverInstance> two_joints() {
   static const RobotLibrary library = RobotLibrary::load(kTwoJoints);
-  return std::make_unique<Robot>(*library.table, OptionValues{{"gain", "30"}});
+  return std::make_unique<DriverInstance>(*library.table, OptionValues{{"gain", "30"}});
 }
 
 /// Commands, bursts, a reset and a restore.
@@ -68,7 +68,7 @@ TEST_F(InlineRobotTest, LeavesTheRestOfABurstThatItsCallerCuts) {
 }
 
 TEST_F(InlineRobotTest, LeavesTheHardwareToTheParentOfAForkedChild) {
-  auto loop = std::make_unique<Loop>(std::make_unique<Robot>(table(), OptionValues{}),
+  auto loop = std::make_unique<Loop>(std::make_unique<DriverInstance>(table(), OptionValues{}),
                                      BackendOptions{.segment = "here", .bursting = true});
   loop->start();
   const pid_t child = fork();
@@ -96,7 +96,7 @@ TEST_F(InlineRobotTest, WaitsForNothingOfItsOwn) {
 
 TEST_F(InlineRobotTest, RaisesAFaultWhereItWasBurst) {
   const auto robot = std::make_shared<InlineRobot>(
-      std::make_unique<Robot>(table(), OptionValues{{"fails", "write"}}),
+      std::make_unique<DriverInstance>(table(), OptionValues{{"fails", "write"}}),
       BackendOptions{.segment = "here"});
   UntypedFrontend frontend("here", robot);
   EXPECT_THAT(message_of<DriverError>([&] { frontend.burst(10, kPatience); }),
@@ -107,8 +107,8 @@ TEST_F(InlineRobotTest, RaisesAFaultWhereItWasBurst) {
 }
 
 TEST_F(InlineRobotTest, StopsWhenToldAndItsFrontendsSeeIt) {
-  const auto robot = std::make_shared<InlineRobot>(std::make_unique<Robot>(table(), OptionValues{}),
-                                                   BackendOptions{.segment = "here"});
+  const auto robot = std::make_shared<InlineRobot>(
+      std::make_unique<DriverInstance>(table(), OptionValues{}), BackendOptions{.segment = "here"});
   UntypedFrontend frontend("here", robot);
   frontend.burst(2, kAtOnce);
   robot->stop();

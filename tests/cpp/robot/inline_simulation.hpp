@@ -22,7 +22,7 @@ struct InlineSimulation {
   InlineSimulation(std::string_view name, const RobotTable& table, const OptionValues& options,
                    std::int64_t period)
       : segment(unused_segment_name(std::string(name))),
-        robot(std::make_shared<InlineRobot>(std::make_unique<Robot>(table, options),
+        robot(std::make_shared<InlineRobot>(std::make_unique<DriverInstance>(table, options),
                                             BackendOptions{.segment = segment, .period = period})),
         frontend(segment, robot) {}
 

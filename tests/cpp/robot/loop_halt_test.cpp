@@ -19,13 +19,13 @@ using ::testing::HasSubstr;
 class LoopHaltTest : public PuppetTest {
  protected:
   static std::unique_ptr<Loop> bursting_loop(const OptionValues& options = {}) {
-    auto loop = std::make_unique<Loop>(std::make_unique<Robot>(table(), options),
+    auto loop = std::make_unique<Loop>(std::make_unique<DriverInstance>(table(), options),
                                        BackendOptions{.segment = "puppet", .bursting = true});
     loop->start();
     return loop;
   }
   static Loop timed_loop() {
-    return {std::make_unique<Robot>(table(), OptionValues{}),
+    return {std::make_unique<DriverInstance>(table(), OptionValues{}),
             BackendOptions{.segment = "puppet", .period = 100'000}};
   }
 };
@@ -183,7 +183,7 @@ TEST_F(LoopHaltTest, BrakingThatTakesTooLongIsCut) {
 
 TEST_F(LoopHaltTest, AFailedVerbLeavesNoTimeForBraking) {
   Puppet::limits = {.speed = 1000.0, .acceleration = 1.0};
-  Loop loop(std::make_unique<Robot>(table(), OptionValues{{"fails", "write"}}),
+  Loop loop(std::make_unique<DriverInstance>(table(), OptionValues{{"fails", "write"}}),
             BackendOptions{.segment = "puppet", .period = 100'000});
   loop.start();
   const int before = Puppet::calls.written;

@@ -14,7 +14,7 @@ class LoopTest : public PuppetTest {
  protected:
   static std::unique_ptr<Loop> make(const OptionValues& options = {}, bool bursting = true) {
     return std::make_unique<Loop>(
-        std::make_unique<Robot>(table(), options),
+        std::make_unique<DriverInstance>(table(), options),
         BackendOptions{.segment = "puppet", .period = 200'000, .bursting = bursting});
   }
 };

@@ -1,9 +1,9 @@
 #include "o80/robot/make_table.hpp"
 
+#include "robot/driver_instance.hpp"
 #include "robot/inline_simulation.hpp"
 #include "robot/loop.hpp"
 #include "robot/puppet.hpp"
-#include "robot/robot.hpp"
 
 namespace o80::test {
 namespace {
@@ -79,7 +79,7 @@ TEST_F(MakeTableTest, ListsTheOptionsOfTheConfig) {
 }
 
 TEST_F(MakeTableTest, DescribesTheDriverAcrossTheTable) {
-  Robot robot(table(), {});
+  DriverInstance robot(table(), {});
   const Schema schema = robot.describe();
   EXPECT_EQ(schema.head.robot.view(), "puppet");
   EXPECT_EQ(schema.actuators[1].name.view(), "right");
@@ -106,30 +106,31 @@ TEST_F(MakeTableTest, ARobotOfAnyPeriodRunsAtOneKilohertzUnlessAskedOtherwise) {
 }
 
 TEST_F(MakeTableTest, NothingThatADriverThrowsCrossesTheTable) {
-  EXPECT_THAT(message_of<DriverError>([] { Robot(table(), {{"fails", "construct"}}); }),
+  EXPECT_THAT(message_of<DriverError>([] { DriverInstance(table(), {{"fails", "construct"}}); }),
               AllOf(HasSubstr("'puppet'"), HasSubstr("no cable")));
-  EXPECT_THAT(message_of<DriverError>([] { Robot(table(), {{"fails", "describe"}}).describe(); }),
-              HasSubstr("no plan"));
-  Robot robot(table(), {{"fails", "start"}});
+  EXPECT_THAT(
+      message_of<DriverError>([] { DriverInstance(table(), {{"fails", "describe"}}).describe(); }),
+      HasSubstr("no plan"));
+  DriverInstance robot(table(), {{"fails", "start"}});
   EXPECT_FALSE(robot.start());
   EXPECT_STREQ(robot.fault(), "no power");
 }
 
 TEST_F(MakeTableTest, AnOptionThatIsNotThereListsThoseThatAre) {
-  EXPECT_THAT(message_of<InvalidArgument>([] { Robot(table(), {{"gian", "2"}}); }),
+  EXPECT_THAT(message_of<InvalidArgument>([] { DriverInstance(table(), {{"gian", "2"}}); }),
               HasSubstr("there are: fails, gain, finish_at"));
-  EXPECT_THAT(message_of<InvalidArgument>([] { Robot(table(), {{"gain", "much"}}); }),
+  EXPECT_THAT(message_of<InvalidArgument>([] { DriverInstance(table(), {{"gain", "much"}}); }),
               HasSubstr("'gain' must be a number, got 'much'"));
 }
 
 TEST_F(MakeTableTest, ADriverIsStoppedOnceAndOnlyIfAStartWasTried) {
   {
-    const Robot robot(table(), {});
+    const DriverInstance robot(table(), {});
   }
   EXPECT_EQ(Puppet::calls.stopped, 0);
   EXPECT_EQ(Puppet::calls.destroyed, 1);
   {
-    Robot robot(table(), {});
+    DriverInstance robot(table(), {});
     robot.start();
     robot.stop();
     robot.stop();
@@ -145,7 +146,7 @@ TEST_F(MakeTableTest, ATableOfAnotherVersionIsRefusedWithTheCure) {
 }
 
 TEST_F(MakeTableTest, APureSensorIsADriverToo) {
-  Loop loop(std::make_unique<Robot>(*robot_table<Sensor>("sensor"), OptionValues{}),
+  Loop loop(std::make_unique<DriverInstance>(*robot_table<Sensor>("sensor"), OptionValues{}),
             {.segment = "sensor", .bursting = true});
   loop.start();
   UntypedFrontend frontend("sensor");
@@ -155,8 +156,9 @@ TEST_F(MakeTableTest, APureSensorIsADriverToo) {
 }
 
 TEST_F(MakeTableTest, ADriverMayKnowItsLayoutAtRunTimeOnly) {
-  Loop loop(std::make_unique<Robot>(*robot_table<Model>("model"), OptionValues{{"joints", "2"}}),
-            {.segment = "model", .bursting = true});
+  Loop loop(
+      std::make_unique<DriverInstance>(*robot_table<Model>("model"), OptionValues{{"joints", "2"}}),
+      {.segment = "model", .bursting = true});
   loop.start();
   UntypedFrontend frontend("model");
   ASSERT_EQ(frontend.schema().actuators.size(), 2U);

@@ -91,7 +91,7 @@ TEST_F(RealTimeLoop, MeetsNoPageForTheFirstTimeInAnIteration) {
 #if defined(O80_TEST_SANITIZED) || defined(O80_TEST_EMULATOR)
   GTEST_SKIP() << "a sanitizer has pages of its own, an emulator too";
 #endif
-  Loop loop(std::make_unique<Robot>(table(), OptionValues{}),
+  Loop loop(std::make_unique<DriverInstance>(table(), OptionValues{}),
             {.segment = "puppet", .bursting = true, .history = 20'000});
   loop.start();
   UntypedFrontend frontend("puppet");

@@ -19,7 +19,7 @@ using ::testing::IsEmpty;
 class RunningRequestLoopTest : public PuppetTest {
  protected:
   RunningRequestLoopTest()
-      : loop_(std::make_unique<Loop>(std::make_unique<Robot>(table(), OptionValues{}),
+      : loop_(std::make_unique<Loop>(std::make_unique<DriverInstance>(table(), OptionValues{}),
                                      BackendOptions{.segment = "puppet", .bursting = true})) {
     loop_->start();
     frontend_ = std::make_unique<UntypedFrontend>("puppet");

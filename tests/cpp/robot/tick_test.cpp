@@ -61,7 +61,8 @@ class TickTest : public StationTest {
   }
   static std::unique_ptr<Loop> make(const BackendOptions& options) {
     return std::make_unique<Loop>(
-        std::make_unique<Robot>(*robot_table<Ticking>("ticking"), OptionValues{}), options);
+        std::make_unique<DriverInstance>(*robot_table<Ticking>("ticking"), OptionValues{}),
+        options);
   }
 };
 

@@ -141,7 +141,7 @@ TEST_F(BackendTest, WhatEndsInARowThatIsNeverMadeIsNotCompleted) {
   UntypedFrontend frontend("pair");
   const Batch batch = send(frontend, 0, 1.0);
   ASSERT_EQ(station.backend.try_step(), Step::run);
-  station.backend.end(State::failed, "the arm fell off");
+  station.backend.end(BackendState::failed, "the arm fell off");
   EXPECT_EQ(batch.handle(0).status, Status::purged);
   EXPECT_EQ(batch.handle(0).reason, Reason::stopped);
   EXPECT_THROW(batch.wait(kPatience), BackendFailed);
@@ -366,7 +366,7 @@ TEST_F(BackendTest, EndsEveryCommandWhenItStops) {
   add(frontend, 1, 1.0);
   const Batch scheduled = frontend.pulse({.at = 90});
   station.run(2);
-  station.backend.end(State::stopped);
+  station.backend.end(BackendState::stopped);
   EXPECT_EQ(running.handle(0).status, Status::purged);
   EXPECT_EQ(running.handle(0).reason, Reason::stopped);
   EXPECT_EQ(running.handle(1).status, Status::purged);

@@ -159,7 +159,7 @@ TEST_F(BurstCancelTest, NoMemberOfAGroupMovesIfOneCannot) {
   // itself, twice
   EXPECT_THAT(refused_with(frontend, 5), HasSubstr("twice"));
   // gone
-  other.backend.end(State::stopped);
+  other.backend.end(BackendState::stopped);
   EXPECT_THAT(refused_with(second, 5), HasSubstr("other"));
   EXPECT_EQ(frontend.pulse().size(), 1U);
 }
@@ -227,7 +227,7 @@ TEST_F(BurstGroupFailureTest, AMemberThatHaltsIsNoticedWhileAnEarlierOneIsWaited
 }
 
 TEST_F(BurstGroupFailureTest, SoIsOneWhoseBackendEnds) {
-  other.backend.end(State::failed, "the motor burnt");
+  other.backend.end(BackendState::failed, "the motor burnt");
   EXPECT_THAT(message_of<BackendFailed>([&] { wait_for(bursts, kPatience); }),
               AllOf(HasSubstr("'other'"), HasSubstr("the motor burnt")));
   expect_the_first_cancelled();
@@ -251,7 +251,7 @@ TEST_F(BurstGroupFailureTest, WhatAMemberFinishedBeforeItEndedCounts) {
   bursts[1].cancel();
   other.drive();
   EXPECT_EQ(done.wait_done(kAtOnce), 3);
-  other.backend.end(State::failed, "the motor burnt");
+  other.backend.end(BackendState::failed, "the motor burnt");
   EXPECT_THROW(wait_for(bursts, kAtOnce), TimeoutError) << "of the first";
   expect_the_first_cancelled();
 }

@@ -218,7 +218,7 @@ TEST_F(BurstTest, EndsWithAnErrorWhenTheBackendStopsInIt) {
   const Burst burst = frontend.start_burst(1'000'000'000);
   wait_until_it_runs(frontend);
   bursting.stop();
-  bursting.station.backend.end(State::stopped);
+  bursting.station.backend.end(BackendState::stopped);
   EXPECT_THROW(burst.wait(kPatience), BackendStopped);
   EXPECT_FALSE(burst.done());
 }
@@ -230,7 +230,7 @@ TEST_F(BurstTest, AMovementIsNotCalledEndedWhenTheBackendStopsInIt) {
   const Batch batch = frontend.pulse_to_end();
   wait_until_it_runs(frontend);
   bursting.stop();
-  bursting.station.backend.end(State::stopped);
+  bursting.station.backend.end(BackendState::stopped);
   EXPECT_THROW(frontend.wait_for_end(batch, kPatience), BackendStopped);
   EXPECT_THROW(batch.wait(kPatience), BackendStopped);
   EXPECT_EQ(batch.handle(0).status, Status::purged);

@@ -388,7 +388,7 @@ TEST_F(FrontendTest, WaitsEndWithAnErrorThatSaysWhatBecameOfTheBackend) {
   UntypedFrontend frontend("pair");
   const Batch batch = send(frontend, 0, 1.0, {.pace = iterations(50)});
   station->run(1);
-  std::thread ender([&] { station->backend.end(State::failed, "the motor is hot"); });
+  std::thread ender([&] { station->backend.end(BackendState::failed, "the motor is hot"); });
   EXPECT_THAT(message_of<BackendFailed>([&] { frontend.wait_for(99, kPatience); }),
               AllOf(HasSubstr("pair"), HasSubstr("the motor is hot")));
   EXPECT_THROW(batch.wait(kPatience), BackendFailed);

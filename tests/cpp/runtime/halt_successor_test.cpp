@@ -44,8 +44,8 @@ void live_and_die(Before before, const ChildProcess::Ready& ready, bool bursting
     iterate();
   }
   if (before == Before::asked) frontend.halt("me");
-  if (before == Before::stopped) station.backend.end(State::stopped);
-  if (before == Before::failed) station.backend.end(State::failed, "broken");
+  if (before == Before::stopped) station.backend.end(BackendState::stopped);
+  if (before == Before::failed) station.backend.end(BackendState::failed, "broken");
   ready();
   pause_for_ever();
 }

@@ -347,7 +347,7 @@ TEST_F(RunningRequestTest, AnEndOfTheBackendEndsIt) {
   UntypedFrontend frontend("pair");
   const Batch batch = ask<Home>(frontend);
   station.run(1);
-  station.backend.untyped().end(State::stopped);
+  station.backend.untyped().end(BackendState::stopped);
   EXPECT_EQ(batch.handle(0).status, Status::purged);
   EXPECT_EQ(batch.handle(0).reason, Reason::stopped);
   EXPECT_THAT(frontend.running_requests(), IsEmpty());

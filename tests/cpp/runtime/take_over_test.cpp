@@ -47,14 +47,14 @@ TEST_F(TakeOverTest, SaysWhatBecameOfTheOldBackendByNameAndPid) {
     second.start();
     expect_every_verb_says<BackendSuperseded>(first, pid + ") is gone and a new one has its name");
     UntypedFrontend of_second("pair");
-    second.backend.end(State::failed, "the elbow is too hot");
+    second.backend.end(BackendState::failed, "the elbow is too hot");
     expect_every_verb_says<BackendFailed>(of_second, "failed: the elbow is too hot");
-    second.backend.end(State::stopped);
+    second.backend.end(BackendState::stopped);
   }
   Station third;
   third.start();
   UntypedFrontend of_third("pair");
-  third.backend.end(State::stopped);
+  third.backend.end(BackendState::stopped);
   expect_every_verb_says<BackendStopped>(of_third, "has stopped");
 }
 

@@ -180,7 +180,8 @@ void run(Actor& actor, const Habits& habits, Machine& machine, Generation& life)
   const std::string fault = iterate(actor, habits, machine);
   life.failed = fault.empty() ? 0 : 1;
   life.ending_at = o80::monotonic_now();
-  machine.backend().end(fault.empty() ? o80::State::stopped : o80::State::failed, fault);
+  machine.backend().end(fault.empty() ? o80::BackendState::stopped : o80::BackendState::failed,
+                        fault);
 }
 
 }  // namespace

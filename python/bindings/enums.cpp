@@ -1,4 +1,4 @@
-#include "words.hpp"
+#include "enums.hpp"
 
 #include <nanobind/stl/string.h>
 #include <array>

@@ -27,13 +27,13 @@ void check_options(const RobotTable& table, const OptionValues& options);
 /// One driver object behind its table of functions.
 ///
 /// Not copyable. The destructor stops and destroys the driver.
-class Robot {
+class DriverInstance {
  public:
   /// Constructs the driver, which touches no hardware. Throws InvalidArgument, DriverError.
-  Robot(const RobotTable& table, const OptionValues& options);
-  Robot(const Robot&) = delete;
-  Robot& operator=(const Robot&) = delete;
-  ~Robot();
+  DriverInstance(const RobotTable& table, const OptionValues& options);
+  DriverInstance(const DriverInstance&) = delete;
+  DriverInstance& operator=(const DriverInstance&) = delete;
+  ~DriverInstance();
 
   const RobotTable& table() const { return table_; }
   /// `period`: the period that the user requested [ns]; 0: none. Throws DriverError.

@@ -1,4 +1,4 @@
-#include "robot/robot.hpp"
+#include "robot/driver_instance.hpp"
 
 #include <algorithm>
 #include <cstdio>
@@ -45,7 +45,8 @@ void check_options(const RobotTable& table, const OptionValues& options) {
   }
 }
 
-Robot::Robot(const RobotTable& table, const OptionValues& options) : table_(table) {
+DriverInstance::DriverInstance(const RobotTable& table, const OptionValues& options)
+    : table_(table) {
   check_table(table, table.name);
   check_options(table, options);
   const std::vector<OptionValue> values = plain(options);
@@ -56,12 +57,12 @@ Robot::Robot(const RobotTable& table, const OptionValues& options) : table_(tabl
   }
 }
 
-Robot::~Robot() {
+DriverInstance::~DriverInstance() {
   stop();
   table_.destroy(driver_);
 }
 
-Schema Robot::describe(std::int64_t period) const {
+Schema DriverInstance::describe(std::int64_t period) const {
   Schema schema;
   FaultText fault{};
   const auto copy = [](void* context, const SchemaRows* rows) {
@@ -84,19 +85,21 @@ Schema Robot::describe(std::int64_t period) const {
   return schema;
 }
 
-bool Robot::start() noexcept {
+bool DriverInstance::start() noexcept {
   started_ = true;
   return table_.start(driver_, &fault_) == 0;
 }
-bool Robot::wait(std::int64_t due) noexcept { return table_.wait(driver_, due, &fault_) == 0; }
-bool Robot::write(const DesiredView& desired) noexcept {
+bool DriverInstance::wait(std::int64_t due) noexcept {
+  return table_.wait(driver_, due, &fault_) == 0;
+}
+bool DriverInstance::write(const DesiredView& desired) noexcept {
   return table_.write(driver_, &desired, &fault_) == 0;
 }
-bool Robot::read(ReadingView& reading) noexcept {
+bool DriverInstance::read(ReadingView& reading) noexcept {
   return table_.read(driver_, &reading, &fault_) == 0;
 }
 
-Served Robot::served(RequestAnswer answer, const FaultText& text) noexcept {
+Served DriverInstance::served(RequestAnswer answer, const FaultText& text) noexcept {
   switch (answer) {
     case RequestAnswer::done:
       return Served::done();
@@ -112,7 +115,7 @@ Served Robot::served(RequestAnswer answer, const FaultText& text) noexcept {
   }
 }
 
-Served Robot::served(const RequestReport& report) noexcept {
+Served DriverInstance::served(const RequestReport& report) noexcept {
   const std::string_view text(report.text, strnlen(report.text, sizeof report.text));
   switch (report.answer) {
     case RequestAnswer::done:
@@ -128,20 +131,22 @@ Served Robot::served(const RequestReport& report) noexcept {
   }
 }
 
-Served Robot::request(std::uint32_t index, const std::byte* payload) noexcept {
+Served DriverInstance::request(std::uint32_t index, const std::byte* payload) noexcept {
   FaultText text{};
   return served(table_.request(driver_, index, payload, &text), text);
 }
 
-bool Robot::halt() noexcept { return table_.halt == nullptr || table_.halt(driver_, &fault_) == 0; }
+bool DriverInstance::halt() noexcept {
+  return table_.halt == nullptr || table_.halt(driver_, &fault_) == 0;
+}
 
-Served Robot::resume() noexcept {
+Served DriverInstance::resume() noexcept {
   if (table_.resume == nullptr) return Served::done();
   FaultText text{};
   return served(table_.resume(driver_, &text), text);
 }
 
-void Robot::stop() noexcept {
+void DriverInstance::stop() noexcept {
   if (!started_) return;
   started_ = false;
   table_.stop(driver_);

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+
+#include "control/record.hpp"
+
+namespace o80 {
+
+inline constexpr std::uint32_t kNobody = 0xFFFFFFFF;  // instead of a lane
+
+/// The burst that a bursting backend runs: its sender, and the iterations that are left.
+///
+/// Realtime: yes.
+class BurstGrant {
+ public:
+  /// Instead of a number of iterations: until every record of the batch has ended.
+  static constexpr std::int64_t kUntilEnded = -1;
+
+  bool runs() const noexcept { return left_ != 0; }
+  /// The lane of the sender, or kNobody.
+  std::uint32_t lane() const noexcept { return lane_; }
+  std::uint64_t incarnation() const noexcept { return incarnation_; }
+  CommandId batch() const noexcept { return batch_; }
+  bool runs_for(std::uint32_t lane) const noexcept { return runs() && lane_ == lane; }
+  bool is_in_last_iteration() const noexcept { return left_ == 1; }
+  /// This status is the one that a burst until the end of its batch waits for.
+  bool ends_with(std::uint32_t lane, CommandId id) const noexcept {
+    return left_ == kUntilEnded && lane == lane_ && id == batch_ + 1;
+  }
+
+  void begin(std::uint32_t lane, std::uint64_t incarnation, CommandId batch,
+             std::int64_t iterations) noexcept {
+    left_ = iterations;
+    lane_ = lane;
+    batch_ = batch;
+    incarnation_ = incarnation;
+  }
+  /// Counts an iteration; true if it was the last one.
+  bool count() noexcept { return left_ > 0 && --left_ == 0; }
+  /// The current iteration is the last one.
+  void shorten() noexcept { left_ = 1; }
+  void end() noexcept {
+    left_ = 0;
+    lane_ = kNobody;
+  }
+
+ private:
+  std::int64_t left_ = 0;
+  std::uint32_t lane_ = kNobody;
+  CommandId batch_ = 0;
+  std::uint64_t incarnation_ = 0;
+};
+
+}  // namespace o80

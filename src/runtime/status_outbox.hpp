@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "control/status_sink.hpp"
+#include "memory/lane_receiver.hpp"
+
+namespace o80 {
+
+/// Reports statuses to their lanes. An end that comes during a step is reported after its row is
+/// published, so that no command is reported as completed by a backend that dies before.
+///
+/// Writer:   the backend's thread.
+/// Realtime: everything but construction.
+class StatusOutbox {
+ public:
+  /// `most`: ends that one step can bring.
+  StatusOutbox(LaneReceivers& lanes, std::size_t most) : lanes_(lanes) { waiting_.reserve(most); }
+
+  void begin_step() noexcept { stepping_ = true; }
+  void end_step() noexcept { stepping_ = false; }
+  void put(const StatusChange& change) noexcept;
+  /// The row of the step is published: reports what waits for it.
+  void report_row() noexcept;
+  /// That row will never be published: what was completed in it ends as purged.
+  void report_no_row() noexcept;
+
+ private:
+  void report(const StatusChange& change) noexcept;
+
+  LaneReceivers& lanes_;
+  std::vector<StatusChange> waiting_;
+  bool stepping_ = false;
+};
+
+}  // namespace o80
