@@ -130,7 +130,8 @@ AttachedSegment AttachedSegment::attach(std::string_view, Access access, const D
 AttachedSegment::AttachedSegment(AttachedSegment&& other) noexcept
     : access_(other.access_), view_(other.view_) {}
 bool AttachedSegment::has_ended() const noexcept {
-  const auto state = static_cast<BackendState>(view_.counters().state.load(rl::mo_acquire, RL_INFO));
+  const auto state =
+      static_cast<BackendState>(view_.counters().state.load(rl::mo_acquire, RL_INFO));
   return state != BackendState::starting && state != BackendState::running;
 }
 bool AttachedSegment::gone() const noexcept { return has_ended(); }
