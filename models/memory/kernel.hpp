@@ -149,11 +149,9 @@ class Segment {
     for (auto& cancelled : page.cancelled) make(cancelled);
     o80::LaneFeedback& feedback = view.feedback(i);
     make(feedback.freed);
-    make(feedback.ended);
     make(feedback.burst);
     make(feedback.bursts);
     make(feedback.events);
-    make(feedback.staged);
     make(feedback.ids);
     make(feedback.incarnation);
     for (std::size_t k = 0; k < kRemembered; ++k) make(feedback.recent_bursts[k]);
