@@ -68,7 +68,7 @@ void futex_wake(const rl::atomic<std::uint32_t>& word, int count) noexcept {
 
 /// FUTEX_WAKE_OP: both in one system call.
 void futex_wake_both(const rl::atomic<std::uint32_t>& first, int count,
-                     const rl::atomic<std::uint32_t>& second) noexcept {
+                     rl::atomic<std::uint32_t>& second) noexcept {
   futex_wake(first, count);
   futex_wake(second, kEverybody);
 }
