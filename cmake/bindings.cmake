@@ -7,9 +7,19 @@ execute_process(
 )
 find_package(nanobind CONFIG REQUIRED)
 
+# signatures and docstrings of compiled verbs stand in the classes of o80.frontend
+set(verb_texts ${PROJECT_BINARY_DIR}/python/verbs.hpp)
+file(GLOB frontend_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/python/o80/frontend/*.py)
+add_custom_command(
+  OUTPUT ${verb_texts}
+  COMMAND ${Python_EXECUTABLE} ${PROJECT_SOURCE_DIR}/python/bindings/verbs.py ${verb_texts} ${frontend_sources}
+  DEPENDS ${PROJECT_SOURCE_DIR}/python/bindings/verbs.py ${frontend_sources}
+  COMMENT "Writing the signatures of compiled verbs"
+)
+
 file(GLOB binding_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/python/bindings/*.cpp)
-nanobind_add_module(_core NOMINSIZE NB_SUPPRESS_WARNINGS ${binding_sources})
-target_include_directories(_core PRIVATE ${PROJECT_SOURCE_DIR}/python/bindings)
+nanobind_add_module(_core NOMINSIZE NB_SUPPRESS_WARNINGS ${binding_sources} ${verb_texts})
+target_include_directories(_core PRIVATE ${PROJECT_SOURCE_DIR}/python/bindings ${PROJECT_BINARY_DIR}/python)
 target_link_libraries(_core PRIVATE o80 o80_private_headers o80_warnings)
 set_target_properties(
   _core PROPERTIES INSTALL_RPATH "$ORIGIN/lib" LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/python

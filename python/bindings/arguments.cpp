@@ -7,6 +7,7 @@
 
 #include "control/record.hpp"
 #include "o80/base/error.hpp"
+#include "waiting.hpp"
 
 namespace nb = nanobind;
 using o80::InvalidArgument;
@@ -56,6 +57,19 @@ std::chrono::nanoseconds nanoseconds_of(nb::handle value, const char* name) {
                           " s, got " + std::to_string(seconds));
   }
   return std::chrono::nanoseconds(std::llround(seconds * 1e9));
+}
+
+o80::Timeout timeout_of(nb::handle seconds) {
+  constexpr double kLongest = 1e9;  // [s]
+  if (seconds.is_none()) return {};
+  const double number = PyFloat_AsDouble(seconds.ptr());
+  if ((number == -1.0 && PyErr_Occurred() != nullptr) || std::isnan(number)) {
+    PyErr_Clear();
+    throw InvalidArgument("timeout must be a number of seconds, or None for ever; got " +
+                          nb::cast<std::string>(nb::repr(seconds)));
+  }
+  if (number > kLongest) return {};
+  return std::chrono::nanoseconds(std::llround(std::fmax(number, 0.0) * 1e9));
 }
 
 o80::PaceSpec pace_of(nb::handle duration, nb::handle speed, nb::handle until,

@@ -92,7 +92,8 @@ class Backend final : public o80::RequestServer {
   }
 
   /// True if an iteration has begun, false if the backend must end.
-  bool step(std::optional<double> timeout) {
+  bool step(nb::handle seconds) {
+    const o80::Timeout timeout = timeout_of(seconds);
     between_steps();
     if (!begun_) throw InvalidArgument("publish row 0 before the first step");
     const Stepping stepping(*this);
@@ -177,8 +178,8 @@ class Backend final : public o80::RequestServer {
     if (from.size() > 0) std::memcpy(to, from.c_str(), from.size());
   }
 
-  o80::Step wait(o80::UntypedBackend& backend, std::optional<double> timeout) {
-    const o80::Deadline deadline(timeout_of(timeout));
+  o80::Step wait(o80::UntypedBackend& backend, o80::Timeout timeout) {
+    const o80::Deadline deadline(timeout);
     const Waiting waiting;
     while (true) {
       const o80::Step step = backend.step_within(deadline.left(kLook));

@@ -19,6 +19,11 @@ using o80::Handle;
 
 namespace {
 
+/// What `await` asks of an object: the iterator of a coroutine of o80.awaiting.
+nb::object awaited(nb::handle self) {
+  return nb::module_::import_("o80.awaiting").attr("end_of")(self).attr("__await__")();
+}
+
 /// None stands for "not yet".
 std::optional<o80::Iteration> known(o80::Iteration iteration) {
   if (iteration < 0) return {};
@@ -114,10 +119,11 @@ void bind_batch(nb::module_& m) {
           "all; see `ended` and `wait`.")
       .def(
           "wait",
-          [](const Batch& self, std::optional<double> timeout) {
+          [](const Batch& self, nb::handle timeout) {
+            const o80::Timeout patience = timeout_of(timeout);
             carrying(self, [&] {
               const Waiting waiting;
-              self.wait(timeout_of(timeout), Waiting::keep_waiting);
+              self.wait(patience, Waiting::keep_waiting);
             });
           },
           "timeout"_a = nb::none(),
@@ -125,6 +131,9 @@ void bind_batch(nb::module_& m) {
 
 A bursting backend must be burst for that. Raises TimeoutError after `timeout` [s], which carries
 this batch, and BackendGone.)")
+      .def("__await__", &awaited,
+           nb::sig("def __await__(self) -> collections.abc.Generator[typing.Any, None, Batch]"),
+           "Waits as a task of asyncio: `await arm.pulse()` gives the batch when it has ended.")
       .def("__repr__", [](const Batch& self) {
         const std::string what = "<o80.Batch of " + std::to_string(self.size());
         try {
@@ -151,11 +160,12 @@ A burst that has not begun runs no iteration. What was sent with it stays queued
 returns the last row there was.)")
       .def(
           "wait",
-          [](const PendingBurst& self, std::optional<double> timeout) {
+          [](const PendingBurst& self, nb::handle timeout) {
+            const o80::Timeout patience = timeout_of(timeout);
             return carrying(self.burst.batch(), [&] {
               o80::UntypedObservation row = [&] {
                 const Waiting waiting;
-                return self.burst.wait(timeout_of(timeout), Waiting::keep_waiting);
+                return self.burst.wait(patience, Waiting::keep_waiting);
               }();
               return Observation(self.decoder, std::move(row));
             });
@@ -164,5 +174,10 @@ returns the last row there was.)")
           R"(Waits for its last iteration and returns the observation of it.
 
 Raises TimeoutError after `timeout` [s], and BackendGone. After a timeout it goes on, and can be
-waited for again, or cancelled.)");
+waited for again, or cancelled.)")
+      .def("__await__", &awaited,
+           nb::sig("def __await__(self) "
+                   "-> collections.abc.Generator[typing.Any, None, Observation]"),
+           "Waits as a task of asyncio for the observation of its last iteration. A task that is "
+           "cancelled leaves it under way.");
 }

@@ -8,6 +8,7 @@ void bind_errors(nanobind::module_& module);
 void bind_segment_list(nanobind::module_& module);
 void bind_observation(nanobind::module_& module);
 void bind_batch(nanobind::module_& module);
+void bind_canceller(nanobind::module_& module);
 void bind_frontend(nanobind::module_& module);
 void bind_prepared_burst(nanobind::module_& module);
 void bind_backend(nanobind::module_& module);

@@ -13,6 +13,7 @@
 #include "describe/table.hpp"
 #include "runtime/link.hpp"
 #include "states.hpp"
+#include "verb.hpp"
 #include "waiting.hpp"
 
 namespace nb = nanobind;
@@ -160,7 +161,7 @@ std::string Frontend::name_of(std::uint32_t index) const {
 
 namespace {
 
-Attachment attach(const std::string& segment, Seconds timeout, bool read_only, bool dead) {
+Attachment attach(const std::string& segment, nb::handle timeout, bool read_only, bool dead) {
   o80::FrontendOptions options;
   options.timeout = timeout_of(timeout);
   options.access = read_only ? o80::Access::read_only : o80::Access::read_write;
@@ -171,7 +172,7 @@ Attachment attach(const std::string& segment, Seconds timeout, bool read_only, b
 }
 
 /// What will take the place of a frontend; its closing ends the wait.
-Attachment attach_again(const Frontend& self, Seconds timeout, bool read_only) {
+Attachment attach_again(const Frontend& self, nb::handle timeout, bool read_only) {
   const std::shared_ptr<UntypedFrontend> former = self.shared();
   former->link()->check_usable();
   o80::FrontendOptions options;
@@ -204,23 +205,17 @@ void bind_frontend(nb::module_& m) {
   bind_sending(m, frontend);
   bind_reading(m, frontend);
   bind_halting(m, frontend);
-  frontend
-      .def_prop_ro(
-          "segment", [](const Frontend& self) { return self.untyped().segment(); },
-          "The name of the segment.")
-      .def_prop_ro(
-          "epoch", [](const Frontend& self) { return self.untyped().epoch(); },
-          "Names this run of the backend; another one of the same name has another.")
-      .def_prop_ro(
-          "bursting", [](const Frontend& self) { return self.untyped().bursting(); },
-          "Whether the backend stands still until it is burst.")
-      .def_prop_ro(
-          "life", [](const Frontend& self) { return std::string(name_of(self.untyped().life())); },
-          "starting, running, stopped, failed, superseded or killed.")
-      .def_prop_ro(
-          "closed", [](const Frontend& self) { return self.untyped().closed(); },
-          "Whether it was closed.")
-      .def_prop_ro("_is_inline", &Frontend::is_inline)
+  def_noun(frontend, "segment", verbs::segment,
+           [](const Frontend& self) { return self.untyped().segment(); });
+  def_noun(frontend, "epoch", verbs::epoch,
+           [](const Frontend& self) { return self.untyped().epoch(); });
+  def_noun(frontend, "bursting", verbs::bursting,
+           [](const Frontend& self) { return self.untyped().bursting(); });
+  def_noun(frontend, "life", verbs::life,
+           [](const Frontend& self) { return std::string(name_of(self.untyped().life())); });
+  def_noun(frontend, "closed", verbs::closed,
+           [](const Frontend& self) { return self.untyped().closed(); });
+  frontend.def_prop_ro("_is_inline", &Frontend::is_inline)
       .def("_close", &Frontend::close)
       .def("_check_usable", [](const Frontend& self) { self.untyped().link()->check_usable(); })
       .def_prop_ro(

@@ -59,9 +59,6 @@ class Frontend {
   std::vector<const o80::FieldRow*> plain_;  // of each actuator; null: a struct
 };
 
-/// Seconds, or None for ever.
-using Seconds = std::optional<double>;
-
 // what each file adds to the class
 void bind_sending(nanobind::module_& m, nanobind::class_<Frontend>& frontend);
 void bind_halting(nanobind::module_& m, nanobind::class_<Frontend>& frontend);

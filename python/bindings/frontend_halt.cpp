@@ -10,6 +10,7 @@
 #include "frontend.hpp"
 #include "memory/verb_word.hpp"
 #include "runtime/link.hpp"
+#include "verb.hpp"
 #include "waiting.hpp"
 
 namespace nb = nanobind;
@@ -34,10 +35,11 @@ std::uint64_t halt(const Frontend& self, nb::handle why) {
   return frontend->halt(reason);
 }
 
-void resume(const Frontend& self, std::uint64_t number, std::optional<double> timeout) {
+void resume(const Frontend& self, std::uint64_t number, nb::handle timeout) {
+  const o80::Timeout patience = timeout_of(timeout);
   const std::shared_ptr<o80::UntypedFrontend> frontend = self.shared();
   const Waiting waiting;
-  frontend->resume(number, timeout_of(timeout), Waiting::keep_waiting);
+  frontend->resume(number, patience, Waiting::keep_waiting);
 }
 
 /// Name, iteration, who, progress.
@@ -58,29 +60,22 @@ std::optional<std::tuple<std::string, double>> slow_verb(const Frontend& self) {
 }
 
 std::uint64_t halt_segment(const std::string& segment, const std::string& reason,
-                           std::optional<double> timeout) {
+                           nb::handle timeout) {
+  const o80::Timeout patience = timeout_of(timeout);
   const Waiting waiting;
-  return o80::halt(segment, reason, timeout_of(timeout), Waiting::keep_waiting);
+  return o80::halt(segment, reason, patience, Waiting::keep_waiting);
 }
 
 }  // namespace
 
 void bind_halting(nb::module_& m, nb::class_<Frontend>& frontend) {
   m.def("halt", &halt_segment, "segment"_a, "reason"_a, "timeout"_a.none());
-  frontend
-      .def(
-          "halt", &halt, "reason"_a.none() = "", nb::sig("def halt(self, reason: str = '') -> int"),
-          R"(Halts the backend: every command ends as halted, every actuator brakes within its limits, and
-nothing moves again until `resume`. Acts in the first iteration begun after it, whoever has control.
-
-Returns the number of the halt. Raises ReadOnly, BackendGone.)")
-      .def_prop_ro("_halted", &halted)
+  def_verb(frontend, "halt", verbs::halt, &halt, "reason"_a.none() = "");
+  def_verb(frontend, "keep_alive", verbs::keep_alive,
+           [](const Frontend& self) { self.untyped().keep_alive(); });
+  frontend.def_prop_ro("_halted", &halted)
       .def_prop_ro("_running_requests", &running_requests,
                    nb::sig("def _running_requests(self) -> list[tuple[str, int, str, str]]"))
       .def("_resume", &resume, "number"_a, "timeout"_a.none())
-      .def_prop_ro("_slow_verb", &slow_verb)
-      .def(
-          "keep_alive", [](const Frontend& self) { self.untyped().keep_alive(); },
-          R"(Tells the backend's watchdog that this frontend lives, as a pulse or a wait for its own batch
-does; reading does not.)");
+      .def_prop_ro("_slow_verb", &slow_verb);
 }

@@ -2,6 +2,7 @@
 
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
+#include <nanobind/stl/vector.h>
 
 #include <algorithm>
 #include <utility>
@@ -11,12 +12,14 @@
 #include "frontend.hpp"
 #include "pickling.hpp"
 #include "runtime/link.hpp"
+#include "verb.hpp"
 #include "waiting.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
 using o80::Iteration;
 using o80::UntypedFrontend;
+using o80::UntypedObservation;
 
 namespace {
 
@@ -26,34 +29,85 @@ Observation latest(const Frontend& self) {
   return observation;
 }
 
-Observation wait_for(const Frontend& self, nb::handle iteration, Seconds timeout) {
+Observation wait_for(const Frontend& self, nb::handle iteration, nb::handle timeout) {
   const Iteration wanted = count_of(iteration, "the iteration to wait for");
+  const o80::Timeout patience = timeout_of(timeout);
   Observation observation = self.blank();
   const auto frontend = self.shared();
   const Waiting waiting;
-  frontend->wait_for(wanted, observation.row.bytes(), timeout_of(timeout), Waiting::keep_waiting);
+  frontend->wait_for(wanted, observation.row.bytes(), patience, Waiting::keep_waiting);
   return observation;
 }
 
 /// Moves the position on.
 Observation next_row(const std::shared_ptr<UntypedFrontend>& frontend,
                      const std::shared_ptr<const Decoder>& decoder, Iteration& position,
-                     Seconds timeout) {
+                     o80::Timeout timeout) {
   Observation observation(decoder);
   const Waiting waiting;
-  observation.missed = frontend->wait_for_next(position, observation.row.bytes(),
-                                               timeout_of(timeout), Waiting::keep_waiting);
+  observation.missed =
+      frontend->wait_for_next(position, observation.row.bytes(), timeout, Waiting::keep_waiting);
   return observation;
 }
 
-Observation wait_for_next(Frontend& self, Seconds timeout) {
+/// The row that wait_for_next gives next.
+Iteration next_of(Frontend& self) {
+  if (self.next < 0) self.next = self.untyped().published() + 1;
+  return self.next;
+}
+
+Observation wait_for_next(Frontend& self, nb::handle timeout) {
+  const o80::Timeout patience = timeout_of(timeout);
   const auto frontend = self.shared();
-  if (self.next < 0) self.next = frontend->published() + 1;
-  Iteration next = self.next;
-  Observation observation = next_row(frontend, self.decoder(), next, timeout);
+  Iteration next = next_of(self);
+  Observation observation = next_row(frontend, self.decoder(), next, patience);
   // another thread may have been here, or attached again
   if (frontend == self.shared()) self.next = std::max(self.next, next);
   return observation;
+}
+
+/// Until a row is there; it may have been overwritten meanwhile.
+void await_row(const UntypedFrontend& frontend, Iteration k, o80::Timeout timeout) {
+  UntypedObservation row(frontend.description());
+  const Waiting waiting;
+  try {
+    frontend.wait_for(k, row.bytes(), timeout, Waiting::keep_waiting);
+  } catch (const o80::RowOverwritten&) {
+    // so it was there
+  }
+}
+
+/// The frontends whose rows have come, with these; None as a row: the next one in sequence.
+std::vector<std::pair<Frontend*, Observation>> wait_for_first(
+    const std::vector<std::pair<Frontend*, nb::object>>& wanted, nb::handle timeout) {
+  const o80::Timeout patience = timeout_of(timeout);
+  std::vector<std::shared_ptr<UntypedFrontend>> alive;
+  std::vector<o80::RowWish> wishes;
+  for (const auto& [frontend, iteration] : wanted) {
+    const Iteration row =
+        iteration.is_none() ? next_of(*frontend) : count_of(iteration, "the iteration to wait for");
+    alive.push_back(frontend->shared());
+    wishes.push_back({.frontend = alive.back().get(), .row = row});
+  }
+  const std::vector<std::size_t> there = [&] {
+    const Waiting waiting;
+    return o80::wait_for_first(wishes, patience, Waiting::keep_waiting);
+  }();
+  std::vector<std::pair<Frontend*, Observation>> rows;
+  for (const std::size_t i : there) {
+    Frontend& frontend = *wanted[i].first;
+    if (wanted[i].second.is_none()) {
+      Iteration next = wishes[i].row;
+      rows.emplace_back(&frontend, next_row(alive[i], frontend.decoder(), next, {}));
+      // another thread may have attached again
+      if (alive[i] == frontend.shared()) frontend.next = std::max(frontend.next, next);
+    } else {
+      Observation observation = frontend.blank();
+      alive[i]->wait_for(wishes[i].row, observation.row.bytes(), std::chrono::nanoseconds(0));
+      rows.emplace_back(&frontend, std::move(observation));
+    }
+  }
+  return rows;
 }
 
 /// Rows in sequence, from a position of its own.
@@ -61,13 +115,23 @@ struct Stream {
   std::shared_ptr<UntypedFrontend> frontend;
   std::shared_ptr<const Decoder> decoder;
   Iteration next;
-  Seconds timeout;
+  o80::Timeout timeout;
 };
 
-Stream open_stream(const Frontend& self, nb::handle since, Seconds timeout) {
+Stream open_stream(const Frontend& self, nb::handle since, nb::handle timeout) {
   const Iteration next = self.untyped().published() + 1;
   const Iteration first = since.is_none() ? next : count_of(since, "since");
-  return {self.shared(), self.decoder(), std::max<Iteration>(first, 0), timeout};
+  return {self.shared(), self.decoder(), std::max<Iteration>(first, 0), timeout_of(timeout)};
+}
+
+Observation at_time(const Frontend& self, std::int64_t time) {
+  const auto frontend = self.shared();
+  const auto decoder = self.decoder();
+  return Observation(decoder, frontend->at_time(time));
+}
+
+Iteration iteration_at(const Frontend& self, std::int64_t time) {
+  return self.untyped().iteration_at(time);
 }
 
 /// Fills an array of rows; gives the first iteration and how many there were.
@@ -89,40 +153,54 @@ void bind_reading(nb::module_& m, nb::class_<Frontend>& frontend) {
   stream
       .def(
           "__iter__", [](nb::object self) { return self; }, nb::sig("def __iter__(self) -> Stream"))
-      .def("__next__", [](Stream& self) {
-        Iteration next = self.next;
-        Observation observation = next_row(self.frontend, self.decoder, next, self.timeout);
-        self.next = std::max(self.next, next);
-        return observation;
-      });
+      .def("__next__",
+           [](Stream& self) {
+             Iteration next = self.next;
+             Observation observation = next_row(self.frontend, self.decoder, next, self.timeout);
+             self.next = std::max(self.next, next);
+             return observation;
+           })
+      .def(
+          "__aiter__", [](nb::object self) { return self; },
+          nb::sig("def __aiter__(self) -> Stream"))
+      .def(
+          "__anext__",
+          [](nb::handle self) {
+            return nb::module_::import_("o80.awaiting").attr("next_of")(self);
+          },
+          nb::sig("def __anext__(self) "
+                  "-> collections.abc.Coroutine[typing.Any, typing.Any, Observation]"))
+      .def_prop_ro(
+          "_ready", [](const Stream& self) { return self.frontend->published() >= self.next; },
+          "Whether the next observation is there.")
+      .def("_await_row",
+           [](const Stream& self) { await_row(*self.frontend, self.next, self.timeout); });
   refuse_to_pickle(stream, "a stream", "its frontend, and open a stream of that");
 
-  frontend.def("latest", &latest, "The newest observation.")
-      .def("wait_for", &wait_for, "iteration"_a.none(), "timeout"_a = nb::none(),
-           nb::sig("def wait_for(self, iteration: int, timeout: float | None = None) "
-                   "-> Observation"),
-           R"(The observation of an iteration, as soon as it is there (a past one: at once).
-
-Raises RowOverwritten if the history no longer holds it, TimeoutError after `timeout` [s],
-BackendGone.)")
-      .def("wait_for_next", &wait_for_next, "timeout"_a = nb::none(),
-           R"(The observation after the one this call returned before; the first time, the next one.
-
-If the reader fell behind, `missed` of the observation says how many were overwritten unread. The
-position belongs to this frontend: threads that all need every row use a stream each.
-
-Raises TimeoutError after `timeout` [s], BackendGone.)")
-      .def("stream", &open_stream, "since"_a = nb::none(), "timeout"_a = nb::none(),
-           nb::sig("def stream(self, since: int | None = None, timeout: float | None = None) "
-                   "-> Stream"),
-           R"(Iterates over every observation, in order, from `since` (None: the next one).
-
-timeout: longest wait for one of them [s].)")
-      .def("_read_rows", &read_rows, "first"_a, "array"_a)
-      .def_prop_ro(
-          "published", [](const Frontend& self) { return self.untyped().published(); },
-          "The iteration of the newest observation.")
-      .def_prop_ro(
-          "oldest", [](const Frontend& self) { return self.untyped().oldest(); },
-          "The iteration of the oldest observation still there.");
+  frontend.def("latest", &latest, nb::sig(verbs::latest.signature), verbs::latest.help);
+  def_verb(frontend, "wait_for", verbs::wait_for, &wait_for, "iteration"_a.none(),
+           "timeout"_a = nb::none());
+  def_verb(frontend, "wait_for_next", verbs::wait_for_next, &wait_for_next,
+           "timeout"_a = nb::none());
+  def_verb(frontend, "stream", verbs::stream, &open_stream, "since"_a = nb::none(),
+           "timeout"_a = nb::none());
+  def_noun(frontend, "published", verbs::published,
+           [](const Frontend& self) { return self.untyped().published(); });
+  def_noun(frontend, "oldest", verbs::oldest,
+           [](const Frontend& self) { return self.untyped().oldest(); });
+  m.def("wait_for_first", &wait_for_first, "wanted"_a, "timeout"_a.none(),
+        nb::sig("def wait_for_first(wanted: collections.abc.Sequence[tuple[Frontend, int | None]], "
+                "timeout: float | None) -> list[tuple[Frontend, Observation]]"));
+  frontend.def_prop_ro("_next", &next_of)
+      .def(
+          "_await_row",
+          [](const Frontend& self, Iteration k, nb::handle timeout) {
+            const std::shared_ptr<UntypedFrontend> alive = self.shared();
+            await_row(*alive, k, timeout_of(timeout));
+          },
+          "iteration"_a, "timeout"_a.none(),
+          nb::sig("def _await_row(self, iteration: int, timeout: float | None) -> None"))
+      .def("_iteration_at", &iteration_at, "time"_a)
+      .def("_at_time", &at_time, "time"_a)
+      .def("_read_rows", &read_rows, "first"_a, "array"_a);
 }

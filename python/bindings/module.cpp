@@ -21,6 +21,7 @@ NB_MODULE(_core, m) {
   bind_segment_list(m);
   bind_observation(m);
   bind_batch(m);
+  bind_canceller(m);
   bind_frontend(m);
   bind_prepared_burst(m);
   bind_backend(m);

@@ -139,27 +139,27 @@ changes them.)")
               "set by wait_for_next and stream.")
       .def_prop_ro(
           "desired", [](nb::handle self) { return decoded(self, &Decoder::desired); },
-          nb::sig("def desired(self) -> typing.Any"),
+          nb::sig("def desired(self) -> States"),
           "The states that were asked: an array (actuators,), or a record of groups.")
       .def_prop_ro(
           "observed", [](nb::handle self) { return decoded(self, &Decoder::observed); },
-          nb::sig("def observed(self) -> typing.Any"),
+          nb::sig("def observed(self) -> States"),
           "The states that were read: an array (actuators,), or a record of groups.")
       .def_prop_ro(
           "extended", [](nb::handle self) { return decoded(self, &Decoder::extended); },
-          nb::sig("def extended(self) -> typing.Any"),
+          nb::sig("def extended(self) -> Record"),
           "Further sensor values: a record with a value for each field.")
       .def_prop_ro(
           "active", [](nb::handle self) { return decoded(self, &Decoder::active); },
-          nb::sig("def active(self) -> typing.Any"),
+          nb::sig("def active(self) -> numpy.typing.NDArray[numpy.bool_]"),
           "Whether a command gave the desired state: bool (actuators,).")
       .def_prop_ro(
           "clamped", [](nb::handle self) { return decoded(self, &Decoder::clamped); },
-          nb::sig("def clamped(self) -> typing.Any"),
+          nb::sig("def clamped(self) -> numpy.typing.NDArray[numpy.bool_]"),
           "Whether the limits changed the desired state: bool (actuators,).")
       .def_prop_ro(
           "braking", [](nb::handle self) { return decoded(self, &Decoder::braking); },
-          nb::sig("def braking(self) -> typing.Any"),
+          nb::sig("def braking(self) -> numpy.typing.NDArray[numpy.bool_]"),
           "Whether the actuator came to rest without a command: bool (actuators,).")
       .def(
           "flat",
@@ -167,7 +167,9 @@ changes them.)")
             const auto* observation = nb::inst_ptr<Observation>(self);
             return call_python([&] { return observation->decoder->flat(self, dtype); });
           },
-          "dtype"_a = nb::none(), nb::sig("def flat(self, dtype: typing.Any = None) -> typing.Any"),
+          "dtype"_a = nb::none(),
+          nb::sig("def flat(self, dtype: numpy.typing.DTypeLike | None = None) -> "
+                  "numpy.typing.NDArray[typing.Any]"),
           "All observed numbers, then all extended ones, as one vector (default: float32).")
       .def(
           "__repr__", [](nb::handle self) { return decoded(self, &Decoder::text); },

@@ -33,13 +33,14 @@ class PreparedBurst {
         targets_(targets),
         rows_(rows, PyBUF_WRITABLE) {}
 
-  o80::Iteration run(const Frontend& self, Seconds timeout, nb::handle at, nb::handle late) const {
+  o80::Iteration run(const Frontend& self, nb::handle timeout, nb::handle at,
+                     nb::handle late) const {
     const o80::PulseOptions options = pulse_options(at, late);
+    const o80::Timeout patience = timeout_of(timeout);
     const auto frontend = self.shared();
     frontend->add_trajectories(actuators_, steps_, targets_.span(), options_);
     const Waiting waiting;
-    return frontend->burst_rows(rows_.writable(), timeout_of(timeout), Waiting::keep_waiting,
-                                options);
+    return frontend->burst_rows(rows_.writable(), patience, Waiting::keep_waiting, options);
   }
 
  private:

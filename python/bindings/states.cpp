@@ -201,15 +201,40 @@ class Writer {
       field(schema_.fields[row.first_field], value, to, number, what);
       return;
     }
+    if (missing_ == Missing::kept && is_first_field(row, value)) {
+      first_field(row, value, to, number, what);
+      return;
+    }
     if (!is_sequence || PySequence_Size(value.ptr()) != static_cast<Py_ssize_t>(row.fields)) {
       refuse(what,
-             "a mapping, a record, or all its fields in order (" + fields_of(schema_, row) + ")",
+             "a number (its first field), a mapping, a record, or all its fields in order (" +
+                 fields_of(schema_, row) + ")",
              value);
     }
     for (std::uint32_t i = 0; i < row.fields; ++i) {
       const FieldRow& member = schema_.fields[row.first_field + i];
       field(member, value[i], to + member.offset, number, "'" + member.name.str() + "' of " + what);
       number += numbers_in(member);
+    }
+  }
+
+  /// A number, or a label if the first field is an enumeration.
+  bool is_first_field(const o80::TypeRow& row, nb::handle value) const {
+    if (row.fields == 0) return false;
+    if (PyUnicode_Check(value.ptr()) != 0) {
+      return schema_.fields[row.first_field].kind == Kind::enumeration;
+    }
+    return PyNumber_Check(value.ptr()) != 0 && PySequence_Check(value.ptr()) == 0;
+  }
+
+  /// The other fields keep their desired values.
+  void first_field(const o80::TypeRow& row, nb::handle value, std::byte* to, std::uint32_t number,
+                   const std::string& what) {
+    const FieldRow& first = schema_.fields[row.first_field];
+    field(first, value, to + first.offset, number, "'" + first.name.str() + "' of " + what);
+    for (std::uint32_t i = 1; i < row.fields; ++i) {
+      const FieldRow& other = schema_.fields[row.first_field + i];
+      left_out(row, other, to + other.offset, what);
     }
   }
 

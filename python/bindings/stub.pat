@@ -1,3 +1,10 @@
 # what the stub of o80._core takes from the Python side of the package
 _core.__prefix__:
+    import numpy.typing
+    from o80.record import Record
+    from o80.states import States
     from o80.words import Reason, Status
+
+# public verbs of a frontend are declared in o80.frontend
+^_core\.Frontend\.[a-z]\w*$:
+

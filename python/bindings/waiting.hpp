@@ -2,13 +2,26 @@
 
 #include <nanobind/nanobind.h>
 
-#include <chrono>
-#include <cmath>
-#include <optional>
+#include <atomic>
 
 #include "interpreter.hpp"
-#include "o80/base/error.hpp"
 #include "o80/base/time.hpp"
+
+/// Ends the waits of one thread from another one (a cancelled task of asyncio).
+///
+/// Writer:  any thread.
+/// Readers: the thread that is inside `call`.
+class Canceller {
+ public:
+  void cancel() noexcept { cancelled_.store(true, std::memory_order_relaxed); }
+  /// Calls it; what waits in there raises Cancelled within 50 ms of `cancel`.
+  nanobind::object call(nanobind::handle callable);
+  /// Whether the call that this thread is in was cancelled.
+  static bool cancelled_here() noexcept;
+
+ private:
+  std::atomic<bool> cancelled_{false};
+};
 
 /// Around every call that may block: other Python threads run on, and Ctrl-C comes through.
 ///
@@ -17,6 +30,7 @@ class Waiting {
  public:
   /// Raises what a signal's handler raised, usually KeyboardInterrupt.
   static bool keep_waiting() {
+    if (Canceller::cancelled_here()) return false;
     const WithGil locked;
     if (call_python(PyErr_CheckSignals) != 0) throw nanobind::python_error();
     return true;
@@ -26,10 +40,5 @@ class Waiting {
   WithoutGil released_;
 };
 
-/// From seconds; None is for ever.
-inline o80::Timeout timeout_of(std::optional<double> seconds) {
-  constexpr double kLongest = 1e9;  // [s]
-  if (!seconds || *seconds > kLongest) return {};
-  if (std::isnan(*seconds)) throw o80::InvalidArgument("a timeout cannot be NaN");
-  return std::chrono::nanoseconds(std::llround(std::fmax(*seconds, 0.0) * 1e9));
-}
+/// From seconds; None is for ever. Throws InvalidArgument.
+o80::Timeout timeout_of(nanobind::handle seconds);

@@ -19,6 +19,7 @@ from o80.errors import (
     Error,
     InvalidArgument,
     LaneFull,
+    MissingExtra,
     NoLane,
     NotBursting,
     ReadOnly,
@@ -30,6 +31,7 @@ from o80.errors import (
     TimeoutError,
     UsedAfterFork,
 )
+from o80.first import wait_for_first
 from o80.frontend import Frontend
 from o80.frontend_classes import register_frontend
 from o80.halts import Halt, halt
@@ -40,6 +42,7 @@ from o80.prepared_burst import PreparedBurst
 from o80.record import Record
 from o80.running_request import RunningRequest
 from o80.segment_list import Segment, clean, segments
+from o80.states import States
 from o80.stopping import stop
 from o80.words import Mode, Profile, Reason, Start, Status
 
@@ -69,6 +72,7 @@ __all__ = [
     "InvalidArgument",
     "LaneFull",
     "Limits",
+    "MissingExtra",
     "Mode",
     "NoLane",
     "NotBursting",
@@ -89,6 +93,7 @@ __all__ = [
     "SegmentTaken",
     "Start",
     "StartAfresh",
+    "States",
     "Status",
     "Stream",
     "TimeoutError",
@@ -103,4 +108,5 @@ __all__ = [
     "segments",
     "stop",
     "version",
+    "wait_for_first",
 ]

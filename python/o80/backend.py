@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from o80.errors import Closed, InvalidArgument, RequestRejected
 from o80.layout import Layout, dtype_of_type
 from o80.loop_options import loop_texts
 from o80.record import Record
+from o80.words import IdleWord, StaleWord
 
 
 @dataclass(frozen=True)
@@ -90,7 +91,7 @@ class Backend:
         requests: Mapping[str, Described | None] | None = None,
         limits: Mapping[Any, Limit | Mapping[str, Limit]] | None = None,
         rests_at: Mapping[Any, Mapping[str, float]] | None = None,
-        when_idle: str | Mapping[Any, str] = "hold",
+        when_idle: IdleWord | Mapping[Any, IdleWord] = "hold",
         units: Mapping[str, str] | None = None,
         frequency: float | None = None,
         bursting: bool = False,
@@ -99,7 +100,7 @@ class Backend:
         lanes: int | None = None,
         lane_blocks: int | None = None,
         permission: int | None = None,
-        stale: Literal["hold", "purge", "halt", "stop"] | None = None,
+        stale: StaleWord | None = None,
         silence: int | None = None,
         max_overruns: int | None = None,
         resume: bool = False,

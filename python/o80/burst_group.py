@@ -1,8 +1,8 @@
 """Several bursting backends that run at the same time."""
 
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping
 from types import MappingProxyType
-from typing import Literal, overload
+from typing import Any, Literal, overload
 
 from o80 import _core
 from o80.frontend import Frontend
@@ -39,6 +39,12 @@ class BurstGroup:
         """
         rows = _core.wait_for_bursts(list(self._bursts.values()), timeout)
         return dict(zip(self._bursts, rows, strict=True))
+
+    def __await__(self) -> Generator[Any, None, dict[Frontend, _core.Observation]]:
+        """As `wait`, for a task of asyncio; a task that is cancelled cancels the bursts."""
+        from o80.awaiting import in_thread
+
+        return in_thread(self.wait).__await__()
 
 
 @overload

@@ -40,6 +40,10 @@ class TimeoutError(Error, builtins.TimeoutError):
         return type(self), (str(self), None, self.handles)
 
 
+class MissingExtra(Error, ImportError):
+    """Something needs a package that `pip install o80` leaves out; the text names the extra."""
+
+
 class SegmentTaken(Error):
     """A living backend has the segment's name."""
 

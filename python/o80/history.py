@@ -1,19 +1,28 @@
 """Many observations at once."""
 
 from collections.abc import Iterator
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from o80 import _core
+from o80.checked import whole
+from o80.errors import InvalidArgument, RowOverwritten
+from o80.record import Record
+from o80.selection import Selection
+from o80.states import States
+
+if TYPE_CHECKING:
+    import pandas
 
 
 class History:
     """Neighbouring observations, oldest first: arrays with a first dimension (T,).
 
     Filled by one copy; its arrays are views of that copy, `rows`, and change no more. It may hold
-    fewer rows than were asked for, never torn ones.
+    fewer rows than were asked for, never torn ones. Pickled it is the same; `numpy.save` and h5py
+    take its `rows`, pandas its `to_frame()`.
     """
 
     __slots__ = ("_decoder", "_layout", "rows")
@@ -26,17 +35,110 @@ class History:
     def __len__(self) -> int:
         return len(self.rows)
 
+    @property
+    def schema(self) -> dict[str, Any]:
+        """All that the backend said of its robot."""
+        schema: dict[str, Any] = self._layout.schema
+        return schema
+
     @overload
     def __getitem__(self, index: int) -> _core.Observation: ...
     @overload
     def __getitem__(self, index: slice) -> "History": ...
     def __getitem__(self, index: int | slice) -> "_core.Observation | History":
+        """By position, as in a list: 0 is the oldest, -1 the newest, a slice is a History.
+
+        By iteration and time: `at_iteration`, `at_time`, `select`.
+        """
         if isinstance(index, slice):
+            if index.step is not None and index.step < 0:
+                raise InvalidArgument(
+                    f"a history begins with its oldest row: the step of a slice must be positive, "
+                    f"got {index.step}"
+                )
             return History(self._decoder, self.rows[index])
         return _core.Observation(self._decoder, self.rows[index].tobytes())
 
     def __iter__(self) -> Iterator[_core.Observation]:
         return (self[i] for i in range(len(self)))
+
+    def at_iteration(self, iteration: int) -> _core.Observation:
+        """The observation of an iteration. Raises RowOverwritten if it is not in this history."""
+        iteration = whole(iteration, "iteration")
+        place = int(np.searchsorted(self.iteration, iteration))
+        if place == len(self) or self.iteration[place] != iteration:
+            raise RowOverwritten(f"row {iteration} is not in this history, {self._extent}")
+        return self[place]
+
+    def at_time(self, time: int) -> _core.Observation:
+        """The newest observation at or before a time [ns].
+
+        Raises RowOverwritten if all of this history are later.
+        """
+        time = whole(time, "time")
+        place = self._place_of(time)
+        if place < 0:
+            raise RowOverwritten(
+                f"no row of {time} ns or before is in this history, {self._extent}"
+            )
+        return self[place]
+
+    def select(
+        self,
+        n: int | None = None,
+        *,
+        since: int | None = None,
+        until: int | None = None,
+        seconds: float | None = None,
+        from_time: int | None = None,
+        to_time: int | None = None,
+    ) -> "History":
+        """A part of this history, without a copy. The arguments are those of `Frontend.history`."""
+        selection = Selection.checked(n, since, until, seconds, from_time, to_time)
+        if not len(self):
+            return self
+        if selection.n is not None:
+            return self[max(0, len(self) - selection.n) :]
+        first, last = selection.range(
+            int(self.iteration[0]),
+            int(self.iteration[-1]),
+            self._iteration_at,
+            lambda: int(self.time[-1]),
+        )
+        begin = int(np.searchsorted(self.iteration, first))
+        end = int(np.searchsorted(self.iteration, last, side="right"))
+        return self[begin : max(begin, end)]
+
+    def _place_of(self, time: int) -> int:
+        """Of the newest one at or before a time; -1 if all are later."""
+        return int(np.searchsorted(self.time, time, side="right")) - 1
+
+    def _iteration_at(self, time: int) -> int:
+        """The iteration at that place; one before the first if all are later."""
+        place = self._place_of(time)
+        return int(self.iteration[place]) if place >= 0 else int(self.iteration[0]) - 1
+
+    @property
+    def _extent(self) -> str:
+        if not len(self):
+            return "which is empty"
+        iterations, times = self.iteration, self.time
+        return (
+            f"which holds rows {iterations[0]} to {iterations[-1]}, of {times[0]} to {times[-1]} ns"
+        )
+
+    def to_frame(self) -> "pandas.DataFrame":
+        """A pandas data frame: a row for each observation, a column for each number.
+
+        Its index is the iteration. Columns are named after part, actuator and field, such as
+        "observed.elbow", "desired.joints[0].position" or "extended.force[2]"; times are in
+        nanoseconds. Enumerations are categories.
+
+        Raises MissingExtra without pandas.
+        """
+        from o80.frames import frame_of
+
+        return frame_of(self)
 
     @property
     def iteration(self) -> NDArray[np.int64]:
@@ -80,19 +182,22 @@ class History:
         return part
 
     @property
-    def desired(self) -> Any:
+    def desired(self) -> States:
         """The states that were asked: (T, actuators), or a record of groups."""
-        return self._layout.many(self.rows, "desired")
+        states: States = self._layout.many(self.rows, "desired")
+        return states
 
     @property
-    def observed(self) -> Any:
+    def observed(self) -> States:
         """The states that were read: (T, actuators), or a record of groups."""
-        return self._layout.many(self.rows, "observed")
+        states: States = self._layout.many(self.rows, "observed")
+        return states
 
     @property
-    def extended(self) -> Any:
+    def extended(self) -> Record:
         """Further sensor values: a record with an array (T, ...) for each field."""
-        return self._layout.many_extras(self.rows)
+        extended: Record = self._layout.many_extras(self.rows)
+        return extended
 
     @property
     def active(self) -> NDArray[np.bool_]:

@@ -151,6 +151,8 @@ class Layout:
             ]
         if self.extras.itemsize:
             parts.append(("extended", self.extras, self._extended_at))
+        # NumPy saves only fields that are in the order of their offsets
+        parts.sort(key=lambda part: part[2])
         names, formats, offsets = zip(*parts, strict=True)
         return np.dtype(
             {"names": names, "formats": formats, "offsets": offsets, "itemsize": self.size}

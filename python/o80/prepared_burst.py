@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from o80 import _core
 from o80.checked import whole
 from o80.errors import InvalidArgument
+from o80.trajectory import states_from
+from o80.words import LateWord
 
 
 class PreparedBurst:
@@ -50,7 +52,7 @@ class PreparedBurst:
     @targets.setter
     def targets(self, values: ArrayLike) -> None:
         wanted = self._targets.dtype
-        given = np.asarray(values, None if wanted.names is None else wanted)
+        given = np.asarray(values) if wanted.names is None else states_from(values, wanted)
         if given.shape != self._targets.shape:
             raise InvalidArgument(
                 f"targets have the shape (steps, actuators) = {self._targets.shape}, "
@@ -66,7 +68,7 @@ class PreparedBurst:
         return self._rows
 
     def run(
-        self, timeout: float | None = None, *, at: int | None = None, late: str = "reject"
+        self, timeout: float | None = None, *, at: int | None = None, late: LateWord = "reject"
     ) -> int:
         """Sends the targets, with what else was added, and bursts; fills `rows`.
 

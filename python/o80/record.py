@@ -1,10 +1,13 @@
 """Values with names, read as attributes or by key."""
 
 from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from o80.states import States
 
 
 class Record:
@@ -19,17 +22,20 @@ class Record:
     def __init__(self, array: NDArray[Any]) -> None:
         self._array = array
 
-    def __getitem__(self, name: str) -> Any:
+    def __getitem__(self, name: str) -> "States":
         try:
-            value = self._array[name]
+            value: Any = self._array[name]
         except (KeyError, ValueError, IndexError):
             there = ", ".join(self.keys()) or "there are none"
             raise KeyError(f"there is no value {name!r}; there are: {there}") from None
         if value.dtype.names and value.ndim == self._array.ndim:
-            return Record(value)
-        return value if value.ndim else value[()]
+            value = Record(value)
+        elif not value.ndim:
+            value = value[()]
+        states: States = value
+        return states
 
-    def __getattr__(self, name: str) -> Any:
+    def __getattr__(self, name: str) -> "States":
         if name.startswith("__"):
             raise AttributeError(name)
         try:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from o80.errors import InvalidArgument
-from o80.layout import Layout, dtype_of_type
+from o80.layout import Layout, dtype_of_type, runs_of
 
 
 def states_of(
@@ -21,10 +21,7 @@ def states_of(
     if isinstance(targets, Mapping):
         array = _from_fields(targets, kind)
     else:
-        try:
-            array = np.asarray(targets, kind)
-        except (TypeError, ValueError) as error:
-            raise InvalidArgument(f"the targets cannot be read as {kind}: {error}") from error
+        array = states_from(targets, kind)
     if single and array.ndim == 1:
         array = array[:, np.newaxis]
     if array.ndim != 2 or array.shape[1] != len(actuators):
@@ -33,6 +30,28 @@ def states_of(
             f"the targets of {len(actuators)} actuators are {expected}, not {array.shape}"
         )
     return np.ascontiguousarray(array.T).reshape(-1).view(np.uint8), len(array)
+
+
+def states_from(targets: ArrayLike, kind: np.dtype[Any]) -> NDArray[Any]:
+    """An array of states. Raises InvalidArgument, also for numbers where a state has several.
+
+    NumPy would give each field of a state the same number.
+    """
+    try:
+        array = np.asarray(targets, kind)
+    except (TypeError, ValueError) as error:
+        raise InvalidArgument(f"the targets cannot be read as {kind}: {error}") from error
+    if kind.names is not None and sum(count for _, _, count in runs_of(kind, 0)) > 1:
+        try:
+            given = np.asarray(targets)
+        except ValueError:  # of mixed lengths: states in tuples
+            return array
+        if given.dtype.names is None and given.shape == array.shape:
+            raise InvalidArgument(
+                f"numbers alone leave fields of these states open ({', '.join(kind.names)}): give "
+                f"a mapping from each field to an array, or a structured array"
+            )
+    return array
 
 
 def common_type(actuators: Sequence[int], layout: Layout) -> np.dtype[Any]:

@@ -1,6 +1,10 @@
-"""Words that are one of a few: strings, with a name for each."""
+"""Words that are one of a few: strings, with a name for each.
+
+The aliases at the end are what arguments accept: a member of the enumeration, or the string itself.
+"""
 
 from enum import StrEnum
+from typing import Literal, TypeAlias
 
 
 class Mode(StrEnum):
@@ -55,3 +59,14 @@ class Reason(StrEnum):
     STOPPED = "stopped"
     HALTED = "halted"
     FULL = "full"  #: more batches wait for later iterations than one frontend may have
+
+
+ModeWord: TypeAlias = Mode | Literal["queue", "overwrite"]
+ProfileWord: TypeAlias = Profile | Literal["linear", "minimum_jerk"]
+StartWord: TypeAlias = Start | Literal["desired", "observed"]
+OnLimitWord: TypeAlias = Literal["end", "go_on"]
+LateWord: TypeAlias = Literal["reject", "now"]
+OnErrorWord: TypeAlias = Literal["purge", "continue"]
+StaleWord: TypeAlias = Literal["hold", "purge", "halt", "stop"]
+IdleWord: TypeAlias = Literal["hold", "follow"]
+LifeWord: TypeAlias = Literal["starting", "running", "stopped", "failed", "superseded", "killed"]

@@ -12,6 +12,7 @@ namespace o80 {
 namespace {
 
 std::string text_of(double value) {
+  if (std::isnan(value)) return "nan";  // its sign means nothing
   char text[32];
   const auto end = std::to_chars(text, text + sizeof text, value).ptr;
   return std::string(text, end);

@@ -52,28 +52,41 @@ Waited RowWaiter::wait_for_row(Iteration k, const Deadline& deadline,
   return Waited::timed_out;
 }
 
-void RowWaiter::sleep(Iteration k, std::int64_t at_most) noexcept {
-  std::atomic<std::uint32_t>& wake = view_.wakes().row_wake;
-  Bell& bell = view_.bell();
+std::optional<std::uint32_t> register_for_row(const AttachedSegment& segment,
+                                              Iteration k) noexcept {
+  const SegmentView& view = segment.view();
+  Bell& bell = view.bell();
 
-  // lower the word, look again, sleep
+  // lower the word, look again
   O80_CRASH_POINT("rows.before_register");
-  const std::uint32_t seen = wake.load(std::memory_order_seq_cst);  // sync row_wake
+  const std::uint32_t seen =
+      view.wakes().row_wake.load(std::memory_order_seq_cst);  // sync row_wake
   // an end is said before it wakes: who has seen that wake sees the end
-  if (segment_->has_ended()) return;
+  if (segment.has_ended()) return std::nullopt;
   Iteration lowest = bell.wanted.load(std::memory_order_seq_cst);  // sync wanted
   while (k < lowest &&
          !bell.wanted.compare_exchange_weak(lowest, k, std::memory_order_seq_cst)) {  // sync wanted
   }
   O80_CRASH_POINT("rows.before_sleep");
-  if (view_.counters().published.load(std::memory_order_seq_cst) >= k) return;  // sync published
-  if (!futex_wait(wake, seen, at_most)) return;
+  if (view.counters().published.load(std::memory_order_seq_cst) >= k) {  // sync published
+    return std::nullopt;
+  }
+  return seen;
+}
 
-  // the writer woke one: the first awake after each of its wakes tells the rest
+void pass_on_wake(const SegmentView& view, std::uint32_t seen) noexcept {
+  std::atomic<std::uint32_t>& wake = view.wakes().row_wake;
+  Bell& bell = view.bell();
   const std::uint32_t now = wake.load(std::memory_order_seq_cst);  // sync row_wake
   if (now == seen || bell.passed_on.exchange(now, std::memory_order_relaxed) == now) return;
   O80_CRASH_POINT("rows.before_pass_on");
   futex_wake(wake, kEverybody);
+}
+
+void RowWaiter::sleep(Iteration k, std::int64_t at_most) noexcept {
+  const std::optional<std::uint32_t> seen = register_for_row(*segment_, k);
+  if (!seen || !futex_wait(view_.wakes().row_wake, *seen, at_most)) return;
+  pass_on_wake(view_, *seen);
 }
 
 void RowWaiter::poll(Iteration k, std::int64_t at_most) noexcept {

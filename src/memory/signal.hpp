@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "memory/attached_segment.hpp"
 #include "memory/spinner.hpp"
@@ -11,6 +12,12 @@ namespace o80 {
 inline constexpr std::int64_t kSlice = 50'000'000;  // longest sleep without a look around [ns]
 
 enum class Waited { ready, timed_out };
+
+/// Registers for the wake-up of row k; the value of `row_wake` to sleep on, or nothing if there is
+/// nothing to wait for: the row is there, or the backend has ended. Needs Access::read_write.
+std::optional<std::uint32_t> register_for_row(const AttachedSegment& segment, Iteration k) noexcept;
+/// After a sleep on `seen`: the writer woke one, and the first awake tells the rest.
+void pass_on_wake(const SegmentView& view, std::uint32_t seen) noexcept;
 
 /// Waits for rows.
 ///

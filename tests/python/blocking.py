@@ -32,6 +32,7 @@ CALLS = {
     "Frontend.wait_for_next": Call("silent.wait_for_next()", "silent.close()"),
     "Frontend.stream": Call("list(silent.stream())", "silent.close()"),
     "Frontend.stream of a reader": Call("list(reader.stream())", "reader.close()"),
+    "wait_for_first": Call("o80.wait_for_first([silent])", "silent.close()"),
     "Frontend.pulse_and_wait": Call(
         "(silent.add_command(0, 1.0), silent.pulse_and_wait())", "silent.close()"
     ),

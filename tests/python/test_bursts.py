@@ -10,7 +10,7 @@ WAIT = 60.0
 def test_a_burst_can_be_cancelled(bursting: o80.robots.Process) -> None:
     with bursting.frontend() as arm:
         burst = arm.burst(10**15, wait=False)
-        arm.wait_for(3, timeout=WAIT)
+        arm.wait_for_next(timeout=WAIT)
         burst.cancel()
         last = burst.wait(WAIT).iteration
 

@@ -128,7 +128,7 @@ def test_echo_refuses_a_rate_that_is_not_positive(folder: Path, rate: str) -> No
 def test_echo_refuses_odd_numbers(folder: Path) -> None:
     assert "'--count'" in o80(folder, "echo", "nobody", "--count=-1", fails=True)
     said = o80(folder, "echo", "nobody", "--timeout", "nan", fails=True)
-    assert "a timeout cannot be NaN" in said
+    assert "timeout must be a number of seconds" in said
 
 
 def test_stop_ends_a_robot_in_order(folder: Path, robot: "subprocess.Popen[str]") -> None:

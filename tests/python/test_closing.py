@@ -24,6 +24,7 @@ CALLS: dict[str, dict[str, Callable[[Any], Any]]] = {
         "request": lambda it: it.request("reset", timeout=WAIT),
         "control": lambda it: it.control(WAIT).__enter__(),
         "wait_for": lambda it: it.wait_for(0, WAIT),
+        "at_time": lambda it: it.at_time(0),
         "wait_for_next": lambda it: it.wait_for_next(WAIT),
         "pulse_and_wait": lambda it: it.pulse_and_wait(WAIT),
         "reattach": lambda it: it.reattach(WAIT),
@@ -36,6 +37,9 @@ CALLS: dict[str, dict[str, Callable[[Any], Any]]] = {
         "on_halt": lambda it: it.on_halt(print),
         "on_resume": lambda it: it.on_resume(print),
         "interrupt": lambda it: it.interrupt(0),
+        "running": lambda it: it.running("home"),
+        "progress": lambda it: it.progress("home", "half"),
+        "end_request": lambda it: it.end_request("home"),
     },
     "Process": {"wait": lambda it: it.wait(WAIT)},
     "Burst": {"wait": lambda it: it.wait(WAIT)},
@@ -46,7 +50,7 @@ CALLS: dict[str, dict[str, Callable[[Any], Any]]] = {
 DATA = {
     "Frontend": {
         *("segment", "schema", "robot", "actuators", "requests", "enums", "period", "frequency"),
-        *("bursting", "epoch", "initial_states", "closed", "close"),
+        *("bursting", "epoch", "initial_states", "closed", "close", "aio"),
     },
     "Backend": {"segment", "schema", "close"},
     "Process": {"segment", "frontend"},

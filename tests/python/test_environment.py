@@ -1,5 +1,6 @@
 """The table-tennis environments: one step order in all modes, honest spaces, nothing left."""
 
+import sys
 import time
 import warnings
 from collections.abc import Iterator
@@ -111,12 +112,38 @@ def test_a_wrong_action_is_refused(inline: TableTennisEnvironment, action: np.nd
 
 
 def test_a_step_needs_an_episode(inline: TableTennisEnvironment) -> None:
-    with pytest.raises(gymnasium.error.ResetNeeded):
+    with pytest.raises(gymnasium.error.ResetNeeded, match="no episode has begun: call reset"):
         inline.step(STILL)
     inline.reset(seed=1)
     played_out(inline)
-    with pytest.raises(gymnasium.error.ResetNeeded):
+    with pytest.raises(gymnasium.error.ResetNeeded, match="the episode is over: call reset"):
         inline.step(STILL)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "text"),
+    [
+        ({"rig": {"twins": 2}}, TypeError, r"write rig=.*settings\.RigSettings\(twins=2\)"),
+        ({"task": 3}, TypeError, r"task must be a TaskSettings, got 3: write task=.*\(\.\.\.\)"),
+        ({"render_mode": "human"}, ValueError, "use 'rgb_array', whose render.. returns pictures"),
+        ({"render_mode": "ansi"}, ValueError, "unknown render mode 'ansi'; there are: rgb_array"),
+    ],
+)
+def test_what_gymnasium_passes_on_is_checked(
+    arguments: dict[str, Any], error: type[Exception], text: str
+) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of Gymnasium, of modes it does not know
+        with pytest.raises(error, match=text):
+            gymnasium.make(o80_table_tennis.ACCELERATED, **arguments)
+
+
+def test_without_a_renderer_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "OpenGL", None)
+    with closing(gymnasium.make(o80_table_tennis.ACCELERATED, render_mode="rgb_array")) as made:
+        made.reset(seed=1)
+        with pytest.raises(o80.MissingExtra, match=r'pip install "o80\[rendering\]"'):
+            made.render()
 
 
 # ------------------------------------------------------------------------------ the step

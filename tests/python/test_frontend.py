@@ -45,7 +45,7 @@ def test_it_knows_its_robot(arm: o80.Frontend, segment: str) -> None:
     assert arm.actuators[1].index == 1
     assert (arm.actuators[1].minimum, arm.actuators[1].maximum) == (-3.0, 3.0)
     assert arm.actuators[0].when_idle == "hold"
-    assert list(arm.requests) == ["reset", "snapshot", "restore"]
+    assert list(arm.requests) == ["reset", "snapshot", "restore", "home"]
     assert arm.frequency == pytest.approx(1000.0)
     assert arm.period == pytest.approx(0.001)
     assert arm.bursting

@@ -33,7 +33,7 @@ class Robot:
         self.backend = backend
         self.frontend = frontend
 
-    def desired(self, actuator: int | str, target: object) -> o80.Record:
+    def desired(self, actuator: int | str | list[str], target: object) -> o80.Record:
         self.frontend.add_command(actuator, target)
         self.frontend.pulse()
         return self.step()
@@ -84,6 +84,37 @@ def test_fields_in_order_are_a_target(robot: Robot) -> None:
     assert joint["tool"]["kind"] == Control.TORQUE
 
 
+@pytest.mark.parametrize("number", [0.25, 1, np.float32(0.25), np.int8(-1), True])
+def test_a_number_is_the_first_field_of_a_larger_state(robot: Robot, number: float) -> None:
+    robot.desired("a", {"position": 0.5, "count": 3, "gains": [1, 2]})
+
+    joint = robot.desired("a", number).joints[0]
+
+    assert joint["position"] == float(number)
+    assert (joint["count"], joint["gains"].tolist()) == (3, [1.0, 2.0])  # kept
+
+
+def test_numbers_are_first_fields_in_a_command_of_several_actuators(robot: Robot) -> None:
+    robot.desired("b", {"count": 7})
+
+    joints = robot.desired(["a", "b"], [0.25, {"position": -0.5, "on": True}]).joints
+
+    assert joints["position"].tolist() == [0.25, -0.5]
+    assert joints["count"].tolist() == [0, 7]
+
+
+def test_a_first_field_that_is_no_number_takes_what_fits_it(segment: str) -> None:
+    states = {"tool": {"kind": Control, "size": float}, "hand": {"fingers": (float, 3), "on": bool}}
+    with o80.Backend(segment, states) as backend:
+        backend.publish()
+        with o80.Frontend(segment) as frontend:
+            robot = Robot(backend, frontend)
+            assert robot.desired("tool", "TORQUE").tool.kind == Control.TORQUE
+            assert robot.desired("tool", 1).tool.kind == Control.POSITION
+            with pytest.raises(o80.InvalidArgument, match=r"'fingers'.*sequence of 3"):
+                frontend.add_command("hand", 0.5)
+
+
 @pytest.mark.parametrize("label", ["TORQUE", Control.TORQUE, 5, np.int64(5)])
 def test_labels_are_given_by_name_or_value(robot: Robot, label: object) -> None:
     assert robot.desired("mode", label).mode == Control.TORQUE
@@ -99,7 +130,9 @@ def test_labels_are_given_by_name_or_value(robot: Robot, label: object) -> None:
         ("gear", 256, "gear.*0 to 255"),
         ("gear", -1, "gear.*0 to 255"),
         ("gear", 1.5, "gear.*integer"),
-        ("a", 0.5, "'a'.*position, gains, count, on, tool"),
+        ("a", "x", "'a'.*a number.*position, gains, count, on, tool"),
+        ("a", [], "'a'.*a number.*position, gains, count, on, tool"),
+        ("a", 2.0, "'a'.*rad"),
         ("a", {"angle": 1}, "'a'.*angle.*position, gains, count, on, tool"),
         ("a", {"position": 2.0}, "rad"),
         ("a", {"position": "x"}, "'position'.*'a'.*number"),
@@ -324,6 +357,14 @@ def test_a_trajectory_of_states_with_fields(robot: Robot) -> None:
 
     assert last.joints["position"].tolist() == [0.8, 1.0]
     assert last.joints["gains"].tolist() == [[1.0, 1.0], [1.0, 1.0]]
+
+
+@pytest.mark.parametrize("targets", [np.zeros((3, 2)), [[0.1, 0.2]], 0.5])
+def test_numbers_are_no_trajectory_of_states_with_fields(robot: Robot, targets: object) -> None:
+    """NumPy would give each field the same number."""
+    with pytest.raises(o80.InvalidArgument, match=r"numbers alone.*position, gains, count"):
+        robot.frontend.add_trajectory(targets, ["a", "b"])  # type: ignore[arg-type]
+    assert robot.frontend.added == 0
 
 
 def test_a_trajectory_from_a_mapping_needs_every_field(robot: Robot) -> None:

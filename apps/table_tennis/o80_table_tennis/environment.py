@@ -47,6 +47,28 @@ OPTIONS = ("ball", "flight")
 LAST = ITERATIONS - 1
 
 
+def refuse_wrong_arguments(
+    rig: object, task: object, render_mode: str | None, modes: list[str]
+) -> None:
+    """Raises TypeError or ValueError, saying what to give instead."""
+    for name, given, wanted in (("rig", rig, RigSettings), ("task", task, TaskSettings)):
+        if given is None or isinstance(given, wanted):
+            continue
+        fields = given.items() if isinstance(given, dict) else ()
+        inside = ", ".join(f"{key}={value!r}" for key, value in fields) or "..."
+        raise TypeError(
+            f"{name} must be a {wanted.__name__}, got {given!r}: write "
+            f"{name}={wanted.__module__}.{wanted.__name__}({inside})"
+        )
+    if render_mode == "human":
+        raise ValueError(
+            "there is no render mode 'human': use 'rgb_array', whose render() returns pictures "
+            "(gymnasium.wrappers.HumanRendering shows them in a window)"
+        )
+    if render_mode is not None and render_mode not in modes:
+        raise ValueError(f"unknown render mode '{render_mode}'; there are: {', '.join(modes)}")
+
+
 class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
     """Real arm, simulated ball: 100 steps a second of eight pressure changes.
 
@@ -76,9 +98,7 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         camera: str = "side",
         log: Path | None = None,
     ) -> None:
-        modes = self.metadata["render_modes"]
-        if render_mode is not None and render_mode not in modes:
-            raise ValueError(f"unknown render mode '{render_mode}'; there are: {', '.join(modes)}")
+        refuse_wrong_arguments(rig, task, render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode
         self._camera = camera
         self._task = task = task or TaskSettings()
@@ -150,7 +170,8 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
     def step(self, action: Action) -> tuple[Float32Array, float, bool, bool, Info]:
         """Five iterations of the arm and of every twin; see the module for their order."""
         if self._over:
-            raise gymnasium.error.ResetNeeded("the episode is over: call reset() before step()")
+            state = "the episode is over" if self._episode >= 0 else "no episode has begun"
+            raise gymnasium.error.ResetNeeded(f"{state}: call reset() before step()")
         if not self._begun:
             self._begin()
         called = time.perf_counter()

@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.extras import needed
+
 from .settings import JOINTS
 
 Image = NDArray[np.uint8]
@@ -33,11 +35,13 @@ OTHER_BALL = (0.95, 0.95, 0.92, 0.8)
 class Scene(AbstractContextManager["Scene"]):
     """Draws the scene with any number of balls, without a screen.
 
-    Needs the extra `rendering`, and EGL or OSMesa; MUJOCO_GL chooses between them.
+    Needs the extra `rendering`, and EGL or OSMesa; MUJOCO_GL chooses between them. Raises
+    o80.MissingExtra.
     """
 
     def __init__(self, *, balls: int = 1, size: tuple[int, int] = SIZE) -> None:
         _choose_renderer()
+        needed("OpenGL", "rendering", "a picture")
         import mujoco
 
         self._mujoco = mujoco

@@ -176,6 +176,12 @@ class UntypedFrontend {
   Rows history(Iteration first, Iteration last) const;
   /// The last n rows.
   Rows history(std::size_t n) const;
+  /// The newest iteration at or before a time [ns]; one before the oldest if all are later.
+  Iteration iteration_at(std::int64_t time) const;
+  /// That row. Throws RowOverwritten if all that are still there are later.
+  UntypedObservation at_time(std::int64_t time) const;
+  /// As many of the rows of these times, both included, as there are [ns].
+  Rows history_between(std::int64_t first, std::int64_t last) const;
   /// Reads rows in sequence: waits for row `position`, or takes the oldest row if that one is
   /// overwritten, and moves `position` behind it. Returns the number of rows that were skipped.
   std::int64_t wait_for_next(Iteration& position, std::byte* row, Timeout timeout,
@@ -215,6 +221,16 @@ class UntypedFrontend {
 
   std::shared_ptr<Link> link_;
 };
+
+/// A row of a frontend's segment that is waited for.
+struct RowWish {
+  const UntypedFrontend* frontend;
+  Iteration row;
+};
+/// Waits until at least one of these rows is there, in one sleep; the places of all that are.
+/// Throws TimeoutError, the BackendGone of a segment that ended without its row, Closed, Cancelled.
+std::vector<std::size_t> wait_for_first(std::span<const RowWish> wishes, Timeout timeout,
+                                        const KeepWaiting& keep_waiting = {});
 
 /// Halts the backend of a segment, also one that is still starting; returns the number of the halt.
 /// Throws TimeoutError if there is no backend within `timeout`, SegmentError, BackendGone.

@@ -1,0 +1,83 @@
+"""The waits of a frontend, for programs on asyncio."""
+
+from typing import TYPE_CHECKING, Any
+
+from o80 import _core
+from o80.awaiting import in_thread
+from o80.words import LateWord
+
+if TYPE_CHECKING:
+    from o80.frontend import Frontend
+
+
+class Waits:
+    """The verbs of a frontend that wait, as coroutines: `await arm.aio.wait_for_next()`.
+
+    They take what the verbs of the same names take, and return and raise the same. Several tasks
+    may wait at once. A task that is cancelled goes on within 50 ms; the rest of its burst is then
+    cancelled too, as after a timeout; what it has pulsed goes on.
+    """
+
+    def __init__(self, frontend: "Frontend") -> None:
+        self._frontend = frontend
+
+    async def wait_for(self, iteration: int, timeout: float | None = None) -> _core.Observation:
+        """The observation of an iteration, as soon as it is there; see `Frontend.wait_for`."""
+        frontend = self._frontend
+        return await in_thread(lambda: frontend.wait_for(iteration, timeout))
+
+    async def wait_for_next(self, timeout: float | None = None) -> _core.Observation:
+        """The next observation in sequence; see `Frontend.wait_for_next`.
+
+        A task that is cancelled loses none. Tasks that all need every observation use a stream
+        each.
+        """
+        frontend = self._frontend
+        awaited = frontend._next
+        if frontend.published < awaited:
+            await in_thread(lambda: frontend._await_row(awaited, timeout))
+        return frontend.wait_for_next(timeout)
+
+    async def pulse_and_wait(
+        self, timeout: float | None = None, *, at: int | None = None, late: LateWord = "reject"
+    ) -> _core.Observation:
+        """Sends what was added at once, waits until it has ended; see `Frontend.pulse_and_wait`."""
+        frontend = self._frontend
+        if frontend._is_inline:  # the iterations run in the thread that asks for them
+            return await in_thread(lambda: frontend.pulse_and_wait(timeout, at=at, late=late))
+        batch = frontend._pulse_to_end(at, late)
+        return await in_thread(lambda: frontend._wait_for_end(batch, timeout))
+
+    async def burst(
+        self,
+        iterations: int = 1,
+        *,
+        timeout: float | None = None,
+        at: int | None = None,
+        late: LateWord = "reject",
+    ) -> _core.Observation:
+        """Sends what was added at once and bursts; see `Frontend.burst`."""
+        frontend = self._frontend
+        if frontend._is_inline:
+            return await in_thread(
+                lambda: frontend.burst(iterations, timeout=timeout, at=at, late=late)
+            )
+        burst = frontend.burst(iterations, wait=False, at=at, late=late)
+        try:
+            return await in_thread(lambda: burst.wait(timeout))
+        except BaseException:
+            burst.cancel()
+            raise
+
+    async def request(self, name: str, /, *, timeout: float | None = None, **fields: Any) -> None:
+        """Sends a request at once and waits for its answer; see `Frontend.request`."""
+        frontend = self._frontend
+        if frontend._is_inline:
+            await in_thread(lambda: frontend.request(name, timeout=timeout, **fields))
+            return
+        batch = frontend._send_request(name, fields)
+        await in_thread(lambda: frontend._wait_for_answer(name, batch, timeout))
+
+    async def resume(self, number: int | None = None, *, timeout: float | None = 5.0) -> None:
+        """Ends a halt; see `Frontend.resume`."""
+        await in_thread(lambda: self._frontend.resume(number, timeout=timeout))

@@ -1,0 +1,102 @@
+"""How a frontend lets a bursting backend run."""
+
+from collections.abc import Sequence
+from typing import Literal, overload
+
+import numpy as np
+
+from o80 import _core
+from o80.errors import NotBursting
+from o80.frontend.commanding import Commanding
+from o80.prepared_burst import PreparedBurst, checked_count
+from o80.trajectory import common_type
+from o80.words import LateWord, ModeWord, ProfileWord, StartWord
+
+
+class Bursting(Commanding):
+    """The part of o80.Frontend that bursts."""
+
+    @overload
+    def burst(
+        self,
+        iterations: int = 1,
+        *,
+        timeout: float | None = None,
+        wait: Literal[True] = True,
+        at: int | None = None,
+        late: LateWord = "reject",
+    ) -> _core.Observation: ...
+    @overload
+    def burst(
+        self,
+        iterations: int = 1,
+        *,
+        timeout: float | None = None,
+        wait: Literal[False],
+        at: int | None = None,
+        late: LateWord = "reject",
+    ) -> _core.Burst: ...
+    def burst(
+        self,
+        iterations: int = 1,
+        *,
+        timeout: float | None = None,
+        wait: bool = True,
+        at: int | None = None,
+        late: LateWord = "reject",
+    ) -> _core.Observation | _core.Burst:
+        """Sends what was added and lets a bursting backend run exactly so many iterations.
+
+        at: the iteration at which what was added is taken, of this burst or a later one (None: the
+            first of this burst).
+        late: what if that iteration has begun: "reject" the batch, which then does not burst, or
+            take it "now".
+
+        Returns the observation of the last iteration; with `wait=False` a Burst, to be waited for
+        or cancelled. A call that ends without its last row (a timeout, Ctrl-C) cancels the rest of
+        its burst: the backend stands still again after the iteration under way. So do the end of
+        this frontend and its death. `prepared_burst` does the same many times, faster.
+
+        Raises NotBursting, TimeoutError after `timeout` [s], BackendGone, LaneFull,
+        InvalidArgument.
+        """
+        if wait:
+            return self._burst(iterations, timeout, at, late)
+        return self._start_burst(iterations, at, late)
+
+    def prepared_burst(
+        self,
+        iterations: int = 1,
+        actuators: int | str | Sequence[int | str] | None = None,
+        *,
+        steps: int = 1,
+        each: int = 1,
+        mode: ModeWord = "queue",
+        profile: ProfileWord = "linear",
+        start: StartWord = "desired",
+    ) -> PreparedBurst:
+        """A burst to be made again and again: targets in, iterations, all their rows out.
+
+        iterations: of each burst.
+        actuators: which ones get targets, by index or name (None: all).
+        steps: how many targets each of them gets for a burst.
+        each: iterations to reach each target.
+        mode, profile, start: as in add_command.
+
+        Raises NotBursting, InvalidArgument.
+        """
+        self._check_usable()
+        if not self.bursting:
+            raise NotBursting(
+                f"'{self.segment}' runs by its own clock and cannot be burst: "
+                "start it with bursting"
+            )
+        chosen, _ = self._chosen(actuators)
+        shape = len(chosen), checked_count(steps, "steps")
+        return PreparedBurst(
+            self,
+            chosen,
+            np.empty(shape, common_type(chosen, self._layout)),
+            np.zeros(checked_count(iterations, "iterations"), self._layout.row),
+            pace=(checked_count(each, "each"), mode, profile, start),
+        )

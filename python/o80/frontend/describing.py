@@ -1,0 +1,82 @@
+"""What the segment says of its backend and its robot."""
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from o80 import _core
+from o80.actuator import Actuator, actuators_of
+from o80.layout import Layout
+from o80.words import LifeWord
+
+
+class Describing(_core.Frontend):
+    """The part of o80.Frontend that describes the robot."""
+
+    _description: _core.Description
+    _layout: Layout
+    _decoder: _core.Decoder
+
+    if TYPE_CHECKING:
+
+        @property
+        def segment(self) -> str:
+            """The name of the segment."""
+
+        @property
+        def epoch(self) -> int:
+            """The number of this run of the backend; another run of the same name has another."""
+
+        @property
+        def bursting(self) -> bool:
+            """Whether the backend stands still until it is burst."""
+
+        @property
+        def life(self) -> LifeWord:
+            """starting, running, stopped, failed, superseded or killed."""
+
+        @property
+        def closed(self) -> bool:
+            """Whether this frontend was closed."""
+
+    @property
+    def alive(self) -> bool:
+        """Whether the backend lives."""
+        return self.life in ("starting", "running")
+
+    @property
+    def schema(self) -> dict[str, Any]:
+        """All that the backend says of its robot."""
+        return self._layout.schema
+
+    @property
+    def robot(self) -> str:
+        """The name of the robot."""
+        name: str = self.schema["robot"]
+        return name
+
+    @cached_property
+    def actuators(self) -> list[Actuator]:
+        """What can be commanded: index, name, unit, limits."""
+        return actuators_of(self.schema)
+
+    @property
+    def requests(self) -> dict[str, str]:
+        """The requests that the driver serves, each with its help."""
+        return {request["name"]: request["help"] for request in self.schema["requests"]}
+
+    @property
+    def enums(self) -> dict[str, Any]:
+        """An IntEnum for each enumerated field, by its name."""
+        return self._layout.enums
+
+    @property
+    def period(self) -> float:
+        """Of the iterations [s]."""
+        nanoseconds: int = self.schema["period"]
+        return nanoseconds * 1e-9
+
+    @property
+    def frequency(self) -> float:
+        """Iterations a second [1/s]."""
+        nanoseconds: int = self.schema["period"]
+        return 1e9 / nanoseconds

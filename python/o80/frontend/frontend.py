@@ -1,0 +1,192 @@
+"""Opening, closing and attaching a frontend again."""
+
+import contextlib
+import threading
+import warnings
+from collections.abc import Callable
+from functools import cached_property
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self, cast
+
+from o80 import _core, at_exit, frontend_classes
+from o80.errors import Error, InvalidArgument, SchemaMismatch, UsedAfterFork
+from o80.frontend.halting import Halting
+from o80.layout import Layout
+from o80.words import OnErrorWord
+
+if TYPE_CHECKING:
+    from o80.aio import Waits
+
+
+class Frontend(Halting):
+    """A frontend of the backend that owns a segment: sends commands, reads observations.
+
+    segment: its name.
+    timeout: how long to wait for the backend [s]; None is for ever.
+    read_only: asks for no right to command.
+    on_error: what becomes of sent motion if the `with` block ends by an exception or Ctrl-C:
+        "purge" drops what this frontend sent, "continue" leaves it.
+    dead: attaches also to a backend that is gone, to read its history.
+
+    May be used from several threads: what they add is one buffer, which any pulse sends. In a
+    forked child its calls raise UsedAfterFork; pickled, it is opened again by its name.
+    Raises TimeoutError, SegmentError, BackendFailed.
+    If the robot's package has a class of its own for it, that one is made.
+    """
+
+    _is_set_up = False
+    _attachment: _core.Attachment  # from __new__ to __init__
+    _arguments: tuple[str, float | None, bool, OnErrorWord, bool] | None
+
+    def __new__(
+        cls,
+        segment: str,
+        timeout: float | None = 5.0,
+        *,
+        read_only: bool = False,
+        on_error: OnErrorWord = "purge",
+        dead: bool = False,
+    ) -> Self:
+        attachment = _core.attach(segment, timeout, read_only, dead)
+        chosen = frontend_classes.of(attachment.robot) if cls is Frontend else None
+        self = super().__new__(cls if chosen is None else cast(type[Self], chosen))
+        self._attachment = attachment
+        return self
+
+    def __init__(
+        self,
+        segment: str,
+        timeout: float | None = 5.0,
+        *,
+        read_only: bool = False,
+        on_error: OnErrorWord = "purge",
+        dead: bool = False,
+    ) -> None:
+        if on_error not in ("purge", "continue"):
+            raise InvalidArgument(f"on_error cannot be {on_error!r}: it is 'purge' or 'continue'")
+        self._on_error = on_error
+        self._unnamed = False
+        self._arguments = (segment, timeout, read_only, on_error, dead)
+        self._set_up(self.__dict__.pop("_attachment"))
+
+    @classmethod
+    def _of(cls, attachment: _core.Attachment, *, unnamed: bool) -> "Frontend":
+        """The frontend of an inline robot; unnamed: nobody chose its segment's name."""
+        chosen = frontend_classes.of(attachment.robot) or cls
+        self = _core.Frontend.__new__(chosen)
+        assert isinstance(self, Frontend)
+        self._on_error = "purge"
+        self._arguments = None
+        self._unnamed = unnamed
+        self._set_up(attachment)
+        return self
+
+    def _set_up(self, attachment: _core.Attachment) -> None:
+        self._description = attachment.description
+        self._layout = Layout(self._description)
+        self._decoder = _core.Decoder(self._description, self._layout)
+        super().__init__(attachment, self._decoder)
+        self._first = self._read(self.oldest, 1) if self.published >= 0 else None
+        self._control_lock = threading.Lock()
+        self._control_blocks = 0
+        self._is_set_up = True
+        at_exit.close_later(self)
+
+    @cached_property
+    def aio(self) -> "Waits":
+        """The verbs that wait, as coroutines of asyncio: `await arm.aio.wait_for_next()`."""
+        from o80.aio import Waits  # asyncio is loaded by those who use it
+
+        return Waits(self)
+
+    def close(self) -> None:
+        """Ends it: sent motion goes on, an inline robot stops. Closing twice is allowed.
+
+        Calls that wait in other threads raise Closed. In a forked child nothing of the parent's
+        is touched.
+        """
+        if self.closed:
+            return
+        added = 0 if self._forked else self.added
+        if added:
+            warnings.warn(
+                f"{added} commands were added to '{self.segment}' and never pulsed",
+                ResourceWarning,
+                stacklevel=2,
+            )
+        self._close()
+        if self._unnamed and not self._forked:  # one that failed would stay, for others to read
+            _core.clean(self.segment)
+
+    def _close_at_exit(self) -> None:
+        """A pure reader has nothing to give back: who waits in a daemon thread is left alone."""
+        if not self.closed and (self._is_inline or self._has_lane or self.added):
+            self.close()
+
+    def __del__(self) -> None:
+        if not self._is_set_up or self.closed:
+            return
+        if self._is_inline and not self._forked:
+            warnings.warn(
+                f"the inline robot '{self.segment}' was never closed", ResourceWarning, stacklevel=2
+            )
+        self.close()
+
+    def reattach(self, timeout: float | None = 5.0) -> None:
+        """Attaches to the backend that now owns the name, after the former one ended.
+
+        Raises TimeoutError, SchemaMismatch if it is described otherwise, and Closed.
+        """
+        if self._arguments is None:
+            raise InvalidArgument("an inline robot that ended cannot be attached again: start it")
+        segment, _, read_only, *_ = self._arguments
+        attachment = self._attach_again(timeout, read_only)
+        difference = _core.difference(self._description, attachment.description)
+        if difference:
+            raise SchemaMismatch(
+                f"'{segment}' is no longer the robot it was; open a new frontend:\n{difference}"
+            )
+        self._reattach(attachment)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if error is not None and not self.closed and not self._forked:
+            self.forget_added()
+            if self._on_error == "purge":
+                with contextlib.suppress(Error):
+                    self._purge_own()
+        self.close()
+
+    def __reduce__(self) -> tuple[Callable[..., "Frontend"], tuple[Any, ...]]:
+        if self._arguments is None:
+            raise TypeError(
+                f"the frontend of an inline robot cannot be pickled: it lives in this process. "
+                f"Attach to its segment: o80.Frontend({self.segment!r})"
+            )
+        return _open_again, (type(self), *self._arguments)
+
+    def __repr__(self) -> str:
+        try:
+            state: str = "closed" if self.closed else self.life
+        except UsedAfterFork:
+            state = "of the parent process"
+        return f"<o80.{type(self).__name__} of '{self.segment}' ({self.robot}), {state}>"
+
+
+def _open_again(
+    cls: type[Frontend],
+    segment: str,
+    timeout: float | None,
+    read_only: bool,
+    on_error: OnErrorWord,
+    dead: bool,
+) -> Frontend:
+    """A pickled frontend attaches again by name."""
+    return cls(segment, timeout, read_only=read_only, on_error=on_error, dead=dead)

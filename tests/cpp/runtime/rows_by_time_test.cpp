@@ -1,0 +1,82 @@
+#include <gmock/gmock.h>
+
+#include <random>
+
+#include "runtime/station.hpp"
+
+namespace o80::test {
+namespace {
+
+using ::testing::HasSubstr;
+
+class RowsByTimeTest : public StationTest {};
+
+/// Simulated time: iteration i is at i milliseconds.
+BackendOptions millisecond(std::uint64_t history) {
+  return {.segment = "pair", .period = 1'000'000, .bursting = true, .history = history};
+}
+
+TEST_F(RowsByTimeTest, FindsTheNewestRowAtOrBeforeATime) {
+  Station station(millisecond(64));
+  station.start();
+  UntypedFrontend frontend("pair");
+  frontend.start_burst(20);
+  station.drive();
+
+  EXPECT_EQ(frontend.iteration_at(0), 0);
+  EXPECT_EQ(frontend.iteration_at(6'999'999), 6);
+  EXPECT_EQ(frontend.iteration_at(7'000'000), 7);
+  EXPECT_EQ(frontend.iteration_at(1'000'000'000), 20);
+  EXPECT_EQ(frontend.iteration_at(-1), -1);
+  EXPECT_EQ(frontend.at_time(7'500'000).iteration(), 7);
+}
+
+TEST_F(RowsByTimeTest, AgreesWithASearchThroughAllRowsThatAreThere) {
+  Station station(millisecond(32));
+  station.start();
+  UntypedFrontend frontend("pair");
+  std::mt19937_64 random(7);
+  for (int round = 0; round < 50; ++round) {
+    frontend.start_burst(std::uniform_int_distribution<std::int64_t>(1, 9)(random));
+    station.drive();
+    const Iteration oldest = frontend.oldest();
+    const Iteration newest = frontend.published();
+    const auto time = [&] {
+      return std::uniform_int_distribution<std::int64_t>((oldest - 3) * 1'000'000,
+                                                         (newest + 3) * 1'000'000)(random);
+    };
+    for (int i = 0; i < 20; ++i) {
+      const std::int64_t first = time();
+      const std::int64_t last = time();
+      Iteration expected = oldest - 1;
+      Iteration begin = newest + 1;
+      std::size_t count = 0;
+      for (Iteration k = newest; k >= oldest; --k) {
+        const std::int64_t at = frontend.wait_for(k, kAtOnce).time();
+        if (at <= first && expected < k) expected = k;
+        if (at < first || at > last) continue;
+        begin = k;
+        ++count;
+      }
+      EXPECT_EQ(frontend.iteration_at(first), expected);
+      const Rows rows = frontend.history_between(first, last);
+      EXPECT_EQ(rows.count, count);
+      if (count > 0) {
+        EXPECT_EQ(rows.first, begin);
+      }
+    }
+  }
+}
+
+TEST_F(RowsByTimeTest, SaysThatARowIsNoLongerThere) {
+  Station station(millisecond(8));
+  station.start();
+  UntypedFrontend frontend("pair");
+  frontend.start_burst(100);
+  station.drive();
+  EXPECT_THAT(message_of<RowOverwritten>([&] { frontend.at_time(5'000'000); }),
+              HasSubstr("the oldest one there is row " + std::to_string(frontend.oldest())));
+}
+
+}  // namespace
+}  // namespace o80::test

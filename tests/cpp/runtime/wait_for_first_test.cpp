@@ -1,0 +1,68 @@
+#include <gmock/gmock.h>
+
+#include <optional>
+
+#include "runtime/station.hpp"
+
+namespace o80::test {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+class WaitForFirstTest : public StationTest {
+ protected:
+  std::vector<RowWish> wish(Iteration of_left, Iteration of_right) const {
+    return {{&left_, of_left}, {&right_, of_right}};
+  }
+
+  BurstingStation left_station_{"left"};
+  std::optional<BurstingStation> right_station_{std::in_place, "right"};
+  UntypedFrontend left_{"left"};
+  UntypedFrontend right_{"right"};
+};
+
+TEST_F(WaitForFirstTest, NamesAllRowsThatAreThere) {
+  EXPECT_THAT(wait_for_first(wish(0, 0), kAtOnce), ElementsAre(0, 1));
+  EXPECT_THAT(wait_for_first(wish(1, 0), kAtOnce), ElementsAre(1));
+}
+
+TEST_F(WaitForFirstTest, EndsWithTheFirstRow) {
+  const Burst burst = right_.start_burst(5);
+  EXPECT_THAT(wait_for_first(wish(1, 5), kPatience), ElementsAre(1));
+  burst.wait(kPatience);
+}
+
+TEST_F(WaitForFirstTest, SaysWhereEachOneStandsAfterATimeout) {
+  const std::string said = message_of<TimeoutError>([&] { wait_for_first(wish(1, 2), kAtOnce); });
+  EXPECT_THAT(said, HasSubstr("'left' is at row 0 of 1 (it waits for a burst)"));
+  EXPECT_THAT(said, HasSubstr("'right' is at row 0 of 2"));
+}
+
+TEST_F(WaitForFirstTest, NamesTheBackendThatHasStopped) {
+  right_station_.reset();
+  EXPECT_THAT(message_of<BackendStopped>([&] { wait_for_first(wish(1, 1), kPatience); }),
+              HasSubstr("'right'"));
+  EXPECT_THAT(wait_for_first(wish(0, 1), kPatience), ElementsAre(0));
+}
+
+TEST_F(WaitForFirstTest, IsEndedByTheCloseOfOne) {
+  std::thread closer;
+  EXPECT_THROW(wait_for_first(wish(1, 1), kPatience,
+                              [&] {
+                                if (!closer.joinable()) {
+                                  closer = std::thread([&] { left_.close(); });
+                                }
+                                return true;
+                              }),
+               Closed);
+  closer.join();
+}
+
+TEST_F(WaitForFirstTest, RefusesNothingAndRowsThatCannotBe) {
+  EXPECT_THROW(wait_for_first({}, kAtOnce), InvalidArgument);
+  EXPECT_THROW(wait_for_first(wish(0, -1), kAtOnce), InvalidArgument);
+}
+
+}  // namespace
+}  // namespace o80::test

@@ -1,0 +1,108 @@
+"""Every verb of o80.Frontend: declared in one typed place, documented, and refused in words."""
+
+import ast
+import inspect
+from pathlib import Path
+
+import pytest
+
+import o80
+import o80.frontend
+from o80 import _core
+
+SOURCES = sorted(Path(inspect.getfile(o80.frontend)).parent.glob("*.py"))
+
+
+def declared(*, compiled: bool) -> dict[str, ast.FunctionDef]:
+    """Verbs that stand under TYPE_CHECKING (compiled), or have a body."""
+    found: dict[str, ast.FunctionDef] = {}
+    for source in SOURCES:
+        for cls in ast.parse(source.read_text()).body:
+            if not isinstance(cls, ast.ClassDef):
+                continue
+            blocks = [block for block in cls.body if isinstance(block, ast.If)]
+            body = [verb for block in blocks for verb in block.body] if compiled else cls.body
+            found.update({verb.name: verb for verb in body if isinstance(verb, ast.FunctionDef)})
+    return {name: verb for name, verb in found.items() if not name.startswith("_")}
+
+
+def test_declares_every_public_verb_and_no_other() -> None:
+    public = {name for name in dir(o80.Frontend) if not name.startswith("_")}
+    assert set(declared(compiled=True)) | set(declared(compiled=False)) == public
+
+
+def test_declares_the_compiled_verbs_as_such() -> None:
+    public = {name for name in dir(_core.Frontend) if not name.startswith("_")}
+    assert set(declared(compiled=True)) == public
+
+
+@pytest.mark.parametrize("name", sorted(declared(compiled=True)))
+def test_shows_signature_and_help_of_a_compiled_verb_once(name: str) -> None:
+    verb = declared(compiled=True)[name]
+    said = inspect.getdoc(getattr(_core.Frontend, name)) or ""
+    text = ast.get_docstring(verb)
+    assert text
+    assert said.count(text) == 1
+    if isinstance(getattr(_core.Frontend, name), property):
+        return
+    assert "Overloaded" not in said
+    shown, other = said.splitlines()[:2]
+    assert other == f"{name}(self, *wrong, **arguments) -> NoReturn" or name == "latest"
+    made = ast.parse(f"def {shown}: ...").body[0]
+    assert isinstance(made, ast.FunctionDef)
+    expected = ast.unparse(verb.args).replace("_core.", "")
+    assert ast.unparse(made.args) == expected
+    assert verb.returns is not None
+    assert made.returns is not None
+    assert ast.unparse(made.returns) == ast.unparse(verb.returns).replace("_core.", "")
+
+
+@pytest.mark.parametrize("name", sorted(declared(compiled=False)))
+def test_documents_a_verb_of_python(name: str) -> None:
+    assert inspect.getdoc(getattr(o80.Frontend, name))
+
+
+def test_names_each_of_its_files_in_the_table() -> None:
+    table = o80.frontend.__doc__ or ""
+    for source in SOURCES:
+        assert source.name == "__init__.py" or f"| {source.name} |" in table
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda arm: arm.add_command(0, 0.5, 2.0), "give the rest by name"),
+        (lambda arm: arm.add_command(0, 0.5, 2.0), "duration, speed, until, iterations"),
+        (lambda arm: arm.add_command(0, 0.5, durations=2.0), "did you mean 'duration'?"),
+        (lambda arm: arm.add_command(0), "missing 1 required positional argument: 'target'"),
+        (lambda arm: arm.pulse(7), "give the rest by name"),
+        (lambda arm: arm.wait_for(), "missing 1 required positional argument: 'iteration'"),
+        (lambda arm: arm.stream(timout=1.0), "did you mean 'timeout'?"),
+        (lambda arm: arm.purge(actuators=0), "did you mean 'actuator'?"),
+        (lambda arm: arm.halt(1, 2), "halt() takes from 1 to 2 positional arguments"),
+    ],
+)
+def test_refuses_wrong_arguments_in_the_words_of_python(call: object, said: str) -> None:
+    with o80.robots.load("two_joints").inline() as arm:
+        with pytest.raises(TypeError) as refused:
+            call(arm)  # type: ignore[operator]
+        assert said in str(refused.value)
+        assert "nanobind" not in str(refused.value)
+        assert arm.added == 0
+
+
+@pytest.mark.parametrize("timeout", ["soon", [1.0], float("nan")])
+def test_says_what_a_timeout_is(timeout: object) -> None:
+    with o80.robots.load("two_joints").inline() as arm:
+        for wait in (arm.wait_for_next, arm.pulse_and_wait, arm.pulse().wait):
+            with pytest.raises(o80.InvalidArgument, match="timeout must be a number of seconds"):
+                wait(timeout)  # type: ignore[arg-type, operator]
+        with pytest.raises(o80.InvalidArgument, match="timeout must be a number of seconds"):
+            arm.burst(1, timeout=timeout)  # type: ignore[call-overload]
+
+
+def test_takes_whole_numbers_of_seconds() -> None:
+    with o80.robots.load("two_joints").inline() as arm:
+        arm.burst(3, timeout=5)
+        assert arm.wait_for(2, 5).iteration == 2
+        assert arm.pulse_and_wait(timeout=5).iteration == 3

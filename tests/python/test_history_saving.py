@@ -1,0 +1,144 @@
+"""Histories outlive a session: NumPy, pickle, HDF5 and pandas."""
+
+import io
+import itertools
+import pickle
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+from mixed_robots import GROUPS, SENSORS, Mode, fill
+
+import o80
+
+_names = (f"test-saving-{i}" for i in itertools.count())
+
+
+def recorded(groups: Any, sensors: Any, seed: int, rows: int = 5) -> o80.History:
+    """What a robot of these types published."""
+    random = np.random.default_rng(seed)
+    name = next(_names)
+    options: Any = {"extended": sensors, "bursting": True}
+    with o80.Backend(name, groups, **options) as backend:
+        backend.publish(_random(random, backend._observed), _random(random, backend._extended))
+        with o80.Frontend(name) as frontend:
+            for row in range(rows):
+                if row > 0:
+                    burst = frontend.burst(1, wait=False)
+                    backend.step()
+                backend.publish(
+                    _random(random, backend._observed), _random(random, backend._extended)
+                )
+            assert rows == 1 or burst.done
+            history = frontend.history()
+    o80.clean(name)
+    return history
+
+
+def _random(random: np.random.Generator, like: Any) -> Any:
+    array = np.array(like)
+    if array.dtype.itemsize == 0:
+        return None
+    fill(random, array)
+    return array
+
+
+# each example starts a backend: shrinking would take longer than a test may
+ROBOTS = settings(
+    max_examples=12,
+    deadline=None,
+    phases=[Phase.explicit, Phase.reuse, Phase.generate],
+    suppress_health_check=[HealthCheck.too_slow],
+)
+
+
+@ROBOTS
+@given(GROUPS, SENSORS, st.integers(0, 2**32 - 1))
+def test_rows_of_any_robot_are_saved_and_loaded(groups: Any, sensors: Any, seed: int) -> None:
+    history = recorded(groups, sensors, seed)
+    file = io.BytesIO()
+    np.save(file, history.rows)
+    file.seek(0)
+    loaded = np.load(file)
+
+    assert loaded.dtype.names == history.rows.dtype.names
+    for name in loaded.dtype.names:
+        # as values: padding is not kept
+        assert repr(loaded[name].tolist()) == repr(history.rows[name].tolist())
+
+
+@ROBOTS
+@given(GROUPS, SENSORS, st.integers(0, 2**32 - 1))
+def test_histories_of_any_robot_are_pickled(groups: Any, sensors: Any, seed: int) -> None:
+    history = recorded(groups, sensors, seed)
+    copy = pickle.loads(pickle.dumps(history))
+
+    assert copy.rows.tobytes() == history.rows.tobytes()
+    assert str(copy[-1]) == str(history[-1])
+    assert pickle.loads(pickle.dumps(history[1:3])).iteration.tolist() == [1, 2]
+
+
+@ROBOTS
+@given(GROUPS, SENSORS, st.integers(0, 2**32 - 1))
+def test_frames_of_any_robot_hold_all_numbers(groups: Any, sensors: Any, seed: int) -> None:
+    history = recorded(groups, sensors, seed)
+    frame = history.to_frame()
+
+    assert frame.index.tolist() == history.iteration.tolist()
+    observed = frame[[name for name in frame if name.startswith(("observed.", "extended"))]]
+    numbers = observed.apply(_as_number).to_numpy(np.float64)
+    assert np.array_equal(numbers, history.flat(np.float64))
+
+
+def _as_number(column: Any) -> Any:
+    return column.map(lambda label: int(Mode[label])) if column.dtype == "category" else column
+
+
+def test_a_frame_names_parts_actuators_and_fields() -> None:
+    groups = {"joints": ({"position": float, "mode": Mode}, ["left", "right"]), "grip": float}
+    frame = recorded(groups, {"force": (float, 2)}, 0).to_frame()
+
+    assert frame.index.name == "iteration"
+    assert {
+        "time",
+        "halted",
+        "desired.left.position",
+        "observed.right.mode",
+        "observed.grip",
+    } < set(frame.columns)
+    assert {"extended.force[0]", "extended.force[1]", "active.left", "braking.grip"} < set(
+        frame.columns
+    )
+    assert set(frame["observed.right.mode"].cat.categories) == {"IDLE", "MOVE", "HOLD"}
+
+
+def test_an_empty_history_is_saved_too(arm: o80.Frontend) -> None:
+    empty = arm.history(0)
+    assert len(empty.to_frame()) == 0
+    assert "observed.elbow" in empty.to_frame()
+    file = io.BytesIO()
+    np.save(file, empty.rows)
+    assert len(pickle.loads(pickle.dumps(empty))) == 0
+
+
+def test_hdf5_takes_the_rows(arm: o80.Frontend, tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    arm.burst(20)
+    history = arm.history()
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        file["rows"] = history.rows
+    with h5py.File(tmp_path / "run.h5") as file:
+        assert np.array_equal(file["rows"]["observed"], history.observed)
+
+
+def test_without_pandas_the_error_names_the_extra(
+    arm: o80.Frontend, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(o80.MissingExtra, match=r'pip install "o80\[pandas\]"') as missing:
+        arm.history().to_frame()
+    assert isinstance(missing.value, ImportError)
