@@ -13,7 +13,7 @@ namespace o80 {
 
 namespace {
 
-using Kind = LoopOption::Kind;
+using OptionKind = LoopOption::Kind;
 
 constexpr unsigned kProcess = LoopOption::kProcess;
 constexpr unsigned kInline = LoopOption::kInline;
@@ -22,7 +22,7 @@ constexpr unsigned kEverywhere = kProcess | kInline | kEmbedded;
 
 /// Reads the whole text as a number; false if it is not one.
 template <class Number, class... Base>
-bool read(std::string_view text, Number& number, Base... base) {
+bool read_number(std::string_view text, Number& number, Base... base) {
   const char* end = text.data() + text.size();
   const auto result = std::from_chars(text.data(), end, number, base...);
   return result.ec == std::errc() && result.ptr == end;
@@ -36,7 +36,7 @@ bool set_stale(LoopOptions& options, std::string_view text, double /*number*/) {
 
 bool set_permission(LoopOptions& options, std::string_view text, double /*number*/) {
   mode_t mode = 0;
-  if (!read(text, mode, 8) || mode < 0400 || mode > 0777) return false;
+  if (!read_number(text, mode, 8) || mode < 0400 || mode > 0777) return false;
   options.backend.permission = mode;
   return true;
 }
@@ -55,7 +55,8 @@ bool set_processors(LoopOptions& options, std::string_view text, double /*number
   while (true) {
     const std::size_t comma = std::min(text.find(','), text.size());
     int processor = 0;
-    if (!read(text.substr(0, comma), processor) || processor < 0 || processor > 1023) return false;
+    if (!read_number(text.substr(0, comma), processor) || processor < 0 || processor > 1023)
+      return false;
     list.push_back(processor);
     if (comma == text.size()) break;
     text.remove_prefix(comma + 1);
@@ -72,72 +73,72 @@ bool set_processors(LoopOptions& options, std::string_view text, double /*number
   }
 
 constexpr std::array kOptions = {
-    LoopOption{"segment", Kind::text, "a name", 0, 0, "the robot's name",
+    LoopOption{"segment", OptionKind::text, "a name", 0, 0, "the robot's name",
                "name that frontends attach to", LoopOption::kFlag,
                [](LoopOptions& options, std::string_view text, double) {
                  options.backend.segment = text;
                  return true;
                }},
-    LoopOption{"frequency", Kind::number, "a number from 0.001 to 1000000 [1/s]", 1e-3, 1e6,
+    LoopOption{"frequency", OptionKind::number, "a number from 0.001 to 1000000 [1/s]", 1e-3, 1e6,
                "the robot's own, or 1000", "iterations a second; in bursting, of simulated time",
                kEverywhere,
                [](LoopOptions& options, std::string_view, double number) {
                  options.backend.period = std::llround(1e9 / number);
                  return true;
                }},
-    LoopOption{"bursting", Kind::boolean, "true or false", 0, 1, "no",
+    LoopOption{"bursting", OptionKind::boolean, "true or false", 0, 1, "no",
                "run only the iterations that frontends request", kProcess | kEmbedded,
                O80_SET(backend.bursting)},
-    LoopOption{"history", Kind::integer, "a whole number from 1 to 1000000000", 1, 1e9,
+    LoopOption{"history", OptionKind::integer, "a whole number from 1 to 1000000000", 1, 1e9,
                "as many as 16 MiB hold, at most 100000", "rows kept", kEverywhere,
                O80_SET(backend.history)},
-    LoopOption{"lanes", Kind::integer, "a whole number from 1 to 256", 1, 256, "8",
+    LoopOption{"lanes", OptionKind::integer, "a whole number from 1 to 256", 1, 256, "8",
                "frontends that may command at once", kEverywhere, O80_SET(backend.lanes)},
-    LoopOption{"lane_blocks", Kind::integer, "a whole number from 16 to 4194304", 16, 1 << 22,
+    LoopOption{"lane_blocks", OptionKind::integer, "a whole number from 16 to 4194304", 16, 1 << 22,
                "16384", "blocks of 64 bytes that each of them may have in flight", kEverywhere,
                O80_SET(backend.lane_blocks)},
-    LoopOption{"permission", Kind::octal, "an octal mode such as 600, 640 or 660", 0, 0, "600",
-               "read bits: who may observe, write bits: who may command", kEverywhere,
+    LoopOption{"permission", OptionKind::octal, "an octal mode such as 600, 640 or 660", 0, 0,
+               "600", "read bits: who may observe, write bits: who may command", kEverywhere,
                set_permission},
-    LoopOption{"stale", Kind::word, "hold, purge, halt or stop", 0, 0, "hold",
+    LoopOption{"stale", OptionKind::word, "hold, purge, halt or stop", 0, 0, "hold",
                "policy for a commander that dies, or is silent for too long", kEverywhere,
                set_stale},
-    LoopOption{"silence", Kind::integer, "a whole number from 1 to 1000000000000000", 1, 1e15,
+    LoopOption{"silence", OptionKind::integer, "a whole number from 1 to 1000000000000000", 1, 1e15,
                "no watchdog", "watchdog: iterations without a sign of life before stale applies",
                kEverywhere, O80_SET(backend.silence)},
-    LoopOption{"max_overruns", Kind::integer, "a whole number from 1 to 100000", 1, 1e5, "no limit",
-               "number of late iterations within a second that halts the robot",
+    LoopOption{"max_overruns", OptionKind::integer, "a whole number from 1 to 100000", 1, 1e5,
+               "no limit", "number of late iterations within a second that halts the robot",
                kProcess | kEmbedded, O80_SET(backend.max_overruns)},
-    LoopOption{"resume", Kind::boolean, "true or false", 0, 1, "no",
+    LoopOption{"resume", OptionKind::boolean, "true or false", 0, 1, "no",
                "start without a halt even if the previous backend was halted or killed",
                kProcess | kEmbedded, O80_SET(backend.resume)},
-    LoopOption{"policy", Kind::word, "other, fifo or rr", 0, 0, "other",
+    LoopOption{"policy", OptionKind::word, "other, fifo or rr", 0, 0, "other",
                "scheduling class of the loop", kProcess, set_policy},
-    LoopOption{"priority", Kind::integer, "a whole number from 1 to 99", 1, 99, "80",
+    LoopOption{"priority", OptionKind::integer, "a whole number from 1 to 99", 1, 99, "80",
                "priority of the loop, with policy fifo and rr", kProcess,
                O80_SET(real_time.priority)},
-    LoopOption{"cpus", Kind::list, "a list of processors such as 2,3", 0, 0, "all",
+    LoopOption{"cpus", OptionKind::list, "a list of processors such as 2,3", 0, 0, "all",
                "processors of the loop", kProcess, set_processors},
-    LoopOption{"lock_memory", Kind::boolean, "true or false", 0, 1, "no",
+    LoopOption{"lock_memory", OptionKind::boolean, "true or false", 0, 1, "no",
                "keep all memory resident", kProcess, O80_SET(real_time.lock_memory)},
-    LoopOption{"until_eof", Kind::boolean, "true or false", 0, 1, "no",
+    LoopOption{"until_eof", OptionKind::boolean, "true or false", 0, 1, "no",
                "stop when the standard input ends", LoopOption::kFlag, O80_SET(until_eof)},
-    LoopOption{"help", Kind::boolean, "true or false", 0, 1, "no", "this text", LoopOption::kFlag,
-               O80_SET(help)}};
+    LoopOption{"help", OptionKind::boolean, "true or false", 0, 1, "no", "this text",
+               LoopOption::kFlag, O80_SET(help)}};
 #undef O80_SET
 
 /// Reads a number or a boolean; false if the text is invalid. Other kinds have no number.
 bool read_number(const LoopOption& option, std::string_view text, double& number) {
   switch (option.kind) {
-    case Kind::boolean:
+    case OptionKind::boolean:
       number = text == "true" ? 1 : 0;
       return text == "true" || text == "false";
-    case Kind::number:
-    case Kind::integer:
-      if (!read(text, number) || !(number >= option.minimum && number <= option.maximum)) {
+    case OptionKind::number:
+    case OptionKind::integer:
+      if (!read_number(text, number) || !(number >= option.minimum && number <= option.maximum)) {
         return false;
       }
-      return option.kind == Kind::number || number == std::floor(number);
+      return option.kind == OptionKind::number || number == std::floor(number);
     default:
       return true;
   }
