@@ -26,6 +26,12 @@
     using O80Type [[maybe_unused]] = Type;                                                       \
     O80_FOR_EACH(O80_FIELD, ~, __VA_ARGS__)                                                      \
   }                                                                                              \
+  template <class O80Use>                                                                        \
+  consteval bool o80_crosses_memory(::o80::Tag<Type>, O80Use) {                                  \
+    using O80Type [[maybe_unused]] = Type;                                                       \
+    O80_FOR_EACH(O80_CROSSES, Type, __VA_ARGS__)                                                 \
+    return true;                                                                                 \
+  }                                                                                              \
   static_assert(true)
 
 /// Describes an enumeration: O80_DESCRIBE_ENUM(ControlMode, off, position, torque).
@@ -45,6 +51,18 @@
 #define O80_FIELD_NAMED(field, ...)                                         \
   o80_visit(#field, &O80Type::field, std::size_t{offsetof(O80Type, field)}, \
             ::o80::FieldNote(__VA_ARGS__));
+// depends on a template parameter: only structs that are shared are checked
+#define O80_CROSSES(Type, field) O80_JOIN(O80_CROSSES_, O80_IS_GROUP(field))(Type, field)
+#define O80_CROSSES_0(Type, field) O80_CROSSES_NAMED(Type, field)
+#define O80_CROSSES_1(Type, field) O80_CROSSES_OF(Type, O80_FIRST field)
+#define O80_CROSSES_OF(...) O80_CROSSES_NAMED(__VA_ARGS__)
+#define O80_FIRST(first, ...) first
+#define O80_CROSSES_NAMED(Type, field)                                                         \
+  static_assert(::o80::describing::kCrossesMemory<decltype(O80Type::field), O80Use>,           \
+                #Type "::" #field                                                              \
+                      " cannot be shared between processes: use numbers, described enums, "    \
+                      "described structs or a std::array of them (no pointer, std::string or " \
+                      "std::vector)");
 #define O80_LABEL(fixed, label) o80_visit(#label, O80Type::label);
 
 namespace o80 {
@@ -113,6 +131,25 @@ concept Number = std::is_arithmetic_v<T> && !std::is_same_v<T, char> &&
 template <class T>
 concept Shareable =
     Number<T> || DescribedEnum<T> || (DescribedStruct<T> && std::is_trivially_copyable_v<T>);
+
+namespace describing {
+
+template <class T, class Use>
+constexpr bool crosses_memory() {
+  if constexpr (ArrayOf<T>::value) {
+    return crosses_memory<typename ArrayOf<T>::Element, Use>();
+  } else if constexpr (DescribedStruct<T>) {
+    return o80_crosses_memory(Tag<T>{}, Use{}) && std::is_trivially_copyable_v<T>;
+  } else {
+    return Shareable<T>;
+  }
+}
+
+/// May be shared as a member of a struct; `Use` is any type.
+template <class T, class Use>
+inline constexpr bool kCrossesMemory = crosses_memory<T, Use>();
+
+}  // namespace describing
 
 /// A state type with its own interpolation: `static T blend(const T&, const T&, double)`.
 template <class T>

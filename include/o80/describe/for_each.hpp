@@ -1,4 +1,6 @@
 #pragma once
+// g++ then leaves the steps of these macros out of its errors: 2000 lines for a misspelt field
+#pragma GCC system_header
 
 // Calls a macro for every argument: O80_FOR_EACH(M, fixed, a, b) => M(fixed, a) M(fixed, b).
 // Up to 256 arguments, by rescanning (C++20 __VA_OPT__).

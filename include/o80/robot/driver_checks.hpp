@@ -83,6 +83,34 @@ consteval bool config_is_described() {
   return true;  // a missing Config is an error of its own
 }
 
+template <class D>
+consteval bool actuators_are_states() {
+  if constexpr (O80_TYPE(Actuators)) {
+    using Actuators = typename D::Actuators;
+    if constexpr (describing::ArrayOf<Actuators>::value) {
+      using State = typename describing::ArrayOf<Actuators>::Element;
+      return Shareable<State> || DescribedStruct<State>;  // its members are checked one by one
+    } else {
+      return std::is_same_v<Actuators, NoActuators> ||
+             std::is_same_v<Actuators, RunTimeActuators> || DescribedStruct<Actuators>;
+    }
+  }
+  return true;  // there are none: reported before
+}
+
+/// Its static assertions name the members that cannot be shared.
+template <class D>
+consteval bool states_cross_memory() {
+  if constexpr (O80_TYPE(Actuators)) {
+    using Actuators = typename D::Actuators;
+    if constexpr (actuators_are_states<D>() && !std::is_same_v<Actuators, NoActuators> &&
+                  !std::is_same_v<Actuators, RunTimeActuators>) {
+      return describing::kCrossesMemory<Actuators, int>;
+    }
+  }
+  return true;  // or reported before
+}
+
 /// The required types of a driver.
 template <class D>
 struct Parts {
@@ -94,6 +122,11 @@ struct Parts {
   static_assert(O80_TYPE(Actuators),
                 "a driver needs a public `using Actuators = std::array<Joint, 4>;`, a described "
                 "struct of actuators, o80::NoActuators or o80::RunTimeActuators");
+  static_assert(
+      actuators_are_states<D>(),
+      "a driver's Actuators must be a std::array of states or a described struct of them; "
+      "a state is a number, a described enum or a struct that O80_DESCRIBE describes");
+  static_assert(states_cross_memory<D>(), "a state must be a plain struct of numbers");
   static constexpr bool kPassed = true;
 };
 

@@ -37,15 +37,19 @@ O80_DESCRIBE(Force, x);
   void stop() noexcept {}
 #endif
 
+#ifndef ARM_STATE
+#define ARM_STATE Joint
+#endif
+
 /// Begins the class Arm.
-#define ARM_WITHOUT_MISTAKE               \
- public:                                  \
-  struct Config {};                       \
-  using Actuators = std::array<Joint, 2>; \
-  explicit Arm(const Config&) {}          \
-  ARM_START                               \
-  ARM_WRITE                               \
-  ARM_READ                                \
+#define ARM_WITHOUT_MISTAKE                   \
+ public:                                      \
+  struct Config {};                           \
+  using Actuators = std::array<ARM_STATE, 2>; \
+  explicit Arm(const Config&) {}              \
+  ARM_START                                   \
+  ARM_WRITE                                   \
+  ARM_READ                                    \
   ARM_STOP
 
 /// Follows the class Arm.
