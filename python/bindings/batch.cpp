@@ -19,12 +19,12 @@ using o80::Handle;
 
 namespace {
 
-/// What `await` asks of an object: the iterator of a coroutine of o80.awaiting.
+/// The iterator of a coroutine of o80.awaiting, for `__await__`.
 nb::object awaited(nb::handle self) {
   return nb::module_::import_("o80.awaiting").attr("end_of")(self).attr("__await__")();
 }
 
-/// None stands for "not yet".
+/// The iteration; nothing (None) if there is none yet.
 std::optional<o80::Iteration> known(o80::Iteration iteration) {
   if (iteration < 0) return {};
   return iteration;
@@ -35,7 +35,7 @@ o80::Iteration reached(o80::Iteration iteration, const char* not_yet) {
   throw o80::Error(std::string("the batch ") + not_yet + ", or was empty: wait for it first");
 }
 
-/// A handle that was pickled.
+/// Makes a handle from its pickled values.
 Handle* handle_of(o80::CommandId id, int status, int reason, o80::Iteration iteration,
                   std::string text, std::string progress) {
   return new Handle{id,
@@ -66,7 +66,7 @@ nb::list statuses_of(const Batch& batch) {
 }  // namespace
 
 void bind_batch(nb::module_& m) {
-  nb::class_<Handle>(m, "Handle", "What became of one command or request, when it was asked.")
+  nb::class_<Handle>(m, "Handle", "Status of one command or request, when it was read.")
       .def(nb::new_(&handle_of), "id"_a, "status"_a, "reason"_a, "iteration"_a, "text"_a,
            "progress"_a)
       .def(
@@ -79,24 +79,26 @@ void bind_batch(nb::module_& m) {
                                             handle->text, handle->progress));
           },
           nb::sig("def __reduce__(self) -> tuple[typing.Any, ...]"))
-      .def_ro("id", &Handle::id, "Names it within its frontend.")
+      .def_ro("id", &Handle::id, "Its id, unique within its frontend.")
       .def_prop_ro(
           "status", [](const Handle& self) { return python_word(self.status); },
-          nb::sig("def status(self) -> Status"), "What became of it.")
+          nb::sig("def status(self) -> Status"), "Its status.")
       .def_prop_ro(
           "reason", [](const Handle& self) { return python_word(self.reason); },
-          nb::sig("def reason(self) -> Reason"), "Why.")
+          nb::sig("def reason(self) -> Reason"), "The reason of its status.")
       .def_prop_ro(
           "iteration", [](const Handle& self) { return known(self.iteration); },
-          "The iteration at which the status changed; None while it is queued.")
-      .def_ro("text", &Handle::text, "Why it was rejected or dropped, in words.")
-      .def_ro("progress", &Handle::progress, "What the driver says of a request that runs.")
+          "The iteration in which the status changed; None while it is queued.")
+      .def_ro("text", &Handle::text, "The reason in words.")
+      .def_ro("progress", &Handle::progress, "The driver's text about a running request.")
       .def_prop_ro(
           "ended", [](const Handle& self) { return o80::is_end(self.status); },
-          "Whether the status changes no more.")
+          "True if the status is final.")
       .def("__repr__", &text_of);
 
-  nb::class_<Batch> batch(m, "Batch", "What one pulse sent. Its length is that of its records.");
+  nb::class_<Batch> batch(
+      m, "Batch",
+      "The commands, requests and purges that one pulse sent; its length is their number.");
   refuse_to_pickle(batch, "a batch", "its handles, its first_iteration or its last_iteration");
   batch.def("__len__", &Batch::size)
       .def("__bool__", [](const Batch&) { return true; })
@@ -104,19 +106,19 @@ void bind_batch(nb::module_& m) {
                    "A handle for each command, request and purge, in the order they were added.")
       .def_prop_ro("statuses", &statuses_of, nb::sig("def statuses(self) -> list[Status]"),
                    "The status of each, in the order they were added.")
-      .def_prop_ro("ended", &Batch::ended, "Whether every record has an end status.")
+      .def_prop_ro("ended", &Batch::ended, "True if all of them have ended.")
       .def_prop_ro(
           "taken", [](const Batch& self) { return self.first_iteration() >= 0; },
-          "Whether the backend has taken (or rejected) it.")
+          "True if the backend has taken or rejected it.")
       .def_prop_ro(
           "first_iteration",
           [](const Batch& self) { return reached(self.first_iteration(), "was not taken yet"); },
-          "The iteration at which it was taken. Raises Error if it was not yet; see `taken`.")
+          "The iteration in which it was taken. Raises Error if it was not taken yet; see `taken`.")
       .def_prop_ro(
           "last_iteration",
           [](const Batch& self) { return reached(self.last_iteration(), "has not ended yet"); },
-          "The iteration at which the last of its commands ended. Raises Error if they have not "
-          "all; see `ended` and `wait`.")
+          "The iteration in which the last of its commands ended. Raises Error if some have not "
+          "ended; see `ended` and `wait`.")
       .def(
           "wait",
           [](const Batch& self, nb::handle timeout) {
@@ -127,37 +129,37 @@ void bind_batch(nb::module_& m) {
             });
           },
           "timeout"_a = nb::none(),
-          R"(Waits until every record has an end status.
+          R"(Waits until every command, request and purge of it has ended.
 
-A bursting backend must be burst for that. Raises TimeoutError after `timeout` [s], which carries
-this batch, and BackendGone.)")
+In bursting mode a frontend must request the iterations for that. Raises TimeoutError after
+`timeout` [s], with this batch as its member, and BackendGone.)")
       .def("__await__", &awaited,
            nb::sig("def __await__(self) -> collections.abc.Generator[typing.Any, None, Batch]"),
-           "Waits as a task of asyncio: `await arm.pulse()` gives the batch when it has ended.")
+           "Waits in asyncio: `await arm.pulse()` returns the batch when it has ended.")
       .def("__repr__", [](const Batch& self) {
         const std::string what = "<o80.Batch of " + std::to_string(self.size());
         try {
-          return what + (self.ended() ? ", ended>" : ", under way>");
+          return what + (self.ended() ? ", ended>" : ", not ended>");
         } catch (const o80::UsedAfterFork&) {
           return what + ", of the parent process>";
         }
       });
 
-  nb::class_<PendingBurst> burst(m, "Burst", "A burst under way.");
+  nb::class_<PendingBurst> burst(m, "Burst", "A burst that was requested.");
   refuse_to_pickle(burst, "a burst", "the observation that its wait returns");
   burst
       .def_prop_ro(
           "batch", [](const PendingBurst& self) { return self.burst.batch(); },
-          "What was sent with it.")
+          "The batch that was sent with it.")
       .def_prop_ro(
           "done", [](const PendingBurst& self) { return self.burst.done(); },
-          "Whether its last iteration is done.")
+          "True if its last iteration is done.")
       .def(
           "cancel", [](const PendingBurst& self) { self.burst.cancel(); },
-          R"(Ends it: the backend stands still after the iteration under way.
+          R"(Ends the burst after the current iteration.
 
-A burst that has not begun runs no iteration. What was sent with it stays queued. Its wait then
-returns the last row there was.)")
+A burst that has not begun runs no iteration. Commands sent with it stay queued. `wait` then returns
+the last row that it published.)")
       .def(
           "wait",
           [](const PendingBurst& self, nb::handle timeout) {
@@ -171,13 +173,13 @@ returns the last row there was.)")
             });
           },
           "timeout"_a = nb::none(),
-          R"(Waits for its last iteration and returns the observation of it.
+          R"(Waits for its last iteration and returns that observation.
 
-Raises TimeoutError after `timeout` [s], and BackendGone. After a timeout it goes on, and can be
-waited for again, or cancelled.)")
+Raises TimeoutError after `timeout` [s], and BackendGone. After a timeout the burst continues: wait
+for it again, or cancel it.)")
       .def("__await__", &awaited,
            nb::sig("def __await__(self) "
                    "-> collections.abc.Generator[typing.Any, None, Observation]"),
-           "Waits as a task of asyncio for the observation of its last iteration. A task that is "
-           "cancelled leaves it under way.");
+           "Waits in asyncio for the observation of its last iteration. If the task is cancelled, "
+           "the burst continues.");
 }

@@ -1,4 +1,4 @@
-// Ends waits of another thread.
+// Cancels waits of another thread.
 
 #include <utility>
 
@@ -12,7 +12,7 @@ namespace {
 
 thread_local const std::atomic<bool>* cancelled_call = nullptr;
 
-/// While it lives, `cancelled` ends the waits of this thread.
+/// While this object exists, `cancelled` ends the waits of this thread.
 class CancelledBy {
  public:
   explicit CancelledBy(const std::atomic<bool>& cancelled)
@@ -37,7 +37,7 @@ bool Canceller::cancelled_here() noexcept {
 }
 
 void bind_canceller(nb::module_& m) {
-  nb::class_<Canceller>(m, "Canceller", "Ends the waits of one thread from another one.")
+  nb::class_<Canceller>(m, "Canceller", "Cancels the waits of one thread from another thread.")
       .def(nb::init<>())
       .def("cancel", &Canceller::cancel)
       .def("call", &Canceller::call, "callable"_a,

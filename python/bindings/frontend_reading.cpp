@@ -1,4 +1,4 @@
-// How a frontend reads what the backend published.
+// How a frontend reads rows.
 
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
@@ -39,7 +39,7 @@ Observation wait_for(const Frontend& self, nb::handle iteration, nb::handle time
   return observation;
 }
 
-/// Moves the position on.
+/// Moves the position behind the row that was read.
 Observation next_row(const std::shared_ptr<UntypedFrontend>& frontend,
                      const std::shared_ptr<const Decoder>& decoder, Iteration& position,
                      o80::Timeout timeout) {
@@ -50,7 +50,7 @@ Observation next_row(const std::shared_ptr<UntypedFrontend>& frontend,
   return observation;
 }
 
-/// The row that wait_for_next gives next.
+/// The row that wait_for_next returns next.
 Iteration next_of(Frontend& self) {
   if (self.next < 0) self.next = self.untyped().published() + 1;
   return self.next;
@@ -61,23 +61,23 @@ Observation wait_for_next(Frontend& self, nb::handle timeout) {
   const auto frontend = self.shared();
   Iteration next = next_of(self);
   Observation observation = next_row(frontend, self.decoder(), next, patience);
-  // another thread may have been here, or attached again
+  // another thread may have read a row or attached again meanwhile
   if (frontend == self.shared()) self.next = std::max(self.next, next);
   return observation;
 }
 
-/// Until a row is there; it may have been overwritten meanwhile.
+/// Waits until a row is published; it may be overwritten since.
 void await_row(const UntypedFrontend& frontend, Iteration k, o80::Timeout timeout) {
   UntypedObservation row(frontend.description());
   const Waiting waiting;
   try {
     frontend.wait_for(k, row.bytes(), timeout, Waiting::keep_waiting);
   } catch (const o80::RowOverwritten&) {
-    // so it was there
+    // it was published
   }
 }
 
-/// The frontends whose rows have come, with these; None as a row: the next one in sequence.
+/// The frontends whose rows are published, with these rows. None as a row is the next in sequence.
 std::vector<std::pair<Frontend*, Observation>> wait_for_first(
     const std::vector<std::pair<Frontend*, nb::object>>& wanted, nb::handle timeout) {
   const o80::Timeout patience = timeout_of(timeout);
@@ -110,7 +110,7 @@ std::vector<std::pair<Frontend*, Observation>> wait_for_first(
   return rows;
 }
 
-/// Rows in sequence, from a position of its own.
+/// Iterates over rows in sequence, with a position of its own.
 struct Stream {
   std::shared_ptr<UntypedFrontend> frontend;
   std::shared_ptr<const Decoder> decoder;
@@ -134,7 +134,7 @@ Iteration iteration_at(const Frontend& self, std::int64_t time) {
   return self.untyped().iteration_at(time);
 }
 
-/// Fills an array of rows; gives the first iteration and how many there were.
+/// Fills an array of rows; returns the first iteration and the number of rows.
 std::pair<Iteration, std::size_t> read_rows(const Frontend& self, Iteration first,
                                             nb::handle array) {
   const Bytes bytes(array, PyBUF_WRITABLE);

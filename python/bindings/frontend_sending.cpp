@@ -1,4 +1,4 @@
-// What a frontend adds to a batch, and how it sends it.
+// How a frontend adds records to a batch and sends it.
 
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
@@ -43,8 +43,8 @@ void add_command(const Frontend& self, nb::handle actuator, nb::handle target, n
   }
 }
 
-/// One trajectory for several actuators.
-/// `states` holds the rows of the first, then those of the second...; `times` are ends [ns].
+/// Adds one trajectory for several actuators. `states` holds all rows of the first, then all rows
+/// of the second, and so on; `times` are the ends of rows [ns].
 void add_trajectories(const Frontend& self, const std::vector<std::uint32_t>& actuators,
                       std::uint32_t rows, nb::handle states, nb::handle times, nb::handle speed,
                       nb::handle iterations, nb::handle mode, nb::handle profile,
@@ -98,7 +98,7 @@ Observation pulse_and_wait(const Frontend& self, nb::handle timeout, nb::handle 
   return wait_for_end(self, pulse_to_end(self, at, late), timeout);
 }
 
-/// Of a burst: any whole number.
+/// The number of iterations of a burst: any whole number.
 std::int64_t burst_length(nb::handle iterations) {
   return count_of(iterations, "the number of iterations of a burst");
 }
@@ -127,7 +127,7 @@ Observation burst(const Frontend& self, nb::handle iterations, nb::handle timeou
   return Observation(decoder, std::move(row));
 }
 
-/// Begins the bursts of a group; each comes with what decodes its row.
+/// Starts the bursts of a group, each with the decoder of its row.
 std::vector<PendingBurst> start_bursts(
     const std::vector<std::pair<Frontend*, nb::object>>& members) {
   std::vector<std::shared_ptr<UntypedFrontend>> alive;
@@ -163,7 +163,7 @@ std::vector<Observation> wait_for_bursts(const std::vector<PendingBurst>& pendin
   return observations;
 }
 
-/// A batch of one record, sent at once.
+/// Sends a batch of one record at once.
 template <class Fill>
 Batch send_alone(const Frontend& self, Fill&& fill) {
   o80::BatchBuilder batch;
@@ -178,7 +178,7 @@ std::uint16_t purged(const Frontend& self, nb::handle actuator) {
                             : static_cast<std::uint16_t>(self.actuator(actuator));
 }
 
-/// Bursting, the backend runs until the request has ended.
+/// Sends a request at once; a bursting backend runs until it has ended.
 Batch send_request(const Frontend& self, nb::handle name, nb::handle fields) {
   const auto frontend = self.shared();
   const std::uint32_t index = frontend->request_index(string_of(name, "the name of a request"));

@@ -63,7 +63,7 @@ nb::bytes table_of(const o80::Description& description) {
   return nb::bytes(bytes.data(), bytes.size());
 }
 
-/// As data: how to decode it, its bytes, and what it missed.
+/// Its decoder, bytes and number of missed rows, for pickle.
 nb::tuple reduce(nb::handle self) {
   const auto* observation = nb::inst_ptr<Observation>(self);
   const nb::bytes row(observation->row.bytes(), observation->row.size());
@@ -89,7 +89,7 @@ void bind_observation(nb::module_& m) {
       .def("table", &table_of)
       .def("hash", [](const o80::Description& self) { return o80::hash(self.schema); });
 
-  nb::class_<Decoder>(m, "Decoder", "How rows of one robot become arrays.")
+  nb::class_<Decoder>(m, "Decoder", "Converts rows of one robot to arrays.")
       .def(nb::new_([](std::shared_ptr<o80::Description> description, nb::object layout) {
              return std::make_shared<Decoder>(std::move(description), std::move(layout));
            }),
@@ -107,10 +107,9 @@ void bind_observation(nb::module_& m) {
 
   nb::class_<Observation>(
       m, "Observation", nb::type_slots(buffer_slots),
-      R"(One row of the history: what was asked in an iteration and what came of it.
+      R"(One row of the history: desired, observed and extended values of one iteration.
 
-The arrays share the memory of this observation, which is its own: nothing that happens later
-changes them.)")
+The arrays are views of this observation's own copy of the row, which does not change.)")
       .def(nb::new_(&from_bytes), "decoder"_a, "row"_a, "missed"_a = 0)
       .def("__reduce__", &reduce, nb::sig("def __reduce__(self) -> tuple[typing.Any, ...]"))
       .def_prop_ro(
@@ -121,30 +120,30 @@ changes them.)")
           "When it was published [ns]: of the monotonic clock, or simulated in bursting.")
       .def_prop_ro(
           "lateness", [](const Observation& self) { return self.row.head().lateness; },
-          "How long after its due moment the iteration began [ns].")
+          "Delay between the due time and the begin of the iteration [ns].")
       .def_prop_ro(
           "overruns", [](const Observation& self) { return self.row.head().overruns; },
-          "Iterations so far that were not done in time.")
+          "Number of iterations so far that were late.")
       .def_prop_ro(
           "skipped", [](const Observation& self) { return self.row.head().skipped; },
-          "Periods so far that were left out to catch up.")
+          "Number of periods so far that were skipped.")
       .def_prop_ro(
           "fresh", [](const Observation& self) { return self.row.head().fresh != 0; },
-          "Whether the robot started afresh in this row.")
+          "True if this is the row of a fresh start.")
       .def_prop_ro(
           "halted", [](const Observation& self) { return self.row.head().halted != 0; },
-          "Whether the backend was halted in this row.")
+          "True if a halt was in force in this row.")
       .def_ro("missed", &Observation::missed,
-              "Rows between this one and the one read before it that were overwritten unread; "
-              "set by wait_for_next and stream.")
+              "Number of rows between the row read before and this one that were overwritten; set "
+              "by wait_for_next and stream.")
       .def_prop_ro(
           "desired", [](nb::handle self) { return decoded(self, &Decoder::desired); },
           nb::sig("def desired(self) -> States"),
-          "The states that were asked: an array (actuators,), or a record of groups.")
+          "The desired states: an array (actuators,), or a record of groups.")
       .def_prop_ro(
           "observed", [](nb::handle self) { return decoded(self, &Decoder::observed); },
           nb::sig("def observed(self) -> States"),
-          "The states that were read: an array (actuators,), or a record of groups.")
+          "The observed states: an array (actuators,), or a record of groups.")
       .def_prop_ro(
           "extended", [](nb::handle self) { return decoded(self, &Decoder::extended); },
           nb::sig("def extended(self) -> Record"),
@@ -152,15 +151,15 @@ changes them.)")
       .def_prop_ro(
           "active", [](nb::handle self) { return decoded(self, &Decoder::active); },
           nb::sig("def active(self) -> numpy.typing.NDArray[numpy.bool_]"),
-          "Whether a command gave the desired state: bool (actuators,).")
+          "True where a command or braking gave the desired state: bool (actuators,).")
       .def_prop_ro(
           "clamped", [](nb::handle self) { return decoded(self, &Decoder::clamped); },
           nb::sig("def clamped(self) -> numpy.typing.NDArray[numpy.bool_]"),
-          "Whether the limits changed the desired state: bool (actuators,).")
+          "True where the limits changed the desired state: bool (actuators,).")
       .def_prop_ro(
           "braking", [](nb::handle self) { return decoded(self, &Decoder::braking); },
           nb::sig("def braking(self) -> numpy.typing.NDArray[numpy.bool_]"),
-          "Whether the actuator came to rest without a command: bool (actuators,).")
+          "True where the actuator comes to rest without a command: bool (actuators,).")
       .def(
           "flat",
           [](nb::handle self, nb::handle dtype) {

@@ -13,13 +13,13 @@
                                      nanobind::handle arguments, nanobind::handle keywords) {
   const nanobind::object refuse = nanobind::module_::import_("o80.calls").attr("refuse");
   refuse(signature, self, arguments, keywords);
-  throw nanobind::python_error();  // it has raised
+  throw nanobind::python_error();  // refuse() has raised
 }
 
-/// Adds a compiled verb that o80.frontend declares.
+/// Adds a compiled method that o80.frontend declares.
 ///
-/// A call with arguments that it does not take raises a TypeError in Python's own words. For that
-/// its arguments are handles: nanobind asks the second overload where it would convert others.
+/// A call with wrong arguments raises the TypeError of a Python function. For that the method takes
+/// handles, which need no conversion: nanobind tries the second overload only for wrong arguments.
 template <class Function, class... Arguments>
 void def_verb(nanobind::class_<Frontend>& frontend, const char* name, const VerbText& text,
               Function&& function, const Arguments&... arguments) {
@@ -32,7 +32,7 @@ void def_verb(nanobind::class_<Frontend>& frontend, const char* name, const Verb
                                    nanobind::kwargs keywords) -> nanobind::object {
         refuse_call(signature, self, given, keywords);
       },
-      nanobind::sig(other.c_str()), text.help);  // the same help is shown once
+      nanobind::sig(other.c_str()), text.help);  // the same text as above, so it is shown once
 }
 
 /// Adds a property that o80.frontend declares.

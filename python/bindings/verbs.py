@@ -1,7 +1,7 @@
-"""Writes signatures and docstrings of the compiled verbs into a C++ header.
+"""Writes signatures and docstrings of the compiled methods into a C++ header.
 
-They are declared once, under `if TYPE_CHECKING` in the classes of python/o80/frontend, where type
-checkers and readers see them. Usage: verbs.py HEADER SOURCE...
+They are declared once, under `if TYPE_CHECKING` in the classes of python/o80/frontend, for type
+checkers and readers. Usage: verbs.py HEADER SOURCE...
 """
 
 import ast
@@ -11,7 +11,7 @@ from pathlib import Path
 
 
 def declared(source: str) -> Iterator[tuple[str, str, str]]:
-    """Name, signature and docstring of each verb that a file declares."""
+    """Name, signature and docstring of each compiled method that a file declares."""
     for cls in ast.parse(source).body:
         if not isinstance(cls, ast.ClassDef):
             continue
@@ -24,7 +24,7 @@ def declared(source: str) -> Iterator[tuple[str, str, str]]:
 
 
 def signature_of(verb: ast.FunctionDef, source: str) -> str:
-    """In one line, as nanobind takes it."""
+    """The signature in one line, in nanobind's format."""
     lines = source.splitlines()[verb.lineno - 1 : verb.body[0].lineno - 1]
     text = " ".join(" ".join(lines).split()).removesuffix(":")
     return text.replace("( ", "(").replace(", )", ")").replace("_core.", "")

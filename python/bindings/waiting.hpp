@@ -7,28 +7,28 @@
 #include "interpreter.hpp"
 #include "o80/base/time.hpp"
 
-/// Ends the waits of one thread from another one (a cancelled task of asyncio).
+/// Cancels the waits of one thread from another thread (for a cancelled task of asyncio).
 ///
 /// Writer:  any thread.
 /// Readers: the thread that is inside `call`.
 class Canceller {
  public:
   void cancel() noexcept { cancelled_.store(true, std::memory_order_relaxed); }
-  /// Calls it; what waits in there raises Cancelled within 50 ms of `cancel`.
+  /// Calls `callable`; its waits throw Cancelled within 50 ms after `cancel`.
   nanobind::object call(nanobind::handle callable);
-  /// Whether the call that this thread is in was cancelled.
+  /// True if the call in this thread was cancelled.
   static bool cancelled_here() noexcept;
 
  private:
   std::atomic<bool> cancelled_{false};
 };
 
-/// Around every call that may block: other Python threads run on, and Ctrl-C comes through.
+/// Put one around every call that may block, so that other Python threads and Ctrl-C work.
 ///
-/// Lets go of the GIL until it is destroyed; `keep_waiting` goes into the call as KeepWaiting.
+/// Releases the GIL until it is destroyed. Pass `keep_waiting` to the call as its KeepWaiting.
 class Waiting {
  public:
-  /// Raises what a signal's handler raised, usually KeyboardInterrupt.
+  /// Raises the exception of a signal handler, usually KeyboardInterrupt.
   static bool keep_waiting() {
     if (Canceller::cancelled_here()) return false;
     const WithGil locked;
@@ -40,5 +40,5 @@ class Waiting {
   WithoutGil released_;
 };
 
-/// From seconds; None is for ever. Throws InvalidArgument.
+/// Converts seconds; None is for ever. Throws InvalidArgument.
 o80::Timeout timeout_of(nanobind::handle seconds);

@@ -11,25 +11,25 @@ if TYPE_CHECKING:
 
 
 class Waits:
-    """The verbs of a frontend that wait, as coroutines: `await arm.aio.wait_for_next()`.
+    """The waiting methods of a frontend as coroutines: `await arm.aio.wait_for_next()`.
 
-    They take what the verbs of the same names take, and return and raise the same. Several tasks
-    may wait at once. A task that is cancelled goes on within 50 ms; the rest of its burst is then
-    cancelled too, as after a timeout; what it has pulsed goes on.
+    Arguments, results and exceptions are those of the methods with the same names. Several tasks
+    may wait at the same time. A cancelled task continues within 50 ms; the rest of its burst is
+    then cancelled too, as after a timeout, but commands that it has pulsed continue.
     """
 
     def __init__(self, frontend: "Frontend") -> None:
         self._frontend = frontend
 
     async def wait_for(self, iteration: int, timeout: float | None = None) -> _core.Observation:
-        """The observation of an iteration, as soon as it is there; see `Frontend.wait_for`."""
+        """Waits for the observation of an iteration; see `Frontend.wait_for`."""
         frontend = self._frontend
         return await in_thread(lambda: frontend.wait_for(iteration, timeout))
 
     async def wait_for_next(self, timeout: float | None = None) -> _core.Observation:
         """The next observation in sequence; see `Frontend.wait_for_next`.
 
-        A task that is cancelled loses none. Tasks that all need every observation use a stream
+        A cancelled task loses no observation. Tasks that each need every observation need a stream
         each.
         """
         frontend = self._frontend
@@ -41,9 +41,9 @@ class Waits:
     async def pulse_and_wait(
         self, timeout: float | None = None, *, at: int | None = None, late: LateWord = "reject"
     ) -> _core.Observation:
-        """Sends what was added at once, waits until it has ended; see `Frontend.pulse_and_wait`."""
+        """Sends what was added and waits until it has ended; see `Frontend.pulse_and_wait`."""
         frontend = self._frontend
-        if frontend._is_inline:  # the iterations run in the thread that asks for them
+        if frontend._is_inline:  # iterations of an inline robot run in the calling thread
             return await in_thread(lambda: frontend.pulse_and_wait(timeout, at=at, late=late))
         batch = frontend._pulse_to_end(at, late)
         return await in_thread(lambda: frontend._wait_for_end(batch, timeout))
@@ -56,7 +56,7 @@ class Waits:
         at: int | None = None,
         late: LateWord = "reject",
     ) -> _core.Observation:
-        """Sends what was added at once and bursts; see `Frontend.burst`."""
+        """Sends what was added and bursts; see `Frontend.burst`."""
         frontend = self._frontend
         if frontend._is_inline:
             return await in_thread(

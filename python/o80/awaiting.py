@@ -1,4 +1,4 @@
-"""Waits as tasks of asyncio: each in a thread of its own, which ends when the task is cancelled."""
+"""Runs waiting calls for asyncio, each in a thread that ends when its task is cancelled."""
 
 import asyncio
 import contextlib
@@ -12,9 +12,9 @@ Result = TypeVar("Result")
 
 
 async def in_thread(wait: Callable[[], Result]) -> Result:
-    """Runs a call that waits in a thread.
+    """Runs a waiting call in a thread of its own and returns its result.
 
-    A task that is cancelled cancels the call, and goes on when the thread has ended: within 50 ms.
+    A cancelled task cancels the call and continues when the thread has ended, within 50 ms.
     """
     loop = asyncio.get_running_loop()
     ended: asyncio.Future[Result] = loop.create_future()
@@ -35,7 +35,7 @@ async def in_thread(wait: Callable[[], Result]) -> Result:
             result = canceller.call(wait)
         except BaseException as error:
             caught = error
-        with contextlib.suppress(RuntimeError):  # a loop that was closed waits for nothing
+        with contextlib.suppress(RuntimeError):  # the loop may be closed
             loop.call_soon_threadsafe(end, result, caught)
 
     thread = threading.Thread(target=run, name="o80 wait", daemon=True)
@@ -45,19 +45,19 @@ async def in_thread(wait: Callable[[], Result]) -> Result:
     except asyncio.CancelledError:
         canceller.cancel()
         while not ended.done():
-            # it may be cancelled again; how the call ends no longer matters
+            # the task may be cancelled again; the result of the call is not needed any more
             with contextlib.suppress(Exception, asyncio.CancelledError):
                 await asyncio.shield(ended)
         if not ended.cancelled():
-            ended.exception()  # it was seen
+            ended.exception()  # mark it as retrieved
         thread.join()
         raise
     except BaseException:
-        canceller.cancel()  # the coroutine may have been closed: nobody waits any more
+        canceller.cancel()  # the coroutine was closed
         if ended.done():
             thread.join()
         raise
-    thread.join()  # it has nothing left to do
+    thread.join()  # it has done its work
     return result
 
 
@@ -66,7 +66,7 @@ async def end_of(sent: _core.Batch) -> _core.Batch: ...
 @overload
 async def end_of(sent: _core.Burst) -> _core.Observation: ...
 async def end_of(sent: _core.Batch | _core.Burst) -> _core.Batch | _core.Observation:
-    """Waits for a batch, and gives it; or for a burst, and gives its last observation."""
+    """Waits for a batch and returns it, or for a burst and returns its last observation."""
     if isinstance(sent, _core.Burst):
         return await in_thread(sent.wait)
     await in_thread(sent.wait)
@@ -76,7 +76,7 @@ async def end_of(sent: _core.Batch | _core.Burst) -> _core.Batch | _core.Observa
 async def next_of(stream: _core.Stream) -> _core.Observation:
     """The next observation of a stream.
 
-    It is read by the task, not by the thread: a task that is cancelled loses none.
+    The task reads it, not the thread: a cancelled task loses no observation.
     """
     while not stream._ready:
         await in_thread(stream._await_row)

@@ -30,12 +30,12 @@ class BurstGroup:
             burst.cancel()
 
     def wait(self, timeout: float | None = None) -> dict[Frontend, _core.Observation]:
-        """Waits for all of them and returns the observation of the last iteration of each.
+        """Waits for all bursts and returns the last observation of each.
 
-        timeout: for all together [s].
+        timeout: for all of them together [s].
 
-        When one cannot be waited for (TimeoutError, BackendGone, Ctrl-C, a member whose burst was
-        rejected because another frontend has control), the rest of all bursts is cancelled.
+        If it raises (TimeoutError, BackendGone, Ctrl-C, Error for a burst that was rejected, for
+        example because another frontend has control), the rest of all bursts is cancelled.
         """
         rows = _core.wait_for_bursts(list(self._bursts.values()), timeout)
         return dict(zip(self._bursts, rows, strict=True))
@@ -58,12 +58,12 @@ def burst(
 ) -> dict[Frontend, _core.Observation] | BurstGroup:
     """Lets several bursting backends run at the same time, each its number of iterations.
 
-    All members are checked first: nothing runs unless each is alive, bursts, and has a lane and
-    room for what was added. Then all are granted theirs, and all are waited for.
+    All members are checked first: nothing runs unless each is alive, bursting, and has a lane with
+    room for the added commands. Then all bursts start.
 
-    Returns the observation of the last iteration of each; with `wait=False` a BurstGroup, to be
-    waited for or cancelled. Raises NotBursting, InvalidArgument, NoLane, LaneFull and BackendGone
-    before anything runs; and what `BurstGroup.wait` raises.
+    Returns the last observation of each; with `wait=False` a BurstGroup, to wait for or to cancel.
+    Raises NotBursting, InvalidArgument, NoLane, LaneFull and BackendGone before anything runs, and
+    the exceptions of `BurstGroup.wait`.
     """
     group = BurstGroup(dict(zip(members, _core.start_bursts(list(members.items())), strict=True)))
     return group.wait(timeout) if wait else group

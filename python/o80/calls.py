@@ -1,4 +1,4 @@
-"""Calls of compiled verbs with arguments that they do not take."""
+"""Error texts for calls of compiled methods with wrong arguments."""
 
 import difflib
 import inspect
@@ -9,7 +9,7 @@ from typing import Any, NoReturn
 def refuse(
     signature: str, this: object, arguments: Sequence[Any], keywords: Mapping[str, Any]
 ) -> NoReturn:
-    """Raises the TypeError of a Python function with this signature; lists what it takes."""
+    """Raises the TypeError of a function with this signature, with a list of its arguments."""
     made: dict[str, Any] = {}
     exec(f"from __future__ import annotations\n{signature}: ...", made)
     function = made[signature.removeprefix("def ").partition("(")[0]]

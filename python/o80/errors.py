@@ -41,7 +41,7 @@ class TimeoutError(Error, builtins.TimeoutError):
 
 
 class MissingExtra(Error, ImportError):
-    """Something needs a package that `pip install o80` leaves out; the text names the extra."""
+    """A function needs an optional package; the text names the extra of o80 that installs it."""
 
 
 class SegmentTaken(Error):

@@ -1,4 +1,4 @@
-"""Packages that o80 does not install by itself."""
+"""Import of optional packages."""
 
 import importlib
 from types import ModuleType
@@ -7,7 +7,7 @@ from o80.errors import MissingExtra
 
 
 def needed(module: str, extra: str, purpose: str) -> ModuleType:
-    """Imports a module of an extra. Raises MissingExtra, which names the extra."""
+    """Imports a module that an extra of o80 installs. Raises MissingExtra with its name."""
     try:
         return importlib.import_module(module)
     except ImportError as error:

@@ -12,14 +12,14 @@ def wait_for_first(
 ) -> dict[Frontend, _core.Observation]:
     """Waits until the first of several backends has published a row.
 
-    members: frontends, each waiting for its next observation, as `Frontend.wait_for_next` does; or
-        a mapping from frontends to the iterations that are waited for.
-    timeout: for the first of them [s].
+    members: frontends, for the next observation of each, as with `Frontend.wait_for_next`; or a
+        mapping from frontends to iterations.
+    timeout: for the first row [s].
 
-    Returns the observations that are there: of one frontend at least, of several if they came
-    together. Raises TimeoutError, and BackendGone (naming the segment) if one of the backends ends
-    while none has its row. No thread and no polling: one sleep on all segments, but for read-only
-    frontends and Linux before 5.16, where it looks every millisecond.
+    Returns the observations that are published: of one frontend or more. Raises TimeoutError, and
+    BackendGone with the segment's name if a backend ends before any row is published. It needs no
+    thread and does not poll: it sleeps on all segments at once. With read-only frontends, and on
+    Linux before 5.16, it looks every millisecond instead.
     """
     wanted: list[tuple[Frontend, int | None]] = (
         list(members.items())

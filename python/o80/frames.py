@@ -46,7 +46,7 @@ def frame_of(history: "History") -> "pandas.DataFrame":
 
 
 def columns_of(schema: dict[str, Any]) -> Iterator[Column]:
-    """The numbers of desired, observed and extended."""
+    """The columns of desired, observed and extended numbers."""
     row = schema["row"]
     for part in ("desired", "observed"):
         counts = [0] * len(schema["groups"])
@@ -61,7 +61,7 @@ def columns_of(schema: dict[str, Any]) -> Iterator[Column]:
 
 
 def _numbers(described: dict[str, Any], path: str, start: int) -> Iterator[Column]:
-    """Those of a described type, in order."""
+    """The columns of a described type, in order."""
     for field in described["fields"]:
         inner = f"{path}.{field['name']}" if field["name"] else path
         dtype = dtype_of_field(field)
@@ -77,7 +77,7 @@ def _numbers(described: dict[str, Any], path: str, start: int) -> Iterator[Colum
 
 
 def _values(rows: NDArray[Any], column: Column) -> NDArray[Any]:
-    """The numbers of a column, copied together: (T,)."""
+    """The numbers of a column as a contiguous copy: (T,)."""
     if not len(rows):
         return np.empty(0, column.dtype)
     part: NDArray[Any] = np.ndarray(
@@ -87,7 +87,7 @@ def _values(rows: NDArray[Any], column: Column) -> NDArray[Any]:
 
 
 def _categories(pandas: Any, values: NDArray[Any], labels: dict[str, int]) -> Any:
-    """Names of an enumeration; what is none of them is missing."""
+    """Labels of an enumeration as categories; other values become missing values."""
     codes = np.full(len(values), -1)
     for code, value in enumerate(labels.values()):
         codes[values == value] = code

@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 
 
 class History:
-    """Neighbouring observations, oldest first: arrays with a first dimension (T,).
+    """Consecutive observations, oldest first: arrays with a first dimension (T,).
 
-    Filled by one copy; its arrays are views of that copy, `rows`, and change no more. It may hold
-    fewer rows than were asked for, never torn ones. Pickled it is the same; `numpy.save` and h5py
-    take its `rows`, pandas its `to_frame()`.
+    Its arrays are views of one copy, `rows`, which does not change. It may hold fewer rows than
+    requested, but every row is complete. It can be pickled; for `numpy.save` and h5py use `rows`,
+    for pandas `to_frame()`.
     """
 
     __slots__ = ("_decoder", "_layout", "rows")
@@ -30,14 +30,14 @@ class History:
     def __init__(self, decoder: _core.Decoder, rows: NDArray[Any]) -> None:
         self._decoder = decoder
         self._layout = decoder.layout
-        self.rows = rows  #: structured array (T,): whole rows, as they stand in the segment
+        self.rows = rows  #: structured array (T,): whole rows, as in the segment
 
     def __len__(self) -> int:
         return len(self.rows)
 
     @property
     def schema(self) -> dict[str, Any]:
-        """All that the backend said of its robot."""
+        """The description of the robot."""
         schema: dict[str, Any] = self._layout.schema
         return schema
 
@@ -46,9 +46,9 @@ class History:
     @overload
     def __getitem__(self, index: slice) -> "History": ...
     def __getitem__(self, index: int | slice) -> "_core.Observation | History":
-        """By position, as in a list: 0 is the oldest, -1 the newest, a slice is a History.
+        """The observation at a position: 0 is the oldest, -1 the newest; a slice is a History.
 
-        By iteration and time: `at_iteration`, `at_time`, `select`.
+        To find observations by iteration or time use `at_iteration`, `at_time`, `select`.
         """
         if isinstance(index, slice):
             if index.step is not None and index.step < 0:
@@ -73,7 +73,7 @@ class History:
     def at_time(self, time: int) -> _core.Observation:
         """The newest observation at or before a time [ns].
 
-        Raises RowOverwritten if all of this history are later.
+        Raises RowOverwritten if all observations of this history are later.
         """
         time = whole(time, "time")
         place = self._place_of(time)
@@ -110,11 +110,11 @@ class History:
         return self[begin : max(begin, end)]
 
     def _place_of(self, time: int) -> int:
-        """Of the newest one at or before a time; -1 if all are later."""
+        """Position of the newest observation at or before a time; -1 if all are later."""
         return int(np.searchsorted(self.time, time, side="right")) - 1
 
     def _iteration_at(self, time: int) -> int:
-        """The iteration at that place; one before the first if all are later."""
+        """Iteration of that observation; one before the first if all are later."""
         place = self._place_of(time)
         return int(self.iteration[place]) if place >= 0 else int(self.iteration[0]) - 1
 
@@ -157,23 +157,23 @@ class History:
 
     @property
     def overruns(self) -> NDArray[np.uint32]:
-        """Iterations so far that were not done in time: (T,)."""
+        """Number of iterations so far that were late: (T,)."""
         return self._part("overruns")
 
     @property
     def skipped(self) -> NDArray[np.uint32]:
-        """Periods so far that were left out to catch up: (T,)."""
+        """Number of periods so far that were skipped: (T,)."""
         return self._part("skipped")
 
     @property
     def fresh(self) -> NDArray[np.bool_]:
-        """Whether the robot started afresh in that row: (T,)."""
+        """True in rows of a fresh start: (T,)."""
         fresh: NDArray[np.bool_] = self._part("fresh") != 0
         return fresh
 
     @property
     def halted(self) -> NDArray[np.bool_]:
-        """Whether the backend was halted in that row: (T,)."""
+        """True in rows with a halt in force: (T,)."""
         halted: NDArray[np.bool_] = self._part("halted") != 0
         return halted
 
@@ -183,13 +183,13 @@ class History:
 
     @property
     def desired(self) -> States:
-        """The states that were asked: (T, actuators), or a record of groups."""
+        """The desired states: (T, actuators), or a record of groups."""
         states: States = self._layout.many(self.rows, "desired")
         return states
 
     @property
     def observed(self) -> States:
-        """The states that were read: (T, actuators), or a record of groups."""
+        """The observed states: (T, actuators), or a record of groups."""
         states: States = self._layout.many(self.rows, "observed")
         return states
 
@@ -201,19 +201,19 @@ class History:
 
     @property
     def active(self) -> NDArray[np.bool_]:
-        """Whether a command gave the desired state: (T, actuators)."""
+        """True where a command or braking gave the desired state: (T, actuators)."""
         mask: NDArray[np.bool_] = self._layout.many_masks(self.rows, "active")
         return mask
 
     @property
     def clamped(self) -> NDArray[np.bool_]:
-        """Whether the limits changed the desired state: (T, actuators)."""
+        """True where the limits changed the desired state: (T, actuators)."""
         mask: NDArray[np.bool_] = self._layout.many_masks(self.rows, "clamped")
         return mask
 
     @property
     def braking(self) -> NDArray[np.bool_]:
-        """Whether the actuator came to rest without a command: (T, actuators)."""
+        """True where the actuator comes to rest without a command: (T, actuators)."""
         mask: NDArray[np.bool_] = self._layout.many_masks(self.rows, "braking")
         return mask
 

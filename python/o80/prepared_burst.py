@@ -1,4 +1,4 @@
-"""A burst that is made again and again: what stays the same is checked and looked up once."""
+"""A burst that is repeated: its options are checked and its buffers looked up once."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from o80.words import LateWord
 
 
 class PreparedBurst:
-    """Targets in, iterations, all their rows out; made by `Frontend.prepared_burst`.
+    """A burst that sends targets and returns all rows; made by `Frontend.prepared_burst`.
 
-    targets: (steps, actuators), to be filled before a run: numbers for states of one number, else
-        structured. What is not filled of floats is not a number, and refused. Targets stay from run
-        to run. An array that is assigned is copied into them.
-    rows: (iterations,), structured like `history().rows`: those of the last run, in the same
-        memory every time. Copy what you keep.
+    targets: (steps, actuators), to be filled before a run: numbers for states of one number,
+        otherwise structured. Floats that are not filled are NaN and refused. Targets keep their
+        values from run to run. An array that is assigned is copied into them.
+    rows: (iterations,), structured like `history().rows`: the rows of the last run. Every run
+        overwrites them: copy rows that you keep.
 
-    For loops that do the same thousands of times a second; one thread at a time.
+    For loops that repeat a burst thousands of times a second; one thread at a time.
     """
 
     def __init__(
@@ -55,11 +55,11 @@ class PreparedBurst:
         given = np.asarray(values) if wanted.names is None else states_from(values, wanted)
         if given.shape != self._targets.shape:
             raise InvalidArgument(
-                f"targets have the shape (steps, actuators) = {self._targets.shape}, "
-                f"not {given.shape}"
+                f"targets must have the shape (steps, actuators) = {self._targets.shape}, "
+                f"got {given.shape}"
             )
         if wanted.names is None and not np.can_cast(given.dtype, wanted, "same_kind"):
-            raise InvalidArgument(f"targets are of dtype {wanted}, not {given.dtype}")
+            raise InvalidArgument(f"targets must have dtype {wanted}, got {given.dtype}")
         self._targets[...] = given
 
     @property
@@ -70,13 +70,13 @@ class PreparedBurst:
     def run(
         self, timeout: float | None = None, *, at: int | None = None, late: LateWord = "reject"
     ) -> int:
-        """Sends the targets, with what else was added, and bursts; fills `rows`.
+        """Sends the targets, with all else that was added, and bursts; fills `rows`.
 
         timeout: for the whole burst [s].
         at, late: as in `Frontend.burst`.
 
         Returns the iteration of the last row. Raises InvalidArgument for targets that the robot
-        cannot follow, and what `Frontend.burst` raises.
+        cannot follow, and the exceptions of `Frontend.burst`.
         """
         return self._run(self._frontend, timeout, at, late)
 

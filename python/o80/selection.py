@@ -1,4 +1,4 @@
-"""Which observations of a history are meant."""
+"""Selects observations of a history from the arguments of a call."""
 
 import math
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from o80.errors import InvalidArgument
 
 @dataclass(frozen=True)
 class Selection:
-    """The last n, those of the last seconds, or those of iterations and times."""
+    """Observations by number, by the last seconds, or by iterations and times."""
 
     n: int | None
     since: int | None
@@ -30,7 +30,7 @@ class Selection:
         from_time: int | None,
         to_time: int | None,
     ) -> Self:
-        """From the arguments of a call. Raises InvalidArgument."""
+        """Makes a selection from the arguments of a call. Raises InvalidArgument."""
         ends = since, until, from_time, to_time
         if (n is not None) + (seconds is not None) + any(end is not None for end in ends) > 1:
             raise InvalidArgument(
@@ -52,9 +52,10 @@ class Selection:
         iteration_at: Callable[[int], int],
         newest_time: Callable[[], int],
     ) -> tuple[int, int]:
-        """First and last iteration, out of oldest to newest; none if first is above last.
+        """First and last iteration between oldest and newest; empty if first is above last.
 
-        iteration_at: gives the newest iteration at or before a time, `oldest - 1` if all are later.
+        iteration_at: returns the newest iteration at or before a time, `oldest - 1` if there is
+            none.
         """
         first, last = oldest, newest
         if newest < oldest:

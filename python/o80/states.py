@@ -1,4 +1,4 @@
-"""The states of a robot as type checkers see them."""
+"""The type of a robot's states for type checkers."""
 
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -11,13 +11,13 @@ if TYPE_CHECKING:
     class States(np.ndarray[Any, np.dtype[Any]]):
         """The states of all actuators, of one row or of T rows.
 
-        A robot whose actuators are all alike: a NumPy array, (actuators,) or (T, actuators). Its
-        dtype is that of the state: float64, or structured, with `states["position"]` for a field.
-        A robot of several groups: an o80.Record, with `states.joints` or `states["joints"]` for a
+        For a robot with one group of actuators: a NumPy array, (actuators,) or (T, actuators), with
+        the dtype of the state: float64, or structured, with `states["position"]` for a field. For a
+        robot with several groups: an o80.Record, with `states.joints` or `states["joints"]` for a
         group.
 
-        Which of the two is known when the robot is. A type checker takes it for both; at run time
-        `isinstance(states, o80.Record)` tells.
+        A type checker accepts both uses, because the robot is known only at run time; there
+        `isinstance(states, o80.Record)` distinguishes them.
         """
 
         def __getattr__(self, name: str) -> "States": ...

@@ -1,6 +1,6 @@
-"""Words that are one of a few: strings, with a name for each.
+"""String enumerations of the API.
 
-The aliases at the end are what arguments accept: a member of the enumeration, or the string itself.
+Arguments accept the aliases at the end: a member of an enumeration, or the string itself.
 """
 
 from enum import StrEnum
@@ -8,14 +8,14 @@ from typing import Literal, TypeAlias
 
 
 class Mode(StrEnum):
-    """Where a command goes."""
+    """The place of a command in the queue of its actuator."""
 
-    QUEUE = "queue"  #: after what is there
-    OVERWRITE = "overwrite"  #: instead of what is there
+    QUEUE = "queue"  #: after the queued commands
+    OVERWRITE = "overwrite"  #: instead of the queued commands
 
 
 class Profile(StrEnum):
-    """How a command moves between two states."""
+    """Interpolation between two states."""
 
     LINEAR = "linear"
     MINIMUM_JERK = "minimum_jerk"
@@ -29,7 +29,7 @@ class Start(StrEnum):
 
 
 class Status(StrEnum):
-    """What became of a command or a request."""
+    """Status of a command or request."""
 
     NONE = "none"
     QUEUED = "queued"
@@ -40,12 +40,12 @@ class Status(StrEnum):
     PURGED = "purged"
     INTERRUPTED = "interrupted"
     REJECTED = "rejected"
-    FORGOTTEN = "forgotten"  #: asked for too late
+    FORGOTTEN = "forgotten"  #: its status slot was reused
     HALTED = "halted"
 
 
 class Reason(StrEnum):
-    """Why a status is what it is."""
+    """Reason of a status."""
 
     NONE = "none"
     LATE = "late"
@@ -58,7 +58,7 @@ class Reason(StrEnum):
     SILENCE = "silence"
     STOPPED = "stopped"
     HALTED = "halted"
-    FULL = "full"  #: more batches wait for later iterations than one frontend may have
+    FULL = "full"  #: too many batches of its frontend wait for later iterations
 
 
 ModeWord: TypeAlias = Mode | Literal["queue", "overwrite"]

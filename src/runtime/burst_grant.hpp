@@ -6,14 +6,14 @@
 
 namespace o80 {
 
-inline constexpr std::uint32_t kNobody = 0xFFFFFFFF;  // instead of a lane
+inline constexpr std::uint32_t kNobody = 0xFFFFFFFF;  // no lane
 
-/// The burst that a bursting backend runs: its sender, and the iterations that are left.
+/// The burst that a bursting backend runs: its sender and the iterations left.
 ///
 /// Realtime: yes.
 class BurstGrant {
  public:
-  /// Instead of a number of iterations: until every record of the batch has ended.
+  /// Number of iterations for a burst that runs until every record of its batch has ended.
   static constexpr std::int64_t kUntilEnded = -1;
 
   bool runs() const noexcept { return left_ != 0; }
@@ -23,7 +23,7 @@ class BurstGrant {
   CommandId batch() const noexcept { return batch_; }
   bool runs_for(std::uint32_t lane) const noexcept { return runs() && lane_ == lane; }
   bool is_in_last_iteration() const noexcept { return left_ == 1; }
-  /// This status is the one that a burst until the end of its batch waits for.
+  /// True if this status is the end of the batch for which a kUntilEnded burst waits.
   bool ends_with(std::uint32_t lane, CommandId id) const noexcept {
     return left_ == kUntilEnded && lane == lane_ && id == batch_ + 1;
   }
@@ -37,7 +37,7 @@ class BurstGrant {
   }
   /// Counts an iteration; true if it was the last one.
   bool count() noexcept { return left_ > 0 && --left_ == 0; }
-  /// The current iteration is the last one.
+  /// Makes the current iteration the last one.
   void shorten() noexcept { left_ = 1; }
   void end() noexcept {
     left_ = 0;

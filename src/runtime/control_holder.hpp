@@ -6,13 +6,13 @@
 
 namespace o80 {
 
-/// The owner of a lane that has exclusive control, or nobody.
+/// The lane and owner with exclusive control, if any.
 ///
 /// Realtime: yes.
 class ControlHolder {
  public:
   bool is_nobody() const noexcept { return lane_ == kNobody; }
-  /// kNobody if nobody has control.
+  /// The lane with control, or kNobody.
   std::uint32_t lane() const noexcept { return lane_; }
   std::uint64_t incarnation() const noexcept { return incarnation_; }
   bool is(std::uint32_t lane, std::uint64_t incarnation) const noexcept {

@@ -11,14 +11,14 @@ Iteration UntypedFrontend::iteration_at(std::int64_t time) const {
   link_->check_usable();
   const HistoryReader& history = link_->history;
   UntypedObservation row(link_->description);
-  // times do not fall: halve the rows from the oldest to the newest
+  // times do not decrease: search by halves from the oldest row to the newest
   Iteration below = history.oldest() - 1;
   Iteration above = history.published() + 1;
   while (above - below > 1) {
     const Iteration middle = below + (above - below) / 2;
     if (!history.read(middle, row.bytes())) {
       if (history.is_damaged()) throw damaged();
-      // the writer has come round: what was overwritten counts as before the oldest one
+      // overwritten meanwhile: count it as before the oldest row
       below = std::max(middle, history.oldest() - 1);
       above = std::max(above, below + 1);
     } else if (row.time() <= time) {
@@ -35,7 +35,7 @@ UntypedObservation UntypedFrontend::at_time(std::int64_t time) const {
   const Iteration k = iteration_at(time);
   if (k >= 0 && link_->history.read(k, row.bytes()) && row.time() <= time) return row;
   throw RowOverwritten("'" + segment() + "' has no row of " + std::to_string(time) +
-                       " ns or before: the oldest one there is row " +
+                       " ns or before: the oldest one is row " +
                        std::to_string(link_->history.oldest()));
 }
 

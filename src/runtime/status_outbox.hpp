@@ -15,15 +15,15 @@ namespace o80 {
 /// Realtime: everything but construction.
 class StatusOutbox {
  public:
-  /// `most`: ends that one step can bring.
+  /// `most`: most ends of commands in one step.
   StatusOutbox(LaneReceivers& lanes, std::size_t most) : lanes_(lanes) { waiting_.reserve(most); }
 
   void begin_step() noexcept { stepping_ = true; }
   void end_step() noexcept { stepping_ = false; }
   void put(const StatusChange& change) noexcept;
-  /// The row of the step is published: reports what waits for it.
+  /// Reports the ends of the last step. Call it after the row is published.
   void report_row() noexcept;
-  /// That row will never be published: what was completed in it ends as purged.
+  /// Reports them if the row will never be published: completed commands as purged (stopped).
   void report_no_row() noexcept;
 
  private:

@@ -9,7 +9,7 @@ namespace o80 {
 namespace {
 
 std::string not_in_time(std::span<const RowWish> wishes) {
-  std::string text = "none of the rows waited for was there in time:";
+  std::string text = "none of the rows was published in time:";
   for (const RowWish& wish : wishes) {
     const UntypedFrontend& frontend = *wish.frontend;
     text += (&wish == wishes.data() ? " '" : ", '") + frontend.segment() + "' is at row " +

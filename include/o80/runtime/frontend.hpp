@@ -176,11 +176,11 @@ class UntypedFrontend {
   Rows history(Iteration first, Iteration last) const;
   /// The last n rows.
   Rows history(std::size_t n) const;
-  /// The newest iteration at or before a time [ns]; one before the oldest if all are later.
+  /// The newest iteration at or before a time [ns]; one before the oldest if all rows are later.
   Iteration iteration_at(std::int64_t time) const;
-  /// That row. Throws RowOverwritten if all that are still there are later.
+  /// The row of that iteration. Throws RowOverwritten if all rows in the history are later.
   UntypedObservation at_time(std::int64_t time) const;
-  /// As many of the rows of these times, both included, as there are [ns].
+  /// The rows between two times [ns], both included, that the history holds.
   Rows history_between(std::int64_t first, std::int64_t last) const;
   /// Reads rows in sequence: waits for row `position`, or takes the oldest row if that one is
   /// overwritten, and moves `position` behind it. Returns the number of rows that were skipped.
@@ -222,13 +222,14 @@ class UntypedFrontend {
   std::shared_ptr<Link> link_;
 };
 
-/// A row of a frontend's segment that is waited for.
+/// A row of a frontend's segment, for wait_for_first.
 struct RowWish {
   const UntypedFrontend* frontend;
   Iteration row;
 };
-/// Waits until at least one of these rows is there, in one sleep; the places of all that are.
-/// Throws TimeoutError, the BackendGone of a segment that ended without its row, Closed, Cancelled.
+/// Waits, in one sleep, until at least one of these rows is published; returns the indices of all
+/// that are. Throws TimeoutError, BackendGone of a segment that ended without its row, Closed,
+/// Cancelled.
 std::vector<std::size_t> wait_for_first(std::span<const RowWish> wishes, Timeout timeout,
                                         const KeepWaiting& keep_waiting = {});
 

@@ -1,8 +1,8 @@
-"""The side that commands and reads: every verb of o80.Frontend, typed, a file for each concern.
+"""o80.Frontend, the side that commands and reads: a file for each group of methods.
 
-| file | verbs |
+| file | methods |
 |---|---|
-| describing.py | what the segment says of its robot: names, actuators, requests, period, life |
+| describing.py | description of the robot: names, actuators, requests, period, life |
 | observing.py | latest, wait_for, wait_for_next, stream, history, ... |
 | commanding.py | add_command, add_trajectory, add_request, purge, pulse, pulse_and_wait, ... |
 | bursting.py | burst, prepared_burst |
@@ -10,8 +10,8 @@
 | halting.py | halt, halted, resume, keep_alive |
 | frontend.py | opening, closing, attaching again |
 
-What stands under `if TYPE_CHECKING` is compiled, because it is called thousands of times a second:
-the build takes signature and docstring of the compiled verb from there (python/bindings/verbs.py).
+Methods under `if TYPE_CHECKING` are compiled, because programs call them thousands of times a
+second. The build takes their signatures and docstrings from there (python/bindings/verbs.py).
 """
 
 from o80.frontend.frontend import Frontend

@@ -1,4 +1,4 @@
-"""How a frontend lets a bursting backend run."""
+"""How a frontend requests iterations of a bursting backend."""
 
 from collections.abc import Sequence
 from typing import Literal, overload
@@ -45,17 +45,17 @@ class Bursting(Commanding):
         at: int | None = None,
         late: LateWord = "reject",
     ) -> _core.Observation | _core.Burst:
-        """Sends what was added and lets a bursting backend run exactly so many iterations.
+        """Sends all that was added and runs exactly this number of iterations.
 
-        at: the iteration at which what was added is taken, of this burst or a later one (None: the
-            first of this burst).
-        late: what if that iteration has begun: "reject" the batch, which then does not burst, or
+        at: the iteration in which the backend takes the batch, of this burst or a later one (None:
+            the first iteration of this burst).
+        late: if that iteration has begun already: "reject" the batch, which then does not burst, or
             take it "now".
 
-        Returns the observation of the last iteration; with `wait=False` a Burst, to be waited for
-        or cancelled. A call that ends without its last row (a timeout, Ctrl-C) cancels the rest of
-        its burst: the backend stands still again after the iteration under way. So do the end of
-        this frontend and its death. `prepared_burst` does the same many times, faster.
+        Returns the observation of the last iteration; with `wait=False` a Burst, to wait for or to
+        cancel. A call that ends without its last row (timeout, Ctrl-C) cancels the rest of its
+        burst after the current iteration. So do the end of this frontend and its death.
+        `prepared_burst` is faster for bursts that are repeated.
 
         Raises NotBursting, TimeoutError after `timeout` [s], BackendGone, LaneFull,
         InvalidArgument.
@@ -75,11 +75,11 @@ class Bursting(Commanding):
         profile: ProfileWord = "linear",
         start: StartWord = "desired",
     ) -> PreparedBurst:
-        """A burst to be made again and again: targets in, iterations, all their rows out.
+        """Prepares a burst that is repeated: it sends targets and returns all rows.
 
-        iterations: of each burst.
-        actuators: which ones get targets, by index or name (None: all).
-        steps: how many targets each of them gets for a burst.
+        iterations: number of iterations of each burst.
+        actuators: indices or names of the actuators that get targets (None: all).
+        steps: number of targets of each actuator in a burst.
         each: iterations to reach each target.
         mode, profile, start: as in add_command.
 
@@ -88,8 +88,7 @@ class Bursting(Commanding):
         self._check_usable()
         if not self.bursting:
             raise NotBursting(
-                f"'{self.segment}' runs by its own clock and cannot be burst: "
-                "start it with bursting"
+                f"'{self.segment}' runs in real time and cannot be burst: start it with bursting"
             )
         chosen, _ = self._chosen(actuators)
         shape = len(chosen), checked_count(steps, "steps")

@@ -1,4 +1,4 @@
-"""How a frontend commands: what it adds to a batch, and how it sends it."""
+"""How a frontend adds commands, requests and purges to a batch, and sends it."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, SupportsIndex
@@ -34,56 +34,56 @@ class Commanding(Observing):
             start: StartWord = "desired",
             on_limit: OnLimitWord = "end",
         ) -> None:
-            """Adds a command to what the next pulse sends.
+            """Adds a command to the next pulse.
 
-            actuator: its index or its name; several, or None for all, for one command that they
-                carry out together: it begins when all their queues have come to it, takes as many
-                iterations as the slowest of them, and has one status. It needs one target for each.
+            actuator: its index or its name. Several, or None for all, make one command for all of
+                them: it begins when it is the next command of all of them, takes as many iterations
+                as the slowest, and has one status. It needs a target for each.
             target: the state to reach, in the unit of its field. A number is its first field (or
                 the state, if that is one number); otherwise a mapping, a record, or all fields in
                 order. Fields that are left out keep their desired value.
-            duration: time to get there [s].
+            duration: time of the motion [s].
             speed: peak speed of the first number that is given [its unit/s].
-            until: the iteration at which to be there.
-            iterations: how many iterations to take.
+            until: the iteration in which the target is reached.
+            iterations: number of iterations of the motion.
             fastest: as fast as the limits of speed, acceleration and jerk allow, at rest at the
-                end. Give one of these five, or none to be there in one iteration.
-            mode: "queue" (after what is there) or "overwrite" (instead of what is there).
-            profile: "linear" or "minimum_jerk" (None: linear, or minimum_jerk where the actuator
-                has acceleration limits).
+                end. Give one of these five, or none to reach the target in one iteration.
+            mode: "queue" (after the queued commands) or "overwrite" (instead of them).
+            profile: "linear" or "minimum_jerk" (None: linear, or minimum_jerk for actuators with
+                acceleration limits).
             start: "desired" or "observed", the state to start from.
-            on_limit: of a command without a pace that the limits do not let arrive in its
-                iteration: "end" (as limited, and the actuator comes to rest) or "go_on" (to the
-                target, as fast as they allow).
+            on_limit: for a command without a pace, if the limits keep it from its target in its
+                iteration: "end" (it ends as limited and the actuator comes to rest) or "go_on" (it
+                continues to the target, as fast as the limits allow).
 
-            Raises InvalidArgument for what the robot cannot follow.
+            Raises InvalidArgument for a command that the robot cannot follow.
             """
 
         def add_request(self, name: str, /, **fields: Any) -> None:
-            """Adds a request to what the next pulse sends.
+            """Adds a request to the next pulse.
 
             It is served in order with the commands of that pulse. Every field without a default
             must be given; `o80 info` shows the defaults.
             """
 
         def add_purge(self, actuator: SupportsIndex | str | None = None) -> None:
-            """Adds a purge (of one actuator, or of all) to what the next pulse sends."""
+            """Adds a purge of one actuator, or of all, to the next pulse."""
 
         @property
         def added(self) -> int:
-            """How many commands, requests and purges were added and not pulsed."""
+            """Number of commands, requests and purges that were added and not pulsed."""
 
         def forget_added(self) -> None:
-            """Drops what was added and not pulsed."""
+            """Drops all that was added and not pulsed."""
 
         def pulse(self, *, at: int | None = None, late: LateWord = "reject") -> _core.Batch:
-            """Sends what was added, as one batch; does not wait.
+            """Sends all that was added as one batch; does not wait.
 
-            at: the iteration at which the batch is taken (None: at once).
-            late: what if that iteration has begun: "reject" the batch, or take it "now".
+            at: the iteration in which the backend takes the batch (None: at once).
+            late: if that iteration has begun already: "reject" the batch, or take it "now".
 
-            Raises LaneFull if too much is in flight (nothing is sent, all stays added), NoLane,
-            ReadOnly, BackendGone.
+            Raises LaneFull if the lane has no room for it (nothing is sent, all stays added),
+            NoLane, ReadOnly, BackendGone.
             """
 
         def pulse_and_wait(
@@ -93,18 +93,19 @@ class Commanding(Observing):
             at: int | None = None,
             late: LateWord = "reject",
         ) -> _core.Observation:
-            """Sends what was added and waits until all of it has ended.
+            """Sends all that was added and waits until every command of it has ended.
 
-            A bursting backend runs as long as that takes. Returns the observation of the last
-            iteration. What was rejected, purged or limited raises nothing: pulse and the statuses
-            of its batch tell.
+            A bursting backend runs until then. Returns the observation of the last iteration.
+            Commands that are limited, purged, overwritten or rejected one by one raise nothing: to
+            see them, use `pulse` and the `statuses` of its batch.
 
-            Raises TimeoutError after `timeout` [s], which carries the `batch`, and what pulse
-            raises.
+            Raises Error if the whole batch was rejected, BackendHalted if a halt ended a command or
+            the batch, TimeoutError after `timeout` [s] with the `batch`, and the exceptions of
+            pulse.
             """
 
         def purge(self, actuator: SupportsIndex | str | None = None) -> _core.Batch:
-            """Drops all commands of an actuator (None: of all), whoever sent them, at once.
+            """Drops all commands of an actuator (None: of all) at once, also those of others.
 
             Needs no pulse; what was added and not pulsed stays added.
             """
@@ -123,17 +124,16 @@ class Commanding(Observing):
     ) -> None:
         """Adds one command through many states, for one or several actuators.
 
-        targets: (T, actuators), row after row; (T,) for a single actuator. Numbers for states of
-            one number; else every field, in a structured array or a mapping from each field to an
-            array.
-        actuators: which ones, by index or name (None: all).
-        iterations: of each row (default: 1).
-        times: when each row is reached, since the start [s]: (T,), not falling.
-        speed: at which to go to each row, as in add_command.
+        targets: (T, actuators), or (T,) for a single actuator. Numbers for states of one number;
+            otherwise all fields, in a structured array or a mapping from each field to an array.
+        actuators: indices or names (None: all).
+        iterations: number of iterations for each row (default: 1).
+        times: when each row is reached, since the start [s]: (T,), not decreasing.
+        speed: peak speed to each row, as in add_command.
         mode, profile, start: as in add_command.
 
-        Several actuators go through each row together, as in add_command. All of it is added or,
-        if InvalidArgument is raised, none.
+        Several actuators reach each row together, as in add_command. If InvalidArgument is raised,
+        nothing is added.
         """
         if times is not None and (iterations is not None or speed is not None):
             raise InvalidArgument(
@@ -156,7 +156,7 @@ class Commanding(Observing):
         )
 
     def _chosen(self, actuators: int | str | Sequence[int | str] | None) -> tuple[list[int], bool]:
-        """Indices, and whether one actuator was named alone."""
+        """Indices of the actuators; True if a single one was named without a list."""
         if actuators is None:
             return list(range(len(self.actuators))), False
         if isinstance(actuators, (int, str, np.integer)):

@@ -1,4 +1,4 @@
-"""Exclusive control of a robot."""
+"""How a frontend takes exclusive control of a robot."""
 
 import contextlib
 import threading
@@ -31,7 +31,7 @@ class Controlling(Bursting):
         try:
             batch.wait(timeout)
         except BaseException:
-            # it may be given yet
+            # control may still be given later: release it
             with contextlib.suppress(Error):
                 self._leave_control()
             raise
@@ -48,7 +48,7 @@ class Controlling(Bursting):
                     released.wait(timeout)
 
     def _leave_control(self) -> _core.Batch | None:
-        """A block ends; the last one releases control."""
+        """Ends a block; the last one releases control."""
         self._check_usable()
         with self._control_lock:
             self._control_blocks -= 1

@@ -1,4 +1,4 @@
-"""What the segment says of its backend and its robot."""
+"""How a frontend describes its backend and robot."""
 
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -28,7 +28,7 @@ class Describing(_core.Frontend):
 
         @property
         def bursting(self) -> bool:
-            """Whether the backend stands still until it is burst."""
+            """True if the backend runs only the iterations that frontends request."""
 
         @property
         def life(self) -> LifeWord:
@@ -36,16 +36,16 @@ class Describing(_core.Frontend):
 
         @property
         def closed(self) -> bool:
-            """Whether this frontend was closed."""
+            """True if this frontend was closed."""
 
     @property
     def alive(self) -> bool:
-        """Whether the backend lives."""
+        """True while the backend runs or starts."""
         return self.life in ("starting", "running")
 
     @property
     def schema(self) -> dict[str, Any]:
-        """All that the backend says of its robot."""
+        """The description of the robot."""
         return self._layout.schema
 
     @property
@@ -56,7 +56,7 @@ class Describing(_core.Frontend):
 
     @cached_property
     def actuators(self) -> list[Actuator]:
-        """What can be commanded: index, name, unit, limits."""
+        """The actuators: index, name, unit, limits."""
         return actuators_of(self.schema)
 
     @property
@@ -71,7 +71,7 @@ class Describing(_core.Frontend):
 
     @property
     def period(self) -> float:
-        """Of the iterations [s]."""
+        """Duration of an iteration [s]."""
         nanoseconds: int = self.schema["period"]
         return nanoseconds * 1e-9
 

@@ -21,17 +21,17 @@ if TYPE_CHECKING:
 class Frontend(Halting):
     """A frontend of the backend that owns a segment: sends commands, reads observations.
 
-    segment: its name.
+    segment: name of the segment.
     timeout: how long to wait for the backend [s]; None is for ever.
-    read_only: asks for no right to command.
-    on_error: what becomes of sent motion if the `with` block ends by an exception or Ctrl-C:
-        "purge" drops what this frontend sent, "continue" leaves it.
-    dead: attaches also to a backend that is gone, to read its history.
+    read_only: attach without the right to command.
+    on_error: if the `with` block ends by an exception or Ctrl-C, "purge" drops the commands of this
+        frontend, "continue" keeps them.
+    dead: attach also to a backend that has ended, to read its history.
 
-    May be used from several threads: what they add is one buffer, which any pulse sends. In a
-    forked child its calls raise UsedAfterFork; pickled, it is opened again by its name.
+    May be used from several threads: all of them add to one buffer, and any pulse sends it. In a
+    forked child its calls raise UsedAfterFork. A pickled frontend attaches again by name.
     Raises TimeoutError, SegmentError, BackendFailed.
-    If the robot's package has a class of its own for it, that one is made.
+    Returns an object of the robot's own frontend class if its package registers one.
     """
 
     _is_set_up = False
@@ -63,7 +63,7 @@ class Frontend(Halting):
         dead: bool = False,
     ) -> None:
         if on_error not in ("purge", "continue"):
-            raise InvalidArgument(f"on_error cannot be {on_error!r}: it is 'purge' or 'continue'")
+            raise InvalidArgument(f"on_error must be 'purge' or 'continue', got {on_error!r}")
         self._on_error = on_error
         self._unnamed = False
         self._arguments = (segment, timeout, read_only, on_error, dead)
@@ -71,7 +71,7 @@ class Frontend(Halting):
 
     @classmethod
     def _of(cls, attachment: _core.Attachment, *, unnamed: bool) -> "Frontend":
-        """The frontend of an inline robot; unnamed: nobody chose its segment's name."""
+        """The frontend of an inline robot. unnamed: o80 chose the name of its segment."""
         chosen = frontend_classes.of(attachment.robot) or cls
         self = _core.Frontend.__new__(chosen)
         assert isinstance(self, Frontend)
@@ -94,16 +94,16 @@ class Frontend(Halting):
 
     @cached_property
     def aio(self) -> "Waits":
-        """The verbs that wait, as coroutines of asyncio: `await arm.aio.wait_for_next()`."""
-        from o80.aio import Waits  # asyncio is loaded by those who use it
+        """The waiting methods as asyncio coroutines: `await arm.aio.wait_for_next()`."""
+        from o80.aio import Waits  # here, because most programs do not need asyncio
 
         return Waits(self)
 
     def close(self) -> None:
-        """Ends it: sent motion goes on, an inline robot stops. Closing twice is allowed.
+        """Closes the frontend. Sent commands continue; an inline robot stops.
 
-        Calls that wait in other threads raise Closed. In a forked child nothing of the parent's
-        is touched.
+        May be called twice. Calls that wait in other threads raise Closed. In a forked child it
+        does not affect the parent.
         """
         if self.closed:
             return
@@ -115,11 +115,11 @@ class Frontend(Halting):
                 stacklevel=2,
             )
         self._close()
-        if self._unnamed and not self._forked:  # one that failed would stay, for others to read
+        if self._unnamed and not self._forked:  # the segment of a failed robot would remain
             _core.clean(self.segment)
 
     def _close_at_exit(self) -> None:
-        """A pure reader has nothing to give back: who waits in a daemon thread is left alone."""
+        """A frontend that only reads stays open: daemon threads may wait with it."""
         if not self.closed and (self._is_inline or self._has_lane or self.added):
             self.close()
 
@@ -133,18 +133,18 @@ class Frontend(Halting):
         self.close()
 
     def reattach(self, timeout: float | None = 5.0) -> None:
-        """Attaches to the backend that now owns the name, after the former one ended.
+        """Attaches to the backend that owns the name now, after the former one has ended.
 
-        Raises TimeoutError, SchemaMismatch if it is described otherwise, and Closed.
+        Raises TimeoutError, SchemaMismatch if the robot is described differently, and Closed.
         """
         if self._arguments is None:
-            raise InvalidArgument("an inline robot that ended cannot be attached again: start it")
+            raise InvalidArgument("an inline robot cannot be attached again: start a new one")
         segment, _, read_only, *_ = self._arguments
         attachment = self._attach_again(timeout, read_only)
         difference = _core.difference(self._description, attachment.description)
         if difference:
             raise SchemaMismatch(
-                f"'{segment}' is no longer the robot it was; open a new frontend:\n{difference}"
+                f"'{segment}' is described differently now; open a new frontend:\n{difference}"
             )
         self._reattach(attachment)
 
@@ -188,5 +188,5 @@ def _open_again(
     on_error: OnErrorWord,
     dead: bool,
 ) -> Frontend:
-    """A pickled frontend attaches again by name."""
+    """Opens a pickled frontend again."""
     return cls(segment, timeout, read_only=read_only, on_error=on_error, dead=dead)

@@ -8,26 +8,26 @@ from o80.halts import Halt
 
 
 class Halting(Controlling):
-    """The part of o80.Frontend that halts, resumes and shows life."""
+    """The part of o80.Frontend that halts, resumes and gives signs of life."""
 
     if TYPE_CHECKING:
 
         def halt(self, reason: str = "") -> int:
             """Halts the backend: commands end as halted, actuators brake within their limits.
 
-            Nothing moves again until `resume`. Acts in the first iteration begun after it, whoever
-            has control. Returns the number of the halt. Raises ReadOnly, BackendGone.
+            Nothing moves again until `resume`. In force from the first iteration begun after it;
+            needs no control. Returns the number of the halt. Raises ReadOnly, BackendGone.
             """
 
         def keep_alive(self) -> None:
-            """Tells the backend's watchdog that this frontend lives.
+            """Gives the backend's watchdog a sign of life.
 
-            A pulse and a wait for one's own batch do so too; reading does not.
+            A pulse and a wait for a batch of this frontend do so too; reading does not.
             """
 
     @property
     def halted(self) -> Halt | None:
-        """The halt that acts, or None. Asked for a moment ago, its iteration is None."""
+        """The halt in force, or requested (its iteration is then None); None if there is none."""
         fields = self._halted
         if fields is None:
             return None
@@ -35,18 +35,18 @@ class Halting(Controlling):
         return Halt(number, cause, None if iteration < 0 else iteration, who, text)
 
     def resume(self, number: int | None = None, *, timeout: float | None = 5.0) -> None:
-        """Ends a halt: the robot starts afresh from where it is, with nothing queued.
+        """Ends a halt: the robot makes a fresh start at its present position, with empty queues.
 
-        number: of the halt that was looked at (None: the one that acts now). A halt that came after
-            it stands.
-        timeout: for the halt to act, the robot to come to rest, and the backend's answer [s].
+        number: number of the halt (None: the one in force now). A halt that came after it stays.
+        timeout: how long to wait until the halt is in force, the robot is at rest, and the backend
+            has answered [s].
 
-        Needs a lane, but no control. In bursting it does not wait for the robot to rest: burst
-        until it does.
+        Needs a lane, but no control. In bursting mode it does not wait until the robot is at rest:
+        burst until it is.
 
-        Raises BackendHalted if it is refused: another halt came, the robot refuses, or it still
-        brakes and bursts. Raises TimeoutError, NoLane, BackendGone.
-        Does nothing if no halt acts.
+        Raises BackendHalted if it is refused: another halt came after it, the robot refuses, or, in
+        bursting mode, it still brakes. Raises TimeoutError, NoLane, BackendGone.
+        Does nothing if no halt is in force.
         """
         if number is None:
             halt = self.halted

@@ -1,4 +1,4 @@
-"""How a frontend reads what the backend published."""
+"""How a frontend reads observations."""
 
 from typing import TYPE_CHECKING
 
@@ -26,13 +26,13 @@ class Observing(Describing):
 
         @property
         def oldest(self) -> int:
-            """The iteration of the oldest observation still there."""
+            """The iteration of the oldest observation in the history."""
 
         def latest(self) -> _core.Observation:
             """The newest observation."""
 
         def wait_for(self, iteration: int, timeout: float | None = None) -> _core.Observation:
-            """The observation of an iteration, as soon as it is there (a past one: at once).
+            """Waits until an iteration is published and returns its observation.
 
             Raises RowOverwritten if the history no longer holds it, TimeoutError after `timeout`
             [s], BackendGone.
@@ -41,9 +41,10 @@ class Observing(Describing):
         def wait_for_next(self, timeout: float | None = None) -> _core.Observation:
             """The observation after the one that this call returned before.
 
-            The first call waits for the next one. If the reader fell behind, `missed` of the
-            observation says how many were overwritten unread. The position belongs to this
-            frontend: threads that all need every row use a stream each.
+            The first call waits for the next one. If the reader was too slow, `missed` of the
+            observation is the number of observations that were overwritten before they were read.
+            The position belongs to this frontend: threads that each need every row need a stream
+            each.
 
             Raises TimeoutError after `timeout` [s], BackendGone.
             """
@@ -64,15 +65,15 @@ class Observing(Describing):
         from_time: int | None = None,
         to_time: int | None = None,
     ) -> History:
-        """Many observations at once. Without an argument: all that are still there.
+        """Many observations at once. Without an argument: all observations in the history.
 
-        n: the last n.
-        seconds: those of the last seconds before the newest one [s].
-        since, until: those of these iterations, both included.
-        from_time, to_time: those of these times, both included [ns], as in `Observation.time`.
+        n: the last n observations.
+        seconds: observations of the last seconds before the newest one [s].
+        since, until: first and last iteration, both included.
+        from_time, to_time: first and last time, both included [ns], as in `Observation.time`.
 
-        Give n, or seconds, or any of the other four. What is no longer there, or not yet, is left
-        out. Raises InvalidArgument.
+        Give n, or seconds, or any of the other four. Iterations that are overwritten or not yet
+        published are left out. Raises InvalidArgument.
         """
         selection = Selection.checked(n, since, until, seconds, from_time, to_time)
         first, last = selection.range(
@@ -83,7 +84,7 @@ class Observing(Describing):
     def at_time(self, time: int) -> _core.Observation:
         """The newest observation at or before a time [ns], as in `Observation.time`.
 
-        Raises RowOverwritten if all that are still there are later.
+        Raises RowOverwritten if all observations in the history are later.
         """
         return self._at_time(whole(time, "time"))
 
@@ -94,9 +95,9 @@ class Observing(Describing):
 
     @property
     def initial_states(self) -> States:
-        """The observed states of row 0, before anything was asked.
+        """The observed states of row 0, before any command.
 
-        If that row was overwritten before this frontend attached: of the oldest row it found.
+        If row 0 was overwritten before this frontend attached: of the oldest row at that time.
         """
         if self._first is None or not len(self._first):
             raise Error(f"'{self.segment}' had no row yet when this frontend attached")

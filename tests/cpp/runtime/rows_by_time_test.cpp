@@ -75,7 +75,7 @@ TEST_F(RowsByTimeTest, SaysThatARowIsNoLongerThere) {
   frontend.start_burst(100);
   station.drive();
   EXPECT_THAT(message_of<RowOverwritten>([&] { frontend.at_time(5'000'000); }),
-              HasSubstr("the oldest one there is row " + std::to_string(frontend.oldest())));
+              HasSubstr("the oldest one is row " + std::to_string(frontend.oldest())));
 }
 
 }  // namespace
