@@ -88,7 +88,7 @@ def test_a_plain_burst_may_be_taken_later_too(arm: o80.Frontend) -> None:
     assert arm.history(since=1, until=1).desired[0, 0] == 0.0
     with pytest.raises(o80.InvalidArgument, match="late"):
         arm.burst(1, at=9, late="never")
-    with pytest.raises(o80.InvalidArgument, match="iteration -5"):
+    with pytest.raises(o80.InvalidArgument, match="an iteration from 0 on, got -5"):
         arm.burst(1, at=-5, wait=False)
 
 

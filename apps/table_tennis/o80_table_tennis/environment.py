@@ -345,6 +345,12 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         self._rig.close()
 
 
+def _paced(rig: RigSettings | None, pacing: Pacing) -> RigSettings:
+    """The settings with this pacing. Raises TypeError for what are no settings."""
+    refuse_wrong_arguments(rig, None, None, [])
+    return (rig or RigSettings()).paced(pacing)
+
+
 def accelerated_environment(
     *,
     processes: bool = False,
@@ -354,12 +360,12 @@ def accelerated_environment(
 ) -> TableTennisEnvironment:
     """`o80/TableTennis-v0`: inline, or with arm and twins in processes of their own."""
     pacing = Pacing.PROCESSES if processes else Pacing.INLINE
-    return TableTennisEnvironment(rig=(rig or RigSettings()).paced(pacing), task=task, **rest)
+    return TableTennisEnvironment(rig=_paced(rig, pacing), task=task, **rest)
 
 
 def real_time_environment(
     *, rig: RigSettings | None = None, task: TaskSettings | None = None, **rest: Any
 ) -> TableTennisEnvironment:
     """`o80/TableTennisRealTime-v0`: the arm runs by the clock."""
-    settings = (rig or RigSettings()).paced(Pacing.REAL_TIME)
+    settings = _paced(rig, Pacing.REAL_TIME)
     return TableTennisEnvironment(rig=settings, task=task, **rest)
