@@ -2,11 +2,11 @@
 // ever passes; what was there before the end is not lost to it.
 //
 // mutant end_of_rows_slept_through: src/memory/signal.cpp
-//   - // an end is said before it wakes: who has seen that wake sees the end
-//   - if (segment_->has_ended()) return;
+//   - // the end is stored before `row_wake` changes: has_ended() is reliable after the load above
+//   - if (segment.has_ended()) return std::nullopt;
 //   +
 // mutant end_of_lanes_slept_through: src/memory/lane_sender.cpp
-//   - // who has seen the wake of an end sees the end
+//   - // the end is stored before `lane_wake` changes: has_ended() is reliable after the load above
 //   - if (segment_->has_ended()) return;
 //   +
 // mutant ended_after_the_wake: src/memory/segment_file.cpp

@@ -2,8 +2,8 @@
 // One is woken, the first awake wakes the rest.
 //
 // mutant waiter_looks_relaxed: src/memory/signal.cpp
-//   - if (view_.counters().published.load(std::memory_order_seq_cst) >= k) return;
-//   + if (view_.counters().published.load(std::memory_order_relaxed) >= k) return;
+//   - if (view.counters().published.load(std::memory_order_seq_cst) >= k) {
+//   + if (view.counters().published.load(std::memory_order_relaxed) >= k) {
 // mutant published_with_release: src/memory/history.cpp
 //   - counters_->published.store(k, std::memory_order_seq_cst);
 //   + counters_->published.store(k, std::memory_order_release);
@@ -22,8 +22,9 @@
 //   - O80_CRASH_POINT("rows.after_wake");
 //   + if (sleepers.rows) view.bell().wanted.store(kNoWish, std::memory_order_seq_cst);
 // mutant sleeps_on_a_later_value: src/memory/signal.cpp
-//   - futex_wait(wake, seen, at_most)
-//   + futex_wait(wake, wake.load(std::memory_order_seq_cst), at_most)
+//   - futex_wait(view_.wakes().row_wake, *seen, at_most)
+//   + futex_wait(view_.wakes().row_wake, view_.wakes().row_wake.load(std::memory_order_seq_cst),
+//   at_most)
 
 #include "kernel.hpp"
 

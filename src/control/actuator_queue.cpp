@@ -10,9 +10,9 @@ namespace o80 {
 namespace {
 
 constexpr double kNoSpeed = std::numeric_limits<double>::infinity();
-// rows of a trajectory that are over before they began, passed in one iteration
+// most waypoints of a trajectory that are skipped in one iteration, because they end before it
 constexpr int kMostPassed = 256;
-// rows of an overwritten trajectory that are looked at
+// most waypoints of an overwritten trajectory that are read
 constexpr std::uint32_t kMostAhead = 64;
 
 }  // namespace
@@ -47,7 +47,8 @@ void ActuatorQueue::drop(Status status, Reason reason, Iteration iteration) noex
   while (!queue_.empty()) ledger_->drop(queue_.take_any(), status, reason, iteration);
 }
 
-/// What overwrites a trajectory may go on for a while towards its further rows.
+/// Stores the running motion for the command that overwrites it. The overwritten velocity fades
+/// within the span of the further waypoints of the trajectory.
 void ActuatorQueue::keep_moving() noexcept {
   auto* ahead = reinterpret_cast<std::byte*>(scratch_.data());
   layout_->copy(ahead, motion_.to());
@@ -117,7 +118,7 @@ void ActuatorQueue::end_running(Iteration iteration) noexcept {
   }
 }
 
-/// No command gives a state: motion and resting fields come to rest within their limits.
+/// Without a command: the motion brakes within its limits, and fields with a rest value go to it.
 ActuatorQueue::Moved ActuatorQueue::come_to_rest(const std::byte* observed) noexcept {
   streams_ = false;
   if (empty()) end_motion();
@@ -130,7 +131,7 @@ bool ActuatorQueue::begin_next(Iteration iteration, const std::byte* observed,
   if (!end_late(iteration, late_budget)) return false;
   const RecordHead& head = pool_->head(queue_.front());
   if (is_member(head) && !ledger_->groups().is_complete(head, iteration)) {
-    end_motion();  // what it begins when the others have come does not continue what ran before
+    end_motion();  // it brakes while it waits, so the group command starts from rest
     return false;
   }
   begin_command(iteration);
@@ -138,7 +139,7 @@ bool ActuatorQueue::begin_next(Iteration iteration, const std::byte* observed,
   return true;
 }
 
-/// Skips what was to end before now; false if nothing is left to begin.
+/// Rejects commands whose `until` has passed; false if no command is left to begin.
 bool ActuatorQueue::end_late(Iteration iteration, std::uint32_t& late_budget) noexcept {
   while (!queue_.empty()) {
     const RecordHead& late = pool_->head(queue_.front());
@@ -154,7 +155,7 @@ bool ActuatorQueue::end_late(Iteration iteration, std::uint32_t& late_budget) no
 }
 
 void ActuatorQueue::begin_command(Iteration iteration) noexcept {
-  // mask, times and rows of the command lie behind its head
+  // head => mask, times, rows
   const BlockIndex record = queue_.front();
   const RecordHead& head = pool_->head(record);
   rows_ = Cursor(*pool_, record, sizeof(RecordHead), head.payload_bytes);
@@ -163,7 +164,7 @@ void ActuatorQueue::begin_command(Iteration iteration) noexcept {
   timed_ = head.pace == Pace::duration && head.rows > 1;
   time_ = 0;
   if (timed_) {
-    // the check has noted where the rows begin
+    // the check has stored the position of the rows
     times_ = rows_;
     rows_ = rows_of_timed(*pool_, head, layout_->size());
   }
@@ -174,7 +175,7 @@ void ActuatorQueue::begin_command(Iteration iteration) noexcept {
   rows_left_ = head.rows;
   first_row_ = true;
   running_ = true;
-  // a stream of direct commands is one motion
+  // consecutive direct commands are one motion
   if (pace_ != Pace::direct || !streams_) limiter_.begin();
   streams_ = false;
   if (is_member(head) && pace_ == Pace::duration) carry_.carry(ledger_->groups().agreed(head));
@@ -186,7 +187,7 @@ void ActuatorQueue::arrive(Iteration iteration, std::uint32_t& late_budget) noex
   const RecordHead& head = pool_->head(queue_.front());
   if (!is_member(head)) return;
   ledger_->groups().arrive(head, iteration);
-  // rounding that one queue still owes is owed by all
+  // all members use the largest rounding carry
   if (head.pace == Pace::duration) {
     ledger_->groups().offer(head, iteration, carry_.carried());
   }
@@ -232,11 +233,11 @@ void ActuatorQueue::begin_row(Iteration iteration, const std::byte* observed) no
   first_row_ = false;
 }
 
-/// The next row, from where to where, and the iterations it takes by itself.
+/// Reads the next waypoint: start, target, and its own number of iterations.
 void ActuatorQueue::plan_row(Iteration iteration, const std::byte* observed) noexcept {
   const RecordHead& head = pool_->head(queue_.front());
 
-  // desired or observed, or the row before => from
+  // desired, observed or the waypoint before => from
   if (!first_row_) {
     layout_->copy(motion_.from(), motion_.to());
   } else {
@@ -271,7 +272,7 @@ std::int64_t ActuatorQueue::iterations(const RecordHead& head, Iteration iterati
   return 1;
 }
 
-/// Rows whose time is over before an iteration could show them are passed.
+/// Skips waypoints that end before the next iteration; the iterations of the first that does not.
 std::int64_t ActuatorQueue::row_of_own_time() noexcept {
   const auto next = [&] {
     std::int64_t end = time_;

@@ -15,20 +15,20 @@
 
 namespace o80 {
 
-/// The commands of one actuator, first in first out, and the motion of the one that runs.
+/// The queue of the commands of one actuator, and the motion of the running one.
 ///
 /// Realtime: everything but construction.
 class ActuatorQueue {
  public:
-  /// What an iteration gave the desired state.
+  /// How the desired state of an iteration was computed.
   enum class Moved : std::uint8_t {
-    idle,     // nothing: no command is left, and it rests
-    braking,  // no command: it comes to rest
-    active,
-    clamped
+    idle,     // no command; at rest
+    braking,  // no command; it comes to rest
+    active,   // by a command
+    clamped   // by a command, changed by a limit
   };
 
-  /// `desired` is the actuator's own place in the desired block.
+  /// `desired`: the state of this actuator in the desired block.
   ActuatorQueue(const Schema& schema, const ActuatorRow& row, const StateLayout& layout,
                 BlockPool& pool, Ledger& ledger, std::byte* desired, std::uint32_t lanes);
 
@@ -36,33 +36,33 @@ class ActuatorQueue {
   void append(BlockIndex first, BlockIndex last, std::uint32_t lane) noexcept {
     queue_.append(first, last, lane);
   }
-  /// Ends everything; what overwrites it may continue its motion.
+  /// Ends all commands. With Status::overwritten the next command may continue the motion.
   void drop(Status status, Reason reason, Iteration iteration) noexcept;
-  /// Ends what one lane sent, the direct value it gave last included.
+  /// Ends the commands of one lane, and releases a direct value that this lane has set.
   void drop_lane(std::uint32_t lane, Status status, Reason reason, Iteration iteration) noexcept;
-  /// What queues do for commands of several actuators before any of them steps: all tell when such
-  /// a command is their next, then all whose group is complete plan their next row, so that the
-  /// slowest decides how many iterations it takes.
+  /// For commands of several actuators (ARCHITECTURE.md, Commands of several actuators); called for
+  /// all queues before any step(). Reports that the next command is a member of a group.
   void arrive(Iteration iteration, std::uint32_t& late_budget) noexcept;
+  /// Then, if all members have arrived: proposes its number of iterations. The largest is used.
   void plan_with_others(Iteration iteration, const std::byte* observed) noexcept;
-  /// `late_budget` is how many late commands may still be told in this iteration.
+  /// `late_budget`: number of late commands that may still be rejected in this iteration.
   Moved step(Iteration iteration, const std::byte* observed, std::uint32_t& late_budget) noexcept;
   bool empty() const noexcept { return queue_.empty(); }
-  /// A direct value keeps a resting number away from its rest until something takes its place.
+  /// True if a direct value keeps a number away from its rest value.
   bool holds() const noexcept { return limiter_.holds(); }
-  /// An iteration without a command would not move it.
+  /// True if an iteration without a command would change nothing.
   bool at_rest() const noexcept {
     return follows() ? limiter_.resting_at_rest() : limiter_.at_rest();
   }
-  /// A command of this lane, or the direct value it gave last, still acts.
+  /// True if a command of this lane is queued or running, or its direct value is still held.
   bool acts(std::uint32_t lane) const noexcept {
     return queue_.has(lane) || (holder_ == lane && holds());
   }
 
-  /// Begins at rest in this state; what is no finite number keeps its last desired value.
+  /// Sets the desired state, at rest. Numbers that are not finite keep their last desired value.
   void restart(const std::byte* state) noexcept;
-  /// The state of an actuator that follows, as long as it is idle: what was observed, but for the
-  /// numbers that rest. True while one of these moves.
+  /// For an idle actuator that follows: the observed state becomes the desired one, except for
+  /// numbers with a rest value, which go to it. True while one of these moves.
   bool follow(const std::byte* observed) noexcept;
   bool follows() const noexcept { return when_idle_ == WhenIdle::follow; }
 
@@ -94,29 +94,29 @@ class ActuatorQueue {
   double period_;  // [s]
   WhenIdle when_idle_;
 
-  LaneLists queue_;  // in front the one that runs, if one does
+  LaneLists queue_;  // the front is the running command, if `running_`
   bool running_ = false;
-  Limited limited_;           // by the last iteration
+  Limited limited_;           // in the last iteration
   std::uint32_t holder_ = 0;  // lane that gave the direct value that stays
   bool streams_ = false;      // the iteration before was a direct command's
 
-  // of the command that runs
+  // the running command
   Pace pace_ = Pace::direct;
   double most_ =
       std::numeric_limits<double>::infinity();  // speed of its first number [1/iteration]
-  std::uint32_t first_number_ = 0;              // that it commands
+  std::uint32_t first_number_ = 0;              // its first commanded number
   std::uint32_t rows_left_ = 0;
   bool masked_ = false;
   bool timed_ = false;
   bool first_row_ = false;
-  bool planned_ = false;             // its next row, with those of its group
-  std::int64_t row_iterations_ = 1;  // of the row that is planned
-  std::int64_t time_ = 0;            // end of the last row [ns]
+  bool planned_ = false;             // plan_with_others() has planned its next waypoint
+  std::int64_t row_iterations_ = 1;  // iterations of the planned waypoint
+  std::int64_t time_ = 0;            // end time of the last waypoint [ns]
   Cursor times_;
   Cursor rows_;
   std::vector<std::uint64_t> mask_;
-  std::vector<std::uint64_t> scratch_;  // a state
-  std::vector<std::uint64_t> spare_;    // likewise
+  std::vector<std::uint64_t> scratch_;  // space for a state
+  std::vector<std::uint64_t> spare_;    // space for a state
 };
 
 }  // namespace o80

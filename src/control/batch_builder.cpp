@@ -25,7 +25,7 @@ std::byte* BatchBuilder::open(const RecordHead& head, std::uint64_t payload_byte
   if (payload_bytes > std::numeric_limits<std::uint32_t>::max() ||
       all > std::numeric_limits<std::uint32_t>::max()) {
     throw LaneFull("a batch of " + std::to_string(all) +
-                   " blocks fits no lane: send it in several pulses");
+                   " blocks is larger than any lane: send it in several pulses");
   }
   const std::size_t first = blocks_.size();
   blocks_.resize(all);
@@ -80,7 +80,7 @@ std::uint32_t BatchBuilder::group(std::span<const Member> members,
       add_command(written, member.mask, times, rows, member.states);
     }
   } catch (...) {
-    // all or nothing
+    // remove the incomplete group
     blocks_.resize(before);
     --records_;
     --commands_;
@@ -146,7 +146,7 @@ std::span<const Block> BatchBuilder::seal(const BatchRecord& batch) {
   if (is_express(batch)) written.flags |= kExpress;
   std::memcpy(blocks_.front().bytes.data(), &written, sizeof written);
 
-  // the ids follow the batch's; members bear that of their group
+  // records get the ids after the batch's two; members get the id of their group
   std::size_t block = 1;
   for (std::uint32_t place = 0; place < records_; ++place) {
     const CommandId id = record_id(batch.id, place);
@@ -164,7 +164,7 @@ bool BatchBuilder::is_express(const BatchRecord& batch) const noexcept {
          batch.at == kNow && batch.burst == 0 && (batch.flags & kBurstUntilEnded) == 0;
 }
 
-/// Of the record that starts there; the block behind it.
+/// Sets the id of the record at `block`; returns the block after the record.
 std::size_t BatchBuilder::set_id(std::size_t block, CommandId id) {
   std::byte* bytes = blocks_[block].bytes.data();
   RecordHead head;

@@ -8,25 +8,25 @@
 
 namespace o80 {
 
-/// A batch while a frontend fills it, as the blocks that will cross its lane.
+/// Builds a batch as blocks for a lane.
 ///
-/// Each verb returns the place of its record in the batch; once the batch has its id, the record's
-/// is `record_id(batch, place)`.
+/// Each function returns the index of its record in the batch. Once the batch has its id, the id of
+/// the record is `record_id(batch, index)`.
 class BatchBuilder {
  public:
   BatchBuilder();
 
-  /// Adds a command. `head` says actuator, mode, pace, profile, start and amount; the rest is set
-  /// here. `mask` is empty or one bit a number of the state, `times` empty or one end a row [ns],
-  /// `states` holds `rows` states.
+  /// Adds a command. `head` has actuator, mode, pace, profile, start and amount. `mask` is empty or
+  /// has one bit for each number of the state. `times` is empty or has one end time for each row
+  /// [ns]. `states` holds `rows` states.
   std::uint32_t command(const RecordHead& head, std::span<const std::uint64_t> mask,
                         std::span<const std::int64_t> times, std::uint32_t rows,
                         std::span<const std::byte> states);
   std::uint32_t command(const RecordHead& head, std::span<const std::byte> state) {
     return command(head, {}, {}, 1, state);
   }
-  /// One command for several actuators. Heads as above, all alike but for the actuator; `times`
-  /// and `rows` are those of each member.
+  /// Adds one command for several actuators. The heads (as above) differ only in the actuator;
+  /// `times` and `rows` apply to each member.
   struct Member {
     RecordHead head;
     std::span<const std::uint64_t> mask;
@@ -35,7 +35,7 @@ class BatchBuilder {
   std::uint32_t group(std::span<const Member> members, std::span<const std::int64_t> times = {},
                       std::uint32_t rows = 1);
   std::uint32_t purge(std::uint16_t actuator_or_every);
-  /// Drops only what this lane sent.
+  /// Purges only commands of this lane.
   std::uint32_t purge_own(std::uint16_t actuator_or_every);
   std::uint32_t request(std::uint16_t index, std::span<const std::byte> payload);
   std::uint32_t take_control();
@@ -43,8 +43,8 @@ class BatchBuilder {
   /// Clears halts up to this number.
   std::uint32_t resume(std::uint64_t number);
 
-  /// Completes the batch: `batch` says id, ticket, at, late_now, burst and flags. One of a few
-  /// purges and control orders, for now and without a burst, is marked as express.
+  /// Completes the batch. `batch` has id, ticket, at, late_now, burst and flags. A batch of few
+  /// purges and control orders, without `at` and without a burst, is marked as express.
   std::span<const Block> seal(const BatchRecord& batch);
 
   void clear();
@@ -53,7 +53,7 @@ class BatchBuilder {
   bool has_commands() const noexcept { return commands_ > 0; }
   std::uint32_t requests() const noexcept { return requests_; }
   std::uint32_t control_orders() const noexcept { return control_orders_; }
-  /// Blocks that the batch takes in its lane.
+  /// Number of blocks of the batch.
   std::uint64_t blocks() const noexcept { return blocks_.size(); }
 
  private:
@@ -64,7 +64,7 @@ class BatchBuilder {
   std::size_t set_id(std::size_t block, CommandId id);
   bool is_express(const BatchRecord& batch) const noexcept;
 
-  std::vector<Block> blocks_;  // the batch's own block first
+  std::vector<Block> blocks_;  // the first is the BatchRecord
   std::uint32_t records_ = 0;
   std::uint32_t commands_ = 0;
   std::uint32_t requests_ = 0;

@@ -7,19 +7,19 @@
 
 namespace o80 {
 
-/// How a request, or the wish for exclusive control, ended.
+/// Result of a request or of a control order.
 struct Outcome {
   Status status = Status::completed;  // or rejected; of a request that ends later, active
   Reason reason = Reason::none;
   std::uint8_t detail = 0;
 };
 
-/// What the controller needs of its surroundings while it takes a batch.
+/// Called by the controller while it takes a batch.
 class BatchHandler {
  public:
-  /// The iteration about to run; a fresh start inside `request` may move it on.
+  /// The iteration about to run; a fresh start inside request() may increase it.
   virtual Iteration iteration() const noexcept = 0;
-  /// Serves a request now; may call `Controller::restart`. `payload` holds the whole struct. The
+  /// Serves a request; may call `Controller::restart`. `payload` holds the whole struct. The
   /// request ends with the iteration at which it began: that of the fresh row, if it made one. If
   /// the outcome is active, `Controller::end` ends the record later.
   virtual Outcome request(std::uint32_t lane, CommandId id, BlockIndex record, std::uint32_t index,

@@ -6,22 +6,22 @@
 namespace o80 {
 namespace {
 
-// what a plan writes into `BatchRecord::own`, beside kFirstStep; its work takes the place of
-// `blocks`, which the pool knows too
+// words that a plan writes into `BatchRecord::own`, besides kFirstStep. Its work is stored in
+// `BatchRecord::blocks`: the pool knows the count of blocks as well.
 constexpr std::size_t kMissingFrom = 1;
 constexpr std::size_t kSpareFirst = 2;
 constexpr std::size_t kTraits = 3;
 constexpr std::size_t kSpareBlocks = 4;
 
-// traits: the number of requests, these, and above them the number of groups
-constexpr std::uint32_t kRequests = 0x7F;  // their number
+// bits of kTraits
+constexpr std::uint32_t kRequests = 0x7F;  // number of requests
 constexpr std::uint32_t kResumes = 1U << 7;
 constexpr std::uint32_t kIsExpress = 1U << 8;
 constexpr std::uint32_t kReleases = 1U << 9;
 constexpr std::uint32_t kMoves = 1U << 10;
-constexpr std::uint32_t kFirstGroupBit = 11;
+constexpr std::uint32_t kFirstGroupBit = 11;  // above: number of groups
 
-constexpr std::uint32_t kBatchWork = 6;  // of an iteration; copying a block: 1
+constexpr std::uint32_t kBatchWork = 6;  // work of a batch; copying a block is 1
 
 }  // namespace
 
@@ -76,7 +76,7 @@ bool BatchPlanner::check(std::uint32_t lane_index, BlockIndex batch,
 }
 
 void BatchPlanner::complete(std::uint32_t lane_index, std::uint32_t& budget) noexcept {
-  if (lanes_[lane_index].group != kNoBlock) fail_group(lane_index, budget);  // it goes on nowhere
+  if (lanes_[lane_index].group != kNoBlock) fail_group(lane_index, budget);  // incomplete
   end_part(lane_index, budget);
   Lane& lane = lanes_[lane_index];
   const BlockChain chain = pool_.chain(lane.batch);
@@ -105,7 +105,7 @@ void BatchPlanner::begin_record(Lane& lane) noexcept {
   lane.last = lane.cursor;
   lane.to_walk = 0;
   if (claimed > there) {
-    // it has what is left
+    // it gets the remaining blocks
     lane.verdict = Verdict::invalid;
     lane.record_blocks = there;
     lane.last = chain.last;
@@ -122,7 +122,7 @@ void BatchPlanner::begin_record(Lane& lane) noexcept {
   if (lane.verdict != Verdict::unfinished) stop_reading(lane);
 }
 
-/// The check is done: the record ends where it has read to, or so many blocks later.
+/// After the check of a record: computes how many blocks remain to its end.
 void BatchPlanner::stop_reading(Lane& lane) noexcept {
   const Cursor& payload = lane.progress.payload;
   const std::uint64_t here = kBlockBytes - payload.offset();
@@ -195,7 +195,7 @@ void BatchPlanner::begin_group(Lane& lane) noexcept {
   lane.group_blocks = 1;
 }
 
-/// A member does what its group does, and no other member is of its actuator.
+/// True if a member has the options of its group, and an actuator that no other member has.
 bool BatchPlanner::fits_group(std::uint32_t lane_index, const RecordHead& head) noexcept {
   if (head.actuator >= actuators_) return false;
   const Lane& lane = lanes_[lane_index];
@@ -220,7 +220,7 @@ void BatchPlanner::add_member(Lane& lane) noexcept {
   --lane.members_left;
 }
 
-/// Its members go to their queues like any command.
+/// Adds the members of a complete group, which go to their queues like other commands.
 void BatchPlanner::complete_group(std::uint32_t lane_index, std::uint32_t& budget) noexcept {
   Lane& lane = lanes_[lane_index];
   CommandGroup group;
@@ -237,7 +237,7 @@ void BatchPlanner::complete_group(std::uint32_t lane_index, std::uint32_t& budge
   ++lane.place;
 }
 
-/// The blocks of the group, as far as they were looked at, are one record that is invalid.
+/// Replaces an invalid group by one invalid record with all its blocks read so far.
 void BatchPlanner::fail_group(std::uint32_t lane_index, std::uint32_t& budget) noexcept {
   Lane& lane = lanes_[lane_index];
   RecordHead& head = pool_.head(lane.group);
@@ -250,7 +250,8 @@ void BatchPlanner::fail_group(std::uint32_t lane_index, std::uint32_t& budget) n
   ++lane.place;
 }
 
-/// Whoever writes into its lane itself may have passed over what `pulse` refuses.
+/// True if the record exceeds the limits of a batch. pulse() refuses such a batch, but a frontend
+/// can write its lane directly.
 bool BatchPlanner::is_one_too_many(Lane& lane, const RecordHead& head) const noexcept {
   switch (head.kind) {
     case RecordKind::request:

@@ -15,33 +15,33 @@
 
 namespace o80 {
 
-/// What taking a checked batch comes to.
+/// The steps that take a checked batch.
 struct Plan {
-  BlockIndex steps = kNoBlock;     // the first; the others follow by Own::kNextStep
-  std::uint32_t missing_from = 0;  // place of the first record that has no blocks
-  BlockChain spare;                // blocks that no record uses
-  std::uint32_t groups = 0;        // commands of several actuators
+  BlockIndex steps = kNoBlock;     // the first step, linked by Own::kNextStep
+  std::uint32_t missing_from = 0;  // index of the first record without blocks
+  BlockChain spare;                // unused blocks
+  std::uint32_t groups = 0;        // number of commands of several actuators
 };
 
-/// How much taking a checked batch takes of an iteration.
+/// The cost of taking a checked batch, and the properties that decide when it may be taken.
 struct Effort {
-  std::uint32_t work = 0;      // in units of the backend's budget: about one block each
-  std::uint32_t requests = 0;  // that the driver will serve
-  bool express = false;        // nothing but purges and control orders
-  bool releases = false;       // some of which let go of control
-  bool moves = false;    // has what a halt refuses: a command, a request not marked `while_halted`
-  bool resumes = false;  // nothing but orders to resume, and no burst
+  std::uint32_t work = 0;      // part of the budget of an iteration; copying a block is 1
+  std::uint32_t requests = 0;  // number of requests to the driver
+  bool express = false;        // only purges and control orders
+  bool releases = false;       // releases exclusive control
+  bool moves = false;          // has a command, or a request without `while_halted`
+  bool resumes = false;        // only resumes, and no burst
 };
 
-/// Turns a batch in the pool into the few steps that take it, checking each of its records.
+/// Checks the records of a batch in the pool, and reduces them to the few steps that take it.
 ///
-/// A step is one record, or a list of records that go to the end of one actuator's queue together,
-/// or a list of records with the same end. What the batch itself overwrites or purges goes into
-/// such a list and never reaches a queue. So taking a batch costs no more for its thousands of
-/// records than for its actuators and requests.
+/// A step is one record, a list of commands for the queue of one actuator, or a list of records
+/// with the same end status. Commands that a later record of the same batch overwrites or purges go
+/// into such a list and never reach a queue. So the cost of taking a batch depends on its actuators
+/// and requests, not on its number of records.
 ///
-/// Requests divide a batch into parts, because one may start afresh: a part drops only what the
-/// same part has added.
+/// A request may make a fresh start, so requests split a batch into parts: an overwrite or a purge
+/// drops only commands of its own part.
 ///
 /// Realtime: everything but construction.
 class BatchPlanner {
@@ -49,49 +49,49 @@ class BatchPlanner {
   BatchPlanner(const Schema& schema, RecordCheck::Layouts layouts, BlockPool& pool,
                std::uint32_t lanes);
 
-  /// Goes on with a batch, for about `budget` blocks, which it takes off; true when all of it is
-  /// checked.
+  /// Continues the check of a batch for about `budget` blocks, and reduces `budget` by them. True
+  /// when the whole batch is checked.
   bool check(std::uint32_t lane, BlockIndex batch, std::uint32_t& budget) noexcept;
-  /// What taking a checked batch takes.
+  /// The cost of taking a checked batch.
   Effort effort(BlockIndex batch) const noexcept;
-  /// The plan of a checked batch, once; none if the batch itself is garbage.
+  /// The plan of a checked batch; call it once. Empty if the batch is invalid.
   std::optional<Plan> plan(BlockIndex batch) noexcept;
   /// Forgets a batch that will not be taken.
   void forget(std::uint32_t lane, BlockIndex batch) noexcept;
-  /// The last record of a step's list.
+  /// The last record of the list of a step.
   BlockIndex tail(BlockIndex step) const noexcept { return tails_[step]; }
 
  private:
   static constexpr std::size_t kFirstStep = 0;  // of BatchRecord::own
 
   enum class Known : std::uint8_t { nothing, plan, garbage };
-  /// What a part of a batch has done to a queue so far.
+  /// Effect of the present part of a batch on one queue, before its own commands are appended.
   struct Done {
-    bool empty = false;      // nothing is left in it
-    bool empty_own = false;  // nothing that this lane sent
-    bool at_rest = false;    // what it moved comes to rest
-    bool purged = false;     // by a purge of every lane's commands
+    bool empty = false;      // all commands are dropped
+    bool empty_own = false;  // all commands of this lane are dropped
+    bool at_rest = false;    // the actuator brakes
+    bool purged = false;     // all commands are purged
   };
-  /// One actuator in the part of a lane's batch that is being checked.
+  /// One actuator in the present part of the batch of a lane.
   struct Target {
-    std::uint64_t epoch = 0;      // what else is here is valid while this is the lane's
-    BlockIndex list = kNoBlock;   // commands that will be appended, if nothing drops them
-    bool list_is_step = false;    // the first of them overwrites: it is a step already
-    bool listed = false;          // in `listed_`: has a list, or moves on after an overwrite
-    BlockIndex group = kNoBlock;  // the last one that it was a member of
+    std::uint64_t epoch = 0;      // valid while it equals Lane::epoch
+    BlockIndex list = kNoBlock;   // commands that will be appended, unless they are dropped
+    bool list_is_step = false;    // its first command overwrites, and is a step already
+    bool listed = false;          // is in `listed_`
+    BlockIndex group = kNoBlock;  // the last group with a member of this actuator
     Done done;
   };
   struct Lane {
     BlockIndex batch = kNoBlock;   // being checked
     BlockIndex cursor = kNoBlock;  // first block of the record being checked
-    bool begun = false;            // it has been looked at
+    bool begun = false;            // the check of the record has begun
     RecordCheck::Verdict verdict = RecordCheck::Verdict::unfinished;
-    BlockIndex last = kNoBlock;  // its last one, or as far as an invalid one has been walked
-    std::uint32_t to_walk = 0;   // blocks of it behind `last`
+    BlockIndex last = kNoBlock;  // last block of the record that was reached
+    std::uint32_t to_walk = 0;   // blocks from `last` to the end of the record
     BlockIndex last_step = kNoBlock;
     std::uint32_t place = 0;
     std::uint32_t record_blocks = 0;
-    std::uint32_t blocks = 0;  // seen
+    std::uint32_t blocks = 0;  // blocks of the batch that are checked
     std::uint64_t epoch = 0;
     RecordCheck::Progress progress;
     Effort effort;
@@ -103,10 +103,10 @@ class BatchPlanner {
     BlockIndex last_member = kNoBlock;
     std::uint32_t members_left = 0;
     std::uint32_t group_blocks = 0;
-    std::uint32_t groups = 0;  // of the batch, so far
-    // of the part under way
-    std::array<BlockIndex, 4> ends{};  // first of the lists of records of one end
-    Done all;                          // done to every queue
+    std::uint32_t groups = 0;  // groups of the batch so far
+    // the present part
+    std::array<BlockIndex, 4> ends{};  // for each End the first record of its list
+    Done all;                          // effect on every queue
     std::uint32_t listed = 0;
   };
   /// Index into Lane::ends.
@@ -153,8 +153,8 @@ class BatchPlanner {
   RecordCheck check_;
   std::uint32_t actuators_;
   std::vector<Lane> lanes_;
-  std::vector<Target> targets_;        // of each lane, one for each actuator
-  std::vector<std::uint16_t> listed_;  // the same
+  std::vector<Target> targets_;        // one for each lane and actuator
+  std::vector<std::uint16_t> listed_;  // for each lane: actuators of its present part
   std::vector<BlockIndex> tails_;      // one for each block
   std::vector<Known> known_;           // one for each block
   std::vector<bool> while_halted_;     // one for each request

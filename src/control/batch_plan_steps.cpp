@@ -1,4 +1,4 @@
-// How the checked records of a batch become the steps of its plan.
+// BatchPlanner: converts the checked records of a batch to the steps of its plan.
 
 #include <array>
 
@@ -7,9 +7,9 @@
 namespace o80 {
 namespace {
 
-// what steps take of an iteration, next to copying a block: 1
+// work of a step; copying a block is 1
 constexpr std::uint32_t kStepWork = 2;
-constexpr std::uint32_t kRequestWork = 16;  // and one for each actuator: it may start afresh
+constexpr std::uint32_t kRequestWork = 16;  // plus 1 for each actuator: it may make a fresh start
 
 }  // namespace
 
@@ -29,8 +29,8 @@ void BatchPlanner::add(std::uint32_t lane_index, BlockIndex record,
       [[fallthrough]];
     case RecordKind::resume:
       if (pool_.head(record).kind == RecordKind::resume) ++lane.resumes;
-      // may start afresh too, and is never express: commands sent before it, while the robot was
-      // halted, are rejected and would act if it overtook them
+      // a resume makes a fresh start too. It is never express: if it overtook commands that were
+      // sent during the halt, they would act instead of being rejected
       lane.effort.express = false;
       ++lane.effort.requests;
       end_part(lane_index, budget);
@@ -76,7 +76,7 @@ void BatchPlanner::add_purge(std::uint32_t lane_index, BlockIndex record,
   add_step(lane, record, kStepWork + (all ? actuators_ : 0));
 }
 
-/// True if it does something to the queue, beside dropping what this part would append.
+/// True if the purge affects the queue, besides dropping commands that this part would append.
 bool BatchPlanner::purge_one(std::uint32_t lane_index, std::uint32_t actuator, bool own) noexcept {
   Target& to = target(lane_index, actuator);
   drop_list(lanes_[lane_index], to, End::purged);
@@ -102,19 +102,19 @@ bool BatchPlanner::purge_all(std::uint32_t lane_index, bool own, std::uint32_t& 
   lane.all.empty_own = true;
   if (!own) {
     lane.all = {.empty = true, .empty_own = true, .at_rest = true, .purged = true};
-    ++lane.epoch;  // the same holds for each of them
+    ++lane.epoch;  // every Target starts again from `all`
   }
   return does_something;
 }
 
-/// What has not been dropped is appended.
+/// Ends a part: adds a step for each list of commands that was not dropped.
 void BatchPlanner::end_part(std::uint32_t lane_index, std::uint32_t& budget) noexcept {
   Lane& lane = lanes_[lane_index];
   for (const std::uint16_t actuator : listed(lane_index)) {
     const Target& to = target(lane_index, actuator);
     spend(budget, 1);
     if (to.list == kNoBlock || to.list_is_step) continue;
-    pool_.head(to.list).mode = Mode::queue;  // there is nothing to overwrite
+    pool_.head(to.list).mode = Mode::queue;  // the queue is empty
     add_step(lane, to.list, kStepWork);
   }
   begin_part(lane);

@@ -8,35 +8,36 @@
 
 namespace o80 {
 
-/// Marks the id of a member of a group; the bits below hold the block of the group's head. Ids of
-/// records never grow that far.
+/// The internal id of a member of a group: this bit plus the block index of the group record. Ids
+/// of records never reach this bit.
 inline constexpr CommandId kMemberMark = CommandId{1} << 63;
 
-/// A checked command that is part of one for several actuators.
+/// True for a checked command that is a member of a group.
 inline bool is_member(const RecordHead& head) noexcept { return (head.id & kMemberMark) != 0; }
 
-/// What the backend keeps of a command of several actuators, behind its head. Each member lies in
-/// the queue of its actuator like any command.
+/// State of a command of several actuators, stored behind the head of its group record
+/// (ARCHITECTURE.md, Commands of several actuators). Each member is in the queue of its actuator.
 struct CommandGroup {
-  Iteration last_end = 0;     // of its members
+  Iteration last_end = 0;     // last iteration in which a member has ended
   std::uint16_t open = 0;     // members that have not ended
-  std::uint16_t arrived = 0;  // of them, first in their queues in the iteration of the stamp
-  Status end = Status::none;  // the first one that is not completed
+  std::uint16_t arrived = 0;  // members that are next in their queues, in the iteration kArrivals
+  Status end = Status::none;  // the first end status of a member that is not completed
   Reason reason = Reason::none;
   std::uint8_t detail = 0;
   std::uint8_t active : 1 = 0;   // reported as active
-  std::uint8_t offered : 1 = 0;  // the stamp of offers is valid
+  std::uint8_t offered : 1 = 0;  // kOffers is valid
 };
 static_assert(sizeof(CommandGroup) == kBlockBytes - sizeof(RecordHead));
 
-/// Finds groups, and lets their members begin together.
+/// Lets the members of a group begin together and take the same number of iterations.
 ///
 /// Realtime: yes.
 class CommandGroups {
  public:
   explicit CommandGroups(BlockPool& pool) : pool_(&pool) {}
 
-  /// Members whose own numbers of iterations differ from row to row.
+  /// True for the paces (speed, fastest) whose members must agree on the iterations of every
+  /// waypoint.
   static bool agrees_on_rows(const RecordHead& head) noexcept {
     return head.pace == Pace::speed || head.pace == Pace::fastest;
   }
@@ -47,8 +48,8 @@ class CommandGroups {
     return *reinterpret_cast<CommandGroup*>(pool_->bytes(head) + sizeof(RecordHead));
   }
 
-  /// Notes that a member is the next one of its queue. All queues call it before any asks
-  /// `is_complete`.
+  /// Notes that a member is the next command of its queue. All queues call it before any calls
+  /// is_complete().
   void arrive(const RecordHead& member, Iteration iteration) noexcept {
     const BlockIndex head = head_of(member);
     CommandGroup& group = at(head);
@@ -56,7 +57,7 @@ class CommandGroups {
     stamp(head, kArrivals) = low(iteration);
     ++group.arrived;
   }
-  /// Whether all members that have not ended have arrived, or some have already begun.
+  /// True if all members that have not ended have arrived, or if one has begun.
   bool is_complete(const RecordHead& member, Iteration iteration) noexcept {
     const BlockIndex head = head_of(member);
     const CommandGroup& group = at(head);
@@ -64,7 +65,7 @@ class CommandGroups {
            (stamp(head, kArrivals) == low(iteration) && group.arrived == group.open);
   }
 
-  /// Offers a number; the largest one offered in an iteration holds for all members.
+  /// Proposes a number; agreed() is the largest one of an iteration.
   void offer(const RecordHead& member, Iteration iteration, std::int64_t number) noexcept {
     const BlockIndex head = head_of(member);
     CommandGroup& group = at(head);
@@ -79,7 +80,8 @@ class CommandGroups {
   }
 
  private:
-  // words of RecordHead::own that the head of a group does not need, because it is in no queue
+  // words of RecordHead::own for iterations (low 32 bits). They are unused in a group record,
+  // because it is in no queue.
   static constexpr std::size_t kArrivals = 0;
   static constexpr std::size_t kOffers = 3;
 

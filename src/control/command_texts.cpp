@@ -1,4 +1,4 @@
-// The words of commands, in the order of their enumerators.
+// The texts of the enumerations of commands, in the order of their enumerators.
 
 #include <cstddef>
 

@@ -68,10 +68,10 @@ void Controller::restart(const std::byte* observed, const std::byte* wanted,
   }
 }
 
-/// Commands of several actuators begin when all their queues have come to them.
+/// Begins the commands of several actuators whose members are next in all queues.
 void Controller::step_groups(Iteration iteration, const std::byte* observed,
                              std::uint32_t& late_budget) noexcept {
-  // dropped members end before those that step; the others do not wait for them
+  // end dropped members first, so that the others of their group do not wait for them
   told_ = ledger_.report_ends(kStatusesPerIteration);
   if (ledger_.undecided_groups() == 0) return;
   const auto each_busy = [&](auto&& visit) {
@@ -93,7 +93,7 @@ void Controller::step(Iteration iteration, const std::byte* observed) noexcept {
     std::uint64_t clamped = 0;
     std::uint64_t braking = 0;
 
-    // who had nothing to do before follows on, the others move
+    // idle actuators follow the observed state, busy ones step
     each_bit(follow_[word] & ~busy_[word], base,
              [&](std::uint32_t i) { actuators_[i].follow(of(i, observed)); });
     each_bit(busy_[word], base, [&](std::uint32_t i) {
@@ -101,7 +101,7 @@ void Controller::step(Iteration iteration, const std::byte* observed) noexcept {
       const std::uint64_t bit = std::uint64_t{1} << (i % 64);
       switch (queue.step(iteration, of(i, observed), late_budget)) {
         case ActuatorQueue::Moved::idle:
-          // late commands in a row may have used up the iteration's share of work
+          // the queue is not empty if late commands have used up their budget
           if (queue.empty()) busy_[word] &= ~bit;
           break;
         case ActuatorQueue::Moved::braking:
@@ -169,7 +169,7 @@ void Controller::interrupt(std::uint32_t actuator, Iteration iteration) noexcept
 }
 
 bool Controller::braking() const noexcept {
-  // in the last step, or, of one that has just lost its command, in the next one
+  // in the last step; or in the next one, for an actuator that has just lost its command
   return std::ranges::any_of(braking_mask_, [](std::uint64_t word) { return word != 0; }) ||
          std::ranges::any_of(actuators_, [](const ActuatorQueue& queue) {
            return queue.empty() && !queue.at_rest();

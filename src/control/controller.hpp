@@ -18,98 +18,99 @@
 
 namespace o80 {
 
-/// A number that is none, in a block of states.
+/// Position of a number in a block of states that is NaN or infinite.
 struct NotFinite {
   std::uint32_t actuator = 0;
-  std::uint32_t number = 0;  // of its state
+  std::uint32_t number = 0;  // index in its state
 };
 
-/// Turns the commands of all lanes into desired states, one iteration after the other.
+/// Computes the desired states of each iteration from the commands of all lanes.
 ///
-/// Its order in an iteration: `take` what is due, `step`, then `finish_pending` once the row is
-/// out. Every record ends with exactly one end status (`queued` is not told: a record of a batch
-/// that is active and has no status yet is queued). The schema's rows are copied.
+/// Order of calls in an iteration: take() each due batch, step(), then finish_pending() after the
+/// row is published. Every record gets exactly one end status. `queued` is not reported: a record
+/// without a status in an active batch is queued.
 ///
 /// Writer:   one thread.
 /// Realtime: everything but construction; nothing allocates, locks or throws.
 class Controller {
  public:
-  /// Statuses of dropped or late commands told in one iteration, at most.
+  /// Most statuses of dropped or late commands that are reported in one iteration.
   static constexpr std::uint32_t kStatusesPerIteration = 1024;
 
   Controller(const Schema& schema, BlockPool& pool, StatusSink& sink, std::uint32_t lanes = 8);
   Controller(const Controller&) = delete;
   Controller& operator=(const Controller&) = delete;
 
-  /// Begins, or begins afresh: desired becomes `desired`, or `observed` where that is null, and all
-  /// that was queued ends purged (fresh_start) at iteration `row`.
+  /// The first start or a fresh start: sets the desired block to `desired`, or to `observed` if
+  /// that is null. All commands end as purged (fresh_start) at iteration `row`.
   void restart(const std::byte* observed, const std::byte* desired, Iteration row) noexcept;
 
-  /// Checks the records of a batch that is complete in the pool but not yet due, about `budget`
-  /// blocks a call, which it takes off; true when all are. Batches of one lane are checked one
-  /// after the other. `take` does what is left of it.
+  /// Checks the records of a complete batch in the pool before it is due, about `budget` blocks,
+  /// and reduces `budget` by them. True when all are checked. The batches of one lane are checked
+  /// one after the other. take() checks the rest.
   bool check(std::uint32_t lane, BlockIndex batch, std::uint32_t& budget) noexcept {
     return planner_.check(lane, batch, budget);
   }
-  /// What taking a checked batch takes of an iteration.
+  /// The cost of taking a checked batch.
   Effort effort(BlockIndex batch) const noexcept { return planner_.effort(batch); }
-  /// Takes a whole batch at `handler.iteration()`. The batch record in the pool is the
-  /// controller's from here on: copy `burst` and `flags` before. A purge also ends commands with
-  /// tickets below the batch's that are taken later.
+  /// Takes a whole batch at `handler.iteration()`. This overwrites the batch record in the pool:
+  /// copy `burst` and `flags` before. A purge also ends commands with lower tickets that are taken
+  /// later.
   void take(std::uint32_t lane, BlockIndex batch, BatchHandler& handler) noexcept;
-  /// Ends a whole batch, never taken, as rejected; its records follow in `finish_pending`, with
-  /// this status.
+  /// Rejects a whole batch instead of taking it. finish_pending() ends its records with `status`.
   void reject(std::uint32_t lane, BlockIndex batch, Reason reason, std::uint8_t detail,
               Iteration iteration, Status status = Status::rejected) noexcept;
 
-  /// Ends a request that was left active when its batch was taken.
+  /// Ends a request that was active after take().
   void end(BlockIndex request, const Outcome& outcome, Iteration iteration) noexcept {
     ledger_.end(request, outcome.status, outcome.reason, outcome.detail, iteration);
   }
 
-  /// Commands => desired. `observed` is the last row's.
+  /// Commands => desired. `observed`: the observed block of the last row.
   void step(Iteration iteration, const std::byte* observed) noexcept;
 
-  /// Drops what an actuator (or kEveryActuator) runs and queues; O(1) an actuator.
+  /// Ends all commands of an actuator, or of kEveryActuator; O(1) for each actuator.
   void purge(std::uint32_t actuator, Iteration iteration, Reason reason = Reason::none) noexcept;
-  /// Drops what one lane sent, to an actuator or to every one; O(lanes) an actuator.
+  /// Ends the commands that one lane has sent to an actuator, or to kEveryActuator; O(lanes) for
+  /// each actuator.
   void purge_lane(std::uint32_t lane, std::uint32_t actuator, Iteration iteration,
                   Reason reason = Reason::none) noexcept;
-  /// Purges that were taken no longer end what is taken later: tickets begin anew.
+  /// Earlier purges no longer end commands that are taken later; for an invalid ticket counter.
   void forget_tickets() noexcept { purge_tickets_.forget(); }
-  /// Ends everything as halted; each actuator then brakes within its limits.
+  /// Ends all commands as halted; each actuator then brakes within its limits.
   void halt(Iteration iteration) noexcept;
-  /// Ends what an actuator runs and queues as interrupted.
+  /// Ends all commands of an actuator as interrupted.
   void interrupt(std::uint32_t actuator, Iteration iteration) noexcept;
 
-  /// Tells the statuses of what was dropped, at most kStatusesPerIteration a call (less what the
-  /// last step spent on late commands); false when some are left.
+  /// Reports the end statuses of dropped commands, at most kStatusesPerIteration minus those that
+  /// the last step() has reported. False if some are left.
   bool finish_pending() noexcept;
 
-  /// The desired block, as the schema lays it out.
+  /// The desired block, in the layout of the schema.
   const std::byte* desired() const noexcept {
     return reinterpret_cast<const std::byte*>(desired_.data());
   }
-  /// One bit an actuator, in whole words: a command gave the desired state of the last step.
+  /// One bit for each actuator: a command or braking gave the desired state of the last step.
   const std::uint64_t* active_mask() const noexcept { return active_mask_.data(); }
-  /// One bit an actuator, in whole words: the last step clamped it.
+  /// One bit for each actuator: a limit changed the desired state of the last step.
   const std::uint64_t* clamped_mask() const noexcept { return clamped_mask_.data(); }
-  /// One bit an actuator, in whole words: the last step brought it to rest, without a command.
+  /// One bit for each actuator: it braked in the last step, without a command.
   const std::uint64_t* braking_mask() const noexcept { return braking_mask_.data(); }
-  /// Some actuator has no command and has not come to rest; O(actuators).
+  /// True if an actuator without a command is not at rest; O(actuators).
   bool braking() const noexcept;
-  /// Words of a mask.
+  /// Number of 64-bit words of a mask.
   std::uint32_t words() const noexcept { return static_cast<std::uint32_t>(active_mask_.size()); }
 
-  /// Something runs or is queued.
+  /// True if a command is running or queued; O(actuators).
   bool active() const noexcept;
-  /// Some direct value stays until something takes its place; O(actuators).
+  /// True if a direct value keeps a number away from its rest value; O(actuators).
   bool holds() const noexcept;
-  /// A command of this lane, or a direct value that it gave last, still acts; O(actuators).
+  /// True if a command of this lane is running or queued, or its direct value is still held;
+  /// O(actuators).
   bool acts(std::uint32_t lane) const noexcept;
-  /// The first number of a block of states that is infinite or NaN; O(numbers).
+  /// The first number of a block of states that is infinite or NaN, if any; O(numbers).
   std::optional<NotFinite> not_finite(const std::byte* block) const noexcept;
-  /// Something dropped is still to be told.
+  /// True if end statuses of dropped commands have not been reported yet.
   bool pending() const noexcept { return ledger_.pending(); }
 
  private:
@@ -126,7 +127,7 @@ class Controller {
   const std::byte* of(std::uint32_t actuator, const std::byte* block) const noexcept {
     return block + offsets_[actuator];
   }
-  /// Calls `visit(ActuatorQueue&)` for one actuator or every one, which may have to come to rest.
+  /// Calls `visit(ActuatorQueue&)` for one actuator or kEveryActuator, and marks them as busy.
   template <class Visit>
   void each(std::uint32_t actuator, Visit&& visit) noexcept {
     const auto last = static_cast<std::uint32_t>(actuators_.size());
@@ -140,19 +141,19 @@ class Controller {
 
   BlockPool& pool_;
   Ledger ledger_;
-  std::vector<std::optional<StateLayout>> layouts_;  // of each type of the schema
+  std::vector<std::optional<StateLayout>> layouts_;  // one for each type of the schema
   BatchPlanner planner_;
   PurgeTickets purge_tickets_;
   std::vector<Block> desired_;
   std::vector<std::uint64_t> active_mask_;
   std::vector<std::uint64_t> clamped_mask_;
   std::vector<std::uint64_t> braking_mask_;
-  std::vector<std::uint32_t> offsets_;     // of each actuator, in a block of states
-  std::vector<const StateLayout*> types_;  // of each actuator
+  std::vector<std::uint32_t> offsets_;     // offset of each actuator in a block of states [bytes]
+  std::vector<const StateLayout*> types_;  // layout of each actuator
   std::vector<ActuatorQueue> actuators_;
-  std::vector<std::uint64_t> busy_;    // has commands, or has just lost its last
-  std::vector<std::uint64_t> follow_;  // follows when idle
-  std::uint32_t told_ = 0;             // statuses, in the last step
+  std::vector<std::uint64_t> busy_;    // mask: has commands, or is not known to be at rest
+  std::vector<std::uint64_t> follow_;  // mask: follows the observed state when idle
+  std::uint32_t told_ = 0;             // statuses reported by the last step()
 };
 
 }  // namespace o80

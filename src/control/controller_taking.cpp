@@ -1,4 +1,4 @@
-// How a batch is taken: each step of its plan goes to its place.
+// Controller: takes a batch by executing the steps of its plan.
 
 #include <limits>
 #include <optional>
@@ -27,7 +27,7 @@ void Controller::take(std::uint32_t lane, BlockIndex batch, BatchHandler& handle
 
 void Controller::take_step(const Taking& from, BlockIndex record, BatchHandler& handler) noexcept {
   const RecordHead& head = pool_.head(record);
-  // a fresh start moves the count on: the request bears the iteration of the fresh row
+  // read before the request: a fresh start in it increases the iteration
   const Iteration now = handler.iteration();
   const auto end = [&](const Outcome& outcome) {
     ledger_.end(record, outcome.status, outcome.reason, outcome.detail, now);
@@ -63,11 +63,12 @@ void Controller::take_step(const Taking& from, BlockIndex record, BatchHandler& 
   }
 }
 
-/// Appends a list of commands, unless something has ended them before they came to be taken.
+/// Appends a list of commands to the queue of its actuator, unless a purge or their own batch has
+/// ended them.
 void Controller::take_commands(const Taking& from, BlockIndex first, Iteration iteration) noexcept {
   const RecordHead& head = pool_.head(first);
   if (purge_tickets_.cover(from.lane, head.actuator, from.ticket)) {
-    // what was sent after that purge is not theirs to overwrite
+    // purged commands must not overwrite commands that were sent after the purge
     return ledger_.drop(first, Status::purged, Reason::none, iteration);
   }
   ActuatorQueue& queue = actuators_[head.actuator];

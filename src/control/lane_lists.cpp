@@ -5,7 +5,7 @@
 namespace o80 {
 
 namespace {
-/// What a record bears that was appended behind another.
+/// Own::kTurn of a record that is not the first of an append().
 constexpr std::uint32_t kNoTurn = 0xFFFFFFFF;
 }  // namespace
 
@@ -52,7 +52,7 @@ void LaneLists::choose_front() noexcept {
   front_ = kNoLane;
   std::uint32_t oldest = 0;
   for (const std::uint32_t lane : used_) {
-    // turns may have run over; what is queued at once is far less than they
+    // compare ages, not turns: the counter may have wrapped around
     const std::uint32_t age = next_turn_ - lists_[lane].turn;
     if (front_ != kNoLane && age <= oldest) continue;
     front_ = lane;

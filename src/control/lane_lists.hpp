@@ -8,10 +8,11 @@
 
 namespace o80 {
 
-/// Records of several lanes, first in first out; all that one lane sent can leave in one step.
+/// A queue of the records of all lanes, from which all records of one lane can be removed in one
+/// step.
 ///
-/// Each lane has a list of its own, and the first record of what was appended at once bears its
-/// turn: the front is the list whose first record came first.
+/// Each lane has its own list. The first record of each append() stores a turn number; the front is
+/// the first record with the oldest turn.
 ///
 /// Realtime: everything but construction.
 class LaneLists {
@@ -24,25 +25,25 @@ class LaneLists {
 
   bool empty() const noexcept { return front_ == kNoLane; }
   bool has(std::uint32_t lane) const noexcept { return lists_[lane].first != kNoBlock; }
-  /// The first record of all, if there is one.
+  /// The first record; kNoBlock if the queue is empty.
   BlockIndex front() const noexcept { return front_ == kNoLane ? kNoBlock : lists_[front_].first; }
-  /// Whose it is.
+  /// The lane of front().
   std::uint32_t front_lane() const noexcept { return front_; }
 
-  /// Adds a list of records of one lane, linked by Own::kNext.
+  /// Appends a list of records of one lane, linked by Own::kNext.
   void append(BlockIndex first, BlockIndex last, std::uint32_t lane) noexcept;
-  /// Takes the front away.
+  /// Removes front().
   void pop() noexcept;
-  /// Takes all of a lane away: the first of its records, linked by Own::kNext.
+  /// Removes all records of a lane; returns the first, linked by Own::kNext.
   BlockIndex take(std::uint32_t lane) noexcept;
-  /// The same for any lane that has some; no block when there is none.
+  /// The same for any lane that has records; kNoBlock if there is none.
   BlockIndex take_any() noexcept { return used_.empty() ? kNoBlock : take(used_.back()); }
 
  private:
   struct List {
     BlockIndex first = kNoBlock;
     BlockIndex last = kNoBlock;
-    std::uint32_t turn = 0;  // of the first
+    std::uint32_t turn = 0;  // turn of the first record
   };
 
   void choose_front() noexcept;
@@ -50,7 +51,7 @@ class LaneLists {
 
   BlockPool* pool_;
   std::vector<List> lists_;
-  std::vector<std::uint32_t> used_;  // lanes that have some
+  std::vector<std::uint32_t> used_;  // lanes that have records
   std::uint32_t front_ = kNoLane;
   std::uint32_t next_turn_ = 0;
 };

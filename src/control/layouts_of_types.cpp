@@ -9,7 +9,8 @@ namespace o80 {
 
 namespace {
 
-/// What blends its states in its own way has no numbers that could be limited one by one.
+/// Throws if an actuator has limits: they apply to single numbers, which a type with its own
+/// blend() does not interpolate one by one.
 void refuse_limits(const Schema& schema, const ActuatorRow& actuator) {
   for (std::uint32_t i = 0; i < actuator.limits; ++i) {
     const LimitRow& limit = schema.limits.at(actuator.first_limit + i);
@@ -17,7 +18,7 @@ void refuse_limits(const Schema& schema, const ActuatorRow& actuator) {
         std::isfinite(limit.speed) || limit.resting != 0) {
       throw InvalidArgument("actuator '" + actuator.name.str() + "' has limits, but its type '" +
                             schema.types[actuator.type].name.str() +
-                            "' brings its own blend(): limit it in the driver");
+                            "' has its own blend(): limit it in the driver");
     }
   }
 }

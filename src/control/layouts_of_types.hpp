@@ -8,8 +8,8 @@
 
 namespace o80 {
 
-/// The layouts of the types of a schema that actuators and requests use, by the index of the type.
-/// Throws InvalidArgument if an actuator cannot be controlled as it is described.
+/// The layout of each type that an actuator or a request uses, by index of the type; others are
+/// empty. Throws InvalidArgument if an actuator cannot be controlled.
 std::vector<std::optional<StateLayout>> layouts_of_types(const Schema& schema);
 
 }  // namespace o80

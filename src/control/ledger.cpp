@@ -6,22 +6,22 @@
 
 namespace o80 {
 
-/// The first block of a batch once it is taken.
+/// Replaces the BatchRecord in the first block of a batch that was taken.
 struct Ledger::TakenBatch {
   RecordKind kind = RecordKind::batch;
-  Status end = Status::completed;  // of the batch
-  Reason reason = Reason::none;    // of the records without blocks
+  Status end = Status::completed;  // end status of the batch
+  Reason reason = Reason::none;    // reason for the records without blocks
   std::uint8_t detail = 0;
   std::uint32_t records = 0;
   CommandId id = 0;
   Iteration last_end = 0;
   Iteration rejected_at = 0;
-  std::uint32_t open = 0;  // records that have not ended, and one until the batch is closed
-  std::uint32_t told = 0;  // place of the next record without blocks
+  std::uint32_t open = 0;  // records that have not ended, plus 1 until close()
+  std::uint32_t told = 0;  // index of the next record without blocks to report
   BlockIndex next_group = kNoBlock;
   std::uint32_t lane = 0;
   BlockChain spare;
-  Status told_as = Status::rejected;  // of the records without blocks
+  Status told_as = Status::rejected;  // end status of the records without blocks
 };
 
 Ledger::TakenBatch& Ledger::batch(BlockIndex block) noexcept {
@@ -64,7 +64,7 @@ void Ledger::reject_from(BlockIndex block, std::uint32_t place, Reason reason, s
 
 void Ledger::reject(std::uint32_t lane, BlockIndex block, Reason reason, std::uint8_t detail,
                     Iteration iteration, Status status) noexcept {
-  // how many blocks there really are decides how many records there can be
+  // do not trust the count of records: there are at most as many as blocks
   BlockChain spare = pool_.chain(block);
   spare.first = pool_.next(block);
   --spare.blocks;
@@ -159,7 +159,8 @@ void Ledger::append(BlockIndex group) noexcept {
 
 void Ledger::drop(BlockIndex first, Status status, Reason reason, Iteration iteration) noexcept {
   if (first == kNoBlock) return;
-  // the first of them bears what became of all; what it asked for no longer matters
+  // store the common end in the first record, whose command is not needed any more: amount =
+  // iteration, rows = status << 8 | reason
   RecordHead& head = pool_.head(first);
   head.amount = iteration;
   head.rows = static_cast<std::uint32_t>(status) << 8 | static_cast<std::uint32_t>(reason);
@@ -181,7 +182,7 @@ bool Ledger::tell_rejected(BlockIndex block, std::uint32_t& budget) noexcept {
 std::uint32_t Ledger::report_ends(std::uint32_t most) noexcept {
   std::uint32_t budget = most;
   while (true) {
-    // the group at hand
+    // the present list
     while (group_.record != kNoBlock) {
       if (budget == 0) return most;
       const BlockIndex record = group_.record;
@@ -192,10 +193,10 @@ std::uint32_t Ledger::report_ends(std::uint32_t most) noexcept {
     if (first_ == kNoBlock) return most - budget;
     if (budget == 0) return most;
 
-    // the next one: records of a batch that have no blocks, or records that were dropped
+    // the next list: records without blocks of a batch, or dropped records
     const BlockIndex group = first_;
     if (static_cast<RecordKind>(*pool_.bytes(group)) == RecordKind::batch) {
-      // the batch stays open while it is told
+      // keeps the batch open until all are reported
       if (!tell_rejected(group, budget)) return most - budget;
       first_ = link(group);
       ++batch(group).open;

@@ -10,55 +10,55 @@
 
 namespace o80 {
 
-/// What the backend writes into `RecordHead::own` of the records it has taken.
+/// Words of `RecordHead::own` that the backend uses.
 struct Own {
-  static constexpr std::size_t kNext = 0;   // record in a queue, or among the dropped
-  static constexpr std::size_t kBatch = 1;  // to which it belongs
-  static constexpr std::size_t kLast = 2;   // block of the record
-  // one word, read in one sense at a time
-  static constexpr std::size_t kNextStep = 3;     // of a plan; of a group: the next member
-  static constexpr std::size_t kTurn = 3;         // of what is queued (LaneLists)
-  static constexpr std::size_t kNextDropped = 3;  // list of dropped records
+  static constexpr std::size_t kNext = 0;   // next record of the same list
+  static constexpr std::size_t kBatch = 1;  // first block of its batch
+  static constexpr std::size_t kLast = 2;   // last block of the record
+  // one word with three uses at different times
+  static constexpr std::size_t kNextStep = 3;     // next step of the plan; next member of a group
+  static constexpr std::size_t kTurn = 3;         // turn in a queue (LaneLists)
+  static constexpr std::size_t kNextDropped = 3;  // next list of dropped records
 };
 
-/// Keeps account of taken batches: tells every end exactly once and gives the blocks back.
+/// Tracks taken batches: reports each end status exactly once, and returns the blocks to the pool.
 ///
-/// Realtime: everything but construction. Dropping is O(1); `report_ends` tells the statuses bit by
-/// bit.
+/// Realtime: everything but construction. drop() is O(1); report_ends() reports the statuses in
+/// bounded portions.
 class Ledger {
  public:
   Ledger(BlockPool& pool, StatusSink& sink) : pool_(pool), sink_(sink), groups_(pool) {}
 
-  /// Commands of several actuators that were taken and have not ended.
+  /// Number of commands of several actuators that were taken and have not ended.
   std::uint32_t open_groups() const noexcept { return open_groups_; }
-  /// Those of them whose members still have to agree: on when to begin, or on the
-  /// iterations of each row.
+  /// Number of those whose members still have to agree on their begin, or on the iterations of each
+  /// waypoint.
   std::uint32_t undecided_groups() const noexcept { return undecided_groups_; }
   CommandGroups& groups() noexcept { return groups_; }
 
-  /// Enters a batch as taken; it stays open until `close` and until all its records have ended.
-  /// `spare` are its blocks that no record uses.
+  /// Enters a batch as taken. It ends after close() and the end of all its records. `spare`: its
+  /// unused blocks.
   void enter(std::uint32_t lane, BlockIndex batch, const BlockChain& spare, std::uint32_t groups,
              Iteration iteration) noexcept;
-  /// Ends the records from `place` on, which have no blocks, as rejected; told by `report_ends`.
+  /// Rejects the records from index `place` on, which have no blocks; reported by report_ends().
   void reject_from(BlockIndex batch, std::uint32_t place, Reason reason, std::uint8_t detail,
                    Iteration iteration) noexcept;
-  /// The batch gets no more records.
+  /// Call it after the last step of the batch.
   void close(BlockIndex batch, Iteration iteration) noexcept { ended(batch, iteration); }
-  /// Ends a whole batch that was never taken; its records are told by `report_ends`, as `status`.
+  /// Rejects a whole batch that was not taken; report_ends() reports its records with `status`.
   void reject(std::uint32_t lane, BlockIndex batch, Reason reason, std::uint8_t detail,
               Iteration iteration, Status status = Status::rejected) noexcept;
 
-  /// A command has begun; of several actuators, one of its members.
+  /// A command, or a member of a group, has begun.
   void activate(BlockIndex record, Iteration iteration) noexcept;
-  /// A record has ended: told at once. That of a group when its last member has ended, with the
-  /// first end that is not completed.
+  /// A record has ended; reported at once. A group is reported when its last member has ended, with
+  /// the first end status that is not completed.
   void end(BlockIndex record, Status status, Reason reason, std::uint8_t detail,
            Iteration iteration) noexcept;
-  /// A list of records has ended: told by `report_ends`.
+  /// A list of records has ended; reported by report_ends().
   void drop(BlockIndex first, Status status, Reason reason, Iteration iteration) noexcept;
 
-  /// Tells at most `budget` ends; how many it has told.
+  /// Reports at most `budget` end statuses; returns how many.
   std::uint32_t report_ends(std::uint32_t budget) noexcept;
   bool pending() const noexcept { return group_.record != kNoBlock || first_ != kNoBlock; }
 
@@ -66,6 +66,7 @@ class Ledger {
 
  private:
   struct TakenBatch;
+  /// A list of records with a common end.
   struct Group {
     BlockIndex record = kNoBlock;
     Status status = Status::none;
@@ -86,9 +87,9 @@ class Ledger {
   CommandGroups groups_;
   std::uint32_t open_groups_ = 0;
   std::uint32_t undecided_groups_ = 0;
-  Group group_;                  // whose ends are being told
-  BlockIndex first_ = kNoBlock;  // of the groups that wait: dropped records, or a batch's missing
-  BlockIndex last_ = kNoBlock;
+  Group group_;                  // the list whose end statuses are being reported
+  BlockIndex first_ = kNoBlock;  // waiting lists: dropped records, or batches with missing records
+  BlockIndex last_ = kNoBlock;   // the last waiting list
 };
 
 }  // namespace o80

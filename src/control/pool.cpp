@@ -14,18 +14,18 @@ namespace o80 {
 BlockPool::BlockPool(std::uint32_t blocks)
     : size_(blocks), available_(blocks), next_(blocks), ends_(blocks) {
   if (blocks == 0 || blocks == kNoBlock) {
-    throw InvalidArgument("a pool of " + std::to_string(blocks) +
-                          " blocks cannot be: give it 1 to " + std::to_string(kNoBlock - 1));
+    throw InvalidArgument("a pool must have 1 to " + std::to_string(kNoBlock - 1) +
+                          " blocks, got " + std::to_string(blocks));
   }
   void* mapped = mmap(nullptr, std::size_t{blocks} * kBlockBytes, PROT_READ | PROT_WRITE,
                       MAP_PRIVATE | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
   if (mapped == MAP_FAILED) {
     throw Error("no memory for " + std::to_string(blocks) + " blocks of queued commands (" +
-                std::strerror(errno) + "): give the segment fewer or smaller lanes");
+                std::strerror(errno) + "): start the backend with fewer or smaller lanes");
   }
   blocks_ = static_cast<std::byte*>(mapped);
 
-  // touched once, so that the loop meets no page fault; neighbours are handed out in order
+  // write all pages now, so that the loop has no page faults; link the blocks in their order
   std::memset(blocks_, 0, std::size_t{blocks} * kBlockBytes);
   for (BlockIndex block = 0; block < blocks; ++block) next_[block] = block + 1;
   next_[blocks - 1] = kNoBlock;
@@ -44,7 +44,7 @@ BlockPool::~BlockPool() {
   if (blocks_ != nullptr) munmap(blocks_, std::size_t{size_} * kBlockBytes);
 }
 
-/// What does not lie in one block.
+/// Reads bytes that cross a block boundary or the end.
 bool Cursor::read_across(void* out, std::size_t bytes) noexcept {
   auto* to = static_cast<std::byte*>(out);
   if (bytes > left_) {

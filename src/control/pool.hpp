@@ -14,17 +14,16 @@ namespace o80 {
 using BlockIndex = std::uint32_t;
 inline constexpr BlockIndex kNoBlock = 0xFFFFFFFF;
 
-/// A batch in the pool while it is copied there block by block.
+/// A linked list of blocks in the pool, for example a batch.
 struct BlockChain {
   BlockIndex first = kNoBlock;
   BlockIndex last = kNoBlock;
   std::uint32_t blocks = 0;
 };
 
-/// The backend's private blocks, in which queued commands live; mapped once, touched once.
+/// Move-only: the private blocks of the backend for queued commands.
 ///
-/// Move-only owner of a mapping.
-/// Realtime: all but construction; nothing allocates, nothing can fail but an empty pool.
+/// Realtime: everything but construction; append() fails only if the pool is empty.
 class BlockPool {
  public:
   explicit BlockPool(std::uint32_t blocks);
@@ -49,7 +48,7 @@ class BlockPool {
     ends_[chain.first] = {taken, chain.blocks};
     return true;
   }
-  /// Gives back the chain from `first` to `last`.
+  /// Frees the chain from `first` to `last`.
   void release(BlockIndex first, BlockIndex last, std::uint32_t blocks) noexcept {
     next_[last] = free_;
     free_ = first;
@@ -63,7 +62,7 @@ class BlockPool {
     O80_VISIT_BLOCK(block);
     return next_[block];
   }
-  /// The chain that was appended from this first block on.
+  /// The chain that begins with this block.
   BlockChain chain(BlockIndex first) const noexcept {
     return {first, ends_[first].last, ends_[first].blocks};
   }
@@ -101,10 +100,10 @@ class BlockPool {
   std::uint32_t available_ = 0;
   BlockIndex free_ = kNoBlock;
   std::vector<BlockIndex> next_;
-  std::vector<End> ends_;  // of the chain that begins there
+  std::vector<End> ends_;  // for each block: the end of the chain that begins there
 };
 
-/// Reads along the chain of a record's blocks; never past its end.
+/// Reads the bytes of a record along its chain of blocks, never past its end.
 class Cursor {
  public:
   Cursor() = default;
@@ -115,10 +114,10 @@ class Cursor {
   std::uint64_t left() const noexcept { return left_; }
   BlockIndex block() const noexcept { return block_; }
   std::uint32_t offset() const noexcept { return offset_; }
-  /// Copies the next bytes; what is past the end reads as zero, and false is returned.
+  /// Copies the next bytes. False, with zeros, if the record ends before.
   bool read(void* out, std::size_t bytes) noexcept {
     if (bytes > left_ || bytes > kBlockBytes - offset_) return read_across(out, bytes);
-    if (bytes == 0) return true;  // `out` may be nothing then
+    if (bytes == 0) return true;  // `out` may be null
     std::memcpy(out, pool_->bytes(block_) + offset_, bytes);
     offset_ += static_cast<std::uint32_t>(bytes);
     left_ -= bytes;

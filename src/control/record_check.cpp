@@ -106,12 +106,12 @@ RecordCheck::Verdict RecordCheck::begin_command(const RecordHead& head,
   const std::uint64_t row_bytes = std::uint64_t{head.rows} * layout.size();
   if (head.payload_bytes != mask_bytes + time_bytes + row_bytes) return Verdict::invalid;
 
-  // the mask names no number that is not there
+  // no bit of the mask is beyond the last number
   if (head.masked != 0) {
     progress.payload.read(mask_.data(), mask_bytes);
     if (numbers % 64 != 0 && mask_[numbers / 64] >> (numbers % 64) != 0) return Verdict::invalid;
   }
-  // the fastest way needs limits of every number it leads
+  // every commanded number has limits of speed and acceleration
   if (head.pace == Pace::fastest) {
     const std::uint32_t first = first_limits_[head.actuator];
     for (std::uint32_t i = 0; i < numbers; ++i) {
@@ -135,11 +135,11 @@ RecordCheck::Verdict RecordCheck::go_on(const BlockPool& pool, BlockIndex block,
     Cursor(pool, block, sizeof(RecordHead), head.payload_bytes).read(mask_.data(), mask_bytes);
     mask = mask_.data();
   }
-  // what lies in the block of the head costs no more than the head
+  // payload in the block of the head is free
   constexpr std::int64_t kWithHead = kBlockBytes - sizeof(RecordHead);
   auto bytes_left = static_cast<std::int64_t>(std::uint64_t{budget} * kBlockBytes) + kWithHead;
 
-  // times never run backwards
+  // times must not decrease
   for (; progress.times_left > 0 && bytes_left > 0; --progress.times_left) {
     std::int64_t time = 0;
     progress.payload.read(&time, sizeof time);

@@ -19,9 +19,9 @@ namespace o80 {
 
 namespace {
 
-constexpr std::int64_t kPoll = 1'000'000;  // while a segment is awaited [ns]
+constexpr std::int64_t kPoll = 1'000'000;  // interval of attach() [ns]
 constexpr int kPollsBetweenChecks = 20;
-constexpr std::int64_t kKnownFor = 20'000'000;  // how long an answer of the kernel counts [ns]
+constexpr std::int64_t kKnownFor = 20'000'000;  // validity of a query of the lock [ns]
 
 std::string segment_called(std::string_view name) { return "segment '" + std::string(name) + "'"; }
 
@@ -74,13 +74,13 @@ std::optional<AttachedSegment> AttachedSegment::open(std::string_view name, Acce
   return segment;
 }
 
-/// False if the file is missing: then the segment has a successor, or is being removed.
+/// False, with a reason, if the file is missing: the segment was replaced or is being removed.
 bool AttachedSegment::open_commands(std::string& reason) {
   const std::string path = commands_path(name_, header_.epoch);
   commands_ = LockFile::open(path, O_RDWR | O_NOFOLLOW);
   if (!commands_.is_open() && errno == ENOENT) {
     reason = "its commanders' file (" + path +
-             ") is missing: its backend was replaced, or somebody removed the file";
+             ") is missing: its backend was replaced, or the file was removed";
     return false;
   }
   if (!commands_.is_open() && (errno == EACCES || errno == EPERM))
@@ -98,7 +98,7 @@ bool AttachedSegment::open_commands(std::string& reason) {
   return true;
 }
 
-/// All of it to read; to write only where frontends may.
+/// Maps the whole file for reading, and the bell for writing.
 void AttachedSegment::map_commands() {
   commands_mapping_ = Mapping(commands_.descriptor(), view_.offsets.commands_bytes,
                               Mapping::Protection::read, Mapping::Faults::later);
@@ -107,13 +107,13 @@ void AttachedSegment::map_commands() {
                          view_.shape.page_bytes);
 }
 
-/// The waiting side of attach: looks at what bears the name, again and again.
+/// Polls the name for attach() until its segment fits the options.
 class SegmentSearch {
  public:
   SegmentSearch(std::string_view name, Access access, const AttachOptions& options)
       : name_(name), access_(access), options_(options), path_(segment_path(name)) {}
 
-  /// True if `found` may be taken. Throws BackendFailed.
+  /// True if found() fits. Throws BackendFailed.
   bool look() {
     if (!found_ || !leads_to(path_, found_->descriptor()))
       found_ = AttachedSegment::open(name_, access_, reason_);
@@ -187,7 +187,8 @@ std::span<const std::byte> AttachedSegment::schema() const noexcept {
 }
 
 Life AttachedSegment::life() const noexcept {
-  // the locks of the segment file are for observers, who can pile read locks on it
+  // only observers query the segment file: they can place many read locks on it, which would slow
+  // the query of a commander
   const int asked = access_ == Access::read_write ? commands_descriptor() : descriptor();
   const Life now = judge_life(asked, view_.counters().state);
   if (is_over(now)) {
@@ -216,7 +217,7 @@ void AttachedSegment::throw_if_gone() const {
 }
 
 void AttachedSegment::throw_gone(Life life) const {
-  // asked in every burst: nothing is written unless it is thrown
+  // called in every burst: no text is built unless it is thrown
   const auto backend = [&] {
     return segment_called(name_) + ": its backend (pid " + std::to_string(header_.pid) + ") ";
   };
@@ -233,7 +234,8 @@ void AttachedSegment::throw_gone(Life life) const {
     }
     case Life::superseded:
       throw BackendSuperseded(backend() +
-                              "is gone and a new one has its name: attach again. The old history "
+                              "is gone and a new one has its name: attach again, in Python with "
+                              "reattach(). The old history "
                               "can still be read.");
     case Life::killed:
       throw BackendKilled(backend() + "was killed." + cure);
@@ -256,7 +258,7 @@ void AttachedSegment::check_process() const {
 
 LockFile AttachedSegment::open_commands_again() const {
   check_process();
-  // through the descriptor: the file may have lost its name by now
+  // by descriptor, because the file may be unlinked already
   const std::string path = "/proc/self/fd/" + std::to_string(commands_descriptor());
   LockFile file = LockFile::open(path, O_RDWR);
   if (!file.is_open())

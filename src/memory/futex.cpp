@@ -18,7 +18,7 @@ bool futex_wait(const std::atomic<std::uint32_t>& word, std::uint32_t expected,
   if (at_most <= 0) return false;
   const timespec timeout{.tv_sec = static_cast<time_t>(at_most / 1'000'000'000),
                          .tv_nsec = static_cast<long>(at_most % 1'000'000'000)};
-  // not the private kind: sleepers and wakers share the file, not the address
+  // not FUTEX_PRIVATE_FLAG: the processes share the file, not the address
   return syscall(SYS_futex, &word, FUTEX_WAIT, expected, &timeout, nullptr, 0) == 0;
 }
 
@@ -62,7 +62,8 @@ void futex_wake(const std::atomic<std::uint32_t>& word, int count) noexcept {
 
 void futex_wake_both(const std::atomic<std::uint32_t>& first, int count,
                      std::atomic<std::uint32_t>& second) noexcept {
-  // the kernel adds 0 to the second word, and wakes its sleepers if the word was not what it is not
+  // FUTEX_WAKE_OP adds 0 to the second word and compares its old value with a value that it does
+  // not have, so the second wake always happens
   const std::uint32_t other = second.load(std::memory_order_relaxed) == 0 ? 1 : 0;
   syscall(SYS_futex, &first, FUTEX_WAKE_OP, count, static_cast<long>(kEverybody), &second,
           FUTEX_OP(FUTEX_OP_ADD, 0, FUTEX_OP_CMP_NE, other));

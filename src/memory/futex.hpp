@@ -24,11 +24,11 @@ inline constexpr std::size_t kMostFutexWords = 128;  // of one wait, says the ke
 /// at once if the kernel cannot do that (before Linux 5.16, or forbidden in a container).
 bool futex_wait_any(std::span<const FutexWord> words, std::int64_t at_most) noexcept;
 
-/// Wakes up to `count` sleepers of any process; works through a read-only mapping.
+/// Wakes up to `count` sleeping threads of any process; a read-only mapping is enough.
 void futex_wake(const std::atomic<std::uint32_t>& word, int count) noexcept;
 
-/// The same for two words in one call: up to `count` sleepers of `first`, and all of `second`,
-/// which must be writable and is written by the caller only.
+/// Wakes the sleepers of two words in one call: up to `count` of `first`, all of `second`. `second`
+/// must be writable, and only the caller may write it.
 void futex_wake_both(const std::atomic<std::uint32_t>& first, int count,
                      std::atomic<std::uint32_t>& second) noexcept;
 

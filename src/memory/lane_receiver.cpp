@@ -27,7 +27,7 @@ std::uint32_t LaneReceiver::available_of_one() noexcept {
   return of_another - 1 < all ? static_cast<std::uint32_t>(of_another) : all;
 }
 
-/// An honest owner never has more in flight than the lane, nor takes anything back.
+/// Valid counters: at most one lane of blocks is in flight, and `committed` never decreases.
 bool LaneReceiver::is_possible(std::uint64_t cursor) const noexcept {
   return committed_ - cursor <= mask_ + 1 - in_flight();
 }
@@ -79,9 +79,9 @@ void LaneReceiver::free(std::uint32_t blocks) noexcept {
 void LaneReceiver::set_status(std::uint64_t id, StatusWord word) noexcept {
   StatusSlot& slot = statuses_[id & (2 * (mask_ + 1) - 1)];
   const std::uint64_t owner = slot.id.load(std::memory_order_relaxed);
-  if (owner > id) return;  // a later command has the place: this one is forgotten already
+  if (owner > id) return;  // the slot belongs to a later id: this one is forgotten
   if (owner != id) {
-    // so that a reader never sees the new id with the old word
+    // announce the new id first: a reader never sees the new id with the old status
     slot.word.store(StatusWord::announcing(id), std::memory_order_relaxed);
     O80_CRASH_POINT("status.before_id");
     slot.id.store(id, std::memory_order_release);  // sync status_id
@@ -148,7 +148,7 @@ bool LaneReceiver::flush() noexcept {
   if (!flagged_) return false;
   flagged_ = false;
 
-  // the flag is taken down before the events move: who raises it later has seen them or sees them
+  // clear `waiting` before `events` changes: a sleeper that sets it later sees the new `events`
   std::atomic<std::uint32_t>& waiting = page_->waiting;
   bool sleepers = waiting.load(std::memory_order_seq_cst) != 0;  // sync waiting
   if (sleepers) waiting.store(0, std::memory_order_seq_cst);     // sync waiting
@@ -175,7 +175,7 @@ std::uint64_t LaneReceiver::dead_predecessor() noexcept {
 }
 
 bool LaneReceiver::next_is_of_dead() noexcept {
-  // blocks before the begin of the dead owner's successor are not the successor's
+  // blocks before `successor_begin` were committed by the dead owner
   const std::uint64_t begin = page_->successor_begin.load(std::memory_order_relaxed);
   return dead_predecessor() != 0 && static_cast<std::int64_t>(cursor_ - begin) < 0;
 }
@@ -194,7 +194,7 @@ bool LaneReceivers::look() noexcept {
   put_back_ = put_back_ || drawn < below_;
   below_ = drawn;
   pending_ = true;
-  others_wait_ = true;  // for all that is known
+  others_wait_ = true;  // until next() knows better
   return true;
 }
 
@@ -205,7 +205,7 @@ std::uint64_t LaneReceivers::tickets_drawn() const noexcept {
 std::uint64_t LaneReceivers::ticket_of(std::uint32_t lane) noexcept {
   if (lanes_[lane].is_quiet() || lanes_[lane].available() == 0) return kNoTicket;
   const std::uint64_t ticket = lanes_[lane].peek_word(ticket_offset_);
-  // nobody drew it: the order is lost, the batch is not
+  // an invalid ticket (above the counter) becomes 0: the batch is kept, its order is lost
   return ticket < below_ || ticket < tickets_drawn() ? ticket : 0;
 }
 
@@ -236,7 +236,7 @@ bool LaneReceivers::announce() noexcept {
   bool sleepers = false;
   for (LaneReceiver& lane : lanes_)
     if (lane.has_news()) sleepers = lane.flush() || sleepers;
-  // after the events: who read the old value before it raised its flag does not sleep on it
+  // after `events`: a sleeper that has read the old `lane_wake` before does not sleep on it
   if (sleepers) view_.wakes().lane_wake.fetch_add(1, std::memory_order_seq_cst);  // sync lane_wake
   return sleepers;
 }

@@ -14,10 +14,10 @@
 
 namespace o80 {
 
-/// The backend's end of one lane.
+/// The backend's end of one lane (ARCHITECTURE.md, Lanes and their owners).
 ///
-/// Trusts nothing that the frontend can write: its cursor is private, blocks are copied out in
-/// whole before anybody looks at them, impossible counters reset the lane.
+/// Every value that a frontend can write is checked: the cursor is private, blocks are copied
+/// before they are read, impossible counters reset the lane.
 ///
 /// Writer:   the backend's thread.
 /// Readers:  LaneSender.
@@ -26,72 +26,74 @@ class LaneReceiver {
  public:
   LaneReceiver(const SegmentView& view, std::uint32_t lane) noexcept;
 
-  /// Nothing was committed that was not taken: one load.
+  /// True if all committed blocks were taken: one load.
   bool is_quiet() const noexcept {
     return page_->committed.load(std::memory_order_acquire) == cursor_;  // sync lane
   }
-  /// Committed blocks not taken yet; resets the lane if that is impossible.
+  /// Number of committed blocks that were not taken; resets the lane if its counters are
+  /// impossible.
   std::uint32_t available() noexcept;
-  /// The same, as far as one owner sent them: no batch is of two.
+  /// The same, but only blocks of one owner: a batch never spans two owners.
   std::uint32_t available_of_one() noexcept;
-  /// Copies the next block (64 bytes) and moves on; false if none is committed.
+  /// Copies the next block (64 bytes) and advances the cursor; false if none is committed.
   bool take(std::byte* block) noexcept;
-  /// 8 bytes at `offset` of the next block, to be asked only if one is available.
+  /// The 8 bytes at `offset` of the next block. Call it only if available() is not 0.
   std::uint64_t peek_word(std::size_t offset) const noexcept;
-  /// Forgets what is committed and not taken: after garbage. What was taken stays in flight, and
-  /// what the present owner sent behind the garbage of another stays committed.
+  /// Skips committed blocks that were not taken, after invalid data. Taken blocks stay in flight.
+  /// Blocks that the present owner sent behind invalid data of a former owner are kept.
   void reset() noexcept;
-  /// Looks for a new owner. Its first batch may lie before the cursor, if a former owner took back
-  /// what it had committed.
+  /// Reads whether the lane has a new owner. Moves the cursor back to its first batch if a former
+  /// owner has decreased `committed`.
   void meet_owner() noexcept;
-  /// How often that happened.
+  /// Number of resets so far.
   std::uint64_t resets() const noexcept { return resets_; }
 
-  /// Gives back blocks that were taken; the sender sees it at the next flush.
+  /// Frees blocks that were taken; the sender sees it after the next flush.
   void free(std::uint32_t blocks) noexcept;
-  /// Blocks taken and not given back.
+  /// Number of taken blocks that were not freed.
   std::uint64_t in_flight() const noexcept { return cursor_ - freed_; }
 
-  /// Visible at once; nobody is to be woken before flag() and flush().
+  /// Visible at once; waiters wake up after flag() and flush().
   void set_status(std::uint64_t id, StatusWord word) noexcept;
-  /// A text for an id, cut to 247 bytes; to be written before the status that it explains.
+  /// Stores a text for an id, cut to 247 bytes. Call it before the set_status() that it explains.
   void set_message(std::uint64_t id, std::string_view text) noexcept;
-  /// Whether a batch may have this id: ids grow, by limited steps. An owner that could choose any
-  /// id could make the statuses of later owners unreadable.
+  /// True if a batch may have this id: ids grow by limited steps. Otherwise one owner could use up
+  /// the ids, so that the statuses of later owners were unreadable.
   bool expects(std::uint64_t id) const noexcept { return id - ids_ <= kMostSkippedIds; }
-  /// A batch was staged whose ids end before `ids_end`; for the next owner, should this one die.
+  /// A batch was staged whose ids end before `ids_end`; the next owner of the lane continues there.
   void note_ids(std::uint64_t ids_end) noexcept;
-  /// Flags.
+  /// The burst of the batch `id` has ended with this row. Calls flag().
   void set_burst_done(std::uint64_t id, Iteration row, BurstEnd end = BurstEnd::done) noexcept;
-  /// Its sender wants the burst of the batch `id` to end. Of many cancelled at once only the newest
-  /// are known.
+  /// True if the sender has cancelled the burst of the batch `id`. Only the newest kCancelsKept
+  /// cancellations are known.
   bool is_cancelled(std::uint64_t id) const noexcept;
-  /// Asks for the lane's waiters to be woken at the next flush.
+  /// Wakes the waiters of the lane at the next flush.
   void flag() noexcept { flagged_ = has_news_ = true; }
-  /// flush() has something to do.
+  /// True if flush() has something to do.
   bool has_news() const noexcept { return has_news_; }
-  /// Publishes what was freed and moves the events, both only if there is cause; once an iteration.
-  /// True if somebody sleeps until then.
+  /// Publishes freed blocks, and changes `events` if the lane was flagged. Call it once in each
+  /// iteration. True if a thread sleeps until `events` changes.
   bool flush() noexcept;
 
-  /// Newest row that the owner knew when it last showed life, as it says itself.
+  /// The newest row when the owner last gave a sign of life, as the owner wrote it.
   Iteration life() const noexcept { return page_->life.load(std::memory_order_relaxed); }
-  /// Owner of the lane as its page has it: a count, 0 if never taken; and the last that closed.
+  /// Incarnation of the present owner; 0: the lane was never acquired.
   std::uint64_t incarnation() const noexcept;
+  /// Incarnation of the last owner that closed the lane.
   std::uint64_t closed() const noexcept;
-  /// The last owner that died and has a successor: its count, else 0. Meets the owner.
+  /// Incarnation of the last owner that died and was replaced, else 0. Calls meet_owner().
   std::uint64_t dead_predecessor() noexcept;
-  /// The next batch was sent by that one.
+  /// True if the next batch was sent by the dead owner of dead_predecessor().
   bool next_is_of_dead() noexcept;
-  /// The owner that sent what is next: its count, or 0 if another has the lane since. To be asked
-  /// after `available`.
+  /// Incarnation of the owner that sent the next block; 0 if it is not the present owner. Call it
+  /// after available().
   std::uint64_t owner_of_next() const noexcept {
     return static_cast<std::int64_t>(first_ - cursor_) > 0 ? 0 : owner_;
   }
 
  private:
   bool is_possible(std::uint64_t cursor) const noexcept;
-  /// What was taken stays in flight.
+  /// Moves the cursor; taken blocks stay in flight.
   void move_to(std::uint64_t cursor) noexcept;
 
   LaneSenderPage* page_;
@@ -100,70 +102,73 @@ class LaneReceiver {
   std::byte* transport_;
   std::uint64_t mask_;
   std::uint64_t cursor_ = 0;
-  std::uint64_t committed_ = 0;  // as last read
+  std::uint64_t committed_ = 0;  // value at the last load
   std::uint64_t freed_ = 0;
   std::uint64_t freed_published_ = 0;
   std::uint64_t bursts_ = 0;
   std::uint64_t messages_ = 0;
   std::uint64_t resets_ = 0;
-  std::uint64_t ids_ = 1;    // all below belong to batches that were staged
-  std::uint64_t owner_ = 0;  // as last met: its incarnation,
-  std::uint64_t first_ = 0;  // and what was committed before it
+  std::uint64_t ids_ = 1;    // all ids below belong to batches that were staged
+  std::uint64_t owner_ = 0;  // incarnation of the owner at the last meet_owner()
+  std::uint64_t first_ = 0;  // blocks that were committed before that owner
   bool flagged_ = false;
   bool has_news_ = false;
 };
 
-/// What no batch bears as its ticket.
+/// Stands for the absence of a ticket.
 inline constexpr std::uint64_t kNoTicket = ~std::uint64_t{0};
 
-/// All lanes, and the order of their batches.
+/// All lanes of a segment, and the order of their batches by ticket.
 ///
 /// Writer / Readers / Realtime: as LaneReceiver.
 class LaneReceivers {
  public:
-  /// `ticket_offset`: where in its first block a batch bears its ticket.
+  /// `ticket_offset`: offset of the ticket in the first block of a batch [bytes].
   LaneReceivers(const SegmentView& view, std::size_t ticket_offset);
 
   std::uint32_t size() const noexcept { return static_cast<std::uint32_t>(lanes_.size()); }
   LaneReceiver& operator[](std::uint32_t lane) noexcept { return lanes_[lane]; }
   const LaneReceiver& operator[](std::uint32_t lane) const noexcept { return lanes_[lane]; }
 
-  /// Begins to look for batches: remembers bell and tickets. False if nothing can be there.
+  /// Starts a scan: stores the value of the bell and the ticket counter. False if nothing can have
+  /// been committed since the last scan.
   bool look() noexcept;
-  /// The lane whose next batch is the next of all below the remembered ticket. Empty when there is
-  /// no more. `begun` has a ticket for each lane whose next batch was taken from it at least in
-  /// part; without it, the batch is to be taken whole (or the lane reset) before the next call.
+  /// The lane of the batch with the lowest ticket, if that is below the stored ticket counter; else
+  /// empty. `begun` has the ticket of each batch that was taken in part, kNoTicket for other lanes.
+  /// Without `begun`, take the whole batch (or reset the lane) before the next call.
   std::optional<std::uint32_t> next(std::span<const std::uint64_t> begun = {}) noexcept;
-  /// Whether a lane has a batch below the remembered ticket, to be asked between batches.
+  /// True if the next batch of a lane has a ticket below the stored counter. Call it only between
+  /// batches.
   bool has_batch(std::uint32_t lane) noexcept {
     const std::uint64_t ticket = ticket_of(lane);
     return ticket != kNoTicket && is_seen(ticket);
   }
-  /// The next ticket that will be drawn.
+  /// The ticket counter: the ticket that will be drawn next.
   std::uint64_t tickets_drawn() const noexcept;
-  /// This ticket, or the count of tickets if nobody can have drawn it yet.
+  /// This ticket, but at most the ticket counter (a higher ticket is invalid).
   std::uint64_t drawn_at_most(std::uint64_t ticket) const noexcept {
     return ticket < below_ ? ticket : std::min(ticket, tickets_drawn());
   }
-  /// Whether somebody has put back the count of tickets since this was last asked.
+  /// True if the ticket counter has decreased since the last call (an invalid write).
   bool tickets_were_put_back() noexcept { return std::exchange(put_back_, false); }
-  /// Makes the next look() look whatever the bell says (a lane's owner died).
+  /// The next look() starts a scan even if the bell is unchanged (the owner of a lane died).
   void look_again() noexcept { pending_ = true; }
-  /// The same if next() saw more than this lane's, or it has more; what is committed later rings.
+  /// The same, but only if next() found batches in other lanes, or if this lane has more. Later
+  /// commits ring the bell.
   void look_again_after(std::uint32_t lane) noexcept {
     pending_ = others_wait_ || !lanes_[lane].is_quiet();
   }
-  /// The last look() has left something, for all that is known.
+  /// True if the last scan may have left batches.
   bool has_pending() const noexcept { return pending_; }
-  /// The bell as look() found it, for BellWaiter::wait.
+  /// The value of the bell at the last look(), for BellWaiter::wait().
   std::uint32_t bell_seen() const noexcept { return bell_seen_; }
-  /// flush() on every lane; true if those who sleep on `lane_wake` are to be woken.
+  /// Flushes every lane; true if a thread sleeps on `lane_wake`. The caller wakes it.
   bool announce() noexcept;
 
  private:
-  /// 0 stands for one that nobody drew.
+  /// True for a ticket below the stored counter, and for 0, which replaces invalid tickets.
   bool is_seen(std::uint64_t ticket) const noexcept { return ticket < below_ || ticket == 0; }
-  /// Of the lane's next batch; kNoTicket if there is none.
+  /// Ticket of the next batch of the lane; kNoTicket if there is none.
   std::uint64_t ticket_of(std::uint32_t lane) noexcept;
 
   SegmentView view_;
@@ -173,7 +178,7 @@ class LaneReceivers {
   std::uint64_t below_ = 0;
   bool put_back_ = false;
   bool pending_ = true;
-  bool others_wait_ = true;  // besides the lane that next() named last
+  bool others_wait_ = true;  // next() found batches in other lanes than the one it returned
 };
 
 }  // namespace o80

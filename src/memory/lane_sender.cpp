@@ -14,8 +14,8 @@ namespace o80 {
 
 namespace {
 
-constexpr int kTries = 1000;  // of a status that is being written
-constexpr std::uint32_t kDrawsUnasked = 64;
+constexpr int kTries = 1000;                 // retries while a status is being written
+constexpr std::uint32_t kDrawsUnasked = 64;  // draws between two reads of the backend's ids
 
 std::string holders(const SegmentView& view) {
   std::string text;
@@ -31,7 +31,7 @@ std::string holders(const SegmentView& view) {
 LaneSender::LaneSender(const AttachedSegment& segment) : segment_(&segment), view_(segment.view()) {
   const std::string quoted = "segment '" + segment.name() + "'";
   if (segment.access() != Access::read_write)
-    throw ReadOnly(quoted + " was attached to read only: attach again without it to command");
+    throw ReadOnly(quoted + " is attached read-only: attach it for reading and writing to command");
   lock_ = segment.open_commands_again();
   const std::uint32_t lanes = view_.shape.lanes;
   while (lane_ < lanes && !lock_.try_lock(kFirstLaneByte + lane_)) ++lane_;
@@ -40,7 +40,7 @@ LaneSender::LaneSender(const AttachedSegment& segment) : segment_(&segment), vie
                  holders(view_) +
                  ". Close one of these frontends, or start the backend with more lanes.");
 
-  // ours: writable through the descriptor that bears no lock
+  // map our lane writable, through the descriptor without a lock
   O80_CRASH_POINT("lane.after_lock");
   Mapping::make_writable(view_.commands, segment.commands_descriptor(), view_.lane_offset(lane_),
                          view_.offsets.lane_stride);
@@ -49,9 +49,9 @@ LaneSender::LaneSender(const AttachedSegment& segment) : segment_(&segment), vie
   statuses_ = view_.statuses(lane_);
   transport_ = view_.transport(lane_);
 
-  // go on where the last owner left off
+  // continue where the last owner stopped
   sent_ = page_->committed.load(std::memory_order_relaxed);
-  // its ids too, unless it wrote nonsense there
+  // continue its ids too, unless its `next_id` is impossible
   const std::uint64_t taken =
       std::max<std::uint64_t>(1, feedback_->ids.load(std::memory_order_relaxed));
   if (page_->next_id.load(std::memory_order_relaxed) - taken > kMostSkippedIds / 2)
@@ -66,19 +66,19 @@ LaneSender::LaneSender(const AttachedSegment& segment) : segment_(&segment), vie
   ring_bell(view_);
 }
 
-/// Becomes the owner after the last one. Words of the last one that cannot be are corrected.
+/// Becomes the next owner; impossible values of the last owner are replaced.
 void LaneSender::count_in() {
   const std::uint64_t met = feedback_->incarnation.load(std::memory_order_relaxed);
   std::uint64_t last =
       possible_incarnation(page_->incarnation.load(std::memory_order_relaxed), met);
-  if (last - met == kMostUnmetOwners) last = met;  // one more would not be possible
+  if (last - met == kMostUnmetOwners) last = met;  // last + 1 would be impossible
   incarnation_ = last + 1;
 
   const std::uint64_t closed = page_->closed.load(std::memory_order_relaxed);
   const std::uint64_t dead = page_->dead_incarnation.load(std::memory_order_relaxed);
   const std::uint64_t begin = page_->successor_begin.load(std::memory_order_relaxed);
-  // the last owner held the lane: unless it closed it, it is dead. The present one may be gone
-  // before anybody asks, so it leaves a mark
+  // the last owner has died unless it has closed. Record that in `dead_incarnation`, because this
+  // owner may end before the backend looks
   const bool died = closed != last;
   if (died || static_cast<std::int64_t>(begin - sent_) > 0)
     page_->successor_begin.store(sent_, std::memory_order_relaxed);
@@ -114,7 +114,7 @@ void LaneSender::give_back() noexcept {
   O80_CRASH_POINT("lane.before_close");
   page_->closed.store(incarnation_, std::memory_order_release);  // sync closed
   O80_CRASH_POINT("lane.after_close");
-  // the page stays writable: another thread may still raise the flag of its waiting
+  // the page stays writable: another thread may still set `waiting`
   lock_.close();
 }
 
@@ -141,8 +141,8 @@ std::uint32_t LaneSender::free_blocks() const noexcept {
 void LaneSender::draw_ids(std::uint64_t next) noexcept {
   O80_CRASH_POINT("lane.before_ids");
   next_id_ = std::max(next, next_id_);
-  // nobody else draws them, unless a former owner goes on writing: the backend, which may be
-  // writing on that very line, is asked now and then
+  // only this owner draws ids. In case a former owner still writes here, compare them now and then
+  // with those that the backend has seen; not each time, because the backend writes that cache line
   if (++draws_ % kDrawsUnasked == 0)
     next_id_ = std::max(next_id_, feedback_->ids.load(std::memory_order_relaxed));
   page_->next_id.store(next_id_, std::memory_order_relaxed);
@@ -153,7 +153,7 @@ std::uint64_t LaneSender::send(std::span<const std::byte> batch, std::size_t tic
   if (batch.empty() || batch.size() % kBlockSize != 0 || ticket_offset % 8 != 0 ||
       ticket_offset >= kBlockSize)
     throw InvalidArgument(
-        "a batch is made of whole blocks of 64 bytes and bears its ticket in "
+        "a batch must consist of whole blocks of 64 bytes, with its ticket in "
         "the first");
   const std::uint64_t count = batch.size() / kBlockSize;
   const std::uint32_t free = free_blocks();
@@ -167,7 +167,8 @@ std::uint64_t LaneSender::send(std::span<const std::byte> batch, std::size_t tic
   store_words(first, batch.data(), before_end);
   store_words(transport_, batch.data() + before_end, batch.size() - before_end);
 
-  // what happened before this ticket was drawn is seen by whoever draws a later one
+  // sequentially consistent: all writes before this draw are visible after the draw of any later
+  // ticket
   O80_CRASH_POINT("lane.before_ticket");
   const std::uint64_t ticket =
       view_.bell().tickets.fetch_add(1, std::memory_order_seq_cst);  // sync tickets
@@ -178,14 +179,14 @@ std::uint64_t LaneSender::send(std::span<const std::byte> batch, std::size_t tic
   page_->committed.store(sent_, std::memory_order_release);  // sync lane
   O80_CRASH_POINT("lane.after_commit");
   ring_bell(view_);
-  // the backend has read the next block last, a lap ago
+  // the backend has read the next block one lap ago: fetch its line for the next batch
   prefetch_to_write(transport_ + (sent_ & (blocks() - 1)) * kBlockSize);
   return ticket;
 }
 
 void LaneSender::cancel_burst(std::uint64_t id) noexcept {
   if (!lock_.is_open() || guard_.forked()) return;
-  // whoever cancels at the same time takes another place
+  // threads that cancel at the same time get different slots
   std::atomic<std::uint64_t>& count = page_->cancels;
   const std::uint64_t place = count.fetch_add(1, std::memory_order_relaxed) % kCancelsKept;
   page_->cancelled[place].store(id, std::memory_order_release);  // sync cancelled
@@ -236,11 +237,11 @@ LaneSender::BurstAnswer LaneSender::burst(std::uint64_t id) const noexcept {
   };
   Iteration row = -1;
   if (read_burst(feedback_->burst, id, row)) return answer(row);
-  // bursts of a lane are done in the order of their ids
+  // the bursts of a lane end in the order of their ids
   const std::uint64_t newest = feedback_->burst.id.load(std::memory_order_acquire);  // sync burst
   if (newest != 0 && newest < id) return {Known::not_yet, -1};
 
-  // not the newest: look through the recent ones
+  // not the newest: search the recent ones
   const std::uint64_t done = feedback_->bursts.load(std::memory_order_acquire);  // sync bursts
   const std::uint64_t kept = std::min<std::uint64_t>(done, kBurstsKept);
   for (std::uint64_t back = 1; back <= kept; ++back)
@@ -253,12 +254,12 @@ LaneSender::BurstAnswer LaneSender::burst(std::uint64_t id) const noexcept {
 
 void LaneSender::sleep(std::uint32_t seen, std::int64_t at_most) {
   if (guard_.forked()) guard_.check("segment '" + segment_->name() + "'");
-  // one word for all lanes, so that one call of the loop wakes whoever it has news for
+  // one futex word for all lanes, so that the loop needs one call to wake all waiters
   const std::atomic<std::uint32_t>& wake = view_.wakes().lane_wake;
   const std::uint32_t now = wake.load(std::memory_order_seq_cst);  // sync lane_wake
   page_->waiting.store(1, std::memory_order_seq_cst);              // sync waiting
   O80_CRASH_POINT("lane.before_sleep");
-  // who has seen the wake of an end sees the end
+  // the end is stored before `lane_wake` changes: has_ended() is reliable after the load above
   if (segment_->has_ended()) return;
   if (feedback_->events.load(std::memory_order_seq_cst) == seen)  // sync events
     futex_wait(wake, now, at_most);

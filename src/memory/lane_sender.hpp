@@ -16,104 +16,102 @@
 
 namespace o80 {
 
-inline constexpr std::int64_t kShortestSlice = 100'000;  // of a wait that shows life [ns]
+inline constexpr std::int64_t kShortestSlice = 100'000;  // between signs of life in a wait [ns]
 
-/// The error for a batch of `needed` blocks when only `free` of `most` may be used.
+/// The error for a batch of `needed` blocks if only `free` of `most` blocks can be used.
 LaneFull lane_full(std::string_view segment, std::uint64_t needed, std::uint32_t free,
                    std::uint32_t most);
 
-/// Move-only: a lane taken by a frontend; given back by the destructor, or by the kernel.
+/// Move-only: a lane owned by a frontend (ARCHITECTURE.md, Lanes and their owners). The destructor
+/// releases it; the kernel does if the process dies.
 ///
-/// Ids and positions go on where former owners left them.
+/// Ids and positions continue where the former owner stopped.
 ///
-/// Writer:   its owner, which guards the sending calls (next_id, draw_ids, free_blocks, send) if it
-/// has
-///           several threads.
-/// Readers:  the backend; statuses, bursts, messages and waits may be asked from any thread.
-/// Realtime: send and the questions, yes; taking and waiting, no.
+/// Writer:   one thread at a time for next_id, draw_ids, free_blocks and send.
+/// Readers:  the backend; statuses, bursts, messages and waits: any thread of the owner.
+/// Realtime: send and the queries; not construction, not waits.
 class LaneSender {
  public:
   enum class Known { not_yet, yes, forgotten };
   struct StatusAnswer {
     Known known;
-    StatusWord word;  // if known == yes
+    StatusWord word;  // valid if known == yes
   };
   struct BurstAnswer {
     Known known;
-    Iteration row;  // of its last iteration, if known == yes
+    Iteration row;  // row of its last iteration, valid if known == yes
     BurstEnd end = BurstEnd::done;
   };
 
-  /// Takes the first free lane of a segment attached with Access::read_write, which must outlive
-  /// it. Throws NoLane (naming the holders), ReadOnly, UsedAfterFork.
+  /// Acquires the first free lane of a segment attached with Access::read_write. The segment must
+  /// outlive it. Throws NoLane (with the owners of the lanes), ReadOnly, UsedAfterFork.
   explicit LaneSender(const AttachedSegment& segment);
   LaneSender(LaneSender&& other) noexcept;
   LaneSender& operator=(LaneSender&&) = delete;
   ~LaneSender();
 
-  /// Gives the lane back now; questions may still be asked, nothing may be sent.
+  /// Releases the lane. Queries stay valid; send() is not allowed any more.
   void give_back() noexcept;
 
   std::uint32_t lane() const noexcept { return lane_; }
   std::uint64_t incarnation() const noexcept { return incarnation_; }
-  /// All blocks of the lane: the largest batch there can be.
+  /// Blocks of the lane: the size of the largest batch.
   std::uint32_t blocks() const noexcept { return view_.shape.lane_blocks; }
-  /// Blocks that may be sent now.
+  /// Blocks that can be sent now.
   std::uint32_t free_blocks() const noexcept;
-  /// The lowest id that was never drawn, from 1.
+  /// The lowest unused id, from 1.
   std::uint64_t next_id() const noexcept { return next_id_; }
-  /// All ids below `next` are drawn. Ids never go back.
+  /// Marks all ids below `next` as used. Ids never decrease.
   void draw_ids(std::uint64_t next) noexcept;
-  /// Ids whose status is remembered: each at its id modulo this.
+  /// Number of status slots; the slot of an id is id modulo this.
   std::uint64_t statuses() const noexcept { return 2 * std::uint64_t{blocks()}; }
-  /// Copies a whole batch of blocks, draws its ticket, writes it at `ticket_offset` (multiple of 8)
-  /// of the first block, commits all with one store, rings. Returns the ticket.
-  /// Throws LaneFull with nothing sent, InvalidArgument, UsedAfterFork.
+  /// Copies a batch of whole blocks, draws its ticket, writes the ticket at `ticket_offset` (a
+  /// multiple of 8) of the first block, commits all with one store, and rings the bell. Returns the
+  /// ticket. Throws LaneFull (nothing is sent), InvalidArgument, UsedAfterFork.
   std::uint64_t send(std::span<const std::byte> batch, std::size_t ticket_offset);
 
-  /// Asks for the burst of the batch `id` to end, after the iteration under way or before its
-  /// first. From any thread; nothing happens once the lane is given back.
+  /// Cancels the burst of the batch `id`: it ends after the present iteration, or before its first.
+  /// Any thread may call it; no effect once the lane is released.
   void cancel_burst(std::uint64_t id) noexcept;
 
   StatusAnswer status(std::uint64_t id) const noexcept;
-  /// The text that came with a status, if it is still there.
+  /// The text of a status, if the backend has stored one that was not overwritten.
   std::optional<std::string> message(std::uint64_t id) const;
-  /// Whether the burst of the batch `id` is done.
+  /// The result of the burst of the batch `id`.
   BurstAnswer burst(std::uint64_t id) const noexcept;
 
-  /// Tells the backend's watchdog that this frontend lives.
+  /// Gives a sign of life to the watchdog of the backend.
   void show_life() noexcept {
-    // after it was given back the lane may be another's, the page is still writable
+    // a released lane may have another owner, and the page is still writable
     if (!lock_.is_open()) return;
     page_->life.store(view_.counters().published.load(std::memory_order_relaxed),
                       std::memory_order_relaxed);
   }
-  /// The backend has a watchdog: waits show life, at least this often [ns].
+  /// Waits give a sign of life at least this often [ns]; for a backend with a watchdog.
   void show_life_every(std::int64_t slice) noexcept {
     slice_ = std::clamp<std::int64_t>(slice, kShortestSlice, kSlice);
     watched_ = true;
   }
 
-  /// Changes whenever the backend has news for this lane.
+  /// A count that changes when the backend has flagged this lane.
   std::uint32_t events() const noexcept {
     return feedback_->events.load(std::memory_order_acquire);  // sync events
   }
-  /// Until `done()`, which is asked again whenever the backend has flagged the lane.
-  /// `events_before_send` is the event count before the awaited batch was sent: `done` is not asked
-  /// while the count stands there.
-  /// Throws BackendGone (any of it) and Cancelled.
+  /// Waits until done() is true. done() is called whenever events() has changed.
+  /// `events_before_send` is the event count before the awaited batch was sent: done() is not
+  /// called while the count is unchanged. Throws BackendGone (any kind) and Cancelled.
   template <class Done>
   Waited wait_until(Done&& done, const Deadline& deadline, const KeepWaiting& keep_waiting = {},
                     std::optional<std::uint32_t> events_before_send = {}) {
     std::int64_t look_at = 0;
-    std::int64_t nap = slice_;  // what is left until then
+    std::int64_t nap = slice_;  // time until look_at [ns]
     while (true) {
       if (watched_) show_life();
       const std::uint32_t seen = events();
       if (seen != events_before_send && done()) return Waited::ready;
       if (spinner_.spin([&] { return events() != seen; }) && done()) return Waited::ready;
       if (deadline.over()) {
-        // a wait too short to look around learns of the end all the same
+        // a wait shorter than one slice checks for the end of the backend too
         const bool gone = segment_->gone();
         if (done()) return Waited::ready;
         if (gone) segment_->throw_if_gone();
@@ -125,7 +123,7 @@ class LaneSender {
       if (nap > 0 && !segment_->has_ended()) continue;
       look_at = monotonic_now() + slice_;
       nap = slice_;
-      // what is done is done, whatever became of the backend
+      // first the end, then the result: a result counts even if the backend has ended since
       const bool gone = look_around(keep_waiting);
       if (done()) return Waited::ready;
       if (gone) segment_->throw_if_gone();
@@ -134,9 +132,9 @@ class LaneSender {
 
  private:
   void count_in();
-  /// So long [ns] at most.
+  /// Sleeps until `events` is no longer `seen`, at most so long [ns].
   void sleep(std::uint32_t seen, std::int64_t at_most);
-  /// True if the backend is gone. Throws Cancelled.
+  /// True if the backend has ended. Throws Cancelled.
   bool look_around(const KeepWaiting& keep_waiting) const;
 
   const AttachedSegment* segment_;

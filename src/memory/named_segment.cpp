@@ -18,9 +18,8 @@ namespace o80 {
 
 namespace {
 
-// how long a lock of a living process, or of one that is being torn down, may last unnoticed
-constexpr std::int64_t kPassing = 20'000'000;   // [ns]
-constexpr std::int64_t kDying = 1'000'000'000;  // [ns]
+constexpr std::int64_t kPassing = 20'000'000;   // longest lock of a starter or a cleaner [ns]
+constexpr std::int64_t kDying = 1'000'000'000;  // longest end of a dying process [ns]
 
 std::int64_t patience(int descriptor) noexcept {
   SegmentHeader header{};
@@ -29,25 +28,26 @@ std::int64_t patience(int descriptor) noexcept {
   return dead ? kDying : kPassing;
 }
 
-/// The epoch of the segment that bears the name, 0 if there is none of this version; nothing if
-/// this user may not know.
+/// The epoch of the segment with this name, 0 if there is none of this version; empty if this user
+/// may not read it.
 std::optional<std::uint64_t> epoch_behind(std::string_view name) {
   const LockFile file = LockFile::open(segment_path(name), O_RDONLY | O_NOFOLLOW);
   if (file.is_open()) return epoch_of(file.descriptor());
   return errno == ENOENT ? std::optional<std::uint64_t>(0) : std::nullopt;
 }
 
-/// What belongs to one epoch of a name and is not in use.
+/// Removes the unused files of one epoch of a name.
 void sweep(const std::string& name, std::uint64_t epoch) {
   const std::string commands = commands_path(name, epoch);
   LockFile lock = LockFile::open(commands, O_RDWR | O_NOFOLLOW);
   if (lock.is_open()) {
-    // its holder builds the segment, or lives
+    // the holder of the lock builds this segment, or is its living backend
     if (!lock.try_lock(kBackendByte) || !leads_to(commands, lock.descriptor())) return;
   } else if (errno != ENOENT) {
     return;
   }
-  // from here on nobody can give this epoch the name: that takes the lock, or a file that is gone
+  // from here on this epoch cannot get the name: that needs the lock that we hold, or the
+  // commanders' file that is gone
   O80_CRASH_POINT("sweep.before_draft");
   unlink(draft_path(name, epoch).c_str());
   O80_CRASH_POINT("sweep.after_draft");

@@ -8,38 +8,40 @@
 
 namespace o80 {
 
-/// Move-only: the two files behind the name of a segment, for whoever replaces or removes them.
+/// Move-only: the two files behind the name of a segment, to replace or remove them
+/// (ARCHITECTURE.md, How a backend takes a name).
 ///
-/// Byte 0 of the commanders' file decides: its holder is the living backend, or the only process
-/// that may take the name away. A file without a commanders' file (of another version of o80, made
-/// by something else, damaged) is decided by its own byte 0.
+/// The lock of byte 0 of the commanders' file decides: its holder is the living backend, or the
+/// only process that may replace or remove the segment. For a file without a commanders' file
+/// (another version of o80, a foreign or damaged file) the lock of its own byte 0 decides.
 class NamedSegment {
  public:
   /// Not open, with errno set, if the segment file cannot be opened.
   static NamedSegment open(std::string_view name);
 
   bool is_open() const noexcept { return file_.is_open(); }
-  /// Of the segment file; bears no lock if there is a commanders' file.
+  /// Descriptor of the segment file; without a lock if there is a commanders' file.
   int descriptor() const noexcept { return file_.descriptor(); }
   const std::string& path() const noexcept { return path_; }
   const std::string& commands_path() const noexcept { return commands_path_; }
-  /// False if this user may not open the deciding file for writing: then nothing can be locked.
+  /// False if this user may not open the deciding file for writing, and so cannot lock it.
   bool can_lock() const noexcept { return can_lock_; }
   /// Throws SegmentError if the owner of the file is not trusted (file_owner.hpp).
   void check_owner() const;
-  /// True if the deciding byte is now ours. To be followed by `is_current`.
+  /// True if this object now holds the deciding lock. Then check is_current().
   bool try_lock() noexcept;
   /// True if the name still leads to this segment file.
   bool is_current() const noexcept;
-  /// True if a living backend has the name. Waits a moment for processes that hold the byte in
-  /// passing: a cleaner, a starter, a dying process. To be asked only if the byte is not ours.
+  /// True if a living backend has the name. A cleaner, a starter or a dying process may hold the
+  /// lock for a moment, so this waits for it up to 20 ms (1 s if the process of the header is
+  /// gone). Call it only if try_lock() has failed.
   bool is_alive() const;
-  /// What refuses a second backend.
+  /// The text of the error for a second backend.
   std::string taken_text() const;
-  /// Unlinks both files, the segment file first: no name ever leads to a segment whose commanders'
-  /// file is missing. False if the name could not be removed. The byte must be ours.
+  /// Unlinks both files, the segment file first, so that a name never leads to a segment without
+  /// its commanders' file. False if the name could not be removed. Needs the lock.
   bool remove() noexcept;
-  /// After the name was given to another segment. The byte must be ours.
+  /// Unlinks the commanders' file, after another segment has got the name. Needs the lock.
   void remove_commands() noexcept;
 
  private:
@@ -53,8 +55,8 @@ class NamedSegment {
   bool can_lock_ = false;
 };
 
-/// Removes what starters, cleaners and backends left behind when they were killed: segment files
-/// that were never complete, commanders' files without their segment.
+/// Removes the files of killed starters, cleaners and backends: drafts, and commanders' files
+/// without a segment file.
 void sweep_orphans();
 
 }  // namespace o80

@@ -24,9 +24,9 @@ namespace {
 
 SegmentShape shape_of(const SegmentSpec& spec) {
   if (spec.rows == 0 || spec.rows >= std::numeric_limits<std::uint64_t>::max() / 2)
-    throw InvalidArgument("segment '" + spec.name + "': a history has at least one row");
+    throw InvalidArgument("segment '" + spec.name + "': the history must have at least one row");
   if (spec.lane_blocks == 0 || spec.lane_blocks > (1U << 24))
-    throw InvalidArgument("segment '" + spec.name + "': a lane has 1 to 16777216 blocks");
+    throw InvalidArgument("segment '" + spec.name + "': a lane must have 1 to 16777216 blocks");
   return {.page_bytes = static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE)),
           .schema_bytes = spec.schema.size(),
           .row_bytes = spec.row_bytes,
@@ -60,7 +60,7 @@ void fill(const SegmentView& view, const SegmentSpec& spec, std::uint64_t epoch)
   if (!spec.schema.empty())
     std::memcpy(view.base + view.offsets.schema, spec.schema.data(), spec.schema.size());
 
-  // nobody else sees the files yet
+  // relaxed: no other process can see the files yet
   view.counters().begun.store(-1, std::memory_order_relaxed);
   view.counters().published.store(-1, std::memory_order_relaxed);
   view.bell().wanted.store(std::numeric_limits<std::int64_t>::max(), std::memory_order_relaxed);
@@ -73,14 +73,16 @@ OwnedSegment OwnedSegment::create(const SegmentSpec& spec) {
   SegmentView view;
   view.shape = shape_of(spec);
   if (!SegmentOffsets::compute(view.shape, view.offsets))
-    throw InvalidArgument("segment '" + spec.name + "': rows of " + std::to_string(spec.row_bytes) +
-                          " bytes, " + std::to_string(spec.rows) + " of them, and " +
-                          std::to_string(spec.lanes) +
-                          " lanes make no segment (a row is a multiple of 8 bytes)");
+    throw InvalidArgument(
+        "segment '" + spec.name + "': invalid sizes: " + std::to_string(spec.rows) + " rows of " +
+        std::to_string(spec.row_bytes) + " bytes and " + std::to_string(spec.lanes) +
+        " lanes. A row must be a multiple of 8 bytes, a segment must be below 64 TiB, and there "
+        "must be at most " +
+        std::to_string(kMostLanes) + " lanes.");
   refuse_if_taken(spec.name);
   sweep_orphans();
 
-  // two complete files, held by us, that nobody can see
+  // build two complete and locked files that have no name yet
   SegmentDraft draft(spec.name);
   draft.reserve(view.offsets);
   draft.permit(spec.permission);
@@ -98,8 +100,8 @@ OwnedSegment OwnedSegment::create(const SegmentSpec& spec) {
   draft.publish([&](const Predecessor& former) {
     if (!spec.inherits_halt || !(former.was_halted || former.died_acting)) return;
     ask_for_halt(view, HaltCause::predecessor, {},
-                 former.was_halted ? "the backend before was halted and never resumed"
-                                   : "the backend before was killed while commands acted");
+                 former.was_halted ? "the former backend was halted and not resumed"
+                                   : "the former backend was killed while commands were active");
   });
   segment.name_ = spec.name;
   segment.path_ = path;
@@ -169,7 +171,7 @@ void OwnedSegment::end(BackendState stopped_or_failed, std::string_view text) no
 }
 
 void OwnedSegment::remove() noexcept {
-  // we hold byte 0: the name cannot change hands between the look and the unlink
+  // we hold byte 0, so no other segment can get the name between the check and the unlink
   O80_CRASH_POINT("segment.before_unlink");
   if (leads_to(path_, lock_.descriptor())) unlink(path_.c_str());
   O80_CRASH_POINT("segment.between_unlinks");

@@ -20,12 +20,12 @@ struct SegmentSpec {
   std::string name;
   std::span<const std::byte> schema;
   std::uint32_t row_bytes = 0;        // multiple of 8
-  std::uint64_t rows = 1;             // history promised
-  std::uint32_t lanes = 8;            // commanding frontends at once
-  std::uint32_t lane_blocks = 16384;  // of 64 bytes, rounded up to a power of two
+  std::uint64_t rows = 1;             // length of the history
+  std::uint32_t lanes = 8;            // most frontends that command at the same time
+  std::uint32_t lane_blocks = 16384;  // 64-byte blocks of a lane, rounded up to a power of two
   mode_t permission = 0600;           // read: may observe; write: may command
-  /// Begins halted if it replaces a segment that was, or one whose backend died while commands
-  /// acted.
+  /// Starts halted if the replaced segment was halted, or if its backend died while commands were
+  /// active.
   bool inherits_halt = false;
 };
 
@@ -36,29 +36,28 @@ struct SegmentSpec {
 /// Realtime: view() and state only; creation and end are not.
 class OwnedSegment {
  public:
-  /// Builds both files, locks them, gives the segment its name; a dead one of that name is taken
-  /// over.
-  /// Throws SegmentTaken, SegmentError, InvalidArgument.
+  /// Creates and locks both files and gives the segment its name, which it takes over from the
+  /// segment of a dead backend. Throws SegmentTaken, SegmentError, InvalidArgument.
   static OwnedSegment create(const SegmentSpec& spec);
-  /// Throws SegmentTaken if a living backend has the name, SegmentError if somebody else's file
-  /// has it: to ask before hardware is touched.
+  /// Throws SegmentTaken if a living backend has the name, SegmentError if the file of a user
+  /// without trust has it. Call it before the hardware is touched.
   static void refuse_if_taken(std::string_view name);
 
   OwnedSegment(OwnedSegment&&) noexcept = default;
   OwnedSegment& operator=(OwnedSegment&& other) noexcept;
-  /// Ends as stopped unless it has ended, and gives up the name. The files are removed, unless it
-  /// failed: then they stay, so that frontends that attach later learn why.
+  /// Ends as stopped unless it has ended, and removes the files. The files of a failed backend
+  /// stay, so that a later attach can report the reason.
   ~OwnedSegment();
 
   const std::string& name() const noexcept { return name_; }
   std::uint64_t epoch() const noexcept { return epoch_; }
   const SegmentView& view() const noexcept { return view_; }
-  /// A descriptor of the commanders' file that bears no locks.
+  /// A descriptor of the commanders' file without a lock.
   int commands_descriptor() const noexcept { return query_.descriptor(); }
   BackendState state() const noexcept;
-  /// starting => running.
+  /// Stores the state, from starting to running.
   void set_state(BackendState state) noexcept;
-  /// Says why and wakes everybody who waits for a row or on a lane.
+  /// Stores the end and its reason, and wakes all threads that wait for a row or on a lane.
   void end(BackendState stopped_or_failed, std::string_view text = {}) noexcept;
   /// Unlinks both files; the segment file only if the name still leads to it.
   void remove() noexcept;
@@ -74,9 +73,9 @@ class OwnedSegment {
   std::string path_;
   std::string commands_path_;
   std::uint64_t epoch_ = 0;
-  LockFile lock_;           // of the segment file: holds byte 0, never mapped
-  LockFile commands_lock_;  // the same of the commanders' file
-  LockFile query_;          // the mapped commanders' file, holds nothing
+  LockFile lock_;           // the segment file: holds the lock of byte 0, not mapped
+  LockFile commands_lock_;  // the commanders' file: holds the lock of byte 0, not mapped
+  LockFile query_;          // the commanders' file: mapped, without a lock
   Mapping mapping_;
   Mapping commands_mapping_;
   SegmentView view_;

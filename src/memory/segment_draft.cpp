@@ -35,7 +35,7 @@ std::uint64_t random_bits() {
 [[noreturn]] void fail_for_space(const std::string& name, std::uint64_t bytes) {
   throw SegmentError("cannot create segment '" + name + "': " + segment_directory() +
                      " has no room for its " + std::to_string((bytes + (1U << 20) - 1) >> 20) +
-                     " MiB. Ask for a shorter history, remove dead segments with `o80 clean`, or "
+                     " MiB. Use a shorter history, remove dead segments with `o80 clean`, or "
                      "enlarge it (`mount -o remount,size=... " +
                      segment_directory() + "`).");
 }
@@ -49,14 +49,15 @@ BackendState state_of(const SegmentView& view) {
       view.counters().state.load(std::memory_order_acquire));  // sync state
 }
 
-/// The view's backend is dead, and the view is marked as superseded. `state` is what stood there
-/// before; another starter may have marked it before it died too.
+/// Reads what a dead backend has left, after its segment was marked as superseded. `state`: its
+/// state word before that mark, which may be the mark of an earlier starter that died.
 Predecessor judge_predecessor(const SegmentView& view, BackendState state) {
   const Counters& counters = view.counters();
   Predecessor predecessor;
   predecessor.was_halted = counters.halted.load(std::memory_order_acquire) != 0;  // sync halted
   if (view.commands != nullptr)
-    // a change, not a load: a halt that is asked for after it finds the mark (frontend_halt.cpp)
+    // a read-modify-write, not a load: the requester of any later halt sees the mark `superseded`
+    // (runtime/frontend_halt.cpp)
     predecessor.was_halted |=
         view.bell().halts.fetch_add(0, std::memory_order_seq_cst) !=  // sync halts
         counters.cleared.load(std::memory_order_acquire);             // sync cleared
@@ -65,11 +66,11 @@ Predecessor judge_predecessor(const SegmentView& view, BackendState state) {
   return predecessor;
 }
 
-/// Tells frontends attached to a dead segment that it has a successor. A file that is no segment,
-/// or that this user may not write, has nobody to tell.
+/// Marks the segment of a dead backend as superseded and wakes its waiters. Does nothing for a file
+/// that is not a segment, or that this user may not write.
 Predecessor supersede(const NamedSegment& former) {
-  // descriptors of their own: those of `former` bear its lock, and a lock must not be inherited
-  // with a mapping
+  // other descriptors than those of `former`: a locked descriptor must not be mapped, because a
+  // forked child would keep the lock with the mapping
   const LockFile segment = LockFile::open(former.path(), kOpen);
   SegmentHeader header{};
   SegmentView view;
@@ -100,10 +101,12 @@ SegmentDraft::SegmentDraft(const std::string& name) : name_(name) {
     path_ = draft_path(name, epoch_);
     if (create_commands() && create_segment()) return;
   }
-  throw SegmentError("cannot create segment '" + name + "': its files are taken away each time");
+  throw SegmentError("cannot create segment '" + name +
+                     "': another process has removed its files " + std::to_string(kAttempts) +
+                     " times. Try again; does `o80 clean` run in a loop?");
 }
 
-/// False if a sweeper took it before it was locked.
+/// False if sweep_orphans() of another process has removed the file before it was locked.
 bool SegmentDraft::create_commands() {
   commands_ = LockFile::open(commands_path_, kOpen | O_CREAT | O_EXCL, 0600);
   if (!commands_.is_open() && errno == EEXIST) return false;
@@ -123,7 +126,7 @@ bool SegmentDraft::create_segment() {
     fail("no file can be made in " + segment_directory(), error);
   }
   O80_CRASH_POINT("create.after_draft");
-  // nobody else opens it before it is permitted to: this cannot be refused
+  // cannot fail: no other process opens the file before permit()
   return segment_.try_lock(kBackendByte);
 }
 
@@ -183,7 +186,7 @@ void SegmentDraft::publish(const std::function<void(const Predecessor&)>& inheri
   }
 }
 
-/// False if whatever has the name is to be looked at again. Throws SegmentTaken, SegmentError.
+/// False if the file behind the name must be examined again. Throws SegmentTaken, SegmentError.
 bool SegmentDraft::try_replace(const std::function<void(const Predecessor&)>& inherit) {
   NamedSegment former = NamedSegment::open(name_);
   const std::string& path = former.path();
@@ -200,7 +203,7 @@ bool SegmentDraft::try_replace(const std::function<void(const Predecessor&)>& in
   }
   if (!former.is_current()) return false;
 
-  // its backend is dead, and nobody else can replace it while we hold its lock
+  // its backend is dead, and no other process can replace it while we hold its lock
   inherit(supersede(former));
   O80_CRASH_POINT("create.before_rename");
   if (rename(path_.c_str(), path.c_str()) != 0)

@@ -110,7 +110,7 @@ const char* name_of(Life life) noexcept {
 }
 
 Life judge_life(int descriptor, const std::atomic<std::uint32_t>& state) noexcept {
-  // the lock first: an end in order is said before the lock falls
+  // load the state after the lock: a backend stores its end before it releases the lock
   const bool held = is_byte_locked(descriptor, kBackendByte);
   switch (static_cast<BackendState>(state.load(std::memory_order_acquire))) {  // sync state
     case BackendState::stopped:

@@ -52,7 +52,7 @@ SegmentEntry describe(const std::string& name) {
   return entry;
 }
 
-/// Removes it if its backend is dead; false if it lives, or is being replaced.
+/// Removes the segment of a dead backend; false if the backend lives or is being replaced.
 bool remove_dead(NamedSegment& segment, bool& removed) {
   if (!segment.try_lock()) return false;
   removed = segment.is_current() && segment.remove();

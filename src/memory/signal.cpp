@@ -27,7 +27,7 @@ Waited RowWaiter::wait_for_row(Iteration k, const Deadline& deadline,
   };
   if (spinner_.spin(ready)) return Waited::ready;
   std::int64_t look_at = monotonic_now() + kSlice;
-  std::int64_t nap = kSlice;  // what is left until then
+  std::int64_t nap = kSlice;  // time until look_at [ns]
   while (!deadline.over()) {
     if (segment_->access() == Access::read_write)
       sleep(k, deadline.left(nap));
@@ -40,12 +40,12 @@ Waited RowWaiter::wait_for_row(Iteration k, const Deadline& deadline,
     nap = kSlice;
     if (keep_waiting && !keep_waiting())
       throw Cancelled("the wait for a row of segment '" + segment_->name() + "' was cancelled");
-    // rows may have come before the end
+    // first the end, then the row: the row may have been published before the end
     const bool gone = segment_->gone();
     if (ready()) return Waited::ready;
     if (gone) segment_->throw_if_gone();
   }
-  // a wait too short to look around learns of the end all the same
+  // a wait shorter than one slice checks for the end of the backend too
   const bool gone = segment_->gone();
   if (ready()) return Waited::ready;
   if (gone) segment_->throw_if_gone();
@@ -61,7 +61,7 @@ std::optional<std::uint32_t> register_for_row(const AttachedSegment& segment,
   O80_CRASH_POINT("rows.before_register");
   const std::uint32_t seen =
       view.wakes().row_wake.load(std::memory_order_seq_cst);  // sync row_wake
-  // an end is said before it wakes: who has seen that wake sees the end
+  // the end is stored before `row_wake` changes: has_ended() is reliable after the load above
   if (segment.has_ended()) return std::nullopt;
   Iteration lowest = bell.wanted.load(std::memory_order_seq_cst);  // sync wanted
   while (k < lowest &&
@@ -90,7 +90,7 @@ void RowWaiter::sleep(Iteration k, std::int64_t at_most) noexcept {
 }
 
 void RowWaiter::poll(Iteration k, std::int64_t at_most) noexcept {
-  // not on the futex: it would take the one wake meant for those who can pass it on
+  // not on the futex: a read-only reader would consume the one wake-up and cannot pass it on
   const Counters& counters = view_.counters();
   const std::int64_t end = monotonic_now() + at_most;
   for (std::int64_t left = at_most; left > 0; left = end - monotonic_now()) {
@@ -108,7 +108,8 @@ bool RowSignal::announce(Iteration k) noexcept {
   O80_CRASH_POINT("rows.before_reset");
   bell.wanted.store(kNoWish, std::memory_order_seq_cst);  // sync wanted
   O80_CRASH_POINT("rows.before_wake");
-  // after the reset: who registered before it still has the old value and will not sleep on it
+  // after the reset: a reader that lowered `wanted` before has the old `row_wake` and does not
+  // sleep
   view_.wakes().row_wake.fetch_add(1, std::memory_order_seq_cst);  // sync row_wake
   return true;
 }

@@ -9,7 +9,8 @@
 
 namespace o80 {
 
-inline constexpr std::int64_t kSlice = 50'000'000;  // longest sleep without a look around [ns]
+// longest sleep between two checks of the backend and of KeepWaiting [ns]
+inline constexpr std::int64_t kSlice = 50'000'000;
 
 enum class Waited { ready, timed_out };
 
@@ -19,20 +20,21 @@ std::optional<std::uint32_t> register_for_row(const AttachedSegment& segment, It
 /// After a sleep on `seen`: the writer woke one, and the first awake tells the rest.
 void pass_on_wake(const SegmentView& view, std::uint32_t seen) noexcept;
 
-/// Waits for rows.
+/// Waits for rows (ARCHITECTURE.md, Waiting for a row).
 ///
-/// A waiter lowers the word `wanted`, looks again, sleeps; the writer resets it when it is reached
-/// and wakes one; the first awake wakes the rest. A read-only waiter polls.
+/// A waiter spins, lowers the word `wanted`, checks `published` again, and sleeps. The writer
+/// resets `wanted` when that row is published and wakes one waiter, which wakes the others. A
+/// read-only waiter polls.
 ///
 /// Writer:   RowSignal.
 /// Readers:  any threads.
-/// Realtime: no, it waits.
+/// Realtime: no.
 class RowWaiter {
  public:
-  /// `poll` is how often a read-only waiter looks [ns].
+  /// `poll`: interval of a read-only waiter [ns].
   explicit RowWaiter(const AttachedSegment& segment, std::int64_t poll = 1'000'000) noexcept;
 
-  /// Until row k is published. Throws BackendGone (any of it) and Cancelled.
+  /// Waits until row k is published. Throws BackendGone (any kind) and Cancelled.
   Waited wait_for_row(Iteration k, const Deadline& deadline, const KeepWaiting& keep_waiting = {});
 
  private:
@@ -45,33 +47,34 @@ class RowWaiter {
   Spinner spinner_;
 };
 
-/// Knows who waits for rows; `wake_sleepers` wakes them.
+/// Decides whether a thread that waits for a row must be woken; wake_sleepers() wakes it.
 ///
 /// Writer:   the backend's thread, after HistoryWriter::publish.
 /// Readers:  RowWaiter.
-/// Realtime: yes; one load when nobody waits.
+/// Realtime: yes; one load if no thread waits.
 class RowSignal {
  public:
   explicit RowSignal(const SegmentView& view) noexcept : view_(view) {}
-  /// True if one of those who sleep on `row_wake` is to be woken.
+  /// True if a thread waits for row k or an older one. The caller then wakes one on `row_wake`.
   bool announce(Iteration k) noexcept;
 
  private:
   SegmentView view_;
 };
 
-/// The backend's ear: waits until a frontend has committed something.
+/// Blocks the backend until a frontend has committed a batch.
 ///
 /// Writer:   every LaneSender; `interrupt` from any thread or signal handler of the backend.
 /// Readers:  the backend's thread.
-/// Realtime: yes while it rings; else it waits.
+/// Realtime: no, unless the bell has rung already.
 class BellWaiter {
  public:
   explicit BellWaiter(const SegmentView& view) noexcept : view_(view) {}
   std::uint32_t value() const noexcept;
-  /// Until the bell is no longer `seen`, at most `at_most` [ns], cut to kSlice; true if it rang.
+  /// Waits until the bell is no longer `seen`, at most `at_most` [ns] and at most kSlice; true if
+  /// it has rung.
   bool wait(std::uint32_t seen, std::int64_t at_most = kSlice) noexcept;
-  /// Rings it for the backend's own sake (stop).
+  /// Wakes the backend's thread, to stop it.
   void interrupt() noexcept;
 
  private:
@@ -79,13 +82,13 @@ class BellWaiter {
   Spinner spinner_;
 };
 
-/// Which of those who sleep are to be woken.
+/// The sleeping threads to wake.
 struct Sleepers {
-  bool lanes = false;  // what LaneReceivers::announce said: all that wait with a lane
-  bool rows = false;   // what RowSignal::announce said: one that waits for a row
+  bool lanes = false;  // result of LaneReceivers::announce(): all that wait on a lane
+  bool rows = false;   // result of RowSignal::announce(): one that waits for a row
 };
 
-/// Wakes them with one system call at most.
+/// Wakes them with at most one system call.
 ///
 /// Realtime: yes.
 void wake_sleepers(const SegmentView& view, Sleepers sleepers) noexcept;

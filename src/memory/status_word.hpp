@@ -6,7 +6,8 @@
 
 namespace o80 {
 
-/// A status as it stands in the segment; what the numbers mean is not known here (0 is none).
+/// A status as stored in a StatusSlot. This layer does not know the meaning of the numbers (0: no
+/// status).
 struct StatusWord {
   std::uint8_t status = 0;  // 4 bits, never 0 when written
   std::uint8_t reason = 0;  // 4 bits
@@ -24,8 +25,8 @@ struct StatusWord {
             .detail = static_cast<std::uint8_t>(word >> 56),
             .iteration = static_cast<std::int64_t>(word << 16) >> 16};
   }
-  /// What stands in a place before the first status of an id: the id, and no status. Whoever asks
-  /// for the one before knows then that it is forgotten, though the backend die here.
+  /// The word of a slot between its new id and the first status of that id. If the backend crashes
+  /// in between, the former id of the slot reads as forgotten (ARCHITECTURE.md, Statuses and ids).
   static constexpr std::uint64_t announcing(std::uint64_t id) noexcept {
     return id & 0xffff'ffff'ffffULL;
   }

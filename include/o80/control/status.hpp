@@ -6,46 +6,47 @@
 
 namespace o80 {
 
-/// Names a command, a request or a batch within its lane: from 1, never used twice.
+/// Identifies a command, a request or a batch within its lane; from 1, never reused.
 using CommandId = std::uint64_t;
 
-/// The progress of a command or a request; every one ends with one of those from `completed` on.
+/// Status of a command or a request. All values from `completed` on are end statuses; each command
+/// gets exactly one of them.
 enum class Status : std::uint8_t {
   none,
   queued,
   active,
   completed,
-  limited,  // completed, but clamped at its last iteration
+  limited,  // ended, but a limit kept it from its target
   overwritten,
   purged,
   interrupted,
   rejected,
-  forgotten,  // asked too late: only a frontend says so
+  forgotten,  // the slot of the status was reused; set by a frontend only
   halted
 };
 inline constexpr std::size_t kStatuses = static_cast<std::size_t>(Status::halted) + 1;
 
-/// Why a status is what it is.
+/// Reason of a status.
 enum class Reason : std::uint8_t {
   none,
   late,
-  exclusive,  // another lane has control, detail says which
-  invalid,    // garbage in the lane
+  exclusive,  // the lane of the detail has exclusive control
+  invalid,    // invalid data in the lane
   limits,
-  driver,  // the text is the driver's
+  driver,  // the driver rejected it, with a text
   fresh_start,
   dead_frontend,
   silence,
   stopped,
   halted,
-  full  // more of its kind wait already than one lane may have
+  full  // the lane has too many batches that wait for a later iteration
 };
 inline constexpr std::size_t kReasons = static_cast<std::size_t>(Reason::full) + 1;
 
 std::string_view to_text(Status status) noexcept;
 std::string_view to_text(Reason reason) noexcept;
 
-/// Whether a command with this status changes no more.
+/// True for an end status: it does not change any more.
 constexpr bool is_end(Status status) noexcept { return status >= Status::completed; }
 
 }  // namespace o80

@@ -4,13 +4,14 @@
 
 namespace o80 {
 
-/// What the backend says of itself (superseded is said by its successor).
+/// State of a backend as stored in its segment; `superseded` is stored by its successor.
 enum class BackendState : std::uint32_t { starting, running, stopped, failed, superseded };
 
-/// What is true of it: the word above and the kernel's lock together.
+/// State of a backend as a reader decides it, from the stored state and the lock of the backend: a
+/// free lock without a stored end means that the process was killed.
 enum class Life { starting, running, stopped, failed, superseded, killed };
 const char* name_of(Life life) noexcept;
-/// Neither starting nor running, for good.
+/// True if the backend has ended. An end is final.
 constexpr bool is_over(Life life) noexcept {
   return life != Life::starting && life != Life::running;
 }
