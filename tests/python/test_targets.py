@@ -143,6 +143,7 @@ def test_labels_are_given_by_name_or_value(robot: Robot, label: object) -> None:
         ("a", (1, 2), "all its fields in order"),
         ("a", {"count": 128}, "-128 to 127"),
         ("a", {"position": float("nan")}, "position"),
+        ("a", -float("nan"), "target nan for"),
     ],
 )
 def test_a_refusal_names_the_actuator_the_field_and_what_there_is(
