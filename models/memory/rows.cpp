@@ -23,8 +23,8 @@
 //   + if (sleepers.rows) view.bell().wanted.store(kNoWish, std::memory_order_seq_cst);
 // mutant sleeps_on_a_later_value: src/memory/signal.cpp
 //   - futex_wait(view_.wakes().row_wake, *seen, at_most)
-//   + futex_wait(view_.wakes().row_wake, view_.wakes().row_wake.load(std::memory_order_seq_cst),
-//   at_most)
+//   + futex_wait(view_.wakes().row_wake,
+//   +            view_.wakes().row_wake.load(std::memory_order_seq_cst), at_most)
 
 #include "kernel.hpp"
 
