@@ -113,7 +113,7 @@ TEST_F(FirstRowTest, RaisesTheEndOfAnyOfThemWhileNoRowIsThere) {
       [&] { EXPECT_THROW(wait_for_first_row(rows(0, 0), patient()), BackendFailed); });
   arm_.wait_until_wanted(0);
   ball_.wait_until_wanted(0);
-  ball_.segment.end(State::failed, "no power");
+  ball_.segment.end(BackendState::failed, "no power");
   sleeper.join();
 
   arm_.publish(0);
