@@ -27,7 +27,7 @@ struct Source {
   void publish(Iteration k) {
     const std::vector<std::byte> row(64);
     writer.publish(k, row.data());
-    signal.wake_readers(k);
+    wake_sleepers(segment.view(), {.rows = signal.announce(k)});
   }
   void wait_until_wanted(Iteration k) const {
     while (segment.view().bell().wanted.load() > k) std::this_thread::yield();
