@@ -166,14 +166,14 @@ class Commanding(Observing):
     def request(self, name: str, /, *, timeout: float | None = None, **fields: Any) -> None:
         """Sends a request to the driver at once and waits for its answer.
 
-        name: of the request; `requests` lists them.
-        timeout: for the answer, and, if the request takes time, for its end [s].
-        fields: of the request; those that have a default may be left out.
+        name: name of the request; `requests` lists them.
+        timeout: how long to wait for the end of the request [s].
+        fields: fields of the request; those with a default may be left out.
 
         It needs no pulse; what was added and not pulsed stays added. A bursting backend runs until
         the request has ended. Raises RequestRejected with the driver's text, BackendHalted if a
         halt ended it, BackendGone, and TimeoutError, whose `batch` can be waited for again: the
-        request goes on. `add_request` makes one part of a pulse, and waits for nothing.
+        request continues. `add_request` makes it a part of a pulse and does not wait.
         """
         batch = self._send_request(name, fields)
         self._wait_for_answer(name, batch, timeout)
@@ -187,15 +187,17 @@ class Commanding(Observing):
                 raise
             progress = f" ({handle.progress})" if handle.progress else ""
             raise TimeoutError(
-                f"'{name}' of '{self.segment}' still runs{progress}, and goes on: give it more "
-                f"time, or wait for the `batch` of this error",
+                f"'{name}' of '{self.segment}' still runs{progress} and continues: pass a "
+                f"longer timeout, or wait for the `batch` of this error",
                 batch,
             ) from error
         handle = batch.handles[0]
         if handle.status == Status.HALTED:
             raise BackendHalted(f"'{name}' of '{self.segment}' was ended: {handle.text}")
         if handle.status != Status.COMPLETED:
-            raise RequestRejected(f"'{self.segment}' did not serve '{name}': {handle.text}")
+            raise RequestRejected(
+                f"request '{name}' to '{self.segment}' was not completed: {handle.text}"
+            )
 
     @property
     def running_requests(self) -> list[RunningRequest]:
