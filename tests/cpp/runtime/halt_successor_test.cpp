@@ -73,7 +73,7 @@ TEST_F(HaltSuccessorTest, OfABackendThatWasKilledWhileItActedStartsHalted) {
   const auto halt = halt_of_successor(Before::acting);
   ASSERT_TRUE(halt);
   EXPECT_EQ(halt->cause, HaltCause::predecessor);
-  EXPECT_THAT(std::string(halt->reason()), HasSubstr("killed while commands acted"));
+  EXPECT_THAT(std::string(halt->reason()), HasSubstr("killed while commands were active"));
 }
 
 TEST_F(HaltSuccessorTest, OfAHaltedBackendStartsHalted) {
@@ -81,7 +81,7 @@ TEST_F(HaltSuccessorTest, OfAHaltedBackendStartsHalted) {
     const auto halt = halt_of_successor(before);
     ASSERT_TRUE(halt);
     EXPECT_EQ(halt->cause, HaltCause::predecessor);
-    EXPECT_THAT(std::string(halt->reason()), HasSubstr("never resumed"));
+    EXPECT_THAT(std::string(halt->reason()), HasSubstr("not resumed"));
   }
 }
 
