@@ -13,3 +13,5 @@ void bind_frontend(nanobind::module_& module);
 void bind_prepared_burst(nanobind::module_& module);
 void bind_backend(nanobind::module_& module);
 void bind_robots(nanobind::module_& module);
+void bind_loop_state(nanobind::module_& module);
+void bind_nearest_name(nanobind::module_& module);

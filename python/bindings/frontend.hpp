@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "o80/runtime/frontend.hpp"
@@ -58,6 +59,10 @@ class Frontend {
   nanobind::dict indices_;
   std::vector<const o80::FieldRow*> plain_;  // of each actuator; null: a struct
 };
+
+/// Number, cause, iteration, who, text of a halt.
+using HaltFields = std::tuple<std::uint64_t, std::string, std::int64_t, std::string, std::string>;
+std::optional<HaltFields> halt_fields(const std::optional<o80::Halt>& halt);
 
 // what each file adds to the class
 void bind_sending(nanobind::module_& m, nanobind::class_<Frontend>& frontend);

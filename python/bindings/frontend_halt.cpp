@@ -8,8 +8,6 @@
 #include "arguments.hpp"
 #include "base/printable.hpp"
 #include "frontend.hpp"
-#include "memory/verb_word.hpp"
-#include "runtime/link.hpp"
 #include "verb.hpp"
 #include "waiting.hpp"
 
@@ -17,16 +15,6 @@ namespace nb = nanobind;
 using namespace nb::literals;
 
 namespace {
-
-using HaltFields = std::tuple<std::uint64_t, std::string, std::int64_t, std::string, std::string>;
-
-/// Number, cause, iteration, who, text.
-std::optional<HaltFields> halted(const Frontend& self) {
-  const std::optional<o80::Halt> halt = self.untyped().halted();
-  if (!halt) return std::nullopt;
-  return HaltFields{halt->number, std::string(to_text(halt->cause)), halt->iteration,
-                    o80::printable(halt->who_text()), o80::printable(halt->reason())};
-}
 
 std::uint64_t halt(const Frontend& self, nb::handle why) {
   const std::string reason = string_of(why, "the reason of a halt");
@@ -51,14 +39,6 @@ nb::list running_requests(const Frontend& self) {
   return all;
 }
 
-/// The driver verb that has not returned, and for how long [s].
-std::optional<std::tuple<std::string, double>> slow_verb(const Frontend& self) {
-  const o80::SlowVerb slow = o80::slow_verb(self.untyped().link()->segment.view());
-  if (slow.verb == o80::Verb::none) return std::nullopt;
-  return std::tuple{std::string(to_text(slow.verb)),
-                    static_cast<double>(o80::monotonic_now() - slow.since) * 1e-9};
-}
-
 std::uint64_t halt_segment(const std::string& segment, const std::string& reason,
                            nb::handle timeout) {
   const o80::Timeout patience = timeout_of(timeout);
@@ -68,14 +48,21 @@ std::uint64_t halt_segment(const std::string& segment, const std::string& reason
 
 }  // namespace
 
+std::optional<HaltFields> halt_fields(const std::optional<o80::Halt>& halt) {
+  if (!halt) return std::nullopt;
+  return HaltFields{halt->number, std::string(to_text(halt->cause)), halt->iteration,
+                    o80::printable(halt->who_text()), o80::printable(halt->reason())};
+}
+
 void bind_halting(nb::module_& m, nb::class_<Frontend>& frontend) {
   m.def("halt", &halt_segment, "segment"_a, "reason"_a, "timeout"_a.none());
   def_verb(frontend, "halt", verbs::halt, &halt, "reason"_a.none() = "");
   def_verb(frontend, "keep_alive", verbs::keep_alive,
            [](const Frontend& self) { self.untyped().keep_alive(); });
-  frontend.def_prop_ro("_halted", &halted)
+  frontend
+      .def_prop_ro("_halted",
+                   [](const Frontend& self) { return halt_fields(self.untyped().halted()); })
       .def_prop_ro("_running_requests", &running_requests,
                    nb::sig("def _running_requests(self) -> list[tuple[str, int, str, str]]"))
-      .def("_resume", &resume, "number"_a, "timeout"_a.none())
-      .def_prop_ro("_slow_verb", &slow_verb);
+      .def("_resume", &resume, "number"_a, "timeout"_a.none());
 }

@@ -26,4 +26,6 @@ NB_MODULE(_core, m) {
   bind_prepared_burst(m);
   bind_backend(m);
   bind_robots(m);
+  bind_loop_state(m);
+  bind_nearest_name(m);
 }

@@ -4,6 +4,7 @@
 
 #include "bindings.hpp"
 #include "memory/process_start.hpp"
+#include "memory/segment_name.hpp"
 #include "o80/memory/segment_list.hpp"
 #include "waiting.hpp"
 
@@ -31,4 +32,5 @@ void bind_segment_list(nb::module_& m) {
   m.def("clean", [](const std::string& name) { return o80::clean(name); }, nb::arg("name"));
   m.def("process_start", &o80::process_start, nb::arg("pid"));
   m.def("clean_dead", &o80::clean_dead);
+  m.def("directory_problem", &o80::directory_problem);
 }

@@ -1,10 +1,11 @@
 """Real-time control, simulators and learning code in step, through shared memory."""
 
-from o80 import robots
+import importlib
+from typing import TYPE_CHECKING, Any
+
+# at once, so that handlers registered after o80 was imported run before its own at the end
+from o80 import at_exit as _at_exit  # noqa: F401
 from o80._core import Batch, Burst, Handle, Observation, Stream, version
-from o80.actuator import Actuator, Number
-from o80.backend import Backend, Running, StartAfresh
-from o80.burst_group import BurstGroup, burst
 from o80.errors import (
     BackendFailed,
     BackendGone,
@@ -31,20 +32,74 @@ from o80.errors import (
     TimeoutError,
     UsedAfterFork,
 )
-from o80.first import wait_for_first
-from o80.frontend import Frontend
-from o80.frontend_classes import register_frontend
-from o80.halts import Halt, halt
-from o80.history import History
-from o80.installation import prefix
-from o80.limits import Limits
-from o80.prepared_burst import PreparedBurst
-from o80.record import Record
-from o80.running_request import RunningRequest
-from o80.segment_list import Segment, clean, segments
-from o80.states import States
-from o80.stopping import stop
-from o80.words import Mode, Profile, Reason, Start, Status
+
+if TYPE_CHECKING:
+    from o80 import robots
+    from o80.actuator import Actuator, Number
+    from o80.backend import Backend, Running, StartAfresh
+    from o80.burst_group import BurstGroup, burst
+    from o80.first import wait_for_first
+    from o80.frontend import Frontend
+    from o80.frontend_classes import register_frontend
+    from o80.halts import Halt, halt
+    from o80.history import History
+    from o80.installation import prefix
+    from o80.limits import Limits
+    from o80.prepared_burst import PreparedBurst
+    from o80.record import Record
+    from o80.running_request import RunningRequest
+    from o80.segment_list import Segment, clean, segments
+    from o80.states import States
+    from o80.stopping import stop
+    from o80.words import Mode, Profile, Reason, Start, Status
+
+# These are imported when they are first used: they need NumPy, which takes most of the time to
+# import o80, and a command such as `o80 list` can do without.
+_LAZY = {
+    "Actuator": "o80.actuator",
+    "Number": "o80.actuator",
+    "Backend": "o80.backend",
+    "Running": "o80.backend",
+    "StartAfresh": "o80.backend",
+    "BurstGroup": "o80.burst_group",
+    "burst": "o80.burst_group",
+    "wait_for_first": "o80.first",
+    "Frontend": "o80.frontend",
+    "register_frontend": "o80.frontend_classes",
+    "Halt": "o80.halts",
+    "halt": "o80.halts",
+    "History": "o80.history",
+    "prefix": "o80.installation",
+    "Limits": "o80.limits",
+    "PreparedBurst": "o80.prepared_burst",
+    "Record": "o80.record",
+    "RunningRequest": "o80.running_request",
+    "Segment": "o80.segment_list",
+    "clean": "o80.segment_list",
+    "segments": "o80.segment_list",
+    "States": "o80.states",
+    "stop": "o80.stopping",
+    "Mode": "o80.words",
+    "Profile": "o80.words",
+    "Reason": "o80.words",
+    "Start": "o80.words",
+    "Status": "o80.words",
+}
+
+if not TYPE_CHECKING:  # or a type checker would believe that every name exists
+
+    def __getattr__(name: str) -> Any:
+        if name == "robots":
+            return importlib.import_module("o80.robots")
+        if name not in _LAZY:
+            raise AttributeError(f"module 'o80' has no attribute {name!r}")
+        value = getattr(importlib.import_module(_LAZY[name]), name)
+        globals()[name] = value
+        return value
+
+    def __dir__() -> list[str]:
+        return sorted({*globals(), *__all__})
+
 
 __version__ = version()
 

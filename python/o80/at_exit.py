@@ -3,7 +3,6 @@
 import atexit
 import os
 import sys
-import traceback
 from typing import Protocol
 from weakref import WeakKeyDictionary
 
@@ -43,4 +42,6 @@ def _close_all() -> None:
         try:
             owner._close_at_exit()
         except Exception:
+            import traceback  # here, because o80 is imported far more often than this happens
+
             traceback.print_exc()  # and close the others

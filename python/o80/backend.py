@@ -243,8 +243,8 @@ class Backend:
     def _index_of(self, request: str) -> int:
         known = [row["name"] for row in self._layout.schema["requests"]]
         if request not in known:
-            there = ", ".join(known) or "none"
-            raise InvalidArgument(f"there is no request '{request}'; there are: {there}")
+            instead = _core.names_instead(request, known)
+            raise InvalidArgument(f"there is no request '{request}'{instead}")
         return known.index(request)
 
     def _read_afresh(self, answer: StartAfresh) -> None:
@@ -277,9 +277,8 @@ class Backend:
         names = [row["name"] for row in rows]
         if isinstance(actuator, str):
             if actuator not in names:
-                raise InvalidArgument(
-                    f"there is no actuator '{actuator}': there are {', '.join(names)}"
-                )
+                instead = _core.names_instead(actuator, names)
+                raise InvalidArgument(f"there is no actuator '{actuator}'{instead}")
             actuator = names.index(actuator)
         if not 0 <= actuator < len(names):
             raise InvalidArgument(f"there is no actuator {actuator}: there are {len(names)}")
@@ -432,8 +431,8 @@ def fill(block: NDArray[Any], values: Any, what: str) -> None:
     elif isinstance(values, Mapping):
         for name, value in values.items():
             if names is None or name not in names:
-                there = ", ".join(names or ()) or "there are none"
-                raise InvalidArgument(f"{what} has no field {name!r}; its fields: {there}")
+                instead = _core.names_instead(str(name), list(names or ()))
+                raise InvalidArgument(f"{what} has no field {name!r}{instead}")
             try:
                 block[name] = value
             except (TypeError, ValueError) as error:

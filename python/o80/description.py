@@ -72,7 +72,8 @@ class SchemaWriter:
         """Adds requests, each with its fields (None: no fields)."""
         for name in while_halted:
             if name not in requests:
-                raise InvalidArgument(f"while_halted: there is no request '{name}'")
+                instead = _core.names_instead(name, list(requests))
+                raise InvalidArgument(f"while_halted: there is no request '{name}'{instead}")
         for name, fields in requests.items():
             described = self._type(name, {} if fields is None else fields)
             self.builder.add_request(name, described, "", name in while_halted)
@@ -110,7 +111,8 @@ class SchemaWriter:
                 return names.index(named)
         elif 0 <= named < len(names):
             return named
-        raise InvalidArgument(f"there is no actuator {named!r}: there are {', '.join(names)}")
+        instead = _core.names_instead(str(named), names)
+        raise InvalidArgument(f"there is no actuator {named!r}{instead}")
 
     # ------------------------------------------------------------------ types
 

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from o80 import _core
+
 if TYPE_CHECKING:
     from o80.states import States
 
@@ -26,8 +28,8 @@ class Record:
         try:
             value: Any = self._array[name]
         except (KeyError, ValueError, IndexError):
-            there = ", ".join(self.keys()) or "there are none"
-            raise KeyError(f"there is no value {name!r}; there are: {there}") from None
+            instead = _core.names_instead(str(name), list(self.keys()))
+            raise KeyError(f"there is no value {name!r}{instead}") from None
         if value.dtype.names and value.ndim == self._array.ndim:
             value = Record(value)
         elif not value.ndim:

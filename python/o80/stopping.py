@@ -22,8 +22,8 @@ def stop(name: str, timeout: float = 5.0) -> None:
     """
     running = {entry.name: entry for entry in segments() if entry.alive}
     if name not in running:
-        there = f"running: {', '.join(running)}" if running else "none runs"
-        raise InvalidArgument(f"no backend '{name}' runs; {there}")
+        there = _core.names_instead(name, list(running)) if running else "; nothing runs"
+        raise InvalidArgument(f"no backend '{name}' runs{there.replace('there are', 'running')}")
     stop_entry(running[name], timeout)
 
 

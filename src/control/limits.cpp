@@ -4,9 +4,11 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "base/short_text.hpp"
 #include "control/number_name.hpp"
+#include "o80/base/nearest_name.hpp"
 
 namespace o80 {
 namespace {
@@ -64,23 +66,14 @@ std::string of_number(const Schema& schema, std::uint32_t actuator, const Number
   return (name.path.empty() ? "" : "'" + name.path + "' of ") + of_actuator(schema, actuator);
 }
 
-std::string actuators_of(const Schema& schema) {
-  std::string there;
-  for (std::size_t i = 0; i < schema.actuators.size(); ++i) {
-    there += (i == 0 ? "" : ", ") + schema.actuators[i].name.str() + " (" + std::to_string(i) + ")";
-  }
-  return "'" + schema.head.robot.str() + "' has " +
-         (there.empty() ? std::string("no actuators") : there);
-}
-
 std::string labels_of(const Schema& schema, const FieldRow& field) {
   if (field.kind == Kind::boolean) return "0, 1";
-  std::string there;
+  std::vector<std::string> labels;
   for (std::uint32_t i = 0; i < field.labels; ++i) {
     const LabelRow& label = schema.labels.at(field.first_label + i);
-    there += (i == 0 ? "" : ", ") + label.name.str() + " (" + std::to_string(label.value) + ")";
+    labels.push_back(label.name.str() + " (" + std::to_string(label.value) + ")");
   }
-  return there;
+  return first_names(labels);
 }
 
 }  // namespace
@@ -105,16 +98,25 @@ std::uint32_t CommandCheck::actuator(std::string_view name) const {
   for (std::size_t i = 0; i < schema_.actuators.size(); ++i) {
     if (schema_.actuators[i].name.view() == name) return static_cast<std::uint32_t>(i);
   }
-  throw InvalidArgument("there is no actuator '" + std::string(name) +
-                        "': " + actuators_of(schema_));
+  std::vector<std::string> known;
+  for (const ActuatorRow& row : schema_.actuators) known.push_back(row.name.str());
+  refuse_actuator("'" + std::string(name) + "'" + names_instead(name, known));
 }
 
 std::uint32_t CommandCheck::actuator(std::int64_t index) const {
-  if (index >= 0 && static_cast<std::size_t>(index) < schema_.actuators.size()) {
-    return static_cast<std::uint32_t>(index);
+  const auto count = static_cast<std::int64_t>(schema_.actuators.size());
+  if (index >= 0 && index < count) return static_cast<std::uint32_t>(index);
+  std::vector<std::string> known;
+  for (std::int64_t i = 0; i < count; ++i) {
+    known.push_back(schema_.actuators[static_cast<std::size_t>(i)].name.str() + " (" +
+                    std::to_string(i) + ")");
   }
-  throw InvalidArgument("there is no actuator " + std::to_string(index) + ": " +
-                        actuators_of(schema_));
+  refuse_actuator(std::to_string(index) + names_instead("", known));
+}
+
+void CommandCheck::refuse_actuator(const std::string& which) const {
+  const std::string robot = "'" + schema_.head.robot.str() + "' has no actuator";
+  throw InvalidArgument(schema_.actuators.empty() ? robot + "s" : robot + " " + which);
 }
 
 bool CommandCheck::within(std::uint32_t actuator, const std::byte* state,
@@ -259,14 +261,10 @@ Profile CommandCheck::profile(std::uint32_t index) const {
 
 void CommandCheck::request(std::uint32_t index, std::span<const std::byte> payload) const {
   if (index >= schema_.requests.size()) {
-    std::string there;
-    for (const RequestRow& row : schema_.requests) {
-      if (!there.empty()) there += ", ";
-      there += row.name.str();
-    }
-    throw InvalidArgument("there is no request " + std::to_string(index) + ": '" +
-                          schema_.head.robot.str() + "' has " +
-                          (there.empty() ? std::string("none") : there));
+    std::vector<std::string> known;
+    for (const RequestRow& row : schema_.requests) known.push_back(row.name.str());
+    throw InvalidArgument("'" + schema_.head.robot.str() + "' has no request " +
+                          std::to_string(index) + names_instead("", known));
   }
   const RequestRow& row = schema_.requests[index];
   const std::size_t size = row.type == kNoType ? 0 : layouts_[row.type]->size();

@@ -52,6 +52,7 @@ class CommandCheck {
 
   bool within(std::uint32_t actuator, const std::byte* state,
               const std::uint64_t* mask) const noexcept;
+  [[noreturn]] void refuse_actuator(const std::string& which) const;
   [[noreturn]] void refuse(std::uint32_t actuator, const std::byte* state,
                            const std::uint64_t* mask) const;
 

@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <map>
 #include <sstream>
+#include <utility>
+#include <vector>
 
 #include "describe/table.hpp"
 
@@ -72,6 +74,7 @@ std::string limits_of(const Schema& schema, const ActuatorRow& actuator) {
   return text;
 }
 
+constexpr std::size_t kShown = 5;            // differences, of all that there are
 constexpr std::string_view kUnit = " unit";  // ends the names of lines that give a unit
 
 void add_fields(Lines& lines, const std::string& of, const Schema& schema, std::uint32_t type) {
@@ -123,20 +126,39 @@ Lines lines_of(const Schema& schema) {
   return lines;
 }
 
+/// What says most about two robots comes first; the size of a row follows from the rest.
+int rank(std::string_view what) {
+  if (what == "robot") return 0;
+  if (what == "actuators") return 1;
+  if (what.starts_with("actuator 0 ")) return 2;  // the others are often of the same type
+  if (what.starts_with("size of")) return 5;
+  return what.starts_with("actuator ") ? 4 : 3;
+}
+
 std::string compare(const Lines& expected, const Lines& found) {
-  std::string text;
+  std::vector<std::pair<int, std::string>> lines;
+  const auto add = [&](const std::string& what, const std::string& wanted,
+                       const std::string& there) {
+    lines.emplace_back(rank(what),
+                       "  " + what + ": expected " + wanted + ", found " + there + "\n");
+  };
   for (const auto& [what, line] : expected) {
     const auto other = found.find(what);
     if (other == found.end()) {
-      text += "  " + what + ": expected " + line + ", found nothing\n";
+      add(what, line, "nothing");
     } else if (other->second != line) {
-      text += "  " + what + ": expected " + line + ", found " + other->second + "\n";
+      add(what, line, other->second);
     }
   }
   for (const auto& [what, line] : found) {
-    if (!expected.contains(what)) text += "  " + what + ": expected nothing, found " + line + "\n";
+    if (!expected.contains(what)) add(what, "nothing", line);
   }
-  return text;
+  std::ranges::stable_sort(lines, {}, &std::pair<int, std::string>::first);
+  std::string text;
+  const std::size_t shown = std::min(lines.size(), kShown);
+  for (std::size_t i = 0; i < shown; ++i) text += lines[i].second;
+  const std::size_t more = lines.size() - shown;
+  return more == 0 ? text : text + "  and " + std::to_string(more) + " more differences\n";
 }
 
 /// Drops lines that may be missing on one side: units, and requests that the program does not use.

@@ -23,7 +23,8 @@ void check(const Schema& schema);
 /// Hash of layout, names, limits and requests.
 std::uint64_t hash(const Schema& schema);
 
-/// What differs, a line each, in words; empty if nothing does. A watchdog may be set otherwise.
+/// The first five differences, a line each, in words, and how many more there are; empty if nothing
+/// differs. A watchdog may be set otherwise.
 std::string difference(const Schema& expected, const Schema& found);
 
 /// The differences that matter to a program compiled for `expected`: offsets and kinds of the

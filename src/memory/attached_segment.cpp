@@ -7,12 +7,15 @@
 #include <cerrno>
 #include <cstring>
 #include <utility>
+#include <vector>
 
 #include "memory/atomic_words.hpp"
 #include "memory/file_owner.hpp"
 #include "memory/segment_file.hpp"
 #include "memory/segment_name.hpp"
+#include "memory/verb_word.hpp"
 #include "o80/base/error.hpp"
+#include "o80/base/nearest_name.hpp"
 #include "o80/memory/segment_list.hpp"
 
 namespace o80 {
@@ -25,11 +28,30 @@ constexpr std::int64_t kKnownFor = 20'000'000;  // validity of a query of the lo
 
 std::string segment_called(std::string_view name) { return "segment '" + std::string(name) + "'"; }
 
-std::string what_there_is() {
-  std::string text;
-  for (const SegmentEntry& entry : list_segments())
-    text += (text.empty() ? "" : ", ") + entry.name + " (" + name_of(entry.life) + ")";
-  return text.empty() ? "There is no segment at all." : "There are: " + text + ".";
+/// For a name that no segment has: what may be meant, what there is, and what to do.
+std::string other_segments(std::string_view name) {
+  if (const std::string problem = directory_problem(); !problem.empty()) return problem;
+  std::vector<std::string> names;
+  std::vector<std::string> known;
+  for (const SegmentEntry& entry : list_segments()) {
+    names.push_back(entry.name);
+    known.push_back(entry.name + " (" + name_of(entry.life) + ")");
+  }
+  if (names.empty()) return "Nothing runs in " + segment_directory() + ": start a robot, `o80 run`";
+  const std::string near = nearest_name(name, names);
+  if (!near.empty()) return "Did you mean '" + near + "'? `o80 list` shows all";
+  return "There are: " + first_names(known) + ". Start a robot with `o80 run`";
+}
+
+/// Why a backend that starts is not there yet.
+std::string starting_text(const AttachedSegment& segment) {
+  std::string text =
+      "its backend (pid " + std::to_string(segment.header().pid) + ") is still starting";
+  const SlowVerb slow = slow_verb(segment.view());
+  if (slow.verb == Verb::none) return text;
+  const std::int64_t seconds = (monotonic_now() - slow.since) / 1'000'000'000;
+  return text + ": " + std::string(to_text(slow.verb)) + "() of its driver has been running for " +
+         std::to_string(seconds) + " s";
 }
 
 }  // namespace
@@ -43,7 +65,7 @@ std::optional<AttachedSegment> AttachedSegment::open(std::string_view name, Acce
   segment.file_ = LockFile::open(segment.path_, O_RDONLY | O_NOFOLLOW);
   if (!segment.file_.is_open()) {
     const int error = errno;
-    reason = "there is no such segment";
+    reason = "no segment has that name";
     if (error == ENOENT) return std::nullopt;
     throw SegmentError(segment_called(name) + " cannot be opened (" + segment.path_ + " of user " +
                        owner_of(segment.path_) + "): " + std::strerror(error) +
@@ -119,24 +141,26 @@ class SegmentSearch {
       found_ = AttachedSegment::open(name_, access_, reason_);
     if (!found_) return false;
     if (found_->epoch() == options_.ignore_epoch) {
-      reason_ = "its new backend has not come";
+      reason_ = "no new backend has started";
       return false;
     }
     const Life life = found_->life();
     if (life == Life::running) return true;
     if (life == Life::starting && options_.starting) return true;
     if (life == Life::starting) {
-      reason_ = "its backend is still starting";
+      reason_ = starting_text(*found_);
       return false;
     }
     if (options_.dead == AttachOptions::Dead::accept) return true;
     if (life == Life::failed) found_->throw_gone(life);
-    reason_ = std::string("its last backend was ") + name_of(life) + ", and no new one has come";
+    reason_ = std::string("its last backend was ") + name_of(life) +
+              ", and no new one has started. Start it again; until then its history can be read";
     return false;
   }
 
   AttachedSegment found() { return std::move(*found_); }
-  const std::string& reason() const noexcept { return reason_; }
+  /// Why there is none, and what to do about it.
+  std::string reason() const { return found_ ? reason_ : reason_ + ". " + other_segments(name_); }
 
  private:
   std::string_view name_;
@@ -153,9 +177,8 @@ AttachedSegment AttachedSegment::attach(std::string_view name, Access access,
   for (int polls = 0;; ++polls) {
     if (search.look()) return search.found();
     if (deadline.over())
-      throw TimeoutError(segment_called(name) +
-                         " has no running backend within the time given: " + search.reason() +
-                         ". " + what_there_is() + " Start one with `o80 run`, or check the name.");
+      throw TimeoutError(segment_called(name) + " has no running backend" +
+                         (polls == 0 ? ": " : " within the time given: ") + search.reason() + ".");
     if (polls % kPollsBetweenChecks == 0 && options.keep_waiting && !options.keep_waiting())
       throw Cancelled("the wait for " + segment_called(name) + " was cancelled");
     const timespec pause{.tv_sec = 0, .tv_nsec = std::max<long>(deadline.left(kPoll), 1000)};

@@ -105,11 +105,19 @@ bool NamedSegment::is_alive() const {
   return false;
 }
 
-std::string NamedSegment::taken_text() const {
+std::string NamedSegment::backend_text() const {
   SegmentHeader header{};
   const bool known = epoch_of(descriptor()) != 0 && read_header(descriptor(), header);
-  return "segment '" + name_ + "' already has a backend" +
-         (known ? " (" + describe_owner(header) + ")" : std::string()) +
+  return "a backend" + (known ? " (" + describe_owner(header) + ")" : std::string());
+}
+
+std::string NamedSegment::in_use_text() const {
+  return "segment '" + name_ + "' is not removed: it has " + backend_text() +
+         " that lives. Stop it first with `o80 stop " + name_ + "`";
+}
+
+std::string NamedSegment::taken_text() const {
+  return "segment '" + name_ + "' already has " + backend_text() +
          ".\nStop it first with `o80 stop " + name_ +
          "`, or give this one another name with --segment.";
 }

@@ -38,6 +38,8 @@ class NamedSegment {
   bool is_alive() const;
   /// The text of the error for a second backend.
   std::string taken_text() const;
+  /// What refuses to remove it while its backend lives.
+  std::string in_use_text() const;
   /// Unlinks both files, the segment file first, so that a name never leads to a segment without
   /// its commanders' file. False if the name could not be removed. Needs the lock.
   bool remove() noexcept;
@@ -45,6 +47,7 @@ class NamedSegment {
   void remove_commands() noexcept;
 
  private:
+  std::string backend_text() const;
   const LockFile& deciding() const noexcept { return commands_.is_open() ? commands_ : file_; }
 
   std::string name_;

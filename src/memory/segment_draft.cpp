@@ -137,6 +137,8 @@ SegmentDraft::~SegmentDraft() {
 }
 
 void SegmentDraft::fail(const std::string& what, int error) const {
+  const std::string problem = error == ENOENT ? directory_problem() : "";
+  if (!problem.empty()) throw SegmentError("cannot create segment '" + name_ + "'. " + problem);
   throw SegmentError("cannot create segment '" + name_ + "': " + what + ": " +
                      std::strerror(error));
 }

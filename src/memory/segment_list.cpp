@@ -72,9 +72,9 @@ bool clean(std::string_view name) {
   sweep_orphans();
   NamedSegment segment = NamedSegment::open(name);
   bool removed = false;
-  if (segment.is_open() && segment.is_alive()) throw SegmentTaken(segment.taken_text());
+  if (segment.is_open() && segment.is_alive()) throw SegmentTaken(segment.in_use_text());
   if (segment.can_lock() && !remove_dead(segment, removed))
-    throw SegmentTaken(segment.taken_text());
+    throw SegmentTaken(segment.in_use_text());
   if (!removed && access(segment_path(name).c_str(), F_OK) == 0)
     throw SegmentError("segment '" + std::string(name) + "' cannot be removed by this user: " +
                        segment_path(name) + " belongs to user " + owner_of(segment_path(name)));

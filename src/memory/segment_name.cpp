@@ -1,6 +1,7 @@
 #include "memory/segment_name.hpp"
 
 #include <dirent.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <charconv>
@@ -14,6 +15,7 @@ namespace o80 {
 
 namespace {
 
+constexpr const char* kDirectory = "/dev/shm";
 constexpr std::string_view kPrefix = "o80-";
 constexpr std::string_view kCommands = ".commanders-";
 constexpr std::string_view kDraft = ".new-";
@@ -28,7 +30,16 @@ std::string with_epoch(std::string path, std::string_view mark, std::uint64_t ep
 
 std::string segment_directory() {
   const char* directory = secure_getenv("O80_DIRECTORY");
-  return directory != nullptr && *directory != '\0' ? directory : "/dev/shm";
+  return directory != nullptr && *directory != '\0' ? directory : kDirectory;
+}
+
+std::string directory_problem() {
+  const std::string directory = segment_directory();
+  struct stat found{};
+  if (stat(directory.c_str(), &found) == 0 && S_ISDIR(found.st_mode)) return {};
+  const bool given = secure_getenv("O80_DIRECTORY") != nullptr && directory != kDirectory;
+  return "The directory " + directory + (given ? ", which O80_DIRECTORY names, " : " ") +
+         "does not exist: " + (given ? "create it, or unset O80_DIRECTORY" : "mount a tmpfs there");
 }
 
 bool is_segment_name(std::string_view name) noexcept {

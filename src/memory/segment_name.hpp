@@ -10,6 +10,8 @@ namespace o80 {
 
 /// The directory of all segments: the environment variable O80_DIRECTORY, else /dev/shm.
 std::string segment_directory();
+/// Why no segment can lie there, and what to do; empty if it is a directory.
+std::string directory_problem();
 
 /// 1 to 64 of [A-Za-z0-9_.-], not starting with '.', without ".new-" and ".commanders-".
 bool is_segment_name(std::string_view name) noexcept;

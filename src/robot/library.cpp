@@ -1,13 +1,16 @@
 #include "robot/library.hpp"
 
+#include <cxxabi.h>
 #include <dlfcn.h>
 
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <memory>
 #include <sstream>
 
 #include "o80/base/error.hpp"
+#include "o80/base/nearest_name.hpp"
 #include "robot/driver_instance.hpp"
 #include "robot/trusted_library.hpp"
 
@@ -43,9 +46,32 @@ std::string other_versions(const fs::path& robot, const std::string& missing) {
   return found;
 }
 
+/// The function or variable that a library uses and nobody defines, as C++ writes it.
+std::string undefined_symbol(const std::string& message) {
+  constexpr std::string_view kMark = "undefined symbol: ";
+  const std::string::size_type at = message.find(kMark);
+  if (at == std::string::npos) return {};
+  const std::string::size_type begin = at + kMark.size();
+  // ", version NAME" may follow
+  const std::string symbol = message.substr(begin, message.find_first_of(", ", begin) - begin);
+  int status = 0;
+  const std::unique_ptr<char, decltype(&std::free)> plain(
+      abi::__cxa_demangle(symbol.c_str(), nullptr, nullptr, &status), &std::free);
+  return plain == nullptr ? symbol : plain.get();
+}
+
 /// What the dynamic linker said, with the cure: it names one library only.
 std::string why_not_loaded(const std::string& robot, const std::string& message) {
   std::string text = "the robot library '" + robot + "' cannot be loaded: " + message + ". ";
+  if (const std::string symbol = undefined_symbol(message); !symbol.empty()) {
+    const bool of_o80 = symbol.find("o80::") != std::string::npos;
+    return text +
+           (of_o80 ? "Build the robot again with the o80 that is installed, which has no '" +
+                         symbol + "'"
+                   : "It uses '" + symbol +
+                         "', which neither it nor a library that it links defines: add the source "
+                         "file or the library (target_link_libraries) that does");
+  }
   const std::string missing = message.substr(0, message.find(':'));
   if (message.find("cannot open shared object file") == std::string::npos || missing == robot) {
     return text + "Build the robot again with the o80 that is installed";
@@ -59,13 +85,15 @@ std::string why_not_loaded(const std::string& robot, const std::string& message)
 
 std::string where(const std::string& name_or_path) {
   if (name_or_path.find('/') != std::string::npos) return fs::absolute(name_or_path).string();
-  std::string there;
+  std::vector<std::string> known;
   for (const RobotFile& robot : find_robots()) {
     if (robot.name == name_or_path) return robot.path;
-    there += (there.empty() ? "" : ", ") + robot.name;
+    known.push_back(robot.name);
   }
-  throw DriverError("there is no robot '" + name_or_path + "'; there are: " + there +
-                    ". Give the path of its library, or add its folder to O80_ROBOT_PATH");
+  throw DriverError(
+      "there is no robot '" + name_or_path + "'" + names_instead(name_or_path, known) +
+      ". `o80 run` lists all. Else give the path of its library, or add its folder to "
+      "O80_ROBOT_PATH");
 }
 
 }  // namespace

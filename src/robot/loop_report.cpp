@@ -3,6 +3,7 @@
 #include <pthread.h>
 #include <signal.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <utility>
@@ -38,15 +39,30 @@ std::string words_for(const Halt& halt) {
 }  // namespace
 
 std::optional<std::string> OverrunReport::look(const RowHead& row, std::int64_t now) {
-  if (row.overruns == last_.overruns) return std::nullopt;
+  if (!first_ || row.overruns == first_->overruns) {
+    first_ = row;
+    return std::nullopt;
+  }
   if (said_at_ != 0 && now - said_at_ < kBetweenLines) return std::nullopt;
   said_at_ = now;
-  const RowHead before = std::exchange(last_, row);
-  return std::to_string(row.overruns - before.overruns) + " of the last " +
-         std::to_string(row.iteration - before.iteration) +
-         " iterations were late or missed their tick, " +
+  const RowHead before = *std::exchange(first_, row);
+  const auto rows = static_cast<std::uint32_t>(row.iteration - before.iteration);
+  const double rate =
+      rows * 1e9 / static_cast<double>(std::max<std::int64_t>(row.time - before.time, 1));
+  return late_text(row.overruns - before.overruns, rows, rate, period_) + ", " +
          std::to_string(row.skipped - before.skipped) +
-         " periods were left out: see docs/real_time.md, or lower --frequency";
+         " periods were left out. See docs/real_time.md, or lower --frequency";
+}
+
+std::optional<std::string> HangReport::look(const LoopState& loop, std::int64_t now) {
+  const std::string text = loop.hang();
+  if (text.empty()) {
+    return std::exchange(hangs_, false) ? std::optional("the loop goes on") : std::nullopt;
+  }
+  if (hangs_ && now - said_at_ < kBetweenLines) return std::nullopt;
+  hangs_ = true;
+  said_at_ = now;
+  return text;
 }
 
 LoopReport::LoopReport(std::string segment) : segment_(std::move(segment)) {
@@ -71,11 +87,19 @@ void LoopReport::run() noexcept {
   try {
     // the loop may have ended before this thread began: then stop waiting for its segment
     const KeepWaiting goes_on = [this] { return stop_.load(std::memory_order_acquire) == 0; };
-    const UntypedFrontend watcher(segment_, {.access = Access::read_only, .keep_waiting = goes_on});
-    OverrunReport overruns;
+    // a start() that hangs is reported too
+    const UntypedFrontend watcher(
+        segment_,
+        {.timeout = {}, .access = Access::read_only, .starting = true, .keep_waiting = goes_on});
+    OverrunReport overruns(watcher.period());
+    HangReport hangs;
     std::uint64_t halted = 0;
     while (stop_.load(std::memory_order_acquire) == 0) {
-      if (const auto line = overruns.look(watcher.latest().head(), monotonic_now())) say(*line);
+      const std::int64_t moment = monotonic_now();
+      if (const auto line = hangs.look(loop_state(watcher, moment), moment)) say(*line);
+      if (watcher.published() >= 0) {
+        if (const auto line = overruns.look(watcher.latest().head(), moment)) say(*line);
+      }
       const std::optional<Halt> halt = watcher.halted();
       const std::uint64_t now = halt ? halt->number : 0;
       if (now != halted && halt) say_state(words_for(*halt));

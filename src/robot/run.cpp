@@ -12,6 +12,8 @@
 #include <iterator>
 #include <memory>
 #include <mutex>
+#include <optional>
+#include <string_view>
 #include <thread>
 
 #include "base/printable.hpp"
@@ -122,7 +124,8 @@ void leave_fault(const BackendOptions& options, const char* why) noexcept {
     UntypedBackend backend(Schema(), least);
     backend.end(BackendState::failed, why);
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "o80: who waits to attach cannot be told: %s\n", error.what());
+    if (std::string_view(error.what()) == why) return;  // is said by the caller
+    std::fprintf(stderr, "o80: frontends that wait to attach cannot be told: %s\n", error.what());
   }
 }
 
@@ -184,17 +187,15 @@ int run_robot(const RobotTable& table, const RunOptions& options) {
   const std::unique_ptr<Loop> loop = make_loop(table, options);
   const Running running(*loop);
   if (options.until_eof) watch_input();
+  std::optional<LoopReport> report(std::in_place, loop->backend().name());
   loop->start();
   for (const std::string& refused : set_up_real_time(options.real_time)) {
     complain(refused.c_str());
   }
   announce(table, loop->backend());
   tell_service_manager("READY=1\nSTATUS=runs on segment '" + loop->backend().name() + "'");
-  Ended ended;
-  {
-    const LoopReport report(loop->backend().name());
-    ended = loop->run();
-  }
+  const Ended ended = loop->run();
+  report.reset();
   if (!ended.in_order) complain(ended.fault.c_str());
   tell_service_manager("STOPPING=1\nSTATUS=" +
                        (ended.in_order ? "stopped" : printable(ended.fault)));

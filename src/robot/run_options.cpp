@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "o80/base/error.hpp"
+#include "robot/flag_errors.hpp"
 
 namespace o80 {
 
@@ -73,20 +74,25 @@ RunOptions parse_run_options(const RobotTable& table, int argc, char** argv) {
   }
   long_options.push_back({nullptr, 0, nullptr, 0});
 
+  std::vector<std::string> switches;
+  for (const LoopOption& flag : kFlags) {
+    if (flag.is_switch()) switches.push_back(dashed(flag.name));
+  }
+  const std::vector<std::string> words(argv, argv + argc);  // getopt_long changes their order
+
   RunOptions options;
   options.backend.segment = table.name;
   options.real_time.priority = 80;
   bool has_priority = false;
   opterr = 0;
-  optind = 1;
+  optind = 0;  // begins anew, also after a command line that was refused half way
   for (int chosen = 0;
        (chosen = getopt_long(argc, argv, ":", long_options.data(), nullptr)) != -1;) {
     if (chosen == ':') {
       throw InvalidArgument(std::string(argv[optind - 1]) + " needs a value");
     }
     if (chosen == '?' || chosen < 0) {
-      throw InvalidArgument("there is no flag " + std::string(argv[optind - 1]) +
-                            " (or it is ambiguous); see --help");
+      throw InvalidArgument(refused_flag(argv[optind - 1], names, switches));
     }
     const auto index = static_cast<std::size_t>(chosen);
     if (index < kFlags.size()) {
@@ -99,7 +105,7 @@ RunOptions parse_run_options(const RobotTable& table, int argc, char** argv) {
     }
   }
   if (optind < argc) {
-    throw InvalidArgument("'" + std::string(argv[optind]) + "' is no flag; see --help");
+    throw InvalidArgument(refused_word(argv[optind], words, switches));
   }
   if (has_priority && options.real_time.policy == RealTimeOptions::Policy::other) {
     throw InvalidArgument("--priority needs --policy fifo or rr: policy other has no priorities");

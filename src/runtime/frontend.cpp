@@ -5,11 +5,14 @@
 #include <algorithm>
 #include <utility>
 
+#include "o80/base/nearest_name.hpp"
+
 namespace o80 {
 
 UntypedFrontend::UntypedFrontend(const std::string& segment, const FrontendOptions& options) {
   AttachOptions attach;
   attach.dead = options.dead ? AttachOptions::Dead::accept : AttachOptions::Dead::wait;
+  attach.starting = options.starting;
   attach.keep_waiting = options.keep_waiting;
   link_ = std::make_shared<Link>(
       AttachedSegment::attach(segment, options.access, Deadline(options.timeout), attach), nullptr);
@@ -52,13 +55,13 @@ std::uint32_t UntypedFrontend::actuator(std::string_view name) const {
 }
 
 std::uint32_t UntypedFrontend::request_index(std::string_view name) const {
-  std::string there;
   for (std::uint32_t i = 0; i < schema().requests.size(); ++i) {
     if (schema().requests[i].name.view() == name) return i;
-    there += (i == 0 ? "" : ", ") + schema().requests[i].name.str();
   }
-  throw InvalidArgument("'" + segment() + "' serves no request '" + std::string(name) +
-                        (there.empty() ? "': it serves none" : "'; there are: " + there));
+  std::vector<std::string> known;
+  for (const RequestRow& row : schema().requests) known.push_back(row.name.str());
+  throw InvalidArgument("'" + segment() + "' serves no request '" + std::string(name) + "'" +
+                        names_instead(name, known));
 }
 
 // ------------------------------------------------------------------------------ reading

@@ -187,7 +187,7 @@ def test_limits_idle_and_units_reach_the_frontend(segment: str) -> None:
         ({"actuators": ["a"], "dtype": "U8"}, "dtype"),
         ({"actuators": ["a"], "dtype": np.float16}, "float16"),
         ({"actuators": ["a"], "dtype": complex}, "complex"),
-        ({"actuators": ["a"], "limits": {"b": (0, 1)}}, "there are a"),
+        ({"actuators": ["a"], "limits": {"b": (0, 1)}}, "there are: a"),
         ({"actuators": ["a"], "limits": {"a": (1, 0)}}, "limits of actuator 'a'"),
         ({"actuators": ["a"], "when_idle": "rest"}, "'hold' or 'follow'"),
         ({"actuators": ["a"], "frequency": 0}, "frequency"),

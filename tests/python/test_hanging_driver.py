@@ -47,20 +47,33 @@ O80_ROBOT(hanging, Hanging)
 @pytest.fixture(scope="module")
 def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A robot library that hangs where it is told to."""
-    folder = tmp_path_factory.mktemp("hanging")
-    (folder / "hanging.cpp").write_text(DRIVER)
+    return compiled(tmp_path_factory.mktemp("hanging"), "hanging", DRIVER)
+
+
+def compiled(folder: Path, name: str, driver: str) -> Path:
+    """A robot library of this source."""
+    (folder / f"{name}.cpp").write_text(driver)
     include = Path(o80.__file__).parent / "include"
     compiler = (sysconfig.get_config_var("CXX") or "g++").split()[0]
     subprocess.run(
         [compiler, "-std=c++20", "-shared", "-fPIC", "-fvisibility=hidden", f"-I{include}",
-         "hanging.cpp", "-o", "hanging.so"],
+         f"{name}.cpp", "-o", f"{name}.so"],
         cwd=folder,
         check=True,
     )  # fmt: skip
-    return folder / "hanging.so"
+    return folder / f"{name}.so"
 
 
-Hang = Callable[[str], None]
+def line_with(text: str, process: "subprocess.Popen[bytes]") -> str:
+    """The first line with this text that the process prints on its standard error."""
+    assert process.stderr is not None
+    for line in process.stderr:
+        if text in line.decode():
+            return line.decode()
+    raise AssertionError(f"it ended without a line with '{text}'")
+
+
+Hang = Callable[[str], "subprocess.Popen[bytes]"]
 
 
 @pytest.fixture
@@ -68,14 +81,17 @@ def hang(library: Path, segment: str) -> Iterator[Hang]:
     """Starts a robot that hangs in a verb."""
     started: list[subprocess.Popen[bytes]] = []
 
-    def start(verb: str) -> None:
+    def start(verb: str) -> "subprocess.Popen[bytes]":
         command = [O80, "run", str(library), "--segment", segment, "--verb", verb]
-        started.append(subprocess.Popen(command, stderr=subprocess.DEVNULL))
+        started.append(subprocess.Popen(command, stderr=subprocess.PIPE))
+        return started[-1]
 
     yield start
     for process in started:
         process.kill()
         process.wait()
+        assert process.stderr is not None
+        process.stderr.close()
     o80.clean(segment)
 
 
@@ -96,9 +112,9 @@ def until_said(text: str, *command: str) -> str:
 def test_a_start_that_does_not_return_is_listed(segment: str, hang: Hang) -> None:
     hang("start")
 
-    answer = until_said(f"{segment}: start", "list")
+    answer = until_said(f"{segment}: start() of the driver has been running for", "list")
 
-    assert "has not returned for" in answer
+    assert "hangs" in answer
 
 
 def test_a_verb_that_does_not_return_is_listed_and_so_are_missing_rows(
@@ -106,10 +122,69 @@ def test_a_verb_that_does_not_return_is_listed_and_so_are_missing_rows(
 ) -> None:
     hang("write")
 
-    until_said(f"{segment}: write has not returned for", "list")
-    answer = until_said("no row for", "info", segment)
+    answer = until_said("no row for", "list")
+    assert f"{segment}: no row for" in answer
+    assert "write() of the driver has been running for" in answer
+    assert "hangs" in answer
 
-    assert "write has not returned for" in answer
+    answer = until_said("no row for", "info", segment)
+    assert "write() of the driver has been running for" in answer
+
+
+def test_the_process_itself_says_that_its_driver_hangs(segment: str, hang: Hang) -> None:
+    process = hang("write")
+
+    assert "write() of the driver has been running for" in line_with("no row for", process)
+
+
+def test_the_process_itself_says_that_start_hangs(segment: str, hang: Hang) -> None:
+    process = hang("start")
+
+    line_with("start() of the driver has been running for", process)
+
+
+def test_the_process_itself_says_which_rate_it_reaches(segment: str, hang: Hang) -> None:
+    process = hang("late")
+
+    assert "iterations were late" in line_with("Hz reached of 1000", process)
+
+
+def test_python_tells_a_hang_from_standing_still(segment: str, hang: Hang) -> None:
+    hang("write")
+    with o80.Frontend(segment, read_only=True, timeout=WAIT) as frontend:
+        end = time.monotonic() + WAIT
+        while "write() of the driver" not in frontend.trouble:
+            assert time.monotonic() < end
+        assert frontend.slow_verb is not None
+        assert frontend.slow_verb[0] == "write"
+        assert frontend.rate_reached == 0.0
+        assert frontend.row_age is not None
+        assert frontend.row_age > 1.0
+
+
+def test_a_frontend_that_waits_is_told_what_the_driver_is_doing(segment: str, hang: Hang) -> None:
+    hang("start")
+    until_said("start() of the driver", "list")
+
+    with pytest.raises(
+        o80.TimeoutError, match=r"is still starting: start\(\) of its driver has been"
+    ):
+        o80.Frontend(segment, timeout=0.0)
+
+
+def test_a_library_with_an_undefined_function_is_told_its_name(tmp_path: Path) -> None:
+    library = compiled(
+        tmp_path,
+        "undefined",
+        "double torque(int joint);\n"
+        + DRIVER.replace(
+            "void read(o80::Reading<Hanging>&) {}",
+            "void read(o80::Reading<Hanging>&) { torque(1); }",
+        ),
+    )
+
+    with pytest.raises(o80.DriverError, match=r"It uses 'torque\(int\)', which neither it nor a"):
+        o80.robots.load(library)
 
 
 def test_late_iterations_are_listed_with_the_rate_that_is_reached(segment: str, hang: Hang) -> None:

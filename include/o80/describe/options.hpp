@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "o80/base/nearest_name.hpp"
 #include "o80/describe/describe.hpp"
 
 namespace o80 {
@@ -129,10 +130,10 @@ std::vector<Option> options_of() {
 template <class Config>
 void set_option(Config& config, std::string_view name, std::string_view text) {
   bool known = false;
-  std::string there;
+  std::vector<std::string> names;
   o80_describe(Tag<Config>{}, [&]<class Field>(std::string_view field, Field Config::* member,
                                                std::size_t, std::string_view) {
-    there += (there.empty() ? "" : ", ") + std::string(field);
+    names.emplace_back(field);
     if (field != name) return;
     known = true;
     if (!describing::parse_option(text, config.*member)) {
@@ -142,8 +143,8 @@ void set_option(Config& config, std::string_view name, std::string_view text) {
     }
   });
   if (!known) {
-    throw InvalidArgument("there is no option '" + std::string(name) +
-                          (there.empty() ? "': this robot has none" : "'; there are: " + there));
+    throw InvalidArgument("there is no option '" + std::string(name) + "'" +
+                          (names.empty() ? ": this robot has none" : names_instead(name, names)));
   }
 }
 

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "o80/base/nearest_name.hpp"
 #include "o80/describe/hooks.hpp"
 #include "o80/describe/rows.hpp"
 
@@ -303,12 +304,13 @@ inline ActuatorDescription Schema::actuator(std::uint32_t index) {
 }
 
 inline ActuatorDescription Schema::actuator(std::string_view name) {
-  std::string there;
+  std::vector<std::string> known;
   for (std::uint32_t i = 0; i < actuators.size(); ++i) {
     if (actuators[i].name.view() == name) return {*this, i};
-    there += (i == 0 ? "" : ", ") + actuators[i].name.str();
+    known.push_back(actuators[i].name.str());
   }
-  throw InvalidArgument("there is no actuator '" + std::string(name) + "'; there are: " + there);
+  throw InvalidArgument("there is no actuator '" + std::string(name) + "'" +
+                        names_instead(name, known));
 }
 
 inline ActuatorDescription& ActuatorDescription::name(std::string_view name) {
@@ -335,7 +337,7 @@ void ActuatorDescription::each_number(std::string_view field, Visit&& visit) {
   const ActuatorRow& row = schema_.actuators[index_];
   const TypeRow& type = schema_.types.at(row.type);
   std::uint32_t scalar = row.first_limit;
-  std::string there;
+  std::vector<std::string> known;
   for (std::uint32_t i = 0; i < type.fields; ++i) {
     const FieldRow& member = schema_.fields.at(type.first_field + i);
     const std::uint32_t inside =
@@ -345,11 +347,11 @@ void ActuatorDescription::each_number(std::string_view field, Visit&& visit) {
       for (std::uint32_t n = 0; n < numbers; ++n) visit(schema_.limits[scalar + n]);
       return;
     }
-    there += (i == 0 ? "" : ", ") + member.name.str();
+    known.push_back(member.name.str());
     scalar += numbers;
   }
-  throw InvalidArgument("'" + type.name.str() + "' has no field '" + std::string(field) +
-                        "'; there are: " + there);
+  throw InvalidArgument("'" + type.name.str() + "' has no field '" + std::string(field) + "'" +
+                        names_instead(field, known));
 }
 
 inline ActuatorDescription& ActuatorDescription::limits(std::string_view field,

@@ -42,6 +42,7 @@ struct FrontendOptions {
   Timeout timeout = std::chrono::seconds(5);  // to wait for the backend
   Access access = Access::read_write;
   bool dead = false;              // attach also to a backend that is gone, to read its history
+  bool starting = false;          // attach also to one that has not published row 0 yet
   KeepWaiting keep_waiting = {};  // called during the wait for the backend; false ends it
 };
 

@@ -1,7 +1,38 @@
-"""The command line: ``o80 run | list | info | echo | stop | clean``."""
+"""The command line: ``o80 run | list | info | echo | halt | resume | stop | clean``."""
 
 from __future__ import annotations
 
-from o80.cli.app import main
+import os
+import sys
+
+import o80
+from o80.cli.screen import complain
 
 __all__ = ["main"]
+
+
+def main() -> None:
+    """Entry point: o80's own errors become one line and exit code 1."""
+    try:
+        _run(sys.argv[1:])
+    except o80.Error as error:
+        complain(str(error))
+        sys.exit(1)
+    except KeyboardInterrupt:
+        sys.exit(130)
+    except BrokenPipeError:  # `o80 echo arm | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
+
+
+def _run(words: list[str]) -> None:
+    # asked most often, by people and by scripts: it needs no parser, which takes long to import
+    if words in (["list"], ["list", "--json"]):
+        from o80.cli.segment_table import print_segments
+
+        print_segments(as_json="--json" in words)
+        sys.stdout.flush()
+        return
+    from o80.cli.app import app
+
+    app()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from typing import Annotated
 
 import typer
@@ -14,7 +13,6 @@ from o80.cli.halt import halt, resume
 from o80.cli.info import info
 from o80.cli.list_segments import list_segments
 from o80.cli.run import run
-from o80.cli.screen import complain
 from o80.cli.stop import stop
 
 app = typer.Typer(
@@ -23,6 +21,7 @@ app = typer.Typer(
     add_completion=False,
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
+    suggest_commands=True,
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog="A first try: [bold]o80 run two_joints[/bold] here, [bold]o80 list[/bold] and "
     "[bold]o80 echo two_joints[/bold] in another terminal.",
@@ -55,16 +54,3 @@ def root(
     if prefix:
         typer.echo(o80.prefix())
         raise typer.Exit()
-
-
-def main() -> None:
-    """Entry point: o80's own errors become one line and exit code 1."""
-    try:
-        app()
-    except o80.Error as error:
-        complain(str(error))
-        sys.exit(1)
-    except KeyboardInterrupt:
-        sys.exit(130)
-    except BrokenPipeError:
-        sys.exit(0)

@@ -7,7 +7,8 @@ from typing import Annotated
 import typer
 
 import o80
-from o80.cli.screen import out
+from o80 import _core
+from o80.cli.screen import complain
 
 
 def clean(
@@ -20,12 +21,30 @@ def clean(
     Living ones are left alone.
     """
     if segments:
-        removed = [name for each in segments for name in o80.clean(each)]
-        for name in set(segments) - set(removed):
-            out.print(f"there is no segment '{name}'")
-    else:
-        removed = o80.clean()
+        _clean_named(segments)
+        return
+    removed = o80.clean()
     for name in removed:
-        out.print(f"removed {name}")
-    if not removed and not segments:
-        out.print("Nothing to remove.")
+        print(f"removed {name}")
+    if removed:
+        return
+    living = [entry.name for entry in o80.segments() if entry.alive]
+    running = f" ({len(living)} running: left alone)" if living else ""
+    print(f"Nothing to remove{running}.")
+
+
+def _clean_named(names: list[str]) -> None:
+    failed = False
+    known = [entry.name for entry in o80.segments()]
+    for name in dict.fromkeys(names):
+        # one that cannot be removed keeps none of the others
+        try:
+            if o80.clean(name):
+                print(f"removed {name}")
+                continue
+            complain(f"there is no segment '{name}'{_core.names_instead(name, known)}")
+        except o80.Error as error:
+            complain(str(error))
+        failed = True
+    if failed:
+        raise typer.Exit(1)

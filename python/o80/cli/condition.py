@@ -2,69 +2,58 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
-import o80
-
-_SLOW = 1.0  # a verb, or a row, that takes longer is worth a word [s]
+from o80 import _core
 
 
-def halt_text(frontend: o80.Frontend) -> str:
+def halt_text(segment: str, halt: tuple[int, str, int, str, str] | None) -> str:
     """Why it is halted, and how to go on; empty if it is not."""
-    halt = frontend.halted
     if halt is None:
         return ""
-    since = "" if halt.iteration is None else f" since iteration {halt.iteration}"
-    who = f", asked for by {halt.who}" if halt.who else ""
-    reason = f": {halt.text}" if halt.text else ""
+    number, cause, iteration, who, text = halt
+    since = "" if iteration < 0 else f" since iteration {iteration}"
+    by = f", asked for by {who}" if who else ""
+    reason = f": {text}" if text else ""
     return (
-        f"halted{since} (halt {halt.number}, cause {halt.cause}{who}){reason}. "
-        f"Go on with: o80 resume {frontend.segment} {halt.number}"
+        f"halted{since} (halt {number}, cause {cause}{by}){reason}. "
+        f"Go on with: o80 resume {segment} {number}"
     )
 
 
-def running_texts(frontend: o80.Frontend) -> list[str]:
+def running_texts(running: list[tuple[str, int, str, str]]) -> list[str]:
     """The requests that take time and have not ended."""
-    if not frontend.alive:
-        return []
     return [
-        f"request '{request.name}' of {request.who} has been running since iteration "
-        f"{request.since}" + (f": {request.progress}" if request.progress else "")
-        for request in frontend.running_requests
+        f"request '{name}' of {who} has been running since iteration {since}"
+        + (f": {progress}" if progress else "")
+        for name, since, who, progress in running
     ]
 
 
-def start_text(started_at: int) -> str:
-    """What is wrong with a backend that is starting since then [s since 1970]; or nothing."""
-    age = time.time() - started_at
-    if age <= _SLOW + 1:  # the start is known in whole seconds
-        return ""
-    return f"start, or the first read of its driver, has not returned for {age:.0f} s"
+def rate_text(rate: float | None, frequency: float) -> str:
+    """The rate that is reached [1/s], beside the one that was asked for."""
+    return f"{frequency:g} Hz" if rate is None else f"{_rounded(rate)} of {frequency:g} Hz"
 
 
-def loop_text(frontend: o80.Frontend) -> str:
-    """What is wrong with its loop: a driver that hangs, no rows, late iterations; or nothing."""
-    if not frontend.alive or frontend.published < 0:
-        return ""
-    said = []
-    slow = frontend._slow_verb
-    if slow is not None and slow[1] > _SLOW:
-        said.append(f"{slow[0]} has not returned for {slow[1]:.0f} s")
-    if not frontend.bursting:
-        rows = frontend.history(max(2, round(frontend.frequency)))
-        age = (time.monotonic_ns() - rows[-1].time) * 1e-9
-        if age > max(_SLOW, 2 * frontend.period):
-            said.append(f"no row for {age:.0f} s")
-        late = rows[-1].overruns - rows[0].overruns
-        if late:
-            seconds = (rows[-1].time - rows[0].time) * 1e-9
-            rate = (rows[-1].iteration - rows[0].iteration) / seconds if seconds > 0 else 0.0
-            said.append(
-                f"{late} of the last {len(rows)} iterations were late: {rate:.0f} Hz reached of "
-                f"{frontend.frequency:g}"
-            )
-    return "; ".join(said)
+def _rounded(rate: float) -> str:
+    return f"{rate:.0f}" if rate >= 100 else f"{rate:.3g}"
+
+
+def pace_text(loop: _core.LoopState) -> str:
+    """How the loop does, in one line."""
+    if loop.bursting:
+        return f"bursting: runs when a frontend asks for iterations; at row {loop.last}"
+    age = "no row yet" if loop.row_age is None else f"last row {age_text(loop.row_age)} ago"
+    rate = rate_text(loop.rate, loop.frequency)
+    return f"{rate} reached, {loop.overruns} overruns, {loop.skipped} missed ticks, {age}"
+
+
+def age_text(seconds: float) -> str:
+    """A time that has passed, as short as it can be."""
+    for unit, length in (("h", 3600), ("min", 60)):
+        if seconds >= 2 * length:
+            return f"{seconds / length:.0f} {unit}"
+    return f"{seconds:.0f} s" if seconds >= 1 else f"{max(seconds, 0.0) * 1e3:.0f} ms"
 
 
 def watchdog_text(schema: dict[str, Any]) -> str:

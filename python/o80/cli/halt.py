@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 import o80
-from o80.cli.screen import out
+from o80.cli.attach import attach
 
 
 def halt(
@@ -19,19 +19,31 @@ def halt(
     Not a safety function: keep an emergency stop that needs no computer.
     """
     number = o80.halt(segment, reason)
-    out.print(f"halt {number} of {segment}; go on with: o80 resume {segment} {number}")
+    print(f"halt {number} of {segment}; go on with: o80 resume {segment} {number}")
 
 
 def resume(
     segment: Annotated[str, typer.Argument(help="Name of a segment; see o80 list.")],
-    number: Annotated[int | None, typer.Argument(help="Of the halt; default: this one.")] = None,
-    timeout: Annotated[float, typer.Option(help="Seconds to wait for the backend.")] = 5.0,
+    number: Annotated[
+        str | None, typer.Argument(help="Of the halt (default: the one that acts).")
+    ] = None,
+    timeout: Annotated[float, typer.Option(help="Seconds to wait for the robot to rest.")] = 5.0,
 ) -> None:
     """Clear a halt: the robot starts afresh from where it is, with nothing queued."""
-    with o80.Frontend(segment, timeout=1.0) as frontend:
+    chosen = None if number is None else _number(number, segment)
+    with attach(segment, read_only=False) as frontend:
         acting = frontend.halted
         if acting is None:
-            out.print(f"{segment} is not halted")
+            print(f"{segment} is not halted")
             return
-        frontend.resume(acting.number if number is None else number, timeout=timeout)
-        out.print(f"{segment} has resumed")
+        frontend.resume(acting.number if chosen is None else chosen, timeout=timeout)
+        print(f"{segment} has resumed")
+
+
+def _number(text: str, segment: str) -> int:
+    if not text.isdecimal() or int(text) == 0:
+        raise o80.InvalidArgument(
+            f"the number of a halt must be a positive whole number, got '{text}': "
+            f"`o80 info {segment}` shows it, and without a number the halt that acts is cleared"
+        )
+    return int(text)

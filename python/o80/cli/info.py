@@ -5,67 +5,72 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 import typer
-from rich.markup import escape
-from rich.table import Table
 
-import o80
-from o80.cli.condition import halt_text, loop_text, running_texts, watchdog_text
-from o80.cli.screen import out, print_json
+from o80 import _core
+from o80.cli.attach import attach
+from o80.cli.condition import halt_text, pace_text, running_texts, watchdog_text
+from o80.cli.screen import Column, print_json, print_table, style
 
 
 def info(
     segment: Annotated[str, typer.Argument(help="Name of a segment; see o80 list.")],
     as_json: Annotated[bool, typer.Option("--json", help="The whole schema, for tools.")] = False,
-    timeout: Annotated[float, typer.Option(help="Seconds to wait for the backend.")] = 1.0,
 ) -> None:
-    """Describe a robot: actuators, limits, sensor values, requests."""
-    with o80.Frontend(segment, timeout=timeout, read_only=True, dead=True) as frontend:
+    """Describe a robot: how its loop does, actuators, limits, sensor values, requests."""
+    with attach(segment) as frontend:
         schema = frontend.schema
         if as_json:
             print_json(schema)
             return
-        pace = "bursting" if frontend.bursting else f"{frontend.frequency:g} Hz"
-        out.print(
-            f"[bold]{segment}[/bold]: robot {schema['robot']}, {pace}, "
+        loop = _core.loop_state(frontend)
+        print(
+            f"{style(segment, 'bold')}: robot {schema['robot']}, {frontend.life}, "
             f"rows {frontend.oldest} to {frontend.published}, "
             f"{schema['row']['size']} bytes a row"
         )
-        conditions = halt_text(frontend), loop_text(frontend), watchdog_text(schema)
-        for said in (*conditions, *running_texts(frontend)):
+        if frontend.alive:
+            print(pace_text(loop))
+        halt = halt_text(segment, frontend._halted)
+        trouble = loop.trouble if frontend.alive else ""
+        running = running_texts(frontend._running_requests) if frontend.alive else []
+        for said in (halt, trouble, watchdog_text(schema), *running):
             if said:
-                out.print(escape(said), soft_wrap=True)
+                print(said)
         if schema["actuators"]:
-            out.print(_actuators(schema))
+            print()
+            _print_actuators(schema)
         if "extended" in schema:
-            out.print("\n[bold]sensor values[/bold]")
+            print(style("\nsensor values", "bold"))
             for line in _fields(schema["extended"], ""):
-                out.print(f"  {line}", soft_wrap=True)
+                print(f"  {line}")
         if schema["requests"]:
-            out.print("\n[bold]requests[/bold]")
+            print(style("\nrequests", "bold"))
             for request in schema["requests"]:
                 fields = ", ".join(_argument(field) for field in request["type"]["fields"])
                 served = ", also while halted" if request["while_halted"] else ""
-                out.print(f"  {request['name']}({fields})  [dim]{request['help']}{served}[/dim]")
+                told = style(f"{request['help']}{served}", "dim")
+                print(f"  {request['name']}({fields})  {told}".rstrip())
 
 
-def _actuators(schema: dict[str, Any]) -> Table:
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for name in ("", "actuator", "state", "limits", "idle"):
-        table.add_column(name)
+def _print_actuators(schema: dict[str, Any]) -> None:
+    rows = []
     for index, actuator in enumerate(schema["actuators"]):
         fields = schema["groups"][actuator["group"]]["type"]["fields"]
-        table.add_row(
-            str(index),
-            actuator["name"],
-            ", ".join(_field(field) for field in fields),
-            "; ".join(_limit(limit) for limit in actuator["limits"]),
-            actuator["when_idle"],
+        rows.append(
+            [
+                str(index),
+                actuator["name"],
+                ", ".join(_field(field) for field in fields),
+                "; ".join(_limit(limit) for limit in actuator["limits"]),
+                actuator["when_idle"],
+            ]
         )
-    return table
+    names = ("actuator", "state", "limits", "idle")
+    print_table([Column("", right=True), *(Column(name) for name in names)], rows)
 
 
 def _field(field: dict[str, Any]) -> str:
-    unit = f" \\[{field['unit']}]" if field["unit"] else ""
+    unit = f" [{field['unit']}]" if field["unit"] else ""
     shape = f"({', '.join(str(n) for n in field['shape'])})" if field["shape"] else ""
     return f"{field['name'] or field['kind']}{shape}{unit}"
 
@@ -101,7 +106,7 @@ def _fields(described: dict[str, Any], prefix: str) -> list[str]:
     lines: list[str] = []
     for field in described["fields"]:
         text = f"{prefix}{_field(field)}"
-        lines.append(f"{text}  [dim]{field['help']}[/dim]" if field["help"] else text)
+        lines.append(f"{text}  {style(field['help'], 'dim')}" if field["help"] else text)
         if field["kind"] == "struct":
             lines += _fields(field["type"], prefix + "  ")
     return lines

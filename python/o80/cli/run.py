@@ -8,7 +8,7 @@ from pathlib import Path
 import typer
 
 import o80
-from o80.cli.screen import out
+from o80.cli.screen import style
 
 
 def run(context: typer.Context) -> None:
@@ -21,7 +21,7 @@ def run(context: typer.Context) -> None:
     """
     arguments = context.args
     if not arguments or arguments[0] in ("-h", "--help"):
-        out.print(context.get_help())
+        print(context.get_help())
         _print_robots()
         raise typer.Exit(0 if arguments else 2)
     robot, flags = arguments[0], arguments[1:]
@@ -31,6 +31,6 @@ def run(context: typer.Context) -> None:
 
 
 def _print_robots() -> None:
-    out.print("[bold]Robots[/bold]")
+    print(style("Robots", "bold"))
     for robot in o80.robots.list():
-        out.print(f"  {robot.name:<16} {robot.path}", soft_wrap=True)
+        print(f"  {robot.name:<16} {robot.path}")

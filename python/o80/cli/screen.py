@@ -3,14 +3,57 @@
 from __future__ import annotations
 
 import json
+import os
+import shutil
 import sys
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, TextIO
 
-from rich.console import Console
-from rich.markup import escape
+_CODES = {"bold": "1", "dim": "2", "red": "31", "green": "32", "yellow": "33"}
 
-out = Console(highlight=False, soft_wrap=False)
-err = Console(stderr=True, highlight=False)
+
+def style(text: str, name: str, stream: TextIO | None = None) -> str:
+    """The text in a colour or weight, if a terminal shows it."""
+    out = sys.stdout if stream is None else stream
+    if not name or "NO_COLOR" in os.environ or os.environ.get("TERM") == "dumb":
+        return text
+    return f"\033[{_CODES[name]}m{text}\033[0m" if out.isatty() else text
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table."""
+
+    name: str
+    right: bool = False  #: numbers stand right
+    spare: int = 0  #: left out first, the largest first, where the terminal is too narrow
+
+
+def print_table(
+    columns: Sequence[Column], rows: Sequence[Sequence[str]], styles: dict[str, str] | None = None
+) -> None:
+    """A table; a cell whose text is a key of `styles` is shown in that style."""
+    widths = [
+        max(len(cell) for cell in cells) for cells in zip(_names(columns), *rows, strict=True)
+    ]
+    shown = list(range(len(columns)))
+    if sys.stdout.isatty():
+        narrow = shutil.get_terminal_size().columns
+        for i in sorted(shown, key=lambda i: -columns[i].spare):
+            if columns[i].spare and sum(widths[i] + 2 for i in shown) - 2 > narrow:
+                shown.remove(i)
+    for index, row in enumerate([_names(columns), *rows]):
+        cells = []
+        for i in shown:
+            padded = f"{row[i]:>{widths[i]}}" if columns[i].right else f"{row[i]:<{widths[i]}}"
+            chosen = "bold" if index == 0 else (styles or {}).get(row[i], "")
+            cells.append(style(padded, chosen))
+        print("  ".join(cells).rstrip())
+
+
+def _names(columns: Sequence[Column]) -> list[str]:
+    return [column.name for column in columns]
 
 
 def print_json(value: Any) -> None:
@@ -20,5 +63,6 @@ def print_json(value: Any) -> None:
 
 
 def complain(text: str) -> None:
-    """An error, as a person reads it."""
-    err.print(f"[red]o80:[/red] {escape(text)}", soft_wrap=True, markup=True)
+    """An error or a remark, as a person reads it; on stderr."""
+    sys.stdout.flush()
+    print(f"{style('o80:', 'red', sys.stderr)} {text}", file=sys.stderr, flush=True)

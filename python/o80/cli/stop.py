@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 import o80
-from o80.cli.screen import complain, out
+from o80.cli.screen import complain
 
 
 def stop(
@@ -19,7 +19,7 @@ def stop(
     names = [entry.name for entry in o80.segments() if entry.alive] if every else (segments or [])
     if not names:
         if every:
-            out.print("Nothing runs.")
+            print("Nothing runs.")
             return
         raise o80.InvalidArgument("name the segments to stop (see `o80 list`), or give --all")
     failed = False
@@ -31,6 +31,6 @@ def stop(
             complain(str(error))
             failed = True
         else:
-            out.print(f"{name} has stopped")
+            print(f"{name} has stopped")
     if failed:
         raise typer.Exit(1)

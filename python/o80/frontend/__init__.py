@@ -3,6 +3,7 @@
 | file | methods |
 |---|---|
 | describing.py | description of the robot: names, actuators, requests, period, life |
+| watching.py | rate_reached, overruns, missed_ticks, row_age, slow_verb, trouble |
 | observing.py | latest, wait_for, wait_for_next, stream, history, ... |
 | commanding.py | add_command, add_trajectory, add_request, purge, pulse, pulse_and_wait, ... |
 | bursting.py | burst, prepared_burst |

@@ -7,13 +7,13 @@ import numpy as np
 from o80 import _core
 from o80.checked import whole
 from o80.errors import Error
-from o80.frontend.describing import Describing
+from o80.frontend.watching import Watching
 from o80.history import History
 from o80.selection import Selection
 from o80.states import States
 
 
-class Observing(Describing):
+class Observing(Watching):
     """The part of o80.Frontend that reads."""
 
     _first: History | None

@@ -113,7 +113,8 @@ TEST_F(CommandCheckTest, AnUnknownActuatorIsRefusedListingWhatThereIs) {
   for (const std::string& text : {refusal_of([&] { check.actuator("knee"); }),
                                   refusal_of([&] { check.actuator(std::int64_t{3}); }),
                                   refusal_of([&] { check.actuator(std::int64_t{-1}); })}) {
-    EXPECT_THAT(text, HasSubstr("'arm' has joint_0 (0), elbow (1), gripper (2)"));
+    EXPECT_THAT(text, ::testing::ContainsRegex(
+                          "'arm' has no actuator .*; there are: joint_0.*, elbow.*, gripper"));
   }
   EXPECT_THAT(refusal_of([&] { check.actuator("knee"); }), HasSubstr("'knee'"));
 }
@@ -139,7 +140,8 @@ TEST_F(CommandCheckTest, EnumerationsAndBooleansAreWhatTheyMayBe) {
   EXPECT_NO_THROW(check.request(0, gripper(1, 0)));
   EXPECT_THAT(refusal_of([&] { check.request(0, gripper(0, 0)); }), HasSubstr("'shake'"));
   EXPECT_THAT(refusal_of([&] { check.request(0, {}); }), HasSubstr("must have 2 bytes, got 0"));
-  EXPECT_THAT(refusal_of([&] { check.request(1, {}); }), HasSubstr("has shake"));
+  EXPECT_THAT(refusal_of([&] { check.request(1, {}); }),
+              HasSubstr("has no request 1; there are: shake"));
 }
 
 }  // namespace

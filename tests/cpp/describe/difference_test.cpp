@@ -1,5 +1,8 @@
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <string>
+
 #include "describe/described.hpp"
 #include "describe/table.hpp"
 
@@ -9,8 +12,10 @@ namespace {
 using described::MixedRobot;
 using described::schema_of;
 using ::testing::AllOf;
+using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
 using ::testing::Not;
+using ::testing::StartsWith;
 
 TEST(Difference, OfTheSameIsNothing) {
   EXPECT_EQ(difference(schema_of<MixedRobot>(), schema_of<MixedRobot>()), "");
@@ -85,6 +90,20 @@ TEST(Difference, OfALayoutSeesTheValuesOfAnEnumeration) {
     if (label.name.view() == "torque") label.value = 9;
   }
   EXPECT_THAT(layout_difference(expected, found), HasSubstr("torque = 9"));
+}
+
+TEST(Difference, ShowsFiveOfManyThoseFirstThatSayMost) {
+  const Schema expected = schema_of<MixedRobot>();
+  Schema found = expected;
+  found.head.robot = NameText("other");
+  for (ActuatorRow& actuator : found.actuators) actuator.name = NameText("a");
+  for (FieldRow& field : found.fields) field.unit = UnitText("deg");
+
+  const std::string text = difference(expected, found);
+
+  EXPECT_THAT(text, StartsWith("  robot: expected"));
+  EXPECT_EQ(std::ranges::count(text, '\n'), 6);
+  EXPECT_THAT(text, ContainsRegex("\n  and [0-9]+ more differences\n$"));
 }
 
 TEST(Difference, OfHelpsAloneIsSaidToo) {

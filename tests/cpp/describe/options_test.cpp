@@ -74,8 +74,10 @@ TEST(Options, RefuseWhatIsNoSuchValue) {
 }
 
 TEST(Options, ListWhatThereIs) {
-  EXPECT_THAT(refusal("gian", "1"),
-              AllOf(HasSubstr("no option 'gian'"), HasSubstr("address, gain, count")));
+  EXPECT_THAT(refusal("gian", "1"), HasSubstr("no option 'gian'. Did you mean 'gain'?"));
+  EXPECT_THAT(
+      refusal("wheels", "1"),
+      AllOf(HasSubstr("no option 'wheels'; there are: address, gain, count"), HasSubstr(" more")));
   described::Home none;
   EXPECT_THAT(message_of<InvalidArgument>([&] { set_option(none, "x", "1"); }),
               HasSubstr("this robot has none"));

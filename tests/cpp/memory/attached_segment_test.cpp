@@ -41,7 +41,7 @@ TEST_F(AttachedSegmentTest, GivesUpAtItsDeadlineListingWhatThereIs) {
 
   EXPECT_THAT(
       message_of<TimeoutError>([] { AttachedSegment::attach("arm", Access::read_only, soon()); }),
-      AllOf(HasSubstr("'arm'"), HasSubstr("no such segment"), HasSubstr("leg (running)")));
+      AllOf(HasSubstr("'arm'"), HasSubstr("no segment has that name"), HasSubstr("leg (running)")));
 }
 
 TEST_F(AttachedSegmentTest, WaitsForABackendThatComesLaterAndStartsSlowly) {
@@ -189,7 +189,7 @@ TEST_F(AttachedSegmentTest, WaitsPastAStoppedSegmentUnlessItIsToBeRead) {
 
   EXPECT_THAT(
       message_of<TimeoutError>([] { AttachedSegment::attach("arm", Access::read_only, soon()); }),
-      AllOf(HasSubstr("was stopped"), HasSubstr("arm (stopped)")));
+      AllOf(HasSubstr("was stopped"), HasSubstr("no new one has started")));
   EXPECT_EQ(AttachedSegment::attach("arm", Access::read_only, soon(),
                                     {.dead = AttachOptions::Dead::accept})
                 .life(),

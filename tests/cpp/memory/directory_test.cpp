@@ -91,10 +91,11 @@ TEST_F(DirectoryTest, ThatIsNotOursToWriteSaysSo) {
 TEST_F(DirectoryTest, ThatIsMissingIsNamedByEveryVerb) {
   const std::string missing = directory_.path() + "/nowhere";
   setenv("O80_DIRECTORY", missing.c_str(), 1);
-  EXPECT_THAT(refusal(1), HasSubstr(missing));
+  EXPECT_THAT(refusal(1), AllOf(HasSubstr(missing), HasSubstr("unset O80_DIRECTORY")));
   EXPECT_THAT(
       message_of<TimeoutError>([] { AttachedSegment::attach("arm", Access::read_only, soon()); }),
-      HasSubstr("There is no segment at all"));
+      AllOf(HasSubstr(missing + ", which O80_DIRECTORY names, does not exist"),
+            HasSubstr("unset O80_DIRECTORY")));
   EXPECT_TRUE(list_segments().empty());
   EXPECT_TRUE(clean_dead().empty());
   EXPECT_FALSE(clean("arm"));

@@ -1,0 +1,87 @@
+#include "runtime/loop_state.hpp"
+
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+#include <chrono>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "bindings.hpp"
+#include "frontend.hpp"
+#include "o80/runtime/frontend.hpp"
+#include "waiting.hpp"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+
+namespace {
+
+/// Name, iteration, who, progress.
+using RunningFields = std::tuple<std::string, std::int64_t, std::string, std::string>;
+
+/// What `o80 list` shows of a backend: no row is decoded, so NumPy is not needed.
+struct BackendState {
+  std::string robot;
+  o80::LoopState loop;
+  std::optional<HaltFields> halt;
+  std::vector<RunningFields> running;  // requests that take time
+};
+
+BackendState backend_state(const std::string& segment) {
+  const Waiting waiting;
+  const o80::UntypedFrontend frontend(segment, {.timeout = std::chrono::milliseconds(200),
+                                                .access = o80::Access::read_only,
+                                                .dead = true,
+                                                .starting = true,
+                                                .keep_waiting = Waiting::keep_waiting});
+  std::vector<RunningFields> running;
+  for (const o80::RequestUnderWay& each : frontend.running_requests()) {
+    running.emplace_back(each.name, each.since, each.who, each.progress);
+  }
+  return {frontend.schema().head.robot.str(), o80::loop_state(frontend),
+          halt_fields(frontend.halted()), running};
+}
+
+std::optional<double> seconds(std::optional<std::int64_t> nanoseconds) {
+  if (!nanoseconds) return std::nullopt;
+  return static_cast<double>(*nanoseconds) * 1e-9;
+}
+
+std::optional<std::tuple<std::string, double>> slow_verb(const o80::LoopState& state) {
+  if (state.slow_verb == o80::Verb::none) return std::nullopt;
+  return std::tuple{std::string(to_text(state.slow_verb)), *seconds(state.slow_for)};
+}
+
+}  // namespace
+
+void bind_loop_state(nb::module_& m) {
+  using o80::LoopState;
+  nb::class_<LoopState>(m, "LoopState", "How the loop of a backend is doing.")
+      .def_prop_ro("life", [](const LoopState& self) { return std::string(name_of(self.life)); })
+      .def_ro("bursting", &LoopState::bursting)
+      .def_prop_ro("frequency",
+                   [](const LoopState& self) { return 1e9 / static_cast<double>(self.period); })
+      .def_ro("last", &LoopState::last)
+      .def_ro("overruns", &LoopState::overruns)
+      .def_ro("skipped", &LoopState::skipped)
+      .def_ro("rate", &LoopState::rate)
+      .def_ro("recent_rows", &LoopState::recent_rows)
+      .def_ro("recent_overruns", &LoopState::recent_overruns)
+      .def_prop_ro("row_age", [](const LoopState& self) { return seconds(self.row_age); })
+      .def_prop_ro("slow_verb", &slow_verb)
+      .def_prop_ro("stalled", &LoopState::stalled)
+      .def_prop_ro("hang", &LoopState::hang)
+      .def_prop_ro("trouble", &LoopState::trouble);
+  nb::class_<BackendState>(m, "BackendState")
+      .def_ro("robot", &BackendState::robot)
+      .def_ro("loop", &BackendState::loop)
+      .def_ro("halt", &BackendState::halt)
+      .def_ro("running", &BackendState::running);
+  m.def("backend_state", &backend_state, "segment"_a);
+  m.def("loop_state", [](const Frontend& self) { return o80::loop_state(self.untyped()); });
+}

@@ -1,0 +1,15 @@
+#include "o80/base/nearest_name.hpp"
+
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/string_view.h>
+#include <nanobind/stl/vector.h>
+
+#include "bindings.hpp"
+
+namespace nb = nanobind;
+
+void bind_nearest_name(nb::module_& m) {
+  m.def("names_instead", &o80::names_instead, nb::arg("given"), nb::arg("known"),
+        "Ends an error about an unknown name: what there is, and what may be meant.");
+}

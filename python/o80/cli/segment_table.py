@@ -1,0 +1,132 @@
+"""What ``o80 list`` prints. It needs neither NumPy nor a parser, so that it is there at once."""
+
+from __future__ import annotations
+
+import os
+import time
+from typing import Any
+
+import o80
+from o80 import _core
+from o80.cli.condition import age_text, halt_text, rate_text, running_texts
+from o80.cli.screen import Column, print_json, print_table, style
+
+_COLUMNS = (
+    Column("segment"),
+    Column("robot", spare=2),
+    Column("state"),
+    Column("rate"),
+    Column("overruns", right=True),
+    Column("missed", right=True, spare=1),
+    Column("last row", right=True),
+    Column("pid", right=True, spare=3),
+    Column("user", spare=4),
+    Column("up", right=True, spare=5),
+)
+_STYLES = {
+    "running": "green",
+    "starting": "yellow",
+    "halted": "yellow",
+    "hangs": "red",
+    "killed": "red",
+    "failed": "red",
+}
+
+
+def print_segments(*, as_json: bool) -> None:
+    """All backends of this machine, as a table or as JSON."""
+    rows = [_row(entry) for entry in o80.segments()]
+    if as_json:
+        print_json(rows)
+        return
+    if not rows:
+        if problem := _core.directory_problem():
+            raise o80.SegmentError(problem)
+        where = f" in {os.environ['O80_DIRECTORY']}" if os.environ.get("O80_DIRECTORY") else ""
+        print(f"Nothing runs{where}. Start a robot with {style('o80 run two_joints', 'bold')}.")
+        return
+    print_table(_COLUMNS, [_cells(row) for row in rows], _STYLES)
+    for row in rows:
+        for said in (row["halted"], row["state_of_loop"], row["problem"], *row["running"]):
+            if said:
+                print(f"{style(row['segment'], 'yellow')}: {said}")
+    if any(row["state"] in ("killed", "failed", "stopped") for row in rows):
+        print(style("Dead ones can still be read; o80 clean removes them.", "dim"))
+
+
+def _row(entry: o80.Segment) -> dict[str, Any]:
+    row: dict[str, Any] = {
+        "segment": entry.name,
+        "state": entry.life if entry.readable else "unreadable",
+        "problem": entry.problem,
+        "pid": entry.pid,
+        "user": entry.user,
+        "program": entry.program,
+        "started_at": entry.started_at,
+        "bytes": entry.bytes,
+        "robot": None,
+        "frequency": None,
+        "rate": None,
+        "bursting": None,
+        "iteration": None,
+        "overruns": None,
+        "missed_ticks": None,
+        "row_age": None,
+        "hangs": False,
+        "state_of_loop": None,
+        "halted": None,
+        "running": [],
+    }
+    if not entry.readable:
+        return row
+    try:
+        state = _core.backend_state(entry.name)
+    except o80.Error:
+        return row  # it went while we looked
+    loop = state.loop
+    row |= {
+        "robot": state.robot,
+        "frequency": loop.frequency,
+        "rate": loop.rate,
+        "bursting": loop.bursting,
+        "iteration": loop.last,
+        "overruns": loop.overruns,
+        "missed_ticks": loop.skipped,
+        "row_age": loop.row_age,
+        "hangs": entry.alive and bool(loop.hang),
+        "state_of_loop": loop.trouble if entry.alive else "",
+        "halted": halt_text(entry.name, state.halt) if entry.alive else "",
+        "running": running_texts(state.running) if entry.alive else [],
+    }
+    return row
+
+
+def _cells(row: dict[str, Any]) -> list[str]:
+    alive = row["state"] in ("starting", "running")
+    state = row["state"]
+    if row["hangs"]:
+        state = "hangs"
+    elif alive and row["halted"]:
+        state = "halted"
+    return [
+        row["segment"],
+        row["robot"] or "?",
+        state,
+        _rate(row) if alive else "",
+        _count(row["overruns"]),
+        _count(row["missed_ticks"]),
+        "" if row["row_age"] is None else age_text(row["row_age"]),
+        str(row["pid"]) if row["pid"] else "",
+        row["user"],
+        age_text(max(0.0, time.time() - row["started_at"])) if alive else "",
+    ]
+
+
+def _rate(row: dict[str, Any]) -> str:
+    if row["frequency"] is None or row["bursting"]:
+        return "bursting" if row["bursting"] else ""
+    return rate_text(row["rate"], row["frequency"])
+
+
+def _count(number: int | None) -> str:
+    return "" if number is None else str(number)

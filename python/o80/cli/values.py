@@ -1,0 +1,134 @@
+"""The values of a row as plain lists, dictionaries and labels, and the choice of some of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import o80
+from o80 import _core
+
+
+class RowValues:
+    """Turns the rows of one robot into what is printed."""
+
+    def __init__(self, schema: dict[str, Any]) -> None:
+        self._schema = schema
+        self._actuators: list[str] = [actuator["name"] for actuator in schema["actuators"]]
+
+    def plain(self, row: o80.Observation) -> dict[str, Any]:
+        """A row as JSON has it; enumerations by the names of their values."""
+        sensors = self._schema.get("extended")
+        return {
+            "iteration": row.iteration,
+            "time": row.time,
+            "desired": self._states(row.desired),
+            "observed": self._states(row.observed),
+            "extended": None if sensors is None else _described(row.extended, sensors),
+            "active": [bool(value) for value in row.active],
+            "clamped": [bool(value) for value in row.clamped],
+            "braking": [bool(value) for value in row.braking],
+            "halted": row.halted,
+            "overruns": row.overruns,
+            "missed_ticks": row.skipped,
+        }
+
+    def _states(self, states: Any) -> Any:
+        groups = self._schema["groups"]
+        if not groups:
+            return {}
+        if len(groups) == 1 and not groups[0]["name"]:
+            return _described(states, groups[0]["type"])
+        return {group["name"]: _described(states[group["name"]], group["type"]) for group in groups}
+
+    def acting(self, row: o80.Observation) -> str:
+        """Which actuators commands drive, and which brake."""
+        active, braking = row.active, row.braking
+        driven = [name for i, name in enumerate(self._actuators) if active[i] and not braking[i]]
+        slowing = [name for i, name in enumerate(self._actuators) if braking[i]]
+        said = []
+        for word, names in (("driven", driven), ("braking", slowing)):
+            if names:
+                said.append(f"{word} {self._named(names)}")
+        return "  ".join(said) or ("idle" if self._actuators else "")
+
+    def _named(self, names: list[str]) -> str:
+        if len(names) == len(self._actuators) > 2:
+            return "all"
+        rest = f" and {len(names) - 5} more" if len(names) > 5 else ""
+        return ", ".join(names[:5]) + rest
+
+    def choose(self, plain: dict[str, Any], path: str) -> Any:
+        """One value by its path: "observed.elbow", "extended.effort", "observed.position.0".
+
+        Raises InvalidArgument.
+        """
+        value: Any = plain
+        walked = ""
+        for step in path.split("."):
+            known = self._steps(value)
+            if step not in known:
+                where = f"'{walked}' has no value" if walked else "a row has no field"
+                if not known:
+                    raise o80.InvalidArgument(f"--fields: {where} '{step}': it is a plain value")
+                names = [name for name in known if not name.isdecimal()] or list(known)
+                instead = _core.names_instead(step, names)
+                raise o80.InvalidArgument(f"--fields: {where} '{step}'{instead}")
+            value = value[known[step]]
+            walked = f"{walked}.{step}" if walked else step
+        return value
+
+    def _steps(self, value: Any) -> dict[str, Any]:
+        """What may follow in a path: names of fields and actuators, or indices."""
+        if isinstance(value, dict):
+            return {name: name for name in value}
+        if not isinstance(value, list):
+            return {}
+        indices = {str(i): i for i in range(len(value))}
+        named = len(value) == len(self._actuators)
+        names = {name: i for i, name in enumerate(self._actuators)} if named else {}
+        return names | indices
+
+
+def _described(value: Any, described: dict[str, Any]) -> Any:
+    """A value of a described type, or an array of such."""
+    fields = described["fields"]
+    if len(fields) == 1 and not fields[0]["name"]:
+        return _labelled(_listed(value), fields[0])
+    return {field["name"]: _member(value[field["name"]], field) for field in fields}
+
+
+def _member(value: Any, field: dict[str, Any]) -> Any:
+    if field["kind"] == "struct":
+        return _described(value, field["type"])
+    return _labelled(_listed(value), field)
+
+
+def _listed(value: Any) -> Any:
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+def _labelled(value: Any, field: dict[str, Any]) -> Any:
+    """Names instead of the numbers of an enumeration; a number without a name stays."""
+    if field["kind"] != "enum":
+        return value
+    if isinstance(value, list):
+        return [_labelled(each, field) for each in value]
+    for label, number in field["labels"].items():
+        if number == value:
+            return label
+    return value
+
+
+def text(value: Any) -> str:
+    """A plain value in one line."""
+    if isinstance(value, dict):
+        return " ".join(f"{name} {_inner(each)}" for name, each in value.items())
+    return _inner(value)
+
+
+def _inner(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{" + text(value) + "}"
+    if isinstance(value, list):
+        return "(" + " ".join(_inner(each) for each in value) + ")"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,46 @@
+"""How a frontend tells whether the loop of its backend keeps up."""
+
+from o80 import _core
+from o80.frontend.describing import Describing
+
+
+class Watching(Describing):
+    """The part of o80.Frontend that watches the loop of the backend."""
+
+    @property
+    def rate_reached(self) -> float | None:
+        """Iterations a second over the last second of rows [1/s].
+
+        0.0 if rows have stopped coming. None in bursting, whose time is simulated, and before there
+        are two rows.
+        """
+        return _core.loop_state(self).rate
+
+    @property
+    def overruns(self) -> int:
+        """Late iterations since the start."""
+        return _core.loop_state(self).overruns
+
+    @property
+    def missed_ticks(self) -> int:
+        """Skipped periods, or missed ticks of the robot, since the start."""
+        return _core.loop_state(self).skipped
+
+    @property
+    def row_age(self) -> float | None:
+        """Time since the newest row [s]; None in bursting, and before row 0."""
+        return _core.loop_state(self).row_age
+
+    @property
+    def slow_verb(self) -> tuple[str, float] | None:
+        """The function of the driver that has not returned, and for how long [s]; or None.
+
+        Calls shorter than some 20 ms are not noticed. In bursting, None means that the backend
+        waits for a burst.
+        """
+        return _core.loop_state(self).slow_verb
+
+    @property
+    def trouble(self) -> str:
+        """Missing rows with the cause, or overruns with the rate reached; empty if all is well."""
+        return _core.loop_state(self).trouble

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "memory/verb_word.hpp"
+#include "o80/base/time.hpp"
+#include "o80/memory/life.hpp"
+
+namespace o80 {
+
+class UntypedFrontend;
+
+/// How the loop of a backend is doing, from its rows and counters.
+struct LoopState {
+  Life life = Life::killed;
+  int pid = 0;
+  bool process_stopped = false;  // by SIGSTOP or a debugger
+  bool bursting = false;
+  std::int64_t period = 0;     // [ns]
+  Iteration last = -1;         // the newest row; -1: none yet
+  std::uint32_t overruns = 0;  // so far
+  std::uint32_t skipped = 0;   // periods left out, or ticks of the robot missed, so far
+
+  // over the last second of rows, or the last two rows; nothing in simulated time
+  std::optional<double> rate;  // reached [1/s]; 0: no row has come for two periods and a second
+  std::uint32_t recent_rows = 0;
+  std::uint32_t recent_overruns = 0;
+
+  std::optional<std::int64_t> row_age;  // of the newest row [ns]; nothing in simulated time
+  Verb slow_verb = Verb::none;          // a call into the driver that has not returned
+  std::int64_t slow_for = 0;            // [ns]
+
+  /// No row has come for longer than a second and two periods.
+  bool stalled() const noexcept;
+  /// Why no row comes although one should; empty if that is not so.
+  std::string hang() const;
+  /// What an operator should know: the same, and overruns with the rate that is reached.
+  std::string trouble() const;
+};
+
+/// "303 of the last 304 iterations were late or missed their tick: 99 Hz reached of 1000"
+std::string late_text(std::uint32_t overruns, std::uint32_t rows, double rate, std::int64_t period);
+
+/// Reads a few rows; throws Closed, UsedAfterFork.
+LoopState loop_state(const UntypedFrontend& frontend, std::int64_t now = monotonic_now());
+
+}  // namespace o80

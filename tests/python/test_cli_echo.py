@@ -1,0 +1,184 @@
+"""`o80 echo`: which values it shows, what it says beside them, and how it ends."""
+
+import json
+import os
+import pty
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from enum import IntEnum
+from pathlib import Path
+
+import pytest
+
+import o80
+
+WAIT = 60.0  # [s] longer than any answer should take
+O80 = str(Path(sys.executable).parent / "o80")
+
+
+class Gear(IntEnum):
+    """What an enumeration of a sensor holds."""
+
+    NEUTRAL = 0
+    FORWARD = 4
+
+
+@pytest.fixture
+def backend(segment: str) -> Iterator[o80.Backend]:
+    """Two joints and a gear box, iterated by hand."""
+    with o80.Backend(
+        segment,
+        actuators=["shoulder", "elbow"],
+        extended={"gear": Gear, "force": "f8"},
+        bursting=False,
+    ) as made:
+        made.publish([0.0, 0.5], {"gear": Gear.FORWARD, "force": 1.5})
+        yield made
+
+
+def echo(segment: str, *words: str, fails: bool = False) -> str:
+    """What it prints; its errors if it should fail."""
+    done = subprocess.run(
+        [O80, "echo", segment, *words], capture_output=True, text=True, timeout=WAIT, check=False
+    )
+    assert (done.returncode != 0) == fails, done.stdout + done.stderr
+    assert "Traceback" not in done.stderr
+    return done.stderr if fails else done.stdout
+
+
+def test_an_enumeration_is_shown_by_name(segment: str, backend: o80.Backend) -> None:
+    assert "gear FORWARD force 1.5" in echo(segment, "--count", "1")
+    row = json.loads(echo(segment, "--count", "1", "--json"))
+    assert row["extended"] == {"gear": "FORWARD", "force": 1.5}
+
+
+def test_the_actuators_that_commands_drive_are_named(segment: str, backend: o80.Backend) -> None:
+    assert echo(segment, "--count", "1").rstrip().endswith("idle")
+    with o80.Frontend(segment) as frontend:
+        frontend.add_command("elbow", 1.0, iterations=1000)
+        frontend.pulse()
+        assert backend.step() is not None
+        backend.publish([0.0, 0.5], {"gear": Gear.NEUTRAL, "force": 0.0})
+
+        assert echo(segment, "--count", "1").rstrip().endswith("driven elbow")
+
+
+def test_fields_are_chosen_by_path(segment: str, backend: o80.Backend) -> None:
+    chosen = json.loads(
+        echo(segment, "--count", "1", "--json", "--fields", "observed.elbow,extended.gear,halted")
+    )
+    del chosen["iteration"], chosen["time"]
+    assert chosen == {"observed.elbow": 0.5, "extended.gear": "FORWARD", "halted": False}
+
+
+@pytest.mark.parametrize(
+    ("path", "said"),
+    [
+        ("obsrved", "a row has no field 'obsrved'. Did you mean 'observed'?"),
+        ("observed.elbw", "no value 'elbw'; there are: shoulder, elbow. Did you mean 'elbow'?"),
+        ("extended.geer", "'extended' has no value 'geer'; there are: gear, force. Did you mean"),
+        ("observed.elbow.x", "'observed.elbow' has no value 'x': it is a plain value"),
+    ],
+)
+def test_a_field_that_is_not_there_is_answered_with_the_nearest(
+    segment: str, backend: o80.Backend, path: str, said: str
+) -> None:
+    assert said in echo(segment, "--fields", path, fails=True)
+
+
+def test_a_missing_segment_is_said_at_once(segment: str) -> None:
+    begin = time.monotonic()
+    said = echo(segment, fails=True)
+    assert "no segment has that name" in said
+    assert "within the time given" not in said, "it waited"
+    assert "--wait" in said
+    assert time.monotonic() - begin < WAIT
+
+
+def test_it_waits_for_a_robot_if_told_so(segment: str) -> None:
+    waiting = subprocess.Popen(
+        [O80, "echo", segment, "--wait", "--count", "1", "--json"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert waiting.stderr is not None
+    assert "waiting; Ctrl-C ends it" in waiting.stderr.readline()
+    with o80.Backend(segment, actuators=1) as backend:
+        backend.publish([0.25])
+        printed, _ = waiting.communicate(timeout=WAIT)
+    assert json.loads(printed)["observed"] == [0.25]
+
+
+def test_a_backend_that_waits_for_a_burst_is_said_to_stand_still(segment: str) -> None:
+    with o80.robots.load("two_joints").inline(segment) as frontend:
+        watching = subprocess.Popen(
+            [O80, "echo", segment, "--count", "2"],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        assert watching.stderr is not None
+        said = watching.stderr.readline() + watching.stderr.readline()
+        assert "stands still at row 0 until a frontend asks for iterations" in said
+        frontend.burst(1)
+        printed, _ = watching.communicate(timeout=WAIT)
+    assert watching.returncode == 0
+    assert len(printed.splitlines()) == 2
+
+
+def test_ctrl_c_ends_it_without_a_word(segment: str, backend: o80.Backend) -> None:
+    watching = subprocess.Popen(
+        [O80, "echo", segment], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert watching.stdout is not None
+    watching.stdout.readline()
+    watching.send_signal(signal.SIGINT)
+    _, said = watching.communicate(timeout=WAIT)
+    assert watching.returncode == 130
+    assert "Traceback" not in said
+
+
+def test_a_reader_that_leaves_ends_it_without_a_word(segment: str) -> None:
+    with o80.robots.load("two_joints").start(segment):
+        watching = subprocess.Popen(
+            [O80, "echo", segment, "--every"],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        assert watching.stdout is not None
+        assert watching.stderr is not None
+        watching.stdout.readline()
+        watching.stdout.close()
+        said = watching.stderr.read()
+        watching.wait(timeout=WAIT)
+    watching.stderr.close()
+    assert "Broken" not in said
+    assert "Traceback" not in said
+
+
+def test_a_table_fits_a_terminal_of_80_columns(segment: str, backend: o80.Backend) -> None:
+    parent, child = pty.openpty()
+    subprocess.run(
+        [O80, "list"],
+        stdout=child,
+        check=True,
+        timeout=WAIT,
+        env={**os.environ, "COLUMNS": "80", "NO_COLOR": "1", "TERM": "xterm"},
+    )
+    os.close(child)
+    printed = b""
+    try:
+        while part := os.read(parent, 4096):
+            printed += part
+    except OSError:  # the other end is closed
+        pass
+    os.close(parent)
+    table = [line for line in printed.decode().splitlines() if not line.startswith(segment + ":")]
+    assert segment in printed.decode()
+    assert "rate" in table[0]
+    assert max(map(len, table)) <= 80

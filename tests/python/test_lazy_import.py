@@ -1,0 +1,31 @@
+"""What `import o80` loads, and that every name is there all the same."""
+
+import subprocess
+import sys
+
+import o80
+from o80 import _LAZY
+
+
+def in_a_fresh_interpreter(program: str) -> str:
+    return subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    ).stdout.strip()
+
+
+def test_import_and_list_load_neither_numpy_nor_a_parser() -> None:
+    loaded = "print(sorted({'numpy', 'typer', 'rich'} & set(sys.modules)))"
+    assert in_a_fresh_interpreter(f"import sys, o80; {loaded}") == "[]"
+    listing = "sys.argv = ['o80', 'list', '--json']; import o80.cli; o80.cli.main()"
+    assert in_a_fresh_interpreter(f"import sys; {listing}; {loaded}").endswith("[]")
+
+
+def test_every_public_name_is_there_and_listed() -> None:
+    for name in o80.__all__:
+        assert getattr(o80, name) is not None
+        assert name in dir(o80)
+    assert set(_LAZY) <= set(o80.__all__)
+
+
+def test_a_name_that_is_not_there_is_an_attribute_error() -> None:
+    assert not hasattr(o80, "Fronted")
