@@ -24,12 +24,12 @@ namespace {
 /// Name, iteration, who, progress.
 using RunningFields = std::tuple<std::string, std::int64_t, std::string, std::string>;
 
-/// What `o80 list` shows of a backend: no row is decoded, so NumPy is not needed.
+/// The data of a backend for `o80 list`, which does not need NumPy to decode a row.
 struct BackendState {
   std::string robot;
   o80::LoopState loop;
   std::optional<HaltFields> halt;
-  std::vector<RunningFields> running;  // requests that take time
+  std::vector<RunningFields> running;  // requests
 };
 
 BackendState backend_state(const std::string& segment) {
@@ -61,7 +61,7 @@ std::optional<std::tuple<std::string, double>> slow_verb(const o80::LoopState& s
 
 void bind_loop_state(nb::module_& m) {
   using o80::LoopState;
-  nb::class_<LoopState>(m, "LoopState", "How the loop of a backend is doing.")
+  nb::class_<LoopState>(m, "LoopState", "State of a backend's loop.")
       .def_prop_ro("life", [](const LoopState& self) { return std::string(name_of(self.life)); })
       .def_ro("bursting", &LoopState::bursting)
       .def_prop_ro("frequency",

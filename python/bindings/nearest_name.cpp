@@ -11,5 +11,5 @@ namespace nb = nanobind;
 
 void bind_nearest_name(nb::module_& m) {
   m.def("names_instead", &o80::names_instead, nb::arg("given"), nb::arg("known"),
-        "Ends an error about an unknown name: what there is, and what may be meant.");
+        "The end of an error text about an unknown name: known names and the nearest one.");
 }

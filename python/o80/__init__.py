@@ -1,9 +1,9 @@
-"""Real-time control, simulators and learning code in step, through shared memory."""
+"""Connects learning code, real-time control and simulators through shared memory."""
 
 import importlib
 from typing import TYPE_CHECKING, Any
 
-# at once, so that handlers registered after o80 was imported run before its own at the end
+# imported first, so that exit handlers registered after `import o80` run before its own
 from o80 import at_exit as _at_exit  # noqa: F401
 from o80._core import Batch, Burst, Handle, Observation, Stream, version
 from o80.errors import (
@@ -53,8 +53,8 @@ if TYPE_CHECKING:
     from o80.stopping import stop
     from o80.words import Mode, Profile, Reason, Start, Status
 
-# These are imported when they are first used: they need NumPy, which takes most of the time to
-# import o80, and a command such as `o80 list` can do without.
+# Imported when they are first used: they need NumPy, which takes most of the time of `import o80`,
+# and commands such as `o80 list` do not need them.
 _LAZY = {
     "Actuator": "o80.actuator",
     "Number": "o80.actuator",
@@ -86,7 +86,7 @@ _LAZY = {
     "Status": "o80.words",
 }
 
-if not TYPE_CHECKING:  # or a type checker would believe that every name exists
+if not TYPE_CHECKING:  # otherwise a type checker would accept every name
 
     def __getattr__(name: str) -> Any:
         if name == "robots":

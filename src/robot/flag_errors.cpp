@@ -10,7 +10,7 @@ namespace {
 
 std::string takes_no_value(const std::string& flag, std::string_view value) {
   return "--" + flag + " takes no value, got '" + std::string(value) +
-         "': give it alone for yes, leave it out for no";
+         "': give it without a value, or leave it out";
 }
 
 /// "--name=value" => name; without dashes: nothing.
@@ -49,7 +49,7 @@ std::string refused_word(std::string_view word, std::span<const std::string> wor
     }
   }
   const bool flag_without_dashes = word.find('=') != std::string_view::npos;
-  return "'" + std::string(word) + "' is no flag: flags begin with --" +
+  return "'" + std::string(word) + "' is not a flag: flags begin with --" +
          (flag_without_dashes ? ", for example --" + std::string(word) : "; see --help");
 }
 

@@ -7,12 +7,12 @@
 
 namespace o80 {
 
-// What `o80 run ROBOT ...` says of words it cannot read; `flags` and `switches` without dashes.
+// Error texts for wrong words of a robot's command line. `flags` and `switches` are without dashes.
 
-/// A flag that is unknown or ambiguous, or a switch that was given a value ("--bursting=0").
+/// Text for an unknown or ambiguous flag, or for a switch with a value ("--bursting=0").
 std::string refused_flag(std::string_view word, const std::vector<std::string>& flags,
                          const std::vector<std::string>& switches);
-/// A word that belongs to no flag; `words` is the whole command line.
+/// Text for a word that belongs to no flag; `words` is the whole command line.
 std::string refused_word(std::string_view word, std::span<const std::string> words,
                          const std::vector<std::string>& switches);
 

@@ -46,7 +46,7 @@ std::string other_versions(const fs::path& robot, const std::string& missing) {
   return found;
 }
 
-/// The function or variable that a library uses and nobody defines, as C++ writes it.
+/// The undefined function or variable in an error of the dynamic linker, as C++ writes it.
 std::string undefined_symbol(const std::string& message) {
   constexpr std::string_view kMark = "undefined symbol: ";
   const std::string::size_type at = message.find(kMark);
@@ -65,12 +65,12 @@ std::string why_not_loaded(const std::string& robot, const std::string& message)
   std::string text = "the robot library '" + robot + "' cannot be loaded: " + message + ". ";
   if (const std::string symbol = undefined_symbol(message); !symbol.empty()) {
     const bool of_o80 = symbol.find("o80::") != std::string::npos;
-    return text +
-           (of_o80 ? "Build the robot again with the o80 that is installed, which has no '" +
-                         symbol + "'"
-                   : "It uses '" + symbol +
-                         "', which neither it nor a library that it links defines: add the source "
-                         "file or the library (target_link_libraries) that does");
+    return text + (of_o80
+                       ? "Build the robot again with the o80 that is installed, which has no '" +
+                             symbol + "'"
+                       : "It uses '" + symbol +
+                             "', which is not defined in it or in a library that it links: add the "
+                             "source file or the library (target_link_libraries) that defines it");
   }
   const std::string missing = message.substr(0, message.find(':'));
   if (message.find("cannot open shared object file") == std::string::npos || missing == robot) {
@@ -92,8 +92,8 @@ std::string where(const std::string& name_or_path) {
   }
   throw DriverError(
       "there is no robot '" + name_or_path + "'" + names_instead(name_or_path, known) +
-      ". `o80 run` lists all. Else give the path of its library, or add its folder to "
-      "O80_ROBOT_PATH");
+      ". `o80 run` lists all robots. For a library, give its path (for one in this folder: "
+      "./NAME.so), or add its folder to O80_ROBOT_PATH");
 }
 
 }  // namespace

@@ -51,13 +51,13 @@ std::optional<std::string> OverrunReport::look(const RowHead& row, std::int64_t 
       rows * 1e9 / static_cast<double>(std::max<std::int64_t>(row.time - before.time, 1));
   return late_text(row.overruns - before.overruns, rows, rate, period_) + ", " +
          std::to_string(row.skipped - before.skipped) +
-         " periods were left out. See docs/real_time.md, or lower --frequency";
+         " periods were skipped. See docs/real_time.md, or lower --frequency";
 }
 
 std::optional<std::string> HangReport::look(const LoopState& loop, std::int64_t now) {
   const std::string text = loop.hang();
   if (text.empty()) {
-    return std::exchange(hangs_, false) ? std::optional("the loop goes on") : std::nullopt;
+    return std::exchange(hangs_, false) ? std::optional("the loop continues") : std::nullopt;
   }
   if (hangs_ && now - said_at_ < kBetweenLines) return std::nullopt;
   hangs_ = true;
@@ -87,7 +87,7 @@ void LoopReport::run() noexcept {
   try {
     // the loop may have ended before this thread began: then stop waiting for its segment
     const KeepWaiting goes_on = [this] { return stop_.load(std::memory_order_acquire) == 0; };
-    // a start() that hangs is reported too
+    // attach before row 0, so that a start() that hangs is reported too
     const UntypedFrontend watcher(
         segment_,
         {.timeout = {}, .access = Access::read_only, .starting = true, .keep_waiting = goes_on});

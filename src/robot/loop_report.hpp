@@ -21,23 +21,23 @@ class OverrunReport {
 
  private:
   std::int64_t period_;
-  std::optional<RowHead> first_;  // of those that the next line is about
-  std::int64_t said_at_ = 0;      // [ns], 0: nothing was said yet
+  std::optional<RowHead> first_;  // first row of the next report
+  std::int64_t said_at_ = 0;      // time of the last report [ns]; 0: none yet
 };
 
-/// Decides what a robot's process says about a loop that hangs, at a limited rate.
+/// Makes the report lines about a loop that hangs, at a limited rate.
 class HangReport {
  public:
-  /// The loop, now [ns] => a line, if there is something to say.
+  /// The loop, now [ns] => a line if the loop has begun or ceased to hang.
   std::optional<std::string> look(const LoopState& loop, std::int64_t now);
 
  private:
-  bool hangs_ = false;        // and that was said
-  std::int64_t said_at_ = 0;  // [ns]
+  bool hangs_ = false;        // and that was reported
+  std::int64_t said_at_ = 0;  // time of the last report [ns]
 };
 
-/// Reads the rows of a loop in this process, from a thread of its own, and says on the standard
-/// error when iterations are late, when the loop hangs, and when the backend halts or resumes.
+/// Reads the rows of a loop in this process, in a thread of its own, and reports on the standard
+/// error late iterations, a loop that hangs, and halts and resumes.
 class LoopReport {
  public:
   explicit LoopReport(std::string segment);

@@ -124,8 +124,9 @@ void leave_fault(const BackendOptions& options, const char* why) noexcept {
     UntypedBackend backend(Schema(), least);
     backend.end(BackendState::failed, why);
   } catch (const std::exception& error) {
-    if (std::string_view(error.what()) == why) return;  // is said by the caller
-    std::fprintf(stderr, "o80: frontends that wait to attach cannot be told: %s\n", error.what());
+    if (std::string_view(error.what()) == why) return;  // the caller reports it
+    std::fprintf(stderr, "o80: the fault cannot be published for waiting frontends: %s\n",
+                 error.what());
   }
 }
 

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
 
-/// Whether the process was stopped by a signal or a debugger; false if that cannot be known.
+/// True if the process was stopped by a signal or a debugger; false if that is unknown.
 bool is_process_stopped(int pid, std::uint64_t start) {
   if (pid <= 0 || process_start(pid) != start) return false;
   std::ifstream file("/proc/" + std::to_string(pid) + "/stat");
@@ -27,7 +27,7 @@ bool is_process_stopped(int pid, std::uint64_t start) {
   return state == 'T' || state == 't';
 }
 
-/// Reads the heads of rows.
+/// Reads heads of rows.
 class RowHeads {
  public:
   explicit RowHeads(const UntypedFrontend& frontend)
@@ -89,7 +89,7 @@ std::string LoopState::hang() const {
     text += std::string(to_text(slow_verb)) + "() of the driver has been running for " +
             seconds(slow_for);
   } else if (stalled()) {
-    text += ": " + process + " gets no processor time, or its program calls o80 no more";
+    text += ": " + process + " gets no processor time, or its program no longer calls o80";
   }
   return text;
 }

@@ -12,7 +12,7 @@ namespace o80 {
 
 class UntypedFrontend;
 
-/// How the loop of a backend is doing, from its rows and counters.
+/// State of a backend's loop, from its rows and counters.
 struct LoopState {
   Life life = Life::killed;
   int pid = 0;
@@ -21,10 +21,10 @@ struct LoopState {
   std::int64_t period = 0;     // [ns]
   Iteration last = -1;         // the newest row; -1: none yet
   std::uint32_t overruns = 0;  // so far
-  std::uint32_t skipped = 0;   // periods left out, or ticks of the robot missed, so far
+  std::uint32_t skipped = 0;   // periods skipped, or ticks of the robot missed, so far
 
   // over the last second of rows, or the last two rows; nothing in simulated time
-  std::optional<double> rate;  // reached [1/s]; 0: no row has come for two periods and a second
+  std::optional<double> rate;  // reached [1/s]; 0: stalled
   std::uint32_t recent_rows = 0;
   std::uint32_t recent_overruns = 0;
 
@@ -32,11 +32,11 @@ struct LoopState {
   Verb slow_verb = Verb::none;          // a call into the driver that has not returned
   std::int64_t slow_for = 0;            // [ns]
 
-  /// No row has come for longer than a second and two periods.
+  /// True if no row was published for longer than a second and two periods.
   bool stalled() const noexcept;
-  /// Why no row comes although one should; empty if that is not so.
+  /// Reason why no row is published although one is due; empty if rows are published.
   std::string hang() const;
-  /// What an operator should know: the same, and overruns with the rate that is reached.
+  /// hang(), or else recent overruns with the rate that is reached; empty if there is no trouble.
   std::string trouble() const;
 };
 

@@ -12,7 +12,7 @@ __all__ = ["main"]
 
 
 def main() -> None:
-    """Entry point: o80's own errors become one line and exit code 1."""
+    """Entry point. Exceptions of o80 become one line and exit code 1."""
     try:
         _run(sys.argv[1:])
     except o80.Error as error:
@@ -26,7 +26,7 @@ def main() -> None:
 
 
 def _run(words: list[str]) -> None:
-    # asked most often, by people and by scripts: it needs no parser, which takes long to import
+    # `o80 list` is used most: without typer, which takes long to import, it starts faster
     if words in (["list"], ["list", "--json"]):
         from o80.cli.segment_table import print_segments
 

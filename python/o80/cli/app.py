@@ -1,4 +1,4 @@
-"""The program ``o80``: one command a file, gathered here."""
+"""The program ``o80``: gathers the commands, one a file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How commands attach: at once, or not at all unless they are told to wait."""
+"""How commands attach: at once, or with --wait as soon as the backend starts."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from o80.cli.screen import complain
 
 
 def attach(segment: str, *, wait: bool | None = None, read_only: bool = True) -> o80.Frontend:
-    """A frontend of a segment that is there, dead ones too if it only reads.
+    """A frontend of an existing segment; a read-only one also attaches to a dead segment.
 
-    wait: for one that is not there yet, saying so; None: the command has no such flag.
+    wait: True waits for a segment that does not exist yet and says so; None: the command has no
+        flag --wait.
     """
     try:
         return o80.Frontend(segment, 0.0, read_only=read_only, dead=read_only and not wait)

@@ -1,4 +1,4 @@
-"""``o80 clean``: removes what the dead left behind."""
+"""``o80 clean``: removes dead segments."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from o80.cli.screen import complain
 
 def clean(
     segments: Annotated[
-        list[str] | None, typer.Argument(help="Names of segments; none: all dead ones.")
+        list[str] | None, typer.Argument(help="Names of segments (default: all dead ones).")
     ] = None,
 ) -> None:
-    """Remove dead segments. Never needed to start again: a new backend takes a dead name over.
+    """Remove dead segments. A robot can start again without it: it takes over its dead segment.
 
-    Living ones are left alone.
+    Segments of running backends stay.
     """
     if segments:
         _clean_named(segments)
@@ -29,7 +29,7 @@ def clean(
     if removed:
         return
     living = [entry.name for entry in o80.segments() if entry.alive]
-    running = f" ({len(living)} running: left alone)" if living else ""
+    running = f" ({len(living)} running: not removed)" if living else ""
     print(f"Nothing to remove{running}.")
 
 
@@ -37,7 +37,7 @@ def _clean_named(names: list[str]) -> None:
     failed = False
     known = [entry.name for entry in o80.segments()]
     for name in dict.fromkeys(names):
-        # one that cannot be removed keeps none of the others
+        # remove the others even if one cannot be removed
         try:
             if o80.clean(name):
                 print(f"removed {name}")

@@ -1,4 +1,4 @@
-"""What is to be said of a backend that does not simply run: halted, hanging, late."""
+"""Texts about halted, hanging and late backends."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from o80 import _core
 
 
 def halt_text(segment: str, halt: tuple[int, str, int, str, str] | None) -> str:
-    """Why it is halted, and how to go on; empty if it is not."""
+    """The reason of a halt and the command that resumes; empty if there is no halt."""
     if halt is None:
         return ""
     number, cause, iteration, who, text = halt
     since = "" if iteration < 0 else f" since iteration {iteration}"
-    by = f", asked for by {who}" if who else ""
+    by = f", requested by {who}" if who else ""
     reason = f": {text}" if text else ""
     return (
         f"halted{since} (halt {number}, cause {cause}{by}){reason}. "
@@ -22,7 +22,7 @@ def halt_text(segment: str, halt: tuple[int, str, int, str, str] | None) -> str:
 
 
 def running_texts(running: list[tuple[str, int, str, str]]) -> list[str]:
-    """The requests that take time and have not ended."""
+    """A line for each running request."""
     return [
         f"request '{name}' of {who} has been running since iteration {since}"
         + (f": {progress}" if progress else "")
@@ -31,7 +31,7 @@ def running_texts(running: list[tuple[str, int, str, str]]) -> list[str]:
 
 
 def rate_text(rate: float | None, frequency: float) -> str:
-    """The rate that is reached [1/s], beside the one that was asked for."""
+    """The rate that is reached [1/s] and the frequency that was requested."""
     return f"{frequency:g} Hz" if rate is None else f"{_rounded(rate)} of {frequency:g} Hz"
 
 
@@ -40,16 +40,16 @@ def _rounded(rate: float) -> str:
 
 
 def pace_text(loop: _core.LoopState) -> str:
-    """How the loop does, in one line."""
+    """Rate, overruns and age of the last row, in one line."""
     if loop.bursting:
-        return f"bursting: runs when a frontend asks for iterations; at row {loop.last}"
+        return f"bursting: runs when a frontend requests iterations; at row {loop.last}"
     age = "no row yet" if loop.row_age is None else f"last row {age_text(loop.row_age)} ago"
     rate = rate_text(loop.rate, loop.frequency)
     return f"{rate} reached, {loop.overruns} overruns, {loop.skipped} missed ticks, {age}"
 
 
 def age_text(seconds: float) -> str:
-    """A time that has passed, as short as it can be."""
+    """A duration with one unit."""
     for unit, length in (("h", 3600), ("min", 60)):
         if seconds >= 2 * length:
             return f"{seconds / length:.0f} {unit}"
@@ -57,8 +57,8 @@ def age_text(seconds: float) -> str:
 
 
 def watchdog_text(schema: dict[str, Any]) -> str:
-    """What follows when a commander hangs or dies."""
+    """What the backend does when a commander hangs or dies."""
     silence, stale = schema["silence"], schema["stale"]
     if silence:
-        return f"watchdog: {silence} iterations without life, then {stale}"
+        return f"watchdog: {stale} after {silence} iterations without a sign of life"
     return f"no watchdog (--silence); when a commander dies: {stale}"

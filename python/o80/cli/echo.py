@@ -1,4 +1,4 @@
-"""``o80 echo``: the rows of a robot as they come."""
+"""``o80 echo``: prints rows of a robot."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from o80.cli.condition import halt_text, pace_text
 from o80.cli.screen import complain, style
 from o80.cli.values import RowValues, text
 
-_LOOK = 1.0  # between two looks at a loop from which no row comes [s]
-_BETWEEN_REMARKS = 10.0  # about the same [s]
+_LOOK = 1.0  # between two checks of a loop that publishes no row [s]
+_BETWEEN_REMARKS = 10.0  # between two remarks about one trouble [s]
 
 
 def _rate(value: float) -> float:
@@ -40,33 +40,33 @@ def _timeout(value: float | None) -> float | None:
 
 def echo(
     segment: Annotated[str, typer.Argument(help="Name of a segment; see o80 list.")],
-    rate: Annotated[
-        float, typer.Option(callback=_rate, help="Rows printed a second, at most.")
-    ] = 10.0,
-    count: Annotated[int, typer.Option(min=0, help="Stop after so many rows; 0: never.")] = 0,
-    every: Annotated[bool, typer.Option(help="Every row, in order, however many.")] = False,
+    rate: Annotated[float, typer.Option(callback=_rate, help="Most rows printed a second.")] = 10.0,
+    count: Annotated[
+        int, typer.Option(min=0, help="Stop after this number of rows; 0: never.")
+    ] = 0,
+    every: Annotated[bool, typer.Option(help="Print every row, in order.")] = False,
     fields: Annotated[
-        str, typer.Option(help="Only these, for example observed.elbow,extended.effort")
+        str, typer.Option(help="Print only these, for example observed.elbow,extended.effort")
     ] = "",
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object a line.")] = False,
     wait: Annotated[
-        bool, typer.Option("--wait", help="For a robot that is not there yet.")
+        bool, typer.Option("--wait", help="Wait for a robot that has not started yet.")
     ] = False,
     timeout: Annotated[
         float | None,
         typer.Option(callback=_timeout, help="Seconds to wait for a row (default: for ever)."),
     ] = None,
 ) -> None:
-    """Print rows: iteration, time, desired and observed states, sensor values, what acts.
+    """Print rows: iteration, time, states, sensor values, active and braking actuators.
 
-    Of a dead segment: the last ones, and why it ended. Ctrl-C ends it.
+    For a dead segment it prints the last rows and why the backend ended. Ctrl-C ends it.
     """
     with attach(segment, wait=wait) as frontend:
         printer = _Printer(frontend, [path for path in fields.split(",") if path], as_json)
         if not frontend.alive:
             for row in frontend.history(max(count, 1)):
                 printer.print(row)
-            frontend.wait_for(frontend.published + 1, timeout=0)  # raises why it ended
+            frontend.wait_for(frontend.published + 1, timeout=0)  # raises the reason of its end
         printer.print_head()
         for printed, row in enumerate(_rows(frontend, None if every else rate, timeout), 1):
             printer.print(row)
@@ -77,7 +77,7 @@ def echo(
 def _rows(
     frontend: o80.Frontend, rate: float | None, timeout: float | None
 ) -> Iterator[o80.Observation]:
-    """Rows as they come, every one or so many a second; says why none comes."""
+    """Yields every row (rate None), or at most `rate` rows a second; prints why none comes."""
     remarks = _Remarks(frontend)
     row = frontend.latest()
     while True:
@@ -100,7 +100,7 @@ def _rows(
 
 
 class _Remarks:
-    """What is said beside the rows, on stderr, at a limited rate."""
+    """Remarks about halts and troubles of the loop, on stderr, at a limited rate."""
 
     def __init__(self, frontend: o80.Frontend) -> None:
         self._frontend = frontend
@@ -109,7 +109,7 @@ class _Remarks:
         self._said_at = -math.inf
 
     def look(self, waits: bool = False) -> None:
-        """Says that it is halted, late, hangs or stands still."""
+        """Prints a remark if the backend is halted, late, hangs or waits for a burst."""
         halt = self._frontend._halted
         number = halt[0] if halt else 0
         if number != self._halt:
@@ -120,7 +120,7 @@ class _Remarks:
         loop = _core.loop_state(self._frontend)
         said = loop.trouble
         if not said and waits and loop.bursting:
-            said = f"stands still at row {loop.last} until a frontend asks for iterations (burst)"
+            said = f"at row {loop.last}, waits for a frontend to request iterations (burst)"
             if said == self._said:
                 return
         if said:
@@ -137,19 +137,19 @@ class _Printer:
         self._values = RowValues(frontend.schema)
         self._fields = fields
         self._as_json = as_json
-        if frontend.published >= 0:  # a field that there is not is refused before anything else
+        if frontend.published >= 0:  # refuse an unknown field before anything is printed
             plain = self._values.plain(frontend.latest())
             for path in fields:
                 self._values.choose(plain, path)
 
     def print_head(self) -> None:
-        """What runs, where rows are for people; on stderr, so that rows can be piped."""
+        """Prints the state of the loop on stderr, so that rows can be piped; not beside JSON."""
         if not self._as_json:
             head = pace_text(_core.loop_state(self._frontend))
             print(f"{self._frontend.segment}: {head}", file=sys.stderr, flush=True)
 
     def print(self, row: o80.Observation) -> None:
-        """One line."""
+        """Prints a row in one line."""
         plain = self._values.plain(row)
         if self._fields:
             chosen = {path: self._values.choose(plain, path) for path in self._fields}

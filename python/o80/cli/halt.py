@@ -1,4 +1,4 @@
-"""``o80 halt`` and ``o80 resume``: the latched stop of a robot, and its end."""
+"""``o80 halt`` and ``o80 resume``: halt a robot until it is resumed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from o80.cli.attach import attach
 
 def halt(
     segment: Annotated[str, typer.Argument(help="Name of a segment; see o80 list.")],
-    reason: Annotated[str, typer.Argument(help="Why: others read it.")] = "",
+    reason: Annotated[str, typer.Argument(help="Reason, which others can read.")] = "",
 ) -> None:
     """Halt a robot: commands end, it brakes, and nothing moves until it is resumed.
 
@@ -25,11 +25,13 @@ def halt(
 def resume(
     segment: Annotated[str, typer.Argument(help="Name of a segment; see o80 list.")],
     number: Annotated[
-        str | None, typer.Argument(help="Of the halt (default: the one that acts).")
+        str | None, typer.Argument(help="Number of the halt (default: the one in force).")
     ] = None,
-    timeout: Annotated[float, typer.Option(help="Seconds to wait for the robot to rest.")] = 5.0,
+    timeout: Annotated[
+        float, typer.Option(help="Seconds to wait until the robot is at rest.")
+    ] = 5.0,
 ) -> None:
-    """Clear a halt: the robot starts afresh from where it is, with nothing queued."""
+    """Clear a halt: the robot makes a fresh start at its present position, with empty queues."""
     chosen = None if number is None else _number(number, segment)
     with attach(segment, read_only=False) as frontend:
         acting = frontend.halted
@@ -44,6 +46,6 @@ def _number(text: str, segment: str) -> int:
     if not text.isdecimal() or int(text) == 0:
         raise o80.InvalidArgument(
             f"the number of a halt must be a positive whole number, got '{text}': "
-            f"`o80 info {segment}` shows it, and without a number the halt that acts is cleared"
+            f"`o80 info {segment}` shows it; without a number the halt in force is cleared"
         )
     return int(text)

@@ -1,4 +1,4 @@
-"""``o80 info``: what a robot is made of."""
+"""``o80 info``: describes a robot and its loop."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def info(
     segment: Annotated[str, typer.Argument(help="Name of a segment; see o80 list.")],
     as_json: Annotated[bool, typer.Option("--json", help="The whole schema, for tools.")] = False,
 ) -> None:
-    """Describe a robot: how its loop does, actuators, limits, sensor values, requests."""
+    """Describe a robot: state of its loop, actuators, limits, sensor values, requests."""
     with attach(segment) as frontend:
         schema = frontend.schema
         if as_json:
@@ -76,7 +76,7 @@ def _field(field: dict[str, Any]) -> str:
 
 
 def _argument(field: dict[str, Any]) -> str:
-    """A field of a request; one without a default must be given."""
+    """A field of a request, with its default if it has one."""
     if "default" not in field:
         return str(field["name"])
     default = field["default"]

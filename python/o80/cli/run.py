@@ -1,4 +1,4 @@
-"""``o80 run``: becomes the robot's process."""
+"""``o80 run``: runs a robot in this process."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ def run(context: typer.Context) -> None:
     """Run a robot: [bold]o80 run ROBOT FLAGS[/bold].
 
     ROBOT is a name (see [bold]o80 run[/bold] alone) or the path of a robot library.
-    [bold]o80 run ROBOT --help[/bold] lists the robot's own flags beside those of every robot:
+    [bold]o80 run ROBOT --help[/bold] lists the flags of this robot and those of every robot:
     --segment, --frequency, --bursting, --history, --policy, --cpus and more.
-    The process is a C++ program without Python in it; Ctrl-C stops it in order.
+    The process becomes a C++ program without Python; Ctrl-C stops it in order.
     """
     arguments = context.args
     if not arguments or arguments[0] in ("-h", "--help"):

@@ -1,4 +1,4 @@
-"""How the command line prints: tables that fit a terminal, JSON for scripts, errors on stderr."""
+"""Output of the command line: tables that fit a terminal, JSON for scripts, errors on stderr."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _CODES = {"bold": "1", "dim": "2", "red": "31", "green": "32", "yellow": "33"}
 
 
 def style(text: str, name: str, stream: TextIO | None = None) -> str:
-    """The text in a colour or weight, if a terminal shows it."""
+    """The text in a colour or weight, if the stream is a terminal."""
     out = sys.stdout if stream is None else stream
     if not name or "NO_COLOR" in os.environ or os.environ.get("TERM") == "dumb":
         return text
@@ -26,14 +26,14 @@ class Column:
     """A column of a table."""
 
     name: str
-    right: bool = False  #: numbers stand right
-    spare: int = 0  #: left out first, the largest first, where the terminal is too narrow
+    right: bool = False  #: aligned right, for numbers
+    spare: int = 0  #: in a narrow terminal, columns with the largest value are left out first
 
 
 def print_table(
     columns: Sequence[Column], rows: Sequence[Sequence[str]], styles: dict[str, str] | None = None
 ) -> None:
-    """A table; a cell whose text is a key of `styles` is shown in that style."""
+    """Prints a table; a cell whose text is a key of `styles` gets that style."""
     widths = [
         max(len(cell) for cell in cells) for cells in zip(_names(columns), *rows, strict=True)
     ]
@@ -57,12 +57,12 @@ def _names(columns: Sequence[Column]) -> list[str]:
 
 
 def print_json(value: Any) -> None:
-    """One JSON document, ready for a script."""
+    """Prints one JSON document."""
     json.dump(value, sys.stdout, indent=2)
     sys.stdout.write("\n")
 
 
 def complain(text: str) -> None:
-    """An error or a remark, as a person reads it; on stderr."""
+    """Prints an error or a remark on stderr."""
     sys.stdout.flush()
     print(f"{style('o80:', 'red', sys.stderr)} {text}", file=sys.stderr, flush=True)

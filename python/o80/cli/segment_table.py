@@ -1,4 +1,4 @@
-"""What ``o80 list`` prints. It needs neither NumPy nor a parser, so that it is there at once."""
+"""The output of ``o80 list``. It uses neither NumPy nor typer, so that it starts fast."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _STYLES = {
 
 
 def print_segments(*, as_json: bool) -> None:
-    """All backends of this machine, as a table or as JSON."""
+    """Prints all backends of this machine, as a table or as JSON."""
     rows = [_row(entry) for entry in o80.segments()]
     if as_json:
         print_json(rows)
@@ -51,7 +51,7 @@ def print_segments(*, as_json: bool) -> None:
             if said:
                 print(f"{style(row['segment'], 'yellow')}: {said}")
     if any(row["state"] in ("killed", "failed", "stopped") for row in rows):
-        print(style("Dead ones can still be read; o80 clean removes them.", "dim"))
+        print(style("Dead segments can still be read; o80 clean removes them.", "dim"))
 
 
 def _row(entry: o80.Segment) -> dict[str, Any]:
@@ -82,7 +82,7 @@ def _row(entry: o80.Segment) -> dict[str, Any]:
     try:
         state = _core.backend_state(entry.name)
     except o80.Error:
-        return row  # it went while we looked
+        return row  # it has ended since
     loop = state.loop
     row |= {
         "robot": state.robot,

@@ -1,4 +1,4 @@
-"""``o80 stop``: ends backends in order."""
+"""``o80 stop``: stops backends in order."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from o80.cli.screen import complain
 
 def stop(
     segments: Annotated[list[str] | None, typer.Argument(help="Names of segments.")] = None,
-    every: Annotated[bool, typer.Option("--all", help="All backends that run.")] = False,
+    every: Annotated[bool, typer.Option("--all", help="All running backends.")] = False,
     timeout: Annotated[float, typer.Option(help="Seconds to wait for the end of each.")] = 5.0,
 ) -> None:
-    """Stop backends in order: their drivers are stopped, frontends are told."""
+    """Stop backends in order: robots brake, drivers stop, frontends raise BackendStopped."""
     names = [entry.name for entry in o80.segments() if entry.alive] if every else (segments or [])
     if not names:
         if every:
@@ -24,7 +24,7 @@ def stop(
         raise o80.InvalidArgument("name the segments to stop (see `o80 list`), or give --all")
     failed = False
     for name in dict.fromkeys(names):
-        # one that cannot be stopped keeps none of the others running
+        # stop the others even if one cannot be stopped
         try:
             o80.stop(name, timeout)
         except o80.Error as error:

@@ -1,4 +1,4 @@
-"""The values of a row as plain lists, dictionaries and labels, and the choice of some of them."""
+"""Converts rows to plain lists, dictionaries and labels, and selects values by path."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from o80 import _core
 
 
 class RowValues:
-    """Turns the rows of one robot into what is printed."""
+    """Converts the rows of one robot for printing."""
 
     def __init__(self, schema: dict[str, Any]) -> None:
         self._schema = schema
         self._actuators: list[str] = [actuator["name"] for actuator in schema["actuators"]]
 
     def plain(self, row: o80.Observation) -> dict[str, Any]:
-        """A row as JSON has it; enumerations by the names of their values."""
+        """A row as plain values for JSON; enumerations as labels."""
         sensors = self._schema.get("extended")
         return {
             "iteration": row.iteration,
@@ -41,7 +41,7 @@ class RowValues:
         return {group["name"]: _described(states[group["name"]], group["type"]) for group in groups}
 
     def acting(self, row: o80.Observation) -> str:
-        """Which actuators commands drive, and which brake."""
+        """The actuators that commands drive, and those that brake."""
         active, braking = row.active, row.braking
         driven = [name for i, name in enumerate(self._actuators) if active[i] and not braking[i]]
         slowing = [name for i, name in enumerate(self._actuators) if braking[i]]
@@ -78,7 +78,7 @@ class RowValues:
         return value
 
     def _steps(self, value: Any) -> dict[str, Any]:
-        """What may follow in a path: names of fields and actuators, or indices."""
+        """Possible next steps of a path: names of fields and actuators, or indices."""
         if isinstance(value, dict):
             return {name: name for name in value}
         if not isinstance(value, list):
@@ -90,7 +90,7 @@ class RowValues:
 
 
 def _described(value: Any, described: dict[str, Any]) -> Any:
-    """A value of a described type, or an array of such."""
+    """Plain values of a described type, or of an array of it."""
     fields = described["fields"]
     if len(fields) == 1 and not fields[0]["name"]:
         return _labelled(_listed(value), fields[0])
@@ -108,7 +108,7 @@ def _listed(value: Any) -> Any:
 
 
 def _labelled(value: Any, field: dict[str, Any]) -> Any:
-    """Names instead of the numbers of an enumeration; a number without a name stays."""
+    """Labels instead of the numbers of an enumeration; a number without a label stays."""
     if field["kind"] != "enum":
         return value
     if isinstance(value, list):

@@ -64,7 +64,7 @@ class KilledTest : public SegmentTest, public ::testing::WithParamInterface<cons
                                     {.dead = AttachOptions::Dead::accept});
         EXPECT_TRUE(segment.gone());
       } catch (const TimeoutError& none) {
-        EXPECT_THAT(none.what(), ::testing::HasSubstr("no such segment"));
+        EXPECT_THAT(none.what(), ::testing::HasSubstr("no segment has that name"));
       }
     }
   }

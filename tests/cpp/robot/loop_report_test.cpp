@@ -35,14 +35,14 @@ TEST(OverrunReport, SaysHowManyAtOnceAndThenAtALimitedRate) {
   EXPECT_FALSE(report.look(row(0, 0), kSecond / 2));
   EXPECT_THAT(report.look(row(1000, 303, 12), kSecond).value_or(""),
               AllOf(HasSubstr("303 of the last 1000 iterations were late or missed their tick"),
-                    HasSubstr("100 Hz reached of 1000, 12 periods were left out")));
+                    HasSubstr("100 Hz reached of 1000, 12 periods were skipped")));
   for (int second = 2; second < 11; ++second) {
     EXPECT_FALSE(report.look(row(second * 1000, 303 * static_cast<std::uint32_t>(second)),
                              second * kSecond));
   }
   EXPECT_THAT(report.look(row(11000, 3333, 12), 11 * kSecond).value_or(""),
               AllOf(HasSubstr("3030 of the last 10000 iterations were late"),
-                    HasSubstr("0 periods were left out")));
+                    HasSubstr("0 periods were skipped")));
   EXPECT_FALSE(report.look(row(30000, 3333, 12), 30 * kSecond)) << "none since";
 }
 
@@ -72,7 +72,7 @@ TEST(HangReport, SaysWhatHangsAtALimitedRateAndWhenItIsOver) {
 
   loop.row_age = 0;
   loop.slow_verb = Verb::none;
-  EXPECT_EQ(report.look(loop, 13 * kSecond).value_or(""), "the loop goes on");
+  EXPECT_EQ(report.look(loop, 13 * kSecond).value_or(""), "the loop continues");
   EXPECT_FALSE(report.look(loop, 14 * kSecond));
 }
 

@@ -104,7 +104,7 @@ TEST_F(RunOptionsTest, RefuseWhatIsNotAllowedNamingTheFlag) {
   EXPECT_THAT(refusal({"--gian", "2"}), HasSubstr("Did you mean --gain?"));
   EXPECT_THAT(refusal({"--frequenzy=2"}), HasSubstr("no flag --frequenzy. Did you mean --freq"));
   EXPECT_THAT(refusal({"--la", "2"}), HasSubstr("--la may be --lanes, --lane-blocks"));
-  EXPECT_THAT(refusal({"stray"}), HasSubstr("'stray' is no flag"));
+  EXPECT_THAT(refusal({"stray"}), HasSubstr("'stray' is not a flag"));
   EXPECT_THAT(refusal({"gain=2"}), HasSubstr("for example --gain=2"));
   const char* const no_value = "--bursting takes no value, got '0'";
   EXPECT_THAT(refusal({"--bursting", "0"}), HasSubstr(no_value));
