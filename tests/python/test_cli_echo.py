@@ -113,7 +113,7 @@ def test_it_waits_for_a_robot_if_told_so(segment: str) -> None:
     assert json.loads(printed)["observed"] == [0.25]
 
 
-def test_a_backend_that_waits_for_a_burst_is_said_to_stand_still(segment: str) -> None:
+def test_echo_says_that_a_backend_waits_for_a_burst(segment: str) -> None:
     with o80.robots.load("two_joints").inline(segment) as frontend:
         watching = subprocess.Popen(
             [O80, "echo", segment, "--count", "2"],
@@ -123,7 +123,7 @@ def test_a_backend_that_waits_for_a_burst_is_said_to_stand_still(segment: str) -
         )
         assert watching.stderr is not None
         said = watching.stderr.readline() + watching.stderr.readline()
-        assert "stands still at row 0 until a frontend asks for iterations" in said
+        assert "at row 0, waits for a frontend to request iterations" in said
         frontend.burst(1)
         printed, _ = watching.communicate(timeout=WAIT)
     assert watching.returncode == 0

@@ -170,7 +170,7 @@ def test_an_array_that_is_assigned_is_copied_into_its_targets(arm: o80.Frontend)
 @pytest.mark.parametrize("wrong", [[0.3, -0.6], 0.3, [[0.1], [0.2]], "x", None])
 def test_targets_of_another_shape_are_refused(arm: o80.Frontend, wrong: object) -> None:
     burst = arm.prepared_burst(1)
-    with pytest.raises(o80.InvalidArgument, match=r"\(steps, actuators\) = \(1, 2\), not"):
+    with pytest.raises(o80.InvalidArgument, match=r"\(steps, actuators\) = \(1, 2\), got"):
         burst.targets = wrong
 
 

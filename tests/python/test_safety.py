@@ -290,7 +290,7 @@ def test_the_successor_of_a_killed_robot_starts_halted(segment: str) -> None:
         assert halt.cause == "predecessor"
         assert arm.history()[0].halted
         arm.add_command(0, 1.0)
-        with pytest.raises(o80.BackendHalted, match="killed while commands acted"):
+        with pytest.raises(o80.BackendHalted, match="killed while commands were active"):
             arm.pulse_and_wait(timeout=WAIT)
         arm.resume(halt.number)
         arm.add_command(0, 0.1, iterations=5)
