@@ -79,7 +79,9 @@ bool LoopState::stalled() const noexcept {
 std::string LoopState::hang() const {
   const std::string process = "its process (pid " + std::to_string(pid) + ")";
   std::string text;
-  const bool hangs = slow_verb != Verb::none && slow_for > kSecond + (bursting ? 0 : 2 * period);
+  // a verb begins after the row before it, and the helper thread notes it somewhat later
+  const std::int64_t longest = stalled() ? *row_age / 2 : kSecond + (bursting ? 0 : 2 * period);
+  const bool hangs = slow_verb != Verb::none && slow_for > longest;
   if (stalled()) text = "no row for " + seconds(*row_age);
   if (process_stopped) {
     text += text.empty() ? "" : ": ";

@@ -183,7 +183,9 @@ def test_a_library_with_an_undefined_function_is_told_its_name(tmp_path: Path) -
         ),
     )
 
-    with pytest.raises(o80.DriverError, match=r"It uses 'torque\(int\)', which is not defined in it"):
+    with pytest.raises(
+        o80.DriverError, match=r"It uses 'torque\(int\)', which is not defined in it"
+    ):
         o80.robots.load(library)
 
 

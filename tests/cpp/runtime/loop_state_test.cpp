@@ -125,6 +125,15 @@ TEST(LoopState, SaysOfMissingRowsWhatTheDriverDoes) {
             "4711`");
 }
 
+TEST(LoopState, NamesTheVerbFromTheMomentThatRowsAreMissed) {
+  LoopState state = late_loop();
+  state.row_age = kSecond + 3 * state.period;
+  state.slow_verb = Verb::write;
+  state.slow_for = kSecond - 20'000'000;  // the helper thread noted it 23 ms after the row
+
+  EXPECT_THAT(state.hang(), HasSubstr("write() of the driver has been running for"));
+}
+
 TEST(LoopState, AllowsALoopItsOwnPeriod) {
   LoopState state = late_loop();
   state.recent_overruns = 0;
