@@ -99,6 +99,7 @@ std::uint32_t CommandCheck::actuator(std::string_view name) const {
     if (schema_.actuators[i].name.view() == name) return static_cast<std::uint32_t>(i);
   }
   std::vector<std::string> known;
+  known.reserve(schema_.actuators.size());
   for (const ActuatorRow& row : schema_.actuators) known.push_back(row.name.str());
   refuse_actuator("'" + std::string(name) + "'" + names_instead(name, known));
 }
@@ -107,6 +108,7 @@ std::uint32_t CommandCheck::actuator(std::int64_t index) const {
   const auto count = static_cast<std::int64_t>(schema_.actuators.size());
   if (index >= 0 && index < count) return static_cast<std::uint32_t>(index);
   std::vector<std::string> known;
+  known.reserve(schema_.actuators.size());
   for (std::int64_t i = 0; i < count; ++i) {
     known.push_back(schema_.actuators[static_cast<std::size_t>(i)].name.str() + " (" +
                     std::to_string(i) + ")");
@@ -262,6 +264,7 @@ Profile CommandCheck::profile(std::uint32_t index) const {
 void CommandCheck::request(std::uint32_t index, std::span<const std::byte> payload) const {
   if (index >= schema_.requests.size()) {
     std::vector<std::string> known;
+    known.reserve(schema_.requests.size());
     for (const RequestRow& row : schema_.requests) known.push_back(row.name.str());
     throw InvalidArgument("'" + schema_.head.robot.str() + "' has no request " +
                           std::to_string(index) + names_instead("", known));

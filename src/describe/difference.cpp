@@ -139,8 +139,11 @@ std::string compare(const Lines& expected, const Lines& found) {
   std::vector<std::pair<int, std::string>> lines;
   const auto add = [&](const std::string& what, const std::string& wanted,
                        const std::string& there) {
-    lines.emplace_back(rank(what),
-                       "  " + what + ": expected " + wanted + ", found " + there + "\n");
+    std::pair<int, std::string> line{
+        rank(what), "  " + what + ": expected " + wanted + ", found " + there + "\n"};
+    const auto place =
+        std::ranges::upper_bound(lines, line.first, {}, &std::pair<int, std::string>::first);
+    lines.insert(place, std::move(line));
   };
   for (const auto& [what, line] : expected) {
     const auto other = found.find(what);
@@ -153,7 +156,6 @@ std::string compare(const Lines& expected, const Lines& found) {
   for (const auto& [what, line] : found) {
     if (!expected.contains(what)) add(what, "nothing", line);
   }
-  std::ranges::stable_sort(lines, {}, &std::pair<int, std::string>::first);
   std::string text;
   const std::size_t shown = std::min(lines.size(), kShown);
   for (std::size_t i = 0; i < shown; ++i) text += lines[i].second;

@@ -53,9 +53,10 @@ void hide_running(RunningSlot& slot) noexcept { slot.number.store(0, std::memory
 std::vector<RunningRequest> running_requests(const SegmentView& view) {
   std::vector<RunningRequest> all;
   for (const RunningSlot& slot : view.counters().running) {
-    if (const auto request = whole_running(slot)) all.push_back(*request);
+    const auto request = whole_running(slot);
+    if (!request) continue;
+    all.insert(std::ranges::upper_bound(all, request->since, {}, &RunningRequest::since), *request);
   }
-  std::ranges::stable_sort(all, {}, &RunningRequest::since);
   return all;
 }
 

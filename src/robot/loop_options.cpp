@@ -5,6 +5,8 @@
 #include <charconv>
 #include <cmath>
 #include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "o80/base/error.hpp"
@@ -23,8 +25,9 @@ constexpr unsigned kEverywhere = kProcess | kInline | kEmbedded;
 /// Reads the whole text as a number; false if it is not one.
 template <class Number, class... Base>
 bool read_number(std::string_view text, Number& number, Base... base) {
-  const char* end = text.data() + text.size();
-  const auto result = std::from_chars(text.data(), end, number, base...);
+  const std::string copy(text);
+  const char* end = copy.c_str() + copy.size();
+  const auto result = std::from_chars(copy.c_str(), end, number, base...);
   return result.ec == std::errc() && result.ptr == end;
 }
 
@@ -61,7 +64,7 @@ bool set_processors(LoopOptions& options, std::string_view text, double /*number
     if (comma == text.size()) break;
     text.remove_prefix(comma + 1);
   }
-  options.real_time.processors = list;
+  options.real_time.processors = std::move(list);
   return true;
 }
 

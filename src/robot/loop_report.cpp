@@ -55,7 +55,7 @@ std::optional<std::string> OverrunReport::look(const RowHead& row, std::int64_t 
 }
 
 std::optional<std::string> HangReport::look(const LoopState& loop, std::int64_t now) {
-  const std::string text = loop.hang();
+  std::string text = loop.hang();
   if (text.empty()) {
     return std::exchange(hangs_, false) ? std::optional("the loop continues") : std::nullopt;
   }

@@ -14,8 +14,6 @@ namespace o80 {
 
 namespace {
 
-const std::span<const LoopOption> kFlags = loop_options();
-
 std::string dashed(std::string name) {
   std::ranges::replace(name, '_', '-');
   return name;
@@ -57,7 +55,7 @@ RunOptions parse_run_options(const RobotTable& table, int argc, char** argv) {
   std::vector<std::string> names;
   std::vector<std::string> robot_options;
   std::vector<option> long_options;
-  for (const LoopOption& flag : kFlags) names.push_back(dashed(flag.name));
+  for (const LoopOption& flag : loop_options()) names.push_back(dashed(flag.name));
   for (const Option& own : options_of(table)) {
     if (std::ranges::find(names, dashed(own.name)) != names.end()) {
       throw InvalidArgument("robot '" + std::string(table.name) + "' has an option '" + own.name +
@@ -68,14 +66,14 @@ RunOptions parse_run_options(const RobotTable& table, int argc, char** argv) {
   for (const std::string& own : robot_options) names.push_back(dashed(own));
   for (const std::string& own : robot_options) names.push_back(own);
   for (std::size_t i = 0; i < names.size(); ++i) {
-    const bool is_switch = i < kFlags.size() && kFlags[i].is_switch();
+    const bool is_switch = i < loop_options().size() && loop_options()[i].is_switch();
     long_options.push_back({names[i].c_str(), is_switch ? no_argument : required_argument, nullptr,
                             static_cast<int>(i)});
   }
   long_options.push_back({nullptr, 0, nullptr, 0});
 
   std::vector<std::string> switches;
-  for (const LoopOption& flag : kFlags) {
+  for (const LoopOption& flag : loop_options()) {
     if (flag.is_switch()) switches.push_back(dashed(flag.name));
   }
   const std::vector<std::string> words(argv, argv + argc);  // getopt_long changes their order
@@ -95,12 +93,12 @@ RunOptions parse_run_options(const RobotTable& table, int argc, char** argv) {
       throw InvalidArgument(refused_flag(argv[optind - 1], names, switches));
     }
     const auto index = static_cast<std::size_t>(chosen);
-    if (index < kFlags.size()) {
+    if (index < loop_options().size()) {
       const char* text = optarg == nullptr ? "true" : optarg;
-      set_loop_option(options, kFlags[index], text, "--" + names[index]);
+      set_loop_option(options, loop_options()[index], text, "--" + names[index]);
       has_priority = has_priority || names[index] == "priority";
     } else {
-      const std::size_t own = (index - kFlags.size()) % robot_options.size();
+      const std::size_t own = (index - loop_options().size()) % robot_options.size();
       options.robot.emplace_back(robot_options[own], optarg);
     }
   }
@@ -126,7 +124,7 @@ std::string run_help(const RobotTable& table) {
     line(out, "--" + dashed(each.name) + " " + each.kind, each.help + unit + otherwise);
   }
   out << "\nThe loop:\n";
-  for (const LoopOption& flag : kFlags) {
+  for (const LoopOption& flag : loop_options()) {
     line(out, "--" + dashed(flag.name) + value_of(flag), help_of(flag));
   }
   return out.str();

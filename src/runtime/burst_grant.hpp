@@ -36,7 +36,11 @@ class BurstGrant {
     incarnation_ = incarnation;
   }
   /// Counts an iteration; true if it was the last one.
-  bool count() noexcept { return left_ > 0 && --left_ == 0; }
+  bool count() noexcept {
+    if (left_ <= 0) return false;
+    --left_;
+    return left_ == 0;
+  }
   /// Makes the current iteration the last one.
   void shorten() noexcept { left_ = 1; }
   void end() noexcept {

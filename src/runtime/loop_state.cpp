@@ -97,7 +97,7 @@ std::string LoopState::hang() const {
 }
 
 std::string LoopState::trouble() const {
-  const std::string hangs = hang();
+  std::string hangs = hang();
   if (!hangs.empty() || recent_overruns == 0 || !rate) return hangs;
   return late_text(recent_overruns, recent_rows, *rate, period);
 }
