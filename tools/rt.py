@@ -21,6 +21,7 @@ LEFT_OUT = (
     # robot libraries: a static program loads none. o80-rt-loop runs a robot of its own instead
     "LibraryTest.*",
     "RunTest.*",
+    "ServiceManagerTest.*",
     "PrivilegedTest.*",
     "InlineRobotTest.GivesTheSameRowsBitForBitAsABurstingProcess",
     "InlineRobotTest.LetsOthersWatchAndCommand",
