@@ -90,10 +90,11 @@ std::string where(const std::string& name_or_path) {
     if (robot.name == name_or_path) return robot.path;
     known.push_back(robot.name);
   }
-  throw DriverError(
-      "there is no robot '" + name_or_path + "'" + names_instead(name_or_path, known) +
-      ". `o80 run` lists all robots. For a library, give its path (for one in this folder: "
-      "./NAME.so), or add its folder to O80_ROBOT_PATH");
+  std::string why = "there is no robot '" + name_or_path + "'" + names_instead(name_or_path, known);
+  if (!why.ends_with('?')) why += '.';
+  throw DriverError(why +
+                    " `o80 run` lists all robots. For a library, give its path (for one in this "
+                    "folder: ./NAME.so), or add its folder to O80_ROBOT_PATH");
 }
 
 }  // namespace
