@@ -58,6 +58,7 @@ rt:
 # a robot as a service, in a virtual machine whose first process is systemd
 systemd:
 	@tools/setup.sh test
+	@tools/setup.sh systemd
 	@.venv/bin/cmake --preset dev > /dev/null
 	@.venv/bin/cmake --build --preset dev
 	@.venv/bin/python tools/systemd.py $(ARGS)

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Sets up what a make target needs: tools/setup.sh demo|test|bench
+# Sets up what a make target needs: tools/setup.sh demo|test|bench|systemd
 # Nothing is done twice; stamps of what was done lie in .venv/stamps.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 PATH=$PATH:/usr/sbin:/sbin # ldconfig, for users whose path lacks them
-purpose=${1:?demo, test or bench}
+purpose=${1:?demo, test, bench or systemd}
 
 mkdir -p build
 exec 9> build/setup.lock
@@ -74,9 +74,13 @@ case $purpose in
   test)
     need_packages g++ ccache libgtest-dev libgmock-dev googletest strace stress-ng rt-tests \
       clang-19 libclang-rt-19-dev llvm-19 relacy-dev spin \
-      qemu-user-static g++-aarch64-linux-gnu qemu-system-x86 busybox-static cpio systemd
+      qemu-user-static g++-aarch64-linux-gnu qemu-system-x86 busybox-static cpio
     ;;
   bench) need_packages g++ rt-tests stress-ng ;;
+  systemd) # what `make systemd` needs beside what `test` brings
+    need_packages systemd
+    exit
+    ;;
   *) say "unknown purpose '$purpose'"; exit 2 ;;
 esac
 # pictures without a screen, where EGL cannot make them; refused, only the film is missing
