@@ -55,6 +55,22 @@ def dtype_of_type(described: dict[str, Any]) -> np.dtype[Any]:
     )
 
 
+def labels_of_type(described: dict[str, Any]) -> dict[Any, Any]:
+    """Labels of enumerations, by field and number; those of nested structs by field and field."""
+    if is_plain(described):
+        return labels_of_field(described["fields"][0])
+    found = {field["name"]: labels_of_field(field) for field in described["fields"]}
+    return {name: labels for name, labels in found.items() if labels}
+
+
+def labels_of_field(field: dict[str, Any]) -> dict[Any, Any]:
+    if field["kind"] == "struct":
+        return labels_of_type(field["type"])
+    if field["kind"] != "enum":
+        return {}
+    return {number: label for label, number in field["labels"].items()}
+
+
 def dtype_of_block(groups: list[dict[str, Any]], size: int) -> np.dtype[Any]:
     """The dtype of all states of a robot."""
     formats = [
@@ -194,12 +210,20 @@ class Layout:
                 found.setdefault(name, values)
         return {name: values for name, values in found.items() if name not in ambiguous}
 
+    @cached_property
+    def _state_labels(self) -> dict[Any, Any]:
+        return {group["name"]: labels_of_type(group["type"]) for group in self.schema["groups"]}
+
+    @cached_property
+    def _extended_labels(self) -> dict[Any, Any]:
+        return labels_of_type(self.schema["extended"]) if "extended" in self.schema else {}
+
     # one row, as a buffer => arrays over its memory
 
     def _block(self, row: Any, offset: int) -> Any:
         if self._is_array:
             return np.ndarray(self._shape, self._element, row, offset)
-        return Record(np.ndarray((), self.states, row, offset))
+        return Record(np.ndarray((), self.states, row, offset), self._state_labels)
 
     def desired(self, row: Any) -> Any:
         return self._block(row, self._desired_at)
@@ -208,7 +232,7 @@ class Layout:
         return self._block(row, self._observed_at)
 
     def extended(self, row: Any) -> Record:
-        return Record(np.ndarray((), self.extras, row, self._extended_at))
+        return Record(np.ndarray((), self.extras, row, self._extended_at), self._extended_labels)
 
     def _mask(self, row: Any, offset: int) -> NDArray[np.bool_]:
         bits = np.ndarray((self._mask_bytes,), np.uint8, row, offset)
@@ -246,13 +270,13 @@ class Layout:
         """The states of an array of rows: (T, actuators), or a record of groups."""
         if not self.actuators:
             return Record(np.empty(len(rows), np.dtype([])))
-        return rows[part] if self._is_array else Record(rows[part])
+        return rows[part] if self._is_array else Record(rows[part], self._state_labels)
 
     def many_extras(self, rows: NDArray[Any]) -> Record:
         """The extended values of an array of rows."""
         if not self.extras.itemsize:
             return Record(np.empty(len(rows), np.dtype([])))
-        return Record(rows["extended"])
+        return Record(rows["extended"], self._extended_labels)
 
     def many_masks(self, rows: NDArray[Any], part: str) -> NDArray[np.bool_]:
         """A mask of an array of rows: bool (T, actuators)."""

@@ -1,6 +1,6 @@
 """Values with names, read as attributes or by key."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,10 +19,12 @@ class Record:
     first dimension (a number for a single value) for one row.
     """
 
-    __slots__ = ("_array",)
+    __slots__ = ("_array", "_labels")
 
-    def __init__(self, array: NDArray[Any]) -> None:
+    def __init__(self, array: NDArray[Any], labels: Mapping[str, Any] | None = None) -> None:
+        """labels: of enumerations, by field and number; by field and field in nested structs."""
         self._array = array
+        self._labels = labels or {}
 
     def __getitem__(self, name: str) -> "States":
         try:
@@ -31,7 +33,7 @@ class Record:
             instead = _core.names_instead(str(name), list(self.keys()))
             raise KeyError(f"there is no value {name!r}{instead}") from None
         if value.dtype.names and value.ndim == self._array.ndim:
-            value = Record(value)
+            value = Record(value, self._labels.get(name))
         elif not value.ndim:
             value = value[()]
         states: States = value
@@ -65,9 +67,21 @@ class Record:
         return isinstance(other, Record) and bool(np.array_equal(self._array, other._array))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Record, (self._array,)
+        return Record, (self._array, self._labels)
 
     __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
-        return f"Record({', '.join(f'{name}={self[name]}' for name in self)})"
+        return f"Record({', '.join(f'{name}={self._shown(name)}' for name in self)})"
+
+    def _shown(self, name: str) -> object:
+        """A value for people: labels instead of the numbers of an enumeration."""
+        labels = self._labels.get(name)
+        value: Any = self[name]
+        if not labels or isinstance(value, Record) or np.asarray(value).dtype.names:
+            return value
+        if not np.ndim(value):
+            return labels.get(int(value), value)
+        array = np.asarray(value)
+        named = np.array([labels.get(int(each), str(each)) for each in array.ravel()], object)
+        return named.reshape(array.shape)

@@ -1,6 +1,9 @@
 #include "memory/lane_sender.hpp"
 
 #include <algorithm>
+#include <iterator>
+#include <string>
+#include <vector>
 
 #include "base/crash_point.hpp"
 #include "base/printable.hpp"
@@ -9,6 +12,7 @@
 #include "memory/prefetch.hpp"
 #include "memory/segment_file.hpp"
 #include "o80/base/error.hpp"
+#include "o80/base/nearest_name.hpp"
 
 namespace o80 {
 
@@ -18,12 +22,13 @@ constexpr int kTries = 1000;                 // retries while a status is being 
 constexpr std::uint32_t kDrawsUnasked = 64;  // draws between two reads of the backend's ids
 
 std::string holders(const SegmentView& view) {
-  std::string text;
+  std::vector<std::string> names;
+  names.reserve(view.shape.lanes);
   for (std::uint32_t i = 0; i < view.shape.lanes; ++i) {
     const LaneSenderPage& page = view.lane(i);
-    text += (i == 0 ? "" : ", ") + printable(load_text(page.owner, std::size(page.owner)));
+    names.push_back(printable(load_text(page.owner, std::size(page.owner))));
   }
-  return text;
+  return first_names(names);
 }
 
 }  // namespace

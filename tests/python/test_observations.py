@@ -1,5 +1,6 @@
 """One observation, many of them, and waiting for the next."""
 
+import pickle
 from collections.abc import Iterator
 from enum import IntEnum
 
@@ -83,6 +84,17 @@ def test_groups_of_different_types_have_names(mixed: o80.Backend) -> None:
         assert list(observed) == ["joints", "gripper", "mode"]
         with pytest.raises(AttributeError, match="joints, gripper, mode"):
             _ = observed.wrist
+
+
+def test_a_printed_record_names_the_values_of_enumerations(mixed: o80.Backend) -> None:
+    with o80.Frontend(mixed.segment) as frontend:
+        row = frontend.latest().observed
+        many = frontend.history(1).observed
+
+        assert "mode=POSITION" in repr(row)
+        assert "mode=['POSITION']" in repr(many)
+        assert "mode=POSITION" in repr(pickle.loads(pickle.dumps(row)))
+        assert row.mode == Control.POSITION
 
 
 def test_extended_values_of_every_shape(mixed: o80.Backend) -> None:

@@ -50,6 +50,9 @@ class ActuatorDescription {
   ActuatorDescription& limits(std::string_view field, const Limits& limits);
   /// The rest value of a named field of this actuator (of every element of an array field).
   ActuatorDescription& rests_at(std::string_view field, double value);
+  /// Unit of a state that is a plain number, for example "rad". It holds for all actuators of the
+  /// group; the fields of a described struct have theirs from O80_DESCRIBE.
+  ActuatorDescription& unit(std::string_view unit);
 
  private:
   /// Calls `visit(LimitRow&)` for every number of a named field.
@@ -365,6 +368,30 @@ inline ActuatorDescription& ActuatorDescription::rests_at(std::string_view field
     row.rest = value;
     row.resting = 1;
   });
+  return *this;
+}
+
+inline ActuatorDescription& ActuatorDescription::unit(std::string_view unit) {
+  GroupRow& group = schema_.groups.at(schema_.actuators.at(index_).group);
+  const TypeRow type = schema_.types.at(group.type);
+  FieldRow field = schema_.fields.at(type.first_field);
+  if (type.fields != 1 || !field.name.view().empty()) {
+    throw InvalidArgument("the state of actuator '" + schema_.actuators[index_].name.str() +
+                          "' is a struct: give the units of its fields in O80_DESCRIBE");
+  }
+  // the group gets a type of its own, for other groups of plain numbers keep their units
+  field.unit = UnitText(unit);
+  TypeRow own = type;
+  own.first_field = static_cast<std::uint32_t>(schema_.fields.size());
+  const std::uint32_t former = group.type;
+  group.type = static_cast<std::uint32_t>(schema_.types.size());
+  schema_.fields.push_back(field);
+  schema_.types.push_back(own);
+  schema_.hooks.push_back(schema_.hooks.at(former));
+  schema_.keys.push_back(nullptr);
+  for (std::uint32_t i = 0; i < group.count; ++i) {
+    schema_.actuators[group.first_actuator + i].type = group.type;
+  }
   return *this;
 }
 

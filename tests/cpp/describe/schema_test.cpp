@@ -97,6 +97,27 @@ TEST(Schema, NamesActuatorsAndTheirLimits) {
   EXPECT_EQ(schema.limits[lift + 3].speed, 5);
 }
 
+TEST(Schema, GivesTheNumbersOfOneGroupAUnit) {
+  Schema schema;
+  const std::uint32_t number = describing::type_of<double>(schema);
+  schema.add_actuators("joints", number, 2);
+  schema.add_actuators("valves", number, 1);
+  schema.actuator("joints_0").unit("rad");
+  const auto unit_of = [&](std::string_view name) {
+    for (const ActuatorRow& row : schema.actuators) {
+      if (row.name.view() == name) return schema.fields[schema.types[row.type].first_field].unit;
+    }
+    return UnitText("no actuator");
+  };
+
+  EXPECT_EQ(unit_of("joints_0").view(), "rad");
+  EXPECT_EQ(unit_of("joints_1").view(), "rad");
+  EXPECT_EQ(unit_of("valves_0").view(), "");
+  check(schema);
+  EXPECT_THAT(message_of<InvalidArgument>([] { run_time_robot().actuator("lift").unit("m"); }),
+              HasSubstr("'lift' is a struct"));
+}
+
 TEST(Schema, ListsWhatThereIsWhenSomethingIsNot) {
   Schema schema = run_time_robot();
   EXPECT_THAT(message_of<InvalidArgument>([&] { schema.actuator("elbow"); }),
