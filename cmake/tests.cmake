@@ -1,14 +1,23 @@
-# One test program for each folder of tests/cpp, named after it. A test finds the built programs
-# and robots below O80_TEST_PREFIX, laid out as when installed.
+# One test program for each folder of tests/cpp, and for the folder tests/cpp of each robot and
+# simulator, which is named after the robot. A test finds the built programs and robots below
+# O80_TEST_PREFIX, laid out as when installed.
 include(cmake/googletest.cmake)
 include(GoogleTest)
 
-file(GLOB test_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tests/cpp/*/*.cpp)
+file(GLOB test_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tests/cpp/*/*.cpp
+     ${PROJECT_SOURCE_DIR}/robots/*/tests/cpp/*.cpp ${PROJECT_SOURCE_DIR}/simulators/*/tests/cpp/*.cpp
+)
 set(test_folders)
 foreach(source IN LISTS test_sources)
   cmake_path(GET source PARENT_PATH folder)
-  cmake_path(GET folder FILENAME folder)
-  list(APPEND test_folders ${folder})
+  cmake_path(GET folder FILENAME name)
+  if(name STREQUAL "cpp") # of a robot
+    cmake_path(SET robot NORMALIZE ${folder}/../..)
+    cmake_path(GET robot PARENT_PATH robot)
+    cmake_path(GET robot FILENAME name)
+  endif()
+  list(APPEND test_folders ${name})
+  list(APPEND test_sources_of_${name} ${source})
 endforeach()
 list(REMOVE_DUPLICATES test_folders)
 if(O80_TEST_FOLDERS)
@@ -50,11 +59,9 @@ foreach(folder IN LISTS test_folders)
   if(folder STREQUAL "bounded" AND O80_SANITIZE)
     continue()
   endif()
-  set(sources ${test_sources})
-  list(FILTER sources INCLUDE REGEX "/tests/cpp/${folder}/")
   set(target o80_test_${folder})
   list(APPEND test_targets ${target})
-  add_executable(${target} ${sources})
+  add_executable(${target} ${test_sources_of_${folder}})
   target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/tests/cpp ${PROJECT_SOURCE_DIR})
   target_compile_definitions(
     ${target}

@@ -8,8 +8,8 @@
 #include <memory>
 #include <span>
 
-#include "robots/pam/plant.hpp"
-#include "simulators/mujoco/simulation.hpp"
+#include "driver/simulation.hpp"
+#include "pam/plant.hpp"
 
 namespace {
 

@@ -1,7 +1,7 @@
 """The model of the table-tennis scene is the arm of the plant: MuJoCo's numbers are its reference.
 
-The C++ tests of the arm compare the plant with `tests/cpp/pam/mujoco_reference.txt`; here the same
-numbers are computed anew from the model. After a change of the model write the file again with
+The C++ tests of the arm compare the plant with `robots/pam/tests/cpp/mujoco_reference.txt`; here
+the same numbers are computed anew from the model. After a change of the model write the file with
 `python tests/python/test_pam_model.py`.
 """
 
@@ -14,7 +14,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 MODEL = ROOT / "apps/table_tennis/o80_table_tennis/models/table_tennis.xml"
-REFERENCE = ROOT / "tests/cpp/pam/mujoco_reference.txt"
+REFERENCE = ROOT / "robots/pam/tests/cpp/mujoco_reference.txt"
 HEADER = "racket and dynamics of the arm by MuJoCo: q dq torque | position rotation velocity omega"
 JOINTS = 4
 

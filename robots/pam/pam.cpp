@@ -1,3 +1,0 @@
-#include "robots/pam/driver.hpp"
-
-O80_ROBOT(pam, o80::pam::PamDriver);

@@ -1,0 +1,123 @@
+#include "pam/driver.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <string>
+
+namespace o80::pam {
+namespace {
+
+Plant::Config plant_config(const PamDriver::Config& config) {
+  Plant::Config plant;
+  plant.muscle = config.muscle;
+  plant.ranges = config.ranges == Ranges::real ? kRealRanges : kSimulatedRanges;
+  plant.period = config.period;
+  plant.substeps = config.substeps;
+  plant.start_posture = config.start_posture;
+  plant.start_activation = config.start_activation;
+  plant.start_noise = config.start_noise;
+  if (config.start_pressures != Pressures{}) plant.start_pressures = config.start_pressures;
+  return plant;
+}
+
+}  // namespace
+
+PamDriver::PamDriver(const Config& config)
+    : plant_(plant_config(config)),
+      slots_(config.slots),
+      period_(std::llround(config.period * 1e9)) {
+  begin();
+}
+
+void PamDriver::describe(Schema& schema) const {
+  for (std::uint32_t m = 0; m < kMuscles; ++m) {
+    const auto [minimum, maximum] = plant_.config().ranges[m];
+    schema.actuator(m)
+        .name((m % 2 == 0 ? "agonist_" : "antagonist_") + std::to_string(m / 2 + 1))
+        .when_idle(WhenIdle::hold)
+        .limits({.minimum = static_cast<double>(minimum), .maximum = static_cast<double>(maximum)});
+  }
+}
+
+/// Pressures at the start are exactly those asked for, without the rounding of a lag.
+void PamDriver::begin() noexcept {
+  std::ranges::copy(plant_.state().commanded, now_.desired.begin());
+  now_.observed = now_.desired;
+  now_.clipped = 0;
+}
+
+void PamDriver::write(const Desired<PamDriver>& desired) {
+  const std::int64_t period = std::llround(desired.period() * 1e9);
+  if (period != period_) {
+    std::array<char, 240> text{};
+    std::snprintf(text.data(), text.size(),
+                  "the arm moves on by %g s an iteration, but the loop's period is %g s. Run it at "
+                  "--frequency %g, or give the arm period=%g",
+                  static_cast<double>(period_) * 1e-9, desired.period(),
+                  1e9 / static_cast<double>(period_), desired.period());
+    throw DriverError(text.data());
+  }
+  now_.desired = desired.states;
+  Pressures asked{};
+  for (std::size_t m = 0; m < kMuscles; ++m) {
+    asked[m] = static_cast<std::int32_t>(std::lround(desired[m]));
+  }
+  now_.clipped = plant_.advance(asked);
+  for (std::size_t m = 0; m < kMuscles; ++m) {
+    now_.observed[m] = plant_.config().ranges[m].pressure(plant_.state().activation[m]);
+  }
+}
+
+void PamDriver::read(Reading<PamDriver>& reading) noexcept {
+  const RacketMotion racket = plant_.racket();
+  reading.observed = now_.observed;
+  reading.extended = {.joint_positions = plant_.q(),
+                      .joint_velocities = plant_.dq(),
+                      .bars = plant_.bars(),
+                      .activations = plant_.state().activation,
+                      .racket_position = racket.position,
+                      .racket_rotation = racket.rotation,
+                      .racket_velocity = racket.velocity,
+                      .racket_angular_velocity = racket.angular_velocity,
+                      .clipped = {}};
+  for (std::size_t m = 0; m < kMuscles; ++m) {
+    reading.extended.clipped[m] = (now_.clipped >> m & 1) != 0;
+  }
+  reading.go_on_from(now_.desired);
+}
+
+Served PamDriver::on(const Reset& reset) noexcept {
+  plant_.reset(reset.seed);
+  begin();
+  return Served::start_afresh();
+}
+
+Served PamDriver::on(const Snapshot& snapshot) noexcept {
+  if (snapshot.slot >= slots_.size()) return no_such_slot();
+  State& slot = slots_[snapshot.slot];
+  slot = now_;
+  slot.plant = plant_.state();
+  slot.filled = 1;
+  return Served::done();
+}
+
+Served PamDriver::on(const Restore& restore) noexcept {
+  if (restore.slot >= slots_.size()) return no_such_slot();
+  const State& slot = slots_[restore.slot];
+  if (slot.filled == 0) return Served::rejected("nothing was kept in this slot: snapshot it first");
+  now_ = slot;
+  plant_.restore(slot.plant);
+  return Served::start_afresh();
+}
+
+Served PamDriver::no_such_slot() const noexcept {
+  std::array<char, 160> text{};
+  std::snprintf(text.data(), text.size(),
+                "there are %zu slots, counted from 0; start the robot with more (slots=...)",
+                slots_.size());
+  return Served::rejected(text.data());
+}
+
+}  // namespace o80::pam

@@ -1,0 +1,89 @@
+#include "pam/equilibrium.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "pam/plant.hpp"
+
+namespace o80::pam {
+namespace {
+
+double pair_torque(const Muscle& muscle, std::size_t joint, double angle, double pull,
+                   double counter_pull) {
+  return std::visit(
+      [&](const auto& law) {
+        return kPulleyRadius *
+               (law.resting_force(muscle_length(agonist(joint), angle), pull) -
+                law.resting_force(muscle_length(antagonist(joint), angle), counter_pull));
+      },
+      muscle);
+}
+
+// the activations of two antagonists that differ by `difference` about a mean
+std::pair<double, double> around(double mean, double difference) {
+  return {std::clamp(mean + 0.5 * difference, 0.0, 1.0),
+          std::clamp(mean - 0.5 * difference, 0.0, 1.0)};
+}
+
+}  // namespace
+
+Joints Equilibrium::muscle_torque(const Joints& q, const Pressures& pressures) const noexcept {
+  Joints torque{};
+  for (std::size_t j = 0; j < kJoints; ++j) {
+    torque[j] = pair_torque(muscle, j, q[j], ranges[agonist(j)].activation(pressures[agonist(j)]),
+                            ranges[antagonist(j)].activation(pressures[antagonist(j)]));
+  }
+  return torque;
+}
+
+Pressures Equilibrium::pressures_holding(const Joints& q, double activation) const noexcept {
+  const Joints needed = arm.gravity(q);
+  Pressures pressures{};
+  for (std::size_t j = 0; j < kJoints; ++j) {
+    // torque grows with the difference of the activations: halve
+    double low = -2.0, high = 2.0;
+    for (int i = 0; i < 50; ++i) {
+      const double middle = 0.5 * (low + high);
+      const auto [pull, counter_pull] = around(activation, middle);
+      const bool weak = pair_torque(muscle, j, q[j], pull, counter_pull) < needed[j];
+      (weak ? low : high) = middle;
+    }
+    const auto [pull, counter_pull] = around(activation, 0.5 * (low + high));
+    const auto raw = [&](std::size_t m, double share) {
+      return static_cast<std::int32_t>(std::lround(ranges[m].pressure(share)));
+    };
+    pressures[agonist(j)] = raw(agonist(j), pull);
+    pressures[antagonist(j)] = raw(antagonist(j), counter_pull);
+  }
+  return pressures;
+}
+
+Joints Equilibrium::posture_held_by(const Pressures& pressures,
+                                    const Joints& start) const noexcept {
+  // downhill on the energy of muscles and gravity: ends in a stable posture, not just a balanced
+  // one
+  constexpr double gravity_stiffness = 10.0;  // [Nm/rad], more than gravity ever changes by
+  constexpr double probe_angle = 1e-5;        // [rad]
+  Joints q = start;
+  for (int i = 0; i < 5000; ++i) {
+    Joints probe = q;
+    for (double& angle : probe) angle += probe_angle;
+    const Joints torque = muscle_torque(q, pressures);
+    const Joints probed = muscle_torque(probe, pressures);
+    const Joints gravity = arm.gravity(q);
+    double largest = 0.0;
+    for (std::size_t j = 0; j < kJoints; ++j) {
+      const double stiffness =
+          std::max(0.0, (torque[j] - probed[j]) / probe_angle) + gravity_stiffness;
+      const double next =
+          std::clamp(q[j] + (torque[j] - gravity[j]) / stiffness, -kJointLimit, kJointLimit);
+      largest = std::max(largest, std::abs(next - q[j]));
+      q[j] = next;
+    }
+    if (largest < 1e-14) break;
+  }
+  return q;
+}
+
+}  // namespace o80::pam

@@ -1,0 +1,106 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <type_traits>
+
+#include "pam/arm.hpp"
+#include "pam/muscle.hpp"
+#include "pam/pressure.hpp"
+
+namespace o80::pam {
+
+/// Radius of the pulleys by which the muscles turn the joints [m].
+inline constexpr double kPulleyRadius = 0.037;
+
+/// First-order lag between pressure and activation [s].
+inline constexpr Joints kActivationLag{0.016, 0.044, 0.044, 0.044};
+
+/// Near the median posture of the real arm in recorded play [rad].
+inline constexpr Joints kPlayingPosture{0.17, 1.1, 1.04, 0.5};
+
+/// The pneumatic arm: eight pressures in, joint angles out, one period an iteration.
+///
+/// Realtime: everything but the constructor; no allocation, no lock, no exception. Two plants of
+/// one configuration with one state do the same for ever, bit for bit.
+class Plant {
+ public:
+  struct Config {
+    MuscleModel muscle = MuscleModel::linear;
+    PressureRanges ranges = kSimulatedRanges;
+    double period = 0.002;  ///< [s]
+    int substeps = 4;       ///< integration steps a period
+    Arm::Config arm{};
+    /// The arm starts at rest, as these pressures hold it; unset: as `start_posture` needs.
+    std::optional<Pressures> start_pressures{};
+    Joints start_posture = kPlayingPosture;  ///< [rad]
+    double start_activation = 0.5;           ///< mean of two antagonists, when pressures are unset
+    double start_noise = 0.0;                ///< [rad], uniform in ± this, drawn from reset's seed
+  };
+
+  /// Everything that changes. A copy is a snapshot, assigning it back restores the plant.
+  struct State {
+    std::int64_t iteration = 0;
+    Motion motion{};
+    std::array<double, kMuscles> activation{};
+    std::array<double, kMuscles> fibre_length{};  ///< [m], Hill model
+    Pressures commanded{};                        ///< raw, within the ranges
+    std::int64_t clipped = 0;                     ///< iterations with a pressure out of range
+  };
+  static_assert(std::is_trivially_copyable_v<State>);
+
+  /// Which pressures were out of range: bit m for muscle m.
+  using Clipped = std::uint8_t;
+  static_assert(kMuscles <= 8);
+
+  Plant() : Plant(Config{}) {}
+
+  /// Throws std::invalid_argument on a configuration that makes no arm.
+  explicit Plant(const Config& config);
+
+  const Config& config() const noexcept { return config_; }
+  const Arm& arm() const noexcept { return arm_; }
+  const Muscle& muscle() const noexcept { return muscle_; }
+
+  /// The pressures that hold the arm where it starts.
+  const Pressures& start_pressures() const noexcept { return start_pressures_; }
+
+  /// One period with these pressures and, besides, torques from outside [Nm]. Out-of-range
+  /// pressures are clipped, and said.
+  Clipped advance(const Pressures& pressures, const Joints& external = {}) noexcept;
+
+  /// Back to the start. The seed matters only with `start_noise`.
+  void reset(std::uint64_t seed) noexcept;
+
+  const State& state() const noexcept { return state_; }
+  void restore(const State& state) noexcept { state_ = state; }
+
+  const Joints& q() const noexcept { return state_.motion.q; }    ///< [rad]
+  const Joints& dq() const noexcept { return state_.motion.dq; }  ///< [rad/s]
+  Pressures pressures() const noexcept;                           ///< raw, in the muscles now
+  std::array<double, kMuscles> bars() const noexcept;             ///< [bar], in the muscles now
+  RacketMotion racket() const noexcept { return arm_.racket(state_.motion); }
+
+ private:
+  template <MuscleLaw Law>
+  void integrate(const Law& law, const std::array<double, kMuscles>& target,
+                 const Joints& external) noexcept;
+  void settle_muscles() noexcept;
+
+  Config config_;
+  Arm arm_;
+  Muscle muscle_;
+  double substep_;   // [s]
+  Joints lag_gain_;  // share of the way an activation goes in a substep
+  Pressures start_pressures_{};
+  Joints start_equilibrium_{};
+  State state_{};
+};
+
+/// Length of a muscle when its joint is at `angle` [m]: agonists shorten as it grows.
+constexpr double muscle_length(std::size_t muscle, double angle) noexcept {
+  return kRestLength + (muscle % 2 == 0 ? -kPulleyRadius : kPulleyRadius) * angle;
+}
+
+}  // namespace o80::pam

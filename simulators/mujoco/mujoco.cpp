@@ -1,3 +1,0 @@
-#include "simulators/mujoco/driver.hpp"
-
-O80_ROBOT_WITH(mujoco, o80::mujoco::MujocoDriver, o80::mujoco::built_with());

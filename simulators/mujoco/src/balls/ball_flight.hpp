@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cmath>
+#include <numbers>
+
+#include "balls/vector.hpp"
+
+namespace o80::mujoco {
+
+/// Where a ball is and how it moves.
+struct Ball {
+  Vector position{};  // [m]
+  Vector velocity{};  // [m/s]
+  Vector spin{};      // [rad/s], in the world's axes
+  bool operator==(const Ball&) const = default;
+};
+
+/// What the air and gravity do to one kind of ball:
+/// a = -drag |v| v + magnus (omega x v) + gravity.
+struct Air {
+  double drag = 0;        // 1/2 rho Cd A/m [1/m]
+  double magnus = 0;      // 1/2 rho Cl A r/m []
+  double spin_decay = 0;  // share of the spin lost in a second [1/s]
+  Vector gravity{0, 0, -9.81};
+
+  static Air of(double density, double drag_coefficient, double lift_coefficient, double radius,
+                double mass, double spin_decay, const Vector& gravity) noexcept {
+    const double pressed = 0.5 * density * std::numbers::pi * radius * radius / mass;
+    return {drag_coefficient * pressed, lift_coefficient * pressed * radius, spin_decay, gravity};
+  }
+};
+
+/// The acceleration of a ball [m/s^2].
+inline Vector acceleration(const Air& air, const Vector& velocity, const Vector& spin) noexcept {
+  return air.magnus * cross(spin, velocity) - (air.drag * length(velocity)) * velocity +
+         air.gravity;
+}
+
+/// A ball `duration` [s] later, by the classical Runge-Kutta rule with the spin of the middle.
+inline Ball flown(const Ball& ball, const Air& air, double duration) noexcept {
+  const double half = 0.5 * duration;
+  const double halfway = std::exp(-air.spin_decay * half);
+  const Vector spin = halfway * ball.spin;
+  const Vector v1 = ball.velocity;
+  const Vector a1 = acceleration(air, v1, spin);
+  const Vector v2 = ball.velocity + half * a1;
+  const Vector a2 = acceleration(air, v2, spin);
+  const Vector v3 = ball.velocity + half * a2;
+  const Vector a3 = acceleration(air, v3, spin);
+  const Vector v4 = ball.velocity + duration * a3;
+  const Vector a4 = acceleration(air, v4, spin);
+  const double sixth = duration / 6;
+  return {ball.position + sixth * (v1 + 2 * v2 + 2 * v3 + v4),
+          ball.velocity + sixth * (a1 + 2 * a2 + 2 * a3 + a4), halfway * spin};  // halfway, twice
+}
+
+}  // namespace o80::mujoco

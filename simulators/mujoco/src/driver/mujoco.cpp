@@ -1,0 +1,3 @@
+#include "driver/driver.hpp"
+
+O80_ROBOT_WITH(mujoco, o80::mujoco::MujocoDriver, o80::mujoco::built_with());

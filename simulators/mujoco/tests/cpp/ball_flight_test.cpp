@@ -1,0 +1,54 @@
+#include "balls/ball_flight.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace o80::mujoco {
+namespace {
+
+const Air kVacuum{0, 0, 0, {0, 0, -9.81}};
+
+Air room_air() { return Air::of(1.18, 0.40, 1.47, 0.02, 0.0027, 0.5, {0, 0, -9.81}); }
+
+Ball flown_for(Ball ball, const Air& air, double duration, double step) {
+  for (int i = 0; i < std::lround(duration / step); ++i) ball = flown(ball, air, step);
+  return ball;
+}
+
+TEST(BallFlight, IsAParabolaInVacuum) {
+  const Ball end = flown_for({{0, 0, 1}, {1, 2, 3}, {}}, kVacuum, 0.5, 0.002);
+
+  EXPECT_NEAR(end.position.x, 0.5, 1e-12);
+  EXPECT_NEAR(end.position.z, 1 + 1.5 - 0.5 * 9.81 * 0.25, 1e-12);
+  EXPECT_NEAR(end.velocity.z, 3 - 9.81 * 0.5, 1e-12);
+}
+
+TEST(BallFlight, SlowsDownAsDragSays) {
+  Air air = room_air();
+  air.gravity = {};
+  const Ball end = flown_for({{}, {0, 10, 0}, {}}, air, 1.0, 0.002);
+
+  // dv/dt = -k v^2 has the solution v = v0 / (1 + k v0 t)
+  EXPECT_NEAR(end.velocity.y, 10 / (1 + air.drag * 10), 1e-9);
+  EXPECT_NEAR(end.position.y, std::log(1 + air.drag * 10) / air.drag, 1e-9);
+}
+
+TEST(BallFlight, TopSpinPullsTheBallDown) {
+  const Ball plain = flown_for({{}, {0, -5, 0}, {}}, room_air(), 0.3, 0.002);
+  const Ball top = flown_for({{}, {0, -5, 0}, {30, 0, 0}}, room_air(), 0.3, 0.002);
+
+  EXPECT_LT(top.position.z, plain.position.z - 0.03);
+  EXPECT_NEAR(top.spin.x, 30 * std::exp(-0.5 * 0.3), 1e-9);
+}
+
+TEST(BallFlight, DoesNotDependOnTheStep) {
+  const Ball ball{{}, {1, -5, 2}, {30, 10, -5}};
+  const Ball fine = flown_for(ball, room_air(), 0.6, 0.0005);
+  const Ball coarse = flown_for(ball, room_air(), 0.6, 0.01);
+
+  EXPECT_LT(length(fine.position - coarse.position), 1e-5);
+}
+
+}  // namespace
+}  // namespace o80::mujoco
