@@ -30,7 +30,7 @@ torture:
 # what tests cannot reach: every order of steps, on small cases
 model:
 	@tools/setup.sh test
-	@.venv/bin/python models/run.py $(ARGS)
+	@.venv/bin/python tests/proofs/run.py models $(ARGS)
 
 # bench: the budgets; growth: cost against size, as plots; stress: jitter of the real-time loop on a
 # machine under stress, beside cyclictest
@@ -46,14 +46,12 @@ bench growth stress:
 # some minutes for each fuzzer; finds go to build/fuzz/found: make fuzz ARGS="lane --minutes 60 --merge"
 fuzz:
 	@tools/setup.sh test
-	@.venv/bin/python tools/fuzz.py --minutes 3 $(ARGS)
+	@.venv/bin/python tests/proofs/run.py fuzz --minutes 3 $(ARGS)
 
 # a PREEMPT_RT kernel in a virtual machine: the core tests and a loop, beside cyclictest
 rt:
 	@tools/setup.sh test
-	@.venv/bin/cmake --preset rt > /dev/null
-	@.venv/bin/cmake --build --preset rt
-	@.venv/bin/python tools/rt.py $(ARGS)
+	@.venv/bin/python tests/proofs/run.py real_time $(ARGS)
 
 # a robot as a service, in a virtual machine whose first process is systemd
 systemd:
@@ -61,7 +59,7 @@ systemd:
 	@tools/setup.sh systemd
 	@.venv/bin/cmake --preset dev > /dev/null
 	@.venv/bin/cmake --build --preset dev
-	@.venv/bin/python tools/systemd.py $(ARGS)
+	@.venv/bin/python tests/proofs/run.py service_machine $(ARGS)
 
 format:
 	@tools/setup.sh test

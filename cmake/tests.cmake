@@ -117,7 +117,7 @@ add_custom_target(o80-core-tests DEPENDS ${test_targets})
 # the machine with a real-time kernel runs these beside the tests
 if(O80_STATIC)
   foreach(program o80-rt-loop o80-rt-frontend)
-    add_executable(${program} ${PROJECT_SOURCE_DIR}/tests/rt/${program}.cpp)
+    add_executable(${program} ${PROJECT_SOURCE_DIR}/tests/proofs/real_time/${program}.cpp)
     target_include_directories(${program} PRIVATE ${PROJECT_SOURCE_DIR}/tests/cpp)
     target_link_libraries(${program} PRIVATE o80 o80_private_headers o80_warnings)
   endforeach()

@@ -13,7 +13,6 @@ FOLDERS = (
     "examples",
     "benchmarks",
     "tests",
-    "models",
     "tools",
 )
 

@@ -12,7 +12,6 @@ import time
 from collections import deque
 from pathlib import Path
 
-from rt import LOOP, SHORT
 from sources import ROOT
 
 JOBS = str(len(os.sched_getaffinity(0)))
@@ -21,7 +20,7 @@ LOGS = ROOT / "build" / "test"
 
 def typed_folders() -> list[str]:
     """Folders outside the package whose Python is type-checked too."""
-    folders = ("tools", "benchmarks", "examples", "models")
+    folders = ("tools", "benchmarks", "examples", "tests/proofs")
     return [folder for folder in folders if any((ROOT / folder).rglob("*.py"))]
 
 
@@ -38,6 +37,7 @@ def cpp(preset: str) -> list[list[str]]:
 
 
 PYTHON = [sys.executable, "-m"]
+PROOF = [sys.executable, "tests/proofs/run.py"]
 STEPS: dict[str, list[list[str]]] = {
     "format": [[sys.executable, "tools/format.py", "--check"]],
     "ruff": [["ruff", "check", "."]],
@@ -61,15 +61,11 @@ STEPS: dict[str, list[list[str]]] = {
         ]
     ],
     "tidy": [[sys.executable, "tools/tidy.py"]],
-    "models": [[sys.executable, "models/run.py"]],
+    "models": [[*PROOF, "models"]],
     "asan": cpp("asan"),
     "tsan": cpp("tsan"),
-    "fuzz": [[sys.executable, "tools/fuzz.py"]],
-    "rt": [
-        ["cmake", "--preset", "rt"],
-        ["cmake", "--build", "--preset", "rt", "-j", JOBS, "--target", *SHORT, *LOOP],
-        [sys.executable, "tools/rt.py", "--short"],
-    ],
+    "fuzz": [[*PROOF, "fuzz"]],
+    "rt": [[*PROOF, "real_time", "--short"]],
     "arm64": cpp("arm64"),
     "pytest": [[*PYTHON, "pytest"]],
 }

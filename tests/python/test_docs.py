@@ -6,15 +6,15 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-FOLDERS = ("apps", "benchmarks", "docs", "examples", "models", "robots", "simulators")
+FOLDERS = ("apps", "benchmarks", "docs", "examples", "robots", "simulators", "tests")
 PAGES = sorted([*ROOT.glob("*.md"), *(page for f in FOLDERS for page in (ROOT / f).rglob("*.md"))])
 LINK = re.compile(r"\]\(([^)#\s]*)(?:#([^)\s]+))?\)")
 NAME = re.compile(r"`(?:(\w+)::)?(\w+)`")
 SOURCE = re.compile(r"`([\w/]+\.(?:cpp|hpp|py))`")
-PAGE = re.compile(r"((?:\b(?:docs|models|benchmarks)/\w+|\b[A-Z]+)\.md)(?:#([\w-]+))?")
+PAGE = re.compile(r"((?:\b(?:docs|tests/proofs/models|benchmarks)/\w+|\b[A-Z]+)\.md)(?:#([\w-]+))?")
 SOURCES = [
     path
-    for folder in ("apps", "include", "models", "python", "robots", "simulators", "src", "tests")
+    for folder in ("apps", "include", "python", "robots", "simulators", "src", "tests")
     for path in (ROOT / folder).rglob("*")
     if path.suffix in {".hpp", ".cpp", ".py"} and path != Path(__file__)
 ]
@@ -47,7 +47,7 @@ def test_every_link_leads_to_a_file_and_a_section(page: Path) -> None:
     assert not broken
 
 
-@pytest.mark.parametrize("name", ["ARCHITECTURE.md", "models/README.md"])
+@pytest.mark.parametrize("name", ["ARCHITECTURE.md", "tests/proofs/models/README.md"])
 def test_every_source_that_a_page_names_exists(name: str) -> None:
     there = [f"/{source.relative_to(ROOT)}" for source in SOURCES]
     named = set(SOURCE.findall(without_code(ROOT / name)))
