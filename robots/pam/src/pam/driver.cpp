@@ -32,6 +32,18 @@ PamDriver::PamDriver(const Config& config)
 }
 
 void PamDriver::describe(Schema& schema) const {
+  const std::int64_t asked = schema.asked_period();
+  if (asked != 0 && asked != period_) {
+    const double frequency = 1e9 / static_cast<double>(period_);
+    std::array<char, 240> text{};
+    std::snprintf(text.data(), text.size(),
+                  "an iteration of the arm lasts %g s (%g Hz), but %g Hz was requested. Leave the "
+                  "frequency out, set it to %g, or give the arm period=%g",
+                  static_cast<double>(period_) * 1e-9, frequency, 1e9 / static_cast<double>(asked),
+                  frequency, static_cast<double>(asked) * 1e-9);
+    throw DriverError(text.data());
+  }
+  schema.period(period_);
   for (std::uint32_t m = 0; m < kMuscles; ++m) {
     const auto [minimum, maximum] = plant_.config().ranges[m];
     schema.actuator(m)
@@ -49,16 +61,6 @@ void PamDriver::begin() noexcept {
 }
 
 void PamDriver::write(const Desired<PamDriver>& desired) {
-  const std::int64_t period = std::llround(desired.period() * 1e9);
-  if (period != period_) {
-    std::array<char, 240> text{};
-    std::snprintf(text.data(), text.size(),
-                  "the arm moves on by %g s an iteration, but the loop's period is %g s. Run it at "
-                  "--frequency %g, or give the arm period=%g",
-                  static_cast<double>(period_) * 1e-9, desired.period(),
-                  1e9 / static_cast<double>(period_), desired.period());
-    throw DriverError(text.data());
-  }
   now_.desired = desired.states;
   Pressures asked{};
   for (std::size_t m = 0; m < kMuscles; ++m) {

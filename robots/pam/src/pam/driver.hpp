@@ -89,7 +89,7 @@ class PamDriver {
 O80_DESCRIBE(PamDriver::Config,
              (muscle, "law of the muscles: linear, or of Hill type after Haeufle et al. (2014)"),
              (ranges, "which pressures may be asked for: those of the simulation or the real arm"),
-             (period, "of the plant, which the loop must keep [s]"),
+             (period, "of an iteration; the frequency follows it [s]"),
              (substeps, "integration steps in a period"),
              (start_posture, "where the arm starts, unless start_pressures are given [rad]"),
              (start_activation, "mean of two antagonists at the start, 0 to 1"),

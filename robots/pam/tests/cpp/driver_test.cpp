@@ -107,11 +107,18 @@ TEST_F(PamDriverTest, GivesTheMotionOfItsRacket) {
   }
 }
 
-TEST_F(PamDriverTest, RefusesALoopOfAnotherPeriodAndSaysWhatToDo) {
-  InlineArm arm({}, 1'000'000);
+TEST_F(PamDriverTest, RefusesAnotherFrequencyThanThatOfItsPeriodAndSaysWhatToDo) {
+  EXPECT_THAT([] { InlineArm({}, 1'000'000); },
+              ThrowsMessage<Error>(testing::AllOf(HasSubstr("1000 Hz was requested"),
+                                                  HasSubstr("frequency out, set it to 500"),
+                                                  HasSubstr("period=0.001"))));
+}
 
-  EXPECT_THAT([&] { arm.burst(1); }, ThrowsMessage<Error>(testing::AllOf(
-                                         HasSubstr("--frequency 500"), HasSubstr("period=0.001"))));
+TEST_F(PamDriverTest, RunsAtTheFrequencyOfItsPeriodWhenNoneIsRequested) {
+  InlineArm arm(OptionValues{{"period", "0.004"}}, 0);
+  const auto before = arm.burst(1);
+
+  EXPECT_EQ(arm.burst(1).time() - before.time(), 4'000'000);
 }
 
 TEST_F(PamDriverTest, TellsHowManySlotsThereAre) {
