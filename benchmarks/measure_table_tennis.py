@@ -9,7 +9,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from o80_table_tennis.balls import balls_from
+from o80_table_tennis.balls.sources import balls_from
 from o80_table_tennis.environment import accelerated_environment
 from plain_table_tennis import PlainEnvironment
 from sampling import built, rounds, sample, take_priority

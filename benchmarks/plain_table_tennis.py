@@ -14,13 +14,13 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from o80_table_tennis.actions import MUSCLES, changed_pressures
-from o80_table_tennis.ball_watch import BallWatch, RecordReader
-from o80_table_tennis.observations import JOINT_POSITIONS, JOINT_VELOCITIES, PRESSURES, SIZE
-from o80_table_tennis.rendering import MODEL
-from o80_table_tennis.rewards import End
+from o80_table_tennis.balls.trajectories import SampledFlight
+from o80_table_tennis.rig.ball_records import BallWatch, RecordReader
 from o80_table_tennis.settings import RigSettings, TaskSettings
-from o80_table_tennis.trajectories import SampledFlight
+from o80_table_tennis.task.actions import MUSCLES, changed_pressures
+from o80_table_tennis.task.observations import JOINT_POSITIONS, JOINT_VELOCITIES, PRESSURES, SIZE
+from o80_table_tennis.task.rewards import End
+from o80_table_tennis.world.scene import MODEL
 
 FloatArray = NDArray[np.float64]
 Float32Array = NDArray[np.float32]

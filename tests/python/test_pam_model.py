@@ -13,7 +13,7 @@ import numpy.typing as npt
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-MODEL = ROOT / "apps/table_tennis/o80_table_tennis/models/table_tennis.xml"
+MODEL = ROOT / "apps/table_tennis/o80_table_tennis/world/table_tennis.xml"
 REFERENCE = ROOT / "robots/pam/tests/cpp/mujoco_reference.txt"
 HEADER = "racket and dynamics of the arm by MuJoCo: q dq torque | position rotation velocity omega"
 JOINTS = 4

@@ -21,12 +21,12 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from .balls import balls_from
+from .balls.sources import balls_from
 from .environment import TableTennisEnvironment
-from .episode_record import EpisodeSummary, load_records
-from .playing import Played, play
-from .policies import DEFAULT_FACTOR, default_policy
-from .report import Report, write_report
+from .players.playing import Played, play
+from .players.policies import DEFAULT_FACTOR, default_policy
+from .report.episode_record import EpisodeSummary, load_records
+from .report.report import Report, write_report
 from .settings import Pacing, RigSettings, TaskSettings
 
 

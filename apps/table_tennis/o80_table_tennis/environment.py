@@ -19,18 +19,18 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from .actions import MUSCLES, changed_pressures
-from .ball_watch import BallWatch
-from .balls import balls_from
-from .episode_record import EpisodeSummary
-from .logger import EpisodeLogger
-from .observations import PRESSURES, SIZE, Float32Array
-from .rewards import End
-from .rig import Rig
+from .balls.sources import balls_from
+from .balls.trajectories import SampledFlight
+from .report.episode_record import EpisodeSummary
+from .report.logger import EpisodeLogger
+from .report.statistics import Statistics, StepCounts, statistics_of
+from .rig.ball_records import BallWatch
+from .rig.rig import Rig
+from .rig.virtual_balls import VirtualBalls
 from .settings import ITERATIONS, Pacing, RigSettings, TaskSettings
-from .statistics import Statistics, StepCounts, statistics_of
-from .trajectories import SampledFlight
-from .virtual_balls import VirtualBalls
+from .task.actions import MUSCLES, changed_pressures
+from .task.observations import PRESSURES, SIZE, Float32Array
+from .task.rewards import End
 
 FloatArray = NDArray[np.float64]
 Action = NDArray[np.float32]
@@ -326,7 +326,7 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
             gymnasium.logger.warn("no render mode was chosen: make it with render_mode='rgb_array'")
             return None
         if self._scene is None:
-            from .rendering import Scene
+            from .report.rendering import Scene
 
             self._scene = Scene(balls=1 + self._settings.extra_balls)
         return self._scene.draw(

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
-from .actions import FINE, REAL_RANGE, SIMULATED_RANGE, PressureRange
-from .observations import ObservationBounds
-from .rewards import EndRule, RewardRule
+from .task.actions import FINE, REAL_RANGE, SIMULATED_RANGE, PressureRange
+from .task.observations import ObservationBounds
+from .task.rewards import EndRule, RewardRule
 
 JOINTS = 4
 ITERATIONS = 5

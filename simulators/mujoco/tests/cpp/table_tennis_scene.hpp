@@ -23,7 +23,7 @@ using Row = InlineSimulation::Row;
 
 inline OptionValues table_tennis(OptionValues more = {}) {
   OptionValues options{
-      {"model", O80_TEST_SOURCE "/apps/table_tennis/o80_table_tennis/models/table_tennis.xml"},
+      {"model", O80_TEST_SOURCE "/apps/table_tennis/o80_table_tennis/world/table_tennis.xml"},
       {"balls", "ball"},
       {"racket", "racket"},
       {"table", "table"},

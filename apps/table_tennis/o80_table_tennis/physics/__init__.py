@@ -1,0 +1,1 @@
+"""Flight, rebound and impact of a ball, for fits and predictions."""

@@ -1,0 +1,1 @@
+"""Policies, from a still arm to one that returns most balls."""

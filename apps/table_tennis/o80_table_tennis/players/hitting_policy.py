@@ -1,0 +1,158 @@
+"""A policy that hits: it predicts the ball, plans a strike and drives the arm through it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..task.actions import COARSE
+from ..task.observations import (
+    BALL_POSITION,
+    BALL_VELOCITY,
+    JOINT_POSITIONS,
+    JOINT_VELOCITIES,
+    PRESSURES,
+    Float32Array,
+)
+from .arm_dynamics import ArmModel
+from .interception import ComingBall, InterceptionSettings, Strike, StrikePlanner, coming_ball
+from .kinematics import JOINT_LIMIT, JOINTS
+from .pressure_control import STEP, MusclePair, PressureActions, PressureLag
+from .swing import JointMotion, Swing
+
+FloatArray = NDArray[np.float64]
+
+WRIST = 3
+"""Index of joint 4."""
+PREDICTED_EVERY = 4
+"""Steps between two predictions of the ball; a path serves that long."""
+
+
+@dataclass(frozen=True)
+class ControlSettings:
+    """How the arm is driven along its swing."""
+
+    stiffness: float = 400.0
+    """Of the feedback [1/s^2]."""
+    damping: float = 30.0
+    """Of the feedback [1/s]."""
+    mean_pressure: float = 0.45
+    """Of two muscles against each other."""
+    begin: float = 0.003
+    """From an observation to when its action acts [s]."""
+    ahead: float = 0.012
+    """How far ahead of its observation the action aims [s]."""
+    settling: float = 0.014
+    """Time the pressures are given to come to what is wanted [s]."""
+    wrist_stiffness: float = 12.0
+    """Of the feedback of joint 4, besides: its inertia is next to nothing [Nm/rad]."""
+    learning: tuple[float, float, float, float] = (600.0, 600.0, 225.0, 120.0)
+    """How fast torques are added that the model lacks, for each joint [Nm/(rad s)]."""
+    last_change: float = 0.03
+    """Before the strike [s]: from then on the swing stays as it is."""
+    shortest: float = 0.02
+    """Time that a swing is given at least, should a ball come sooner than was predicted [s]."""
+    follow_through: float = 0.03
+    """After the strike, if the ball is not seen to fly back before [s]."""
+    stop: float = 0.25
+    """From the end of a swing to rest [s]."""
+
+
+@dataclass(frozen=True)
+class HittingSettings:
+    """Everything the policy can be told."""
+
+    interception: InterceptionSettings = field(default_factory=InterceptionSettings)
+    control: ControlSettings = field(default_factory=ControlSettings)
+    arm: ArmModel = field(default_factory=ArmModel)
+    muscles: MusclePair = field(default_factory=MusclePair)
+    lag: PressureLag = field(default_factory=PressureLag)
+    factor: float = COARSE
+    """Of the environment's actions."""
+
+
+class HittingPolicy:
+    """Meets each ball with the racket so that it flies back to the other side."""
+
+    def __init__(self, settings: HittingSettings | None = None) -> None:
+        self._settings = settings or HittingSettings()
+        self._planner = StrikePlanner(self._settings.interception)
+        self._actions = PressureActions(factor=self._settings.factor)
+        self.reset()
+
+    def reset(self) -> None:
+        """A new episode begins."""
+        self._planner.forget()
+        self._lacking = np.zeros(JOINTS)
+        self._swing: Swing | None = None
+        self._ball: ComingBall | None = None
+        self._steps = 0
+        self._over = False
+        self.strike: Strike | None = None
+        """What is planned now."""
+
+    def act(self, observation: Float32Array) -> NDArray[np.float32]:
+        """The action (8,) in [-1, 1] after `observation` (22,)."""
+        row = observation.astype(np.float64)
+        if self._swing is None:
+            self._actions.start(row[PRESSURES])
+            self._swing = Swing.resting_at(row[JOINT_POSITIONS])
+
+        # ball => strike => swing => torques => pressures => action
+        self._swing = self._plan(row[BALL_POSITION], row[BALL_VELOCITY], self._swing.later(STEP))
+        return self._drive(row[JOINT_POSITIONS], row[JOINT_VELOCITIES], row[PRESSURES], self._swing)
+
+    def _plan(self, position: FloatArray, velocity: FloatArray, swing: Swing) -> Swing:
+        """The motion from now on, which was to be `swing`."""
+        control = self._settings.control
+        flying_back = velocity[1] > 0.0
+        if self.strike is not None and self.strike.time <= control.last_change + STEP:
+            # straight on through the ball
+            self.strike = self.strike.later(STEP)
+            if self.strike.time >= -control.follow_through and not flying_back:
+                return swing
+            self._over = True
+        if self._over:
+            self.strike = None
+        else:
+            self._follow(position, velocity)
+            self.strike = None if self._ball is None else self._planner.plan(self._ball)
+        now = swing.at(0.0)
+        if self.strike is None:
+            return Swing.between(now, _resting(now, control.stop), control.stop)
+        end = JointMotion(self.strike.posture, self.strike.speeds, np.zeros(JOINTS))
+        return Swing.between(now, end, max(self.strike.time, control.shortest))
+
+    def _follow(self, position: FloatArray, velocity: FloatArray) -> None:
+        """Predicts the ball anew, or goes on along what was predicted."""
+        if self._steps % PREDICTED_EVERY == 0:
+            self._ball = coming_ball(position, velocity, self._settings.interception)
+        elif self._ball is not None:
+            self._ball = self._ball.later(STEP)
+        self._steps += 1
+
+    def _drive(
+        self, q: FloatArray, dq: FloatArray, pressures: FloatArray, swing: Swing
+    ) -> NDArray[np.float32]:
+        s, control = self._settings, self._settings.control
+        wanted = swing.at(control.ahead)
+        start = swing.at(0.0)
+        # where the arm will be: as far from the swing as it is now, going on at its speed
+        q_error = (start.q - q) + control.ahead * (start.dq - dq)
+        dq_error = start.dq - dq
+        acceleration = wanted.ddq + control.stiffness * q_error + control.damping * dq_error
+        torque = s.arm.torque(wanted.q, wanted.dq, acceleration)
+        torque[WRIST] += control.wrist_stiffness * q_error[WRIST]
+        self._lacking += STEP * np.array(control.learning) * (start.q - q)
+        torque += self._lacking
+        in_muscles = s.muscles.pressures(torque, wanted.q, control.mean_pressure).ravel()
+        begin = s.lag.after(pressures, self._actions.asked, control.begin)
+        return self._actions.towards(s.lag.asking(begin, in_muscles, control.settling))
+
+
+def _resting(now: JointMotion, stop: float) -> JointMotion:
+    """Where the joints come to rest without haste."""
+    q = np.clip(now.q + 0.5 * stop * now.dq, -0.95 * JOINT_LIMIT, 0.95 * JOINT_LIMIT)
+    return JointMotion(q, np.zeros(JOINTS), np.zeros(JOINTS))

@@ -1,0 +1,212 @@
+"""Where, when and how to meet the ball, so that it flies back to the target.
+
+Three numbers make a strike: when it happens, the angle of the wrist, and the speed of joint 1. The
+first says where the ball is, and so the angles of joints 1 to 3; together they say how the ball
+leaves. Least squares finds those that send it to the target, near to a comfortable strike.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..physics.aerodynamics import Aerodynamics
+from ..physics.flight import AERODYNAMICS, BALL_GUN_SPIN, TABLE, predict
+from ..physics.racket_impact import RacketImpact, velocity_to_land
+from ..world.table import BALL_RADIUS, Table
+from .kinematics import BLADE_THICKNESS, posture_towards, racket_pose
+
+FloatArray = NDArray[np.float64]
+
+PERIOD = 0.01
+"""Of the rows of a predicted path [s]."""
+TOUCH = BALL_RADIUS + BLADE_THICKNESS / 2
+"""From the middle of the blade to the centre of a ball that touches it [m]."""
+LATEST = 1.6
+"""No ball is followed further ahead than this [s]."""
+FIRST_ROUNDS = 4
+"""Of the search for the first strike; later ones begin near to what they look for."""
+
+
+@dataclass(frozen=True)
+class Strike:
+    """A motion of the racket through the ball."""
+
+    time: float
+    """From now [s]."""
+    posture: FloatArray
+    """(4,) [rad]"""
+    speeds: FloatArray
+    """(4,) [rad/s]"""
+
+    def later(self, time: float) -> Strike:
+        """The same strike, seen `time` [s] later."""
+        return replace(self, time=self.time - time)
+
+
+@dataclass(frozen=True)
+class InterceptionSettings:
+    """Which strikes are wanted."""
+
+    target_x: float = 0.0
+    """Where on the table the ball shall land [m]."""
+    target_y: float = 2.5
+    """[m]"""
+    flight: float = 0.55
+    """How long it shall fly there [s]."""
+    nearest: float = -0.15
+    """y of the nearest place behind which no ball is met [m]."""
+    farthest: float = 0.30
+    """y of the farthest place [m]."""
+    fastest: float = 4.0
+    """Speed of joint 1 [rad/s]."""
+    steepest: float = 1.2
+    """Angle of the wrist, either way [rad]."""
+    comfortable_y: float = 0.05
+    """Where the ball is met if all places do equally well [m]."""
+    comfortable_wrist: float = 0.3
+    """The same for joint 4 [rad]."""
+    comfortable_speed: float = 1.5
+    """The same for the speed of joint 1 [rad/s]."""
+    discomfort: tuple[float, float, float] = (0.2, 0.05, 0.02)
+    """What deviations from them weigh, against an error of the ball's velocity [1/s, m/s, m]."""
+    off_middle: float = 8.0
+    """What a touch off the middle of the blade weighs, against the same error [1/s]."""
+    spin: tuple[float, float, float] = BALL_GUN_SPIN
+    """Of the ball, before and after the strike [rad/s]."""
+    impact: RacketImpact = field(default_factory=RacketImpact)
+    aerodynamics: Aerodynamics = AERODYNAMICS
+    table: Table = TABLE
+
+
+@dataclass(frozen=True)
+class ComingBall:
+    """The part of a predicted path on which the ball can be met."""
+
+    times: FloatArray
+    """(N,) from now [s]"""
+    positions: FloatArray
+    """(N, 3) [m]"""
+    velocities: FloatArray
+    """(N, 3) [m/s]"""
+
+    def later(self, time: float) -> ComingBall:
+        """The same path, seen `time` [s] later."""
+        return ComingBall(self.times - time, self.positions, self.velocities)
+
+    def at(self, time: float) -> tuple[FloatArray, FloatArray]:
+        """Position and velocity (3,) at `time` from now, between the first row and the last."""
+        row = int(np.clip((time - self.times[0]) / PERIOD, 0, len(self.times) - 2))
+        share = (time - self.times[row]) / PERIOD
+        change = self.velocities[row + 1] - self.velocities[row]
+        velocity = self.velocities[row] + share * change
+        mean = self.velocities[row] + 0.5 * share * change
+        return self.positions[row] + share * PERIOD * mean, velocity
+
+    def time_at(self, y: float) -> float:
+        """When it is at `y`, or as near to it as it comes [s]."""
+        return float(np.interp(-y, -self.positions[:, 1], self.times))
+
+
+def coming_ball(
+    position: FloatArray, velocity: FloatArray, settings: InterceptionSettings
+) -> ComingBall | None:
+    """The path of a ball while it can be met, after its bounce; None if it does not come."""
+    if velocity[1] > -0.5 or position[1] < settings.nearest:
+        return None
+    duration = min(LATEST, 1.6 * (position[1] - settings.nearest) / -velocity[1] + 0.1)
+    path = predict(
+        position,
+        velocity,
+        duration,
+        spin=settings.spin,
+        period=PERIOD,
+        aerodynamics=settings.aerodynamics,
+        table=settings.table,
+    )
+    rising = np.flatnonzero(np.diff(path.velocities[:, 2]) > 0.0)
+    first = int(rising[-1]) + 2 if len(rising) else 0
+    y = path.positions[:, 1]
+    near = np.flatnonzero((y <= settings.farthest + 0.03) & (y >= settings.nearest - 0.03))
+    near = near[near >= first]
+    if len(near) < 2:
+        return None
+    rows = slice(int(near[0]), int(near[-1]) + 1)
+    return ComingBall(path.stamps[rows], path.positions[rows], path.velocities[rows])
+
+
+class StrikePlanner:
+    """Finds strikes; each search begins at the strike found before."""
+
+    def __init__(self, settings: InterceptionSettings) -> None:
+        self._settings = settings
+        self.forget()
+
+    def forget(self) -> None:
+        """The next ball is another one."""
+        self._place = self._settings.comfortable_y
+        self._wrist = self._settings.comfortable_wrist
+        self._speed = self._settings.comfortable_speed
+        self._found = False
+
+    def plan(self, ball: ComingBall) -> Strike:
+        """The strike that sends the ball best to the target, or comes nearest to the ball."""
+        s = self._settings
+        low = np.array([ball.time_at(s.farthest), -s.steepest, 0.0])
+        high = np.array([ball.time_at(s.nearest), s.steepest, s.fastest])
+        comfort = np.array(
+            [ball.time_at(s.comfortable_y), s.comfortable_wrist, s.comfortable_speed]
+        )
+        _, velocity = ball.at(float(comfort[0]))
+        discomfort = np.array(s.discomfort) * [abs(float(velocity[1])), 1.0, 1.0]
+
+        # Gauss-Newton, held within the limits
+        guess = np.clip([ball.time_at(self._place), self._wrist, self._speed], low, high)
+        probe = np.array([0.004, 0.02, 0.05])
+        for _ in range(1 if self._found else FIRST_ROUNDS):
+            wanted = self._wanted(ball, guess)
+            error = self._error(ball, guess, wanted)
+            slopes = np.empty((len(error), 3))
+            for i in range(3):
+                moved = guess.copy()
+                moved[i] += probe[i]
+                slopes[:, i] = (self._error(ball, moved, wanted) - error) / probe[i]
+            matrix = slopes.T @ slopes + np.diag(discomfort**2)
+            right = discomfort**2 * (comfort - guess) - slopes.T @ error
+            guess = np.clip(guess + np.linalg.solve(matrix, right), low, high)
+
+        # guess => strike, and where the next search begins
+        position, _ = ball.at(float(guess[0]))
+        self._place, self._wrist, self._speed = float(position[1]), float(guess[1]), float(guess[2])
+        self._found = True
+        speeds = np.array([self._speed, 0.0, 0.0, 0.0])
+        return Strike(float(guess[0]), touching_posture(position, self._wrist), speeds)
+
+    def _wanted(self, ball: ComingBall, guess: FloatArray) -> FloatArray:
+        """Velocity (3,) with which the ball should leave."""
+        s = self._settings
+        position, _ = ball.at(float(guess[0]))
+        target = np.array([s.target_x, s.target_y, s.table.bounce_height])
+        return velocity_to_land(
+            position, target, s.flight, spin=s.spin, aerodynamics=s.aerodynamics
+        )
+
+    def _error(self, ball: ComingBall, guess: FloatArray, wanted: FloatArray) -> FloatArray:
+        """How much faster than `wanted` the ball leaves, and how far the racket is off it, (6,)."""
+        position, velocity = ball.at(float(guess[0]))
+        speed = float(guess[2])
+        pose = racket_pose(touching_posture(position, float(guess[1])))
+        normal = np.array(pose.normal)
+        racket = np.array([-speed * position[1], speed * position[0], 0.0])
+        leaving = self._settings.impact.outgoing(velocity, racket, normal)
+        off = position - TOUCH * normal - pose.position
+        return np.concatenate([leaving - wanted, self._settings.off_middle * off])
+
+
+def touching_posture(ball: FloatArray, wrist: float) -> FloatArray:
+    """Angles (4,) [rad] with which the racket's face touches the ball, if the arm reaches it."""
+    x, y, z = ball.tolist()
+    nx, ny, nz = racket_pose(posture_towards((x, y, z), wrist)).normal
+    return posture_towards((x - TOUCH * nx, y - TOUCH * ny, z - TOUCH * nz), wrist)

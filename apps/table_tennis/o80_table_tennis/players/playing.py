@@ -1,0 +1,65 @@
+"""Playing episodes with a policy, and what there is to say about them afterwards."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium
+
+from ..environment import TableTennisEnvironment
+from ..report.episode_record import EpisodeSummary
+from ..report.statistics import Statistics
+from .policies import Policy
+
+
+@dataclass(frozen=True)
+class Played:
+    """Episodes of one environment."""
+
+    episodes: Sequence[EpisodeSummary]
+    statistics: Statistics
+    seconds: float
+    """From the first reset to the last step."""
+
+    @property
+    def hits(self) -> int:
+        """Episodes in which the racket met the ball and the ball flew back."""
+        return sum(episode.returned for episode in self.episodes)
+
+    @property
+    def touches(self) -> int:
+        """Episodes in which the racket met the ball."""
+        return sum(episode.hit for episode in self.episodes)
+
+
+def play(
+    environment: gymnasium.Env[Any, Any],
+    policy: Policy,
+    balls: Iterable[int],
+    *,
+    seed: int = 0,
+    after_each: Callable[[EpisodeSummary], None] = lambda _: None,
+) -> Played:
+    """Plays one episode for each number of a ball; `seed` is that of the first reset."""
+    inner = environment.unwrapped
+    if not isinstance(inner, TableTennisEnvironment):
+        raise TypeError(f"only the table-tennis environments can be played, not {inner}")
+    episodes = []
+    begin = time.monotonic()
+    for number, ball in enumerate(balls):
+        observation, _ = environment.reset(
+            seed=seed if number == 0 else None, options={"ball": ball}
+        )
+        policy.reset()
+        over = False
+        while not over:
+            observation, _, terminated, truncated, _ = environment.step(policy.act(observation))
+            over = terminated or truncated
+        summary = inner.summary
+        episodes.append(summary)
+        after_each(summary)
+    seconds = time.monotonic() - begin
+    return Played(episodes=episodes, statistics=inner.statistics(), seconds=seconds)

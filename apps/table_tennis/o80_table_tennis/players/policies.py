@@ -1,0 +1,85 @@
+"""Policies: what turns observations into actions, one for each step of the environment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..task.actions import COARSE, MUSCLES
+from ..task.observations import BALL_POSITION, BALL_VELOCITY, JOINT_POSITIONS, Float32Array
+from .found_parameters import found_settings
+from .hitting_policy import HittingPolicy
+
+DEFAULT_FACTOR = COARSE
+"""Factor of the environment's actions for which `default_policy` is made."""
+
+
+class Policy(Protocol):
+    """Plays by what it observes, and by nothing else."""
+
+    def reset(self) -> None:
+        """A new episode begins."""
+        ...
+
+    def act(self, observation: Float32Array) -> NDArray[np.float32]:
+        """The action (8,) in [-1, 1] after `observation` (22,)."""
+        ...
+
+
+@dataclass
+class StillPolicy:
+    """Leaves the pressures as they are."""
+
+    def reset(self) -> None:
+        """Nothing to forget."""
+
+    def act(self, observation: Float32Array) -> NDArray[np.float32]:
+        """No change."""
+        return np.zeros(MUSCLES, dtype=np.float32)
+
+
+@dataclass
+class RandomPolicy:
+    """Draws each action anew: what a learner starts from."""
+
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        self._rng = np.random.default_rng(self.seed)
+
+    def reset(self) -> None:
+        """The draws go on: no episode repeats another."""
+
+    def act(self, observation: Float32Array) -> NDArray[np.float32]:
+        """Uniform in [-1, 1]."""
+        return self._rng.uniform(-1.0, 1.0, MUSCLES).astype(np.float32)
+
+
+@dataclass
+class SweepPolicy:
+    """Swings the first joint when the ball comes near: a baseline that sees time, not height."""
+
+    lead: float = 0.2
+    """How long before the ball passes the arm the swing begins [s]."""
+    direction: float = 1.0
+    """Which way joint 1 swings."""
+
+    def reset(self) -> None:
+        """Every action follows from one observation."""
+
+    def act(self, observation: Float32Array) -> NDArray[np.float32]:
+        """More pressure in one muscle of joint 1, less in the other, while the swing lasts."""
+        action = np.zeros(MUSCLES, dtype=np.float32)
+        y, vy = observation[BALL_POSITION][1], observation[BALL_VELOCITY][1]
+        swinging = vy < 0 and y < -vy * self.lead and abs(observation[JOINT_POSITIONS][0]) < 1.2
+        if swinging:
+            action[0], action[1] = self.direction, -self.direction
+        return action
+
+
+def default_policy() -> Policy:
+    """The best policy there is."""
+    return HittingPolicy(found_settings())

@@ -1,0 +1,1 @@
+"""What is kept and shown of episodes: records, statistics, plots, films, the report."""

@@ -1,0 +1,166 @@
+"""Pictures and films of the table, the arm and the balls, from published positions."""
+
+from __future__ import annotations
+
+import ctypes.util
+import importlib
+import os
+import sys
+from collections.abc import Iterable
+from contextlib import AbstractContextManager
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o80.extras import needed
+
+from ..settings import JOINTS
+from ..world.scene import MODEL
+
+Image = NDArray[np.uint8]
+FloatArray = NDArray[np.float64]
+
+CAMERAS = ("side", "behind", "close")
+SIZE = (640, 480)
+"""Width and height of pictures [pixels]."""
+SHADOWS = 1024
+"""Size of the map of shadows [pixels]: finer ones take software renderers much longer."""
+OTHER_BALL = (0.95, 0.95, 0.92, 0.8)
+"""Colour of the balls beside the one that is played."""
+
+
+class Scene(AbstractContextManager["Scene"]):
+    """Draws the scene with any number of balls, without a screen.
+
+    Needs the extra `rendering`, and EGL or OSMesa; MUJOCO_GL chooses between them. Raises
+    o80.MissingExtra.
+    """
+
+    def __init__(self, *, balls: int = 1, size: tuple[int, int] = SIZE) -> None:
+        _choose_renderer()
+        needed("OpenGL", "rendering", "a picture")
+        import mujoco
+
+        self._mujoco = mujoco
+        self._model = _model_with(balls)
+        self._model.vis.quality.shadowsize = SHADOWS
+        self._model.vis.quality.offsamples = 4
+        self._data = mujoco.MjData(self._model)
+        self._balls = [self._free_joint(ball) for ball in range(balls)]
+        self._arm = [int(self._model.joint(f"joint_{j + 1}").qposadr[0]) for j in range(JOINTS)]
+        self._renderer = mujoco.Renderer(self._model, size[1], size[0])
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Gives the renderer back; may be called twice."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+    def draw(self, joints: FloatArray, balls: FloatArray, *, camera: str = "side") -> Image:
+        """A fresh picture (height, width, 3) of joints (4,) [rad] and balls (B, 3) [m]."""
+        if self._renderer is None:
+            raise RuntimeError("this scene was closed; make a new one")
+        self._data.qpos[self._arm] = joints
+        for place, ball in zip(self._balls, balls, strict=True):
+            self._data.qpos[place : place + 3] = ball
+        self._mujoco.mj_kinematics(self._model, self._data)
+        self._mujoco.mj_camlight(self._model, self._data)
+        self._renderer.update_scene(self._data, camera)
+        picture: Image = self._renderer.render().copy()
+        return picture
+
+    def _free_joint(self, ball: int) -> int:
+        return int(self._model.joint(_ball_name(ball)).qposadr[0])
+
+
+def write_film(path: Path, pictures: Iterable[Image], *, frames_per_second: float = 25.0) -> int:
+    """Writes pictures (height, width, 3) as an MP4 film; returns how many frames it has."""
+    import imageio_ffmpeg
+
+    writer: Any = None
+    frames = 0
+    try:
+        for picture in pictures:
+            if writer is None:
+                height, width = picture.shape[:2]
+                writer = imageio_ffmpeg.write_frames(
+                    str(path), (width, height), fps=frames_per_second, macro_block_size=2
+                )
+                writer.send(None)
+            writer.send(np.ascontiguousarray(picture))
+            frames += 1
+    finally:
+        if writer is not None:
+            writer.close()
+    return frames
+
+
+def film_episode(
+    path: Path,
+    joints: FloatArray,
+    balls: FloatArray,
+    *,
+    period: float,
+    slow: float = 2.0,
+    frames_per_second: float = 25.0,
+    camera: str = "side",
+    size: tuple[int, int] = SIZE,
+) -> int:
+    """A film of rows of joints (T, 4) [rad] and balls (T, B, 3) [m], `period` [s] apart.
+
+    `slow` times slower than it was. Returns how many frames it has.
+    """
+    step = max(1, round(1.0 / (frames_per_second * slow * period)))
+    with Scene(balls=balls.shape[1], size=size) as scene:
+        pictures = (
+            scene.draw(joints[row], balls[row], camera=camera)
+            for row in range(0, len(joints), step)
+        )
+        return write_film(path, pictures, frames_per_second=frames_per_second)
+
+
+def write_picture(path: Path, picture: Image) -> None:
+    """Writes a picture (height, width, 3) as PNG."""
+    from matplotlib.image import imsave
+
+    imsave(path, picture)
+
+
+def _choose_renderer() -> None:
+    """EGL if it is there, else OSMesa: neither needs a screen.
+
+    MuJoCo looks at the variable when it is first imported; if that is past, its choice is replaced.
+    """
+    usual = "egl" if ctypes.util.find_library("EGL") else "osmesa"
+    chosen = os.environ.setdefault("MUJOCO_GL", usual)
+    contexts: Any = sys.modules.get("mujoco.rendering.classic.gl_context")
+    if contexts is not None and chosen in ("egl", "osmesa"):
+        contexts.GLContext = importlib.import_module(f"mujoco.{chosen}").GLContext
+
+
+def _ball_name(ball: int) -> str:
+    return "ball" if ball == 0 else f"ball_{ball}"
+
+
+def _model_with(balls: int) -> Any:
+    """The model of the scene with so many balls."""
+    import mujoco
+
+    spec = mujoco.MjSpec.from_file(str(MODEL))
+    for ball in range(1, balls):
+        body = spec.worldbody.add_body(name=_ball_name(ball))
+        body.add_freejoint(name=_ball_name(ball))
+        geom = body.add_geom(size=[0.02, 0, 0], rgba=OTHER_BALL)
+        geom.type = mujoco.mjtGeom.mjGEOM_SPHERE
+    return spec.compile()

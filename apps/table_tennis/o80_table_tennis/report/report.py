@@ -1,0 +1,215 @@
+"""What a demo found: numbers for a person and for report.json, the same ones."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table as Grid
+
+from ..players.playing import Played
+from ..settings import Pacing
+from .episode_record import EpisodeRecord
+
+Value = float | int | bool | str | None
+PERCENTILES = (50, 90, 99, 99.9, 100)
+
+LABELS = {
+    "episodes": "episodes",
+    "hits": "hits (the ball flew back)",
+    "touches": "touches of the racket",
+    "mean_reward": "mean reward",
+    "best_reward": "best reward",
+    "steps": "steps of the environment",
+    "exact_steps": "steps of exactly 5 + 5 iterations",
+    "steps_per_second": "steps a second, policy included [1/s]",
+    "bare_steps_per_second": "steps a second, policy left out [1/s]",
+    "times_real_time": "times as fast as real time",
+    "late_actions": "actions taken late",
+    "stalled_episodes": "episodes given up as stalled",
+    "largest_lateness_rows": "largest lateness of a step [rows]",
+    "mean_lateness_rows": "mean lateness of a step [rows]",
+    "arm_iterations": "iterations of the arm",
+    "arm_rate": "iterations of the arm a second [1/s]",
+    "arm_overruns": "overruns of the arm",
+    "arm_skipped": "periods the arm left out",
+    "recorded_episodes": "episodes in the recorded history",
+    "seconds": "seconds played",
+}
+
+
+@dataclass(frozen=True)
+class Report:
+    """The numbers of every mode, and of the whole."""
+
+    modes: Mapping[str, Mapping[str, Value]]
+    whole: Mapping[str, Value]
+
+    def print(self, console: Console) -> None:
+        """A table with a column a mode, and what holds for all of them."""
+        grid = Grid(title="table tennis", title_justify="left")
+        grid.add_column("")
+        for mode in self.modes:
+            grid.add_column(mode, justify="right")
+        rows = dict.fromkeys(key for numbers in self.modes.values() for key in numbers)
+        for key in rows:
+            values = [_text(numbers.get(key)) for numbers in self.modes.values()]
+            grid.add_row(escape(LABELS.get(key, _percentile_label(key))), *values)
+        console.print(grid)
+        for key, value in self.whole.items():
+            console.print(f"{key.replace('_', ' ')}: {_text(value)}", highlight=False)
+
+    def write(self, path: Path) -> None:
+        """As JSON."""
+        path.write_text(json.dumps({"modes": self.modes, **self.whole}, indent=2) + "\n")
+
+
+def write_report(
+    output: Path,
+    modes: Mapping[Pacing, Played],
+    records: Mapping[Pacing, Sequence[EpisodeRecord]],
+    *,
+    film: bool,
+    begin: float,
+) -> Report:
+    """Draws the plots and the film, and writes report.json; `begin` is monotonic time [s]."""
+    drawn = _draw(output, modes, records, film=film)
+    numbers = {
+        pacing.value: mode_numbers(pacing, played, records[pacing])
+        for pacing, played in modes.items()
+    }
+    report = Report(modes=numbers, whole={**drawn, "seconds": round(time.monotonic() - begin, 1)})
+    report.write(output / "report.json")
+    return report
+
+
+def mode_numbers(
+    pacing: Pacing, played: Played, records: Sequence[EpisodeRecord]
+) -> dict[str, Value]:
+    """All numbers of one mode."""
+    statistics = played.statistics
+    rewards = [episode.reward for episode in played.episodes]
+    numbers: dict[str, Value] = {
+        "episodes": len(played.episodes),
+        "hits": played.hits,
+        "touches": played.touches,
+        "mean_reward": round(float(np.mean(rewards)), 4),
+        "best_reward": round(float(np.max(rewards)), 4),
+        "steps": statistics.steps,
+        "exact_steps": statistics.exact_steps,
+        "steps_per_second": round(statistics.steps_per_second, 1),
+        "bare_steps_per_second": round(statistics.bare_steps_per_second, 1),
+        "times_real_time": round(statistics.steps_per_second * statistics.step_seconds, 2),
+        "arm_iterations": statistics.arm_iterations,
+        "recorded_episodes": len(records),
+        "seconds": round(played.seconds, 2),
+    }
+    if pacing.real_time:
+        numbers |= {
+            "late_actions": statistics.late_actions,
+            "stalled_episodes": statistics.stalled_episodes,
+            "mean_lateness_rows": round(statistics.mean_lateness, 3),
+            "largest_lateness_rows": statistics.largest_lateness,
+            "arm_rate": round(statistics.arm_rate, 2),
+            "arm_overruns": statistics.arm_overruns,
+            "arm_skipped": statistics.arm_skipped,
+            **_percentiles("arm_lateness_us", statistics.arm_lateness_us),
+            **_percentiles("arm_jitter_us", np.abs(statistics.arm_periods_us - 2000.0)),
+        }
+    return numbers
+
+
+def _draw(
+    output: Path,
+    modes: Mapping[Pacing, Played],
+    records: Mapping[Pacing, Sequence[EpisodeRecord]],
+    *,
+    film: bool,
+) -> dict[str, Value]:
+    from .plots import plot_jitter, plot_motion, plot_overview, plot_paths
+
+    files: dict[str, Value] = {}
+    plot_overview(
+        output / "overview.png",
+        {pacing.value: played.episodes for pacing, played in modes.items()},
+        {pacing.value: played.statistics.steps_per_second for pacing, played in modes.items()},
+    )
+    if Pacing.REAL_TIME in modes:
+        statistics = modes[Pacing.REAL_TIME].statistics
+        plot_jitter(
+            output / "jitter.png",
+            statistics.arm_lateness_us,
+            statistics.arm_periods_us,
+            period=2000.0,
+        )
+    shown = best_record([record for played in records.values() for record in played])
+    if shown is not None:
+        plot_motion(output / "motion.png", shown)
+        plot_paths(output / "paths.png", shown)
+        files["shown_episode"] = shown.summary.episode
+        files["shown_episode_hit"] = shown.summary.returned
+        files["shown_episode_reward"] = round(shown.summary.reward, 4)
+        if film:
+            files |= _film(output, shown)
+    return files
+
+
+def best_record(records: Sequence[EpisodeRecord]) -> EpisodeRecord | None:
+    """The best paid in which the ball flew back, else the best paid of all that came to an end."""
+    return max(
+        records,
+        key=lambda record: (
+            record.summary.returned,
+            record.summary.end != "stalled",
+            record.summary.reward,
+        ),
+        default=None,
+    )
+
+
+def _film(output: Path, record: EpisodeRecord) -> dict[str, Value]:
+    """A machine that cannot draw has no film, and says why; all else goes on."""
+    from .rendering import film_episode
+
+    try:
+        frames = film_episode(
+            output / "episode.mp4",
+            record.twin_joint_positions,
+            record.balls,
+            period=record.period,
+        )
+    except Exception as error:
+        return {"film_frames": 0, "no_film_because": f"{type(error).__name__}: {error}"}
+    return {"film_frames": frames}
+
+
+def _percentiles(name: str, values: Any) -> dict[str, Value]:
+    return {
+        f"{name}_p{percentile:g}": round(float(np.percentile(values, percentile)), 1)
+        for percentile in PERCENTILES
+        if len(values)
+    }
+
+
+def _percentile_label(key: str) -> str:
+    name, _, percentile = key.rpartition("_p")
+    what = {
+        "arm_lateness_us": "lateness of an iteration of the arm",
+        "arm_jitter_us": "jitter of its period",
+    }.get(name, name)
+    return f"{what}, {percentile} % below [us]"
+
+
+def _text(value: Value) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:g}" if isinstance(value, float) else str(value)

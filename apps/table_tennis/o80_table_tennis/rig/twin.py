@@ -1,0 +1,97 @@
+"""One twin as the environment sees it: it mirrors the arm, and holds balls."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import o80
+
+from ..balls.trajectories import SampledFlight
+from ..settings import ITERATIONS, JOINTS
+from .ball_records import RecordReader
+from .row_words import WORD, words
+
+FloatArray = NDArray[np.float64]
+
+TIMEOUT = 5.0
+"""Longest wait for a burst [s]."""
+BALL_NUMBERS = 6
+"""Position and velocity."""
+
+
+class Twin:
+    """A frontend to one simulation of the arm, the table and `balls` balls."""
+
+    def __init__(self, frontend: o80.Frontend) -> None:
+        self.frontend = frontend
+        dtype = frontend.history(1).rows.dtype
+        contacts = words(dtype, "extended", "contacts")
+        self._joints = words(dtype, "observed", "joints")
+        self._balls = words(dtype, "observed", "balls")
+        self._record_dtype = dtype["extended"]["contacts"].base
+        self._records_at = contacts.start * WORD
+        self.balls = (self._balls.stop - self._balls.start) // BALL_NUMBERS
+        self.played_ball = slice(self._balls.start, self._balls.start + BALL_NUMBERS)
+        """Words of a row that hold position and velocity of the first ball."""
+        names = [actuator.name for actuator in frontend.actuators]
+        self._joint_names, self._ball_names = names[:JOINTS], names[JOINTS:]
+        self._burst = frontend.prepared_burst(ITERATIONS, self._joint_names, steps=ITERATIONS)
+        states = self._burst.targets.T.view(np.float64)
+        self._motion = states.reshape(JOINTS, ITERATIONS, 2)
+        self._last = self._burst.rows.view(np.float64).reshape(ITERATIONS, -1)[-1]
+        self.row: FloatArray = self._last
+        """The words of the newest row; the next step overwrites them."""
+        self.iteration = -1
+        """Of that row."""
+        self._ball_state = np.dtype(
+            [("position", np.float64, (3,)), ("velocity", np.float64, (3,))]
+        )
+
+    def record_reader(self) -> RecordReader:
+        """Of the first ball."""
+        return RecordReader(self._record_dtype, self._records_at)
+
+    def reset(self, seed: int) -> None:
+        """All balls and contacts forgotten."""
+        self.frontend.request("reset", seed=seed)
+
+    def begin(self, q: FloatArray, dq: FloatArray, flights: Sequence[SampledFlight]) -> None:
+        """Adds the arm (4,) as it stands and the whole flight of each ball, for the next burst."""
+        targets = {"position": q[None, :], "velocity": dq[None, :]}
+        self.frontend.add_trajectory(targets, self._joint_names)
+        for ball, flight in zip(self._ball_names, flights, strict=True):
+            states = np.empty(len(flight.positions), self._ball_state)
+            states["position"], states["velocity"] = flight.positions, flight.velocities
+            self.frontend.add_trajectory(states, ball)
+
+    def step(self, motion: FloatArray) -> None:
+        """Mirrors angle and velocity of each joint in the arm's last rows (4, 5, 2)."""
+        self._motion[...] = motion
+        self.iteration = self._burst.run(TIMEOUT)
+        self.row = self._last
+
+    def mirror(self, motion: FloatArray) -> None:
+        """Adds the same, to be burst together with other twins."""
+        self._motion[...] = motion
+        self.frontend.add_trajectory(self._burst.targets, self._joint_names)
+
+    def see(self, row: o80.Observation) -> None:
+        """The newest row is this one."""
+        memory: Any = row
+        self.row, self.iteration = np.frombuffer(memory), row.iteration
+
+    def all_balls(self, row: FloatArray) -> FloatArray:
+        """Positions and velocities (balls, 6) in the words of a row; a view."""
+        return row[self._balls].reshape(self.balls, BALL_NUMBERS)
+
+    def joint_positions(self, row: FloatArray) -> FloatArray:
+        """(4,) [rad] in the words of a row; a view."""
+        return row[self._joints][::2]
+
+    def records(self, row: FloatArray) -> NDArray[Any]:
+        """The records (balls,) in the words of a row; a view."""
+        return np.ndarray((self.balls,), self._record_dtype, row, self._records_at)

@@ -1,0 +1,1 @@
+"""What is played: actions, observations, rewards, ends of episodes, and the tasks themselves."""

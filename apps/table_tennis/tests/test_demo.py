@@ -1,0 +1,166 @@
+"""The demo runs from end to end, tells the truth, and leaves nothing behind."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import o80
+from o80_table_tennis.report.episode_record import EpisodeRecord, load_records
+
+RECORDINGS = Path(__file__).resolve().parents[4] / "shared" / "data" / "ball_gun_2019"
+EPISODES = 4
+MODES = ("real time", "processes", "inline")
+STARTING = 60.0  # [s]
+
+
+def demo(output: Path, *arguments: str) -> list[str]:
+    return [sys.executable, "-m", "o80_table_tennis.demo", f"--output={output}", *arguments]
+
+
+def live_segments(process: int) -> set[str]:
+    """Of those that a demo has started."""
+    return {
+        segment.name
+        for segment in o80.segments()
+        if segment.life == "running" and f"-{process}-" in segment.name
+    }
+
+
+@pytest.fixture(scope="module")
+def played(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """Folder and text of a short demo, on recordings where there are any."""
+    output = tmp_path_factory.mktemp("demo")
+    balls = [f"--balls={RECORDINGS}"] if RECORDINGS.is_dir() else []
+    arguments = [f"--episodes={EPISODES}", "--real-time-episodes=1", *balls]
+    process = subprocess.Popen(
+        demo(output, *arguments), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    try:
+        text, errors = process.communicate(timeout=110)
+    finally:
+        process.kill()
+    assert process.returncode == 0, errors
+    assert not errors
+    assert not live_segments(process.pid)
+    return output, text
+
+
+@pytest.fixture(scope="module")
+def report(played: tuple[Path, str]) -> dict[str, Any]:
+    content: dict[str, Any] = json.loads((played[0] / "report.json").read_text())
+    return content
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_every_step_was_exact(report: dict[str, Any], mode: str) -> None:
+    numbers = report["modes"][mode]
+    assert numbers["episodes"] == (1 if mode == "real time" else EPISODES)
+    assert numbers["steps"] == numbers["exact_steps"] > 0
+
+
+def test_accelerated_is_faster_than_real_time(report: dict[str, Any]) -> None:
+    rates = {mode: report["modes"][mode]["bare_steps_per_second"] for mode in MODES}
+    assert rates["real time"] > 0
+    assert min(rates["processes"], rates["inline"]) > 2 * rates["real time"]
+
+
+def test_processes_and_inline_played_the_same(report: dict[str, Any]) -> None:
+    told = ("hits", "touches", "mean_reward", "best_reward", "steps")
+    processes, inline = report["modes"]["processes"], report["modes"]["inline"]
+    assert [processes[key] for key in told] == [inline[key] for key in told]
+
+
+def test_it_tells_how_the_arm_kept_its_time(report: dict[str, Any]) -> None:
+    numbers = report["modes"]["real time"]
+    assert 0 < numbers["arm_rate"] < 501
+    lateness = [numbers[f"arm_lateness_us_p{p}"] for p in ("50", "90", "99", "99.9", "100")]
+    assert lateness == sorted(lateness)
+    for key in ("arm_overruns", "arm_skipped", "late_actions", "largest_lateness_rows"):
+        assert numbers[key] >= 0
+
+
+def test_every_printed_number_is_in_the_report(
+    played: tuple[Path, str], report: dict[str, Any]
+) -> None:
+    values = [value for numbers in report["modes"].values() for value in numbers.values()]
+    values += [value for key, value in report.items() if key != "modes"]
+    texts = {f"{value:g}" if isinstance(value, float) else str(value) for value in values}
+    columns = [
+        cell.strip()
+        for line in played[1].splitlines()
+        if line.startswith("│")
+        for cell in line.strip("│").split("│")[1:]
+    ]
+    assert columns
+    assert {cell for cell in columns if cell} <= texts
+
+
+def test_plots_and_film_are_there(played: tuple[Path, str], report: dict[str, Any]) -> None:
+    for name in ("overview.png", "jitter.png", "motion.png", "paths.png"):
+        assert (played[0] / name).stat().st_size > 10_000
+    assert report["film_frames"] > 20
+    assert (played[0] / "episode.mp4").stat().st_size > 1_000
+
+
+@pytest.mark.parametrize("mode", ["real_time", "processes", "inline"])
+def test_the_logger_kept_every_row(played: tuple[Path, str], mode: str) -> None:
+    records = load_records(played[0] / "history" / mode)
+    assert len(records) == (1 if mode == "real_time" else EPISODES)
+    for record in records:
+        rows = 5 * record.summary.steps + 1
+        for iterations in (record.arm_iterations, record.twin_iterations):
+            np.testing.assert_array_equal(np.diff(iterations), 1)
+            assert len(iterations) == rows
+        # from the first step on, the twin is the arm
+        np.testing.assert_array_equal(record.twin_joint_positions[1:], record.joint_positions[1:])
+        assert record.balls.shape == (rows, 1, 3)
+
+
+def test_a_record_comes_back_as_it_was_saved(played: tuple[Path, str], tmp_path: Path) -> None:
+    record = load_records(played[0] / "history" / "inline")[0]
+    record.save(tmp_path / "again.npz")
+    again = EpisodeRecord.load(tmp_path / "again.npz")
+    assert again.summary == record.summary
+    np.testing.assert_array_equal(again.balls, record.balls)
+    np.testing.assert_array_equal(again.times, record.times)
+
+
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
+def test_interrupted_it_leaves_nothing_behind(tmp_path: Path, sent: signal.Signals) -> None:
+    process = subprocess.Popen(
+        demo(tmp_path, "--real-time-episodes=50"),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    try:
+        end = time.monotonic() + STARTING
+        while len(live_segments(process.pid)) < 2:
+            assert process.poll() is None
+            assert time.monotonic() < end
+            time.sleep(0.05)
+        # as a terminal does: to all of its processes
+        os.killpg(process.pid, sent)
+        assert process.wait(20) != 0
+    finally:
+        if process.poll() is None:
+            process.kill()
+            process.wait()
+    assert not live_segments(process.pid)
+
+
+def test_wrong_recordings_are_refused_in_words(tmp_path: Path) -> None:
+    done = subprocess.run(
+        demo(tmp_path, "--balls=/nowhere"), capture_output=True, text=True, check=False
+    )
+    assert done.returncode != 0
+    assert "no such file" in done.stderr
+    assert "Traceback" not in done.stderr

@@ -1,0 +1,203 @@
+"""The flight model: against closed forms, bounces, planes, simulated shots."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from o80_table_tennis.physics.aerodynamics import Aerodynamics, runge_kutta_step
+from o80_table_tennis.physics.flight import (
+    ShotVariation,
+    predict,
+    predict_crossing,
+    predict_landing,
+    simulated_shot,
+)
+from o80_table_tennis.physics.path import along_path
+from o80_table_tennis.world.table import Table
+
+VACUUM = Aerodynamics(drag_coefficient=0.0, lift_coefficient=0.0)
+START = (0.46, 2.95, 1.37)
+VELOCITY = (0.24, -4.14, 2.28)
+coordinate = st.floats(-3, 3)
+speed = st.floats(-6, 6)
+
+
+@settings(deadline=None)
+@given(
+    position=st.tuples(coordinate, coordinate, coordinate), velocity=st.tuples(speed, speed, speed)
+)
+def test_without_air_and_table_the_flight_is_a_parabola(
+    position: tuple[float, float, float], velocity: tuple[float, float, float]
+) -> None:
+    flight = predict(position, velocity, 0.7, aerodynamics=VACUUM, table=None)
+
+    t = flight.stamps[:, None]
+    gravity = np.array([0.0, 0.0, -9.81])
+    expected = np.array(position) + t * np.array(velocity) + 0.5 * gravity * t**2
+    np.testing.assert_allclose(flight.positions, expected, atol=1e-9)
+    np.testing.assert_allclose(flight.velocities, velocity + gravity * t, atol=1e-9)
+
+
+def test_drag_alone_slows_a_ball_by_the_closed_form() -> None:
+    air = Aerodynamics(gravity=0.0)
+    flight = predict((0.0, 0.0, 3.0), (5.0, 0.0, 0.0), 1.0, aerodynamics=air, table=None)
+
+    growth = 1 + air.drag * 5.0 * flight.stamps
+    np.testing.assert_allclose(flight.velocities[:, 0], 5.0 / growth, rtol=1e-6)
+    np.testing.assert_allclose(flight.positions[:, 0], np.log(growth) / air.drag, atol=1e-6)
+
+
+def test_the_drag_is_the_published_formula() -> None:
+    air = Aerodynamics(drag_coefficient=0.47)
+
+    area = math.pi * 0.02**2
+    assert air.drag == pytest.approx(0.5 * 1.18 * 0.47 * area / 0.0027)
+    assert air.magnus == pytest.approx(0.5 * 1.18 * 1.47 * area * 0.02 / 0.0027)
+
+
+def test_top_spin_of_a_ball_towards_the_arm_pulls_it_down() -> None:
+    spinning = predict(START, VELOCITY, 0.4, spin=(60.0, 0.0, 0.0), table=None)
+    plain = predict(START, VELOCITY, 0.4, table=None)
+
+    assert spinning.positions[-1, 2] < plain.positions[-1, 2] - 0.05
+
+
+def test_spin_decays() -> None:
+    lasting = Aerodynamics(spin_decay=0.0)
+    kept = predict(START, VELOCITY, 0.5, spin=(60.0, 0.0, 0.0), aerodynamics=lasting, table=None)
+    lost = predict(START, VELOCITY, 0.5, spin=(60.0, 0.0, 0.0), table=None)
+
+    assert kept.positions[-1, 2] < lost.positions[-1, 2]
+
+
+def test_many_balls_in_one_step_fly_like_each_alone() -> None:
+    turns, drags = np.linspace(-0.4, 0.4, 5), np.linspace(0.0, 0.2, 5)
+    start = (0.0, 0.0, 1.0, 0.5, -4.0, 2.0)
+
+    many = runge_kutta_step(
+        tuple(np.full(5, value) for value in start),  # type: ignore[arg-type]
+        (turns, 0 * turns, 0 * turns),
+        drags,
+        9.81,
+        0.01,
+    )
+
+    for ball in range(5):
+        alone = runge_kutta_step(start, (turns[ball], 0.0, 0.0), drags[ball], 9.81, 0.01)
+        np.testing.assert_allclose([value[ball] for value in many], alone, rtol=1e-14)
+
+
+def test_a_bounce_keeps_the_named_shares_of_the_velocity() -> None:
+    table = Table(normal_restitution=0.9, tangential_restitution=0.6)
+    touch = predict_landing(START, VELOCITY, table=table)
+    assert touch is not None
+
+    after = predict(START, VELOCITY, touch.time + 1e-6, period=touch.time + 1e-6, table=table)
+
+    assert touch.position[2] == pytest.approx(0.795, abs=1e-6)
+    expected = touch.velocity * np.array([0.6, 0.6, -0.9])
+    np.testing.assert_allclose(after.velocities[-1], expected, atol=1e-4)
+
+
+def test_a_ball_beside_the_table_falls_past_it() -> None:
+    beside = (1.4, 1.57, 1.2)
+
+    assert predict_landing(beside, (0.0, 0.0, 0.0)) is None
+    assert predict(beside, (0.0, 0.0, 0.0), 0.6).positions[-1, 2] < 0
+
+
+@settings(max_examples=30, deadline=None)
+@given(height=st.floats(0.8, 1.5), vz=st.floats(-3, 3))
+def test_a_ball_over_the_table_never_sinks_into_it(height: float, vz: float) -> None:
+    flight = predict((0.4, 1.57, height), (0.0, 0.0, vz), 3.0, period=0.002)
+
+    assert flight.positions[:, 2].min() > 0.795 - 1e-3
+
+
+def test_the_energy_of_a_bouncing_ball_falls() -> None:
+    flight = predict((0.4, 1.57, 1.3), (0.0, 0.0, 0.0), 2.5)
+
+    energy = 9.81 * flight.positions[:, 2] + 0.5 * np.sum(flight.velocities**2, axis=1)
+    assert np.all(np.diff(energy) < 1e-3)
+    assert energy[-1] < energy[0] - 0.5
+
+
+def test_a_crossing_lies_on_the_plane_and_on_the_flight() -> None:
+    crossing = predict_crossing(START, VELOCITY, axis=1, at=0.4)
+    assert crossing is not None
+
+    flight = predict(START, VELOCITY, crossing.time, period=crossing.time)
+
+    assert crossing.position[1] == pytest.approx(0.4, abs=1e-9)
+    np.testing.assert_allclose(crossing.position, flight.positions[-1], atol=1e-6)
+    np.testing.assert_allclose(crossing.velocity, flight.velocities[-1], atol=1e-4)
+
+
+def test_a_ball_that_starts_on_a_plane_crosses_it_when_it_comes_back() -> None:
+    crossing = predict_crossing(
+        (0.0, 0.0, 2.0), (0.0, 0.0, 2.0), axis=2, at=2.0, aerodynamics=VACUUM, table=None
+    )
+
+    assert crossing is not None
+    assert crossing.time == pytest.approx(4.0 / 9.81, abs=1e-6)
+
+
+def test_a_plane_out_of_reach_is_not_crossed() -> None:
+    assert predict_crossing(START, VELOCITY, axis=2, at=5.0) is None
+
+
+@pytest.mark.parametrize("bad", [0.0, -1.0, math.nan, math.inf])
+def test_a_duration_that_is_none_is_refused(bad: float) -> None:
+    with pytest.raises(ValueError, match="duration"):
+        predict(START, VELOCITY, bad)
+
+
+def test_a_start_that_is_not_finite_is_refused() -> None:
+    with pytest.raises(ValueError, match="finite"):
+        predict((0.0, math.nan, 0.0), VELOCITY, 1.0)
+
+
+def test_the_same_generator_gives_the_same_shot() -> None:
+    first, again = (simulated_shot(np.random.default_rng(7)) for _ in range(2))
+    other = simulated_shot(np.random.default_rng(8))
+
+    np.testing.assert_array_equal(first.positions, again.positions)
+    assert not np.array_equal(first.positions, other.positions)
+
+
+def test_simulated_shots_bounce_once_and_come_into_reach_like_the_recorded_ones() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(30):
+        shot = simulated_shot(rng).resample()
+        arriving = int(np.argmax(shot.positions[:, 1] < 0.4))
+
+        assert len(shot.bounce_times) == 1
+        assert 0.5 < shot.bounce_times[0] < 0.7
+        assert 0.65 < arriving * shot.period < 0.9
+        assert 0.85 < shot.positions[arriving, 2] < 1.4
+        assert shot.duration == pytest.approx(1.28, abs=0.01)
+
+
+def test_a_shot_that_cannot_bounce_once_is_refused() -> None:
+    with pytest.raises(ValueError, match="bounces exactly once"):
+        simulated_shot(np.random.default_rng(0), variation=ShotVariation(velocity=(0.0, 5.0, 0.0)))
+
+
+def test_a_path_goes_through_its_nodes_and_jumps_at_a_bounce() -> None:
+    times = np.array([0.0, 1.0, 1.0, 2.0])
+    nodes = np.array(
+        [
+            [0.0, 0, 0, 1.0, 0, 0],
+            [1.0, 0, 0, 1.0, 0, 0],
+            [1.0, 0, 0, -2.0, 0, 0],
+            [-1.0, 0, 0, -2.0, 0, 0],
+        ]
+    )
+
+    positions, velocities = along_path(np.array([0.5, 1.0, 1.5, 2.5]), nodes, times)
+
+    np.testing.assert_allclose(positions[:, 0], [0.5, 1.0, 0.0, -2.0])
+    np.testing.assert_allclose(velocities[:, 0], [1.0, -2.0, -2.0, -2.0])
