@@ -22,3 +22,16 @@ function(o80_add_robot name)
     set_target_properties(${name} PROPERTIES LIBRARY_OUTPUT_DIRECTORY ${O80_ROBOT_BUILD_DIR})
   endif()
 endfunction()
+
+# o80_install_robot(name)
+#
+# Installs the robot library: in a Python package, built by scikit-build-core, into the folder lib of
+# `wheel.install-dir`; in a plain installation where o80 of the same prefix finds it by its name.
+function(o80_install_robot name)
+  if(DEFINED SKBUILD)
+    install(TARGETS ${name} LIBRARY DESTINATION lib)
+  else()
+    include(GNUInstallDirs)
+    install(TARGETS ${name} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/o80/robots)
+  endif()
+endfunction()

@@ -1,11 +1,14 @@
 # What to build. A user who only wants the library needs none of these.
 if(DEFINED SKBUILD)
   set(building_wheel ON)
+  set(building_all OFF)
 else()
   set(building_wheel OFF)
+  set(building_all ON)
 endif()
 
 option(O80_BUILD_PYTHON "Build the Python module o80._core" ${building_wheel})
+option(O80_BUILD_PACKAGES "Build the robots of the repository's other packages too" ${building_all})
 option(O80_BUILD_TESTS "Build the C++ tests (needs GoogleTest)" OFF)
 option(O80_BUILD_EXAMPLES "Build the C++ examples" OFF)
 option(O80_BUILD_BENCHMARKS "Build the benchmarks" OFF)
@@ -14,7 +17,6 @@ option(O80_CCACHE "Compile through ccache where it is installed" OFF)
 option(O80_STATIC "Link everything statically; such programs load no robot libraries" OFF)
 set(O80_TEST_FOLDERS "" CACHE STRING "Folders of tests/cpp to build; empty: all that can be built")
 set(O80_BUILD_MUJOCO "AUTO" CACHE STRING "Build the MuJoCo simulator: AUTO (if MuJoCo is found), ON or OFF")
-set_property(CACHE O80_BUILD_MUJOCO PROPERTY STRINGS AUTO ON OFF)
 set(O80_SANITIZE "" CACHE STRING "Sanitizers for everything built, as for -fsanitize=")
 
 if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)

@@ -1,15 +1,17 @@
-# Every folder of robots/ and simulators/ that has a CMakeLists.txt; what it adds with
-# o80_add_robot is installed among the bundled robots.
+# The robots that come with o80, and those of the repository's other packages. A package has a
+# pyproject.toml and installs its robot itself.
 file(GLOB robot_lists CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/robots/*/CMakeLists.txt
      ${PROJECT_SOURCE_DIR}/simulators/*/CMakeLists.txt
 )
-set(o80_robots)
-set(CMAKE_CXX_VISIBILITY_PRESET hidden)
-set(CMAKE_VISIBILITY_INLINES_HIDDEN ON)
+set(o80_robots) # all that are built
+set(o80_bundled_robots)
 foreach(list_file IN LISTS robot_lists)
   cmake_path(GET list_file PARENT_PATH folder)
-  cmake_path(GET folder FILENAME name)
-  if(name STREQUAL "mujoco" AND NOT TARGET mujoco::mujoco)
+  set(packaged OFF)
+  if(EXISTS ${folder}/pyproject.toml)
+    set(packaged ON)
+  endif()
+  if(packaged AND NOT O80_BUILD_PACKAGES)
     continue()
   endif()
   add_subdirectory(${folder})
@@ -21,8 +23,9 @@ foreach(list_file IN LISTS robot_lists)
     endif()
     if(type STREQUAL "MODULE_LIBRARY")
       list(APPEND o80_robots ${target})
+      if(NOT packaged)
+        list(APPEND o80_bundled_robots ${target})
+      endif()
     endif()
   endforeach()
 endforeach()
-unset(CMAKE_CXX_VISIBILITY_PRESET)
-unset(CMAKE_VISIBILITY_INLINES_HIDDEN)

@@ -48,7 +48,7 @@ target_compile_definitions(o80_killed PUBLIC O80_CRASH_POINTS)
 target_link_libraries(o80_killed PRIVATE o80_private_headers o80_warnings)
 
 foreach(folder IN LISTS test_folders)
-  if(folder STREQUAL "mujoco" AND NOT TARGET mujoco::mujoco)
+  if(folder STREQUAL "mujoco" AND NOT TARGET mujoco_driver)
     continue()
   endif()
   # one stands in front of shared libraries, as sanitizers do; the other holds parts of the library

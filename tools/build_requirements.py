@@ -1,7 +1,31 @@
-"""Prints what pyproject.toml asks for to build, one requirement a line."""
+"""Prints what the packages of this repository need from elsewhere, one requirement a line.
 
-import pathlib
+With `build`, what building them needs; with `run`, what running them needs. Extras follow: those of
+all packages that have one of the name.
+"""
+
+import sys
 import tomllib
+from pathlib import Path
 
-project = tomllib.loads(pathlib.Path("pyproject.toml").read_text())
-print(*project["build-system"]["requires"], sep="\n")
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGES = (".", "simulators/mujoco", "robots/pam", "apps/table_tennis")
+
+
+def requirements(kind: str, extras: list[str]) -> list[str]:
+    """Requirements of all packages, without those on each other."""
+    found: set[str] = set()
+    for package in PACKAGES:
+        pyproject = tomllib.loads((ROOT / package / "pyproject.toml").read_text())
+        project = pyproject["project"]
+        if kind == "build":
+            found.update(pyproject["build-system"]["requires"])
+        else:
+            found.update(project["dependencies"])
+            for extra in extras:
+                found.update(project.get("optional-dependencies", {}).get(extra, []))
+    return sorted(each for each in found if not each.startswith(("o80=", "o80-", "o80[")))
+
+
+if __name__ == "__main__":
+    print(*requirements(sys.argv[1], sys.argv[2:]), sep="\n")

@@ -42,6 +42,7 @@ once() {
 }
 
 state_of() { find "$@" -type f ! -name '*.pyc' -print0 | sort -z | xargs -0 sha256sum | sha256sum; }
+package_state() { state_of $(find "$1" -mindepth 1 -maxdepth 1 ! -name tests); }
 
 pip() { .venv/bin/python -m pip -qq --disable-pip-version-check "$@"; }
 
@@ -58,15 +59,29 @@ make_environment() {
 }
 
 install_tools() {
-  say "installing what building ${1:+and testing }needs"
+  say "installing what building, running ${1:+and testing }needs"
   pip install 'pip>=25.1'
-  .venv/bin/python tools/build_requirements.py > build/requirements.txt
+  .venv/bin/python tools/build_requirements.py build > build/requirements.txt
+  .venv/bin/python tools/build_requirements.py run rendering >> build/requirements.txt
   pip install -r build/requirements.txt --group build ${1:+--group "$1"}
 }
 
-install_o80() {
-  say "building and installing o80"
-  pip install --no-build-isolation -Cbuild-dir=build/pip '.[rendering]'
+# install_package NAME FOLDER: one of the four packages, whose requirements are there
+install_package() {
+  say "building and installing $1"
+  pip install --no-build-isolation --no-deps "-Cbuild-dir=$PWD/build/pip/$1" "$2"
+}
+
+install_packages() {
+  once o80 "$(state_of pyproject.toml CMakeLists.txt README.md LICENSE cmake include src python \
+    robots/two_joints)" install_package o80 .
+  # what the others are compiled against
+  local headers
+  headers=$(state_of include cmake/o80_add_robot.cmake cmake/o80Config.cmake.in)
+  once pam "$headers $(package_state robots/pam)" install_package o80-pam ./robots/pam
+  once mujoco "$headers $(package_state simulators/mujoco)" install_package o80-mujoco ./simulators/mujoco
+  once table_tennis "$(package_state apps/table_tennis)" \
+    install_package o80-table-tennis ./apps/table_tennis
 }
 
 case $purpose in
@@ -88,6 +103,5 @@ ldconfig -p | grep -q libEGL_mesa || need_packages libosmesa6 || true
 
 .venv/bin/python -c '' 2> /dev/null || make_environment
 group=$([ "$purpose" = test ] && echo test || true)
-once "tools-${group:-build}" "$(state_of pyproject.toml)" install_tools "$group"
-once o80 "$(state_of pyproject.toml CMakeLists.txt README.md LICENSE cmake include src python \
-  $(ls -d robots simulators apps 2> /dev/null))" install_o80
+once "tools-${group:-build}" "$(state_of pyproject.toml ./*/*/pyproject.toml)" install_tools "$group"
+install_packages

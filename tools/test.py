@@ -38,11 +38,12 @@ def cpp(preset: str) -> list[list[str]]:
 
 PYTHON = [sys.executable, "-m"]
 PROOF = [sys.executable, "tests/proofs/run.py"]
+PACKAGES = ["-p", "o80", "-p", "o80_mujoco", "-p", "o80_pam", "-p", "o80_table_tennis"]
 STEPS: dict[str, list[list[str]]] = {
     "format": [[sys.executable, "tools/format.py", "--check"]],
     "ruff": [["ruff", "check", "."]],
     "mypy": [
-        [*PYTHON, "mypy", "-p", "o80", "-p", "o80_table_tennis"],
+        [*PYTHON, "mypy", *PACKAGES],
         *([*PYTHON, "mypy", folder] for folder in typed_folders()),
     ],
     "dev": cpp("dev"),

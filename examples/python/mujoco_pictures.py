@@ -1,6 +1,6 @@
 """Draw pictures of what a MuJoCo robot did, from its history.
 
-Needs `pip install "o80[rendering]"`, and EGL or OSMesa (Debian: libegl1 or libosmesa6).
+Needs `pip install "o80-mujoco[rendering]"`, and EGL or OSMesa (Debian: libegl1 or libosmesa6).
 """
 
 import os

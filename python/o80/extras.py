@@ -6,13 +6,13 @@ from types import ModuleType
 from o80.errors import MissingExtra
 
 
-def needed(module: str, extra: str, purpose: str) -> ModuleType:
-    """Imports a module that an extra of o80 installs. Raises MissingExtra with its name."""
+def needed(module: str, extra: str, purpose: str, *, package: str = "o80") -> ModuleType:
+    """Imports a module that an extra of `package` installs. Raises MissingExtra with both names."""
     try:
         return importlib.import_module(module)
     except ImportError as error:
-        package = module.partition(".")[0]
+        missing = module.partition(".")[0]
         raise MissingExtra(
-            f'{purpose} needs {package}, which is not installed: pip install "o80[{extra}]"',
-            name=package,
+            f'{purpose} needs {missing}, which is not installed: pip install "{package}[{extra}]"',
+            name=missing,
         ) from error

@@ -1,35 +1,81 @@
-"""The package as it was installed agrees with what pyproject.toml says."""
+"""The packages as they were installed agree with what their pyproject.toml say."""
 
 import tomllib
-from importlib.metadata import entry_points
+from importlib.metadata import entry_points, requires, version
 from pathlib import Path
+from typing import Any
+
+import pytest
 
 import o80
 
-PROJECT = tomllib.loads((Path(__file__).resolve().parents[2] / "pyproject.toml").read_text())
-PACKAGE = Path(o80.__file__).parent
+ROOT = Path(__file__).resolve().parents[2]
+INSTALLED = Path(o80.__file__).parent
+OTHERS = ("simulators/mujoco", "robots/pam", "apps/table_tennis")
 
 
-def pin_of(name: str, requirements: list[str]) -> str:
-    """The exact version a list of requirements asks for."""
-    [requirement] = [r for r in requirements if r.partition("==")[0] == name]
-    return requirement.partition("==")[2]
+def pyproject(folder: str = ".") -> dict[str, Any]:
+    return tomllib.loads((ROOT / folder / "pyproject.toml").read_text())
 
 
-def test_the_simulator_runs_with_the_mujoco_it_was_compiled_against() -> None:
-    built = pin_of("mujoco-core", PROJECT["build-system"]["requires"])
+def test_the_core_needs_numpy_and_the_command_line_only() -> None:
+    needed = {name.partition(">")[0] for name in pyproject()["project"]["dependencies"]}
 
-    assert built
-    assert built == pin_of("mujoco-core", PROJECT["project"]["dependencies"])
+    assert needed == {"numpy", "typer", "rich"}
+
+
+@pytest.mark.parametrize("folder", OTHERS)
+def test_each_package_asks_for_the_others_in_the_version_of_this_tree(folder: str) -> None:
+    versions = {
+        project["name"]: project["version"]
+        for project in (pyproject(each)["project"] for each in (".", *OTHERS))
+    }
+    project = pyproject(folder)["project"]
+    pins = dict(
+        name.split("==") for name in project["dependencies"] if name.startswith(("o80=", "o80-"))
+    )
+
+    assert "o80" in pins
+    assert pins.items() <= versions.items()
+    for extra in project.get("optional-dependencies", {}).values():
+        for name in extra:
+            if name.startswith("o80"):
+                assert name.endswith(f"=={versions[name.partition('[')[0]]}")
+
+
+@pytest.mark.parametrize("folder", [".", *OTHERS])
+def test_the_installed_package_is_that_of_the_tree(folder: str) -> None:
+    project = pyproject(folder)["project"]
+
+    assert version(project["name"]) == project["version"]
+    plain = [name.partition(";")[0] for name in requires(project["name"]) or [] if ";" not in name]
+    assert sorted(plain) == sorted(project["dependencies"])
+
+
+def test_packages_share_one_build_backend_and_license() -> None:
+    backends = {
+        (ROOT / folder / "build_backend" / "beside_o80.py").read_text()
+        for folder in ("simulators/mujoco", "robots/pam")
+    }
+    licenses = {(ROOT / folder / "LICENSE").read_text() for folder in (".", *OTHERS)}
+
+    assert len(backends) == 1
+    assert len(licenses) == 1
 
 
 def test_the_compiled_library_has_the_version_of_the_package() -> None:
-    assert o80.version() == PROJECT["project"]["version"]
+    assert o80.version() == pyproject()["project"]["version"]
 
 
 def test_headers_library_and_stub_are_installed_with_the_package() -> None:
     for path in ("include/o80/base/version.hpp", "lib/libo80.so", "_core.pyi", "py.typed"):
-        assert (PACKAGE / path).exists(), path
+        assert (INSTALLED / path).exists(), path
+
+
+def test_the_core_brings_no_robot_but_its_example() -> None:
+    bundled = {file.stem for file in (INSTALLED / "lib" / "o80" / "robots").iterdir()}
+
+    assert bundled == {"two_joints"}
 
 
 def test_cmake_projects_built_by_python_find_the_package() -> None:

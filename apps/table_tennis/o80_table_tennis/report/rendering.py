@@ -41,7 +41,7 @@ class Scene(AbstractContextManager["Scene"]):
 
     def __init__(self, *, balls: int = 1, size: tuple[int, int] = SIZE) -> None:
         _choose_renderer()
-        needed("OpenGL", "rendering", "a picture")
+        needed("OpenGL", "rendering", "a picture", package="o80-table-tennis")
         import mujoco
 
         self._mujoco = mujoco

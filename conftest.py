@@ -14,7 +14,7 @@ os.environ.setdefault("HYPOTHESIS_STORAGE_DIRECTORY", "build/hypothesis")
 # a run in the background may have been started with interrupts ignored, and would pass it on
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parent
 SHARED_MEMORY = Path("/dev/shm")
 GRACE = 5.0  # [s] for the last to die
 

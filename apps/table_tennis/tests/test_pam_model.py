@@ -2,7 +2,7 @@
 
 The C++ tests of the arm compare the plant with `robots/pam/tests/cpp/mujoco_reference.txt`; here
 the same numbers are computed anew from the model. After a change of the model write the file with
-`python tests/python/test_pam_model.py`.
+`python apps/table_tennis/tests/test_pam_model.py`.
 """
 
 from pathlib import Path
@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 MODEL = ROOT / "apps/table_tennis/o80_table_tennis/world/table_tennis.xml"
 REFERENCE = ROOT / "robots/pam/tests/cpp/mujoco_reference.txt"
 HEADER = "racket and dynamics of the arm by MuJoCo: q dq torque | position rotation velocity omega"
