@@ -1,0 +1,71 @@
+"""Draws the pictures of README.md anew: docs/pictures/{table_tennis,first_minute}.png.
+
+python tools/pictures.py
+"""
+
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+from matplotlib.figure import Figure
+
+import o80
+from o80_table_tennis.players.policies import default_policy
+from o80_table_tennis.report.rendering import Scene, write_picture
+from o80_table_tennis.settings import TaskSettings
+from o80_table_tennis.task.observations import BALL_POSITION, JOINT_POSITIONS
+
+FOLDER = Path(__file__).resolve().parent.parent / "docs" / "pictures"
+SIZE = (800, 450)
+SHOWN = 4  # every n-th step of the episode shows the ball
+
+
+def draw_table_tennis(path: Path) -> None:
+    """One accelerated episode: the arm at the hit, the ball on its whole way."""
+    environment = gymnasium.make("o80/TableTennis-v0", task=TaskSettings(factor=1.0))
+    policy = default_policy()
+    observation, _ = environment.reset(seed=1, options={"ball": 3})
+    policy.reset()
+    seen, arm, hit, over = [], None, False, False
+    while not over:
+        observation, _, terminated, truncated, info = environment.step(policy.act(observation))
+        over = terminated or truncated
+        seen.append(observation[BALL_POSITION].astype(float))
+        if not hit:
+            arm, hit = observation[JOINT_POSITIONS].astype(float), info["hit"]
+    environment.close()
+    balls = np.array(seen[::SHOWN])
+    with Scene(balls=len(balls), size=SIZE) as scene:
+        write_picture(path, scene.draw(arm, balls, camera="close"))
+
+
+def draw_first_minute(path: Path) -> None:
+    """The commands of the first minute in Python: desired and observed of both joints."""
+    with o80.robots.load("two_joints").inline(frequency=500) as arm:
+        arm.add_command("elbow", 0.5, duration=0.5)
+        arm.add_command("elbow", -0.2, speed=1.0)
+        arm.add_command("shoulder", 0.4, duration=1.0, profile="minimum_jerk")
+        arm.pulse()
+        arm.burst(350)
+        arm.add_command("shoulder", -0.1, duration=0.6, profile="minimum_jerk", mode="overwrite")
+        arm.pulse()
+        arm.burst(500)
+        rows = arm.history(850)
+        names = [actuator.name for actuator in arm.actuators]
+    figure = Figure(figsize=(9, 3.4), layout="constrained")
+    axes = figure.subplots()
+    for joint, name in enumerate(names):
+        color = f"C{joint}"
+        times = rows.time * 1e-9
+        axes.plot(times, rows.desired[:, joint], "--", color=color, label=f"{name}, desired")
+        axes.plot(times, rows.observed[:, joint], color=color, label=f"{name}, observed")
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel("position [rad]")
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=8)
+    figure.savefig(path, dpi=80)
+
+
+if __name__ == "__main__":
+    draw_table_tennis(FOLDER / "table_tennis.png")
+    draw_first_minute(FOLDER / "first_minute.png")
