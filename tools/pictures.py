@@ -26,7 +26,8 @@ def draw_table_tennis(path: Path) -> None:
     policy = default_policy()
     observation, _ = environment.reset(seed=1, options={"ball": 3})
     policy.reset()
-    seen, arm, hit, over = [], None, False, False
+    seen, arm = [], observation[JOINT_POSITIONS].astype(float)
+    hit = over = False
     while not over:
         observation, _, terminated, truncated, info = environment.step(policy.act(observation))
         over = terminated or truncated
