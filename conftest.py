@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import shutil
 import signal
 import time
 from collections.abc import Callable, Iterator
@@ -15,27 +16,33 @@ os.environ.setdefault("HYPOTHESIS_STORAGE_DIRECTORY", "build/hypothesis")
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 ROOT = Path(__file__).resolve().parent
-SHARED_MEMORY = Path("/dev/shm")
 GRACE = 5.0  # [s] for the last to die
 
 Found = TypeVar("Found", int, Path)
 
 
+def own_directory() -> Path:
+    """A directory for the segments of this process: other test runs and robots use their own."""
+    for old in Path("/dev/shm").glob("pytest-o80-*"):
+        process = old.name.rpartition("-")[2]
+        if process == str(os.getpid()) or not Path("/proc", process).exists():
+            shutil.rmtree(old, ignore_errors=True)
+    made = Path(f"/dev/shm/pytest-o80-{os.getpid()}")
+    made.mkdir()
+    return made
+
+
+DIRECTORY = own_directory()
+os.environ["O80_DIRECTORY"] = str(DIRECTORY)  # all that is started here inherits it
+
+
+def pytest_unconfigure() -> None:
+    shutil.rmtree(DIRECTORY, ignore_errors=True)
+
+
 def segment_files() -> set[Path]:
-    """Files of o80 in shared memory."""
-    return {*SHARED_MEMORY.glob("o80-*"), *SHARED_MEMORY.glob(".o80-*")}
-
-
-def abandoned_files() -> set[Path]:
-    """Those that no living process has mapped: others may run beside these tests."""
-    abandoned = segment_files()
-    for maps in Path("/proc").glob("[0-9]*/maps") if abandoned else ():
-        try:
-            text = maps.read_text()
-        except OSError:
-            continue
-        abandoned = {file for file in abandoned if str(file) not in text}
-    return abandoned
+    """What lies in that directory."""
+    return set(DIRECTORY.iterdir())
 
 
 def command_line(process: int) -> str:
@@ -83,7 +90,7 @@ def left_over(found: Callable[[], set[Found]], before: set[Found]) -> list[Found
 
 @pytest.fixture(scope="session", autouse=True)
 def nothing_left_behind() -> Iterator[None]:
-    processes, files = children(), segment_files()
+    processes = children()
     yield
     living = left_over(children, processes)
     commands = [command_line(process) for process in living]
@@ -91,11 +98,9 @@ def nothing_left_behind() -> Iterator[None]:
     for process in relatives() - processes:
         with contextlib.suppress(ProcessLookupError):
             os.kill(process, signal.SIGKILL)
-    abandoned = left_over(abandoned_files, files)
-    for file in abandoned:
-        file.unlink(missing_ok=True)
+    files = left_over(segment_files, set())
     assert not commands, f"the tests left processes behind: {commands}"
-    assert not abandoned, f"the tests left shared memory behind: {abandoned}"
+    assert not files, f"the tests left shared memory behind: {files}"
 
 
 @pytest.fixture(scope="session")

@@ -1,16 +1,15 @@
 """What the compilation of a robot library reads of o80."""
 
-import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
+from compilers import COMPILERS
 
 import o80
 
 HEADERS = Path(o80.__file__).parent / "include"
 ROBOT = Path(__file__).parent / "headers_only.cpp"
-COMPILERS = [name for name in ("g++", "clang++-19") if shutil.which(name)]
 
 #: All of it: no frontend, backend, lane, spinner or lock. Every robot is compiled again when one of
 #: these changes.

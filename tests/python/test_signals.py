@@ -112,6 +112,7 @@ with backend, o80.Frontend({name!r}) as frontend:
 """
 
 
+@pytest.mark.check
 @pytest.mark.skipif(shutil.which("strace") is None, reason="strace is not installed")
 def test_no_wait_sleeps_longer_than_a_slice_between_looks_at_signals(segment: str) -> None:
     traced = subprocess.run(

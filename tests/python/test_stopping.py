@@ -1,5 +1,6 @@
 """Backends that are stopped by their name."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -49,7 +50,7 @@ def test_a_backend_that_does_not_stop_in_time_is_told_of(segment: str) -> None:
 @pytest.fixture
 def reused(process: o80.robots.Process, segment: str) -> o80.robots.Process:
     """A robot whose segment bears the process id of another, later process."""
-    file = Path("/dev/shm") / f"o80-{segment}"
+    file = Path(os.environ["O80_DIRECTORY"], f"o80-{segment}")
     content = file.read_bytes()
     entry = entry_of(segment)
     where = content.index(entry.process_start.to_bytes(8, "little"))
