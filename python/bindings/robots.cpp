@@ -81,6 +81,8 @@ void bind_robots(nb::module_& m) {
       .def("start_inline", &start_inline, "segment"_a, "loop"_a, "options"_a);
   m.def("load_robot", &o80::RobotLibrary::load, "name_or_path"_a);
   m.def("unused_segment_name", &o80::unused_segment_name, "robot"_a);
+  m.def("no_such_robot", &o80::no_such_robot, "name"_a, "known"_a,
+        "The text of an error: what is there instead, or how to install it.");
   m.def("find_robots", [] {
     std::vector<std::pair<std::string, std::string>> found;
     for (const o80::RobotFile& file : o80::find_robots()) found.emplace_back(file.name, file.path);

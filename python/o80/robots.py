@@ -10,6 +10,7 @@ with o80.robots.load("two_joints").inline() as arm:
 import builtins
 import numbers
 import os
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,7 +26,7 @@ from o80.process import Process, start_process
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
-__all__ = ["Option", "Process", "Robot", "RobotFile", "list", "load"]
+__all__ = ["Option", "Process", "Robot", "RobotFile", "list", "load", "path_of"]
 
 GROUP = "o80.robots"
 
@@ -50,12 +51,35 @@ class Option:
 
 
 def list() -> builtins.list[RobotFile]:
-    """All robots with a name: in O80_ROBOT_PATH, bundled with o80, and in Python packages."""
+    """All robots with a name: in O80_ROBOT_PATH, bundled with o80, and in Python packages.
+
+    A package whose robot cannot be found is left out, with a RuntimeWarning.
+    """
     found = {name: Path(path) for name, path in _core.find_robots()}
     for name, point in announced(GROUP).items():
         if name not in found:
-            found[name] = _path_of(point)
+            try:
+                found[name] = _path_of(point)
+            except DriverError as error:
+                warnings.warn(str(error), RuntimeWarning, stacklevel=2)
     return [RobotFile(name, path) for name, path in found.items()]
+
+
+def path_of(name_or_path: str | os.PathLike[str]) -> Path:
+    """The library of a robot, given its name or a path.
+
+    Raises DriverError for an unknown name, with the known robots in its text.
+    """
+    text = os.fspath(name_or_path)
+    if os.sep in text or (text.endswith(".so") and Path(text).exists()):
+        return Path(text).absolute()
+    found = dict(_core.find_robots())
+    if text in found:
+        return Path(found[text])
+    packaged = announced(GROUP)
+    if text in packaged:
+        return _path_of(packaged[text])
+    raise DriverError(_core.no_such_robot(text, [*found, *packaged]))
 
 
 def load(name_or_path: str | os.PathLike[str]) -> "Robot":
@@ -63,18 +87,19 @@ def load(name_or_path: str | os.PathLike[str]) -> "Robot":
 
     Raises DriverError with the known robots in its text.
     """
-    text = os.fspath(name_or_path)
-    if os.sep not in text:
-        if text.endswith(".so") and Path(text).exists():
-            text = os.path.join(os.curdir, text)
-        elif text not in (name for name, _ in _core.find_robots()) and text in announced(GROUP):
-            text = str(_path_of(announced(GROUP)[text]))
-    return Robot(_core.load_robot(text))
+    return Robot(_core.load_robot(str(path_of(name_or_path))))
 
 
 def _path_of(point: "EntryPoint") -> Path:
-    value = point.load()
-    path = value() if callable(value) else value
+    package = point.dist.name if point.dist is not None else point.module
+    try:
+        value = point.load()
+        path = value() if callable(value) else value
+    except Exception as error:
+        raise DriverError(
+            f"robot '{point.name}' is left out: the package {package}, which announces it, failed "
+            f"with {type(error).__name__}: {error}. Repair the package or uninstall it"
+        ) from error
     if not isinstance(path, (str, os.PathLike)):
         raise DriverError(
             f"entry point '{point.name}' of the group {GROUP} gives {path!r}: it must be the path "

@@ -4,10 +4,13 @@
 #include <dlfcn.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <sstream>
+#include <string_view>
+#include <utility>
 
 #include "o80/base/error.hpp"
 #include "o80/base/nearest_name.hpp"
@@ -29,19 +32,26 @@ fs::path bundled_folder() {
   return library.parent_path() / "o80" / "robots";
 }
 
+/// Robots of the other packages of o80's repository, and these packages.
+constexpr std::array<std::pair<std::string_view, std::string_view>, 2> kPackaged{
+    {{"mujoco", "o80-mujoco"}, {"pam", "o80-pam"}}};
+
 /// Installed versions of a missing shared library ("libx.so.4.0.1"). A wheel puts it into package
-/// "x", beside the package of the robot.
+/// "x", beside the package of the robot, which is a folder or a few above the robot's library.
 std::string other_versions(const fs::path& robot, const std::string& missing) {
   const std::string::size_type end = missing.find(".so");
   if (end == std::string::npos || missing.rfind("lib", 0) != 0) return {};
   const std::string package = missing.substr(3, end - 3);
-  const fs::path folder = robot.parent_path() / "../../../.." / package;
   std::string found;
   std::error_code ignored;
-  for (const auto& entry : fs::directory_iterator(folder, ignored)) {
-    const std::string name = entry.path().filename().string();
-    if (name.rfind(missing.substr(0, end + 3), 0) != 0) continue;
-    found += (found.empty() ? "" : ", ") + name;
+  fs::path above = robot.parent_path();
+  for (int level = 0; level < 4 && found.empty(); ++level) {
+    above = above.parent_path();
+    for (const auto& entry : fs::directory_iterator(above / package, ignored)) {
+      const std::string name = entry.path().filename().string();
+      if (name.rfind(missing.substr(0, end + 3), 0) != 0) continue;
+      found += (found.empty() ? "" : ", ") + name;
+    }
   }
   return found;
 }
@@ -79,7 +89,8 @@ std::string why_not_loaded(const std::string& robot, const std::string& message)
   const std::string there = other_versions(robot, missing);
   text += "It was built for " + missing;
   text += there.empty() ? ", which is not installed" : ", but installed is " + there;
-  return text + ". Install the version it was built for, or build the robot (or o80) again with " +
+  return text +
+         ". Install the version it was built for, or build the package of the robot again with " +
          "the one that is there";
 }
 
@@ -90,14 +101,27 @@ std::string where(const std::string& name_or_path) {
     if (robot.name == name_or_path) return robot.path;
     known.push_back(robot.name);
   }
-  std::string why = "there is no robot '" + name_or_path + "'" + names_instead(name_or_path, known);
-  if (!why.ends_with('?')) why += '.';
-  throw DriverError(why +
-                    " `o80 run` lists all robots. For a library, give its path (for one in this "
-                    "folder: ./NAME.so), or add its folder to O80_ROBOT_PATH");
+  throw DriverError(no_such_robot(name_or_path, known));
 }
 
 }  // namespace
+
+std::string no_such_robot(const std::string& name, const std::vector<std::string>& known) {
+  std::string why = "there is no robot '" + name + "'";
+  const auto* packaged =
+      std::ranges::find(kPackaged, name, &std::pair<std::string_view, std::string_view>::first);
+  if (packaged != kPackaged.end()) {
+    return why + ". It is in the package " + std::string(packaged->second) + ": `pip install " +
+           std::string(packaged->second) +
+           "`. A C++ program finds it if O80_ROBOT_PATH has the folder of its library, which `o80 "
+           "run` lists";
+  }
+  why += names_instead(name, known);
+  if (!why.ends_with('?')) why += '.';
+  return why +
+         " `o80 run` lists all robots. For a library, give its path (for one in this folder: "
+         "./NAME.so), or add its folder to O80_ROBOT_PATH";
+}
 
 std::vector<std::string> robot_folders() {
   std::vector<std::string> folders;

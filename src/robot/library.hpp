@@ -29,4 +29,7 @@ struct RobotFile {
 };
 std::vector<RobotFile> find_robots();
 
+/// The text of an error: what is there instead of a robot of this name, or how to install it.
+std::string no_such_robot(const std::string& name, const std::vector<std::string>& known);
+
 }  // namespace o80

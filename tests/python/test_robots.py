@@ -61,6 +61,44 @@ def test_robots_of_further_folders_are_found(
     assert o80.robots.load("other_joints").path.parent == tmp_path
 
 
+@pytest.mark.parametrize("name", ["mujoco", "pam"])
+def test_a_robot_whose_package_is_missing_names_it(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("o80.robots.announced", lambda group: {})
+
+    with pytest.raises(o80.DriverError, match=f"`pip install o80-{name}`.*O80_ROBOT_PATH"):
+        o80.robots.load(name)
+
+
+def test_a_misspelt_robot_of_a_package_is_recognised() -> None:
+    with pytest.raises(o80.DriverError, match="Did you mean 'mujoco'"):
+        o80.robots.load("mujco")
+
+
+def test_a_package_that_fails_does_not_hide_other_robots(tmp_path: Path) -> None:
+    (tmp_path / "broken_arm.py").write_text("raise ValueError('no licence')\n")
+    metadata = tmp_path / "broken_arm-1.0.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: broken-arm\nVersion: 1.0\n")
+    (metadata / "entry_points.txt").write_text("[o80.robots]\nbroken = broken_arm:library\n")
+    program = (
+        "import warnings, o80\n"
+        "with warnings.catch_warnings(record=True) as caught:\n"
+        "    warnings.simplefilter('always')\n"
+        "    assert 'two_joints' in [robot.name for robot in o80.robots.list()]\n"
+        "assert 'broken-arm' in str(caught[0].message), caught\n"
+        "o80.robots.load('two_joints')\n"
+        "try: o80.robots.load('broken')\n"
+        "except o80.DriverError as error:\n"
+        "    assert 'broken-arm' in str(error) and 'no licence' in str(error), error\n"
+        "else: raise AssertionError\n"
+    )
+    environment = os.environ | {"PYTHONPATH": str(tmp_path)}
+
+    subprocess.run([sys.executable, "-c", program], env=environment, check=True, timeout=60)
+
+
 def test_python_packages_bring_robots_and_frontends(tmp_path: Path, segment: str) -> None:
     package = tmp_path / "joints"
     package.mkdir()

@@ -25,9 +25,8 @@ def run(context: typer.Context) -> None:
         _print_robots()
         raise typer.Exit(0 if arguments else 2)
     robot, flags = arguments[0], arguments[1:]
-    paths = {known.name: str(known.path) for known in o80.robots.list()}
     program = Path(o80.prefix()) / "bin" / "o80-run"
-    os.execv(program, [str(program), paths.get(robot, robot), *flags])
+    os.execv(program, [str(program), str(o80.robots.path_of(robot)), *flags])
 
 
 def _print_robots() -> None:

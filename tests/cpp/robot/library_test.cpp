@@ -49,6 +49,33 @@ TEST_F(LibraryTest, SaysWhatThereIsAndWhereToLook) {
               HasSubstr("no robot library '/nowhere/arm.so'"));
 }
 
+TEST_F(LibraryTest, NamesThePackageOfARobotThatIsInstalledApart) {
+  EXPECT_THAT(no_such_robot("pam", {"two_joints"}),
+              AllOf(HasSubstr("`pip install o80-pam`"), HasSubstr("O80_ROBOT_PATH")));
+  EXPECT_THAT(no_such_robot("mujoco", {"two_joints"}), HasSubstr("`pip install o80-mujoco`"));
+}
+
+TEST_F(LibraryTest, NamesTheInstalledVersionOfALibraryThatIsMissing) {
+#ifdef O80_TEST_EMULATOR
+  GTEST_SKIP() << "the compiler is not emulated";
+#endif
+  // packages side by side, as in a Python environment: foo has another version than the robot needs
+  fs::create_directories(directory_.path() + "/foo");
+  fs::create_directories(directory_.path() + "/foo_robot/lib");
+  const std::string foo = directory_.path() + "/foo/libfoo.so.1";
+  const std::string robot = directory_.path() + "/foo_robot/lib/robot.so";
+  const std::string compiler = std::string(O80_TEST_COMPILER) + " -shared -fPIC -x c++ /dev/null ";
+  // NOLINTBEGIN(bugprone-command-processor)
+  ASSERT_EQ(std::system((compiler + "-Wl,-soname,libfoo.so.1 -o " + foo).c_str()), 0);
+  const std::string linked = "-x none -Wl,--no-as-needed " + foo + " -o " + robot;
+  ASSERT_EQ(std::system((compiler + linked).c_str()), 0);
+  // NOLINTEND(bugprone-command-processor)
+  fs::rename(foo, directory_.path() + "/foo/libfoo.so.2");
+
+  EXPECT_THAT(message_of<DriverError>([&] { RobotLibrary::load(robot); }),
+              AllOf(HasSubstr("built for libfoo.so.1"), HasSubstr("installed is libfoo.so.2")));
+}
+
 TEST_F(LibraryTest, RefusesWhatIsNoRobot) {
   const std::string text = directory_.path() + "/text.so";
   std::ofstream(text) << "no library";
