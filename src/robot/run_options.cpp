@@ -14,6 +14,10 @@ namespace o80 {
 
 namespace {
 
+/// What getopt_long returns for the first option; above the characters ':' and '?', which it
+/// returns for errors.
+constexpr int kFirstOption = 256;
+
 std::string dashed(std::string name) {
   std::ranges::replace(name, '_', '-');
   return name;
@@ -68,7 +72,7 @@ RunOptions parse_run_options(const RobotTable& table, int argc, char** argv) {
   for (std::size_t i = 0; i < names.size(); ++i) {
     const bool is_switch = i < loop_options().size() && loop_options()[i].is_switch();
     long_options.push_back({names[i].c_str(), is_switch ? no_argument : required_argument, nullptr,
-                            static_cast<int>(i)});
+                            kFirstOption + static_cast<int>(i)});
   }
   long_options.push_back({nullptr, 0, nullptr, 0});
 
@@ -92,7 +96,7 @@ RunOptions parse_run_options(const RobotTable& table, int argc, char** argv) {
     if (chosen == '?' || chosen < 0) {
       throw InvalidArgument(refused_flag(argv[optind - 1], names, switches));
     }
-    const auto index = static_cast<std::size_t>(chosen);
+    const auto index = static_cast<std::size_t>(chosen - kFirstOption);
     if (index < loop_options().size()) {
       const char* text = optarg == nullptr ? "true" : optarg;
       set_loop_option(options, loop_options()[index], text, "--" + names[index]);

@@ -149,5 +149,77 @@ TEST_F(RunOptionsTest, RefuseARobotThatTakesAFlagOfEveryRobot) {
               AllOf(HasSubstr("'lane_blocks'"), HasSubstr("rename it")));
 }
 
+/// A robot with more options than there are characters that getopt_long could mistake them for.
+struct Settable {
+  struct Config {
+    int option_0 = 0;
+    int option_1 = 0;
+    int option_2 = 0;
+    int option_3 = 0;
+    int option_4 = 0;
+    int option_5 = 0;
+    int option_6 = 0;
+    int option_7 = 0;
+    int option_8 = 0;
+    int option_9 = 0;
+    int option_10 = 0;
+    int option_11 = 0;
+    int option_12 = 0;
+    int option_13 = 0;
+    int option_14 = 0;
+    int option_15 = 0;
+    int option_16 = 0;
+    int option_17 = 0;
+    int option_18 = 0;
+    int option_19 = 0;
+    int option_20 = 0;
+    int option_21 = 0;
+    int option_22 = 0;
+    int option_23 = 0;
+    int option_24 = 0;
+    int option_25 = 0;
+    int option_26 = 0;
+    int option_27 = 0;
+    int option_28 = 0;
+    int option_29 = 0;
+    int option_30 = 0;
+    int option_31 = 0;
+    int option_32 = 0;
+    int option_33 = 0;
+    int option_34 = 0;
+    int option_35 = 0;
+    int option_36 = 0;
+    int option_37 = 0;
+    int option_38 = 0;
+    int option_39 = 0;
+  };
+  using Actuators = NoActuators;
+  explicit Settable(const Config&) {}
+  void start() {}
+  void write(const Desired<Settable>&) {}
+  void read(Reading<Settable>&) {}
+  void stop() noexcept {}
+};
+O80_DESCRIBE(Settable::Config, option_0, option_1, option_2, option_3, option_4, option_5, option_6,
+             option_7, option_8, option_9, option_10, option_11, option_12, option_13, option_14,
+             option_15, option_16, option_17, option_18, option_19, option_20, option_21, option_22,
+             option_23, option_24, option_25, option_26, option_27, option_28, option_29, option_30,
+             option_31, option_32, option_33, option_34, option_35, option_36, option_37, option_38,
+             option_39);
+
+TEST_F(RunOptionsTest, EveryOneOfManyOptionsIsRead) {
+  const RobotTable& table = *robot_table<Settable>("settable");
+  for (const Option& option : options_of(table)) {
+    for (const bool dashes : {true, false}) {
+      std::string program = "o80-run";
+      std::string word = "--" + option.name + "=7";
+      if (dashes) std::ranges::replace(word, '_', '-');
+      char* words[] = {program.data(), word.data(), nullptr};
+      EXPECT_THAT(parse_run_options(table, 2, words).robot, ElementsAre(Pair(option.name, "7")))
+          << word;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace o80::test
