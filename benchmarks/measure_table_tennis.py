@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from o80_table_tennis.balls.sources import balls_from
 from o80_table_tennis.environment import accelerated_environment
+from o80_table_tennis.rig.ball_records import RECORDS
 from plain_table_tennis import PlainEnvironment
 from sampling import built, rounds, sample, take_priority
 
@@ -54,9 +55,11 @@ def main() -> None:
         inline = stack.enter_context(closing(accelerated_environment()))
         processes = stack.enter_context(closing(accelerated_environment(processes=True)))
         rows = inline.rig.twins[0].frontend.history(1).rows
-        record = rows.dtype["extended"]["contacts"].base
+        record = rows.dtype[RECORDS[0]][RECORDS[1]].base
         library = built() / "lib" / "plain_table_tennis.so"
-        plain = stack.enter_context(closing(PlainEnvironment(library, record)))
+        plain = stack.enter_context(
+            closing(PlainEnvironment(library, record, inline.rig.arm.range))
+        )
 
         environments: dict[str, gymnasium.Env[Any, Any]] = {
             "steps_plain": plain,

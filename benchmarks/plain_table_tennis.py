@@ -14,27 +14,29 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from o80_table_tennis.balls.trajectories import SampledFlight
-from o80_table_tennis.rig.ball_records import BallWatch, RecordReader
-from o80_table_tennis.settings import RigSettings, TaskSettings
-from o80_table_tennis.task.actions import MUSCLES, changed_pressures
-from o80_table_tennis.task.observations import JOINT_POSITIONS, JOINT_VELOCITIES, PRESSURES, SIZE
-from o80_table_tennis.task.rewards import End
+from o80_table_tennis.balls.sampled_flight import SampledFlight
+from o80_table_tennis.rig.ball_records import BallReader
+from o80_table_tennis.rig.pressure_range import PressureRange
+from o80_table_tennis.settings import TaskSettings
+from o80_table_tennis.task.actions import changed_pressures
+from o80_table_tennis.task.box import ObservationBox
+from o80_table_tennis.task.end import End
+from o80_table_tennis.task.state import State
+from o80_table_tennis.world.arm import MUSCLES
 from o80_table_tennis.world.scene import MODEL
 
 FloatArray = NDArray[np.float64]
 Float32Array = NDArray[np.float32]
 
-BALL = slice(PRESSURES.stop, SIZE)
-
 
 class PlainEnvironment(gymnasium.Env[Float32Array, Float32Array]):
     """Same plant, model, observation and reward as the environment; nothing in between.
 
-    `record` is the dtype of what happened to a ball, as the environment's twin publishes it.
+    `record` is the dtype of what happened to a ball, as the environment's twin publishes it;
+    `pressures` are the range of its arm.
     """
 
-    def __init__(self, library: Path, record: np.dtype[Any]) -> None:
+    def __init__(self, library: Path, record: np.dtype[Any], pressures: PressureRange) -> None:
         self._library = ctypes.CDLL(str(library))
         self._library.plain_create.restype = ctypes.c_void_p
         plain = self._library.plain_create(str(MODEL).encode())
@@ -47,16 +49,16 @@ class PlainEnvironment(gymnasium.Env[Float32Array, Float32Array]):
         self._raw = np.empty(MUSCLES)
         self._raw_at = ctypes.c_void_p(self._raw.ctypes.data)
 
-        task = self._task = TaskSettings()
+        self._settings = TaskSettings()
+        self._task = self._settings.made()
+        self._box = ObservationBox(self._task)
         self.action_space = spaces.Box(-1.0, 1.0, (MUSCLES,), np.float32)
-        self.observation_space = spaces.Box(task.bounds.low, task.bounds.high, (SIZE,), np.float32)
-        ranges = RigSettings().pressures
-        self._delay = ctypes.c_int(task.delay)
-        self._watch = BallWatch(RecordReader(record, 22 * 8), end=task.end, reward=task.reward)
-        self._least = np.array(ranges.least, dtype=np.float64)
-        self._span = np.array(ranges.most, dtype=np.float64) - self._least
-        self._low = task.bounds.low.astype(np.float64)
-        self._high = task.bounds.high.astype(np.float64)
+        self.observation_space = self._box.space
+        self._range = pressures
+        self._delay = ctypes.c_int(self._settings.delay)
+        self._reader = BallReader(record, 22 * 8)
+        self._goal = self._task.begin(self.np_random)
+        self._racket = np.full(3, np.nan)  # no task with a ball looks at it
         self._over = True
         self.steps, self.seconds_stepping = 0, 0.0
 
@@ -76,46 +78,48 @@ class PlainEnvironment(gymnasium.Env[Float32Array, Float32Array]):
             self._seen_at,
         )
         self._steps, self._over = 0, False
-        self._asked = (self._numbers[8:16] - self._least) / self._span
-        observation = self._observe()
-        end = self._watch.look(self._seen, float(self._numbers[17]), 0)
-        return observation, self._info(end)
+        self._asked = self._range.normalised(self._numbers[8:16])
+        state = self._look()
+        return self._box.clip(self._task.observe(state)), self._info(state, End.RUNNING)
 
     def step(self, action: Float32Array) -> tuple[Float32Array, float, bool, bool, dict[str, Any]]:
         if self._over:
             raise gymnasium.error.ResetNeeded("the episode is over: call reset() before step()")
         called = time.perf_counter()
-        self._asked = changed_pressures(self._asked, np.asarray(action), factor=self._task.factor)
-        np.rint(self._least + self._asked * self._span, out=self._raw)
+        self._asked = changed_pressures(
+            self._asked, np.asarray(action), factor=self._settings.factor
+        )
+        self._raw[...] = self._range.raw(self._asked)
         self._library.plain_step(self._plain, self._raw_at, self._delay, self._seen_at)
         self._steps += 1
-        observation = self._observe()
-        y = float(self._numbers[17])
-        end = self._watch.look(self._seen, y, self._steps)
-        info = self._info(end)
+        state = self._look()
+        observation = self._box.clip(self._task.observe(state))
+        eventful = bool(self._task.eventful(state))
+        end = End(int(self._task.end(state))) if eventful else End.RUNNING
+        reward = float(self._task.reward(state)) if eventful else 0.0
+        info = self._info(state, end)
         self.steps += 1
         self.seconds_stepping += time.perf_counter() - called
-        if end is End.RUNNING:
-            return observation, 0.0, False, False, info
-        self._over = True
-        return observation, self._watch.reward(y), end.terminated, end.truncated, info
+        self._over = end is not End.RUNNING
+        return observation, reward, end.terminated, end.truncated, info
 
-    def _info(self, end: End) -> dict[str, Any]:
-        return {
-            "hit": self._watch.hit,
-            "smallest_distance": self._watch.smallest_distance,
-            "stalled": False,
-            "end": end.value,
-        }
-
-    def _observe(self) -> Float32Array:
+    def _look(self) -> State:
         numbers = self._numbers
-        observation = np.empty(SIZE)
-        observation[JOINT_POSITIONS] = numbers[0:4]
-        observation[JOINT_VELOCITIES] = numbers[4:8]
-        observation[PRESSURES] = (numbers[8:16] - self._least) / self._span
-        observation[BALL] = numbers[16:22]
-        return np.minimum(np.maximum(observation, self._low), self._high).astype(np.float32)
+        return State(
+            self._steps,
+            numbers[0:8],
+            self._range.normalised(numbers[8:16]),
+            self._racket,
+            numbers[16:22],
+            self._reader.read(self._seen),
+            self._goal,
+        )
+
+    def _info(self, state: State, end: End) -> dict[str, Any]:
+        info = self._task.info(state)
+        info["stalled"] = False
+        info["end"] = end.text
+        return info
 
     def close(self) -> None:
         self._library.plain_destroy(self._plain)

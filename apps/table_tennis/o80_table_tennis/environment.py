@@ -19,67 +19,47 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from .arguments import (
+    refuse_extra_balls_without_ball,
+    refuse_wrong_arguments,
+    refuse_wrong_options,
+)
+from .balls.sampled_flight import SampledFlight
 from .balls.sources import balls_from
-from .balls.trajectories import SampledFlight
 from .report.episode_record import EpisodeSummary
 from .report.logger import EpisodeLogger
 from .report.statistics import Statistics, StepCounts, statistics_of
-from .rig.ball_records import BallWatch
 from .rig.rig import Rig
 from .rig.virtual_balls import VirtualBalls
-from .settings import ITERATIONS, Pacing, RigSettings, TaskSettings
-from .task.actions import MUSCLES, changed_pressures
-from .task.observations import PRESSURES, SIZE, Float32Array
-from .task.rewards import End
+from .settings import Pacing, RigSettings, TaskSettings
+from .task.actions import changed_pressures
+from .task.box import ObservationBox
+from .task.end import End
+from .task.state import State
+from .world.arm import MUSCLES
 
+Float32Array = NDArray[np.float32]
 FloatArray = NDArray[np.float64]
 Action = NDArray[np.float32]
 Info = dict[str, Any]
+Outcome = tuple[Float32Array, float, bool, bool, Info]
 
-MOTION = slice(0, PRESSURES.start)
-"""Angles, then velocities of the joints in an observation."""
-BALL = slice(PRESSURES.stop, SIZE)
-"""Position and velocity of the ball in an observation."""
-BALL_Y = BALL.start + 1
 SEEDS = 2**32
-OPTIONS = ("ball", "flight")
-"""What `reset` can be told."""
-LAST = ITERATIONS - 1
-
-
-def refuse_wrong_arguments(
-    rig: object, task: object, render_mode: str | None, modes: list[str]
-) -> None:
-    """Raises TypeError or ValueError, saying what to give instead."""
-    for name, given, wanted in (("rig", rig, RigSettings), ("task", task, TaskSettings)):
-        if given is None or isinstance(given, wanted):
-            continue
-        fields = given.items() if isinstance(given, dict) else ()
-        inside = ", ".join(f"{key}={value!r}" for key, value in fields) or "..."
-        raise TypeError(
-            f"{name} must be a {wanted.__name__}, got {given!r}: write "
-            f"{name}={wanted.__module__}.{wanted.__name__}({inside})"
-        )
-    if render_mode == "human":
-        raise ValueError(
-            "there is no render mode 'human': use 'rgb_array', whose render() returns pictures "
-            "(gymnasium.wrappers.HumanRendering shows them in a window)"
-        )
-    if render_mode is not None and render_mode not in modes:
-        raise ValueError(f"unknown render mode '{render_mode}'; there are: {', '.join(modes)}")
+STALLED = "stalled"
 
 
 class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
     """Real arm, simulated ball: 100 steps a second of eight pressure changes.
 
-    Actions: Box(-1, 1, (8,)), changes of the normalised pressures. Observations: Box of 22 numbers
-    (see `observations`), clipped into named bounds. The reward is paid in the last step.
+    Actions: Box(-1, 1, (8,)), changes of the normalised pressures. What is observed and paid is
+    said by the task (`TaskSettings.task`); by default observations are a Box of 22 numbers (see
+    `task.observations`), clipped into named bounds, and the reward is paid in the last step.
 
-    `info` holds `hit` (the racket has touched the ball), `smallest_distance` (of the surfaces of
-    ball and racket so far [m]), `stalled` (real time: the caller paused for so long that the
-    episode was given up), `end` (why the episode ended, "running" before), and with extra balls
-    `virtual`: `observations` (N, 22), `rewards` (N,), `hits` (N,), `ended` (N,), and `balls` (N,),
-    their numbers.
+    `info` holds what the task adds (with a ball `hit`: the racket has touched the ball, and
+    `smallest_distance` of the surfaces of ball and racket so far [m]), `stalled` (real time: the
+    caller paused for so long that the episode was given up), `end` (why the episode ended,
+    "running" before), and with extra balls `virtual`: `observations` (N, M), `rewards` (N,),
+    `hits` (N,), `ended` (N,), and `balls` (N,), their numbers.
 
     `options` of `reset`: `ball`, the number of the ball to be played (else drawn from the seed), or
     `flight`, a SampledFlight of the caller's own. `statistics()` tells rates and lateness.
@@ -101,11 +81,15 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         refuse_wrong_arguments(rig, task, render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode
         self._camera = camera
-        self._task = task = task or TaskSettings()
-        self._settings = rig or RigSettings()
-        self._real_time = self._settings.pacing.real_time
-        self._balls = balls_from(task.balls, task.ball_seed, self._settings.period)
-        self._open_spaces()
+        self._settings, self._rig_settings = task or TaskSettings(), rig or RigSettings()
+        self._task = self._settings.made()
+        refuse_extra_balls_without_ball(self._rig_settings, plays_ball=self._task.plays_ball)
+        self._balls = balls_from(
+            self._settings.balls, self._settings.ball_seed, self._rig_settings.period
+        )
+        self._box = ObservationBox(self._task)
+        self.observation_space = self._box.space
+        self.action_space = spaces.Box(-1.0, 1.0, (MUSCLES,), np.float32)
 
         self._counts = StepCounts()
         self._episode = -1
@@ -114,28 +98,17 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         self._summary: EpisodeSummary | None = None
         self._scene: Any = None
         self._logger: EpisodeLogger | None = None
-        self._rig = Rig(self._settings)
+        self._rig = Rig(self._rig_settings)
         try:
-            self._twin = self._rig.twins[0]
-            self._watch = BallWatch(self._twin.record_reader(), end=task.end, reward=task.reward)
-            self._virtual = VirtualBalls(self._rig.twins, self._settings, task)
+            self._arm, self._twin = self._rig.arm, self._rig.twins[0]
+            self._virtual = VirtualBalls(self._rig.twins, self._rig_settings, self._task)
             if log is not None:
                 self._logger = EpisodeLogger(
-                    log, arm=self._rig.arm.frontend.segment, twin=self._twin.frontend.segment
+                    log, arm=self._arm.frontend.segment, twin=self._twin.frontend.segment
                 )
         except BaseException:
             self.close()
             raise
-
-    def _open_spaces(self) -> None:
-        bounds, ranges = self._task.bounds, self._settings.pressures
-        self.action_space = spaces.Box(-1.0, 1.0, (MUSCLES,), np.float32)
-        self.observation_space = spaces.Box(bounds.low, bounds.high, (SIZE,), np.float32)
-        self._low = bounds.low.astype(np.float64)
-        self._high = bounds.high.astype(np.float64)
-        self._least = np.array(ranges.least, dtype=np.float64)
-        self._span = np.array(ranges.most, dtype=np.float64) - self._least
-        self._observed = np.empty(SIZE)
 
     # ------------------------------------------------------------------ an episode
 
@@ -145,29 +118,23 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         """Arm and twins to the start; the ball flies from the first step on."""
         super().reset(seed=seed)
         numbers, flights = self._choose_balls(options or {})
+        self._goal = self._task.begin(self.np_random)
         arm_seed = int(self.np_random.integers(SEEDS))
         twin_seed = int(self.np_random.integers(SEEDS))
+        self._rig.reset(
+            arm_seed=arm_seed, twin_seed=twin_seed, flights=self._virtual.share(flights)
+        )
 
-        rig = self._rig
-        rig.arm.go_back() if self._real_time else rig.arm.reset(arm_seed)
-        for twin in rig.twins:
-            twin.reset(twin_seed)
-        self._row = rig.arm.read_newest()
-        for twin, its_flights in zip(rig.twins, self._virtual.share(flights), strict=True):
-            twin.begin(rig.arm.q[LAST], rig.arm.dq[LAST], its_flights)
-        rig.burst_twins(1)
-
-        self._twin_row = self._twin_first = self._twin.iteration
-        self._asked = (rig.arm.asked - self._least) / self._span
-        self._ball, self._steps = numbers[0], 0
+        self._twin_first = self._rig.twin_row
+        self._asked = self._arm.asked
+        self._ball, self._steps, self._paid = numbers[0], 0, 0.0
         self._begun, self._over, self._summary = False, False, None
         self._episode += 1
         self._virtual.begin(numbers[1:])
-        observation = self._observe()
-        self._watch.look(self._twin.row, observation[BALL_Y], 0)
-        return observation, self._info(observation, End.RUNNING)
+        self._state = state = self._look()
+        return self._box.clip(self._task.observe(state)), self._info(state, End.RUNNING)
 
-    def step(self, action: Action) -> tuple[Float32Array, float, bool, bool, Info]:
+    def step(self, action: Action) -> Outcome:
         """Five iterations of the arm and of every twin; see the module for their order."""
         if self._over:
             state = "the episode is over" if self._episode >= 0 else "no episode has begun"
@@ -175,89 +142,84 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         if not self._begun:
             self._begin()
         called = time.perf_counter()
-        rig, arm, row = self._rig, self._rig.arm, self._row
-        if self._real_time and arm.newest - row > self._task.most_late:
+        rig = self._rig
+        if rig.lateness > self._settings.most_late:
             return self._stall()
 
-        # action => pressures => rows of the arm => the twins
-        self._asked = changed_pressures(self._asked, action, factor=self._task.factor)
-        np.rint(self._least + self._asked * self._span, out=arm.pressures)
-        exact = arm.step(row + 1, row + 1 + self._task.delay)
+        # action => pressures => rows of the arm => rows of the twins => what is returned
+        rig.ask(self._changed(action), delay=self._settings.delay)
+        rig.step_arm()
         rig.step_twins()
-
-        self._row = row + ITERATIONS
-        self._count(exact=exact)
-        self._steps += 1
-        observation = self._observe()
-        end = self._watch.look(self._twin.row, self._ball_y, self._steps)
-        info = self._info(observation, end)
-        self._counts.seconds_stepping += time.perf_counter() - called
-        if end is End.RUNNING:
-            return observation, 0.0, False, False, info
-        return observation, self._finish(end.value), end.terminated, end.truncated, info
+        return self._outcome(called)
 
     def _begin(self) -> None:
         """The first step: an episode begins with it, however long the caller took to think."""
         self._begun = True
         self._first_step_at = time.monotonic()
-        if self._real_time:
-            self._row = self._rig.arm.newest
-        self._arm_first = self._row
+        self._rig.begin()
+        self._arm_first = self._rig.row
 
-    def _stall(self) -> tuple[Float32Array, float, bool, bool, Info]:
+    def _changed(self, action: Action) -> FloatArray:
+        """Normalised pressures (8,) to ask for after an action."""
+        self._asked = changed_pressures(self._asked, action, factor=self._settings.factor)
+        return self._asked
+
+    def _outcome(self, called: float) -> Outcome:
+        """What a step returns that began when the clock said `called` [s]."""
+        self._steps += 1
+        self._count()
+        self._state = state = self._look()
+        observation = self._box.clip(self._task.observe(state))
+        eventful = bool(self._task.eventful(state))
+        end = End(int(self._task.end(state))) if eventful else End.RUNNING
+        reward = float(self._task.reward(state)) if eventful else 0.0
+        self._paid += reward
+        info = self._info(state, end)
+        self._counts.seconds_stepping += time.perf_counter() - called
+        if end is not End.RUNNING:
+            self._finish(end.text)
+        return observation, reward, end.terminated, end.truncated, info
+
+    def _stall(self) -> Outcome:
         """The arm has moved on too far: what the twin would see is no longer what happens."""
         self._counts.stalled_episodes += 1
-        self._finish("stalled", reward=0.0)
-        info = {
-            "hit": self._watch.hit,
-            "smallest_distance": self._watch.smallest_distance,
-            "stalled": True,
-            "end": "stalled",
-        }
-        return self._observe(), 0.0, False, True, info
+        self._finish(STALLED)
+        observation = self._box.clip(self._task.observe(self._state))
+        info = self._task.info(self._state) | {"stalled": True, "end": STALLED}
+        return observation, 0.0, False, True, info
 
-    def _finish(self, end: str, reward: float | None = None) -> float:
-        """The episode is over: its reward, its summary, its record."""
+    def _finish(self, end: str) -> None:
+        """The episode is over: its summary, its record."""
         self._over = True
         self._counts.episodes += 1
         self._counts.seconds += time.monotonic() - self._first_step_at
-        if reward is None:
-            reward = self._watch.reward(self._ball_y)
         self._summary = EpisodeSummary(
             episode=self._episode,
             ball=self._ball,
             steps=self._steps,
-            reward=float(reward),
-            hit=self._watch.hit,
-            returned=self._watch.returned,
+            reward=self._paid,
+            hit=bool(self._state.record.touched),
+            returned=bool(self._state.record.flew_back),
             end=end,
             arm_first=self._arm_first,
-            arm_last=self._row,
+            arm_last=self._rig.row,
             twin_first=self._twin_first,
-            twin_last=self._twin_row,
+            twin_last=self._rig.twin_row,
         )
         if self._logger is not None:
             self._logger.add(self._summary)
-        return float(reward)
 
     def _choose_balls(self, options: Mapping[str, Any]) -> tuple[list[int], list[SampledFlight]]:
         """Numbers and flights: of the ball that is played, then of the extra ones."""
-        unknown = [name for name in options if name not in OPTIONS]
-        if unknown:
-            raise ValueError(
-                f"unknown options: {', '.join(unknown)}; reset knows {', '.join(OPTIONS)}"
-            )
-        drawn = self.np_random.integers(len(self._balls), size=1 + self._settings.extra_balls)
+        plays_ball, rig = self._task.plays_ball, self._rig_settings
+        refuse_wrong_options(options, plays_ball=plays_ball, period=rig.period)
+        if not plays_ball:
+            return [-1], []
+        drawn = self.np_random.integers(len(self._balls), size=1 + rig.extra_balls)
         numbers = [int(number) for number in drawn]
         if "flight" in options:
-            flight = options["flight"]
-            if not np.isclose(flight.period, self._settings.period):
-                raise ValueError(
-                    f"a flight in steps of {flight.period} s cannot be played every "
-                    f"{self._settings.period} s: resample it"
-                )
             numbers[0] = -1
-            flights = [flight]
+            flights = [options["flight"]]
         else:
             numbers[0] = int(options.get("ball", numbers[0]))
             flights = [self._balls.flight(numbers[0])]
@@ -265,42 +227,35 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
 
     # ------------------------------------------------------------------ rows => what is returned
 
-    def _observe(self) -> Float32Array:
-        """The newest rows of the arm and of the first twin, clipped; a fresh array."""
-        arm, twin, observed = self._rig.arm, self._twin, self._observed
-        observed[MOTION] = arm.last_motion
-        observed[PRESSURES] = (arm.last_pressures - self._least) / self._span
-        observed[BALL] = twin.row[twin.played_ball]
-        self._ball_y = float(observed[BALL_Y])
-        return np.minimum(np.maximum(observed, self._low), self._high).astype(np.float32)
+    def _look(self) -> State:
+        """The newest rows of the arm and of the first twin, for the task."""
+        arm, twin = self._arm, self._twin
+        return State(
+            self._steps,
+            arm.last_motion,
+            arm.pressures,
+            arm.last_racket,
+            twin.ball,
+            twin.record,
+            self._goal,
+        )
 
-    def _info(self, observation: Float32Array, end: End) -> Info:
-        info: Info = {
-            "hit": self._watch.hit,
-            "smallest_distance": self._watch.smallest_distance,
-            "stalled": False,
-            "end": end.value,
-        }
-        if self._settings.extra_balls:
-            info["virtual"] = self._virtual.look(
-                observation, steps=self._steps, over=end is not End.RUNNING
-            )
+    def _info(self, state: State, end: End) -> Info:
+        info = self._task.info(state)
+        info["stalled"] = False
+        info["end"] = end.text
+        if self._rig_settings.extra_balls:
+            info["virtual"] = self._virtual.look(state, over=end is not End.RUNNING)
         return info
 
-    def _count(self, *, exact: bool) -> None:
-        """Whether the step was exact, by the numbers of the iterations, and how late it was.
-
-        `exact`: for the arm, it was.
-        """
-        counts, arm, twin_row = self._counts, self._rig.arm, self._twin.iteration
+    def _count(self) -> None:
+        """Whether the step was exact, by the numbers of the iterations, and how late it was."""
+        counts, lateness = self._counts, self._rig.lateness
         counts.steps += 1
-        counts.exact_steps += exact and twin_row == self._twin_row + ITERATIONS
-        self._twin_row = twin_row
-        if self._real_time:
-            lateness = arm.newest - self._row
-            counts.summed_lateness += lateness
-            counts.largest_lateness = max(counts.largest_lateness, lateness)
-            counts.late_actions += arm.late
+        counts.exact_steps += self._rig.exact
+        counts.summed_lateness += lateness
+        counts.largest_lateness = max(counts.largest_lateness, lateness)
+        counts.late_actions += self._arm.late
 
     # ------------------------------------------------------------------ beside the episode
 
@@ -318,7 +273,7 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
 
     def statistics(self) -> Statistics:
         """Rates and lateness since the environment was made."""
-        return statistics_of(self._counts, self._rig.arm.frontend, step=self._settings.step)
+        return statistics_of(self._counts, self._rig.arm.frontend, step=self._rig_settings.step)
 
     def render(self) -> Any:
         """A picture (480, 640, 3) of arm and balls as they were last published."""
@@ -328,11 +283,9 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         if self._scene is None:
             from .report.rendering import Scene
 
-            self._scene = Scene(balls=1 + self._settings.extra_balls)
+            self._scene = Scene(balls=1 + self._rig_settings.extra_balls)
         return self._scene.draw(
-            self._twin.joint_positions(self._twin.row),
-            self._virtual.positions(),
-            camera=self._camera,
+            self._twin.joint_positions, self._virtual.positions(), camera=self._camera
         )
 
     def close(self) -> None:

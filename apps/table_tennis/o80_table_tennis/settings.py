@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
-from .task.actions import FINE, REAL_RANGE, SIMULATED_RANGE, PressureRange
+from .task.actions import FINE
+from .task.ball_play import HitTask, ReturnTask, SmashTask
+from .task.end import EndRule
 from .task.observations import ObservationBounds
-from .task.rewards import EndRule, RewardRule
-
-JOINTS = 4
-ITERATIONS = 5
-"""Of the arm and of each twin, in a step of the environment."""
-RANGES = {"simulated": SIMULATED_RANGE, "real": REAL_RANGE}
-"""Of pressures, by name."""
+from .task.reach import ReachTask
+from .task.rewards import RewardRule
+from .task.task import Task, missing_members
+from .world.timing import ITERATIONS, PERIOD
 
 
 class Pacing(Enum):
@@ -34,7 +34,7 @@ class Pacing(Enum):
 
 @dataclass(frozen=True)
 class RigSettings:
-    """The arm and its twins. Raises ValueError for settings that make none."""
+    """The arm and its twins. Raises ValueError for settings that contradict each other."""
 
     pacing: Pacing = Pacing.INLINE
     arm_segment: str | None = None
@@ -48,30 +48,23 @@ class RigSettings:
     muscle: str = "linear"
     """Model of the muscles of the simulated arm: linear or hill."""
     ranges: str = "simulated"
-    """Whose pressures may be asked for: simulated or real."""
+    """Pressure ranges of the arm: simulated or real."""
     start_noise: float = 0.0
     """On each joint of the simulated arm at a reset, uniform in plus or minus this [rad]."""
-    frequency: float = 500.0
+    frequency: float = 1.0 / PERIOD
     """Of the arm and of the twins [1/s]."""
     history: int | None = None
     """Rows that arm and twins keep; None: as many as fit into o80's usual history."""
 
     def __post_init__(self) -> None:
         if self.twins < 1:
-            raise ValueError(f"at least one twin is needed, not {self.twins}")
+            raise ValueError(f"twins must be at least 1, got {self.twins}")
         if self.extra_balls < 0:
-            raise ValueError(f"extra_balls is a number of balls, not {self.extra_balls}")
-        if self.ranges not in RANGES:
-            raise ValueError(f"unknown ranges '{self.ranges}'; there are: {', '.join(RANGES)}")
+            raise ValueError(f"extra_balls must not be negative, got {self.extra_balls}")
         if self.attach and self.arm_segment is None:
             raise ValueError("to attach to an arm, give the name of its segment: arm_segment")
         if self.attach and self.pacing is Pacing.INLINE:
             raise ValueError("an arm in another process cannot be inline; choose another pacing")
-
-    @property
-    def pressures(self) -> PressureRange:
-        """What each muscle may be asked for."""
-        return RANGES[self.ranges]
 
     @property
     def period(self) -> float:
@@ -99,8 +92,10 @@ class RigSettings:
 
 @dataclass(frozen=True)
 class TaskSettings:
-    """What is played, and how it is paid."""
+    """What is played, and how it is paid. Raises ValueError or TypeError."""
 
+    task: str | Task = "return"
+    """return, smash, hit or reach; or an object of your own, see `task.task.Task`."""
     balls: str | None = None
     """A recording or a folder of them; None: simulated shots."""
     ball_seed: int = 0
@@ -110,14 +105,38 @@ class TaskSettings:
     delay: int = 1
     """Iterations the policy has to think, real time: an action acts from row k + 1 + delay."""
     bounds: ObservationBounds = field(default_factory=ObservationBounds)
+    """Of the observation of the named tasks with a ball."""
     end: EndRule = field(default_factory=EndRule)
+    """Of an episode of the named tasks."""
     reward: RewardRule = field(default_factory=RewardRule)
+    """Of the named tasks with a ball."""
     most_late: int = 20
     """Rows of lateness above which an episode is given up as stalled, real time."""
 
     def __post_init__(self) -> None:
         if not 0 <= self.delay < ITERATIONS:
             raise ValueError(
-                f"a delay of {self.delay} iterations: an action must act within its step, "
-                f"so it lies between 0 and {ITERATIONS - 1}"
+                f"delay must lie between 0 and {ITERATIONS - 1} iterations, so that an action acts "
+                f"within its step, got {self.delay}"
             )
+        if isinstance(self.task, str):
+            if self.task not in TASKS:
+                raise ValueError(f"unknown task '{self.task}'; there are: {', '.join(TASKS)}")
+        elif missing := missing_members(self.task):
+            raise TypeError(
+                f"task must be one of {', '.join(TASKS)}, or an object with the members of "
+                f"o80_table_tennis.task.task.Task; {self.task!r} has no {', '.join(missing)}"
+            )
+
+    def made(self) -> Task:
+        """The task itself."""
+        return TASKS[self.task](self) if isinstance(self.task, str) else self.task
+
+
+TASKS: Mapping[str, Callable[[TaskSettings], Task]] = {
+    "return": lambda s: ReturnTask(s.bounds, s.end, s.reward),
+    "smash": lambda s: SmashTask(s.bounds, s.end, s.reward),
+    "hit": lambda s: HitTask(s.bounds, s.end, s.reward),
+    "reach": lambda s: ReachTask(most_steps=s.end.most_steps),
+}
+"""The tasks with a name."""

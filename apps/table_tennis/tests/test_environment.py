@@ -16,9 +16,11 @@ import o80
 import o80_table_tennis
 from o80_table_tennis.balls.sources import balls_from
 from o80_table_tennis.environment import TableTennisEnvironment
-from o80_table_tennis.settings import ITERATIONS, Pacing, RigSettings, TaskSettings
-from o80_table_tennis.task.actions import COARSE, MUSCLES, changed_pressures
-from o80_table_tennis.task.rewards import EndRule
+from o80_table_tennis.settings import Pacing, RigSettings, TaskSettings
+from o80_table_tennis.task.actions import COARSE, changed_pressures
+from o80_table_tennis.task.end import EndRule
+from o80_table_tennis.world.arm import MUSCLES
+from o80_table_tennis.world.timing import ITERATIONS
 
 STILL = np.zeros(MUSCLES, dtype=np.float32)
 PUSH = np.array([1, -1, 0, 0, 0, 0, 0, 0], dtype=np.float32)
@@ -169,17 +171,15 @@ def test_an_action_acts_from_the_iteration_it_is_meant_for(delay: int) -> None:
     task = TaskSettings(factor=COARSE, delay=delay)
     with closing(opened(task=task)) as environment:
         environment.reset(seed=1)
-        arm, pressures = environment.rig.arm, environment._settings.pressures
-        k = arm.newest
-        before = arm.asked
+        arm = environment.rig.arm
+        k, before = arm.newest, arm.asked
         environment.step(PUSH)
         asked = arm.frontend.history(since=k + 1, until=k + ITERATIONS).desired
 
-        wanted = changed_pressures(pressures.normalised(before), PUSH, factor=COARSE)
-        np.testing.assert_array_equal(asked[:delay], np.tile(before, (delay, 1)))
-        np.testing.assert_array_equal(
-            asked[delay:], np.tile(pressures.raw(wanted), (ITERATIONS - delay, 1))
-        )
+        start = np.array(arm.start_pressures)
+        wanted = arm.range.raw(changed_pressures(before, PUSH, factor=COARSE))
+        np.testing.assert_array_equal(asked[:delay], np.tile(start, (delay, 1)))
+        np.testing.assert_array_equal(asked[delay:], np.tile(wanted, (ITERATIONS - delay, 1)))
 
 
 @pytest.mark.parametrize("pacing", ALL_MODES)
@@ -190,7 +190,7 @@ def test_every_twin_mirrors_every_row_of_the_arm_bit_for_bit(pacing: Pacing) -> 
             environment.step(PUSH)
         rig, rows = environment.rig, 20 * ITERATIONS
         # the arm may have moved on by its own clock
-        last = environment._row
+        last = environment.rig.row
         arm = rig.arm.frontend.history(since=last + 1 - rows, until=last).extended
         for twin in rig.twins:
             seen = twin.frontend.history(rows).observed.joints
@@ -215,7 +215,7 @@ def test_the_observation_is_the_state_after_the_action(inline: TableTennisEnviro
     row = inline.rig.arm.frontend.latest()
 
     np.testing.assert_array_equal(observation[:4], row.extended.joint_positions.astype(np.float32))
-    normalised = inline._settings.pressures.normalised(row.observed)
+    normalised = inline.rig.arm.range.normalised(np.array(row.observed))
     np.testing.assert_allclose(observation[8:16], normalised, rtol=1e-6)
 
 
@@ -263,8 +263,8 @@ def test_wrong_options_are_refused_with_what_there_is(inline: TableTennisEnviron
         inline.reset(options={"bal": 3})
     with pytest.raises(IndexError, match="there are 0 to 79"):
         inline.reset(options={"ball": 80})
-    with pytest.raises(ValueError, match="real"):
-        RigSettings(ranges="imagined")
+    with pytest.raises(ValueError, match="simulated, real"):
+        opened(ranges="imagined")
     with pytest.raises(ValueError, match="within its step"):
         TaskSettings(delay=5)
 
@@ -324,7 +324,7 @@ def test_an_action_that_comes_late_acts_at_once_and_is_counted() -> None:
     with closing(opened(Pacing.REAL_TIME)) as environment:
         environment.reset(seed=1)
         environment.step(STILL)
-        k = environment._row
+        k = environment.rig.row
         environment.rig.arm.frontend.wait_for(k + 7, timeout=WAITING)
         before = environment.statistics()
         environment.step(PUSH)

@@ -1,91 +1,86 @@
-"""The reward of an episode and the reasons why it ends."""
+"""The reward of an episode of ball play, of one or of many."""
 
+import math
+
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from o80_table_tennis.task.rewards import BallRecord, End, EndRule, RewardRule
+from o80_table_tennis.task.ball_record import BallRecord
+from o80_table_tennis.task.rewards import RewardRule
 
 RULE = RewardRule()
-SMASH = RewardRule(smash=True)
+TARGET = np.array(RULE.target)
+MISSED = BallRecord(0.35)
+TOUCHED = BallRecord(0.0, touched=True, largest_speed=9.0)
 
 
-def hit_landing_at(x: float, y: float, largest_speed: float = 5.0) -> BallRecord:
+def landing_at(x: float, y: float, largest_speed: float = 5.0) -> BallRecord:
     return BallRecord(
-        smallest_distance=0.0, y=y, hit=True, landing=(x, y), largest_speed=largest_speed
+        0.0, touched=True, landed=True, landing=(x, y, 0.795), largest_speed=largest_speed
     )
 
 
-def test_without_a_hit_the_reward_is_minus_the_smallest_distance() -> None:
-    assert RULE.reward(BallRecord(smallest_distance=0.35, y=-0.9)) == -0.35
-    assert SMASH.reward(BallRecord(smallest_distance=0.35, y=-0.9)) == -0.35
+def stacked(records: list[BallRecord]) -> BallRecord:
+    """Many records as one."""
+    names = BallRecord.__slots__
+    return BallRecord(*(np.array([getattr(one, name) for one in records]) for name in names))
+
+
+def test_without_a_touch_the_reward_is_minus_the_smallest_distance() -> None:
+    assert RULE.returned(MISSED, TARGET) == -0.35
+    assert RULE.smashed(MISSED, TARGET) == -0.35
+    assert RULE.touched(MISSED) == -0.35
+
+
+def test_a_touch_alone_is_worth_one_where_only_touches_count() -> None:
+    assert RULE.touched(TOUCHED) == 1.0
 
 
 def test_a_landing_on_the_target_is_worth_one() -> None:
-    assert RULE.reward(hit_landing_at(0.0, 2.5)) == 1.0
+    assert RULE.returned(landing_at(0.0, 2.5), TARGET) == 1.0
 
 
 @pytest.mark.parametrize(
     ("distance", "reward"), [(3.0, 0.0), (1.0, 0.561309), (0.1875, 0.875), (30.0, -0.2)]
 )
 def test_a_landing_is_worth_less_the_farther_it_is(distance: float, reward: float) -> None:
-    assert RULE.reward(hit_landing_at(distance, 2.5)) == pytest.approx(reward, abs=1e-6)
+    assert RULE.returned(landing_at(distance, 2.5), TARGET) == pytest.approx(reward, abs=1e-6)
 
 
 def test_the_distance_is_measured_in_the_plane_of_the_table() -> None:
-    assert RULE.distance((0.3, 2.1)) == pytest.approx(0.5)
+    assert RULE.distance((0.3, 2.1, 9.0), TARGET) == pytest.approx(0.5)
 
 
-def test_a_hit_without_a_landing_is_worth_the_floor() -> None:
-    hit = BallRecord(smallest_distance=0.0, y=3.5, hit=True, touched_floor=True, largest_speed=9.0)
-
-    assert RULE.reward(hit) == -0.2
-    assert SMASH.reward(hit) == -0.2
+def test_a_touch_without_a_landing_is_worth_the_floor() -> None:
+    assert RULE.returned(TOUCHED, TARGET) == -0.2
+    assert RULE.smashed(TOUCHED, TARGET) == -0.2
 
 
 def test_a_smash_multiplies_by_the_largest_speed_and_keeps_the_floor() -> None:
-    assert SMASH.reward(hit_landing_at(0.0, 2.5, largest_speed=7.0)) == 7.0
-    assert SMASH.reward(hit_landing_at(3.5, 2.5, largest_speed=7.0)) == -0.2
+    assert RULE.smashed(landing_at(0.0, 2.5, largest_speed=7.0), TARGET) == 7.0
+    assert RULE.smashed(landing_at(3.5, 2.5, largest_speed=7.0), TARGET) == -0.2
 
 
 @settings(deadline=None)
 @given(x=st.floats(-5, 5), y=st.floats(-5, 8), speed=st.floats(0, 30))
-def test_a_hit_is_never_worth_less_than_the_floor(x: float, y: float, speed: float) -> None:
-    hit = hit_landing_at(x, y, largest_speed=speed)
+def test_a_touch_is_never_worth_less_than_the_floor(x: float, y: float, speed: float) -> None:
+    record = landing_at(x, y, largest_speed=speed)
 
-    assert -0.2 <= RULE.reward(hit) <= 1.0
-    assert -0.2 <= SMASH.reward(hit) <= max(speed, 1.0)
-
-
-@pytest.mark.parametrize(
-    ("ball", "end"),
-    [
-        (BallRecord(smallest_distance=1.0, y=1.0), End.RUNNING),
-        (hit_landing_at(0.0, 2.0), End.LANDED),
-        (BallRecord(smallest_distance=1.0, y=1.5, touched_net=True), End.NET),
-        (BallRecord(smallest_distance=1.0, y=3.5, hit=True, touched_floor=True), End.FLOOR),
-        (BallRecord(smallest_distance=1.0, y=-0.81), End.PASSED),
-        (BallRecord(smallest_distance=1.0, y=-0.8), End.RUNNING),
-    ],
-)
-def test_an_episode_ends_by_what_happens_to_the_ball(ball: BallRecord, end: End) -> None:
-    assert EndRule().judge(ball, steps=299) is end
+    assert -0.2 <= RULE.returned(record, TARGET) <= 1.0
+    assert -0.2 <= RULE.smashed(record, TARGET) <= max(speed, 1.0)
 
 
-def test_only_the_count_of_steps_truncates() -> None:
-    ball = BallRecord(smallest_distance=1.0, y=1.0)
+def test_many_episodes_are_paid_as_each_alone_and_as_the_formula_says_bit_for_bit() -> None:
+    rng = np.random.default_rng(1)
+    records = [landing_at(*rng.uniform(-2, 4, 2), rng.uniform(0, 9)) for _ in range(200)]
+    records += [MISSED, TOUCHED]
+    for rule in (RULE.returned, RULE.smashed):
+        together = rule(stacked(records), np.tile(TARGET, (len(records), 1)))
+        np.testing.assert_array_equal(together, [rule(one, TARGET) for one in records])
 
-    end = EndRule().judge(ball, steps=300)
-    assert end is End.OUT_OF_STEPS
-    assert end.truncated
-    assert not end.terminated
-    landed = EndRule().judge(hit_landing_at(0.0, 2.0), steps=300)
-    assert landed.terminated
-    assert not landed.truncated
-    assert not End.RUNNING.terminated
-    assert not End.RUNNING.truncated
-
-
-def test_a_landing_before_any_hit_is_refused() -> None:
-    with pytest.raises(ValueError, match="needs a hit"):
-        BallRecord(smallest_distance=1.0, y=1.0, landing=(0.0, 1.0))
+    distances = [math.dist(one.landing[:2], TARGET[:2]) for one in records[:200]]
+    terms = [max(1.0 - math.pow(d / 3.0, 0.75), -0.2) for d in distances]
+    together = RULE.returned(stacked(records[:200]), np.tile(TARGET, (200, 1)))
+    np.testing.assert_array_equal(together, terms)

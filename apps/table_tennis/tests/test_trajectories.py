@@ -11,9 +11,10 @@ import pytest
 
 from o80_table_tennis.balls.flight_fit import bounce_rows, fit_flight
 from o80_table_tennis.balls.frame_stamps import FRAME_PERIOD, frames_of
-from o80_table_tennis.balls.recordings import BALL_GUN_FRAME
-from o80_table_tennis.balls.trajectories import BallTrajectory, load_trajectories
-from o80_table_tennis.physics.flight import predict, simulated_shot
+from o80_table_tennis.balls.recordings import BALL_GUN_FRAME, load_trajectories
+from o80_table_tennis.balls.simulated_shots import simulated_shot
+from o80_table_tennis.balls.trajectories import BallTrajectory
+from o80_table_tennis.physics.prediction import predict
 
 ROOT = Path(__file__).resolve().parents[3]
 DATA = Path(os.environ.get("O80_DATA", ROOT.parent / "shared" / "data"))
@@ -288,7 +289,8 @@ def test_every_bounce_is_found(duration: float, bounces: int) -> None:
     flight = predict(start, velocity, duration, period=FRAME_PERIOD)
 
     found, _ = bounce_rows(flight.positions)
-    sampled = flight.resample()
+    seen = BallTrajectory("seen", flight.stamps, flight.positions, flight.velocities)
+    sampled = seen.resample()
 
     assert len(found) == bounces
     assert len(sampled.bounce_times) == bounces

@@ -17,12 +17,11 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from ..physics.aerodynamics import Aerodynamics, runge_kutta_step
-from ..physics.path import along_path
+from ..physics.aerodynamics import AERODYNAMICS, runge_kutta_step
+from ..physics.interpolation import along_path
 
 FloatArray = NDArray[np.float64]
 
-AERODYNAMICS = Aerodynamics()
 STEP = 0.05
 """Step of the integration [s]; the error stays below 1 um."""
 POSITION_NOISE = 0.003

@@ -66,6 +66,27 @@ def recording_files(path: Path) -> list[Path]:
     return files
 
 
+def load_trajectories(
+    path: str | Path,
+    *,
+    frame_offset: Sequence[float] | None = None,
+    frame_yaw: float | None = None,
+) -> list[BallTrajectory]:
+    """The trajectories of a file, or of all files of a folder, in the order of their names.
+
+    Read are JSON files of a ball gun (`.json`, time stamps reconstructed), HDF5 files of shots
+    (`.hdf5`, `.h5`). The world frame is the rows turned by `frame_yaw` [rad] about z, then shifted
+    by `frame_offset` (3,) [m]; where None, what is known for the format.
+
+    Raises FileNotFoundError or ValueError, naming the file and the cure.
+    """
+    return [
+        trajectory
+        for file in recording_files(Path(path))
+        for trajectory in read_recording(file, frame_offset=frame_offset, frame_yaw=frame_yaw)
+    ]
+
+
 def read_recording(
     file: Path,
     *,

@@ -9,11 +9,12 @@ from typing import Protocol
 
 import numpy as np
 
-from ..physics.flight import simulated_shot
-from .trajectories import BallTrajectory, SampledFlight, load_trajectories
+from ..world.timing import PERIOD
+from .recordings import load_trajectories, recording_files
+from .sampled_flight import SampledFlight
+from .simulated_shots import simulated_shot
+from .trajectories import BallTrajectory
 
-PERIOD = 0.002
-"""Between two rows of a flight [s]: one iteration of the twin."""
 SIMULATED_SHOTS = 80
 """How many different shots there are without any file."""
 
@@ -58,8 +59,6 @@ def recorded_balls(path: str | Path, *, period: float = PERIOD) -> FlightShelf:
 
     A file of one shot (JSON) is read when the shot is asked for, one of many (HDF5) at once.
     """
-    from .recordings import recording_files
-
     shots: list[Callable[[], BallTrajectory]] = []
     for file in recording_files(Path(path)):
         if file.suffix == ".json":

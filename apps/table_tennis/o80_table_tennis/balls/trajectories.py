@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..world.timing import PERIOD
 from .flight_fit import FlightFit, fit_flight
+from .sampled_flight import SampledFlight
 
 FloatArray = NDArray[np.float64]
 
@@ -24,33 +24,6 @@ def require_enough_rows(name: str, rows: int) -> None:
         raise ValueError(
             f"{name}: {rows} rows are too few to fit a flight, {SHORTEST} are needed; leave it out"
         )
-
-
-@dataclass(frozen=True)
-class SampledFlight:
-    """A flight in equal steps, ready to be commanded: row i is at i * period after the start."""
-
-    name: str
-    period: float
-    """[s]"""
-    positions: FloatArray
-    """(T, 3), world frame [m]"""
-    velocities: FloatArray
-    """(T, 3), world frame [m/s]"""
-    bounce_times: FloatArray
-    """(bounces,), since the first row [s]"""
-    residuals: FloatArray
-    """(N,) distance of each recorded row from the fit [m]"""
-
-    @property
-    def residual(self) -> float:
-        """Root mean square of the distances of the recorded rows from the fit [m]."""
-        return float(np.sqrt(np.mean(self.residuals**2)))
-
-    @property
-    def duration(self) -> float:
-        """From the first row to the last [s]."""
-        return (len(self.positions) - 1) * self.period
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +79,7 @@ class BallTrajectory:
         require_enough_rows(self.name, len(self.stamps))
         return fit_flight(self.stamps, self.positions)
 
-    def resample(self, period: float = 0.002) -> SampledFlight:
+    def resample(self, period: float = PERIOD) -> SampledFlight:
         """The fitted flight in steps of `period` [s], from the first row to the last one fitted.
 
         The velocities are derivatives of the fit: differences of neighbouring rows, and the
@@ -126,26 +99,3 @@ class BallTrajectory:
             bounce_times=fit.bounce_times - fit.start,
             residuals=fit.residuals,
         )
-
-
-def load_trajectories(
-    path: str | Path,
-    *,
-    frame_offset: Sequence[float] | None = None,
-    frame_yaw: float | None = None,
-) -> list[BallTrajectory]:
-    """The trajectories of a file, or of all files of a folder, in the order of their names.
-
-    Read are JSON files of a ball gun (`.json`, time stamps reconstructed), HDF5 files of shots
-    (`.hdf5`, `.h5`). The world frame is the rows turned by `frame_yaw` [rad] about z, then shifted
-    by `frame_offset` (3,) [m]; where None, what is known for the format.
-
-    Raises FileNotFoundError or ValueError, naming the file and the cure.
-    """
-    from .recordings import read_recording, recording_files
-
-    return [
-        trajectory
-        for file in recording_files(Path(path))
-        for trajectory in read_recording(file, frame_offset=frame_offset, frame_yaw=frame_yaw)
-    ]

@@ -3,7 +3,8 @@
     a = -1/2 rho Cd A/m |v| v + 1/2 rho Cl A r/m (omega x v) - g z
 
 as published for the ball of the experiment; rho is the density of air, A = pi r^2, m the mass.
-The functions take floats (one ball, fast without NumPy) or arrays (many balls at once).
+The functions take floats (one ball, fast without NumPy) or arrays (many balls at once). The twins
+follow the same law in C++ (simulators/mujoco/src/balls/ball_flight.hpp); a test compares the two.
 """
 
 from __future__ import annotations
@@ -15,14 +16,14 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..world.table import BALL_RADIUS
+from ..world.ball import BALL_MASS, BALL_RADIUS, GRAVITY
 
 Number = TypeVar("Number", float, NDArray[np.float64])
 
 
 @dataclass(frozen=True)
 class Aerodynamics:
-    """What the air and gravity do to the ball."""
+    """What the air and gravity do to the ball. The twins get the same numbers as options."""
 
     air_density: float = 1.18
     """[kg/m^3]"""
@@ -33,11 +34,11 @@ class Aerodynamics:
     spin_decay: float = 0.5
     """Share of the spin lost in a second [1/s]: the published 0.005 a step, of 10 ms (with steps of
     2 ms the recorded shots would lose their spin five times faster than is seen)."""
-    gravity: float = 9.81
+    gravity: float = GRAVITY
     """[m/s^2]"""
     radius: float = BALL_RADIUS
     """[m]"""
-    mass: float = 0.0027
+    mass: float = BALL_MASS
     """[kg]"""
 
     @property
@@ -55,6 +56,8 @@ class Aerodynamics:
         """1/2 rho Cl A r/m []: the Magnus acceleration is magnus * (omega x v)."""
         return self.lift_coefficient * self.drag_per_coefficient * self.radius
 
+
+AERODYNAMICS = Aerodynamics()
 
 State = tuple[Number, Number, Number, Number, Number, Number]
 """x, y, z [m], vx, vy, vz [m/s]."""

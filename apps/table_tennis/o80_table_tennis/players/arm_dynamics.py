@@ -12,30 +12,40 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .kinematics import UPPER_ARM
+from ..world.arm import FOREARM, JOINT_DAMPING, UPPER_ARM, PointMass, mass_of
+from ..world.ball import GRAVITY
 
 FloatArray = NDArray[np.float64]
 
 
+def _joined(*parts: tuple[PointMass, float]) -> PointMass:
+    """Masses of one link as one; with each, how far out its own origin lies. To 10 um."""
+    mass = sum(part.mass for part, _ in parts)
+    centre = sum(part.mass * (origin + part.centre) for part, origin in parts) / mass
+    return PointMass(mass, round(centre, 5))
+
+
+UPPER_ARM_MASS, ELBOW_MASS = mass_of("upper_arm"), mass_of("elbow")
+FOREARM_MASS = _joined((mass_of("forearm"), 0.0), (mass_of("racket"), FOREARM))
+"""Forearm and racket."""
+
+
 @dataclass(frozen=True)
 class ArmModel:
-    """Masses and friction, as the scene's model has them."""
+    """Masses and damping of the scene."""
 
-    upper_mass: float = 0.208
-    """[kg]"""
-    upper_centre: float = 0.18371
-    """From joint 2 [m]."""
-    elbow_mass: float = 0.03
-    """[kg]"""
-    fore_mass: float = 0.797
-    """Forearm and racket [kg]."""
-    fore_centre: float = 0.33279
-    """From joint 3 [m]."""
+    upper_arm: PointMass = UPPER_ARM_MASS
+    """From joint 2."""
+    elbow: PointMass = ELBOW_MASS
+    """On joint 3."""
+    forearm: PointMass = FOREARM_MASS
+    """Forearm and racket, from joint 3."""
     turning: tuple[float, float, float, float] = (0.012, 0.0145, 0.0115, 0.004)
-    """Inertia of the links about their own centres, and of the pulleys, for each joint [kg m^2]."""
-    damping: tuple[float, float, float, float] = (2.0, 2.0, 1.2, 1.5)
+    """Inertia of the links about their own centres, and of the pulleys, for each joint, fitted to
+    the torques of the scene [kg m^2]."""
+    damping: tuple[float, ...] = JOINT_DAMPING
     """[Nm s/rad]"""
-    gravity: float = 9.81
+    gravity: float = GRAVITY
     """[m/s^2]"""
 
     def torque(self, q: FloatArray, dq: FloatArray, acceleration: FloatArray) -> FloatArray:
@@ -61,7 +71,7 @@ class ArmModel:
     def _points(self) -> tuple[tuple[float, float, float], ...]:
         """Mass [kg], and how far it lies along the upper arm and the forearm [m]."""
         return (
-            (self.upper_mass, self.upper_centre, 0.0),
-            (self.elbow_mass, UPPER_ARM, 0.0),
-            (self.fore_mass, UPPER_ARM, self.fore_centre),
+            (self.upper_arm.mass, self.upper_arm.centre, 0.0),
+            (self.elbow.mass, UPPER_ARM, 0.0),
+            (self.forearm.mass, UPPER_ARM, self.forearm.centre),
         )

@@ -16,10 +16,11 @@ from ..task.observations import (
     PRESSURES,
     Float32Array,
 )
+from ..world.arm import JOINT_LIMIT, JOINTS
+from ..world.timing import STEP
 from .arm_dynamics import ArmModel
 from .interception import ComingBall, InterceptionSettings, Strike, StrikePlanner, coming_ball
-from .kinematics import JOINT_LIMIT, JOINTS
-from .pressure_control import STEP, MusclePair, PressureActions, PressureLag
+from .pressure_control import MusclePair, PressureActions, PressureLag
 from .swing import JointMotion, Swing
 
 FloatArray = NDArray[np.float64]

@@ -7,20 +7,25 @@ leaves. Least squares finds those that send it to the target, near to a comforta
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..physics.aerodynamics import Aerodynamics
-from ..physics.flight import AERODYNAMICS, BALL_GUN_SPIN, TABLE, predict
-from ..physics.racket_impact import RacketImpact, velocity_to_land
-from ..world.table import BALL_RADIUS, Table
-from .kinematics import BLADE_THICKNESS, posture_towards, racket_pose
+from ..physics.aerodynamics import AERODYNAMICS, Aerodynamics
+from ..physics.impact import outgoing_velocity
+from ..physics.prediction import predict
+from ..world.arm import BLADE_THICKNESS, racket_pose
+from ..world.ball import BALL_GUN_SPIN, BALL_RADIUS
+from ..world.materials import RACKET_RESTITUTION, Restitution
+from ..world.scene import Vector
+from ..world.table import TABLE, Table
+from .aiming import velocity_to_land
+from .inverse_kinematics import posture_towards
 
 FloatArray = NDArray[np.float64]
 
-PERIOD = 0.01
+PATH_PERIOD = 0.01
 """Of the rows of a predicted path [s]."""
 TOUCH = BALL_RADIUS + BLADE_THICKNESS / 2
 """From the middle of the blade to the centre of a ball that touches it [m]."""
@@ -70,13 +75,13 @@ class InterceptionSettings:
     """The same for joint 4 [rad]."""
     comfortable_speed: float = 1.5
     """The same for the speed of joint 1 [rad/s]."""
-    discomfort: tuple[float, float, float] = (0.2, 0.05, 0.02)
+    discomfort: Vector = (0.2, 0.05, 0.02)
     """What deviations from them weigh, against an error of the ball's velocity [1/s, m/s, m]."""
     off_middle: float = 8.0
     """What a touch off the middle of the blade weighs, against the same error [1/s]."""
-    spin: tuple[float, float, float] = BALL_GUN_SPIN
+    spin: Vector = BALL_GUN_SPIN
     """Of the ball, before and after the strike [rad/s]."""
-    impact: RacketImpact = field(default_factory=RacketImpact)
+    racket: Restitution = RACKET_RESTITUTION
     aerodynamics: Aerodynamics = AERODYNAMICS
     table: Table = TABLE
 
@@ -98,12 +103,12 @@ class ComingBall:
 
     def at(self, time: float) -> tuple[FloatArray, FloatArray]:
         """Position and velocity (3,) at `time` from now, between the first row and the last."""
-        row = int(np.clip((time - self.times[0]) / PERIOD, 0, len(self.times) - 2))
-        share = (time - self.times[row]) / PERIOD
+        row = int(np.clip((time - self.times[0]) / PATH_PERIOD, 0, len(self.times) - 2))
+        share = (time - self.times[row]) / PATH_PERIOD
         change = self.velocities[row + 1] - self.velocities[row]
         velocity = self.velocities[row] + share * change
         mean = self.velocities[row] + 0.5 * share * change
-        return self.positions[row] + share * PERIOD * mean, velocity
+        return self.positions[row] + share * PATH_PERIOD * mean, velocity
 
     def time_at(self, y: float) -> float:
         """When it is at `y`, or as near to it as it comes [s]."""
@@ -122,7 +127,7 @@ def coming_ball(
         velocity,
         duration,
         spin=settings.spin,
-        period=PERIOD,
+        period=PATH_PERIOD,
         aerodynamics=settings.aerodynamics,
         table=settings.table,
     )
@@ -200,7 +205,7 @@ class StrikePlanner:
         pose = racket_pose(touching_posture(position, float(guess[1])))
         normal = np.array(pose.normal)
         racket = np.array([-speed * position[1], speed * position[0], 0.0])
-        leaving = self._settings.impact.outgoing(velocity, racket, normal)
+        leaving = outgoing_velocity(velocity, racket, normal, self._settings.racket)
         off = position - TOUCH * normal - pose.position
         return np.concatenate([leaving - wanted, self._settings.off_middle * off])
 

@@ -8,8 +8,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..task.actions import COARSE, MUSCLES
+from ..task.actions import COARSE
 from ..task.observations import BALL_POSITION, BALL_VELOCITY, JOINT_POSITIONS, Float32Array
+from ..world.arm import MUSCLES
 from .found_parameters import found_settings
 from .hitting_policy import HittingPolicy
 

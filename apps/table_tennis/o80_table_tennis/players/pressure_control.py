@@ -8,12 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..task.actions import COARSE, changed_pressures
-from .kinematics import JOINTS
+from ..world.arm import MUSCLES
 
 FloatArray = NDArray[np.float64]
-
-STEP = 0.01
-"""Of the environment [s]."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +66,7 @@ class PressureActions:
 
     def __init__(self, *, factor: float = COARSE) -> None:
         self._factor = factor
-        self.asked = np.full(2 * JOINTS, 0.5)
+        self.asked = np.full(MUSCLES, 0.5)
 
     def start(self, pressures: FloatArray) -> None:
         """A new episode: the arm rests, so what is in the muscles (8,) is what was asked for."""

@@ -12,14 +12,11 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from ..world.table import Table
+from ..world.table import NET_HEIGHT, TABLE
 from .episode_record import EpisodeRecord, EpisodeSummary
 
 FloatArray = NDArray[np.float64]
 
-TABLE = Table()
-NET_HEIGHT = 0.1525
-"""Above the table [m]."""
 RESOLUTION = 110
 """[dots per inch]"""
 BALL, RACKET, HIT = "tab:orange", "tab:red", "tab:green"

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from o80.extras import needed
 
-from ..settings import JOINTS
+from ..world.arm import JOINT_NAMES
+from ..world.ball import BALL_RADIUS
 from ..world.scene import MODEL
 
 Image = NDArray[np.uint8]
@@ -50,7 +51,7 @@ class Scene(AbstractContextManager["Scene"]):
         self._model.vis.quality.offsamples = 4
         self._data = mujoco.MjData(self._model)
         self._balls = [self._free_joint(ball) for ball in range(balls)]
-        self._arm = [int(self._model.joint(f"joint_{j + 1}").qposadr[0]) for j in range(JOINTS)]
+        self._arm = [int(self._model.joint(name).qposadr[0]) for name in JOINT_NAMES]
         self._renderer = mujoco.Renderer(self._model, size[1], size[0])
 
     def __exit__(
@@ -161,6 +162,6 @@ def _model_with(balls: int) -> Any:
     for ball in range(1, balls):
         body = spec.worldbody.add_body(name=_ball_name(ball))
         body.add_freejoint(name=_ball_name(ball))
-        geom = body.add_geom(size=[0.02, 0, 0], rgba=OTHER_BALL)
+        geom = body.add_geom(size=[BALL_RADIUS, 0, 0], rgba=OTHER_BALL)
         geom.type = mujoco.mjtGeom.mjGEOM_SPHERE
     return spec.compile()

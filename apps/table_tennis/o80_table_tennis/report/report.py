@@ -16,6 +16,7 @@ from rich.table import Table as Grid
 
 from ..players.playing import Played
 from ..settings import Pacing
+from ..world.timing import ITERATIONS
 from .episode_record import EpisodeRecord
 
 Value = float | int | bool | str | None
@@ -95,6 +96,7 @@ def mode_numbers(
 ) -> dict[str, Value]:
     """All numbers of one mode."""
     statistics = played.statistics
+    period = 1e6 * statistics.step_seconds / ITERATIONS
     rewards = [episode.reward for episode in played.episodes]
     numbers: dict[str, Value] = {
         "episodes": len(played.episodes),
@@ -121,7 +123,7 @@ def mode_numbers(
             "arm_overruns": statistics.arm_overruns,
             "arm_skipped": statistics.arm_skipped,
             **_percentiles("arm_lateness_us", statistics.arm_lateness_us),
-            **_percentiles("arm_jitter_us", np.abs(statistics.arm_periods_us - 2000.0)),
+            **_percentiles("arm_jitter_us", np.abs(statistics.arm_periods_us - period)),
         }
     return numbers
 
@@ -147,7 +149,7 @@ def _draw(
             output / "jitter.png",
             statistics.arm_lateness_us,
             statistics.arm_periods_us,
-            period=2000.0,
+            period=1e6 * statistics.step_seconds / ITERATIONS,
         )
     shown = best_record([record for played in records.values() for record in played])
     if shown is not None:

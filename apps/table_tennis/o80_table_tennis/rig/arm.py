@@ -1,6 +1,6 @@
 """The arm as the environment sees it: eight pressures in, rows of joint angles out.
 
-`step` runs thousands of times a second in an accelerated environment: a prepared burst takes the
+A step runs thousands of times a second in an accelerated environment: a prepared burst takes the
 pressures from memory and puts the rows there.
 """
 
@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 import o80
 
-from ..settings import ITERATIONS, JOINTS
-from ..task.actions import MUSCLES
+from ..world.arm import JOINTS, MUSCLES
+from ..world.timing import ITERATIONS
+from .pressure_range import PressureRange
 from .row_words import words
 
 FloatArray = NDArray[np.float64]
@@ -34,23 +35,33 @@ LONGEST_RETURN = 4.0
 class Arm:
     """A frontend to the arm, and its last five rows.
 
-    `pressures` (8,), raw, are what the next `step` asks for. Views that it fills: `q`, `dq` (5, 4)
-    [rad], [rad/s], both as `motion` (4, 5, 2), a joint after the other; of the last row
-    `last_motion` (8,), q then dq, and `last_pressures` (8,), raw.
+    Views that each step fills: `q`, `dq` (5, 4) [rad], [rad/s], both as `motion` (4, 5, 2), a joint
+    after the other; of the last row `last_motion` (8,), q then dq, and `last_racket` (3,) [m].
     """
 
     def __init__(self, frontend: o80.Frontend) -> None:
         self.frontend = frontend
+        self.range = PressureRange.of(frontend)
+        """Of the raw pressures."""
+        self.late = False
+        """The last step's pressures were taken later than at their iteration, or not yet."""
         self._burst = None
         if frontend.bursting:
             self._burst = frontend.prepared_burst(ITERATIONS, mode="overwrite")
             self._rows = self._burst.rows
-            self.pressures: FloatArray = self._burst.targets[0]
+            self._pressures: FloatArray = self._burst.targets[0]
         else:
             self._rows = np.zeros(ITERATIONS, frontend.history(1).rows.dtype)
-            self.pressures = np.zeros(MUSCLES)
-        self.late = False
-        """The last step's pressures were taken later than at their iteration, or not yet."""
+            self._pressures = np.zeros(MUSCLES)
+        self._at = 0
+        self._view_rows()
+        self.start_pressures = np.array(frontend.latest().desired)
+        self.start_angles = np.array(frontend.latest().extended.joint_positions)
+        assert self.start_pressures.shape == (MUSCLES,)
+        assert self.start_angles.shape == (JOINTS,)
+
+    def _view_rows(self) -> None:
+        """Names the numbers of the rows."""
         dtype = self._rows.dtype
         numbers = self._rows.view(np.float64).reshape(ITERATIONS, -1)
         self.iterations: NDArray[np.int64] = self._rows["iteration"]
@@ -61,40 +72,49 @@ class Arm:
         motion = numbers[:, q.start : dq.stop]
         self.motion = motion.reshape(ITERATIONS, 2, JOINTS).transpose(2, 0, 1)
         self.last_motion = motion[-1]
-        self.last_pressures = numbers[-1, words(dtype, "observed")]
-        self._asked = numbers[:, words(dtype, "desired")]
-        self.start_pressures = np.array(frontend.latest().desired)
-        self.start_angles = np.array(frontend.latest().extended.joint_positions)
-        assert self.start_pressures.shape == (MUSCLES,)
-        assert self.start_angles.shape == (JOINTS,)
+        self.last_racket = numbers[-1, words(dtype, "extended", "racket_position")]
+        self._last_pressures = numbers[-1, words(dtype, "observed")]
+        self._last_asked = numbers[-1, words(dtype, "desired")]
 
     @property
     def newest(self) -> int:
         """Iteration of the newest row."""
         return self.frontend.published
 
-    def step(self, first: int, at: int) -> bool:
-        """Asks for `pressures` from iteration `at` on, or at once if it has begun, and lets the arm
-        make the five rows from `first` on, or waits for them, and reads them.
+    @property
+    def pressures(self) -> FloatArray:
+        """Normalised pressures (8,) in the muscles in the last row, a fresh array."""
+        return self.range.normalised(self._last_pressures)
+
+    @property
+    def asked(self) -> FloatArray:
+        """Normalised pressures (8,) asked for in the last row, a fresh array."""
+        return self.range.normalised(self._last_asked)
+
+    def ask(self, pressures: FloatArray, at: int) -> None:
+        """Asks for normalised pressures (8,) from iteration `at` on, or at once if it has begun.
+
+        By the clock they are sent now; an arm that bursts gets them with its `step`.
+        """
+        self._pressures[...] = self.range.raw(pressures)
+        self._at = at
+        if self._burst is None:
+            self.frontend.add_trajectory(self._pressures[np.newaxis], mode="overwrite")
+            self._sent = self.frontend.pulse(at=at, late="now")
+
+    def step(self, first: int) -> bool:
+        """Makes the five rows from `first` on, or waits for them, and reads them.
 
         Returns whether they were exactly these five.
         """
         last = first + ITERATIONS - 1
         if self._burst is not None:
-            return self._burst.run(TIMEOUT, at=at, late="now") == last
-        self.frontend.add_trajectory(self.pressures[np.newaxis], mode="overwrite")
-        sent = self.frontend.pulse(at=at, late="now")
+            return self._burst.run(TIMEOUT, at=self._at, late="now") == last
         self.frontend.wait_for(last, timeout=TIMEOUT)
         rows = self.frontend.history(since=first, until=last).rows
         self._rows[: len(rows)] = rows
-        self.late = not sent.taken or sent.first_iteration > at
+        self.late = not self._sent.taken or self._sent.first_iteration > self._at
         return len(rows) == ITERATIONS
-
-    @property
-    def asked(self) -> FloatArray:
-        """Raw pressures (8,) asked for in the last row, a fresh array."""
-        asked: FloatArray = self._asked[-1].copy()
-        return asked
 
     def reset(self, seed: int) -> None:
         """To the start, at once: a simulated arm can."""

@@ -6,16 +6,42 @@ No other module knows how the simulator names what happens to a ball.
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..task.rewards import BallRecord, End, EndRule, RewardRule
+from ..physics.aerodynamics import AERODYNAMICS
+from ..task.ball_record import BallRecord
+from ..world.ball import BALL_GUN_SPIN
+from ..world.materials import (
+    FLOOR_RESTITUTION,
+    NET_RESTITUTION,
+    RACKET_RESTITUTION,
+    TABLE_RESTITUTION,
+)
+
+RECORDS = ("extended", "contacts")
+"""Where in a row of the twin the records of its balls are."""
+TOUCHES = ("count",)
+"""Paths inside a record: contacts with the racket,"""
+NET_TOUCHES = ("net_count",)
+FLOOR_TOUCHES = ("floor_count",)
+LANDED_AT = ("landing_iteration",)
+"""when the ball touched the table after the racket, or -1,"""
+LANDING = ("landing_position",)
+VELOCITY_AFTER = ("velocity_after",)
+"""of the first contact with the racket,"""
+LARGEST_SPEED = ("largest_speed",)
+SMALLEST_DISTANCE = ("smallest_distance",)
+
+CODES = {"u4": "I", "i8": "q", "f8": "d"}
+"""Of numbers, for `struct`."""
 
 
 def ball_options(balls: int) -> dict[str, Any]:
-    """Options of the simulator for so many balls, and for what they bounce on."""
+    """Options of the simulator for so many balls, for the air, and for what they bounce on."""
     return {
         "balls": "ball",
         "extra_balls": balls - 1,
@@ -23,125 +49,84 @@ def ball_options(balls: int) -> dict[str, Any]:
         "table": "table",
         "net": "net",
         "floor": "floor",
+        "racket_restitution": RACKET_RESTITUTION.axes,
+        "table_restitution": TABLE_RESTITUTION.axes,
+        "net_restitution": NET_RESTITUTION.axes,
+        "floor_restitution": FLOOR_RESTITUTION.axes,
+        "air_density": AERODYNAMICS.air_density,
+        "drag_coefficient": AERODYNAMICS.drag_coefficient,
+        "lift_coefficient": AERODYNAMICS.lift_coefficient,
+        "spin_decay": AERODYNAMICS.spin_decay,
+        "spin": BALL_GUN_SPIN,
     }
 
 
-CODES = {"u4": "I", "i8": "q", "f8": "d"}
-
-
-class RecordReader:
-    """Reads the record of one ball out of a row, as Python numbers.
+class BallReader:
+    """Reads the record of one ball out of the bytes of a row, without NumPy: that is faster.
 
     `dtype` is that of a record, `offset` where it lies in the row [bytes].
     """
 
     def __init__(self, dtype: np.dtype[Any], offset: int) -> None:
-        assert dtype.names is not None
-        assert dtype.fields is not None
-        codes, self._places = "=", {}
-        for name in dtype.names:
-            field = dtype.fields[name][0]
-            count = int(np.prod(field.shape))
-            self._places[name] = len(struct.unpack(codes, bytes(struct.calcsize(codes))))
-            codes += f"{count}{CODES[field.base.str[1:]]}"
+        codes, places = "=", {}
+        for path, code in _numbers(dtype):
+            places[path] = len(struct.unpack(codes, bytes(struct.calcsize(codes))))
+            codes += code
         self._struct = struct.Struct(codes)
         self._offset = offset
         assert self._struct.size == dtype.itemsize, "a record with gaps"
-
-    def place(self, name: str) -> int:
-        """Of a value in what `read` returns; of its first number if it is a vector."""
-        return self._places[name]
-
-    def read(self, row: Any) -> tuple[Any, ...]:
-        """All numbers of the record in the order of its fields; `row` is any buffer."""
-        return self._struct.unpack_from(row, self._offset)
-
-
-class BallWatch:
-    """Watches the ball that is played."""
-
-    def __init__(self, reader: RecordReader, *, end: EndRule, reward: RewardRule) -> None:
-        self._read = reader.read
-        self._end, self._reward = end, reward
-        place = reader.place
-        self._count, self._net, self._floor = (
-            place("count"),
-            place("net_count"),
-            place("floor_count"),
+        self._touches, self._net, self._floor = (
+            places[path] for path in (TOUCHES, NET_TOUCHES, FLOOR_TOUCHES)
         )
-        self._after = place("velocity_after")
-        self._distance, self._speed = place("smallest_distance"), place("largest_speed")
-        self._landing, self._landed_at = place("landing_iteration"), place("landing_position")
-        self._row: tuple[Any, ...] = ()
+        self._landed, self._landing = places[LANDED_AT], _vector_at(places[LANDING])
+        self._after = _vector_at(places[VELOCITY_AFTER])
+        self._speed, self._distance = places[LARGEST_SPEED], places[SMALLEST_DISTANCE]
 
-    def look(self, row: Any, y: float, steps: int) -> End:
-        """Reads a row (a buffer) in which the ball is at `y` [m], after so many steps."""
-        self._row = seen = self._read(row)
-        quiet = seen[self._landing] < 0 and not seen[self._net] and not seen[self._floor]
-        if quiet and y >= self._end.passed_y and steps < self._end.most_steps:
-            return End.RUNNING
-        return self._end.judge(self._record(y), steps)
-
-    @property
-    def hit(self) -> bool:
-        """The racket has touched the ball."""
-        return bool(self._row[self._count] > 0)
-
-    @property
-    def returned(self) -> bool:
-        """The racket has touched the ball, and it flew back."""
-        return self.hit and bool(self._row[self._after + 1] > 0)
-
-    @property
-    def smallest_distance(self) -> float:
-        """Of the surfaces of ball and racket so far [m]."""
-        distance: float = self._row[self._distance]
-        return distance
-
-    def reward(self, y: float) -> float:
-        """What the episode is worth if it ends now."""
-        return self._reward.reward(self._record(y))
-
-    def _record(self, y: float) -> BallRecord:
-        seen = self._row
-        landed = seen[self._landing] >= 0
+    def read(self, row: Any) -> BallRecord:
+        """What has happened to the ball; `row` is any buffer."""
+        seen = self._struct.unpack_from(row, self._offset)
         return BallRecord(
-            smallest_distance=seen[self._distance],
-            y=y,
-            hit=self.hit,
-            landing=(seen[self._landed_at], seen[self._landed_at + 1]) if landed else None,
-            touched_net=seen[self._net] > 0,
-            touched_floor=seen[self._floor] > 0,
-            largest_speed=seen[self._speed],
+            seen[self._distance],
+            seen[self._touches] > 0,
+            seen[self._after],
+            seen[self._speed],
+            seen[self._landed] >= 0,
+            seen[self._landing],
+            seen[self._net] > 0,
+            seen[self._floor] > 0,
         )
 
 
-def record_of(record: Any, y: float) -> BallRecord:
-    """What the twin says about one ball, which is at `y` [m]."""
-    landed = record["landing_iteration"] >= 0
-    at = record["landing_position"]
+def ball_records(records: NDArray[Any]) -> BallRecord:
+    """What has happened to N balls, of their records (N,)."""
     return BallRecord(
-        smallest_distance=float(record["smallest_distance"]),
-        y=y,
-        hit=bool(record["count"] > 0),
-        landing=(float(at[0]), float(at[1])) if landed else None,
-        touched_net=bool(record["net_count"] > 0),
-        touched_floor=bool(record["floor_count"] > 0),
-        largest_speed=float(record["largest_speed"]),
+        _values(records, SMALLEST_DISTANCE),
+        _values(records, TOUCHES) > 0,
+        _values(records, VELOCITY_AFTER),
+        _values(records, LARGEST_SPEED),
+        _values(records, LANDED_AT) >= 0,
+        _values(records, LANDING),
+        _values(records, NET_TOUCHES) > 0,
+        _values(records, FLOOR_TOUCHES) > 0,
     )
 
 
-def touched_balls(records: NDArray[Any]) -> NDArray[np.bool_]:
-    """(N,) whether the racket has touched each ball."""
-    touched: NDArray[np.bool_] = records["count"] > 0
-    return touched
+def _values(records: NDArray[Any], path: tuple[str, ...]) -> NDArray[Any]:
+    for name in path:
+        records = records[name]
+    return records
 
 
-def settled_balls(records: NDArray[Any]) -> NDArray[np.bool_]:
-    """(N,) whether each ball has landed, or touched net or floor."""
-    settled: NDArray[np.bool_] = (
-        (records["landing_iteration"] >= 0)
-        | (records["net_count"] > 0)
-        | (records["floor_count"] > 0)
-    )
-    return settled
+def _vector_at(place: int) -> slice:
+    return slice(place, place + 3)
+
+
+def _numbers(
+    dtype: np.dtype[Any], path: tuple[str, ...] = ()
+) -> Iterator[tuple[tuple[str, ...], str]]:
+    """Path and code of every number or array of numbers in a record, in order."""
+    if dtype.fields is None:
+        yield path, f"{int(np.prod(dtype.shape))}{CODES[dtype.base.str[1:]]}"
+        return
+    for name in dtype.names or ():
+        yield from _numbers(dtype.fields[name][0], (*path, name))

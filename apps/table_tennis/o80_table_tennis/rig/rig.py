@@ -1,23 +1,30 @@
-"""The arm and its twins: started or attached to, and gone when left."""
+"""The arm and its twins: started or attached to, moved in step, and ended when left."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from contextlib import ExitStack
 from itertools import count
 from types import TracebackType
 from typing import Any, Self
 
+import numpy as np
+from numpy.typing import NDArray
+
 import o80
 
-from ..settings import ITERATIONS, Pacing, RigSettings
+from ..balls.sampled_flight import SampledFlight
+from ..settings import Pacing, RigSettings
 from ..world.scene import MODEL
+from ..world.timing import ITERATIONS
 from .arm import Arm
 from .ball_records import ball_options
 from .twin import TIMEOUT, Twin
 
+FloatArray = NDArray[np.float64]
+
 NUMBERS = count(1)
-JOINT_NAMES = "joint_1,joint_2,joint_3,joint_4"
 
 
 def unused_name(robot: str) -> str:
@@ -28,11 +35,20 @@ def unused_name(robot: str) -> str:
 class Rig:
     """One arm and the twins that mirror it, in one of three ways of pacing.
 
+    A step is `ask`, `step_arm`, `step_twins`, with k the arm's newest row that was used, `row`: the
+    pressures act from iteration k + 1 + delay; the arm makes the rows k + 1 to k + 5; the twins
+    mirror them.
+
     Move nothing but through it while it is open; leaving it ends all that it started.
     """
 
     def __init__(self, settings: RigSettings | None = None) -> None:
         self.settings = settings or RigSettings()
+        self.row = self.twin_row = 0
+        """Iterations of arm and twins that were used last."""
+        self.exact = True
+        """In the last step the arm and the first twin made exactly five iterations."""
+        self._real_time = self.settings.pacing.real_time
         self._stack = ExitStack()
         try:
             self.arm = Arm(self._open_arm())
@@ -56,16 +72,51 @@ class Rig:
         """Ends all that was started; may be called twice."""
         self._stack.close()
 
+    def reset(
+        self, *, arm_seed: int, twin_seed: int, flights: Sequence[Sequence[SampledFlight]]
+    ) -> None:
+        """Arm and twins to the start; the balls of each twin fly from the next step on."""
+        arm = self.arm
+        arm.go_back() if self._real_time else arm.reset(arm_seed)
+        for twin in self.twins:
+            twin.reset(twin_seed)
+        self.row = arm.read_newest()
+        for twin, its_flights in zip(self.twins, flights, strict=True):
+            twin.begin(arm.q[-1], arm.dq[-1], its_flights)
+        self._burst_twins(1)
+        self.twin_row = self.twins[0].iteration
+
+    def begin(self) -> None:
+        """An episode begins now, however long ago the reset was: by the clock the arm moved on."""
+        if self._real_time:
+            self.row = self.arm.newest
+
+    @property
+    def lateness(self) -> int:
+        """By the clock: rows that the arm has made since the one used last; else 0."""
+        return self.arm.newest - self.row if self._real_time else 0
+
+    def ask(self, pressures: FloatArray, *, delay: int) -> None:
+        """Normalised pressures (8,) for the next step, from its iteration `delay` (from 0) on."""
+        self.arm.ask(pressures, at=self.row + 1 + delay)
+
+    def step_arm(self) -> None:
+        """The arm makes the next five rows, or has made them by the clock."""
+        self.exact = self.arm.step(self.row + 1)
+        self.row += ITERATIONS
+
     def step_twins(self) -> None:
         """All twins mirror the arm's last rows, at the same time."""
         if len(self.twins) == 1:
             self.twins[0].step(self.arm.motion)
-            return
-        for twin in self.twins:
-            twin.mirror(self.arm.motion)
-        self.burst_twins(ITERATIONS)
+        else:
+            for twin in self.twins:
+                twin.mirror(self.arm.motion)
+            self._burst_twins(ITERATIONS)
+        self.exact = self.exact and self.twins[0].iteration == self.twin_row + ITERATIONS
+        self.twin_row = self.twins[0].iteration
 
-    def burst_twins(self, iterations: int) -> None:
+    def _burst_twins(self, iterations: int) -> None:
         """All twins run at the same time."""
         rows = o80.burst({twin.frontend: iterations for twin in self.twins}, timeout=TIMEOUT)
         for twin in self.twins:
@@ -87,7 +138,6 @@ class Rig:
     def _open_twin(self, twin: int) -> o80.Frontend:
         options = {
             "model": str(MODEL),
-            "joints": JOINT_NAMES,
             "timestep": self.settings.period,
             **ball_options(self.settings.balls_of(twin)),
         }

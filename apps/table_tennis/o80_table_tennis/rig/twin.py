@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 import o80
 
-from ..balls.trajectories import SampledFlight
-from ..settings import ITERATIONS, JOINTS
-from .ball_records import RecordReader
+from ..balls.sampled_flight import SampledFlight
+from ..task.ball_record import BallRecord
+from ..world.arm import JOINT_NAMES, JOINTS
+from ..world.timing import ITERATIONS
+from .ball_records import RECORDS, BallReader
 from .row_words import WORD, words
 
 FloatArray = NDArray[np.float64]
@@ -29,16 +31,17 @@ class Twin:
     def __init__(self, frontend: o80.Frontend) -> None:
         self.frontend = frontend
         dtype = frontend.history(1).rows.dtype
-        contacts = words(dtype, "extended", "contacts")
         self._joints = words(dtype, "observed", "joints")
         self._balls = words(dtype, "observed", "balls")
-        self._record_dtype = dtype["extended"]["contacts"].base
-        self._records_at = contacts.start * WORD
         self.balls = (self._balls.stop - self._balls.start) // BALL_NUMBERS
-        self.played_ball = slice(self._balls.start, self._balls.start + BALL_NUMBERS)
-        """Words of a row that hold position and velocity of the first ball."""
+        """How many there are."""
+        self._first_ball = slice(self._balls.start, self._balls.start + BALL_NUMBERS)
+        self._records_at = words(dtype, *RECORDS).start * WORD
+        self._record_dtype = dtype[RECORDS[0]][RECORDS[1]].base
+        self._reader = BallReader(self._record_dtype, self._records_at)
         names = [actuator.name for actuator in frontend.actuators]
         self._joint_names, self._ball_names = names[:JOINTS], names[JOINTS:]
+        assert tuple(self._joint_names) == JOINT_NAMES, "the twin moves the joints of the scene"
         self._burst = frontend.prepared_burst(ITERATIONS, self._joint_names, steps=ITERATIONS)
         states = self._burst.targets.T.view(np.float64)
         self._motion = states.reshape(JOINTS, ITERATIONS, 2)
@@ -51,19 +54,18 @@ class Twin:
             [("position", np.float64, (3,)), ("velocity", np.float64, (3,))]
         )
 
-    def record_reader(self) -> RecordReader:
-        """Of the first ball."""
-        return RecordReader(self._record_dtype, self._records_at)
-
     def reset(self, seed: int) -> None:
         """All balls and contacts forgotten."""
         self.frontend.request("reset", seed=seed)
 
     def begin(self, q: FloatArray, dq: FloatArray, flights: Sequence[SampledFlight]) -> None:
-        """Adds the arm (4,) as it stands and the whole flight of each ball, for the next burst."""
+        """Adds the arm (4,) as it stands and the whole flight of each ball, for the next burst.
+
+        Without any flight the balls fall from where the scene puts them.
+        """
         targets = {"position": q[None, :], "velocity": dq[None, :]}
         self.frontend.add_trajectory(targets, self._joint_names)
-        for ball, flight in zip(self._ball_names, flights, strict=True):
+        for ball, flight in zip(self._ball_names, flights, strict=bool(flights)):
             states = np.empty(len(flight.positions), self._ball_state)
             states["position"], states["velocity"] = flight.positions, flight.velocities
             self.frontend.add_trajectory(states, ball)
@@ -84,14 +86,27 @@ class Twin:
         memory: Any = row
         self.row, self.iteration = np.frombuffer(memory), row.iteration
 
-    def all_balls(self, row: FloatArray) -> FloatArray:
-        """Positions and velocities (balls, 6) in the words of a row; a view."""
-        return row[self._balls].reshape(self.balls, BALL_NUMBERS)
+    @property
+    def ball(self) -> FloatArray:
+        """Position and velocity (6,) of the first ball in the newest row; a view."""
+        return self.row[self._first_ball]
 
-    def joint_positions(self, row: FloatArray) -> FloatArray:
-        """(4,) [rad] in the words of a row; a view."""
-        return row[self._joints][::2]
+    @property
+    def all_balls(self) -> FloatArray:
+        """Positions and velocities (balls, 6) in the newest row; a view."""
+        return self.row[self._balls].reshape(self.balls, BALL_NUMBERS)
 
-    def records(self, row: FloatArray) -> NDArray[Any]:
-        """The records (balls,) in the words of a row; a view."""
-        return np.ndarray((self.balls,), self._record_dtype, row, self._records_at)
+    @property
+    def joint_positions(self) -> FloatArray:
+        """(4,) [rad] in the newest row; a view."""
+        return self.row[self._joints][::2]
+
+    @property
+    def record(self) -> BallRecord:
+        """What has happened to the first ball until the newest row."""
+        return self._reader.read(self.row)
+
+    @property
+    def all_records(self) -> NDArray[Any]:
+        """The records (balls,) in the newest row, as the simulator has them; a view."""
+        return np.ndarray((self.balls,), self._record_dtype, self.row, self._records_at)

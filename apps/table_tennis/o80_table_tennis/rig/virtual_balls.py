@@ -8,28 +8,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..balls.trajectories import SampledFlight
-from ..settings import RigSettings, TaskSettings
-from ..task.observations import JOINT_POSITIONS, PRESSURES, SIZE, Float32Array
-from ..task.rewards import EndRule, RewardRule
-from .ball_records import record_of, settled_balls, touched_balls
+from ..balls.sampled_flight import SampledFlight
+from ..settings import RigSettings
+from ..task.box import ObservationBox
+from ..task.end import End
+from ..task.state import State
+from ..task.task import Task
+from .ball_records import ball_records
 from .twin import Twin
 
 FloatArray = NDArray[np.float64]
-
-ARM = slice(JOINT_POSITIONS.start, PRESSURES.stop)
-"""What all observations of a step have in common."""
-BALL = slice(PRESSURES.stop, SIZE)
 
 
 class VirtualBalls:
     """All extra balls, in the order of the twins that hold them."""
 
-    def __init__(self, twins: Sequence[Twin], rig: RigSettings, task: TaskSettings) -> None:
-        self._twins, self._rig = twins, rig
-        self._end: EndRule = task.end
-        self._reward: RewardRule = task.reward
-        self._low, self._high = task.bounds.low, task.bounds.high
+    def __init__(self, twins: Sequence[Twin], rig: RigSettings, task: Task) -> None:
+        self._twins, self._rig, self._task = twins, rig, task
+        self._box = ObservationBox(task)
+        self._count = rig.extra_balls
         # the first twin holds the ball that is played; a twin without extra balls mirrors it
         self._extra = [
             slice(twin.balls - rig.extra_balls_of(number), twin.balls)
@@ -40,11 +37,13 @@ class VirtualBalls:
     def begin(self, numbers: Sequence[int] = ()) -> None:
         """A new episode with these balls."""
         self._numbers = np.array(numbers, dtype=np.int64)
-        self._ended = np.zeros(self._rig.extra_balls, np.bool_)
-        self._hits = np.zeros(self._rig.extra_balls, np.bool_)
+        self._ended = np.zeros(self._count, np.bool_)
+        self._hits = np.zeros(self._count, np.bool_)
 
     def share(self, flights: Sequence[SampledFlight]) -> list[list[SampledFlight]]:
         """The flights of each twin's balls, of all flights, the played one first."""
+        if not flights:
+            return [[] for _ in self._twins]
         played, left = flights[0], list(flights[1:])
         shared = []
         for number, twin in enumerate(self._twins):
@@ -53,29 +52,17 @@ class VirtualBalls:
             shared.append([played] * (twin.balls - extra) + mine)
         return shared
 
-    def look(self, observation: Float32Array, *, steps: int, over: bool) -> dict[str, Any]:
-        """What the twins' newest rows say about the extra balls, beside the observation (22,).
+    def look(self, played: State, *, over: bool) -> dict[str, Any]:
+        """What the twins' newest rows say about the extra balls, beside the state of the played.
 
         A ball is paid for once: when its own episode ends, or at last when the played ball's is
         `over`. After that, `ended` says that its entries mean nothing any more.
         """
-        balls = [
-            twin.all_balls(twin.row)[extra]
-            for twin, extra in zip(self._twins, self._extra, strict=True)
-        ]
-        records = np.concatenate(
-            [
-                twin.records(twin.row)[extra]
-                for twin, extra in zip(self._twins, self._extra, strict=True)
-            ]
-        )
-        observations = np.empty((len(records), SIZE), np.float32)
-        observations[:, ARM] = observation[ARM]
-        observations[:, BALL] = np.concatenate(balls)
-        np.clip(observations, self._low, self._high, out=observations)
+        state = self._state(played)
+        self._hits |= ~self._ended & state.record.touched
         return {
-            "observations": observations,
-            "rewards": self._judge(records, observations[:, BALL.start + 1], over=over),
+            "observations": self._box.clip(self._task.observe(state)),
+            "rewards": self._judge(state, over=over),
             "hits": self._hits.copy(),
             "ended": self._ended.copy(),
             "balls": self._numbers.copy(),
@@ -83,17 +70,36 @@ class VirtualBalls:
 
     def positions(self) -> FloatArray:
         """(1 + N, 3) of the played ball and the extra ones [m]."""
-        all_balls = [twin.all_balls(twin.row) for twin in self._twins]
-        extra = [balls[its] for balls, its in zip(all_balls, self._extra, strict=True)]
-        return np.concatenate([all_balls[0][:1], *extra])[:, :3]
+        return np.concatenate([self._twins[0].all_balls[:1], *self._balls()])[:, :3]
 
-    def _judge(self, records: NDArray[Any], y: NDArray[Any], *, over: bool) -> FloatArray:
+    def _balls(self) -> list[FloatArray]:
+        pairs = zip(self._twins, self._extra, strict=True)
+        return [twin.all_balls[extra] for twin, extra in pairs]
+
+    def _state(self, played: State) -> State:
+        """The states of all extra balls: the arm is that of the played one."""
+        pairs = zip(self._twins, self._extra, strict=True)
+        records = np.concatenate([twin.all_records[extra] for twin, extra in pairs])
+
+        def shared(array: FloatArray) -> FloatArray:
+            return np.broadcast_to(array, (self._count, *array.shape))
+
+        return State(
+            np.full(self._count, played.steps),
+            shared(played.motion),
+            shared(played.pressures),
+            shared(played.racket),
+            np.concatenate(self._balls()),
+            ball_records(records),
+            shared(played.goal),
+        )
+
+    def _judge(self, state: State, *, over: bool) -> FloatArray:
         """The rewards (N,) that are paid now."""
-        rewards = np.zeros(len(records))
-        self._hits |= ~self._ended & (touched_balls(records))
-        settled = settled_balls(records) | (y < self._end.passed_y)
-        ending = ~self._ended & (settled | over)
-        for ball in np.flatnonzero(ending):
-            rewards[ball] = self._reward.reward(record_of(records[ball], float(y[ball])))
-        self._ended |= ending
+        rewards = np.zeros(self._count)
+        judged = ~self._ended & (self._task.eventful(state) | over)
+        if judged.any():
+            some = state.at(judged)
+            rewards[judged] = self._task.reward(some)
+            self._ended[judged] = over | (self._task.end(some) != End.RUNNING)
         return rewards

@@ -1,4 +1,4 @@
-"""When an episode ends, and what it was worth.
+"""What an episode of ball play is worth.
 
 The published rule pays at the end: without a hit, minus the smallest distance of ball and racket;
 after a hit, by how near to the target the ball landed. Landing is the first touch of the table
@@ -9,102 +9,57 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from enum import Enum
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 
-@dataclass(frozen=True)
-class BallRecord:
-    """What has happened to one ball since the episode began."""
+from ..world.scene import Vector
+from .ball_record import BallRecord, Numbers
 
-    smallest_distance: float
-    """Of the surfaces of ball and racket so far [m]."""
-    y: float
-    """Where the ball is now [m]; the arm stands at 0, the opponent at 2.9."""
-    hit: bool = False
-    """The racket has touched the ball."""
-    landing: tuple[float, float] | None = None
-    """x, y of the first touch of the table after the hit [m]."""
-    touched_net: bool = False
-    touched_floor: bool = False
-    largest_speed: float = 0.0
-    """Of the ball after the hit [m/s]."""
+FloatArray = NDArray[np.float64]
 
-    def __post_init__(self) -> None:
-        if self.landing is not None and not self.hit:
-            raise ValueError("a landing needs a hit: a touch of the table before it is a bounce")
-
-
-class End(Enum):
-    """Why an episode ended."""
-
-    RUNNING = "running"
-    LANDED = "landed"
-    NET = "net"
-    FLOOR = "floor"
-    PASSED = "passed"
-    """The ball has passed the arm."""
-    OUT_OF_STEPS = "out of steps"
-
-    @property
-    def terminated(self) -> bool:
-        """Ended by what happened to the ball."""
-        return self not in (End.RUNNING, End.OUT_OF_STEPS)
-
-    @property
-    def truncated(self) -> bool:
-        """Ended by the number of steps."""
-        return self is End.OUT_OF_STEPS
-
-
-@dataclass(frozen=True)
-class EndRule:
-    """The limits of an episode."""
-
-    passed_y: float = -0.8
-    """A ball nearer to the wall behind the arm than this has passed it [m]."""
-    most_steps: int = 300
-    """Steps of the environment after which an episode is truncated."""
-
-    def judge(self, ball: BallRecord, steps: int) -> End:
-        """The first reason that holds after `steps` steps; bounces before the hit are none."""
-        if ball.landing is not None:
-            return End.LANDED
-        if ball.touched_net:
-            return End.NET
-        if ball.touched_floor:
-            return End.FLOOR
-        if ball.y < self.passed_y:
-            return End.PASSED
-        return End.OUT_OF_STEPS if steps >= self.most_steps else End.RUNNING
+# NumPy's own power and hypot differ in the last bit from these, which one episode alone was paid by
+_power = np.frompyfunc(math.pow, 2, 1)
+_hypot = np.frompyfunc(math.hypot, 2, 1)
 
 
 @dataclass(frozen=True)
 class RewardRule:
-    """What an ended episode pays; the numbers of the published configuration."""
+    """The numbers of the published configuration."""
 
-    target: tuple[float, float, float] = (0.0, 2.5, 0.78)
+    target: Vector = (0.0, 2.5, 0.78)
     """Where the ball should land [m]."""
     reach: float = 3.0
     """A landing this far from the target is worth nothing [m]."""
     exponent: float = 0.75
     floor: float = -0.2
-    """The least a hit is worth."""
-    smash: bool = False
-    """The hit term times the largest speed of the ball after the hit."""
+    """The least a touched ball is worth."""
 
-    def distance(self, landing: tuple[float, float]) -> float:
-        """Of a landing from the target, in the plane of the table [m]."""
-        return math.dist(landing, self.target[:2])
+    def distance(self, landing: Any, target: Any) -> FloatArray:
+        """(...) of landings (..., 2+) from targets (..., 2+), in the plane of the table [m]."""
+        apart = np.asarray(landing)[..., :2] - np.asarray(target)[..., :2]
+        return np.asarray(_hypot(apart[..., 0], apart[..., 1]), dtype=np.float64)
 
-    def landing_term(self, distance: float) -> float:
-        """max(1 - (d / reach)^exponent, floor), for `distance` d from the target [m]."""
-        return max(1.0 - math.pow(distance / self.reach, self.exponent), self.floor)
+    def landing_term(self, distance: Numbers) -> FloatArray:
+        """max(1 - (d / reach)^exponent, floor), for distances d (...) from the target [m]."""
+        share = np.asarray(_power(np.asarray(distance) / self.reach, self.exponent), np.float64)
+        return np.maximum(1.0 - share, self.floor)
 
-    def reward(self, ball: BallRecord) -> float:
-        """The reward of an episode that ended like this; it is paid once, at the end."""
-        if not ball.hit:
-            return -ball.smallest_distance
-        if ball.landing is None:
-            return self.floor
-        term = self.landing_term(self.distance(ball.landing))
-        return max(term * ball.largest_speed, self.floor) if self.smash else term
+    def returned(self, record: BallRecord, target: Any) -> FloatArray:
+        """(...) what balls are worth that should land on the target."""
+        term = self.landing_term(self.distance(record.landing, target))
+        return self._paid(record, term)
+
+    def smashed(self, record: BallRecord, target: Any) -> FloatArray:
+        """(...) the same times the largest speed of the ball after the touch [m/s]."""
+        term = self.landing_term(self.distance(record.landing, target))
+        return self._paid(record, np.maximum(term * record.largest_speed, self.floor))
+
+    def touched(self, record: BallRecord) -> FloatArray:
+        """(...) 1 for a touched ball."""
+        return np.where(record.touched, 1.0, -np.asarray(record.smallest_distance))
+
+    def _paid(self, record: BallRecord, landing: FloatArray) -> FloatArray:
+        touched = np.where(record.landed, landing, self.floor)
+        return np.where(record.touched, touched, -np.asarray(record.smallest_distance))

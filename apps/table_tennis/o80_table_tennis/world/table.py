@@ -1,24 +1,31 @@
-"""Where the table stands, and how a ball leaves it."""
+"""Where the table stands, and what a ball keeps of its velocity when it bounces on it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-BALL_RADIUS = 0.02
-"""Radius of the ball [m]."""
+from .ball import BALL_RADIUS
+from .materials import TABLE_RESTITUTION
+from .scene import Vector, full_size, geom, vector
+
+TABLE_CENTRE = vector(geom("table"), "pos")
+"""World frame [m]."""
+TABLE_SIZE = full_size(geom("table"))
+"""[m]"""
+NET_HEIGHT = full_size(geom("net"))[2]
+"""Above the table [m]."""
 
 
 @dataclass(frozen=True)
 class Table:
     """A table in the world frame: x across, y along towards the opponent, z up; lengths in [m]."""
 
-    centre: tuple[float, float, float] = (0.4, 1.57, 0.755)
-    size: tuple[float, float, float] = (1.525, 2.74, 0.04)
-    normal_restitution: float = 0.92
-    """Share of the vertical speed kept (median of the bounces of the recorded shots)."""
-    tangential_restitution: float = 0.70
-    """Share of the horizontal velocity kept (median of the bounces of the recorded shots, from the
-    flights fitted before and after; coarser estimates said 0.67)."""
+    centre: Vector = TABLE_CENTRE
+    size: Vector = TABLE_SIZE
+    normal_restitution: float = TABLE_RESTITUTION.normal
+    """Share of the vertical speed kept."""
+    tangential_restitution: float = TABLE_RESTITUTION.tangential
+    """Share of the horizontal velocity kept."""
 
     @property
     def top(self) -> float:
@@ -36,3 +43,6 @@ class Table:
             abs(x - self.centre[0]) <= self.size[0] / 2
             and abs(y - self.centre[1]) <= self.size[1] / 2
         )
+
+
+TABLE = Table()

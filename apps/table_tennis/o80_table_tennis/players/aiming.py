@@ -1,32 +1,14 @@
-"""What the racket does to a ball, and how the ball must leave it to land on a target."""
+"""How a ball must leave the racket to land on a target."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .aerodynamics import Aerodynamics, State, runge_kutta_step
+from ..physics.aerodynamics import Aerodynamics, State, runge_kutta_step
+from ..world.scene import Vector
 
 FloatArray = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class RacketImpact:
-    """Shares of the velocity relative to the racket that a ball keeps."""
-
-    normal: float = 0.78
-    """Along the face's normal; it turns round."""
-    tangential: float = 0.78
-    """Along the face."""
-
-    def outgoing(self, ball: FloatArray, racket: FloatArray, normal: FloatArray) -> FloatArray:
-        """Velocity of the ball afterwards, from those of ball and racket and the unit normal."""
-        relative = ball - racket
-        along = float(relative @ normal)
-        kept: FloatArray = self.tangential * relative
-        return racket + kept - (self.tangential + self.normal) * along * normal
 
 
 def velocity_to_land(
@@ -34,7 +16,7 @@ def velocity_to_land(
     target: FloatArray,
     duration: float,
     *,
-    spin: tuple[float, float, float],
+    spin: Vector,
     aerodynamics: Aerodynamics,
     steps: int = 6,
     corrections: int = 2,

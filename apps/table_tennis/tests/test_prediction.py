@@ -7,15 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from o80_table_tennis.balls.simulated_shots import ShotVariation, simulated_shot
 from o80_table_tennis.physics.aerodynamics import Aerodynamics, runge_kutta_step
-from o80_table_tennis.physics.flight import (
-    ShotVariation,
+from o80_table_tennis.physics.interpolation import along_path
+from o80_table_tennis.physics.prediction import (
     predict,
     predict_crossing,
     predict_landing,
-    simulated_shot,
 )
-from o80_table_tennis.physics.path import along_path
 from o80_table_tennis.world.table import Table
 
 VACUUM = Aerodynamics(drag_coefficient=0.0, lift_coefficient=0.0)

@@ -1,4 +1,4 @@
-"""The flight of a ball as a model: prediction, bounces on the table, simulated shots."""
+"""Predicted flights of a ball that bounces on the table."""
 
 from __future__ import annotations
 
@@ -11,26 +11,33 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ..balls.trajectories import BallTrajectory
-from ..world.table import Table
-from .aerodynamics import Aerodynamics, State, runge_kutta_step
-from .path import along_path
+from ..world.ball import NO_SPIN
+from ..world.table import TABLE, Table
+from .aerodynamics import AERODYNAMICS, Aerodynamics, State, runge_kutta_step
+from .impact import bounced
+from .interpolation import along_path
 
 FloatArray = NDArray[np.float64]
 Vector = Sequence[float] | FloatArray
 
-AERODYNAMICS = Aerodynamics()
-TABLE = Table()
 STEP = 0.02
 """Step of the integration [s]; the error over a second of flight stays below 10 um."""
 SHORTEST_STEP = 1e-9
 """What is left of a flight below this counts as nothing [s]."""
-SLOWEST_REBOUND = 0.05
-"""A ball leaves the table at least this fast [m/s]: it hops on, it never rests."""
-NO_SPIN = (0.0, 0.0, 0.0)
-BALL_GUN_SPIN = (30.0, 0.0, 0.0)
-"""Top spin of the recorded shots of the ball gun [rad/s]: with it, a prediction from y = 2 m
-through the bounce to the arm is off by 7 mm, 14 mm in height and 6 ms; without it by 70 mm."""
+
+
+@dataclass(frozen=True, eq=False)
+class PredictedFlight:
+    """Where a ball will be, in equal steps."""
+
+    stamps: FloatArray
+    """(N,) since the start [s]"""
+    positions: FloatArray
+    """(N, 3), world frame [m]"""
+    velocities: FloatArray
+    """(N, 3), world frame [m/s]"""
+    bounce_times: FloatArray
+    """(bounces,) since the start [s]"""
 
 
 @dataclass(frozen=True)
@@ -61,7 +68,7 @@ def predict(
     period: float = 0.01,
     aerodynamics: Aerodynamics = AERODYNAMICS,
     table: Table | None = TABLE,
-) -> BallTrajectory:
+) -> PredictedFlight:
     """The flight from `position` (3,) [m], `velocity` (3,) [m/s], `spin` (3,) [rad/s], world frame.
 
     Rows every `period` [s] from 0 to `duration` [s]; the ball bounces on `table` if there is one.
@@ -72,7 +79,8 @@ def predict(
     positions, velocities = along_path(
         times, np.array([node.state for node in nodes]), np.array([node.time for node in nodes])
     )
-    return BallTrajectory("predicted", times, positions, velocities)
+    bounces = np.array([node.time for node in nodes if node.after_bounce])
+    return PredictedFlight(times, positions, velocities, bounces)
 
 
 def predict_crossing(
@@ -114,66 +122,6 @@ def predict_landing(
             state = np.array(touching.state)
             return Crossing(time=touching.time, position=state[:3], velocity=state[3:])
     return None
-
-
-@dataclass(frozen=True)
-class ShotVariation:
-    """How simulated shots start: means and standard deviations of flights fitted to recordings."""
-
-    position: tuple[float, float, float] = (0.46, 2.95, 1.37)
-    """[m]"""
-    position_deviation: tuple[float, float, float] = (0.01, 0.013, 0.016)
-    """[m]"""
-    velocity: tuple[float, float, float] = (0.24, -4.14, 2.28)
-    """[m/s]"""
-    velocity_deviation: tuple[float, float, float] = (0.09, 0.07, 0.17)
-    """[m/s]"""
-    spin: tuple[float, float, float] = BALL_GUN_SPIN
-    """[rad/s]"""
-    spin_deviation: tuple[float, float, float] = (2.0, 3.0, 2.0)
-    """[rad/s]"""
-    duration: float = 1.28
-    """[s]"""
-    period: float = 1 / 180
-    """Between two rows, as the cameras give them [s]."""
-
-
-def simulated_shot(
-    rng: np.random.Generator,
-    *,
-    variation: ShotVariation | None = None,
-    aerodynamics: Aerodynamics = AERODYNAMICS,
-    table: Table = TABLE,
-) -> BallTrajectory:
-    """A shot towards the arm that bounces once on the table; the same `rng` gives the same shot."""
-    variation = variation or ShotVariation()
-    for _ in range(1000):
-        position = rng.normal(variation.position, variation.position_deviation)
-        velocity = rng.normal(variation.velocity, variation.velocity_deviation)
-        spin = rng.normal(variation.spin, variation.spin_deviation)
-        nodes = _nodes(position, velocity, spin, variation.duration, aerodynamics, table)
-        if sum(node.after_bounce for node in nodes) == 1:
-            shot = predict(
-                position,
-                velocity,
-                variation.duration,
-                spin=spin,
-                period=variation.period,
-                aerodynamics=aerodynamics,
-                table=table,
-            )
-            return shot.named("simulated shot")
-    raise ValueError(
-        f"no shot of {variation} bounces exactly once on the table; choose other means"
-    )
-
-
-def bounced(state: State[float], table: Table = TABLE) -> State[float]:
-    """The state after the touch of the table: shares of its velocity kept, its spin unchanged."""
-    x, y, z, vx, vy, vz = state
-    tangential = table.tangential_restitution
-    rebound = max(table.normal_restitution * abs(vz), SLOWEST_REBOUND)
-    return (x, y, z, tangential * vx, tangential * vy, rebound)
 
 
 def _nodes(

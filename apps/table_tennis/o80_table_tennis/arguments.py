@@ -1,0 +1,55 @@
+"""Checks of what users give to the environments: Gymnasium passes any keyword on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from .settings import RigSettings, TaskSettings
+
+OPTIONS = ("ball", "flight")
+"""What `reset` can be told."""
+
+
+def refuse_wrong_arguments(
+    rig: object, task: object, render_mode: str | None, modes: list[str]
+) -> None:
+    """Raises TypeError or ValueError, saying what to give instead."""
+    for name, given, wanted in (("rig", rig, RigSettings), ("task", task, TaskSettings)):
+        if given is None or isinstance(given, wanted):
+            continue
+        fields = given.items() if isinstance(given, dict) else ()
+        inside = ", ".join(f"{key}={value!r}" for key, value in fields) or "..."
+        raise TypeError(
+            f"{name} must be a {wanted.__name__}, got {given!r}: write "
+            f"{name}={wanted.__module__}.{wanted.__name__}({inside})"
+        )
+    if render_mode == "human":
+        raise ValueError(
+            "there is no render mode 'human': use 'rgb_array', whose render() returns pictures "
+            "(gymnasium.wrappers.HumanRendering shows them in a window)"
+        )
+    if render_mode is not None and render_mode not in modes:
+        raise ValueError(f"unknown render mode '{render_mode}'; there are: {', '.join(modes)}")
+
+
+def refuse_extra_balls_without_ball(rig: RigSettings, *, plays_ball: bool) -> None:
+    """Raises ValueError."""
+    if rig.extra_balls and not plays_ball:
+        raise ValueError(f"this task plays no ball: extra_balls must be 0, got {rig.extra_balls}")
+
+
+def refuse_wrong_options(options: Mapping[str, Any], *, plays_ball: bool, period: float) -> None:
+    """Raises ValueError for options of `reset`; `period` is that of the twins [s]."""
+    known = OPTIONS if plays_ball else ()
+    unknown = [name for name in options if name not in known]
+    if unknown:
+        there_is = ", ".join(known) or "no option, as this task plays no ball"
+        raise ValueError(f"unknown options: {', '.join(unknown)}; reset knows {there_is}")
+    if "flight" in options and not np.isclose(options["flight"].period, period):
+        raise ValueError(
+            f"a flight in steps of {options['flight'].period} s cannot be played every "
+            f"{period} s: resample it"
+        )

@@ -1,0 +1,37 @@
+"""A flight in equal steps: what the twins play."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SampledFlight:
+    """A flight in equal steps, ready to be commanded: row i is at i * period after the start."""
+
+    name: str
+    period: float
+    """[s]"""
+    positions: FloatArray
+    """(T, 3), world frame [m]"""
+    velocities: FloatArray
+    """(T, 3), world frame [m/s]"""
+    bounce_times: FloatArray
+    """(bounces,), since the first row [s]"""
+    residuals: FloatArray
+    """(N,) distance of each recorded row from the fit [m]"""
+
+    @property
+    def residual(self) -> float:
+        """Root mean square of the distances of the recorded rows from the fit [m]."""
+        return float(np.sqrt(np.mean(self.residuals**2)))
+
+    @property
+    def duration(self) -> float:
+        """From the first row to the last [s]."""
+        return (len(self.positions) - 1) * self.period

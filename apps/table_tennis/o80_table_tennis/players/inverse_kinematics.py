@@ -1,0 +1,39 @@
+"""The angles of the joints that bring the racket to a point."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..world.arm import FOREARM, JOINT_LIMIT, SHOULDER, UPPER_ARM
+from ..world.scene import Vector
+
+FloatArray = NDArray[np.float64]
+
+
+def posture_towards(point: Vector, wrist: float) -> FloatArray:
+    """Angles (4,) [rad], the elbow up, that bring the racket's centre to `point` of the world [m].
+
+    `wrist` is the angle of joint 4. Where the joints do not reach: a posture near to the point.
+    """
+    x, y, z = point
+    out, height = math.hypot(x, y), z - SHOULDER
+    # the triangle of upper arm, forearm and the line from the shoulder to the racket
+    square = out * out + height * height
+    cosine = (square - UPPER_ARM**2 - FOREARM**2) / (2 * UPPER_ARM * FOREARM)
+    bend = _held(math.acos(min(max(cosine, -1.0), 1.0)))
+    lift = math.atan2(out, height) - math.atan2(
+        FOREARM * math.sin(bend), UPPER_ARM + FOREARM * math.cos(bend)
+    )
+    if abs(lift) > JOINT_LIMIT:
+        # the upper arm at its stop: the forearm points at the racket
+        lift = _held(lift)
+        elbow_out, elbow_height = UPPER_ARM * math.sin(lift), UPPER_ARM * math.cos(lift)
+        bend = _held(math.atan2(out - elbow_out, height - elbow_height) - lift)
+    return np.array([_held(math.atan2(y, x)), lift, bend, _held(wrist)])
+
+
+def _held(angle: float) -> float:
+    return min(max(angle, -JOINT_LIMIT), JOINT_LIMIT)

@@ -1,0 +1,52 @@
+"""The range of each muscle's pressure, as the arm describes it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+import o80
+
+FloatArray = NDArray[np.float64]
+
+
+class PressureRange:
+    """The least and the most raw pressure (8,) of each muscle. Raises ValueError."""
+
+    def __init__(self, least: Sequence[float], most: Sequence[float]) -> None:
+        if len(least) != len(most):
+            raise ValueError(
+                f"a pressure range needs as many least pressures ({len(least)}) as most pressures "
+                f"({len(most)})"
+            )
+        for muscle, (low, high) in enumerate(zip(least, most, strict=True)):
+            if not (math.isfinite(low) and math.isfinite(high) and low < high):
+                raise ValueError(
+                    f"muscle {muscle}: the least pressure, {low:g}, must be below the most, "
+                    f"{high:g}, and both finite"
+                )
+        self.least: FloatArray = np.array(least, dtype=np.float64)
+        self._span: FloatArray = np.array(most, dtype=np.float64) - self.least
+
+    @classmethod
+    def of(cls, frontend: o80.Frontend) -> PressureRange:
+        """The limits of the actuators of an arm, whose driver knows them."""
+        muscles = frontend.actuators
+        return cls([m.minimum for m in muscles], [m.maximum for m in muscles])
+
+    @property
+    def most(self) -> FloatArray:
+        """(8,) raw"""
+        return self.least + self._span
+
+    def raw(self, normalised: FloatArray) -> FloatArray:
+        """Whole raw pressures (..., 8) of normalised ones in [0, 1], a fresh array."""
+        raw: FloatArray = np.rint(self.least + normalised * self._span)
+        return raw
+
+    def normalised(self, raw: FloatArray) -> FloatArray:
+        """Normalised pressures (..., 8) of raw ones, a fresh array; not clipped."""
+        return (raw - self.least) / self._span

@@ -1,0 +1,86 @@
+"""The task without a ball: bring the racket to a point and stay slow there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..world.arm import JOINT_LIMIT, racket_pose
+from .end import End
+from .state import State
+
+Float32Array = NDArray[np.float32]
+FloatArray = NDArray[np.float64]
+
+MIDDLE_POSTURE = (0.17, 1.1, 1.04, 0.5)
+"""About which goals lie: the median posture of the real arm between two balls [rad]."""
+
+
+@dataclass(frozen=True)
+class ReachTask:
+    """Each step costs the distance of the racket's centre from the goal; reaching it ends that.
+
+    Goals are where the racket is at postures drawn about the middle one. Observed are the joints
+    (8), the pressures (8), the centre of the racket (3) and the goal (3).
+    """
+
+    tolerance: float = 0.03
+    """A racket this near to the goal has reached it [m]."""
+    slowest: float = 0.5
+    """Unless a joint is faster [rad/s]."""
+    spread: float = 0.4
+    """Of the drawn postures, either way on each joint [rad]."""
+    most_steps: int = 300
+    """Steps of the environment after which an episode is truncated."""
+    joint_velocity: float = 20.0
+    """Bound of the observation, either way [rad/s]."""
+
+    plays_ball = False
+
+    @property
+    def low(self) -> Float32Array:
+        """(22,)"""
+        bounds = [-JOINT_LIMIT] * 4 + [-self.joint_velocity] * 4 + [0.0] * 8 + [-2.0, -2.0, 0.0] * 2
+        return np.array(bounds, dtype=np.float32)
+
+    @property
+    def high(self) -> Float32Array:
+        """(22,)"""
+        bounds = [JOINT_LIMIT] * 4 + [self.joint_velocity] * 4 + [1.0] * 8 + [2.0, 2.0, 3.0] * 2
+        return np.array(bounds, dtype=np.float32)
+
+    def begin(self, rng: np.random.Generator) -> FloatArray:
+        """A point (3,) that the racket can reach [m]."""
+        posture = np.array(MIDDLE_POSTURE) + rng.uniform(-self.spread, self.spread, 4)
+        return np.array(racket_pose(np.clip(posture, -JOINT_LIMIT, JOINT_LIMIT)).position)
+
+    def observe(self, state: State) -> FloatArray:
+        """(..., 22)"""
+        parts = (state.motion, state.pressures, state.racket, state.goal)
+        return np.concatenate(parts, axis=-1)
+
+    def eventful(self, state: State) -> Any:
+        """(...) true: every step is paid."""
+        return np.ones(np.shape(state.steps), np.bool_)
+
+    def end(self, state: State) -> NDArray[np.int64]:
+        """(...) the goal is reached, or the steps are over."""
+        slow = np.abs(state.joint_velocities).max(axis=-1) <= self.slowest
+        reached = (self._distance(state) <= self.tolerance) & slow
+        over = np.where(np.asarray(state.steps) >= self.most_steps, End.OUT_OF_STEPS, End.RUNNING)
+        return np.where(reached, End.GOAL, over).astype(np.int64)
+
+    def reward(self, state: State) -> FloatArray:
+        """(...) minus the distance from the goal [m]."""
+        return -self._distance(state)
+
+    def info(self, state: State) -> dict[str, Any]:
+        """`distance` of the racket's centre from the goal [m], `goal` (..., 3) [m]."""
+        return {"distance": self._distance(state), "goal": np.array(state.goal)}
+
+    def _distance(self, state: State) -> FloatArray:
+        distance: FloatArray = np.linalg.norm(state.racket - state.goal, axis=-1)
+        return distance

@@ -1,0 +1,59 @@
+"""What a task sees of the world after a step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..world.arm import JOINTS
+from .ball_record import BallRecord
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(slots=True)
+class State:
+    """Arm and ball of one episode, or of N: then every array has a first dimension of N.
+
+    The arrays may be views of memory that the next step overwrites.
+    """
+
+    steps: int | NDArray[np.int64]
+    """(...) of the episode so far."""
+    motion: FloatArray
+    """(..., 8) angles [rad], then velocities [rad/s] of the joints."""
+    pressures: FloatArray
+    """(..., 8) in the muscles, normalised."""
+    racket: FloatArray
+    """(..., 3) centre of the racket, world frame [m]."""
+    ball: FloatArray
+    """(..., 6) position [m], then velocity [m/s] of the ball, world frame."""
+    record: BallRecord
+    """What has happened to the ball."""
+    goal: FloatArray
+    """(..., G) of the episode, as the task chose it."""
+
+    @property
+    def joint_positions(self) -> FloatArray:
+        """(..., 4) [rad]"""
+        return self.motion[..., :JOINTS]
+
+    @property
+    def joint_velocities(self) -> FloatArray:
+        """(..., 4) [rad/s]"""
+        return self.motion[..., JOINTS:]
+
+    def at(self, index: Any) -> State:
+        """Some of N episodes, by an index or a mask (N,)."""
+        return State(
+            np.asarray(self.steps)[index],
+            self.motion[index],
+            self.pressures[index],
+            self.racket[index],
+            self.ball[index],
+            self.record.at(index),
+            self.goal[index],
+        )

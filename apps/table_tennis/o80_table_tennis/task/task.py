@@ -1,0 +1,84 @@
+"""What a task is: the part of an environment that can be exchanged.
+
+The environment moves arm and ball; the task says what is observed, what is paid and when an episode
+ends. Every method takes the `State` of one episode or of N, and returns as many results, so that a
+vector environment uses the same task. `ball_play` and `reach` are examples.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .state import State
+
+Float32Array = NDArray[np.float32]
+FloatArray = NDArray[np.float64]
+
+
+@runtime_checkable
+class Task(Protocol):
+    """Give an object with these members as `TaskSettings(task=...)`."""
+
+    @property
+    def low(self) -> Float32Array:
+        """(M,) least observation; the environment clips into the box."""
+        ...
+
+    @property
+    def high(self) -> Float32Array:
+        """(M,) largest observation."""
+        ...
+
+    @property
+    def plays_ball(self) -> bool:
+        """Whether a ball flies. Without one, `State.ball` and `State.record` mean nothing."""
+        ...
+
+    def begin(self, rng: np.random.Generator) -> FloatArray:
+        """The goal (G,) of a new episode, as `State.goal` has it; draw from `rng` only."""
+        ...
+
+    def observe(self, state: State) -> FloatArray:
+        """Observations (..., M), fresh arrays."""
+        ...
+
+    def eventful(self, state: State) -> Any:
+        """(...) whether the episode may have ended, or the step is paid.
+
+        Asked after every step, so it should be cheap; `end` and `reward` are asked only where it is
+        true. Elsewhere the episode goes on, and the step is worth 0.
+        """
+        ...
+
+    def end(self, state: State) -> NDArray[np.int64]:
+        """(...) numbers of `End`: RUNNING, or why the episode ended."""
+        ...
+
+    def reward(self, state: State) -> FloatArray:
+        """(...) what the last step is worth."""
+        ...
+
+    def info(self, state: State) -> dict[str, Any]:
+        """Further entries of `info`, each (...)."""
+        ...
+
+
+TASK_MEMBERS = (
+    "low",
+    "high",
+    "plays_ball",
+    "begin",
+    "observe",
+    "eventful",
+    "end",
+    "reward",
+    "info",
+)
+
+
+def missing_members(task: object) -> list[str]:
+    """What an object lacks to be a task."""
+    return [name for name in TASK_MEMBERS if not hasattr(task, name)]

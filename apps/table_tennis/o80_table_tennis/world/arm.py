@@ -1,0 +1,76 @@
+"""The arm as the scene describes it: joints, lengths, masses, and where its racket is.
+
+At angles of zero the arm is a straight line upwards; joint 1 turns it about the vertical, joints 2
+and 3 bend it in a vertical plane, joint 4 turns the forearm about itself.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .scene import Vector, body, element, full_size, geom, joints_of, numbers, vector
+
+FloatArray = NDArray[np.float64]
+
+_JOINTS = joints_of("shoulder")
+JOINT_NAMES = tuple(joint.attrib["name"] for joint in _JOINTS)
+"""From the base to the wrist."""
+JOINTS = len(JOINT_NAMES)
+MUSCLES = 2 * JOINTS
+"""An agonist and an antagonist for each joint."""
+JOINT_LIMIT = math.radians(numbers(element("default/joint"), "range")[1])
+"""Of every joint, either way [rad]."""
+JOINT_DAMPING = tuple(numbers(joint, "damping")[0] for joint in _JOINTS)
+"""[Nm s/rad]"""
+
+SHOULDER = vector(body("shoulder"), "pos")[2] + vector(body("upper_arm"), "pos")[2]
+"""Height of joint 2 above the floor, on the axis of joint 1 [m]."""
+UPPER_ARM = vector(body("elbow"), "pos")[2]
+"""Joint 2 to joint 3 [m]."""
+FOREARM = vector(body("racket"), "pos")[2]
+"""Joint 3 to the centre of the racket [m]."""
+BLADE_THICKNESS = full_size(geom("racket"))[1]
+"""Of the racket [m]."""
+
+
+@dataclass(frozen=True)
+class PointMass:
+    """A mass on the line of a link."""
+
+    mass: float
+    """[kg]"""
+    centre: float
+    """From the joint that moves it [m]."""
+
+
+def mass_of(name: str) -> PointMass:
+    """Mass of a body of the scene alone, and where its centre lies on its link."""
+    inertial = element(f".//body[@name='{name}']/inertial")
+    return PointMass(numbers(inertial, "mass")[0], vector(inertial, "pos")[2])
+
+
+@dataclass(frozen=True)
+class RacketPose:
+    """Where the racket is, and where it looks."""
+
+    position: Vector
+    """Of its centre, in the world [m]."""
+    normal: Vector
+    """Of its face, a unit vector."""
+
+
+def racket_pose(q: FloatArray) -> RacketPose:
+    """The racket at the angles q (4,) [rad]."""
+    q1, q2, q3, q4 = q.tolist()
+    c1, s1, c4, s4 = math.cos(q1), math.sin(q1), math.cos(q4), math.sin(q4)
+    c23, s23 = math.cos(q2 + q3), math.sin(q2 + q3)
+    out = UPPER_ARM * math.sin(q2) + FOREARM * s23
+    height = SHOULDER + UPPER_ARM * math.cos(q2) + FOREARM * c23
+    # the face in the vertical plane of the arm, across it and up => in the world
+    outwards, across, up = -s4 * c23, c4, s4 * s23
+    normal = (c1 * outwards - s1 * across, s1 * outwards + c1 * across, up)
+    return RacketPose((c1 * out, s1 * out, height), normal)

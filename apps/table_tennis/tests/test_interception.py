@@ -1,0 +1,52 @@
+"""Planned strikes send the ball to the target."""
+
+import numpy as np
+import pytest
+
+from o80_table_tennis.balls.simulated_shots import simulated_shot
+from o80_table_tennis.physics.impact import outgoing_velocity
+from o80_table_tennis.physics.prediction import predict_landing
+from o80_table_tennis.players.interception import (
+    TOUCH,
+    InterceptionSettings,
+    StrikePlanner,
+    coming_ball,
+)
+from o80_table_tennis.world.arm import racket_pose
+from o80_table_tennis.world.materials import RACKET_RESTITUTION
+
+NARROW = 0.074  # from the middle of the blade to its nearest rim [m]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_planned_strike_sends_the_ball_to_the_target(seed: int) -> None:
+    settings = InterceptionSettings()
+    shot = simulated_shot(np.random.default_rng(seed))
+    row = int(np.argmax(shot.positions[:, 1] < 2.0))
+    ball = coming_ball(shot.positions[row], shot.velocities[row], settings)
+    assert ball is not None
+    strike = StrikePlanner(settings).plan(ball)
+    assert strike is not None
+
+    # the racket's face touches the ball, and turns it round
+    position, velocity = ball.at(strike.time)
+    pose = racket_pose(strike.posture)
+    normal = np.array(pose.normal)
+    offset = position - np.array(pose.position)
+    assert offset @ normal == pytest.approx(TOUCH, abs=0.002)
+    assert np.linalg.norm(offset - TOUCH * normal) < NARROW
+    racket = np.cross([0.0, 0.0, strike.speeds[0]], pose.position)
+    outgoing = outgoing_velocity(velocity, racket, normal, RACKET_RESTITUTION)
+    landing = predict_landing(position, outgoing, spin=settings.spin)
+    assert landing is not None
+    assert landing.position[:2] == pytest.approx((0.0, 2.5), abs=0.1)
+
+
+def test_a_ball_that_flies_away_is_left_alone() -> None:
+    away = np.array([0.2, 3.0, 1.0])
+    assert coming_ball(np.array([0.5, 1.0, 1.2]), away, InterceptionSettings()) is None
+
+
+def test_a_ball_behind_the_arm_is_left_alone() -> None:
+    coming = np.array([0.2, -3.0, 0.0])
+    assert coming_ball(np.array([0.6, -0.5, 1.2]), coming, InterceptionSettings()) is None

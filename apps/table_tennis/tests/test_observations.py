@@ -1,0 +1,58 @@
+"""The 22 numbers of an observation, and their box."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from o80_table_tennis.task import observations
+from o80_table_tennis.task.ball_play import ReturnTask
+from o80_table_tennis.task.ball_record import BallRecord
+from o80_table_tennis.task.box import ObservationBox
+from o80_table_tennis.task.observations import ObservationBounds, observe_ball
+from o80_table_tennis.task.state import State
+
+
+def state_of(motion: np.ndarray, pressures: np.ndarray, ball: np.ndarray) -> State:
+    return State(0, motion, pressures, np.zeros(3), ball, BallRecord(1.0), np.zeros(3))
+
+
+def test_each_part_of_an_observation_has_its_place() -> None:
+    row = observe_ball(state_of(np.arange(8.0), np.arange(8.0, 16.0), np.arange(16.0, 22.0)))
+
+    np.testing.assert_array_equal(row, np.arange(22.0))
+    np.testing.assert_array_equal(row[observations.JOINT_VELOCITIES], [4, 5, 6, 7])
+    np.testing.assert_array_equal(row[observations.BALL_POSITION], [16, 17, 18])
+
+
+def test_many_balls_share_the_arm() -> None:
+    balls = np.arange(30.0).reshape(5, 6)
+    rows = observe_ball(state_of(np.ones(8), np.full(8, 0.5), balls))
+
+    assert rows.shape == (5, 22)
+    np.testing.assert_array_equal(rows[:, observations.BALL], balls)
+    np.testing.assert_array_equal(rows[:, observations.PRESSURES], np.full((5, 8), 0.5))
+
+
+@settings(deadline=None)
+@given(arrays(np.float64, (3, 22), elements=st.floats(-1e6, 1e6)))
+def test_a_clipped_observation_lies_in_the_box(rows: np.ndarray) -> None:
+    box, bounds = ObservationBox(ReturnTask()), ObservationBounds()
+    clipped = box.clip(rows)
+
+    assert clipped.dtype == np.float32
+    assert np.all((clipped >= bounds.low) & (clipped <= bounds.high))
+    assert all(row in box.space for row in clipped)
+    inside = (rows > bounds.low) & (rows < bounds.high)
+    np.testing.assert_array_equal(clipped[inside], rows[inside].astype(np.float32))
+
+
+def test_the_box_has_room_for_the_robot_and_its_balls() -> None:
+    bounds = ObservationBounds()
+    row = np.array(
+        [0.17, 1.1, 1.04, 0.5, *[3.8] * 4, *[0.5] * 8, 0.46, 2.95, 1.37, 0.24, -4.14, 2.28]
+    )
+
+    assert np.all((row > bounds.low) & (row < bounds.high))
+    assert bounds.high[0] == pytest.approx(np.radians(89.8))
