@@ -1,0 +1,97 @@
+"""Parts of an MCAP chunk: many messages of one channel, built as one array."""
+
+import struct
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+MESSAGE_HEAD = np.dtype(
+    [
+        ("opcode", "u1"),
+        ("length", "<u8"),
+        ("channel", "<u2"),
+        ("sequence", "<u4"),
+        ("log_time", "<u8"),
+        ("publish_time", "<u8"),
+    ]
+)
+"""What stands before the data of a message; packed."""
+LENGTH_ENDS_AT = 9  # opcode and length are not counted in a record's length
+MESSAGE, MESSAGE_INDEX = 0x05, 0x07
+
+
+@dataclass(frozen=True)
+class Block:
+    """Messages of one channel, of equal size, as they stand in a chunk."""
+
+    channel: int
+    log_times: NDArray[np.uint64]  #: (n,) [ns]
+    records: NDArray[np.uint8]  #: (n, bytes of a record)
+
+    @classmethod
+    def reserved(
+        cls, channel: int, log_times: NDArray[np.uint64], sequence: int, size: int
+    ) -> "Block":
+        """Records whose messages, `size` bytes each, are not filled yet."""
+        records = np.empty((len(log_times), MESSAGE_HEAD.itemsize + size), np.uint8)
+        heads = np.zeros(len(log_times), MESSAGE_HEAD)
+        heads["opcode"] = MESSAGE
+        heads["length"] = records.shape[1] - LENGTH_ENDS_AT
+        heads["channel"] = channel
+        heads["sequence"] = np.arange(sequence, sequence + len(log_times)) % 2**32
+        heads["log_time"] = heads["publish_time"] = log_times
+        records[:, : MESSAGE_HEAD.itemsize] = heads.view(np.uint8).reshape(len(heads), -1)
+        return cls(channel, log_times, records)
+
+    @property
+    def messages(self) -> NDArray[np.uint8]:
+        """The data of the messages (n, size), a view."""
+        return self.records[:, MESSAGE_HEAD.itemsize :]
+
+    @property
+    def content(self) -> bytes:
+        """All records."""
+        return self.records.tobytes()
+
+    @property
+    def count(self) -> int:
+        """Messages."""
+        return len(self.records)
+
+    @property
+    def time_range(self) -> tuple[int, int]:
+        """First and last log time [ns]."""
+        return int(self.log_times[0]), int(self.log_times[-1])
+
+    def index(self, offset: int) -> bytes:
+        """The message index of this block, which begins at `offset` in its chunk."""
+        entries = np.empty((len(self.log_times), 2), "<u8")
+        entries[:, 0] = self.log_times
+        entries[:, 1] = offset + np.arange(len(entries)) * self.records.shape[1]
+        content = entries.tobytes()
+        head = struct.pack("<BQHI", MESSAGE_INDEX, 6 + len(content), self.channel, len(content))
+        return head + content
+
+
+def messages_in(content: bytes, index: NDArray[np.uint64]) -> NDArray[np.uint8]:
+    """The data of a channel's messages in a chunk: (n, size), a view where they are adjacent.
+
+    index: (n, 2), the log time and the offset of each. Raises ValueError if their sizes differ or
+    an offset is outside.
+    """
+    data = np.frombuffer(content, np.uint8)
+    offsets = index[:, 1].astype(np.int64)
+    begin = int(offsets[0])
+    head = np.frombuffer(content, MESSAGE_HEAD, count=1, offset=begin)[0]
+    length = int(head["length"]) + LENGTH_ENDS_AT
+    if int(offsets.min()) < 0 or int(offsets.max()) + length > len(data):
+        raise ValueError("a message index leads out of its chunk")
+    if len(offsets) == 1 or bool(np.all(np.diff(offsets) == length)):
+        records = data[begin : begin + len(offsets) * length].reshape(len(offsets), length)
+    else:
+        records = data[offsets[:, None] + np.arange(length)]
+    lengths = records[:, 1:LENGTH_ENDS_AT]
+    if not bool(np.all(lengths == lengths[0])):
+        raise ValueError("messages of one channel differ in size")
+    return records[:, MESSAGE_HEAD.itemsize :]

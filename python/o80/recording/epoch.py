@@ -1,0 +1,111 @@
+"""One run of a backend in a recording: its channel, its description, its clock."""
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o80.recording.blocks import Block
+from o80.recording.message_plan import MessagePlan
+from o80.recording.message_types import PACKAGE, row_type
+
+if TYPE_CHECKING:
+    from o80.frontend import Frontend
+    from o80.layout import Layout
+    from o80.recording.file_writer import FileWriter
+
+DESCRIPTION = "application/x-o80-description"
+"""Media type of the attachment with the description of a robot, as it is in a segment."""
+
+
+@dataclass(frozen=True)
+class EpochNote:
+    """What the metadata of a channel say about its rows."""
+
+    segment: str
+    robot: str
+    epoch: int
+    number: int  #: of this run among those of the segment in the file, from 0
+    wall_offset: int  #: log time less row time [ns]
+    clock: str  #: monotonic or simulated
+
+    def texts(self) -> dict[str, str]:
+        return {name: str(value) for name, value in vars(self).items()}
+
+    @classmethod
+    def of(cls, texts: Mapping[str, str]) -> "EpochNote | None":
+        """None for a channel that is not one of rows."""
+        try:
+            return cls(
+                segment=texts["segment"],
+                robot=texts["robot"],
+                epoch=int(texts["epoch"]),
+                number=int(texts["number"]),
+                wall_offset=int(texts["wall_offset"]),
+                clock=texts["clock"],
+            )
+        except (KeyError, ValueError):
+            return None
+
+    @property
+    def attachment(self) -> str:
+        """Name of the attachment with the robot's description."""
+        return f"{self.segment}/{self.number}/description"
+
+    def not_before(self, first_time: int, log_time: int) -> "EpochNote":
+        """The same; the log time of a row at `first_time` is later than `log_time`."""
+        offset = max(self.wall_offset, log_time + 1 - first_time)
+        return replace(self, wall_offset=offset)
+
+
+def topic_of(segment: str) -> str:
+    """Topic of a segment's rows."""
+    return f"/{segment}"
+
+
+def note_of(frontend: "Frontend", number: int) -> EpochNote:
+    """What is to be said about the rows of a backend; its newest row was published about now."""
+    clock: str = frontend.schema["clock"]
+    now = time.time_ns()
+    row_time = frontend.latest().time if clock == "simulated" else time.monotonic_ns()
+    return EpochNote(
+        segment=frontend.segment,
+        robot=frontend.robot,
+        epoch=frontend.epoch,
+        number=number,
+        wall_offset=now - row_time,
+        clock=clock,
+    )
+
+
+class RowWriter:
+    """Writes the rows of one epoch: rows in, blocks of messages out."""
+
+    def __init__(self, layout: "Layout", note: EpochNote, channel: int) -> None:
+        self.note = note
+        self.channel = channel
+        self._plan = MessagePlan(row_type(layout), layout.size)
+
+    @classmethod
+    def added_to(
+        cls, file: "FileWriter", frontend: "Frontend", note: EpochNote
+    ) -> "RowWriter":
+        """Adds message type, description and channel of an epoch to a file."""
+        layout = frontend._layout
+        message = row_type(layout)
+        schema = file.add_schema(f"{PACKAGE}/msg/{message.name}", message.definition)
+        file.attach(note.attachment, DESCRIPTION, frontend._description.table(), time.time_ns())
+        channel = file.add_channel(topic_of(note.segment), schema, note.texts())
+        return cls(layout, note, channel)
+
+    def block(self, rows: NDArray[np.void]) -> Block:
+        """The messages of consecutive rows."""
+        raw = np.ascontiguousarray(rows).view(np.uint8).reshape(len(rows), -1)
+        log_times = (rows["time"] + self.note.wall_offset).astype(np.uint64)
+        first = int(rows["iteration"][0])
+        block = Block.reserved(self.channel, log_times, first, self._plan.size)
+        self._plan.encode(raw, block.messages)
+        return block

@@ -1,0 +1,273 @@
+"""Writes an MCAP file in groups, of which each is whole or not there.
+
+Whatever kills the writer, the file up to the last group can be read, and a successor continues
+behind it.
+"""
+
+import contextlib
+import os
+import struct
+import zlib
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Protocol
+
+import zstandard
+from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
+from mcap.records import (
+    Attachment,
+    AttachmentIndex,
+    Channel,
+    ChunkIndex,
+    DataEnd,
+    Header,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+    SummaryOffset,
+)
+
+import o80
+from o80.recording.scan import HEAD, MAGIC, NotARecording, Scan, scan
+from o80.recording.space import reserve
+
+PROFILE = "ros2"
+COMPRESSIONS = ("zstd", "none")
+SUMMARY_OF_A_CHUNK = 128  # most bytes of the summary that a chunk adds, with one channel
+SUMMARY_OF_THE_REST = 65536
+CHUNK_HEAD = struct.Struct("<BQQQQI")
+
+
+class MessageBlock(Protocol):
+    """Messages of one channel; see o80.recording.blocks.Block."""
+
+    @property
+    def channel(self) -> int: ...
+    @property
+    def content(self) -> bytes: ...
+    @property
+    def count(self) -> int: ...
+    @property
+    def time_range(self) -> tuple[int, int]: ...
+    def index(self, offset: int) -> bytes: ...
+
+
+class FileWriter:
+    """Writes one file. Move-only: close it once; it is not finished unless `finish` was called."""
+
+    def __init__(self, path: Path, *, compression: str = "zstd") -> None:
+        """Creates the file. Raises FileExistsError."""
+        self._open(path, compression, os.O_CREAT | os.O_EXCL)
+        self._found = Scan()
+        builder = RecordBuilder()
+        Header(PROFILE, f"o80 {o80.__version__}").write(builder)
+        self._append(MAGIC + builder.end())
+
+    @classmethod
+    def continued(cls, path: Path, *, compression: str = "zstd") -> "FileWriter":
+        """Goes on behind the last whole group of a file. Raises NotARecording, OSError."""
+        found = scan(path)
+        if not found.library:
+            raise NotARecording(f"{path} was cut before its first record")
+        self = cls.__new__(cls)
+        self._open(path, compression, 0)
+        self._found = found
+        self.size = found.end
+        os.ftruncate(self._descriptor, self.size)
+        return self
+
+    def _open(self, path: Path, compression: str, flags: int) -> None:
+        if compression not in COMPRESSIONS:
+            raise ValueError(
+                f"unknown compression '{compression}': choose {' or '.join(COMPRESSIONS)}"
+            )
+        self.path = path
+        self.size = 0  #: [bytes]
+        self._compressor = zstandard.ZstdCompressor(level=1) if compression == "zstd" else None
+        self._descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC | flags, 0o644)
+
+    # ------------------------------------------------------------------ groups
+
+    @property
+    def found(self) -> Scan:
+        """What the file holds by now, except messages."""
+        return self._found
+
+    def add_schema(self, name: str, definition: str) -> int:
+        """Adds a message type, unless the file has it. Returns its number."""
+        for schema in self._found.schemas.values():
+            if schema.name == name and schema.data == definition.encode():
+                return schema.id
+        number = 1 + max(self._found.schemas, default=0)
+        schema = Schema(id=number, data=definition.encode(), encoding="ros2msg", name=name)
+        builder = RecordBuilder()
+        schema.write(builder)
+        self._append(builder.end())
+        self._found.schemas[number] = schema
+        return number
+
+    def add_channel(self, topic: str, schema: int, metadata: Mapping[str, str]) -> int:
+        """Adds a channel. Returns its number."""
+        number = 1 + max(self._found.channels, default=0)
+        channel = Channel(
+            id=number,
+            topic=topic,
+            message_encoding="cdr",
+            metadata=dict(metadata),
+            schema_id=schema,
+        )
+        builder = RecordBuilder()
+        channel.write(builder)
+        self._append(builder.end())
+        self._found.channels[number] = channel
+        return number
+
+    def attach(self, name: str, media_type: str, data: bytes, time: int) -> None:
+        """Adds an attachment. time: [ns] since 1970."""
+        builder = RecordBuilder()
+        Attachment(time, time, name, media_type, data).write(builder)
+        record = builder.end()
+        self._found.attachments.append(
+            AttachmentIndex(
+                offset=self.size,
+                length=len(record),
+                log_time=time,
+                create_time=time,
+                data_size=len(data),
+                name=name,
+                media_type=media_type,
+            )
+        )
+        self._append(record)
+
+    def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
+        """Adds a record of texts."""
+        builder = RecordBuilder()
+        metadata = Metadata(name, dict(values))
+        metadata.write(builder)
+        record = builder.end()
+        self._found.metadata_places.append(MetadataIndex(self.size, len(record), name))
+        self._found.metadata.append(metadata)
+        self._append(record)
+
+    def add_chunk(self, blocks: Sequence[MessageBlock]) -> None:
+        """Adds messages, each channel at most once. Raises OSError: then nothing was added."""
+        content = b"".join(block.content for block in blocks)
+        compressed = self._compressor.compress(content) if self._compressor else content
+        compression = "zstd" if self._compressor else ""
+        start = min(block.time_range[0] for block in blocks)
+        end = max(block.time_range[1] for block in blocks)
+        named = compression.encode()
+        head = CHUNK_HEAD.pack(
+            Opcode.CHUNK,
+            CHUNK_HEAD.size - HEAD.size + 4 + len(named) + 8 + len(compressed),
+            start,
+            end,
+            len(content),
+            zlib.crc32(content),
+        )
+        chunk = head + struct.pack("<I", len(named)) + named
+        chunk += struct.pack("<Q", len(compressed)) + compressed
+        indexes, offsets, at = b"", {}, 0
+        for block in blocks:
+            offsets[block.channel] = self.size + len(chunk) + len(indexes)
+            indexes += block.index(at)
+            at += len(block.content)
+        index = ChunkIndex(
+            chunk_length=len(chunk),
+            chunk_start_offset=self.size,
+            compression=compression,
+            compressed_size=len(compressed),
+            message_end_time=end,
+            message_index_length=len(indexes),
+            message_index_offsets=offsets,
+            message_start_time=start,
+            uncompressed_size=len(content),
+        )
+        self._append(chunk + indexes)
+        self._found.chunks.append(index)
+        for block in blocks:
+            counts = self._found.counts
+            counts[block.channel] = counts.get(block.channel, 0) + block.count
+
+    def _append(self, data: bytes, *, last: bool = False) -> None:
+        """Writes a group whole, or restores the file and raises OSError."""
+        try:
+            if not last:
+                reserve(self._descriptor, self.size, len(data) + self._summary_room())
+            written = 0
+            while written < len(data):
+                written += os.pwrite(self._descriptor, data[written:], self.size + written)
+        except OSError:
+            with contextlib.suppress(OSError):
+                os.ftruncate(self._descriptor, self.size)
+            raise
+        self.size += len(data)
+
+    def _summary_room(self) -> int:
+        found = self._found
+        texts = sum(len(each.data) for each in found.schemas.values())
+        per_chunk = SUMMARY_OF_A_CHUNK + 10 * len(found.channels)
+        rest = 512 * len(found.channels) + 256 * (len(found.metadata) + len(found.attachments))
+        return SUMMARY_OF_THE_REST + texts + rest + per_chunk * (1 + len(found.chunks))
+
+    # ------------------------------------------------------------------ the end
+
+    def finish(self) -> None:
+        """Writes the summary and closes the file; after it any reader opens the file."""
+        builder = RecordBuilder()
+        DataEnd(0).write(builder)
+        data_end = builder.end()
+        summary_start = self.size + len(data_end)
+        summary = bytearray()
+        offsets = bytearray()
+        for opcode, records in self._summary():
+            begin = summary_start + len(summary)
+            for record in records:
+                record.write(builder)
+            group = builder.end()
+            if group:
+                summary += group
+                SummaryOffset(opcode, begin, len(group)).write(builder)
+                offsets += builder.end()
+        offset_start = summary_start + len(summary)
+        footer = _footer(bytes(summary + offsets), summary_start, offset_start)
+        self._append(bytes(data_end) + summary + offsets + footer + MAGIC, last=True)
+        self._found.finished = True
+        self.close()
+
+    def _summary(self) -> Iterable[tuple[Opcode, Sequence[object]]]:
+        found = self._found
+        chunks = found.chunks
+        yield Opcode.SCHEMA, list(found.schemas.values())
+        yield Opcode.CHANNEL, list(found.channels.values())
+        statistics = Statistics(
+            attachment_count=len(found.attachments),
+            channel_count=len(found.channels),
+            channel_message_counts=found.counts,
+            chunk_count=len(chunks),
+            message_count=sum(found.counts.values()),
+            message_end_time=max((chunk.message_end_time for chunk in chunks), default=0),
+            message_start_time=min((chunk.message_start_time for chunk in chunks), default=0),
+            metadata_count=len(found.metadata),
+            schema_count=len(found.schemas),
+        )
+        yield Opcode.STATISTICS, [statistics]
+        yield Opcode.CHUNK_INDEX, chunks
+        yield Opcode.ATTACHMENT_INDEX, found.attachments
+        yield Opcode.METADATA_INDEX, found.metadata_places
+
+    def close(self) -> None:
+        """Closes the file as it is; may be called twice."""
+        if self._descriptor >= 0:
+            os.ftruncate(self._descriptor, self.size)  # gives reserved space back
+            os.close(self._descriptor)
+            self._descriptor = -1
+
+
+def _footer(summary: bytes, summary_start: int, offset_start: int) -> bytes:
+    """The footer record; its checksum covers the summary and itself up to the checksum."""
+    head = HEAD.pack(Opcode.FOOTER, 20) + struct.pack("<QQ", summary_start, offset_start)
+    return head + struct.pack("<I", zlib.crc32(head, zlib.crc32(summary)))

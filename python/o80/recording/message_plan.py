@@ -1,0 +1,112 @@
+"""Conversion of rows to CDR messages and back, many at once.
+
+CDR (the encoding of ROS 2 messages) has no gaps but those that alignment needs, and its structs
+have no alignment of their own. So the place of each number in a message is fixed for a robot: a
+plan lists which bytes of a row go where, and numbers that lie side by side in both are copied
+together.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o80.recording.message_types import MessageType
+
+ENCAPSULATION = b"\x00\x01\x00\x00"
+"""First bytes of a message: CDR, little endian."""
+
+Bytes = NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class Copy:
+    """Bytes of a row that are at another place in a message."""
+
+    row: int
+    message: int
+    length: int
+
+
+@dataclass(frozen=True)
+class Mask:
+    """Bits of a row that are bytes of 0 or 1 in a message."""
+
+    row: int
+    message: int
+    count: int
+
+
+class MessagePlan:
+    """Encodes and decodes rows of one robot. Each direction costs one copy per run of bytes."""
+
+    def __init__(self, message: MessageType, row_size: int) -> None:
+        self.row_size = row_size  #: [bytes]
+        self._at = 0
+        self._masks: list[Mask] = []
+        self._copies = _merged(self._walk(message, 0))
+        self.size = len(ENCAPSULATION) + self._at  #: of a message [bytes]
+
+    def encode(self, rows: Bytes, messages: Bytes) -> None:
+        """Rows (n, row_size) to messages (n, size), which may be a view of something larger."""
+        messages[:] = 0
+        messages[:, : len(ENCAPSULATION)] = np.frombuffer(ENCAPSULATION, np.uint8)
+        for copy in self._copies:
+            messages[:, copy.message : copy.message + copy.length] = rows[
+                :, copy.row : copy.row + copy.length
+            ]
+        for mask in self._masks:
+            bits = np.ascontiguousarray(rows[:, mask.row : mask.row + (mask.count + 7) // 8])
+            messages[:, mask.message : mask.message + mask.count] = np.unpackbits(
+                bits, axis=1, count=mask.count, bitorder="little"
+            )
+
+    def decode(self, messages: Bytes) -> Bytes:
+        """Messages (n, size) to rows (n, row_size); padding is zero, as in a segment."""
+        rows = np.zeros((len(messages), self.row_size), np.uint8)
+        for copy in self._copies:
+            rows[:, copy.row : copy.row + copy.length] = messages[
+                :, copy.message : copy.message + copy.length
+            ]
+        for mask in self._masks:
+            values = messages[:, mask.message : mask.message + mask.count]
+            packed = np.packbits(values, axis=1, bitorder="little")
+            rows[:, mask.row : mask.row + packed.shape[1]] = packed
+        return rows
+
+    # message type => copies, in the order of the message
+
+    def _walk(self, message: MessageType, row: int) -> Iterator[Copy]:
+        for member in message.members:
+            place = row + member.offset
+            if member.bits:
+                assert member.count is not None
+                self._masks.append(Mask(place, self._reserve(1, member.count), member.count))
+            elif member.type is not None:
+                for i in range(1 if member.count is None else member.count):
+                    yield from self._walk(member.type, place + i * member.size)
+            else:
+                length = member.size * (1 if member.count is None else member.count)
+                if length:
+                    yield Copy(place, self._reserve(member.size, length), length)
+
+    def _reserve(self, alignment: int, length: int) -> int:
+        """The place in a message of the next `length` bytes."""
+        begin = -(-self._at // alignment) * alignment
+        self._at = begin + length
+        return len(ENCAPSULATION) + begin
+
+
+def _merged(copies: Iterator[Copy]) -> list[Copy]:
+    """The same copies; those that are adjacent in row and message are joined."""
+    result: list[Copy] = []
+    for copy in copies:
+        if result:
+            last = result[-1]
+            row, message = last.row + last.length, last.message + last.length
+            if (row, message) == (copy.row, copy.message):
+                result[-1] = Copy(last.row, last.message, last.length + copy.length)
+                continue
+        result.append(copy)
+    return result

@@ -1,0 +1,202 @@
+"""Message types of a robot's rows, in the language of ROS 2 interface files (ros2msg).
+
+Public readers of MCAP files (Foxglove, PlotJuggler, rosbags) decode rows by these definitions. A
+type has a hash of its definition in its name, because readers allow one definition per name in a
+file.
+"""
+
+import hashlib
+import re
+from dataclasses import dataclass, field
+from typing import Any
+
+from o80.layout import HEAD, Layout, is_plain
+
+PACKAGE = "o80"
+SEPARATOR = "=" * 80
+
+
+@dataclass(frozen=True)
+class Member:
+    """One member of a message type."""
+
+    name: str
+    kind: str  #: of ROS 2 (float64, bool, ...), or the name of a MessageType
+    size: int  #: of a number [bytes]; of an element in the row
+    offset: int  #: in the row, or in the struct it is part of [bytes]
+    count: int | None = None  #: elements of an array; None: no array
+    type: "MessageType | None" = None
+    bits: bool = False  #: a mask of the row: one bit per element there, one bool in the message
+
+
+@dataclass(frozen=True)
+class MessageType:
+    """A definition, and where its members are in a row."""
+
+    name: str
+    text: str
+    members: tuple[Member, ...] = field(repr=False)
+
+    @property
+    def definition(self) -> str:
+        """The text of this type and of all that it contains, as MCAP schemas hold it."""
+        parts = [self.text]
+        parts += [f"{SEPARATOR}\nMSG: {PACKAGE}/{each.name}\n{each.text}" for each in self.inner()]
+        return "\n".join(parts)
+
+    def inner(self) -> list["MessageType"]:
+        """The types of its members, and of theirs, each once."""
+        found: dict[str, MessageType] = {}
+        for member in self.members:
+            if member.type is not None:
+                found.setdefault(member.type.name, member.type)
+                found.update({each.name: each for each in member.type.inner()})
+        return list(found.values())
+
+
+def row_type(layout: Layout) -> MessageType:
+    """The message type of a robot's rows."""
+    row = layout.schema["row"]
+    numbers = {"i8": ("int64", 8), "u4": ("uint32", 4)}
+    members = [Member(name, *numbers[kind], row[name]) for name, kind in HEAD]
+    if layout.actuators:
+        states = _states_members(layout)
+        for part in ("desired", "observed"):
+            members.append(_placed(states, part, row[part]))
+        for mask in ("active", "clamped", "braking"):
+            members.append(Member(mask, "bool", 1, row[mask], layout.actuators, bits=True))
+    if layout.extras.itemsize:
+        extended = _struct(layout.schema["extended"], "Extended")
+        members.append(Member("extended", extended.name, 0, row["extended"], None, extended))
+    return _type(_identifier(layout.schema["robot"], "Robot"), members)
+
+
+def _states_members(layout: Layout) -> Member:
+    """The states of all actuators as one member: an array, or a struct of groups."""
+    groups = layout.schema["groups"]
+    members = [_group_member(group) for group in groups]
+    if len(groups) == 1 and not groups[0]["name"]:
+        return members[0]
+    states = _type("States", members)
+    return Member("", states.name, 0, 0, None, states)
+
+
+def _group_member(group: dict[str, Any]) -> Member:
+    described = group["type"]
+    count = group["count"] if group["array"] else None
+    if is_plain(described):
+        plain = _field_member(described["fields"][0], group["name"] or "state")
+        inner = plain.count or 1
+        total = inner * (count or 1) if count is not None or plain.count is not None else None
+        return Member(plain.name, plain.kind, plain.size, group["offset"], total, plain.type)
+    struct = _struct(described, group["name"] or "State")
+    return Member(
+        _field_name(group["name"] or "state"),
+        struct.name,
+        described["size"],
+        group["offset"],
+        count,
+        struct,
+    )
+
+
+def _placed(member: Member, name: str, offset: int) -> Member:
+    return Member(
+        name, member.kind, member.size, offset + member.offset, member.count, member.type
+    )
+
+
+def _struct(described: dict[str, Any], fallback: str) -> MessageType:
+    members = [_field_member(each, each["name"]) for each in described["fields"]]
+    constants = [line for each in described["fields"] for line in _constants(each)]
+    notes = {
+        member.name: _note(each) for member, each in zip(members, described["fields"], strict=True)
+    }
+    return _type(_identifier(described["name"], fallback), members, constants, notes)
+
+
+def _field_member(described: dict[str, Any], name: str) -> Member:
+    count = 1
+    for length in described["shape"]:
+        count *= length
+    array = count if described["shape"] else None
+    if described["kind"] == "struct":
+        inner = _struct(described["type"], name)
+        return Member(
+            _field_name(name), inner.name, described["size"], described["offset"], array, inner
+        )
+    kind = described["kind"]
+    if kind == "enum":
+        kind = f"{'int' if described['signed'] else 'uint'}{8 * described['size']}"
+    return Member(_field_name(name), kind, described["size"], described["offset"], array)
+
+
+def _constants(described: dict[str, Any]) -> list[str]:
+    """An enumeration's labels, as constants of its number type."""
+    if described["kind"] != "enum":
+        return []
+    kind = f"{'int' if described['signed'] else 'uint'}{8 * described['size']}"
+    prefix = _field_name(described["name"] or "state").upper()
+    return [
+        f"{kind} {prefix}_{_field_name(label).upper()}={number}"
+        for label, number in described["labels"].items()
+    ]
+
+
+def _note(described: dict[str, Any]) -> str:
+    unit = f"[{described['unit']}]" if described["unit"] else ""
+    return " ".join(part for part in (described["help"], unit) if part).replace("\n", " ")
+
+
+def _type(
+    base: str,
+    members: list[Member],
+    constants: list[str] | None = None,
+    notes: dict[str, str] | None = None,
+) -> MessageType:
+    lines = list(constants or [])
+    members = _with_unique_names(members)
+    for member in members:
+        kind = member.kind if member.type is None else f"{PACKAGE}/{member.type.name}"
+        array = "" if member.count is None else f"[{member.count}]"
+        note = (notes or {}).get(member.name, "")
+        lines.append(f"{kind}{array} {member.name}" + (f"  # {note}" if note else ""))
+    text = "\n".join(lines) + "\n"
+    digest = hashlib.sha256(text.encode()).hexdigest()[:8]
+    return MessageType(f"{base}X{digest}", text, tuple(members))
+
+
+def _with_unique_names(members: list[Member]) -> list[Member]:
+    taken: set[str] = set()
+    result = []
+    for member in members:
+        name, number = member.name, 1
+        while name in taken:
+            number += 1
+            name = f"{member.name}_{number}"
+        taken.add(name)
+        result.append(
+            Member(
+                name,
+                member.kind,
+                member.size,
+                member.offset,
+                member.count,
+                member.type,
+                member.bits,
+            )
+        )
+    return result
+
+
+def _field_name(name: str) -> str:
+    """A valid name of a member: lower case, digits, single underscores, a letter first."""
+    plain = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
+    return plain if plain and plain[0].isalpha() else f"x_{plain}".rstrip("_")
+
+
+def _identifier(name: str, fallback: str) -> str:
+    """A valid name of a type: letters and digits, an upper-case letter first."""
+    words = re.findall(r"[A-Za-z0-9]+", name) or re.findall(r"[A-Za-z0-9]+", fallback)
+    joined = "".join(word[0].upper() + word[1:] for word in words) or "Type"
+    return joined if joined[0].isalpha() else f"T{joined}"
