@@ -24,6 +24,7 @@ from o80.errors import (
     NoLane,
     NotBursting,
     ReadOnly,
+    RecordingError,
     RequestRejected,
     RowOverwritten,
     SchemaMismatch,
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
     from o80.limits import Limits
     from o80.prepared_burst import PreparedBurst
     from o80.record import Record
+    from o80.recording.reader import RecordingFile, open
     from o80.running_request import RunningRequest
     from o80.segment_list import Segment, clean, segments
     from o80.states import States
@@ -73,6 +75,8 @@ _LAZY = {
     "Limits": "o80.limits",
     "PreparedBurst": "o80.prepared_burst",
     "Record": "o80.record",
+    "RecordingFile": "o80.recording.reader",
+    "open": "o80.recording.reader",
     "RunningRequest": "o80.running_request",
     "Segment": "o80.segment_list",
     "clean": "o80.segment_list",
@@ -103,6 +107,7 @@ if not TYPE_CHECKING:  # otherwise a type checker would accept every name
 
 __version__ = version()
 
+# `open` is left out: `from o80 import *` must not replace the builtin
 __all__ = [
     "Actuator",
     "Backend",
@@ -138,6 +143,8 @@ __all__ = [
     "ReadOnly",
     "Reason",
     "Record",
+    "RecordingError",
+    "RecordingFile",
     "RequestRejected",
     "RowOverwritten",
     "Running",

@@ -125,3 +125,7 @@ class RequestRejected(Error):
 
 class ControlTaken(Error):
     """Another frontend has exclusive control."""
+
+
+class RecordingError(Error):
+    """A recording cannot be written or read; the text names the file and what to do."""

@@ -12,7 +12,9 @@ from o80.cli.echo import echo
 from o80.cli.halt import halt, resume
 from o80.cli.info import info
 from o80.cli.list_segments import list_segments
+from o80.cli.record import record
 from o80.cli.run import run
+from o80.cli.save import repair, save
 from o80.cli.stop import stop
 
 app = typer.Typer(
@@ -34,6 +36,9 @@ app.command(
 app.command("list")(list_segments)
 app.command("info")(info)
 app.command("echo")(echo)
+app.command("record")(record)
+app.command("save")(save)
+app.command("repair")(repair)
 app.command("halt")(halt)
 app.command("resume")(resume)
 app.command("stop")(stop)

@@ -1,1 +1,5 @@
 """Rows of segments in MCAP files: writing them while robots run, and reading them again."""
+
+from o80.extras import needed
+
+needed("mcap", "record", "a recording")

@@ -29,6 +29,7 @@ class EpochNote:
     robot: str
     epoch: int
     number: int  #: of this run among those of the segment in the file, from 0
+    begin: int  #: iteration of the first row to record
     wall_offset: int  #: log time less row time [ns]
     clock: str  #: monotonic or simulated
 
@@ -44,6 +45,7 @@ class EpochNote:
                 robot=texts["robot"],
                 epoch=int(texts["epoch"]),
                 number=int(texts["number"]),
+                begin=int(texts["begin"]),
                 wall_offset=int(texts["wall_offset"]),
                 clock=texts["clock"],
             )
@@ -66,8 +68,8 @@ def topic_of(segment: str) -> str:
     return f"/{segment}"
 
 
-def note_of(frontend: "Frontend", number: int) -> EpochNote:
-    """What is to be said about the rows of a backend; its newest row was published about now."""
+def note_of(frontend: "Frontend", number: int, begin: int) -> EpochNote:
+    """What is to be said about rows from `begin` on; the newest row was published about now."""
     clock: str = frontend.schema["clock"]
     now = time.time_ns()
     row_time = frontend.latest().time if clock == "simulated" else time.monotonic_ns()
@@ -76,6 +78,7 @@ def note_of(frontend: "Frontend", number: int) -> EpochNote:
         robot=frontend.robot,
         epoch=frontend.epoch,
         number=number,
+        begin=begin,
         wall_offset=now - row_time,
         clock=clock,
     )

@@ -30,7 +30,7 @@ from mcap.records import (
 )
 
 import o80
-from o80.recording.scan import HEAD, MAGIC, NotARecording, Scan, scan
+from o80.recording.scan import HEAD, MAGIC, Scan, scan
 from o80.recording.space import reserve
 
 PROFILE = "ros2"
@@ -61,19 +61,19 @@ class FileWriter:
         """Creates the file. Raises FileExistsError."""
         self._open(path, compression, os.O_CREAT | os.O_EXCL)
         self._found = Scan()
-        builder = RecordBuilder()
-        Header(PROFILE, f"o80 {o80.__version__}").write(builder)
-        self._append(MAGIC + builder.end())
+        self._append(_beginning())
 
     @classmethod
     def continued(cls, path: Path, *, compression: str = "zstd") -> "FileWriter":
         """Goes on behind the last whole group of a file. Raises NotARecording, OSError."""
-        found = scan(path)
-        if not found.library:
-            raise NotARecording(f"{path} was cut before its first record")
         self = cls.__new__(cls)
         self._open(path, compression, 0)
-        self._found = found
+        begun = os.pread(self._descriptor, len(_beginning()), 0)
+        if len(begun) < len(_beginning()) and _beginning().startswith(begun):
+            os.ftruncate(self._descriptor, 0)  # cut before its first group was whole
+            self._found = Scan()
+            self._append(_beginning())
+        self._found = found = scan(path)
         self.size = found.end
         os.ftruncate(self._descriptor, self.size)
         return self
@@ -265,6 +265,13 @@ class FileWriter:
             os.ftruncate(self._descriptor, self.size)  # gives reserved space back
             os.close(self._descriptor)
             self._descriptor = -1
+
+
+def _beginning() -> bytes:
+    """What every file begins with."""
+    builder = RecordBuilder()
+    Header(PROFILE, f"o80 {o80.__version__}").write(builder)
+    return MAGIC + builder.end()
 
 
 def _footer(summary: bytes, summary_start: int, offset_start: int) -> bytes:

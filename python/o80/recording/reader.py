@@ -8,12 +8,11 @@ from typing import IO, Any
 
 import numpy as np
 
-from o80.errors import InvalidArgument
+from o80.errors import InvalidArgument, RecordingError
 from o80.history import History
 from o80.layout import decoder_of
 from o80.recording.blocks import messages_in
 from o80.recording.epoch import EpochNote
-from o80.recording.errors import RecordingError
 from o80.recording.message_plan import MessagePlan
 from o80.recording.message_types import row_type
 from o80.recording.scan import (
@@ -68,6 +67,14 @@ class RecordingFile:
 
     def __repr__(self) -> str:
         return f"<o80 recording {self.path}: {', '.join(self.segments) or 'no segment'}>"
+
+
+def open(path: str | os.PathLike[str]) -> RecordingFile:
+    """Opens a recording: `o80.open("run.mcap")["arm"].history(1000).observed`.
+
+    Raises RecordingError.
+    """
+    return RecordingFile(path)
 
 
 class RecordedSegment:

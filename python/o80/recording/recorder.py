@@ -8,22 +8,23 @@ from pathlib import Path
 
 import numpy as np
 
-from o80.errors import InvalidArgument
+from o80.errors import InvalidArgument, RecordingError
+from o80.recording.blocks import messages_in
 from o80.recording.epoch import EpochNote
-from o80.recording.errors import RecordingError
 from o80.recording.file_writer import FileWriter
 from o80.recording.message_plan import ENCAPSULATION
 from o80.recording.scan import NotARecording, content_of, index_of
-from o80.recording.blocks import messages_in
 from o80.recording.source import Source, Written
 from o80.segment_list import segments
 
-BETWEEN_CHUNKS = 0.1  # [s]
 BETWEEN_SEARCHES = 0.5  # for segments that match a pattern [s]
 
 
 class Recorder:
     """Reads segments and writes their rows; `poll` does a part of the work. One thread."""
+
+    between_chunks = 0.1
+    """Longest time that `poll` should not be called [s]: what a killed recorder has not written."""
 
     def __init__(
         self,
@@ -38,7 +39,7 @@ class Recorder:
         if not names:
             raise InvalidArgument("give the name of at least one segment to record")
         self._patterns = [name for name in names if any(sign in name for sign in "*?[")]
-        self.file = _opened(Path(path), proceed=proceed, compression=compression)
+        self.file = opened(Path(path), proceed=proceed, compression=compression)
         self._written = _written_in(self.file) if proceed else {}
         self._whole = whole
         self.sources: dict[str, Source] = {}
@@ -99,7 +100,8 @@ class Recorder:
                 self._add(segment.name, whole)
 
 
-def _opened(path: Path, *, proceed: bool, compression: str) -> FileWriter:
+def opened(path: Path, *, proceed: bool, compression: str = "zstd") -> FileWriter:
+    """A new file; or, to `proceed`, the one that is there. Raises RecordingError."""
     try:
         if proceed and path.exists():
             return FileWriter.continued(path, compression=compression)

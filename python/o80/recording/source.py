@@ -92,11 +92,11 @@ class Source:
         known = self._written.get(frontend.epoch)
         if known is not None:
             self._writer = RowWriter(frontend._layout, known.note, known.channel)
-            self._next = known.last + 1
+            self._next = max(known.last + 1, known.note.begin)
             return
         first = frontend.oldest if self._whole or self._written else frontend.published
         self._whole = True  # whoever starts later is recorded from its first row
-        note = note_of(frontend, len(self._written))
+        note = note_of(frontend, len(self._written), first)
         if self._written:
             first_time = frontend.history(since=first, until=first).time
             if len(first_time):

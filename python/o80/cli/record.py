@@ -1,0 +1,150 @@
+"""``o80 record``: writes the rows of segments to a file."""
+
+from __future__ import annotations
+
+import math
+import signal
+import sys
+import time
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from o80.cli.screen import complain
+
+if TYPE_CHECKING:
+    from o80.recording.recorder import Recorder
+
+_BETWEEN_REPORTS = 0.5  # [s]
+_SUFFIXES = {"k": 1e3, "M": 1e6, "G": 1e9}
+
+
+def _seconds(value: float | None) -> float | None:
+    if value is not None and not (value > 0 and math.isfinite(value)):
+        raise typer.BadParameter(f"seconds must be positive, got {value:g}")
+    return value
+
+
+def _size(text: str | None) -> float | None:
+    """Bytes of "500M", "2G" or a plain number."""
+    if text is None:
+        return None
+    number, factor = (text[:-1], _SUFFIXES[text[-1]]) if text[-1:] in _SUFFIXES else (text, 1.0)
+    try:
+        size = float(number) * factor
+    except ValueError:
+        size = 0.0
+    if not (size > 0 and math.isfinite(size)):
+        raise typer.BadParameter(f"size must be a number of bytes such as 500M or 2G, got '{text}'")
+    return size
+
+
+def record(
+    names: Annotated[
+        list[str], typer.Argument(help="Segments; a pattern such as 'arm*' includes later ones.")
+    ],
+    output: Annotated[Path, typer.Option("--output", "-o", help="File to write, NAME.mcap.")],
+    seconds: Annotated[
+        float | None, typer.Option(callback=_seconds, help="Stop after this time [s].")
+    ] = None,
+    size: Annotated[
+        str | None, typer.Option(help="Stop when the file has this size, for example 2G.")
+    ] = None,
+    proceed: Annotated[
+        bool, typer.Option("--continue", help="Append to the file, also to one that was cut.")
+    ] = False,
+    whole: Annotated[
+        bool, typer.Option(help="Begin with the oldest row that a segment still holds.")
+    ] = False,
+) -> None:
+    """Record rows of robots to an MCAP file until Ctrl-C.
+
+    A robot that is not there yet is waited for; one that restarts is recorded on in the same file.
+    """
+    from o80.recording.recorder import Recorder
+
+    most = _size(size)
+    recorder = Recorder(output, names, proceed=proceed, whole=whole)
+    end = _Stop()
+    report = _Report(recorder)
+    begin = time.monotonic()
+    try:
+        while not end.requested:
+            started = time.monotonic()
+            recorder.poll()
+            report.show()
+            if seconds is not None and started - begin >= seconds:
+                break
+            if most is not None and recorder.file.size >= most:
+                break
+            busy = any(source.behind for source in recorder.sources.values())
+            if not busy:
+                end.wait(max(0.0, recorder.between_chunks - (time.monotonic() - started)))
+        recorder.catch_up()
+    finally:
+        recorder.finish()
+    report.show(last=True)
+
+
+class _Stop:
+    """Ctrl-C and SIGTERM end a recording in order."""
+
+    def __init__(self) -> None:
+        self.requested = False
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, self._request)
+
+    def _request(self, _number: int, _frame: FrameType | None) -> None:
+        self.requested = True
+
+    def wait(self, seconds: float) -> None:
+        end = time.monotonic() + seconds
+        while not self.requested and (left := end - time.monotonic()) > 0:
+            time.sleep(min(left, 0.05))
+
+
+class _Report:
+    """Shows on stderr how far a recording is: one line, again and again on a terminal."""
+
+    def __init__(self, recorder: Recorder) -> None:
+        self._recorder = recorder
+        self._at = time.monotonic()
+        self._rows = 0
+        self._missed = 0
+        self._absent: set[str] = set()
+        self._terminal = sys.stderr.isatty()
+
+    def show(self, last: bool = False) -> None:
+        now = time.monotonic()
+        if now - self._at < _BETWEEN_REPORTS and not last:
+            return
+        recorder = self._recorder
+        self._say_what_changed()
+        rate = (recorder.rows - self._rows) / (now - self._at)
+        self._at, self._rows = now, recorder.rows
+        if last or self._terminal:
+            behind = sum(source.behind for source in recorder.sources.values())
+            line = f"{recorder.rows} rows"
+            if not last:
+                line += f", {rate:.0f} a second, {behind} behind"
+            line += f", {recorder.missed} missed" if recorder.missed else ""
+            line += f", {recorder.file.size / 1e6:.1f} MB in {recorder.file.path}"
+            begin = "\r\033[K" if self._terminal else ""
+            print(f"{begin}{line}", end="\n" if last else "", file=sys.stderr, flush=True)
+
+    def _say_what_changed(self) -> None:
+        recorder = self._recorder
+        if recorder.missed > self._missed:
+            complain(
+                f"{recorder.missed - self._missed} rows were overwritten before they were read: "
+                f"the file has a gap. A longer --history of the robot gives the recorder more time"
+            )
+            self._missed = recorder.missed
+        absent = {name for name, source in recorder.sources.items() if not source.attached}
+        for name in sorted(absent - self._absent):
+            complain(f"waiting for segment '{name}'")
+        self._absent = absent
+
+

@@ -1,0 +1,45 @@
+"""``o80 save`` and ``o80 repair``: recordings after the fact."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def save(
+    names: Annotated[list[str], typer.Argument(help="Segments, alive or dead; see o80 list.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="File to write, NAME.mcap.")],
+) -> None:
+    """Save what segments still hold, also those of robots that have ended or crashed."""
+    import o80
+    from o80.recording.recorder import Recorder
+
+    there = {segment.name for segment in o80.segments() if segment.readable}
+    for name in names:
+        if not any(sign in name for sign in "*?[") and name not in there:
+            raise o80.SegmentError(f"there is no segment '{name}' (see `o80 list`)")
+    recorder = Recorder(output, names, whole=True)
+    try:
+        recorder.catch_up()
+    finally:
+        recorder.finish()
+    print(f"{recorder.rows} rows of {', '.join(recorder.sources) or 'no segment'} in {output}")
+
+
+def repair(
+    path: Annotated[Path, typer.Argument(help="A recording that was cut.")],
+) -> None:
+    """Complete a recording whose recorder was killed, so that every MCAP reader opens it."""
+    from o80.recording.reader import RecordingFile
+    from o80.recording.recorder import opened
+
+    if RecordingFile(path).finished:
+        print(f"{path} is complete")
+        return
+    size = path.stat().st_size
+    file = opened(path, proceed=True)
+    kept = file.size
+    file.finish()
+    print(f"{path}: {kept} bytes kept, {size - kept} bytes of an incomplete part removed")

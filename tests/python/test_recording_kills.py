@@ -1,0 +1,73 @@
+"""A recorder that is killed at any moment loses no row, and its successor repeats none."""
+
+import os
+import random
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import o80
+from o80.recording.reader import RecordingFile
+from o80.recording.recorder import Recorder
+
+KILLS = int(os.environ.get("O80_RECORDER_KILLS", "200"))
+MOST_CHUNKS = 4  # of a recorder before it is killed
+
+
+def record_for_ever(path: Path, name: str, progress: int) -> None:
+    """In a forked child: records until it is killed, and tells of each chunk."""
+    recorder = Recorder(path, [name], proceed=True)
+    os.write(progress, b".")
+    while True:
+        if recorder.poll():
+            os.write(progress, b".")
+
+
+def kill_a_recorder(path: Path, name: str, chance: random.Random) -> None:
+    """Starts one and kills it while it opens the file or writes a chunk."""
+    read, write = os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            record_for_ever(path, name, write)
+        finally:
+            os._exit(1)
+    os.close(write)
+    for _ in range(chance.randint(0, MOST_CHUNKS)):
+        os.read(read, 1)
+    for _ in range(chance.randint(0, 20_000)):  # somewhere in the next step
+        pass
+    os.kill(child, signal.SIGKILL)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == -signal.SIGKILL
+    os.close(read)
+
+
+def recorded_iterations(path: Path, name: str) -> "np.ndarray[tuple[int], np.dtype[np.int64]]":
+    file = RecordingFile(path)
+    return file[name].history().iteration if len(file) else np.empty(0, np.int64)
+
+
+# @pytest.mark.check
+def test_no_row_is_lost_and_none_is_written_twice(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    chance = random.Random(7)
+    with o80.robots.load("two_joints").start(frequency=1000, history=200_000) as process:
+        name = process.segment
+        for _ in range(KILLS):
+            kill_a_recorder(path, name, chance)
+            if path.exists() and path.stat().st_size > 100:
+                assert np.all(np.diff(recorded_iterations(path, name)) == 1)
+        recorder = Recorder(path, [name], proceed=True)
+        recorder.catch_up()
+        recorder.finish()
+        with process.frontend() as robot:
+            recorded = RecordingFile(path)[name].history()
+            first, last = int(recorded.iteration[0]), int(recorded.iteration[-1])
+            there = robot.history(since=first, until=last)
+
+    assert len(recorded) > KILLS
+    assert np.array_equal(recorded.iteration, np.arange(first, last + 1))
+    assert recorded.rows.tobytes() == there.rows.tobytes()
+    assert RecordingFile(path)[name].epochs[0].gaps == []
