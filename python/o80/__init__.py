@@ -48,7 +48,9 @@ if TYPE_CHECKING:
     from o80.limits import Limits
     from o80.prepared_burst import PreparedBurst
     from o80.record import Record
-    from o80.recording.reader import RecordingFile, open
+    from o80.recording.reader import RecordingFile
+    from o80.recording.reader import open as open
+    from o80.recording.recording import Recording
     from o80.running_request import RunningRequest
     from o80.segment_list import Segment, clean, segments
     from o80.states import States
@@ -75,6 +77,7 @@ _LAZY = {
     "Limits": "o80.limits",
     "PreparedBurst": "o80.prepared_burst",
     "Record": "o80.record",
+    "Recording": "o80.recording.recording",
     "RecordingFile": "o80.recording.reader",
     "open": "o80.recording.reader",
     "RunningRequest": "o80.running_request",
@@ -143,6 +146,7 @@ __all__ = [
     "ReadOnly",
     "Reason",
     "Record",
+    "Recording",
     "RecordingError",
     "RecordingFile",
     "RequestRejected",

@@ -1,7 +1,6 @@
 """Histories outlive a session: NumPy, pickle, HDF5 and pandas."""
 
 import io
-import itertools
 import pickle
 import sys
 from pathlib import Path
@@ -9,51 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
-from mixed_robots import GROUPS, SENSORS, Mode, fill
+from mixed_robots import GROUPS, ROBOTS, SENSORS, Mode, recorded
 
 import o80
-
-_names = (f"test-saving-{i}" for i in itertools.count())
-
-
-def recorded(groups: Any, sensors: Any, seed: int, rows: int = 5) -> o80.History:
-    """What a robot of these types published."""
-    random = np.random.default_rng(seed)
-    name = next(_names)
-    options: Any = {"extended": sensors, "bursting": True}
-    with o80.Backend(name, groups, **options) as backend:
-        backend.publish(_random(random, backend._observed), _random(random, backend._extended))
-        with o80.Frontend(name) as frontend:
-            for row in range(rows):
-                if row > 0:
-                    burst = frontend.burst(1, wait=False)
-                    backend.step()
-                backend.publish(
-                    _random(random, backend._observed), _random(random, backend._extended)
-                )
-            assert rows == 1 or burst.done
-            history = frontend.history()
-    o80.clean(name)
-    return history
-
-
-def _random(random: np.random.Generator, like: Any) -> Any:
-    array = np.array(like)
-    if array.dtype.itemsize == 0:
-        return None
-    fill(random, array)
-    return array
-
-
-# each example starts a backend: shrinking would take longer than a test may
-ROBOTS = settings(
-    max_examples=12,
-    deadline=None,
-    phases=[Phase.explicit, Phase.reuse, Phase.generate],
-    suppress_health_check=[HealthCheck.too_slow],
-)
 
 
 @ROBOTS

@@ -146,5 +146,3 @@ class _Report:
         for name in sorted(absent - self._absent):
             complain(f"waiting for segment '{name}'")
         self._absent = absent
-
-

@@ -93,9 +93,7 @@ class RowWriter:
         self._plan = MessagePlan(row_type(layout), layout.size)
 
     @classmethod
-    def added_to(
-        cls, file: "FileWriter", frontend: "Frontend", note: EpochNote
-    ) -> "RowWriter":
+    def added_to(cls, file: "FileWriter", frontend: "Frontend", note: EpochNote) -> "RowWriter":
         """Adds message type, description and channel of an epoch to a file."""
         layout = frontend._layout
         message = row_type(layout)

@@ -10,7 +10,7 @@ import struct
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import zstandard
 from mcap.data_stream import RecordBuilder
@@ -22,6 +22,7 @@ from mcap.records import (
     ChunkIndex,
     DataEnd,
     Header,
+    McapRecord,
     Metadata,
     MetadataIndex,
     Schema,
@@ -95,40 +96,36 @@ class FileWriter:
         """What the file holds by now, except messages."""
         return self._found
 
-    def add_schema(self, name: str, definition: str) -> int:
+    def add_schema(self, name: str, definition: str, *, encoding: str = "ros2msg") -> int:
         """Adds a message type, unless the file has it. Returns its number."""
         for schema in self._found.schemas.values():
             if schema.name == name and schema.data == definition.encode():
                 return schema.id
         number = 1 + max(self._found.schemas, default=0)
-        schema = Schema(id=number, data=definition.encode(), encoding="ros2msg", name=name)
-        builder = RecordBuilder()
-        schema.write(builder)
-        self._append(builder.end())
+        schema = Schema(id=number, data=definition.encode(), encoding=encoding, name=name)
+        self._append(_bytes_of(schema))
         self._found.schemas[number] = schema
         return number
 
-    def add_channel(self, topic: str, schema: int, metadata: Mapping[str, str]) -> int:
+    def add_channel(
+        self, topic: str, schema: int, metadata: Mapping[str, str], *, encoding: str = "cdr"
+    ) -> int:
         """Adds a channel. Returns its number."""
         number = 1 + max(self._found.channels, default=0)
         channel = Channel(
             id=number,
             topic=topic,
-            message_encoding="cdr",
+            message_encoding=encoding,
             metadata=dict(metadata),
             schema_id=schema,
         )
-        builder = RecordBuilder()
-        channel.write(builder)
-        self._append(builder.end())
+        self._append(_bytes_of(channel))
         self._found.channels[number] = channel
         return number
 
     def attach(self, name: str, media_type: str, data: bytes, time: int) -> None:
         """Adds an attachment. time: [ns] since 1970."""
-        builder = RecordBuilder()
-        Attachment(time, time, name, media_type, data).write(builder)
-        record = builder.end()
+        record = _bytes_of(Attachment(time, time, name, media_type, data))
         self._found.attachments.append(
             AttachmentIndex(
                 offset=self.size,
@@ -144,10 +141,8 @@ class FileWriter:
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Adds a record of texts."""
-        builder = RecordBuilder()
         metadata = Metadata(name, dict(values))
-        metadata.write(builder)
-        record = builder.end()
+        record = _bytes_of(metadata)
         self._found.metadata_places.append(MetadataIndex(self.size, len(record), name))
         self._found.metadata.append(metadata)
         self._append(record)
@@ -217,28 +212,23 @@ class FileWriter:
 
     def finish(self) -> None:
         """Writes the summary and closes the file; after it any reader opens the file."""
-        builder = RecordBuilder()
-        DataEnd(0).write(builder)
-        data_end = builder.end()
+        data_end = _bytes_of(DataEnd(0))
         summary_start = self.size + len(data_end)
         summary = bytearray()
         offsets = bytearray()
         for opcode, records in self._summary():
             begin = summary_start + len(summary)
-            for record in records:
-                record.write(builder)
-            group = builder.end()
+            group = _bytes_of(*records)
             if group:
                 summary += group
-                SummaryOffset(opcode, begin, len(group)).write(builder)
-                offsets += builder.end()
+                offsets += _bytes_of(SummaryOffset(opcode, begin, len(group)))
         offset_start = summary_start + len(summary)
         footer = _footer(bytes(summary + offsets), summary_start, offset_start)
-        self._append(bytes(data_end) + summary + offsets + footer + MAGIC, last=True)
+        self._append(data_end + summary + offsets + footer + MAGIC, last=True)
         self._found.finished = True
         self.close()
 
-    def _summary(self) -> Iterable[tuple[Opcode, Sequence[object]]]:
+    def _summary(self) -> Iterable[tuple[Opcode, Sequence[McapRecord]]]:
         found = self._found
         chunks = found.chunks
         yield Opcode.SCHEMA, list(found.schemas.values())
@@ -269,9 +259,14 @@ class FileWriter:
 
 def _beginning() -> bytes:
     """What every file begins with."""
-    builder = RecordBuilder()
-    Header(PROFILE, f"o80 {o80.__version__}").write(builder)
-    return MAGIC + builder.end()
+    return MAGIC + _bytes_of(Header(PROFILE, f"o80 {o80.__version__}"))
+
+
+def _bytes_of(*records: McapRecord) -> bytes:
+    builder: Any = RecordBuilder()
+    for record in records:
+        record.write(builder)
+    return bytes(builder.end())
 
 
 def _footer(summary: bytes, summary_start: int, offset_start: int) -> bytes:

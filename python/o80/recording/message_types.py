@@ -61,10 +61,11 @@ def row_type(layout: Layout) -> MessageType:
     members = [Member(name, *numbers[kind], row[name]) for name, kind in HEAD]
     if layout.actuators:
         states = _states_members(layout)
-        for part in ("desired", "observed"):
-            members.append(_placed(states, part, row[part]))
-        for mask in ("active", "clamped", "braking"):
-            members.append(Member(mask, "bool", 1, row[mask], layout.actuators, bits=True))
+        members += [_placed(states, part, row[part]) for part in ("desired", "observed")]
+        members += [
+            Member(mask, "bool", 1, row[mask], layout.actuators, bits=True)
+            for mask in ("active", "clamped", "braking")
+        ]
     if layout.extras.itemsize:
         extended = _struct(layout.schema["extended"], "Extended")
         members.append(Member("extended", extended.name, 0, row["extended"], None, extended))
@@ -101,9 +102,7 @@ def _group_member(group: dict[str, Any]) -> Member:
 
 
 def _placed(member: Member, name: str, offset: int) -> Member:
-    return Member(
-        name, member.kind, member.size, offset + member.offset, member.count, member.type
-    )
+    return Member(name, member.kind, member.size, offset + member.offset, member.count, member.type)
 
 
 def _struct(described: dict[str, Any], fallback: str) -> MessageType:

@@ -13,10 +13,11 @@ from o80.history import History
 from o80.layout import decoder_of
 from o80.recording.blocks import messages_in
 from o80.recording.epoch import EpochNote
+from o80.recording.marks import Mark, marks_in
 from o80.recording.message_plan import MessagePlan
 from o80.recording.message_types import row_type
 from o80.recording.scan import (
-    NotARecording,
+    NotARecordingError,
     Scan,
     attachment_of,
     content_of,
@@ -36,7 +37,7 @@ class RecordingFile:
         self.path = Path(path)
         try:
             self._scan = scan(path)
-        except NotARecording as error:
+        except NotARecordingError as error:
             raise RecordingError(f"{error}: o80.open reads files of o80 record") from None
         except OSError as error:
             raise RecordingError(f"{path} cannot be read: {error.strerror}") from error
@@ -51,6 +52,12 @@ class RecordingFile:
     def finished(self) -> bool:
         """Its recorder ended in order; else `o80 repair` completes the file for other readers."""
         return self._scan.finished
+
+    @property
+    def marks(self) -> list[Mark]:
+        """The notes of the program that recorded, in their order."""
+        with self.path.open("rb") as file:
+            return marks_in(file, self._scan)
 
     def __getitem__(self, name: str) -> "RecordedSegment":
         try:
@@ -175,10 +182,8 @@ class RecordedEpoch:
         ]
         layout = self._decoder.layout
         plan = MessagePlan(row_type(layout), layout.size)
-        parts = []
         with self._path.open("rb") as file:
-            for chunk in chosen:
-                parts.append(plan.decode(self._messages(file, chunk, plan.size)))
+            parts = [plan.decode(self._messages(file, chunk, plan.size)) for chunk in chosen]
         raw = np.concatenate(parts) if parts else np.empty((0, layout.size), np.uint8)
         rows = np.ascontiguousarray(raw).view(layout.row).reshape(len(raw))
         history = History(self._decoder, rows)

@@ -13,7 +13,7 @@ from o80.recording.blocks import messages_in
 from o80.recording.epoch import EpochNote
 from o80.recording.file_writer import FileWriter
 from o80.recording.message_plan import ENCAPSULATION
-from o80.recording.scan import NotARecording, content_of, index_of
+from o80.recording.scan import NotARecordingError, content_of, index_of
 from o80.recording.source import Source, Written
 from o80.segment_list import segments
 
@@ -58,6 +58,11 @@ class Recorder:
     def missed(self) -> int:
         """Rows that were overwritten before they were read."""
         return sum(source.missed for source in self.sources.values())
+
+    @property
+    def newest(self) -> dict[str, int]:
+        """Iteration of the newest row of each segment; -1 for one that is not there."""
+        return {name: source.newest for name, source in self.sources.items()}
 
     def poll(self) -> int:
         """Writes a chunk of the rows published since the last call; returns how many rows."""
@@ -110,7 +115,7 @@ def opened(path: Path, *, proceed: bool, compression: str = "zstd") -> FileWrite
         raise RecordingError(
             f"{path} exists. Choose another name, continue it with --continue, or remove it"
         ) from None
-    except NotARecording as error:
+    except NotARecordingError as error:
         raise RecordingError(f"{error}: choose another name, or remove it") from None
     except OSError as error:
         raise RecordingError(f"{path} cannot be written: {error.strerror}") from error

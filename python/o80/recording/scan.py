@@ -36,7 +36,7 @@ CHUNK_HEAD = struct.Struct("<QQQIL")
 FOOTER_LENGTH = HEAD.size + 20 + len(MAGIC)
 
 
-class NotARecording(ValueError):
+class NotARecordingError(ValueError):
     """The file does not begin as an MCAP file does."""
 
 
@@ -57,11 +57,11 @@ class Scan:
 
 
 def scan(path: str | os.PathLike[str]) -> Scan:
-    """Reads everything but messages. Raises NotARecording, OSError."""
+    """Reads everything but messages. Raises NotARecordingError, OSError."""
     with Path(path).open("rb") as file:
         size = os.fstat(file.fileno()).st_size
         if file.read(len(MAGIC)) != MAGIC:
-            raise NotARecording(f"{path} is not an MCAP file")
+            raise NotARecordingError(f"{path} is not an MCAP file")
         return _Scanner(file, size).run()
 
 
@@ -87,7 +87,8 @@ def index_of(file: IO[bytes], chunk: ChunkIndex, channel: int) -> NDArray[np.uin
 def attachment_of(file: IO[bytes], place: AttachmentIndex) -> Attachment:
     """An attachment with its data."""
     file.seek(place.offset + HEAD.size)
-    return Attachment.read(ReadDataStream(file))
+    attachment: Attachment = Attachment.read(ReadDataStream(file))
+    return attachment
 
 
 class _Scanner:
@@ -209,5 +210,5 @@ class _Scanner:
         data = self._file.read()
         if len(data) != FOOTER_LENGTH or not data.endswith(MAGIC):
             return False
-        footer = Footer.read(ReadDataStream(BytesIO(data[HEAD.size :])))
+        footer: Footer = Footer.read(ReadDataStream(BytesIO(data[HEAD.size :])))
         return footer.summary_start > 0

@@ -46,11 +46,17 @@ class Source:
         self._last_log_time = max((each.last_log_time for each in written.values()), default=0)
         self._look_at = 0.0
         self._attach()  # recording begins now
+        self._whole = True  # a robot that starts later is recorded from its first row
 
     @property
     def attached(self) -> bool:
         """Rows come, or may come."""
         return self._frontend is not None
+
+    @property
+    def newest(self) -> int:
+        """Iteration of the newest row; -1: there is none."""
+        return -1 if self._frontend is None else self._frontend.published
 
     def close(self) -> None:
         """Detaches."""
@@ -95,7 +101,6 @@ class Source:
             self._next = max(known.last + 1, known.note.begin)
             return
         first = frontend.oldest if self._whole or self._written else frontend.published
-        self._whole = True  # whoever starts later is recorded from its first row
         note = note_of(frontend, len(self._written), first)
         if self._written:
             first_time = frontend.history(since=first, until=first).time
@@ -133,6 +138,4 @@ class Source:
         self.missed += last - first + 1
         note = self._writer.note
         values = {"segment": note.segment, "epoch": str(note.epoch), "number": str(note.number)}
-        self._file.add_metadata(
-            GAP, values | {"first": str(first), "last": str(last)}
-        )
+        self._file.add_metadata(GAP, values | {"first": str(first), "last": str(last)})

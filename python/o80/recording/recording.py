@@ -1,0 +1,122 @@
+"""A recording made by a program, beside what it does."""
+
+import os
+import threading
+import time
+from collections.abc import Sequence
+from types import TracebackType
+from typing import Any, Self
+
+from o80.errors import Closed, RecordingError
+from o80.frontend import Frontend
+from o80.recording.marks import Mark, add_mark
+from o80.recording.recorder import Recorder
+
+BETWEEN_POLLS = 0.05  # [s]
+
+
+class Recording:
+    """Records segments in a thread while its `with` block runs.
+
+    with o80.Recording("run.mcap", [arm, "ball"]) as recording:
+        recording.mark("episode", number=3)
+
+    path: the file, which must not exist.
+    segments: names, patterns such as "arm*", or frontends. Rows are recorded from the newest one
+        on, of robots that start later from the first.
+    proceed: continue an existing file, also one that was cut.
+    whole: begin with the oldest rows that the segments still hold.
+
+    A robot whose history is overwritten before the thread reads it leaves a gap: a program that
+    bursts very many iterations at once calls `flush` between them. Raises RecordingError.
+    """
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        segments: str | Frontend | Sequence[str | Frontend],
+        *,
+        proceed: bool = False,
+        whole: bool = False,
+    ) -> None:
+        several = [segments] if isinstance(segments, (str, Frontend)) else segments
+        names = [each.segment if isinstance(each, Frontend) else each for each in several]
+        self._recorder = Recorder(path, names, proceed=proceed, whole=whole)
+        self._lock = threading.Lock()
+        self._end = threading.Event()
+        self._failure: RecordingError | None = None
+        self._closed = False
+        self._thread = threading.Thread(target=self._run, name="o80-recording", daemon=True)
+        self._thread.start()
+
+    @property
+    def rows(self) -> int:
+        """Rows recorded so far."""
+        return self._recorder.rows
+
+    @property
+    def missed(self) -> int:
+        """Rows that were overwritten before they were read: each is in a gap of the file."""
+        return self._recorder.missed
+
+    @property
+    def size(self) -> int:
+        """Of the file so far [bytes]."""
+        return self._recorder.file.size
+
+    def flush(self) -> None:
+        """Returns when every row that was published before the call is in the file."""
+        with self._lock:
+            self._check()
+            self._recorder.catch_up()
+
+    def mark(self, name: str, **values: Any) -> None:
+        """Writes a note: a name and values, with the newest iteration of each segment.
+
+        values: whatever JSON can hold. Raises TypeError.
+        """
+        with self._lock:
+            self._check()
+            rows = self._recorder.newest
+            add_mark(self._recorder.file, Mark(name, time.time_ns(), rows, values))
+
+    def close(self) -> None:
+        """Records the rows published until now and finishes the file; may be called twice."""
+        if self._closed:
+            return
+        self._closed = True
+        self._end.set()
+        self._thread.join()
+        try:
+            if self._failure is None:
+                self._recorder.catch_up()
+        finally:
+            self._recorder.finish()
+        if self._failure is not None:
+            raise self._failure
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _check(self) -> None:
+        if self._closed:
+            raise Closed(f"the recording {self._recorder.file.path} was closed")
+        if self._failure is not None:
+            raise self._failure
+
+    def _run(self) -> None:
+        while not self._end.wait(BETWEEN_POLLS):
+            try:
+                with self._lock:
+                    self._recorder.catch_up()
+            except RecordingError as error:
+                self._failure = error
+                return

@@ -1,0 +1,122 @@
+"""o80 record, o80 save and o80 repair."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import o80
+from o80.recording.scan import scan
+
+WAIT = 60.0  # [s] longer than any command should take
+
+
+def o80_command(*words: str | Path) -> list[str]:
+    return [str(Path(sys.executable).parent / "o80"), *map(str, words)]
+
+
+def run(*words: str | Path, code: int = 0) -> str:
+    done = subprocess.run(o80_command(*words), capture_output=True, text=True, timeout=WAIT)
+    assert done.returncode == code, done.stdout + done.stderr
+    return done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_finishes_the_file(
+    number: signal.Signals, process: o80.robots.Process, tmp_path: Path
+) -> None:
+    path = tmp_path / "run.mcap"
+    command = o80_command("record", process.segment, "-o", path)
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as recorder:
+        while not path.exists() or not scan_or_none(path):
+            assert recorder.poll() is None
+        recorder.send_signal(number)
+        _, said = recorder.communicate(timeout=WAIT)
+
+    assert recorder.returncode == 0, said
+    file = o80.open(path)
+    assert file.finished
+    assert f"{file[process.segment].epochs[0].rows} rows" in said
+
+
+def scan_or_none(path: Path) -> bool:
+    """Whether a chunk is in the file."""
+    try:
+        return bool(scan(path).chunks)
+    except ValueError:
+        return False
+
+
+def test_seconds_and_size_end_it(process: o80.robots.Process, tmp_path: Path) -> None:
+    run("record", process.segment, "-o", tmp_path / "a.mcap", "--seconds", "0.2")
+    run("record", process.segment, "-o", tmp_path / "b.mcap", "--size", "3k")
+
+    for name in ("a", "b"):
+        assert o80.open(tmp_path / f"{name}.mcap")[process.segment].epochs[0].rows > 0
+    assert scan(tmp_path / "b.mcap").end >= 3000
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--seconds", "-1"], "seconds must be positive"),
+        (["--seconds", "nan"], "seconds must be positive"),
+        (["--size", "many"], "a number of bytes such as 500M"),
+        (["--size", "0"], "a number of bytes such as 500M"),
+    ],
+)
+def test_wrong_options_are_named(words: list[str], said: str, tmp_path: Path) -> None:
+    assert said in " ".join(run("record", "arm", "-o", tmp_path / "a.mcap", *words, code=2).split())
+    assert not (tmp_path / "a.mcap").exists()
+
+
+def test_a_segment_that_is_not_there_is_waited_for_and_said(tmp_path: Path) -> None:
+    said = run("record", "nobody", "-o", tmp_path / "a.mcap", "--seconds", "0.7")
+
+    assert "waiting for segment 'nobody'" in said
+    assert "0 rows" in said
+
+
+def test_save_writes_what_a_killed_robot_left(process: o80.robots.Process, tmp_path: Path) -> None:
+    with process.frontend() as arm:
+        arm.wait_for(30, timeout=WAIT)
+        os.kill(process.pid, signal.SIGKILL)
+        with pytest.raises(o80.BackendKilled):
+            arm.wait_for(2**40, timeout=WAIT)
+        rows = arm.history().rows
+    path = tmp_path / "crash.mcap"
+
+    assert f"{len(rows)} rows of {process.segment}" in run("save", process.segment, "-o", path)
+    assert o80.open(path)[process.segment].history().rows.tobytes() == rows.tobytes()
+
+
+def test_save_of_an_unknown_segment_makes_no_file(tmp_path: Path) -> None:
+    path = tmp_path / "crash.mcap"
+
+    assert "there is no segment 'nobody'" in run("save", "nobody", "-o", path, code=1)
+    assert not path.exists()
+
+
+def test_repair_finishes_a_cut_file_once(arm: o80.Frontend, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with o80.Recording(path, arm) as recording:
+        arm.burst(20)
+        recording.flush()
+    whole = path.read_bytes()
+    path.write_bytes(whole[: scan(path).end + 5])
+
+    assert not o80.open(path).finished
+    assert "5 bytes of an incomplete part removed" in run("repair", path)
+    assert path.read_bytes() == whole
+    assert "is complete" in run("repair", path)
+    assert path.read_bytes() == whole
+
+
+def test_repair_refuses_what_is_no_recording(tmp_path: Path) -> None:
+    (tmp_path / "x.mcap").write_text("not this")
+
+    assert "is not an MCAP file" in run("repair", tmp_path / "x.mcap", code=1)
+    assert "cannot be read" in run("repair", tmp_path / "missing.mcap", code=1)

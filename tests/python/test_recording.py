@@ -1,0 +1,169 @@
+"""Recording robots: restarts, patterns, gaps, marks, and what stands in the way."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import o80
+from o80.recording.recorder import Recorder
+
+WAIT = 30.0  # [s] longer than any wait should take
+
+
+def test_a_program_records_what_it_does(arm: o80.Frontend, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    arm.burst(10)
+    with o80.Recording(path, arm) as recording:
+        recording.mark("episode", number=3, ball=[0.1, 0.2])
+        arm.add_command("elbow", 0.5, iterations=50)
+        arm.burst(50)
+        recording.flush()
+        assert recording.rows == 51
+        recording.mark("end")
+    file = o80.open(path)
+    first, last = file.marks
+
+    assert file.finished
+    assert file[arm.segment].history().iteration.tolist() == list(range(10, 61))
+    assert (first.name, first.values, first.rows) == (
+        "episode",
+        {"number": 3, "ball": [0.1, 0.2]},
+        {arm.segment: 10},
+    )
+    assert last.rows == {arm.segment: 60}
+    assert first.time <= last.time
+
+
+def test_whole_begins_with_the_oldest_row(arm: o80.Frontend, tmp_path: Path) -> None:
+    arm.burst(10)
+    with o80.Recording(tmp_path / "run.mcap", arm, whole=True):
+        pass
+
+    assert o80.open(tmp_path / "run.mcap")[arm.segment].history().iteration[0] == 0
+
+
+def test_a_robot_that_restarts_goes_on_in_the_same_file(segment: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    recorder = Recorder(path, [segment])  # before the robot is there
+    rows = []
+    for count in (30, 20):
+        with o80.robots.load("two_joints").inline(segment) as arm:
+            arm.burst(count)
+            while recorder.sources[segment].newest != count:
+                recorder.catch_up()
+            recorder.catch_up()
+            rows.append(arm.history().rows.tobytes())
+    recorder.finish()
+    recorded = o80.open(path)[segment]
+
+    assert [epoch.rows for epoch in recorded.epochs] == [31, 21]
+    assert [epoch.history().rows.tobytes() for epoch in recorded.epochs] == rows
+    first, second = recorded.epochs
+    assert (
+        first.history().time[-1] + first.wall_offset < second.history().time[0] + second.wall_offset
+    )
+    with pytest.raises(o80.InvalidArgument, match=r"2 epochs.*\.epochs\[-1\]"):
+        recorded.history()
+
+
+def test_segments_of_a_pattern_join_when_they_appear(segment: str, tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "run.mcap", [f"{segment}*"])
+    load = o80.robots.load("two_joints")
+    with load.inline(f"{segment}-a") as one, load.inline(f"{segment}-b") as other:
+        recorder._search(whole=True)
+        one.burst(5)
+        other.burst(7)
+        recorder.catch_up()
+    recorder.finish()
+    file = o80.open(tmp_path / "run.mcap")
+
+    assert {name: file[name].epochs[0].rows for name in file} == {
+        f"{segment}-a": 6,
+        f"{segment}-b": 8,
+    }
+    with pytest.raises(KeyError, match=f"there are: {segment}-a, {segment}-b"):
+        file["arm"]
+
+
+def test_rows_that_were_overwritten_are_a_gap(segment: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with o80.robots.load("two_joints").inline(segment, history=16) as arm:
+        recorder = Recorder(path, [segment])
+        recorder.catch_up()
+        arm.burst(100)
+        recorder.catch_up()
+        recorder.finish()
+        oldest = arm.oldest
+    epoch = o80.open(path)[segment].epochs[0]
+
+    assert epoch.gaps == [(1, oldest - 1)]
+    assert recorder.missed == oldest - 1
+    assert epoch.history().iteration.tolist() == [0, *range(oldest, 101)]
+
+
+def test_a_recorder_reads_to_the_end_of_a_robot_that_has_ended(
+    segment: str, tmp_path: Path
+) -> None:
+    recorder = Recorder(tmp_path / "run.mcap", [segment])
+    with o80.robots.load("two_joints").inline(segment) as arm:
+        recorder.catch_up()
+        arm.burst(40)
+    recorder.catch_up()
+    recorder.finish()
+
+    assert o80.open(tmp_path / "run.mcap")[segment].epochs[0].rows == 41
+
+
+def test_log_times_are_the_wall_clock(process: o80.robots.Process, tmp_path: Path) -> None:
+    import time
+
+    before = time.time_ns()
+    with process.frontend() as arm, o80.Recording(tmp_path / "run.mcap", arm):
+        arm.wait_for(arm.published + 20, timeout=WAIT)
+    after = time.time_ns()
+    epoch = o80.open(tmp_path / "run.mcap")[process.segment].epochs[0]
+    walls = epoch.history().time + epoch.wall_offset
+
+    assert before - 1e9 < walls[0] < walls[-1] < after + 1e9
+
+
+@pytest.mark.parametrize("value", [object(), {1, 2}])
+def test_a_mark_that_is_no_json_changes_nothing(
+    value: object, arm: o80.Frontend, tmp_path: Path
+) -> None:
+    with o80.Recording(tmp_path / "run.mcap", arm) as recording:
+        with pytest.raises(TypeError):
+            recording.mark("episode", value=value)
+        recording.mark("good")
+
+    assert [mark.name for mark in o80.open(tmp_path / "run.mcap").marks] == ["good"]
+
+
+def test_a_closed_recording_says_so(arm: o80.Frontend, tmp_path: Path) -> None:
+    recording = o80.Recording(tmp_path / "run.mcap", arm)
+    recording.close()
+    recording.close()
+
+    with pytest.raises(o80.Closed, match=r"run\.mcap was closed"):
+        recording.flush()
+    with pytest.raises(o80.Closed):
+        recording.mark("late")
+
+
+def test_no_name_and_no_folder_are_refused(arm: o80.Frontend, tmp_path: Path) -> None:
+    with pytest.raises(o80.InvalidArgument, match="at least one segment"):
+        o80.Recording(tmp_path / "run.mcap", [])
+    with pytest.raises(o80.RecordingError, match="cannot be written: No such file"):
+        o80.Recording(tmp_path / "missing" / "run.mcap", arm)
+
+
+def test_integers_beyond_2_to_the_53_are_kept(segment: str, tmp_path: Path) -> None:
+    with o80.Backend(segment, {"count": np.int64}, bursting=True) as backend:
+        backend.publish({"count": 2**62 + 1})
+        recorder = Recorder(tmp_path / "run.mcap", [segment], whole=True)
+        recorder.catch_up()
+        recorder.finish()
+
+    observed = o80.open(tmp_path / "run.mcap")[segment].history().observed
+    assert int(np.asarray(observed["count"]).ravel()[0]) == 2**62 + 1

@@ -1,0 +1,157 @@
+"""Files of recordings: what public readers see, and what is left of cut and damaged ones."""
+
+import resource
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from rosbags.highlevel import AnyReader
+
+import o80
+from o80.recording.recorder import Recorder
+from o80.recording.scan import scan
+
+CUTS = 60
+
+
+@pytest.fixture
+def recorded(arm: o80.Frontend, tmp_path: Path) -> tuple[Path, o80.History]:
+    """A file of 10 chunks of 20 rows, and the rows."""
+    path = tmp_path / "run.mcap"
+    recorder = Recorder(path, [arm.segment])
+    for i in range(10):
+        arm.add_command("elbow", 0.1 * i, iterations=20)
+        arm.burst(20)
+        recorder.poll()
+    recorder.finish()
+    return path, arm.history()
+
+
+def test_the_mcap_library_reads_it(recorded: tuple[Path, o80.History]) -> None:
+    path, history = recorded
+    with path.open("rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        summary = reader.get_summary()
+        messages = list(reader.iter_messages())
+        attachments = list(reader.iter_attachments())
+
+    assert summary is not None
+    assert summary.statistics is not None
+    assert summary.statistics.message_count == len(messages) == len(history)
+    assert [len(attachment.data) > 0 for attachment in attachments] == [True]
+
+
+def test_rosbags_reads_every_row_in_order(recorded: tuple[Path, o80.History]) -> None:
+    path, history = recorded
+    with AnyReader([path]) as reader:
+        rows = [reader.deserialize(raw, each.msgtype) for each, _, raw in reader.messages()]
+
+    assert [row.iteration for row in rows] == history.iteration.tolist()
+    assert np.array_equal([row.desired for row in rows], history.desired)
+    assert np.array_equal([row.extended.effort for row in rows], history.extended.effort)
+
+
+def test_o80_reads_the_same_bytes(recorded: tuple[Path, o80.History]) -> None:
+    path, history = recorded
+    (read,) = o80.open(path).segments.values()
+
+    assert read.history().rows.tobytes() == history.rows.tobytes()
+    assert read.schema == history.schema
+    assert read.history(since=35, until=47).iteration.tolist() == list(range(35, 48))
+    assert read.history(5).iteration.tolist() == history.iteration.tolist()[-5:]
+    assert read.history(seconds=0.01).time.tolist() == history.select(seconds=0.01).time.tolist()
+    late = int(history.time[-10])
+    assert read.history(from_time=late).time.tolist() == history.time.tolist()[-10:]
+
+
+def test_wherever_it_is_cut_whole_chunks_are_read_and_continued(
+    recorded: tuple[Path, o80.History], arm: o80.Frontend
+) -> None:
+    path, history = recorded
+    whole = path.read_bytes()
+    groups = {0, *(each.chunk_start_offset for each in scan(path).chunks), len(whole) - 1}
+    chance = np.random.default_rng(3)
+    for cut in [*groups, *chance.integers(0, len(whole), CUTS)]:
+        path.write_bytes(whole[: int(cut)])
+        recorder = Recorder(path, [arm.segment], proceed=True, whole=True)
+        recorder.catch_up()
+        recorder.finish()
+
+        read = o80.open(path)[arm.segment].history()
+        assert read.rows.tobytes() == history.rows.tobytes(), f"cut at {cut}"
+        with path.open("rb") as file:
+            assert sum(1 for _ in make_reader(file, validate_crcs=True).iter_messages()) == len(
+                read
+            )
+
+
+def test_a_cut_file_is_read_up_to_its_last_whole_chunk(
+    recorded: tuple[Path, o80.History], arm: o80.Frontend
+) -> None:
+    path, history = recorded
+    whole = path.read_bytes()
+    chunks = scan(path).chunks
+    path.write_bytes(whole[: chunks[6].chunk_start_offset + 40])
+    file = o80.open(path)
+
+    assert not file.finished
+    rows = file[arm.segment].history()
+    assert rows.rows.tobytes() == history[: len(rows)].rows.tobytes()
+    assert len(rows) == int(history.iteration.searchsorted(120, side="right"))
+
+
+def test_a_damaged_chunk_is_named(recorded: tuple[Path, o80.History], arm: o80.Frontend) -> None:
+    path, _ = recorded
+    data = bytearray(path.read_bytes())
+    place = scan(path).chunks[4].chunk_start_offset
+    data[place + 60] ^= 0xFF
+    path.write_bytes(data)
+
+    with pytest.raises(o80.RecordingError, match=f"chunk at byte {place} is damaged"):
+        o80.open(path)[arm.segment].history()
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 something else"])
+def test_another_file_is_refused(content: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "other.mcap"
+    path.write_bytes(content)
+
+    with pytest.raises(o80.RecordingError, match="is not an MCAP file"):
+        o80.open(path)
+
+
+def test_a_file_that_exists_is_not_overwritten(arm: o80.Frontend, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    path.write_bytes(b"precious")
+
+    with pytest.raises(o80.RecordingError, match="exists"):
+        Recorder(path, [arm.segment])
+    assert path.read_bytes() == b"precious"
+
+
+def record_for_ever(arm: o80.Frontend, recorder: Recorder) -> None:
+    while True:
+        arm.burst(500)
+        recorder.poll()
+
+
+def test_a_full_disk_ends_in_an_error_and_a_file_that_readers_open(
+    arm: o80.Frontend, tmp_path: Path
+) -> None:
+    path = tmp_path / "run.mcap"
+    recorder = Recorder(path, [arm.segment], compression="none")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (250_000, limits[1]))
+    try:
+        with pytest.raises(o80.RecordingError, match="cannot be written any more"):
+            record_for_ever(arm, recorder)
+        recorder.finish()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+
+    rows = o80.open(path)[arm.segment].history()
+    assert np.array_equal(rows.iteration, np.arange(len(rows)))
+    with path.open("rb") as file:
+        assert sum(1 for _ in make_reader(file, validate_crcs=True).iter_messages()) == len(rows)
+    assert path.stat().st_size <= 250_000
