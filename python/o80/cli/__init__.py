@@ -1,4 +1,4 @@
-"""The command line: ``o80 run | list | info | echo | halt | resume | stop | clean``."""
+"""The command line: ``o80 run | list | info | echo | record | ...``, one command a file."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ def record(
     ],
     output: Annotated[Path, typer.Option("--output", "-o", help="File to write, NAME.mcap.")],
     seconds: Annotated[
-        float | None, typer.Option(callback=_seconds, help="Stop after this time [s].")
+        float | None, typer.Option(callback=_seconds, help="Stop after this many seconds.")
     ] = None,
     size: Annotated[
         str | None, typer.Option(help="Stop when the file has this size, for example 2G.")
@@ -121,7 +121,7 @@ class _Report:
         if now - self._at < _BETWEEN_REPORTS and not last:
             return
         recorder = self._recorder
-        self._say_what_changed()
+        self._say_what_changed(last)
         rate = (recorder.rows - self._rows) / (now - self._at)
         self._at, self._rows = now, recorder.rows
         if last or self._terminal:
@@ -134,7 +134,7 @@ class _Report:
             begin = "\r\033[K" if self._terminal else ""
             print(f"{begin}{line}", end="\n" if last else "", file=sys.stderr, flush=True)
 
-    def _say_what_changed(self) -> None:
+    def _say_what_changed(self, last: bool) -> None:
         recorder = self._recorder
         if recorder.missed > self._missed:
             complain(
@@ -142,6 +142,8 @@ class _Report:
                 f"the file has a gap. A longer --history of the robot gives the recorder more time"
             )
             self._missed = recorder.missed
+        if last:  # sources are closed
+            return
         absent = {name for name, source in recorder.sources.items() if not source.attached}
         for name in sorted(absent - self._absent):
             complain(f"waiting for segment '{name}'")
