@@ -23,4 +23,6 @@ with tempfile.TemporaryDirectory() as folder:
     print(f"{len(history)} rows, the last at {history.time[-1] * 1e-9:.3f} s")
     for mark in file.marks:
         row = history.at_iteration(mark.rows[name])
-        print(f"{mark.name} {mark.values['number']}: begins with the elbow at {row.observed[1]:.3f}")
+        print(
+            f"{mark.name} {mark.values['number']}: begins with the elbow at {row.observed[1]:.3f}"
+        )

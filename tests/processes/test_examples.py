@@ -33,6 +33,7 @@ SAYS = {
         "smoothly at 10 rad/s: 188",
     ],
     "queue_and_overwrite": ["the slow command was overwritten", "the last one was purged"],
+    "recording": ["151 rows", "episode 2: begins with the elbow at 0.037"],
     "several_frontends": ["both ended: COMPLETED, COMPLETED", "without control: REJECTED"],
     "snapshots": ["the same to the last bit: True", "refused: "],
     "waiting_or_not": ["asked for 0.30 rad", "is next"],

@@ -107,7 +107,8 @@ def test_a_recorder_reads_to_the_end_of_a_robot_that_has_ended(
 ) -> None:
     recorder = Recorder(tmp_path / "run.mcap", [segment])
     with o80.robots.load("two_joints").inline(segment) as arm:
-        recorder.catch_up()
+        while not recorder.sources[segment].attached:
+            recorder.catch_up()
         arm.burst(40)
     recorder.catch_up()
     recorder.finish()
