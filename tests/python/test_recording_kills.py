@@ -6,6 +6,7 @@ import signal
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import o80
 from o80.recording.reader import RecordingFile
@@ -48,6 +49,7 @@ def recorded_iterations(path: Path, name: str) -> "np.ndarray[tuple[int], np.dty
     return file[name].history().iteration if len(file) else np.empty(0, np.int64)
 
 
+@pytest.mark.check
 def test_no_row_is_lost_and_none_is_written_twice(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     chance = random.Random(7)
