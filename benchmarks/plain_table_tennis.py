@@ -94,13 +94,15 @@ class PlainEnvironment(gymnasium.Env[Float32Array, Float32Array]):
         self._steps += 1
         state = self._look()
         observation = self._box.clip(self._task.observe(state))
-        eventful = bool(self._task.eventful(state))
-        end = End(int(self._task.end(state))) if eventful else End.RUNNING
-        reward = float(self._task.reward(state)) if eventful else 0.0
+        end, reward = End.RUNNING, 0.0
+        if self._task.eventful(state):
+            end, reward = End(int(self._task.end(state))), float(self._task.reward(state))
         info = self._info(state, end)
         self.steps += 1
         self.seconds_stepping += time.perf_counter() - called
-        self._over = end is not End.RUNNING
+        if end is End.RUNNING:
+            return observation, reward, False, False, info
+        self._over = True
         return observation, reward, end.terminated, end.truncated, info
 
     def _look(self) -> State:

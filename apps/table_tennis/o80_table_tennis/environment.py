@@ -91,6 +91,7 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         self.observation_space = self._box.space
         self.action_space = spaces.Box(-1.0, 1.0, (MUSCLES,), np.float32)
 
+        self._real_time = self._rig_settings.pacing.real_time
         self._counts = StepCounts()
         self._episode = -1
         self._begun = False
@@ -118,7 +119,7 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         """Arm and twins to the start; the ball flies from the first step on."""
         super().reset(seed=seed)
         numbers, flights = self._choose_balls(options or {})
-        self._goal = self._task.begin(self.np_random)
+        goal = self._task.begin(self.np_random)
         arm_seed = int(self.np_random.integers(SEEDS))
         twin_seed = int(self.np_random.integers(SEEDS))
         self._rig.reset(
@@ -131,7 +132,10 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         self._begun, self._over, self._summary = False, False, None
         self._episode += 1
         self._virtual.begin(numbers[1:])
-        self._state = state = self._look()
+        arm, twin = self._arm, self._twin
+        self._state = state = State(
+            0, arm.last_motion, arm.pressures, arm.last_racket, twin.ball, twin.record, goal
+        )
         return self._box.clip(self._task.observe(state)), self._info(state, End.RUNNING)
 
     def step(self, action: Action) -> Outcome:
@@ -143,7 +147,7 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
             self._begin()
         called = time.perf_counter()
         rig = self._rig
-        if rig.lateness > self._settings.most_late:
+        if self._real_time and rig.lateness > self._settings.most_late:
             return self._stall()
 
         # action => pressures => rows of the arm => rows of the twins => what is returned
@@ -168,16 +172,17 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         """What a step returns that began when the clock said `called` [s]."""
         self._steps += 1
         self._count()
-        self._state = state = self._look()
+        state = self._look()
         observation = self._box.clip(self._task.observe(state))
-        eventful = bool(self._task.eventful(state))
-        end = End(int(self._task.end(state))) if eventful else End.RUNNING
-        reward = float(self._task.reward(state)) if eventful else 0.0
+        end, reward = End.RUNNING, 0.0
+        if self._task.eventful(state):
+            end, reward = End(int(self._task.end(state))), float(self._task.reward(state))
         self._paid += reward
         info = self._info(state, end)
         self._counts.seconds_stepping += time.perf_counter() - called
-        if end is not End.RUNNING:
-            self._finish(end.text)
+        if end is End.RUNNING:
+            return observation, reward, False, False, info
+        self._finish(end.text)
         return observation, reward, end.terminated, end.truncated, info
 
     def _stall(self) -> Outcome:
@@ -229,16 +234,11 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
 
     def _look(self) -> State:
         """The newest rows of the arm and of the first twin, for the task."""
-        arm, twin = self._arm, self._twin
-        return State(
-            self._steps,
-            arm.last_motion,
-            arm.pressures,
-            arm.last_racket,
-            twin.ball,
-            twin.record,
-            self._goal,
-        )
+        state, twin = self._state, self._twin
+        state.steps = self._steps
+        state.pressures = self._arm.pressures
+        state.ball, state.record = twin.ball, twin.record
+        return state
 
     def _info(self, state: State, end: End) -> Info:
         info = self._task.info(state)
@@ -250,12 +250,14 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
 
     def _count(self) -> None:
         """Whether the step was exact, by the numbers of the iterations, and how late it was."""
-        counts, lateness = self._counts, self._rig.lateness
+        counts = self._counts
         counts.steps += 1
         counts.exact_steps += self._rig.exact
-        counts.summed_lateness += lateness
-        counts.largest_lateness = max(counts.largest_lateness, lateness)
-        counts.late_actions += self._arm.late
+        if self._real_time:
+            lateness = self._rig.lateness
+            counts.summed_lateness += lateness
+            counts.largest_lateness = max(counts.largest_lateness, lateness)
+            counts.late_actions += self._arm.late
 
     # ------------------------------------------------------------------ beside the episode
 

@@ -96,7 +96,7 @@ class Arm:
 
         By the clock they are sent now; an arm that bursts gets them with its `step`.
         """
-        self._pressures[...] = self.range.raw(pressures)
+        self.range.raw(pressures, out=self._pressures)
         self._at = at
         if self._burst is None:
             self.frontend.add_trajectory(self._pressures[np.newaxis], mode="overwrite")

@@ -36,6 +36,10 @@ VELOCITY_AFTER = ("velocity_after",)
 LARGEST_SPEED = ("largest_speed",)
 SMALLEST_DISTANCE = ("smallest_distance",)
 
+READ = {
+    *(TOUCHES, NET_TOUCHES, FLOOR_TOUCHES, LANDED_AT, LANDING),
+    *(VELOCITY_AFTER, LARGEST_SPEED, SMALLEST_DISTANCE),
+}
 CODES = {"u4": "I", "i8": "q", "f8": "d"}
 """Of numbers, for `struct`."""
 
@@ -68,10 +72,15 @@ class BallReader:
     """
 
     def __init__(self, dtype: np.dtype[Any], offset: int) -> None:
-        codes, places = "=", {}
-        for path, code in _numbers(dtype):
-            places[path] = len(struct.unpack(codes, bytes(struct.calcsize(codes))))
-            codes += code
+        codes, places, count = "=", {}, 0
+        for path, numbers in _numbers(dtype):
+            if path in READ:
+                places[path] = count
+                size = int(np.prod(numbers.shape))
+                codes += f"{size}{CODES[numbers.base.str[1:]]}"
+                count += size
+            else:
+                codes += f"{numbers.itemsize}x"
         self._struct = struct.Struct(codes)
         self._offset = offset
         assert self._struct.size == dtype.itemsize, "a record with gaps"
@@ -123,10 +132,10 @@ def _vector_at(place: int) -> slice:
 
 def _numbers(
     dtype: np.dtype[Any], path: tuple[str, ...] = ()
-) -> Iterator[tuple[tuple[str, ...], str]]:
-    """Path and code of every number or array of numbers in a record, in order."""
+) -> Iterator[tuple[tuple[str, ...], np.dtype[Any]]]:
+    """Path and type of every number or array of numbers in a record, in order."""
     if dtype.fields is None:
-        yield path, f"{int(np.prod(dtype.shape))}{CODES[dtype.base.str[1:]]}"
+        yield path, dtype
         return
     for name in dtype.names or ():
         yield from _numbers(dtype.fields[name][0], (*path, name))

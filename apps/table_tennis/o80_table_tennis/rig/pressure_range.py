@@ -42,10 +42,9 @@ class PressureRange:
         """(8,) raw"""
         return self.least + self._span
 
-    def raw(self, normalised: FloatArray) -> FloatArray:
-        """Whole raw pressures (..., 8) of normalised ones in [0, 1], a fresh array."""
-        raw: FloatArray = np.rint(self.least + normalised * self._span)
-        return raw
+    def raw(self, normalised: FloatArray, *, out: FloatArray | None = None) -> FloatArray:
+        """Whole raw pressures (..., 8) of normalised ones in [0, 1]; fresh, or `out`."""
+        return np.rint(self.least + normalised * self._span, out)
 
     def normalised(self, raw: FloatArray) -> FloatArray:
         """Normalised pressures (..., 8) of raw ones, a fresh array; not clipped."""

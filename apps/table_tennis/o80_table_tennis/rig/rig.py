@@ -93,8 +93,8 @@ class Rig:
 
     @property
     def lateness(self) -> int:
-        """By the clock: rows that the arm has made since the one used last; else 0."""
-        return self.arm.newest - self.row if self._real_time else 0
+        """Rows that the arm has made since the one used last: above 0 only by the clock."""
+        return self.arm.newest - self.row
 
     def ask(self, pressures: FloatArray, *, delay: int) -> None:
         """Normalised pressures (8,) for the next step, from its iteration `delay` (from 0) on."""

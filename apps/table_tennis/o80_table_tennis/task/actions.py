@@ -21,7 +21,8 @@ FINE = 0.05
 COARSE = 1.0
 """Factor of the actions in the published coarse configuration."""
 
-_ZEROS = np.zeros(MUSCLES)
+_ZEROS, _ONES = np.zeros(MUSCLES), np.ones(MUSCLES)
+_MINUS_ONES = -_ONES
 
 
 def changed_pressures(
@@ -37,9 +38,10 @@ def changed_pressures(
     if action.shape != pressures.shape:
         raise ValueError(f"an action must have shape {pressures.shape}, got {action.shape}")
     # 0 times infinity or NaN is NaN
-    if math.isnan(action.dot(_ZEROS).sum()):
+    zero = action.dot(_ZEROS)
+    if math.isnan(zero if action.ndim == 1 else zero.sum()):
         raise ValueError(f"an action must be finite, got {action}")
-    clipped = np.minimum(np.maximum(action, -1.0), 1.0)
+    clipped = np.minimum(np.maximum(action, _MINUS_ONES), _ONES)
     changed = pressures + 0.5 * np.tanh(0.5 * factor * clipped)
-    result: FloatArray = np.minimum(np.maximum(changed, 0.0), 1.0)
+    result: FloatArray = np.minimum(np.maximum(changed, _ZEROS), _ONES)
     return result

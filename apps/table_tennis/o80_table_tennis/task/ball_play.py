@@ -20,8 +20,6 @@ from .state import State
 Float32Array = NDArray[np.float32]
 FloatArray = NDArray[np.float64]
 
-BALL_Y = 1
-
 
 @dataclass(frozen=True)
 class ReturnTask:
@@ -53,11 +51,11 @@ class ReturnTask:
 
     def eventful(self, state: State) -> Any:
         """(...) whether the episode has ended."""
-        return self.rule.ended(state.record, state.ball[..., BALL_Y], state.steps)
+        return self.rule.ended(state.record, state.ball_y, state.steps)
 
     def end(self, state: State) -> NDArray[np.int64]:
         """(...) why it has."""
-        return self.rule.judge(state.record, state.ball[..., BALL_Y], state.steps)
+        return self.rule.judge(state.record, state.ball_y, state.steps)
 
     def reward(self, state: State) -> FloatArray:
         """(...) what an episode is worth that ends like this."""

@@ -27,10 +27,9 @@ class End(IntEnum):
     GOAL = 6
     """The goal of the task is reached."""
 
-    @property
-    def text(self) -> str:
+    def __init__(self, number: int) -> None:
+        self.text = self.name.lower().replace("_", " ")
         """As in `info["end"]`: "out of steps"."""
-        return self.name.lower().replace("_", " ")
 
     @property
     def terminated(self) -> bool:
@@ -61,8 +60,8 @@ class EndRule:
             record.landed
             | record.touched_net
             | record.touched_floor
-            | (y < self.passed_y)
             | (steps >= self.most_steps)
+            | (y < self.passed_y)
         )
 
     def judge(self, record: BallRecord, y: Numbers, steps: int | IntArray) -> IntArray:

@@ -25,8 +25,6 @@ BALL_POSITION = slice(16, 19)
 BALL_VELOCITY = slice(19, 22)
 """World frame [m/s]."""
 SIZE = 22
-MOTION = slice(JOINT_POSITIONS.start, JOINT_VELOCITIES.stop)
-BALL = slice(BALL_POSITION.start, BALL_VELOCITY.stop)
 
 
 @dataclass(frozen=True)
@@ -64,8 +62,4 @@ class ObservationBounds:
 
 def observe_ball(state: State) -> FloatArray:
     """The rows (..., 22) of arm and ball, a fresh array; not clipped."""
-    rows = np.empty((*state.ball.shape[:-1], SIZE))
-    rows[..., MOTION] = state.motion
-    rows[..., PRESSURES] = state.pressures
-    rows[..., BALL] = state.ball
-    return rows
+    return np.concatenate((state.motion, state.pressures, state.ball), axis=-1)

@@ -46,6 +46,11 @@ class State:
         """(..., 4) [rad/s]"""
         return self.motion[..., JOINTS:]
 
+    @property
+    def ball_y(self) -> Any:
+        """(...) how far the ball is from the arm, towards the opponent [m]."""
+        return self.ball.item(1) if self.ball.ndim == 1 else self.ball[:, 1]
+
     def at(self, index: Any) -> State:
         """Some of N episodes, by an index or a mask (N,)."""
         return State(
