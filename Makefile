@@ -1,5 +1,5 @@
 # Everything made lies in .venv and build/. Options go through ARGS="...".
-.PHONY: demo test scripts torture model fuzz rt systemd bench growth stress format clean distclean
+.PHONY: demo test check scripts torture model fuzz rt systemd bench growth stress format clean distclean
 ARGS ?=
 export PYTHONDONTWRITEBYTECODE := 1
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
@@ -8,14 +8,19 @@ demo:
 	@tools/setup.sh demo
 	@.venv/bin/python -m o80_table_tennis.demo $(ARGS)
 
-# ARGS names the steps to run, all but arm64 by default: make test ARGS="dev pytest"
+# what a change can break; ARGS chooses tests: make test ARGS=control, ARGS=tests/python/test_bursts.py
 test:
-	@tools/setup.sh test
+	@tools/setup.sh tools
 	@.venv/bin/python tools/test.py $(ARGS)
+
+# everything; ARGS chooses steps: make check ARGS="ruff mypy asan"
+check:
+	@tools/setup.sh check
+	@.venv/bin/python tools/check.py $(ARGS)
 
 # random scripts of motion, 100 000 by default: ARGS="--count 1000000" or ARGS="--replay FILE"
 scripts:
-	@tools/setup.sh test
+	@tools/setup.sh tools
 	@.venv/bin/cmake --preset dev > /dev/null
 	@.venv/bin/cmake --build --preset dev --target o80_test_scripts
 	@.venv/bin/python tools/scripts.py $(ARGS)
@@ -29,7 +34,7 @@ torture:
 
 # what tests cannot reach: every order of steps, on small cases
 model:
-	@tools/setup.sh test
+	@tools/setup.sh check
 	@.venv/bin/python tests/proofs/run.py models $(ARGS)
 
 # bench: the budgets; growth: cost against size, as plots; stress: jitter of the real-time loop on a
@@ -45,24 +50,24 @@ bench growth stress:
 
 # some minutes for each fuzzer; finds go to build/fuzz/found: make fuzz ARGS="lane --minutes 60 --merge"
 fuzz:
-	@tools/setup.sh test
+	@tools/setup.sh check
 	@.venv/bin/python tests/proofs/run.py fuzz --minutes 3 $(ARGS)
 
 # a PREEMPT_RT kernel in a virtual machine: the core tests and a loop, beside cyclictest
 rt:
-	@tools/setup.sh test
+	@tools/setup.sh check
 	@.venv/bin/python tests/proofs/run.py real_time $(ARGS)
 
 # a robot as a service, in a virtual machine whose first process is systemd
 systemd:
-	@tools/setup.sh test
+	@tools/setup.sh check
 	@tools/setup.sh systemd
 	@.venv/bin/cmake --preset dev > /dev/null
 	@.venv/bin/cmake --build --preset dev
 	@.venv/bin/python tests/proofs/run.py service_machine $(ARGS)
 
 format:
-	@tools/setup.sh test
+	@tools/setup.sh tools
 	@.venv/bin/python tools/format.py $(ARGS)
 
 clean:

@@ -7,7 +7,7 @@ import signal
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import pytest
 
@@ -38,6 +38,29 @@ os.environ["O80_DIRECTORY"] = str(DIRECTORY)  # all that is started here inherit
 
 def pytest_unconfigure() -> None:
     shutil.rmtree(DIRECTORY, ignore_errors=True)
+
+
+deselected: set[str] = set()  # names of tests that a marker or a word left out
+
+
+def pytest_deselected(items: list[pytest.Item]) -> None:
+    deselected.update(item.nodeid for item in items)
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Workers of pytest-xdist tell the session what they left out."""
+    if hasattr(session.config, "workeroutput"):
+        session.config.workeroutput["deselected"] = sorted(deselected)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node: Any) -> None:
+    deselected.update(getattr(node, "workeroutput", {}).get("deselected", ()))
+
+
+def pytest_terminal_summary(terminalreporter: Any) -> None:
+    if terminalreporter.config.option.markexpr == "not check":
+        terminalreporter.write_line(f"left to make check: {len(deselected)} tests in Python")
 
 
 def segment_files() -> set[Path]:

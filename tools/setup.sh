@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
-# Sets up what a make target needs: tools/setup.sh demo|test|bench|systemd
+# Sets up what a make target needs: tools/setup.sh demo|tools|test|check|bench|systemd
+# `tools` is `test` without the packages of this repository: C++ tests do not use them installed.
 # Nothing is done twice; stamps of what was done lie in .venv/stamps.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 PATH=$PATH:/usr/sbin:/sbin # ldconfig, for users whose path lacks them
-purpose=${1:?demo, test, bench or systemd}
+purpose=${1:?demo, tools, test, check, bench or systemd}
 
 mkdir -p build
 exec 9> build/setup.lock
@@ -86,22 +87,29 @@ install_packages() {
 
 case $purpose in
   demo) ;;
-  test)
-    need_packages g++ ccache libgtest-dev libgmock-dev googletest strace stress-ng rt-tests \
-      clang-19 libclang-rt-19-dev llvm-19 relacy-dev spin \
-      qemu-user-static g++-aarch64-linux-gnu qemu-system-x86 busybox-static cpio
+  tools | test) need_packages g++ libgtest-dev libgmock-dev ;;
+  check) # compilers of the sanitizers and of another machine, model checkers, emulators, stress
+    need_packages g++ libgtest-dev libgmock-dev googletest ccache clang-19 libclang-rt-19-dev \
+      llvm-19 g++-aarch64-linux-gnu qemu-user-static relacy-dev spin strace stress-ng rt-tests \
+      qemu-system-x86 busybox-static cpio
     ;;
   bench) need_packages g++ rt-tests stress-ng ;;
-  systemd) # what `make systemd` needs beside what `test` brings
+  systemd) # what `make systemd` needs beside what `check` brings
     need_packages systemd
     exit
     ;;
   *) say "unknown purpose '$purpose'"; exit 2 ;;
 esac
 # pictures without a screen, where EGL cannot make them; refused, only the film is missing
-ldconfig -p | grep -q libEGL_mesa || need_packages libosmesa6 || true
+case $purpose in
+  demo | check) ldconfig -p | grep -q libEGL_mesa || need_packages libosmesa6 || true ;;
+esac
 
 .venv/bin/python -c '' 2> /dev/null || make_environment
-group=$([ "$purpose" = test ] && echo test || true)
+case $purpose in
+  tools | test) group=test ;;
+  check) group=check ;;
+  *) group= ;;
+esac
 once "tools-${group:-build}" "$(state_of pyproject.toml ./*/*/pyproject.toml)" install_tools "$group"
-install_packages
+[ "$purpose" = tools ] || install_packages

@@ -304,7 +304,9 @@ std::map<std::string, int> system_calls(const std::string& log) {
   return calls;
 }
 
-TEST_F(RunTest, MakesOneSystemCallAnIterationTheOneThatPacesIt) {
+using RunTestWithTools = RunTest;  // strace
+
+TEST_F(RunTestWithTools, MakesOneSystemCallAnIterationTheOneThatPacesIt) {
 #ifdef O80_TEST_SANITIZED
   GTEST_SKIP() << "a sanitizer makes calls of its own";
 #endif

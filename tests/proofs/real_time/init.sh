@@ -61,6 +61,7 @@ for program in o80_test_*; do
     timeout -s KILL "$limit" chrt $class 10 ./"$program" "--gtest_filter=$(tests_of "$suite")" \
       > /tmp/said 2>&1
     code=$?
+    sed -n "s/^\[ *OK \] \([^ ]*\) .*/rt: ok ${program#o80_test_}.\1/p" /tmp/said
     echo "rt: took $begin $(uptime_s) $suite"
     passed=$((passed + $(count PASSED)))
     skipped=$((skipped + $(count SKIPPED)))

@@ -1,0 +1,119 @@
+"""Checks everything: what `make test` runs, its slow tests, and what needs tools of its own.
+
+Steps that `make test` passed on exactly these files are not run again. A test that was skipped and
+passed in no other step fails the check; --allow-skips only tells of it.
+"""
+
+import argparse
+import sys
+from collections.abc import Callable
+
+from checkout_state import PassedSteps
+from outcomes import Outcomes, of_ctest, of_log, of_pytest, of_real_time_machine
+from sources import ROOT
+from steps import LOGS, PASSED, PYTHON, Step, build, cpp, pytest, run, use_tools
+
+PROOF = [sys.executable, "tests/proofs/run.py"]
+TYPED = ("tools", "benchmarks", "examples", "tests/proofs")  # beside the packages
+TORTURE = ("--kills", "2000", "--halts", "300", "--seed", "77")  # the same mixes in every run
+
+
+def typed() -> Step:
+    packages = [*PYTHON, "mypy", "-p", "o80", "-p", "o80_table_tennis"]
+    folders = [folder for folder in TYPED if any((ROOT / folder).rglob("*.py"))]
+    return Step("mypy", [packages, *([*PYTHON, "mypy", folder] for folder in folders)])
+
+
+def of_real_time() -> Outcomes:
+    listed = ROOT / "build/rt/machine/passed"
+    said = of_log("rt", LOGS / "rt.log")
+    if not said.skipped:
+        said.add(of_real_time_machine(listed))
+    return said
+
+
+def torture() -> Step:
+    program = "build/dev/bin/o80-torture"
+    command = [program, *TORTURE, "--python", sys.executable]
+    return Step("torture", [*build("dev", "o80-torture"), command])
+
+
+STEPS: dict[str, Callable[[], Step]] = {
+    "format": lambda: Step("format", [[sys.executable, "tools/format.py", "--check"]]),
+    "ruff": lambda: Step("ruff", [["ruff", "check", "."]]),
+    "mypy": typed,
+    "cpp": lambda: cpp("dev", report="cpp"),
+    "python": lambda: pytest(report="python"),
+    "torture": torture,
+    "tidy": lambda: Step("tidy", [[sys.executable, "tools/tidy.py"]]),
+    "models": lambda: Step("models", [[*PROOF, "models"]]),
+    "asan": lambda: cpp("asan"),
+    "tsan": lambda: cpp("tsan"),
+    "fuzz": lambda: Step("fuzz", [[*PROOF, "fuzz"]]),
+    "rt": lambda: Step("rt", [[*PROOF, "real_time", "--short"]], outcomes=of_real_time),
+    "arm64": lambda: cpp("arm64"),
+}
+ON_DEMAND = {"arm64"}  # an emulator's minutes
+# what is left of a step that `make test` passed on these files, and what was reported then
+REST: dict[str, tuple[Callable[[], Step], Callable[[], Outcomes]]] = {
+    "cpp": (
+        lambda: cpp("dev", "-L", "^check$", report="cpp_check"),
+        lambda: of_ctest(LOGS / "cpp.xml"),
+    ),
+    "python": (
+        lambda: pytest("-m", "check", report="python_check"),
+        lambda: of_pytest(LOGS / "python.xml"),
+    ),
+}
+
+
+def planned(names: list[str], passed: PassedSteps, found: Outcomes) -> list[Step]:
+    """The steps to run; outcomes of what passed before are added to those found."""
+    steps = []
+    for name in names:
+        if name in REST and passed.contains(name):
+            rest, outcomes = REST[name]
+            print(f"== {name}: passed by make test on these files; left are the tests marked check")
+            found.add(outcomes())
+            steps.append(rest())
+        else:
+            steps.append(STEPS[name]())
+    return steps
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    what = f"of {', '.join(STEPS)}; by default all but {', '.join(ON_DEMAND)}"
+    parser.add_argument("steps", nargs="*", help=what)
+    parser.add_argument("--keep-going", action="store_true", help="run the steps after a failure")
+    parser.add_argument(
+        "--allow-skips", action="store_true", help="pass although tests are skipped"
+    )
+    arguments = parser.parse_args()
+    unknown = set(arguments.steps) - set(STEPS)
+    if unknown:
+        parser.error(f"no step {', '.join(sorted(unknown))}; there are {', '.join(STEPS)}")
+
+    use_tools()
+    found, failed = Outcomes(), []
+    names = arguments.steps or [name for name in STEPS if name not in ON_DEMAND]
+    for step in planned(names, PassedSteps(PASSED), found):
+        if run(step):
+            found.add(step.outcomes())
+            continue
+        failed.append(step.name)
+        if not arguments.keep_going:
+            break
+    gaps = found.gaps()
+    for name, why in gaps.items():
+        print(f"skipped: {name}: {why}")
+    # some steps alone cannot know what the others pass
+    if gaps and not arguments.steps and not failed and not arguments.allow_skips:
+        print(f'failed: {len(gaps)} skipped; install what is missing, or ARGS="--allow-skips"')
+        return 1
+    print(f"failed: {', '.join(failed)} (build/test)" if failed else "all checks passed")
+    return int(bool(failed))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,99 @@
+"""Steps of `make test` and `make check`: commands, their logs, and what to show of them."""
+
+import os
+import subprocess
+import sys
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from outcomes import Outcomes, of_ctest, of_pytest
+from sources import ROOT
+
+JOBS = len(os.sched_getaffinity(0))
+LOGS = ROOT / "build" / "test"
+PASSED = LOGS / "passed.json"  # what `make test` passed, on which files
+PYTHON = [sys.executable, "-m"]
+
+
+@dataclass(frozen=True)
+class Step:
+    """Commands that are run one after the other until one fails."""
+
+    name: str
+    commands: list[list[str]]
+    closing_lines: int = 1  # of its log, shown when it passed
+    outcomes: Callable[[], Outcomes] = Outcomes
+
+    @property
+    def log(self) -> Path:
+        return LOGS / f"{self.name}.log"
+
+
+def use_tools() -> None:
+    """Makes the tools of the environment the first that are found, and the folder of logs."""
+    tools = Path(sys.executable).parent
+    os.environ["PATH"] = f"{tools}{os.pathsep}{os.environ['PATH']}"
+    os.environ.setdefault("CCACHE_DIR", str(ROOT / "build" / "ccache"))
+    os.environ.setdefault("CCACHE_NOHASHDIR", "1")  # presets share what they compile alike
+    LOGS.mkdir(parents=True, exist_ok=True)
+
+
+def run(step: Step) -> bool:
+    """Runs a step; shows its closing lines, or most of its log when it fails."""
+    print(f"== {step.name}", flush=True)
+    begin = time.monotonic()
+    returned = 0
+    with step.log.open("w") as output:
+        for command in step.commands:
+            result = subprocess.run(command, cwd=ROOT, stdout=output, stderr=subprocess.STDOUT)
+            returned = result.returncode
+            if returned != 0:
+                break
+    with step.log.open(errors="replace") as text:
+        print(*deque(text, step.closing_lines if returned == 0 else 400), sep="", end="")
+    seconds = time.monotonic() - begin
+    verdict = "passed" if returned == 0 else f"FAILED ({step.log.relative_to(ROOT)})"
+    print(f"== {step.name}: {verdict} in {seconds:.0f} s", flush=True)
+    return returned == 0
+
+
+def build(preset: str, *targets: str) -> list[list[str]]:
+    """Commands that build a preset, or some targets of it."""
+    chosen = ["--target", *targets] if targets else []
+    return [
+        ["cmake", "--preset", preset],
+        ["cmake", "--build", "--preset", preset, "-j", str(JOBS), *chosen],
+    ]
+
+
+def ctest(preset: str, *options: str, report: str | None = None) -> Step:
+    """Runs the tests of a preset that is built. The report is named after the preset by default."""
+    name = report or preset
+    file = LOGS / f"{name}.xml"
+    # a thread sanitizer of this age cannot stand the widest address randomisation
+    random_bits = int(Path("/proc/sys/vm/mmap_rnd_bits").read_text())
+    fixed_addresses = ["setarch", "-R"] if preset == "tsan" and random_bits > 28 else []
+    command = [
+        *fixed_addresses,
+        *("ctest", "--preset", preset, "-j", str(JOBS), "--output-junit", str(file)),
+        *options,
+    ]
+    return Step(name, [command], 3, lambda: of_ctest(file))
+
+
+def cpp(preset: str, *options: str, report: str | None = None) -> Step:
+    """Builds a preset and runs its tests."""
+    tests = ctest(preset, *options, report=report)
+    return Step(tests.name, [*build(preset), *tests.commands], 3, tests.outcomes)
+
+
+def pytest(*options: str, report: str = "pytest", processes: int = JOBS + 1) -> Step:
+    """Runs tests in Python, each file in one process. Many tests wait: one process more than there
+    are processors keeps these busy."""
+    file = LOGS / f"{report}.xml"
+    several = ["-n", str(processes), "--dist", "loadfile"] if processes > 1 else []
+    command = [*PYTHON, "pytest", *several, f"--junit-xml={file}", *options]
+    return Step(report, [command], 2, lambda: of_pytest(file))
