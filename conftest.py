@@ -131,5 +131,5 @@ def build_prefix() -> Path:
     """The build folder of the preset dev, laid out like an installation (bin, lib)."""
     prefix = ROOT / "build" / "dev"
     if not (prefix / "lib" / "libo80.so").exists():
-        pytest.fail("the C++ side is not built: make test ARGS=dev")
+        pytest.fail("the programs of the preset dev are not built: make test ARGS=processes")
     return prefix
