@@ -1,6 +1,7 @@
 """Steps of `make test` and `make check`: commands, their logs, and what to show of them."""
 
 import os
+import re
 import subprocess
 import sys
 import time
@@ -16,6 +17,8 @@ JOBS = len(os.sched_getaffinity(0))
 LOGS = ROOT / "build" / "test"
 PASSED = LOGS / "passed.json"  # what `make test` passed, on which files
 PYTHON = [sys.executable, "-m"]
+CTEST_CLOSING = r"^\d+% tests passed|^Total Test time"
+PYTEST_CLOSING = r"^left to make check|^=+ .*\b(passed|skipped|deselected)\b.* =+$"
 
 
 @dataclass(frozen=True)
@@ -24,7 +27,7 @@ class Step:
 
     name: str
     commands: list[list[str]]
-    closing_lines: int = 1  # of its log, shown when it passed
+    closing: str = ""  # lines of its log that match this are shown when it passed; empty: the last
     outcomes: Callable[[], Outcomes] = Outcomes
 
     @property
@@ -41,6 +44,18 @@ def use_tools() -> None:
     LOGS.mkdir(parents=True, exist_ok=True)
 
 
+def last_lines(step: Step, count: int) -> list[str]:
+    with step.log.open(errors="replace") as text:
+        return list(deque(text, count))
+
+
+def closing_lines(step: Step) -> list[str]:
+    if not step.closing:
+        return last_lines(step, 1)
+    with step.log.open(errors="replace") as text:
+        return [line for line in text if re.search(step.closing, line)]
+
+
 def run(step: Step) -> bool:
     """Runs a step; shows its closing lines, or most of its log when it fails."""
     print(f"== {step.name}", flush=True)
@@ -52,8 +67,7 @@ def run(step: Step) -> bool:
             returned = result.returncode
             if returned != 0:
                 break
-    with step.log.open(errors="replace") as text:
-        print(*deque(text, step.closing_lines if returned == 0 else 400), sep="", end="")
+    print(*(closing_lines(step) if returned == 0 else last_lines(step, 400)), sep="", end="")
     seconds = time.monotonic() - begin
     verdict = "passed" if returned == 0 else f"FAILED ({step.log.relative_to(ROOT)})"
     print(f"== {step.name}: {verdict} in {seconds:.0f} s", flush=True)
@@ -81,13 +95,13 @@ def ctest(preset: str, *options: str, report: str | None = None) -> Step:
         *("ctest", "--preset", preset, "-j", str(JOBS), "--output-junit", str(file)),
         *options,
     ]
-    return Step(name, [command], 3, lambda: of_ctest(file))
+    return Step(name, [command], CTEST_CLOSING, lambda: of_ctest(file))
 
 
 def cpp(preset: str, *options: str, report: str | None = None) -> Step:
     """Builds a preset and runs its tests."""
     tests = ctest(preset, *options, report=report)
-    return Step(tests.name, [*build(preset), *tests.commands], 3, tests.outcomes)
+    return Step(tests.name, [*build(preset), *tests.commands], tests.closing, tests.outcomes)
 
 
 def pytest(*options: str, report: str = "pytest", processes: int = JOBS + 1) -> Step:
@@ -96,4 +110,4 @@ def pytest(*options: str, report: str = "pytest", processes: int = JOBS + 1) -> 
     file = LOGS / f"{report}.xml"
     several = ["-n", str(processes), "--dist", "loadfile"] if processes > 1 else []
     command = [*PYTHON, "pytest", *several, f"--junit-xml={file}", *options]
-    return Step(report, [command], 2, lambda: of_pytest(file))
+    return Step(report, [command], PYTEST_CLOSING, lambda: of_pytest(file))
