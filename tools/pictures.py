@@ -1,4 +1,4 @@
-"""Draws the pictures of README.md anew: docs/pictures/{table_tennis,first_minute}.png.
+"""Draws the pictures of README.md and of docs/recording.md anew: docs/pictures/*.png.
 
 python tools/pictures.py
 """
@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import o80
+from o80.plot import plot
 from o80_table_tennis.players.policies import default_policy
 from o80_table_tennis.report.rendering import Scene, write_picture
 from o80_table_tennis.settings import TaskSettings
@@ -67,6 +68,21 @@ def draw_first_minute(path: Path) -> None:
     figure.savefig(path, dpi=80)
 
 
+def draw_recording(path: Path) -> None:
+    """A motion that a halt interrupts."""
+    with o80.robots.load("two_joints").inline() as arm:
+        arm.add_command("elbow", 0.5, duration=0.2)
+        arm.add_command("shoulder", 0.4, duration=0.3, profile="minimum_jerk")
+        arm.burst(250)
+        arm.halt("enough")
+        arm.burst(100)
+        arm.resume()
+        arm.add_command("elbow", -0.2, duration=0.2)
+        arm.burst(300)
+        plot({"two_joints": arm.history()}).savefig(path, dpi=80)
+
+
 if __name__ == "__main__":
     draw_table_tennis(FOLDER / "table_tennis.png")
     draw_first_minute(FOLDER / "first_minute.png")
+    draw_recording(FOLDER / "recording.png")

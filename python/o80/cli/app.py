@@ -9,9 +9,11 @@ import typer
 import o80
 from o80.cli.clean import clean
 from o80.cli.echo import echo
+from o80.cli.export import export
 from o80.cli.halt import halt, resume
 from o80.cli.info import info
 from o80.cli.list_segments import list_segments
+from o80.cli.plot import plot
 from o80.cli.record import record
 from o80.cli.run import run
 from o80.cli.save import repair, save
@@ -39,6 +41,8 @@ app.command("echo")(echo)
 app.command("record")(record)
 app.command("save")(save)
 app.command("repair")(repair)
+app.command("plot")(plot)
+app.command("export")(export)
 app.command("halt")(halt)
 app.command("resume")(resume)
 app.command("stop")(stop)

@@ -1,0 +1,40 @@
+"""Histories for commands that take a running robot or a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import o80
+from o80.cli.attach import attach
+
+
+@dataclass(frozen=True)
+class Named:
+    """The rows of one run of a robot."""
+
+    name: str  #: of the segment
+    number: int  #: of the run, from 0; runs of a segment in one file
+    history: o80.History
+    wall_offset: int | None  #: wall clock less row time [ns]; None: not known
+
+
+def histories(source: str, only: str | None, *, seconds: float | None = None) -> Iterator[Named]:
+    """What a file, or a segment in shared memory, holds.
+
+    source: a path that ends in .mcap, or the name of a segment. only: one segment of a file.
+    """
+    if not source.endswith(".mcap"):
+        with attach(source) as frontend:
+            if frontend.published < 0:
+                raise o80.BackendGone(f"segment '{source}' has no row")
+            yield Named(source, 0, frontend.history(seconds=seconds), None)
+        return
+    recording = o80.open(Path(source))
+    if only is not None and only not in recording.segments:
+        there = ", ".join(recording) or "none"
+        raise o80.InvalidArgument(f"no segment '{only}' in {source}; there are: {there}")
+    for name in [only] if only is not None else list(recording):
+        for number, epoch in enumerate(recording[name].epochs):
+            yield Named(name, number, epoch.history(seconds=seconds), epoch.wall_offset)

@@ -1,0 +1,76 @@
+"""Histories as files of other formats, one column a number."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o80.columns import columns_of, values_of
+from o80.errors import InvalidArgument
+from o80.extras import needed
+from o80.history import History
+
+Columns = dict[str, NDArray[Any]]
+HEAD = ("iteration", "time", "lateness", "overruns", "skipped", "fresh", "halted")
+
+
+def columns_in(history: History) -> Columns:
+    """All numbers of all rows, by name, as in `History.to_frame`; enumerations as numbers."""
+    columns = {name: np.ascontiguousarray(getattr(history, name)) for name in HEAD}
+    for column in columns_of(history.schema):
+        columns[column.name] = values_of(history.rows, column)
+    names = [actuator["name"] for actuator in history.schema["actuators"]]
+    for part in ("active", "clamped", "braking"):
+        mask = getattr(history, part)
+        columns.update({f"{part}.{name}": mask[:, i].copy() for i, name in enumerate(names)})
+    return columns
+
+
+def write(path: Path, histories: Mapping[str, History]) -> None:
+    """Writes histories, by name, in the format that the suffix of the path names.
+
+    .npz: arrays `name/column`. .h5, .hdf5: a group per name with a dataset per column. .parquet:
+    one table; only for a single history. Raises InvalidArgument, MissingExtra, OSError.
+    """
+    if path.suffix not in WRITERS:
+        known = ", ".join(WRITERS)
+        raise InvalidArgument(f"unknown format '{path.suffix}' of {path}: choose one of {known}")
+    WRITERS[path.suffix](path, {name: columns_in(each) for name, each in histories.items()})
+
+
+def _write_npz(path: Path, histories: Mapping[str, Columns]) -> None:
+    arrays = {
+        f"{name}/{column}": v for name, each in histories.items() for column, v in each.items()
+    }
+    np.savez_compressed(path, allow_pickle=False, **arrays)
+
+
+def _write_hdf5(path: Path, histories: Mapping[str, Columns]) -> None:
+    h5py = needed("h5py", "export", "a file of HDF5")
+    with h5py.File(path, "w") as file:
+        for name, columns in histories.items():
+            group = file.create_group(name)
+            for column, values in columns.items():
+                group.create_dataset(column, data=values, compression="gzip", compression_opts=1)
+
+
+def _write_parquet(path: Path, histories: Mapping[str, Columns]) -> None:
+    if len(histories) != 1:
+        raise InvalidArgument(
+            f"a Parquet file holds one table, but there are {len(histories)}: "
+            f"{', '.join(histories)}. Choose one with --segment, or write .npz or .h5"
+        )
+    arrow = needed("pyarrow", "export", "a file of Parquet")
+    parquet = needed("pyarrow.parquet", "export", "a file of Parquet")
+    ((_, columns),) = histories.items()
+    parquet.write_table(arrow.table({name: arrow.array(v) for name, v in columns.items()}), path)
+
+
+WRITERS: dict[str, Callable[[Path, Mapping[str, Columns]], None]] = {
+    ".npz": _write_npz,
+    ".h5": _write_hdf5,
+    ".hdf5": _write_hdf5,
+    ".parquet": _write_parquet,
+}

@@ -1,0 +1,155 @@
+"""Curves of histories: desired and observed together, sensor values, halts and late iterations."""
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o80 import _core
+from o80.columns import Column, columns_of, values_of
+from o80.errors import InvalidArgument
+from o80.extras import needed
+from o80.history import History
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MOST_PANELS = 24
+PANEL = (9.0, 1.9)  # width and height [inch]
+PARTS = ("desired", "observed", "extended")
+STYLES = {"desired": "--", "observed": "-", "extended": "-"}
+
+
+class Curve(NamedTuple):
+    """One number of a robot over time."""
+
+    robot: str
+    panel: str  #: curves of one panel have this in common
+    column: Column
+    unit: str
+
+
+def plot(
+    histories: dict[str, History], fields: Sequence[str] = (), *, window: bool = False
+) -> "Figure":
+    """A figure with a panel for each number; desired and observed share one.
+
+    histories: by name of robot; their times begin at 0 together with the earliest row.
+    fields: such as "observed.elbow", "elbow" (desired and observed), "extended.force", "extended";
+        empty: all states.
+    window: a figure that `matplotlib.pyplot.show` shows.
+    Raises InvalidArgument for an unknown field, MissingExtra without matplotlib.
+    """
+    needed("matplotlib", "plot", "a plot")
+    chosen = [
+        curve for name, history in histories.items() for curve in _chosen(name, history, fields)
+    ]
+    panels = list(dict.fromkeys((curve.robot, curve.panel) for curve in chosen))
+    if not panels:
+        raise InvalidArgument("there is nothing to plot: the robot has no states. Name fields")
+    if len(panels) > MOST_PANELS:
+        raise InvalidArgument(
+            f"{len(panels)} panels are too many for a picture (at most {MOST_PANELS}): name fields"
+        )
+    figure = _figure(len(panels), window)
+    axes = figure.subplots(len(panels), sharex=True, squeeze=False)[:, 0]
+    start = min(int(history.time[0]) for history in histories.values() if len(history))
+    for ax, panel in zip(axes, panels, strict=True):
+        curves = [curve for curve in chosen if (curve.robot, curve.panel) == panel]
+        _draw(ax, curves, histories[panel[0]], start, several=len(histories) > 1)
+    axes[-1].set_xlabel("time [s]")
+    return figure
+
+
+def _figure(panels: int, window: bool) -> "Figure":
+    size = (PANEL[0], 0.8 + PANEL[1] * panels)
+    if window:
+        from matplotlib import pyplot
+
+        return pyplot.figure(figsize=size, layout="constrained")
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=size, layout="constrained")
+
+
+def _chosen(name: str, history: History, fields: Sequence[str]) -> Iterable[Curve]:
+    columns = {column.name: column for column in columns_of(history.schema)}
+    wanted = list(columns) if fields else [each for each in columns if _part(each) != "extended"]
+    if fields:
+        matched = {field: [each for each in columns if _matches(each, field)] for field in fields}
+        for field, found in matched.items():
+            if not found:
+                known = sorted({each.partition(".")[2].partition("[")[0] for each in columns})
+                raise InvalidArgument(
+                    f"'{name}' has no field '{field}'{_core.names_instead(field, known)}"
+                )
+        wanted = [each for each in columns if any(each in found for found in matched.values())]
+    units = _units(history.schema)
+    for each in wanted:
+        panel = each if _part(each) == "extended" else each.partition(".")[2]
+        yield Curve(name, panel, columns[each], units.get(panel.partition("[")[0], ""))
+
+
+def _part(column: str) -> str:
+    return column.partition(".")[0]
+
+
+def _matches(column: str, field: str) -> bool:
+    """Whether a field names this column, or what it is part of."""
+    for name in (column, column.partition(".")[2]):
+        if name == field or name.startswith((field + ".", field + "[")):
+            return True
+    return False
+
+
+def _units(schema: dict[str, Any]) -> dict[str, str]:
+    """Units by panel."""
+    units = {}
+    for actuator in schema["actuators"]:
+        for field in schema["groups"][actuator["group"]]["type"]["fields"]:
+            path = f"{actuator['name']}.{field['name']}" if field["name"] else actuator["name"]
+            units[path] = field["unit"]
+    for field in schema.get("extended", {}).get("fields", []):
+        units[f"extended.{field['name']}"] = field["unit"]
+    return units
+
+
+def _draw(
+    ax: "Axes", curves: Sequence[Curve], history: History, start: int, *, several: bool
+) -> None:
+    times = np.asarray((history.time - start) * 1e-9, np.float64)
+    for curve in curves:
+        part = _part(curve.column.name)
+        color = {"desired": "tab:gray", "observed": "tab:blue"}.get(part, "tab:green")
+        values = values_of(history.rows, curve.column)
+        ax.plot(times, values, STYLES[part], color=color, label=part, linewidth=1.2)
+        if curve.column.labels:
+            ax.set_yticks(list(curve.column.labels.values()), list(curve.column.labels))
+    first = curves[0]
+    title = f"{first.robot}: {first.panel}" if several else first.panel
+    ax.set_ylabel(f"{title}\n[{first.unit}]" if first.unit else title)
+    ax.grid(alpha=0.3)
+    _shade(ax, times, history.halted, "tab:red", "halted")
+    late = np.flatnonzero(np.diff(history.overruns.astype(np.int64), prepend=history.overruns[:1]))
+    if len(late):
+        at = np.full(len(late), 0.02)
+        label = "late iteration"
+        ax.plot(times[late], at, "|", color="tab:orange", transform=_bottom(ax), label=label)
+    ax.legend(fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
+def _bottom(ax: "Axes") -> Any:
+    """Data along x, shares of the panel along y."""
+    return ax.get_xaxis_transform()
+
+
+def _shade(
+    ax: "Axes", times: NDArray[np.float64], where: NDArray[np.bool_], color: str, label: str
+) -> None:
+    """Marks the spans of time in which something held."""
+    edges = np.flatnonzero(np.diff(where.astype(np.int8), prepend=0, append=0))
+    for i, (begin, end) in enumerate(zip(edges[::2], edges[1::2], strict=True)):
+        last = times[min(end, len(times) - 1)]
+        ax.axvspan(times[begin], last, color=color, alpha=0.15, label=label if i == 0 else None)

@@ -1,0 +1,142 @@
+"""Rows in formats of other tools, and as plots."""
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pyarrow.parquet
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from mixed_robots import GROUPS, ROBOTS, SENSORS, Mode, recorded
+
+import o80
+from o80.columns import columns_of
+from o80.export import columns_in, write
+from o80.plot import plot
+
+
+def read(path: Path, name: str) -> dict[str, Any]:
+    """The columns in a file."""
+    if path.suffix == ".npz":
+        arrays = np.load(path)
+        return {key.removeprefix(f"{name}/"): arrays[key] for key in arrays.files}
+    if path.suffix == ".h5":
+        with h5py.File(path) as file:
+            return {key: np.asarray(file[name][key]) for key in file[name]}
+    table = pyarrow.parquet.read_table(path)
+    return {key: table[key].to_numpy() for key in table.column_names}
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".h5", ".parquet"])
+@ROBOTS
+@given(groups=GROUPS, sensors=SENSORS, seed=st.integers(0, 2**32 - 1))
+def test_every_number_of_any_robot_is_in_the_file(
+    suffix: str, groups: Any, sensors: Any, seed: int, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    history = recorded(groups, sensors, seed)
+    path = tmp_path_factory.mktemp("export") / f"rows{suffix}"
+    write(path, {"robot": history})
+    found, columns = read(path, "robot"), columns_in(history)
+
+    assert sorted(found) == sorted(columns)
+    for name, values in columns.items():
+        assert np.array_equal(found[name], values), name
+
+
+def test_columns_are_named_after_part_actuator_and_field(arm: o80.Frontend) -> None:
+    arm.add_command("elbow", 0.5)
+    arm.burst(3)
+    history = arm.history()
+    columns = columns_in(history)
+
+    assert np.array_equal(columns["desired.elbow"], history.desired[:, 1])
+    assert np.array_equal(columns["extended.effort[1]"], history.extended.effort[:, 1])
+    assert columns["active.elbow"].tolist() == history.active[:, 1].tolist()
+
+
+def test_formats_that_do_not_fit_are_named(arm: o80.Frontend, tmp_path: Path) -> None:
+    history = arm.history()
+    with pytest.raises(o80.InvalidArgument, match=r"unknown format '\.csv'.*\.npz, \.h5"):
+        write(tmp_path / "rows.csv", {"arm": history})
+    with pytest.raises(o80.InvalidArgument, match="one table, but there are 2: a, b"):
+        write(tmp_path / "rows.parquet", {"a": history, "b": history})
+
+
+def panels(figure: Any) -> list[str]:
+    return [axes.get_ylabel() for axes in figure.axes]
+
+
+def test_desired_and_observed_share_a_panel_and_a_halt_is_shaded(arm: o80.Frontend) -> None:
+    arm.add_command("elbow", 0.5, iterations=10)
+    arm.burst(10)
+    arm.halt("enough")
+    arm.burst(5)
+    figure = plot({"arm": arm.history()})
+    labels = [line.get_label() for line in figure.axes[1].get_lines()]
+    elbow = figure.axes[1].get_lines()[1]
+
+    assert panels(figure) == ["shoulder\n[rad]", "elbow\n[rad]"]
+    assert labels == ["desired", "observed"]
+    assert np.array_equal(elbow.get_ydata(), arm.history().observed[:, 1])
+    assert np.array_equal(elbow.get_xdata(), arm.history().time * 1e-9)
+    assert len(figure.axes[1].patches) == 1
+
+
+@pytest.mark.parametrize(
+    ("fields", "shown"),
+    [
+        (["elbow"], ["elbow\n[rad]"]),
+        (["observed.elbow"], ["elbow\n[rad]"]),
+        (["extended"], ["extended.effort[0]\n[rad]", "extended.effort[1]\n[rad]"]),
+        (["effort[1]"], ["extended.effort[1]\n[rad]"]),
+    ],
+)
+def test_fields_choose_panels(fields: list[str], shown: list[str], arm: o80.Frontend) -> None:
+    assert panels(plot({"arm": arm.history()}, fields)) == shown
+
+
+def test_an_unknown_field_and_too_many_panels_are_refused(arm: o80.Frontend) -> None:
+    with pytest.raises(o80.InvalidArgument, match=r"no field 'elbo'.*elbow"):
+        plot({"arm": arm.history()}, ["elbo"])
+    many = {f"arm-{i}": arm.history() for i in range(20)}
+    with pytest.raises(o80.InvalidArgument, match="40 panels are too many"):
+        plot(many)
+
+
+def test_an_enumeration_has_its_labels_at_the_axis() -> None:
+    figure = plot({"hand": recorded({"hand": {"mode": Mode}}, None, 3)})
+
+    assert [text.get_text() for text in figure.axes[0].get_yticklabels()] == [
+        "IDLE",
+        "MOVE",
+        "HOLD",
+    ]
+
+
+def test_any_robot_can_be_plotted() -> None:
+    history = recorded({"joints": ({"position": "f8"}, 3)}, {"force": ("f4", (2, 2))}, 5)
+    names = [column.name for column in columns_of(history.schema)]
+
+    assert len(plot({"robot": history}, names).axes) == 3 + 4
+
+
+def test_the_commands_write_files(arm: o80.Frontend, tmp_path: Path) -> None:
+    with o80.Recording(tmp_path / "run.mcap", arm):
+        arm.burst(20)
+    for words, said in (
+        (["plot", tmp_path / "run.mcap", "-o", tmp_path / "run.png"], "21 rows"),
+        (["plot", arm.segment, "--seconds", "0.005", "-o", tmp_path / "live.png"], "5 rows"),
+        (["export", tmp_path / "run.mcap", "-o", tmp_path / "run.npz"], "21 rows"),
+    ):
+        command = [str(Path(sys.executable).parent / "o80"), *map(str, words)]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+        assert done.returncode == 0, done.stderr
+        assert said in done.stdout
+
+    assert (tmp_path / "run.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "live.png").stat().st_size > 1000
+    assert len(np.load(tmp_path / "run.npz")[f"{arm.segment}/time"]) == 21
