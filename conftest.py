@@ -16,6 +16,7 @@ os.environ.setdefault("HYPOTHESIS_STORAGE_DIRECTORY", "build/hypothesis")
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 ROOT = Path(__file__).resolve().parent
+DATA = Path(os.environ.get("O80_DATA", ROOT.parent / "shared" / "data"))  # recordings
 GRACE = 5.0  # [s] for the last to die
 
 Found = TypeVar("Found", int, Path)
@@ -40,7 +41,22 @@ def pytest_unconfigure() -> None:
     shutil.rmtree(DIRECTORY, ignore_errors=True)
 
 
-deselected: set[str] = set()  # names of tests that a marker or a word left out
+# names of tests that were left out: for their mark or name, and for want of recordings
+deselected: set[str] = set()
+without_recordings: set[str] = set()
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Tests of recordings are left out where these are not there."""
+    missing = []
+    for item in items:
+        mark = item.get_closest_marker("recordings")
+        if mark is not None and not (DATA / mark.args[0]).is_dir():
+            missing.append(item)
+    if missing:
+        without_recordings.update(item.nodeid for item in missing)
+        config.hook.pytest_deselected(items=missing)
+        items[:] = [item for item in items if item not in missing]
 
 
 def pytest_deselected(items: list[pytest.Item]) -> None:
@@ -51,16 +67,24 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     """Workers of pytest-xdist tell the session what they left out."""
     if hasattr(session.config, "workeroutput"):
         session.config.workeroutput["deselected"] = sorted(deselected)
+        session.config.workeroutput["without_recordings"] = sorted(without_recordings)
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_testnodedown(node: Any) -> None:
-    deselected.update(getattr(node, "workeroutput", {}).get("deselected", ()))
+    output = getattr(node, "workeroutput", {})
+    deselected.update(output.get("deselected", ()))
+    without_recordings.update(output.get("without_recordings", ()))
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
+    say = terminalreporter.write_line
     if terminalreporter.config.option.markexpr == "not check":
-        terminalreporter.write_line(f"left to make check: {len(deselected)} tests in Python")
+        say(f"left to make check: {len(deselected - without_recordings)} tests in Python")
+    if without_recordings:
+        say(
+            f"left out: {len(without_recordings)} tests of recordings, not found in {DATA} (O80_DATA)"
+        )
 
 
 def segment_files() -> set[Path]:

@@ -18,7 +18,7 @@ LOGS = ROOT / "build" / "test"
 PASSED = LOGS / "passed.json"  # what `make test` passed, on which files
 PYTHON = [sys.executable, "-m"]
 CTEST_CLOSING = r"^\d+% tests passed|^Total Test time"
-PYTEST_CLOSING = r"^left to make check|^=+ .*\b(passed|skipped|deselected)\b.* =+$"
+PYTEST_CLOSING = r"^left to make check|^left out|^=+ .*\b(passed|skipped|deselected)\b.* =+$"
 
 
 @dataclass(frozen=True)

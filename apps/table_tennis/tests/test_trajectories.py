@@ -20,16 +20,9 @@ ROOT = Path(__file__).resolve().parents[3]
 DATA = Path(os.environ.get("O80_DATA", ROOT.parent / "shared" / "data"))
 
 
-def recorded(folder: str) -> Path:
-    path = DATA / folder
-    if not path.is_dir():
-        pytest.skip(f"no recordings in {path}; set O80_DATA")
-    return path
-
-
 @pytest.fixture(scope="module")
 def ball_gun() -> list[BallTrajectory]:
-    return load_trajectories(recorded("ball_gun_2019"))
+    return load_trajectories(DATA / "ball_gun_2019")
 
 
 def frames_of_a_reader(rng: np.random.Generator, duration: float) -> np.ndarray:
@@ -311,6 +304,7 @@ def test_rows_of_a_bounce_too_short_to_be_seen_are_left_out(rows_after: int) -> 
     assert sampled.residual < 0.001
 
 
+@pytest.mark.recordings("ball_gun_2019")
 def test_the_ball_gun_flights_are_those_that_were_measured(ball_gun: list[BallTrajectory]) -> None:
     flights = [shot.resample() for shot in ball_gun]
     fits = [shot.fit for shot in ball_gun]
@@ -337,6 +331,7 @@ def test_the_ball_gun_flights_are_those_that_were_measured(ball_gun: list[BallTr
     assert np.median(tangential) == pytest.approx(0.69, abs=0.04)
 
 
+@pytest.mark.recordings("ball_gun_2019")
 def test_most_rows_of_the_ball_gun_are_one_or_two_frames_apart(
     ball_gun: list[BallTrajectory],
 ) -> None:
@@ -346,6 +341,7 @@ def test_most_rows_of_the_ball_gun_are_one_or_two_frames_apart(
         assert np.mean(np.isin(np.diff(frames), (1, 2))) > 0.9, shot.name
 
 
+@pytest.mark.recordings("ball_gun_2019")
 def test_fitted_velocities_change_as_gravity_and_air_would_have_it(
     ball_gun: list[BallTrajectory],
 ) -> None:
@@ -356,9 +352,10 @@ def test_fitted_velocities_change_as_gravity_and_air_would_have_it(
         assert np.all(np.abs(np.diff(fitted[:, 2]) / 0.01 + 9.81) < 3)
 
 
+@pytest.mark.recordings("spin_2022")
 @pytest.mark.parametrize(("name", "turn"), [("mn5008_topspin", 0.35), ("mn5008_no_spin", 0.18)])
 def test_the_shots_of_the_launcher_show_their_spin(name: str, turn: float) -> None:
-    shots = load_trajectories(recorded("spin_2022") / f"{name}.hdf5")
+    shots = load_trajectories(DATA / "spin_2022" / f"{name}.hdf5")
 
     flights = [shot.resample() for shot in shots]
     turns = [shot.fit.flights[0].turn[0] for shot in shots]
