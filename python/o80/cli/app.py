@@ -18,6 +18,7 @@ from o80.cli.record import record
 from o80.cli.run import run
 from o80.cli.save import repair, save
 from o80.cli.stop import stop
+from o80.cli.top import top
 
 app = typer.Typer(
     name="o80",
@@ -36,6 +37,7 @@ app.command(
     add_help_option=False,
 )(run)
 app.command("list")(list_segments)
+app.command("top")(top)
 app.command("info")(info)
 app.command("echo")(echo)
 app.command("record")(record)
