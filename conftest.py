@@ -82,9 +82,8 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
     if terminalreporter.config.option.markexpr == "not check":
         say(f"left to make check: {len(deselected - without_recordings)} tests in Python")
     if without_recordings:
-        say(
-            f"left out: {len(without_recordings)} tests of recordings, not found in {DATA} (O80_DATA)"
-        )
+        count = len(without_recordings)
+        say(f"left out: {count} tests of recordings, which are not in {DATA} (O80_DATA)")
 
 
 def segment_files() -> set[Path]:
