@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o80_table_tennis.balls.sources import balls_from
-from o80_table_tennis.environment import accelerated_environment
+from o80_table_tennis.entry_points import accelerated_environment
 from o80_table_tennis.rig.ball_records import RECORDS
 from plain_table_tennis import PlainEnvironment
 from sampling import built, rounds, sample, take_priority

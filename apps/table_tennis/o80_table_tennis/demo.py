@@ -23,9 +23,10 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from .balls.sources import balls_from
 from .environment import TableTennisEnvironment
-from .players.playing import Played, play
 from .players.policies import DEFAULT_FACTOR, default_policy
+from .playing import play
 from .report.episode_record import EpisodeSummary, load_records
+from .report.played import Played
 from .report.report import Report, write_report
 from .settings import Pacing, RigSettings, TaskSettings
 

@@ -10,7 +10,6 @@ One step, in both modes, with the arm's iterations as the only clock; k is its n
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -24,14 +23,14 @@ from .arguments import (
     refuse_wrong_arguments,
     refuse_wrong_options,
 )
-from .balls.sampled_flight import SampledFlight
+from .balls.draw import NO_BALLS, draw_balls
 from .balls.sources import balls_from
 from .report.episode_record import EpisodeSummary
 from .report.logger import EpisodeLogger
 from .report.statistics import Statistics, StepCounts, statistics_of
 from .rig.rig import Rig
 from .rig.virtual_balls import VirtualBalls
-from .settings import Pacing, RigSettings, TaskSettings
+from .settings import RigSettings, TaskSettings
 from .task.actions import changed_pressures
 from .task.box import ObservationBox
 from .task.end import End
@@ -118,20 +117,26 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
     ) -> tuple[Float32Array, Info]:
         """Arm and twins to the start; the ball flies from the first step on."""
         super().reset(seed=seed)
-        numbers, flights = self._choose_balls(options or {})
+        options, task = options or {}, self._task
+        refuse_wrong_options(options, plays_ball=task.plays_ball, period=self._rig_settings.period)
+        drawn = (
+            draw_balls(self._balls, self.np_random, extra=self._rig_settings.extra_balls, **options)
+            if task.plays_ball
+            else NO_BALLS
+        )
         goal = self._task.begin(self.np_random)
         arm_seed = int(self.np_random.integers(SEEDS))
         twin_seed = int(self.np_random.integers(SEEDS))
         self._rig.reset(
-            arm_seed=arm_seed, twin_seed=twin_seed, flights=self._virtual.share(flights)
+            arm_seed=arm_seed, twin_seed=twin_seed, flights=self._virtual.share(drawn.flights)
         )
 
         self._twin_first = self._rig.twin_row
         self._asked = self._arm.asked
-        self._ball, self._steps, self._paid = numbers[0], 0, 0.0
+        self._ball, self._steps, self._paid = drawn.numbers[0], 0, 0.0
         self._begun, self._over, self._summary = False, False, None
         self._episode += 1
-        self._virtual.begin(numbers[1:])
+        self._virtual.begin(drawn.numbers[1:])
         arm, twin = self._arm, self._twin
         self._state = state = State(
             0, arm.last_motion, arm.pressures, arm.last_racket, twin.ball, twin.record, goal
@@ -214,22 +219,6 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         if self._logger is not None:
             self._logger.add(self._summary)
 
-    def _choose_balls(self, options: Mapping[str, Any]) -> tuple[list[int], list[SampledFlight]]:
-        """Numbers and flights: of the ball that is played, then of the extra ones."""
-        plays_ball, rig = self._task.plays_ball, self._rig_settings
-        refuse_wrong_options(options, plays_ball=plays_ball, period=rig.period)
-        if not plays_ball:
-            return [-1], []
-        drawn = self.np_random.integers(len(self._balls), size=1 + rig.extra_balls)
-        numbers = [int(number) for number in drawn]
-        if "flight" in options:
-            numbers[0] = -1
-            flights = [options["flight"]]
-        else:
-            numbers[0] = int(options.get("ball", numbers[0]))
-            flights = [self._balls.flight(numbers[0])]
-        return numbers, flights + [self._balls.flight(number) for number in numbers[1:]]
-
     # ------------------------------------------------------------------ rows => what is returned
 
     def _look(self) -> State:
@@ -298,29 +287,3 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
             self._scene.close()
             self._scene = None
         self._rig.close()
-
-
-def _paced(rig: RigSettings | None, pacing: Pacing) -> RigSettings:
-    """The settings with this pacing. Raises TypeError for what are no settings."""
-    refuse_wrong_arguments(rig, None, None, [])
-    return (rig or RigSettings()).paced(pacing)
-
-
-def accelerated_environment(
-    *,
-    processes: bool = False,
-    rig: RigSettings | None = None,
-    task: TaskSettings | None = None,
-    **rest: Any,
-) -> TableTennisEnvironment:
-    """`o80/TableTennis-v0`: inline, or with arm and twins in processes of their own."""
-    pacing = Pacing.PROCESSES if processes else Pacing.INLINE
-    return TableTennisEnvironment(rig=_paced(rig, pacing), task=task, **rest)
-
-
-def real_time_environment(
-    *, rig: RigSettings | None = None, task: TaskSettings | None = None, **rest: Any
-) -> TableTennisEnvironment:
-    """`o80/TableTennisRealTime-v0`: the arm runs by the clock."""
-    settings = _paced(rig, Pacing.REAL_TIME)
-    return TableTennisEnvironment(rig=settings, task=task, **rest)

@@ -22,6 +22,6 @@ def register_environments() -> None:
         if name not in gymnasium.registry:
             gymnasium.register(
                 id=name,
-                entry_point=f"o80_table_tennis.environment:{entry}",
+                entry_point=f"o80_table_tennis.entry_points:{entry}",
                 nondeterministic=nondeterministic,
             )

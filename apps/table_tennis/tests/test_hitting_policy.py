@@ -14,8 +14,8 @@ import o80_table_tennis
 from o80_table_tennis.balls.sources import balls_from
 from o80_table_tennis.players.arm_dynamics import ArmModel
 from o80_table_tennis.players.hitting_policy import HittingPolicy, HittingSettings
-from o80_table_tennis.players.playing import play
 from o80_table_tennis.players.policies import DEFAULT_FACTOR, default_policy
+from o80_table_tennis.playing import play
 from o80_table_tennis.settings import TaskSettings
 from o80_table_tennis.task.observations import SIZE, ObservationBounds
 

@@ -4,7 +4,10 @@ import os
 import subprocess
 import sys
 
+import numpy as np
 import pytest
+
+from o80_table_tennis.report.rendering import Scene
 
 DRAW = """
 import numpy as np
@@ -27,3 +30,11 @@ def test_a_scene_is_drawn_without_a_screen(before: str) -> None:
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == "(480, 640, 3) True"
+
+
+def test_an_unknown_camera_is_refused_with_those_there_are() -> None:
+    with (
+        Scene() as scene,
+        pytest.raises(ValueError, match="'top'; there are: side, behind, close"),
+    ):
+        scene.draw(np.zeros(4), np.zeros((1, 3)), camera="top")

@@ -10,7 +10,7 @@ from o80_table_tennis.players.found_parameters import (
     with_parameters,
 )
 from o80_table_tennis.players.hitting_policy import HittingSettings
-from o80_table_tennis.players.search import SCALES, Parameters, Score, search, start_parameters
+from o80_table_tennis.search import SCALES, Parameters, Score, search, start_parameters
 
 
 def score_of(parameters: Parameters) -> Score:

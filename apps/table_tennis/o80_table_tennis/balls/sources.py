@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache, partial
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -19,17 +18,7 @@ SIMULATED_SHOTS = 80
 """How many different shots there are without any file."""
 
 
-class BallSource(Protocol):
-    """Numbered flights; the same number always gives the same flight."""
-
-    def __len__(self) -> int: ...
-
-    def flight(self, index: int) -> SampledFlight:
-        """Flight `index`, from 0, in steps of one iteration. Raises IndexError beyond the last."""
-        ...
-
-
-class FlightShelf:
+class CachedFlights:
     """Flights that are read or computed when first asked for, and kept.
 
     `shots` computes the trajectory of each number.
@@ -54,7 +43,7 @@ class FlightShelf:
         return self._kept[index]
 
 
-def recorded_balls(path: str | Path, *, period: float = PERIOD) -> FlightShelf:
+def recorded_balls(path: str | Path, *, period: float = PERIOD) -> CachedFlights:
     """The shots of a file, or of all recordings of a folder in the order of their names.
 
     A file of one shot (JSON) is read when the shot is asked for, one of many (HDF5) at once.
@@ -65,14 +54,14 @@ def recorded_balls(path: str | Path, *, period: float = PERIOD) -> FlightShelf:
             shots.append(partial(_only_shot, file))
         else:
             shots += [partial(_same, shot) for shot in load_trajectories(file)]
-    return FlightShelf(shots, period=period)
+    return CachedFlights(shots, period=period)
 
 
 def simulated_balls(
     *, count: int = SIMULATED_SHOTS, seed: int = 0, period: float = PERIOD
-) -> FlightShelf:
+) -> CachedFlights:
     """Shots of a ball gun with drag, top spin and one bounce; the same `seed`, the same shots."""
-    return FlightShelf(
+    return CachedFlights(
         [
             partial(lambda rng_seed: simulated_shot(np.random.default_rng(rng_seed)), (seed, i))
             for i in range(count)
@@ -82,7 +71,7 @@ def simulated_balls(
 
 
 @cache
-def balls_from(path: str | None, seed: int = 0, period: float = PERIOD) -> FlightShelf:
+def balls_from(path: str | None, seed: int = 0, period: float = PERIOD) -> CachedFlights:
     """Recorded balls of `path`, or simulated ones if there is none; shared in this process."""
     if path is None:
         return simulated_balls(seed=seed, period=period)

@@ -72,6 +72,8 @@ class Scene(AbstractContextManager["Scene"]):
         """A fresh picture (height, width, 3) of joints (4,) [rad] and balls (B, 3) [m]."""
         if self._renderer is None:
             raise RuntimeError("this scene was closed; make a new one")
+        if camera not in CAMERAS:
+            raise ValueError(f"unknown camera '{camera}'; there are: {', '.join(CAMERAS)}")
         self._data.qpos[self._arm] = joints
         for place, ball in zip(self._balls, balls, strict=True):
             self._data.qpos[place : place + 3] = ball

@@ -14,10 +14,10 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table as Grid
 
-from ..players.playing import Played
 from ..settings import Pacing
 from ..world.timing import ITERATIONS
 from .episode_record import EpisodeRecord
+from .played import Played
 
 Value = float | int | bool | str | None
 PERCENTILES = (50, 90, 99, 99.9, 100)

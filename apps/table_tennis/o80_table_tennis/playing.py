@@ -1,38 +1,17 @@
-"""Playing episodes with a policy, and what there is to say about them afterwards."""
+"""Playing episodes with a policy."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import gymnasium
 
-from ..environment import TableTennisEnvironment
-from ..report.episode_record import EpisodeSummary
-from ..report.statistics import Statistics
-from .policies import Policy
-
-
-@dataclass(frozen=True)
-class Played:
-    """Episodes of one environment."""
-
-    episodes: Sequence[EpisodeSummary]
-    statistics: Statistics
-    seconds: float
-    """From the first reset to the last step."""
-
-    @property
-    def hits(self) -> int:
-        """Episodes in which the racket met the ball and the ball flew back."""
-        return sum(episode.returned for episode in self.episodes)
-
-    @property
-    def touches(self) -> int:
-        """Episodes in which the racket met the ball."""
-        return sum(episode.hit for episode in self.episodes)
+from .environment import TableTennisEnvironment
+from .players.policies import Policy
+from .report.episode_record import EpisodeSummary
+from .report.played import Played
 
 
 def play(

@@ -1,0 +1,35 @@
+"""What Gymnasium calls to make the environments by their ids."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .arguments import refuse_wrong_arguments
+from .environment import TableTennisEnvironment
+from .settings import Pacing, RigSettings, TaskSettings
+
+
+def _paced(rig: RigSettings | None, pacing: Pacing) -> RigSettings:
+    """The settings with this pacing. Raises TypeError for what are no settings."""
+    refuse_wrong_arguments(rig, None, None, [])
+    return (rig or RigSettings()).paced(pacing)
+
+
+def accelerated_environment(
+    *,
+    processes: bool = False,
+    rig: RigSettings | None = None,
+    task: TaskSettings | None = None,
+    **rest: Any,
+) -> TableTennisEnvironment:
+    """`o80/TableTennis-v0`: inline, or with arm and twins in processes of their own."""
+    pacing = Pacing.PROCESSES if processes else Pacing.INLINE
+    return TableTennisEnvironment(rig=_paced(rig, pacing), task=task, **rest)
+
+
+def real_time_environment(
+    *, rig: RigSettings | None = None, task: TaskSettings | None = None, **rest: Any
+) -> TableTennisEnvironment:
+    """`o80/TableTennisRealTime-v0`: the arm runs by the clock."""
+    settings = _paced(rig, Pacing.REAL_TIME)
+    return TableTennisEnvironment(rig=settings, task=task, **rest)

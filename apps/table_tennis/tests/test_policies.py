@@ -1,0 +1,48 @@
+"""The baselines: a still arm, random actions, a swing by the clock of the ball."""
+
+import numpy as np
+import pytest
+
+from o80_table_tennis.players.policies import Policy, RandomPolicy, StillPolicy, SweepPolicy
+from o80_table_tennis.task.observations import SIZE
+
+
+def observed(y: float, vy: float, joint: float = 0.0) -> np.ndarray:
+    """A ball at y with the speed vy, joint 1 at an angle."""
+    row = np.zeros(SIZE, np.float32)
+    row[0], row[17], row[20] = joint, y, vy
+    return row
+
+
+@pytest.mark.parametrize("policy", [StillPolicy(), RandomPolicy(seed=1), SweepPolicy()])
+def test_actions_lie_in_the_box(policy: Policy) -> None:
+    policy.reset()
+    for _ in range(20):
+        action = policy.act(observed(0.5, -4.0))
+        assert (action.shape, action.dtype) == ((8,), np.float32)
+        assert np.abs(action).max() <= 1.0
+
+
+def test_random_actions_follow_their_seed_and_go_on_over_episodes() -> None:
+    first, again = RandomPolicy(seed=3), RandomPolicy(seed=3)
+    one = first.act(observed(1, -4))
+    np.testing.assert_array_equal(one, again.act(observed(1, -4)))
+    first.reset()
+    assert not np.array_equal(one, first.act(observed(1, -4)))
+
+
+@pytest.mark.parametrize(
+    ("y", "vy", "joint", "swings"),
+    [
+        (0.7, -4.0, 0.0, True),
+        (0.9, -4.0, 0.0, False),
+        (0.7, 4.0, 0.0, False),
+        (0.7, -4, 1.3, False),
+    ],
+)
+def test_the_sweep_swings_joint_one_while_the_ball_comes_near(
+    y: float, vy: float, joint: float, swings: bool
+) -> None:
+    action = SweepPolicy(lead=0.2).act(observed(y, vy, joint))
+    assert action[:2].tolist() == ([1.0, -1.0] if swings else [0.0, 0.0])
+    assert not action[2:].any()
