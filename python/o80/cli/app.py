@@ -8,6 +8,7 @@ import typer
 
 import o80
 from o80.cli.clean import clean
+from o80.cli.diff import diff
 from o80.cli.echo import echo
 from o80.cli.export import export
 from o80.cli.halt import halt, resume
@@ -45,6 +46,7 @@ app.command("save")(save)
 app.command("repair")(repair)
 app.command("plot")(plot)
 app.command("export")(export)
+app.command("diff")(diff)
 app.command("halt")(halt)
 app.command("resume")(resume)
 app.command("stop")(stop)

@@ -1,0 +1,125 @@
+"""Two runs are compared row by row, bit for bit."""
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from mixed_robots import GROUPS, ROBOTS, SENSORS, recorded
+
+import o80
+from o80.difference import Difference, first_difference
+
+O80 = str(Path(sys.executable).parent / "o80")
+
+
+def run_of(target: float, segment: str, iterations: int = 30) -> o80.History:
+    with o80.robots.load("two_joints").inline(segment) as arm:
+        arm.add_command("elbow", target, iterations=20)
+        arm.burst(10)
+        arm.burst(iterations - 10)
+        return arm.history()
+
+
+def changed(history: o80.History, row: int, byte: int) -> o80.History:
+    """The same with one bit of a row flipped."""
+    raw = bytearray(history.rows.tobytes())
+    raw[row * history.rows.itemsize + byte] ^= 1
+    return o80.History(history._decoder, np.frombuffer(bytes(raw), history.rows.dtype))
+
+
+def test_equal_runs_have_no_difference(segment: str) -> None:
+    assert first_difference(run_of(0.5, segment), run_of(0.5, segment)) is None
+
+
+def test_the_first_iteration_and_field_are_told(segment: str) -> None:
+    found = first_difference(run_of(0.5, segment), run_of(0.6, segment))
+
+    assert found is not None
+    assert (found.iteration, found.field) == (1, "desired.elbow")
+    assert found.values == (pytest.approx(0.025), pytest.approx(0.03))
+    assert str(found).startswith("iteration 1, desired.elbow: 0.025")
+
+
+@ROBOTS
+@given(groups=GROUPS, sensors=SENSORS, seed=st.integers(0, 2**32 - 1), data=st.data())
+def test_a_flipped_bit_of_any_number_is_found(
+    groups: Any, sensors: Any, seed: int, data: st.DataObject
+) -> None:
+    history = recorded(groups, sensors, seed)
+    row = data.draw(st.integers(0, len(history) - 1))
+    part = data.draw(st.sampled_from(["desired", "observed"]))
+    begin = history.schema["row"][part]
+    other = changed(history, row, begin + data.draw(st.sampled_from(number_bytes(history))))
+    found = first_difference(history, other)
+
+    assert found is not None
+    assert found.iteration == history.iteration[row]
+    assert found.field.startswith(part)
+
+
+def number_bytes(history: o80.History) -> list[int]:
+    """First bytes of the numbers of the states: padding is no number."""
+    from o80.columns import columns_of
+
+    begin = history.schema["row"]["desired"]
+    columns = columns_of(history.schema)
+    return [each.offset - begin for each in columns if each.name.startswith("desired")]
+
+
+def test_not_a_number_equals_itself(segment: str) -> None:
+    with o80.Backend(segment, {"sensor": float}, bursting=True) as backend:
+        backend.publish({"sensor": 1.0})
+        with o80.Frontend(segment) as frontend:
+            frontend.burst(1, wait=False)
+            backend.step()
+            backend.publish({"sensor": float("nan")})
+            history = frontend.history()
+
+    assert first_difference(history, history) is None
+    assert first_difference(history, history, tolerances={"observed": 0.1}) is None
+
+
+def test_rows_that_one_lacks_are_a_difference(segment: str) -> None:
+    history = run_of(0.5, segment)
+
+    assert first_difference(history, history[:20]) == Difference(20, "", (True, False))
+    assert first_difference(history[5:], history) == Difference(0, "", (False, True))
+
+
+def test_columns_are_ignored_and_tolerated(segment: str) -> None:
+    one, other = run_of(0.5, segment), run_of(0.5 + 1e-9, segment)
+
+    assert first_difference(one, other) is not None
+    parts = {"desired": 1e-8, "observed": 1e-8, "extended": 1e-8}
+    assert first_difference(one, other, tolerances=parts) is None
+    assert first_difference(one, other, ignore=list(parts)) is None
+    found = first_difference(one, other, ignore=["desired", "observed"])
+    assert found is not None
+    assert found.field == "extended.effort[1]"
+    with pytest.raises(o80.InvalidArgument, match=r"no column 'desird'.*desired"):
+        first_difference(one, other, ignore=["desird"])
+
+
+def test_different_robots_are_refused(segment: str) -> None:
+    with pytest.raises(o80.InvalidArgument, match="the robots differ"):
+        first_difference(run_of(0.5, segment), recorded({"hand": "f8"}, None, 1))
+
+
+def test_the_command_tells_by_its_exit_code(segment: str, tmp_path: Path) -> None:
+    paths = []
+    for i, target in enumerate((0.5, 0.5, 0.6)):
+        paths.append(tmp_path / f"{i}.mcap")
+        with o80.robots.load("two_joints").inline(segment) as arm, o80.Recording(paths[-1], arm):
+            arm.add_command("elbow", target, iterations=20)
+            arm.burst(25)
+    for other, code, said in ((paths[1], 0, "identical"), (paths[2], 1, "desired.elbow")):
+        done = subprocess.run(
+            [O80, "diff", paths[0], other], capture_output=True, text=True, timeout=60
+        )
+        assert done.returncode == code, done.stderr
+        assert said in done.stdout
