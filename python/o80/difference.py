@@ -55,8 +55,8 @@ def first_difference(
         raise InvalidArgument(f"the robots differ in their fields: {names}")
     for named in [*ignore, *(tolerances or {})]:
         if not any(_belongs(column, named) for column in mine):
-            names = [name.partition(separator)[0] for separator in ".[" for name in mine]
-            instead = _core.names_instead(named, list(dict.fromkeys(names)))
+            known = [name.partition(separator)[0] for separator in ".[" for name in mine]
+            instead = _core.names_instead(named, list(dict.fromkeys(known)))
             raise InvalidArgument(f"there is no column '{named}'{instead}")
 
     first, second, lacking = _rows_of_both(mine["iteration"], others["iteration"])
