@@ -1,4 +1,4 @@
-"""Checks of what users give to the environments: Gymnasium passes any keyword on."""
+"""Checks of the users' arguments: Gymnasium passes any keyword on to the environment."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy as np
 from .settings import RigSettings, TaskSettings
 
 OPTIONS = ("ball", "flight")
-"""What `reset` can be told."""
+"""Options that `reset` knows."""
 
 
 def refuse_wrong_arguments(
     rig: object, task: object, render_mode: str | None, modes: list[str]
 ) -> None:
-    """Raises TypeError or ValueError, saying what to give instead."""
+    """Raises TypeError or ValueError with the arguments to give instead."""
     for name, given, wanted in (("rig", rig, RigSettings), ("task", task, TaskSettings)):
         if given is None or isinstance(given, wanted):
             continue

@@ -2,7 +2,7 @@
 
 Starts the arm in real time (500 Hz, a process of its own), its simulated twin (bursting, another
 one) and an environment between them, plays episodes, then plays accelerated, as processes and
-inline. Prints how well that went and writes plots, a film, the recorded history and a report.
+inline. Prints rates, lateness and hits; writes plots, a film, the recorded history and a report.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class DemoSettings:
 
 
 def run_demo(settings: DemoSettings, console: Console) -> Report:
-    """Plays all modes and writes everything; returns what was found."""
+    """Plays all modes, writes all files, returns the report."""
     begin = time.monotonic()
     settings.output.mkdir(parents=True, exist_ok=True)
     available = len(balls_from(settings.task().balls))
@@ -131,7 +131,7 @@ def _advance(progress: Progress, bar: Any) -> Callable[[EpisodeSummary], None]:
 
 
 def _end_in_order(number: int, _frame: FrameType | None) -> None:
-    """A request to terminate unwinds the stack, so that nothing is left behind."""
+    """SIGTERM unwinds the stack, so that no process and no segment remains."""
     sys.exit(128 + number)
 
 
@@ -147,7 +147,7 @@ def main(
     film: Annotated[bool, typer.Option(help="Draw a film of a hit.")] = True,
     output: Annotated[Path, typer.Option(help="Folder that is written.")] = Path("build/demo"),
 ) -> None:
-    """Plays table tennis in real time, then accelerated, and reports how well that went."""
+    """Plays table tennis in real time, then accelerated, and reports rates, lateness and hits."""
     signal.signal(signal.SIGTERM, _end_in_order)
     console = Console()
     settings = DemoSettings(

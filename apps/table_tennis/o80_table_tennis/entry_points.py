@@ -1,4 +1,4 @@
-"""What Gymnasium calls to make the environments by their ids."""
+"""The functions that Gymnasium calls to make the environments by their ids."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .settings import Pacing, RigSettings, TaskSettings
 
 
 def _paced(rig: RigSettings | None, pacing: Pacing) -> RigSettings:
-    """The settings with this pacing. Raises TypeError for what are no settings."""
+    """The settings with this pacing. Raises TypeError for anything but settings."""
     refuse_wrong_arguments(rig, None, None, [])
     return (rig or RigSettings()).paced(pacing)
 

@@ -50,11 +50,11 @@ STALLED = "stalled"
 class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
     """Real arm, simulated ball: 100 steps a second of eight pressure changes.
 
-    Actions: Box(-1, 1, (8,)), changes of the normalised pressures. What is observed and paid is
-    said by the task (`TaskSettings.task`); by default observations are a Box of 22 numbers (see
+    Actions: Box(-1, 1, (8,)), changes of the normalised pressures. The task (`TaskSettings.task`)
+    defines observation and reward. By default observations are a Box of 22 numbers (see
     `task.observations`), clipped into named bounds, and the reward is paid in the last step.
 
-    `info` holds what the task adds (with a ball `hit`: the racket has touched the ball, and
+    `info` holds the entries of the task (with a ball `hit`: the racket has touched the ball, and
     `smallest_distance` of the surfaces of ball and racket so far [m]), `stalled` (real time: the
     caller paused for so long that the episode was given up), `end` (why the episode ended,
     "running" before), and with extra balls `virtual`: `observations` (N, M), `rewards` (N,),
@@ -155,7 +155,7 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         if self._real_time and rig.lateness > self._settings.most_late:
             return self._stall()
 
-        # action => pressures => rows of the arm => rows of the twins => what is returned
+        # action => pressures => rows of the arm => rows of the twins => outcome
         rig.ask(self._changed(action), delay=self._settings.delay)
         rig.step_arm()
         rig.step_twins()
@@ -174,7 +174,7 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         return self._asked
 
     def _outcome(self, called: float) -> Outcome:
-        """What a step returns that began when the clock said `called` [s]."""
+        """The result of a step that began at `called` on the clock [s]."""
         self._steps += 1
         self._count()
         state = self._look()
@@ -191,7 +191,7 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         return observation, reward, end.terminated, end.truncated, info
 
     def _stall(self) -> Outcome:
-        """The arm has moved on too far: what the twin would see is no longer what happens."""
+        """The arm has moved on too far for the twin to follow: the episode is given up."""
         self._counts.stalled_episodes += 1
         self._finish(STALLED)
         observation = self._box.clip(self._task.observe(self._state))
@@ -219,7 +219,7 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         if self._logger is not None:
             self._logger.add(self._summary)
 
-    # ------------------------------------------------------------------ rows => what is returned
+    # ------------------------------------------------------------------ rows => observation, info
 
     def _look(self) -> State:
         """The newest rows of the arm and of the first twin, for the task."""

@@ -13,7 +13,7 @@ REAL_TIME = "o80/TableTennisRealTime-v0"
 def register_environments() -> None:
     """Makes both ids known; may be called twice.
 
-    Episodes end by their own count of steps, and environments check what they are given themselves.
+    The environments count steps and check their arguments themselves, without Gymnasium's wrappers.
     """
     for name, entry, nondeterministic in (
         (ACCELERATED, "accelerated_environment", False),

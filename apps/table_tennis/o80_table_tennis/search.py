@@ -33,7 +33,7 @@ SCALES = {
     "control.ahead": 0.002,
     "control.settling": 0.003,
 }
-"""What is searched for, and how far the first steps go."""
+"""The parameters that are searched, and the scale of the first steps."""
 GROWTH = 1.3
 """Of the steps after a success; four failures undo it."""
 

@@ -1,4 +1,4 @@
-"""What an experiment is set up with: plain frozen values with the published defaults."""
+"""Settings of rig and task: frozen values with the published defaults."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ class RigSettings:
 
 @dataclass(frozen=True)
 class TaskSettings:
-    """What is played, and how it is paid. Raises ValueError or TypeError."""
+    """The task, its balls and its rules. Raises ValueError or TypeError."""
 
     task: str | Task = "return"
     """return, smash, hit or reach; or an object of your own, see `task.task.Task`."""

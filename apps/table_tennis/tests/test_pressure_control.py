@@ -1,5 +1,6 @@
 """Torques to pressures to actions."""
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -7,7 +8,13 @@ import o80
 from o80_table_tennis.players.pressure_control import MusclePair, PressureActions, PressureLag
 from o80_table_tennis.rig.pressure_range import PressureRange
 from o80_table_tennis.task.actions import COARSE, FINE, changed_pressures
+from o80_table_tennis.world.scene import MODEL
 from o80_table_tennis.world.timing import PERIOD
+
+
+@pytest.fixture(scope="module")
+def model() -> mujoco.MjModel:
+    return mujoco.MjModel.from_xml_path(str(MODEL))
 
 
 def test_pressures_make_their_torques() -> None:
@@ -60,3 +67,18 @@ def test_the_lag_is_that_of_the_arm() -> None:
             elapsed = float(arm.latest().iteration) * PERIOD
             wanted = PressureLag().after(start, pressures.normalised(pressures.raw(asked)), elapsed)
             assert seen == pytest.approx(wanted, abs=1e-9)
+
+
+def test_the_muscles_hold_the_arm_as_the_robots_do(model: mujoco.MjModel) -> None:
+    """The robot starts in equilibrium: its pressures make the torques of gravity."""
+    with o80.robots.load("pam").inline("pressure-equilibrium-test") as arm:
+        row = arm.latest()
+        pressures = PressureRange.of(arm).normalised(np.array(row.observed))
+        q = np.array(row.extended.joint_positions)
+    data = mujoco.MjData(model)
+    data.qpos[:4] = q
+    mujoco.mj_inverse(model, data)
+    for joint in range(4):
+        mean = float(pressures[2 * joint : 2 * joint + 2].mean())
+        wanted = MusclePair().pressures(data.qfrc_inverse[:4], q, mean)[joint]
+        assert wanted == pytest.approx(pressures[2 * joint : 2 * joint + 2], abs=1e-4)

@@ -17,10 +17,10 @@ from o80_table_tennis.settings import TASKS, RigSettings, TaskSettings
 from o80_table_tennis.task.actions import COARSE
 from o80_table_tennis.task.ball_play import ReturnTask
 from o80_table_tennis.task.end import End, EndRule
-from o80_table_tennis.task.reach import MIDDLE_POSTURE, ReachTask
+from o80_table_tennis.task.reach import ReachTask
 from o80_table_tennis.task.state import State
 from o80_table_tennis.task.task import TASK_MEMBERS, Task
-from o80_table_tennis.world.arm import MUSCLES, racket_pose
+from o80_table_tennis.world.arm import MUSCLES, PLAYING_POSTURE, racket_pose
 
 STILL = np.zeros(MUSCLES, dtype=np.float32)
 
@@ -132,7 +132,7 @@ class TestReach:
         assert np.linalg.norm(goals[0] - goals[1]) > 0.01
 
     def test_a_racket_that_rests_at_the_goal_has_reached_it(self) -> None:
-        there = np.array(racket_pose(np.array(MIDDLE_POSTURE)).position)
+        there = np.array(racket_pose(np.array(PLAYING_POSTURE)).position)
         fast, slow = np.full(8, 0.6), np.full(8, 0.4)
         rows = [
             (slow, there, 1),

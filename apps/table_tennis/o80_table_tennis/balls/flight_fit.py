@@ -51,7 +51,7 @@ BELIEFS = np.array([0.0] * 6 + [1 / (DRAG_BELIEF * AERODYNAMICS.drag)] + [1 / TU
 
 @dataclass(frozen=True, eq=False)
 class Flight:
-    """A flight without bounce: a state at `origin` and what the air does to the ball."""
+    """A flight without bounce: a state at `origin`, drag and turn."""
 
     origin: float
     """[s]"""

@@ -109,7 +109,7 @@ def _settle(times: FloatArray, positions: FloatArray, period: float) -> _Count:
     flight: Flight | None = None
     for _ in range(MOST_ROUNDS):
         flight = fit_segment(times, positions, start=flight)
-        # how much later each row lies on the flight than its stamp says => its frame anew
+        # delay of each row on the flight relative to its stamp => its frame
         flown, speed = flight.at(times)
         misses = positions - flown
         late = np.sum(misses * speed, axis=1) / np.sum(speed**2, axis=1)
@@ -130,14 +130,14 @@ def _missed(
     """Frames (n,) to add where one frame more or less from some row on brings the rows closer.
 
     A flight gives way to a frame missed in its middle, so that no row looks wrong by itself: each
-    cut is judged by what is left after the best flight for it, to first order.
+    cut is judged by the residual after the best flight for it, to first order.
     """
     _, slopes = sloped(flight.unknowns, frames.astype(np.float64) * period)
     matrix = np.vstack([slopes.reshape(-1, 10) / POSITION_NOISE, np.diag(BELIEFS)])
     basis = np.linalg.qr(matrix * SCALES)[0][: misses.size]
     left = misses.ravel() / POSITION_NOISE
 
-    # column c: what it does to the misses when all rows after c come one frame later
+    # column c: change of the misses when all rows after c come one frame later
     later = np.tri(len(frames), k=-1)[:, :-1]
     shifts = (later[:, None, :] * (speed * period)[..., None]).reshape(misses.size, -1)
     shifts /= POSITION_NOISE

@@ -76,7 +76,7 @@ def load_trajectories(
 
     Read are JSON files of a ball gun (`.json`, time stamps reconstructed), HDF5 files of shots
     (`.hdf5`, `.h5`). The world frame is the rows turned by `frame_yaw` [rad] about z, then shifted
-    by `frame_offset` (3,) [m]; where None, what is known for the format.
+    by `frame_offset` (3,) [m]; by default as known for the format.
 
     Raises FileNotFoundError or ValueError, naming the file and the cure.
     """
@@ -93,7 +93,7 @@ def read_recording(
     frame_offset: Sequence[float] | None = None,
     frame_yaw: float | None = None,
 ) -> list[BallTrajectory]:
-    """The trajectories of one file; what is None of the frame is that of the format."""
+    """The trajectories of one file; None means the frame of the format."""
     readers = {".json": _read_ball_gun, ".hdf5": _read_shots, ".h5": _read_shots}
     if file.suffix not in readers:
         raise ValueError(f"{file}: unknown format; can read {', '.join(FORMATS)}")

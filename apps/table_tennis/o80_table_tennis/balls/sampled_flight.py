@@ -1,4 +1,4 @@
-"""A flight in equal steps: what the twins play."""
+"""A flight in equal steps, as the twins play it."""
 
 from __future__ import annotations
 

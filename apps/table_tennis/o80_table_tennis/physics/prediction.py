@@ -23,7 +23,7 @@ Vector = Sequence[float] | FloatArray
 STEP = 0.02
 """Step of the integration [s]; the error over a second of flight stays below 10 um."""
 SHORTEST_STEP = 1e-9
-"""What is left of a flight below this counts as nothing [s]."""
+"""A shorter rest of a flight is ignored [s]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,7 @@ def velocity_to_land(
     steps: int = 6,
     corrections: int = 2,
 ) -> FloatArray:
-    """With which a ball flies from `position` to `target` (3,) in `duration` [s].
+    """The velocity (3,) with which a ball flies from `position` to `target` (3,) in `duration` [s].
 
     Its `spin` (3,) [rad/s] is taken as constant.
     """
@@ -31,7 +31,7 @@ def velocity_to_land(
         aerodynamics.magnus * spin[1],
         aerodynamics.magnus * spin[2],
     )
-    # a flight without air, then what the air took off it is aimed further
+    # start with a flight without air, then add the miss that the air causes
     velocity = (target - position) / duration
     velocity[2] += 0.5 * aerodynamics.gravity * duration
     for _ in range(corrections):

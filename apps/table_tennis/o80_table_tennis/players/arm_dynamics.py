@@ -1,6 +1,6 @@
 """Torques that move the arm: a model with its masses on points of the links.
 
-It leaves out what feedback makes good: the speeds of joints 2 and 3 acting on each other, and the
+It leaves out effects that feedback corrects: the coupling of the speeds of joints 2 and 3, and the
 couplings of the wrist.
 """
 
@@ -49,7 +49,7 @@ class ArmModel:
     """[m/s^2]"""
 
     def torque(self, q: FloatArray, dq: FloatArray, acceleration: FloatArray) -> FloatArray:
-        """What the muscles have to give (4,) [Nm] for angles, speeds and accelerations (4,)."""
+        """Torques of the muscles (4,) [Nm] for angles, speeds and accelerations (4,)."""
         a1, a2, a3, a4 = acceleration.tolist()
         w1, w2, w3, _ = dq.tolist()
         t1, t2, t3, t4 = self.turning
@@ -58,7 +58,7 @@ class ArmModel:
             out2, up2 = along_upper * math.sin(q[1]), along_upper * math.cos(q[1])
             out3, up3 = along_fore * math.sin(q[1] + q[2]), along_fore * math.cos(q[1] + q[2])
             out, up = out2 + out3, up2 + up3
-            # turning about the vertical, and what it pulls outwards
+            # rotation about the vertical, and its centrifugal effect
             torque1 += mass * out * (out * a1 + 2.0 * w1 * (up * w2 + up3 * w3))
             away = -out * w1 * w1
             # the vertical plane, gravity as an acceleration upwards

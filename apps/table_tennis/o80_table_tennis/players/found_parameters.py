@@ -31,7 +31,7 @@ class FoundParameters:
 
     @classmethod
     def load(cls, path: Path = FILE) -> FoundParameters:
-        """Reads what `save` wrote."""
+        """Reads a file that `save` wrote."""
         return cls(**json.loads(path.read_text()))
 
 

@@ -28,7 +28,7 @@ FloatArray = NDArray[np.float64]
 WRIST = 3
 """Index of joint 4."""
 PREDICTED_EVERY = 4
-"""Steps between two predictions of the ball; a path serves that long."""
+"""A predicted path of the ball is used for so many steps."""
 
 
 @dataclass(frozen=True)
@@ -40,23 +40,23 @@ class ControlSettings:
     damping: float = 30.0
     """Of the feedback [1/s]."""
     mean_pressure: float = 0.45
-    """Of two muscles against each other."""
+    """Mean normalised pressure of two antagonists."""
     begin: float = 0.003
-    """From an observation to when its action acts [s]."""
+    """Time from an observation to the effect of its action [s]."""
     ahead: float = 0.012
-    """How far ahead of its observation the action aims [s]."""
+    """Time after the observation at which the action aims [s]."""
     settling: float = 0.014
-    """Time the pressures are given to come to what is wanted [s]."""
+    """Time in which the pressures should reach the wanted ones [s]."""
     wrist_stiffness: float = 12.0
-    """Of the feedback of joint 4, besides: its inertia is next to nothing [Nm/rad]."""
+    """Additional feedback of joint 4, whose inertia is very small [Nm/rad]."""
     learning: tuple[float, float, float, float] = (600.0, 600.0, 225.0, 120.0)
-    """How fast torques are added that the model lacks, for each joint [Nm/(rad s)]."""
+    """Integral gain of each joint, for torques that the model lacks [Nm/(rad s)]."""
     last_change: float = 0.03
-    """Before the strike [s]: from then on the swing stays as it is."""
+    """From this time before the strike on, the swing is not changed any more [s]."""
     shortest: float = 0.02
-    """Time that a swing is given at least, should a ball come sooner than was predicted [s]."""
+    """Least duration of a swing, for balls that come sooner than predicted [s]."""
     follow_through: float = 0.03
-    """After the strike, if the ball is not seen to fly back before [s]."""
+    """The swing goes on this long after the strike, unless the ball flies back before [s]."""
     stop: float = 0.25
     """From the end of a swing to rest [s]."""
 
@@ -127,7 +127,7 @@ class HittingPolicy:
         return Swing.between(now, end, max(self.strike.time, control.shortest))
 
     def _follow(self, position: FloatArray, velocity: FloatArray) -> None:
-        """Predicts the ball anew, or goes on along what was predicted."""
+        """Predicts the ball, or goes on along its last predicted path."""
         if self._steps % PREDICTED_EVERY == 0:
             self._ball = coming_ball(position, velocity, self._settings.interception)
         elif self._ball is not None:

@@ -1,8 +1,9 @@
 """Where, when and how to meet the ball, so that it flies back to the target.
 
-Three numbers make a strike: when it happens, the angle of the wrist, and the speed of joint 1. The
-first says where the ball is, and so the angles of joints 1 to 3; together they say how the ball
-leaves. Least squares finds those that send it to the target, near to a comfortable strike.
+A strike has three unknowns: its time, the angle of the wrist, and the speed of joint 1. The time
+determines the place of the ball, and so the angles of joints 1 to 3; all three determine the
+velocity with which the ball leaves. Least squares finds the strike that sends it to the target,
+with a preference for a comfortable one.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from ..world.arm import BLADE_THICKNESS, racket_pose
 from ..world.ball import BALL_GUN_SPIN, BALL_RADIUS
 from ..world.materials import RACKET_RESTITUTION, Restitution
 from ..world.scene import Vector
-from ..world.table import TABLE, Table
+from ..world.table import TABLE, TARGET, Table
 from .aiming import velocity_to_land
 from .inverse_kinematics import posture_towards
 
@@ -32,7 +33,7 @@ TOUCH = BALL_RADIUS + BLADE_THICKNESS / 2
 LATEST = 1.6
 """No ball is followed further ahead than this [s]."""
 FIRST_ROUNDS = 4
-"""Of the search for the first strike; later ones begin near to what they look for."""
+"""Iterations for the first strike of a ball; later searches start at the last one, and take one."""
 
 
 @dataclass(frozen=True)
@@ -53,18 +54,18 @@ class Strike:
 
 @dataclass(frozen=True)
 class InterceptionSettings:
-    """Which strikes are wanted."""
+    """Target, limits and preferences of strikes."""
 
-    target_x: float = 0.0
-    """Where on the table the ball shall land [m]."""
-    target_y: float = 2.5
+    target_x: float = TARGET[0]
+    """Where on the table the ball should land [m]."""
+    target_y: float = TARGET[1]
     """[m]"""
     flight: float = 0.55
-    """How long it shall fly there [s]."""
+    """Duration of its flight there [s]."""
     nearest: float = -0.15
-    """y of the nearest place behind which no ball is met [m]."""
+    """Least y at which a ball is met [m]."""
     farthest: float = 0.30
-    """y of the farthest place [m]."""
+    """Largest y [m]."""
     fastest: float = 4.0
     """Speed of joint 1 [rad/s]."""
     steepest: float = 1.2
@@ -76,9 +77,9 @@ class InterceptionSettings:
     comfortable_speed: float = 1.5
     """The same for the speed of joint 1 [rad/s]."""
     discomfort: Vector = (0.2, 0.05, 0.02)
-    """What deviations from them weigh, against an error of the ball's velocity [1/s, m/s, m]."""
+    """Weights of deviations from them, relative to an error of its velocity [1/s, m/s, m]."""
     off_middle: float = 8.0
-    """What a touch off the middle of the blade weighs, against the same error [1/s]."""
+    """Weight of a touch off the middle of the blade, relative to the same error [1/s]."""
     spin: Vector = BALL_GUN_SPIN
     """Of the ball, before and after the strike [rad/s]."""
     racket: Restitution = RACKET_RESTITUTION
@@ -150,7 +151,7 @@ class StrikePlanner:
         self.forget()
 
     def forget(self) -> None:
-        """The next ball is another one."""
+        """Forgets the last strike: another ball comes."""
         self._place = self._settings.comfortable_y
         self._wrist = self._settings.comfortable_wrist
         self._speed = self._settings.comfortable_speed
@@ -199,7 +200,7 @@ class StrikePlanner:
         )
 
     def _error(self, ball: ComingBall, guess: FloatArray, wanted: FloatArray) -> FloatArray:
-        """How much faster than `wanted` the ball leaves, and how far the racket is off it, (6,)."""
+        """Velocity of the leaving ball less `wanted`, and the racket's offset from it, (6,)."""
         position, velocity = ball.at(float(guess[0]))
         speed = float(guess[2])
         pose = racket_pose(touching_posture(position, float(guess[1])))

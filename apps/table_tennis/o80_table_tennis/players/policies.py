@@ -1,4 +1,4 @@
-"""Policies: what turns observations into actions, one for each step of the environment."""
+"""Policies turn observations into actions: the protocol, baselines, the default policy."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ DEFAULT_FACTOR = COARSE
 
 
 class Policy(Protocol):
-    """Plays by what it observes, and by nothing else."""
+    """Chooses actions from observations only."""
 
     def reset(self) -> None:
         """A new episode begins."""
@@ -44,7 +44,7 @@ class StillPolicy:
 
 @dataclass
 class RandomPolicy:
-    """Draws each action anew: what a learner starts from."""
+    """Draws each action at random, as an untrained learner does."""
 
     seed: int = 0
 

@@ -1,4 +1,4 @@
-"""Which pressures make the torques: the law of the muscles and their lag, turned round."""
+"""Pressures for wanted torques: the inverse of the muscles' law and of their lag."""
 
 from __future__ import annotations
 
@@ -29,7 +29,8 @@ class MusclePair:
     def pressures(self, torque: FloatArray, q: FloatArray, mean: float) -> FloatArray:
         """Normalised pressures (4, 2) in agonists and antagonists for torques (4,) at q (4,).
 
-        `mean` of two is the stiffness; it yields where it would ask for less than nothing.
+        `mean` is that of both muscles and sets the stiffness; it is raised where a pressure would
+        become negative.
         """
         at_zero = 1.0 - self.contracted / self.stroke
         change = self.pulley / self.stroke * q
@@ -57,19 +58,19 @@ class PressureLag:
         return asked + (pressures - asked) * np.exp(-duration / np.array(self.times))
 
     def asking(self, pressures: FloatArray, wanted: FloatArray, duration: float) -> FloatArray:
-        """What to ask for (8,) to have `wanted` (8,) in the muscles after `duration` [s]."""
+        """Pressures to ask for (8,) to have `wanted` (8,) in the muscles after `duration` [s]."""
         return pressures + (wanted - pressures) / -np.expm1(-duration / np.array(self.times))
 
 
 class PressureActions:
-    """Turns wanted pressures into actions, and keeps count of what has been asked for."""
+    """Turns wanted pressures into actions, and keeps track of the pressures asked for."""
 
     def __init__(self, *, factor: float = COARSE) -> None:
         self._factor = factor
         self.asked = np.full(MUSCLES, 0.5)
 
     def start(self, pressures: FloatArray) -> None:
-        """A new episode: the arm rests, so what is in the muscles (8,) is what was asked for."""
+        """A new episode: the arm rests, the pressures in its muscles (8,) are those asked for."""
         self.asked = np.clip(pressures, 0.0, 1.0)
 
     def towards(self, wanted: FloatArray) -> NDArray[np.float32]:

@@ -1,4 +1,4 @@
-"""How the joints shall move: smooth from what they do now into the strike, and to rest after it."""
+"""Smooth motions of the joints: from the present motion into the strike, and to rest after it."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Swing:
     def between(cls, start: JointMotion, end: JointMotion, duration: float) -> Swing:
         """From `start` to `end` in `duration` [s]."""
         t = duration
-        # what is missing at the end if the start simply went on
+        # difference at the end if the motion of the start went on
         gap = end.q - (start.q + t * start.dq + 0.5 * t * t * start.ddq)
         gap_dq = t * (end.dq - start.dq - t * start.ddq)
         gap_ddq = t * t * (end.ddq - start.ddq)

@@ -1,1 +1,1 @@
-"""What is kept and shown of episodes: records, statistics, plots, films, the report."""
+"""Records, statistics, plots and films of episodes, and the report of the demo."""

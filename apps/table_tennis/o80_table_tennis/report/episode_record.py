@@ -1,4 +1,4 @@
-"""A recorded episode: what arm and twin did in it, row by row, and how it ended."""
+"""A recorded episode: the rows of arm and twin, and how it ended."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class EpisodeRecord:
 
     @classmethod
     def load(cls, path: Path) -> EpisodeRecord:
-        """Reads what `save` wrote."""
+        """Reads a file that `save` wrote."""
         with np.load(path) as file:
             summary = json.loads(str(file["summary"]))
             period = summary.pop("period")

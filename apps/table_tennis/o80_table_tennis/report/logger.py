@@ -21,11 +21,11 @@ import o80
 from .episode_record import EpisodeRecord, EpisodeSummary
 
 LONGEST_WRITING = 20.0
-"""Time given to it to write what is left when it is closed [s]."""
+"""Timeout for writing the remaining episodes when it is closed [s]."""
 
 
 class EpisodeLogger(AbstractContextManager["EpisodeLogger"]):
-    """Starts the logger beside the segments `arm` and `twin`; it ends with whoever started it."""
+    """Starts the logger of the segments `arm` and `twin`; it ends with its parent process."""
 
     def __init__(self, folder: Path, *, arm: str, twin: str) -> None:
         folder.mkdir(parents=True, exist_ok=True)
@@ -36,7 +36,7 @@ class EpisodeLogger(AbstractContextManager["EpisodeLogger"]):
         )
 
     def add(self, summary: EpisodeSummary) -> None:
-        """An episode has ended; its rows are to be kept. Does nothing once the logger is gone."""
+        """Asks for the record of an episode that has ended. No effect if the logger has died."""
         assert self._process.stdin is not None
         try:
             self._process.stdin.write(json.dumps(asdict(summary)) + "\n")
@@ -121,7 +121,7 @@ def write_episodes(
 
 def main(arm: str, twin: str, folder: str) -> int:
     """Runs until its input ends."""
-    # whoever started it ends it: a Ctrl-C at the terminal comes here too
+    # a Ctrl-C at the terminal arrives here too; the parent process ends the logger
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     with (

@@ -1,4 +1,4 @@
-"""What a demo found: numbers for a person and for report.json, the same ones."""
+"""The report of a demo: the same numbers as a table and as report.json."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Report:
     whole: Mapping[str, Value]
 
     def print(self, console: Console) -> None:
-        """A table with a column a mode, and what holds for all of them."""
+        """A table with a column for each mode, then the numbers of the whole demo."""
         grid = Grid(title="table tennis", title_justify="left")
         grid.add_column("")
         for mode in self.modes:

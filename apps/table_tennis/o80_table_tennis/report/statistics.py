@@ -1,4 +1,4 @@
-"""How an environment kept its time: rates, lateness, and whether each step was exact."""
+"""Rates and lateness of an environment, and how many of its steps were exact."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass
 class StepCounts:
-    """What an environment counts while it plays."""
+    """Counts of an environment while it plays."""
 
     episodes: int = 0
     steps: int = 0
@@ -44,7 +44,7 @@ class Statistics:
     steps_per_second: float
     """While an episode was played, the caller's own time (its policy) included [1/s]."""
     bare_steps_per_second: float
-    """The caller's own time left out: what a policy that needs no time would reach [1/s]."""
+    """Without the caller's own time, as for a policy that needs no time [1/s]."""
     step_seconds: float
     """How long a step takes in real time [s]."""
     late_actions: int
@@ -68,7 +68,7 @@ class Statistics:
 
 
 def statistics_of(counts: StepCounts, arm: o80.Frontend, *, step: float) -> Statistics:
-    """What was counted, and what the history of the arm tells; `step` lasts so long [s]."""
+    """From the counts and the history of the arm; a step of the environment lasts `step` [s]."""
     rows = arm.history()
     seconds = float(rows.time[-1] - rows.time[0]) * 1e-9
     lateness: FloatArray = np.empty(0)

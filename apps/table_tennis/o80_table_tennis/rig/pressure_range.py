@@ -33,7 +33,7 @@ class PressureRange:
 
     @classmethod
     def of(cls, frontend: o80.Frontend) -> PressureRange:
-        """The limits of the actuators of an arm, whose driver knows them."""
+        """The limits of the actuators of an arm, as its driver describes them."""
         muscles = frontend.actuators
         return cls([m.minimum for m in muscles], [m.maximum for m in muscles])
 

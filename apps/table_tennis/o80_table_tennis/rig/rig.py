@@ -16,6 +16,7 @@ import o80
 
 from ..balls.sampled_flight import SampledFlight
 from ..settings import Pacing, RigSettings
+from ..world.arm import PLAYING_POSTURE
 from ..world.scene import MODEL
 from ..world.timing import ITERATIONS
 from .arm import Arm
@@ -39,7 +40,7 @@ class Rig:
     pressures act from iteration k + 1 + delay; the arm makes the rows k + 1 to k + 5; the twins
     mirror them.
 
-    Move nothing but through it while it is open; leaving it ends all that it started.
+    While it is open, move arm and twins only through it. Closing it ends what it started.
     """
 
     def __init__(self, settings: RigSettings | None = None) -> None:
@@ -131,6 +132,7 @@ class Rig:
             "muscle": settings.muscle,
             "ranges": settings.ranges,
             "start_noise": settings.start_noise,
+            "start_posture": PLAYING_POSTURE,
             "period": settings.period,
         }
         return self._open("pam", settings.arm_segment, settings.pacing.real_time, options)

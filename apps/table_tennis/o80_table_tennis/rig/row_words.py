@@ -17,7 +17,7 @@ WORD = 8
 def words(dtype: np.dtype[Any], *path: str) -> slice:
     """The words of a row taken by a field, named by the way to it ("observed", "joints").
 
-    Raises LookupError, naming what there is, unless the field is there and is made of whole words.
+    Raises LookupError, listing the fields, if the field is missing or is not made of whole words.
     """
     offset, field = 0, dtype
     for name in path:

@@ -53,10 +53,10 @@ class VirtualBalls:
         return shared
 
     def look(self, played: State, *, over: bool) -> dict[str, Any]:
-        """What the twins' newest rows say about the extra balls, beside the state of the played.
+        """`info["virtual"]` of the twins' newest rows; `played` is the state of the played ball.
 
-        A ball is paid for once: when its own episode ends, or at last when the played ball's is
-        `over`. After that, `ended` says that its entries mean nothing any more.
+        Each ball is paid for once: when its own episode ends, or when that of the played ball is
+        `over`. From then on its entries are invalid, and `ended` is true.
         """
         state = self._state(played)
         self._hits |= ~self._ended & state.record.touched

@@ -1,1 +1,1 @@
-"""What is played: actions, observations, rewards, ends of episodes, and the tasks themselves."""
+"""Tasks: actions, observations, rewards, ends of episodes, and the named tasks."""

@@ -58,7 +58,7 @@ class ReturnTask:
         return self.rule.judge(state.record, state.ball_y, state.steps)
 
     def reward(self, state: State) -> FloatArray:
-        """(...) what an episode is worth that ends like this."""
+        """(...) reward of an episode that ends in this state."""
         return self.pay.returned(state.record, state.goal)
 
     def info(self, state: State) -> dict[str, Any]:
@@ -71,7 +71,7 @@ class SmashTask(ReturnTask):
     """The ball should land on the target, and be fast: published as well."""
 
     def reward(self, state: State) -> FloatArray:
-        """(...) what an episode is worth that ends like this."""
+        """(...) reward of an episode that ends in this state."""
         return self.pay.smashed(state.record, state.goal)
 
 

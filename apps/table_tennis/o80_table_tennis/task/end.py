@@ -14,6 +14,9 @@ from .ball_record import BallRecord, Numbers
 IntArray = NDArray[np.int64]
 
 
+MOST_STEPS = 300
+
+
 class End(IntEnum):
     """Why an episode ended. Arrays hold these numbers."""
 
@@ -33,7 +36,7 @@ class End(IntEnum):
 
     @property
     def terminated(self) -> bool:
-        """Ended by what happened."""
+        """Ended by an event."""
         return self not in (End.RUNNING, End.OUT_OF_STEPS)
 
     @property
@@ -48,7 +51,7 @@ class EndRule:
 
     passed_y: float = -0.8
     """A ball nearer to the wall behind the arm than this has passed it [m]."""
-    most_steps: int = 300
+    most_steps: int = MOST_STEPS
     """Steps of the environment after which an episode is truncated."""
 
     def ended(self, record: BallRecord, y: Numbers, steps: int | IntArray) -> Any:

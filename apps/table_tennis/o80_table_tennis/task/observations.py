@@ -25,15 +25,17 @@ BALL_POSITION = slice(16, 19)
 BALL_VELOCITY = slice(19, 22)
 """World frame [m/s]."""
 SIZE = 22
+JOINT_VELOCITY_BOUND = 20.0
+"""[rad/s]"""
 
 
 @dataclass(frozen=True)
 class ObservationBounds:
-    """The box of observations; what lies outside is clipped into it."""
+    """The box of observations; values outside are clipped into it."""
 
     joint_position: float = JOINT_LIMIT
     """Either way [rad]: the limit of the joints."""
-    joint_velocity: float = 20.0
+    joint_velocity: float = JOINT_VELOCITY_BOUND
     """Either way [rad/s]: the fastest joints recorded reach 3.8."""
     ball_low: Vector = (-3.0, -3.0, -1.0)
     """[m]"""

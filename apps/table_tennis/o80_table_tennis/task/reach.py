@@ -8,23 +8,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..world.arm import JOINT_LIMIT, racket_pose
-from .end import End
+from ..world.arm import JOINT_LIMIT, JOINTS, PLAYING_POSTURE, racket_pose
+from .end import MOST_STEPS, End
+from .observations import JOINT_VELOCITY_BOUND
 from .state import State
 
 Float32Array = NDArray[np.float32]
 FloatArray = NDArray[np.float64]
-
-MIDDLE_POSTURE = (0.17, 1.1, 1.04, 0.5)
-"""About which goals lie: the median posture of the real arm between two balls [rad]."""
 
 
 @dataclass(frozen=True)
 class ReachTask:
     """Each step costs the distance of the racket's centre from the goal; reaching it ends that.
 
-    Goals are where the racket is at postures drawn about the middle one. Observed are the joints
-    (8), the pressures (8), the centre of the racket (3) and the goal (3).
+    Goals are where the racket is at postures drawn about the one in which episodes begin. Observed
+    are the joints (8), the pressures (8), the centre of the racket (3) and the goal (3).
     """
 
     tolerance: float = 0.03
@@ -33,9 +31,9 @@ class ReachTask:
     """Unless a joint is faster [rad/s]."""
     spread: float = 0.4
     """Of the drawn postures, either way on each joint [rad]."""
-    most_steps: int = 300
+    most_steps: int = MOST_STEPS
     """Steps of the environment after which an episode is truncated."""
-    joint_velocity: float = 20.0
+    joint_velocity: float = JOINT_VELOCITY_BOUND
     """Bound of the observation, either way [rad/s]."""
 
     plays_ball = False
@@ -54,7 +52,7 @@ class ReachTask:
 
     def begin(self, rng: np.random.Generator) -> FloatArray:
         """A point (3,) that the racket can reach [m]."""
-        posture = np.array(MIDDLE_POSTURE) + rng.uniform(-self.spread, self.spread, 4)
+        posture = np.array(PLAYING_POSTURE) + rng.uniform(-self.spread, self.spread, JOINTS)
         return np.array(racket_pose(np.clip(posture, -JOINT_LIMIT, JOINT_LIMIT)).position)
 
     def observe(self, state: State) -> FloatArray:

@@ -1,4 +1,4 @@
-"""What an episode of ball play is worth.
+"""Rewards of the tasks with a ball.
 
 The published rule pays at the end: without a hit, minus the smallest distance of ball and racket;
 after a hit, by how near to the target the ball landed. Landing is the first touch of the table
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..world.scene import Vector
+from ..world.table import TARGET
 from .ball_record import BallRecord, Numbers
 
 FloatArray = NDArray[np.float64]
@@ -28,10 +29,10 @@ _hypot = np.frompyfunc(math.hypot, 2, 1)
 class RewardRule:
     """The numbers of the published configuration."""
 
-    target: Vector = (0.0, 2.5, 0.78)
+    target: Vector = TARGET
     """Where the ball should land [m]."""
     reach: float = 3.0
-    """A landing this far from the target is worth nothing [m]."""
+    """A landing this far from the target is worth 0 [m]."""
     exponent: float = 0.75
     floor: float = -0.2
     """The least a touched ball is worth."""
@@ -47,7 +48,7 @@ class RewardRule:
         return np.maximum(1.0 - share, self.floor)
 
     def returned(self, record: BallRecord, target: Any) -> FloatArray:
-        """(...) what balls are worth that should land on the target."""
+        """(...) rewards of balls that should land on the target."""
         term = self.landing_term(self.distance(record.landing, target))
         return self._paid(record, term)
 

@@ -1,4 +1,4 @@
-"""What a task sees of the world after a step."""
+"""The state of arm and ball after a step, as tasks see it."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""What a task is: the part of an environment that can be exchanged.
+"""The protocol of a task, the part of an environment that can be exchanged.
 
-The environment moves arm and ball; the task says what is observed, what is paid and when an episode
-ends. Every method takes the `State` of one episode or of N, and returns as many results, so that a
-vector environment uses the same task. `ball_play` and `reach` are examples.
+The environment moves arm and ball; the task defines observation, reward and end of an episode.
+Every method takes the `State` of one episode or of N, and returns as many results, so that a vector
+environment uses the same task. `ball_play` and `reach` are examples.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Task(Protocol):
 
     @property
     def plays_ball(self) -> bool:
-        """Whether a ball flies. Without one, `State.ball` and `State.record` mean nothing."""
+        """Whether a ball flies. Without one, ignore `State.ball` and `State.record`."""
         ...
 
     def begin(self, rng: np.random.Generator) -> FloatArray:
@@ -58,7 +58,7 @@ class Task(Protocol):
         ...
 
     def reward(self, state: State) -> FloatArray:
-        """(...) what the last step is worth."""
+        """(...) rewards of the last step."""
         ...
 
     def info(self, state: State) -> dict[str, Any]:
@@ -80,5 +80,5 @@ TASK_MEMBERS = (
 
 
 def missing_members(task: object) -> list[str]:
-    """What an object lacks to be a task."""
+    """The members that an object lacks to be a task."""
     return [name for name in TASK_MEMBERS if not hasattr(task, name)]

@@ -27,6 +27,9 @@ JOINT_LIMIT = math.radians(numbers(element("default/joint"), "range")[1])
 JOINT_DAMPING = tuple(numbers(joint, "damping")[0] for joint in _JOINTS)
 """[Nm s/rad]"""
 
+PLAYING_POSTURE = (0.17, 1.1, 1.04, 0.5)
+"""Where episodes begin: the median posture of the real arm beside a tracked ball [rad]."""
+
 SHOULDER = vector(body("shoulder"), "pos")[2] + vector(body("upper_arm"), "pos")[2]
 """Height of joint 2 above the floor, on the axis of joint 1 [m]."""
 UPPER_ARM = vector(body("elbow"), "pos")[2]

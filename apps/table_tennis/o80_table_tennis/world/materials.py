@@ -29,6 +29,6 @@ TABLE_RESTITUTION = Restitution(tangential=0.70, normal=0.92)
 """Medians of the bounces of the recorded shots of the ball gun, from the flights fitted before and
 after them (published: 0.73 and 0.92)."""
 NET_RESTITUTION = Restitution(tangential=0.50, normal=0.15)
-"""Chosen: nothing is published."""
+"""Chosen; no value is published."""
 FLOOR_RESTITUTION = Restitution(tangential=0.70, normal=0.75)
-"""Chosen: nothing is published."""
+"""Chosen; no value is published."""

@@ -1,4 +1,4 @@
-"""Where the table stands, and what a ball keeps of its velocity when it bounces on it."""
+"""Place and size of the table, height of the net, and the table's restitutions."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ TABLE_CENTRE = vector(geom("table"), "pos")
 """World frame [m]."""
 TABLE_SIZE = full_size(geom("table"))
 """[m]"""
+TARGET: Vector = (0.0, 2.5, 0.78)
+"""Where on the opponent's half a ball should land, as published [m]."""
 NET_HEIGHT = full_size(geom("net"))[2]
 """Above the table [m]."""
 
