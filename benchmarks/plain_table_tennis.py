@@ -14,16 +14,18 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from o80.loop_options import text_of
 from o80_table_tennis.balls.sampled_flight import SampledFlight
-from o80_table_tennis.rig.ball_records import BallReader
+from o80_table_tennis.rig.ball_records import BallReader, ball_options
 from o80_table_tennis.rig.pressure_range import PressureRange
 from o80_table_tennis.settings import TaskSettings
 from o80_table_tennis.task.actions import changed_pressures
 from o80_table_tennis.task.box import ObservationBox
 from o80_table_tennis.task.end import End
 from o80_table_tennis.task.state import State
-from o80_table_tennis.world.arm import MUSCLES
+from o80_table_tennis.world.arm import JOINT_NAMES, MUSCLES
 from o80_table_tennis.world.scene import MODEL
+from o80_table_tennis.world.timing import PERIOD
 
 FloatArray = NDArray[np.float64]
 Float32Array = NDArray[np.float32]
@@ -32,14 +34,13 @@ Float32Array = NDArray[np.float32]
 class PlainEnvironment(gymnasium.Env[Float32Array, Float32Array]):
     """Same plant, model, observation and reward as the environment; nothing in between.
 
-    `record` is the dtype of what happened to a ball, as the environment's twin publishes it;
+    `record` is the dtype of the contacts of a ball, as the environment's twin publishes them;
     `pressures` are the range of its arm.
     """
 
     def __init__(self, library: Path, record: np.dtype[Any], pressures: PressureRange) -> None:
         self._library = ctypes.CDLL(str(library))
-        self._library.plain_create.restype = ctypes.c_void_p
-        plain = self._library.plain_create(str(MODEL).encode())
+        plain = self._create()
         if not plain:
             raise RuntimeError(f"{library.name} could not be set up")
         self._plain = ctypes.c_void_p(plain)
@@ -61,6 +62,22 @@ class PlainEnvironment(gymnasium.Env[Float32Array, Float32Array]):
         self._racket = np.full(3, np.nan)  # no task with a ball looks at it
         self._over = True
         self.steps, self.seconds_stepping = 0, 0.0
+
+    def _create(self) -> int | None:
+        options = {
+            "model": MODEL,
+            "joints": JOINT_NAMES,
+            "timestep": PERIOD,
+            **ball_options(1),
+        }
+        texts = ctypes.c_char_p * len(options)
+        self._library.plain_create.restype = ctypes.c_void_p
+        plain: int | None = self._library.plain_create(
+            texts(*(name.encode() for name in options)),
+            texts(*(text_of(value).encode() for value in options.values())),
+            ctypes.c_size_t(len(options)),
+        )
+        return plain
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

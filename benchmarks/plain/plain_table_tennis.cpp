@@ -1,6 +1,8 @@
 // The table-tennis experiment in one process and without o80: the same plant, the same MuJoCo model
-// and the same law of impact, stepped by plain calls. What the environment is measured against.
+// and the same balls, stepped by plain calls. The environment is measured against it.
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -9,19 +11,22 @@
 #include <span>
 
 #include "driver/simulation.hpp"
+#include "o80/describe/options.hpp"
 #include "pam/plant.hpp"
 
 namespace {
 
 constexpr int kIterations = 5;  // of arm and twin in a step
 
-/// What one step gives; laid out alike in Python.
+/// The result of a step; Python knows the same layout.
 struct Seen {
   double q[4];
   double dq[4];
   double pressures[8];
   double ball[6];
-  o80::mujoco::BallRecord record;
+  // as in a row of the simulation
+  o80::mujoco::WatchedContacts racket;
+  std::array<o80::mujoco::SurfaceContacts, 3> others;
 };
 
 class Plain {
@@ -56,10 +61,11 @@ class Plain {
   void mirror() {
     o80::mujoco::Targets& targets = twin_.targets();
     for (std::size_t i = 0; i < 4; ++i) targets.joints[i] = {arm_.q()[i], arm_.dq()[i]};
-    targets.balls[0].imposed = played_ < flight_.size();
-    if (targets.balls[0].imposed) targets.balls[0].state = flight_[played_++];
+    o80::mujoco::BallTarget& ball = twin_.balls()->targets()[0];
+    ball.imposed = played_ < flight_.size();
+    if (ball.imposed) ball.state = flight_[played_++];
     twin_.advance();
-    if (twin_.released(0)) played_ = flight_.size();
+    if (twin_.balls()->released(0)) played_ = flight_.size();
   }
 
   void look(Seen& seen) const {
@@ -70,12 +76,13 @@ class Plain {
     for (std::size_t m = 0; m < 8; ++m) {
       seen.pressures[m] = arm_.config().ranges[m].pressure(arm_.state().activation[m]);
     }
-    const o80::mujoco::BallState ball = twin_.ball(0);
+    const o80::mujoco::BallState ball = twin_.balls()->ball(0);
     for (std::size_t axis = 0; axis < 3; ++axis) {
       seen.ball[axis] = ball.position[axis];
       seen.ball[3 + axis] = ball.velocity[axis];
     }
-    seen.record = twin_.record(0);
+    seen.racket = twin_.balls()->watched_contacts(0)[0];
+    std::ranges::copy(twin_.balls()->other_contacts(0), seen.others.begin());
   }
 
   o80::pam::Plant arm_;
@@ -89,17 +96,13 @@ class Plain {
 
 extern "C" {
 
-__attribute__((visibility("default"))) Plain* plain_create(const char* model) {
+/// `names` and `texts` are the options of the simulation.
+__attribute__((visibility("default"))) Plain* plain_create(const char* const* names,
+                                                           const char* const* texts,
+                                                           std::size_t options) {
   try {
     o80::mujoco::Config config;
-    config.model = model;
-    config.joints = "joint_1,joint_2,joint_3,joint_4";
-    config.balls = "ball";
-    config.racket = "racket";
-    config.table = "table";
-    config.net = "net";
-    config.floor = "floor";
-    config.timestep = 0.002;
+    for (std::size_t i = 0; i < options; ++i) o80::set_option(config, names[i], texts[i]);
     return new Plain(config);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());

@@ -25,6 +25,11 @@ SAYS = {
         "after 2 s the pole stands: True",
         "100 Hz: five steps of the model in each iteration",
     ],
+    "mujoco_balls": [
+        "spin 0 rad/s: bounces {'step_1': 1, 'step_2': 1, 'step_3': 1}",
+        "spin -100 rad/s: bounces",
+        "first on the floor at x = ",
+    ],
     "mujoco_imposed": ["met the paddle at iteration", "rose again at"],
     "mujoco_pictures": ["6 pictures of shape (240, 320, 3)", "they differ: True"],
     "paces": [

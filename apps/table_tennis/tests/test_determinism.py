@@ -106,5 +106,8 @@ def run(rig: Rig, actions: NDArray[np.float64]) -> list[NDArray[Any]]:
     for twin in rig.twins:
         history = twin.frontend.history(rows)
         seen += [history.observed.joints["position"], history.observed.balls["position"]]
-        seen += [history.observed.balls["velocity"], history.extended.racket_velocity]
+        seen += [
+            history.observed.balls["velocity"],
+            history.extended.contacts["racket"]["smallest_distance"],
+        ]
     return seen

@@ -11,7 +11,7 @@
 
 namespace o80 {
 
-/// One option of a robot: a field of its described Config.
+/// One option of a robot: a field of its described Config, or of a described struct in it.
 struct Option {
   std::string name;
   std::string kind;  // "number", "integer", "boolean", "text", "one of: a, b"
@@ -40,8 +40,8 @@ std::string option_kind() {
     return std::to_string(ArrayOf<T>::kCount) + " x " + option_kind<typename ArrayOf<T>::Element>();
   } else {
     static_assert(std::is_same_v<T, std::string>,
-                  "an option is a number, a boolean, a described enum, a std::string or a "
-                  "std::array of those");
+                  "an option is a number, a boolean, a described enum, a std::string, a std::array "
+                  "of those, or a described struct of options");
     return "text";
   }
 }
@@ -109,20 +109,76 @@ bool parse_option(std::string_view text, T& value) {
   }
 }
 
+/// Calls `visit(name, member of Config, text)` for every option. The options of a described struct
+/// among the fields take their place, under their own names.
+template <class Config, class Visit>
+constexpr void each_option(Config& config, Visit&& visit) {
+  using Described = std::remove_const_t<Config>;
+  o80_describe(Tag<Described>{}, [&]<class Field>(std::string_view name, Field Described::* member,
+                                                  std::size_t, std::string_view text) {
+    if constexpr (DescribedStruct<Field>) {
+      describing::each_option(config.*member, visit);
+    } else {
+      visit(name, config.*member, text);
+    }
+  });
+}
+
+/// How many options a Config has, and whether a name stands for two of them.
+template <class Config>
+constexpr std::size_t option_count() {
+  std::size_t count = 0;
+  o80_describe(Tag<Config>{},
+               [&]<class Field>(std::string_view, Field Config::*, std::size_t, std::string_view) {
+                 if constexpr (DescribedStruct<Field>) {
+                   count += option_count<Field>();
+                 } else {
+                   ++count;
+                 }
+               });
+  return count;
+}
+template <class Config, class Names>
+constexpr void collect_option_names(Names& names, std::size_t& count) {
+  o80_describe(Tag<Config>{}, [&]<class Field>(std::string_view name, Field Config::*, std::size_t,
+                                               std::string_view) {
+    if constexpr (DescribedStruct<Field>) {
+      collect_option_names<Field>(names, count);
+    } else {
+      names[count++] = name;
+    }
+  });
+}
+template <class Config>
+consteval bool has_repeated_option() {
+  std::array<std::string_view, option_count<Config>() + 1> names;
+  std::size_t count = 0;
+  collect_option_names<Config>(names, count);
+  for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t k = 0; k < i; ++k) {
+      if (names[i] == names[k]) return true;
+    }
+  }
+  return false;
+}
+
 }  // namespace describing
 
-/// The options of a described Config.
+/// The options of a described Config. A field that is a described struct adds its fields as options
+/// of their own, so that the options of a part can be kept in a struct of that part.
 template <class Config>
 std::vector<Option> options_of() {
+  static_assert(!describing::has_repeated_option<Config>(),
+                "two options of this Config, or of the structs in it, have the same name");
   std::vector<Option> options;
   const Config defaults{};
-  o80_describe(Tag<Config>{}, [&]<class Field>(std::string_view name, Field Config::* member,
-                                               std::size_t, std::string_view text) {
-    FieldRow row;
-    set_text(row, text);
-    options.push_back({std::string(name), describing::option_kind<Field>(),
-                       describing::option_text(defaults.*member), row.help.str(), row.unit.str()});
-  });
+  describing::each_option(
+      defaults, [&]<class Value>(std::string_view name, const Value& value, std::string_view text) {
+        FieldRow row;
+        set_text(row, text);
+        options.push_back({std::string(name), describing::option_kind<Value>(),
+                           describing::option_text(value), row.help.str(), row.unit.str()});
+      });
   return options;
 }
 
@@ -131,17 +187,17 @@ template <class Config>
 void set_option(Config& config, std::string_view name, std::string_view text) {
   bool known = false;
   std::vector<std::string> names;
-  o80_describe(Tag<Config>{}, [&]<class Field>(std::string_view field, Field Config::* member,
-                                               std::size_t, std::string_view) {
-    names.emplace_back(field);
-    if (field != name) return;
-    known = true;
-    if (!describing::parse_option(text, config.*member)) {
-      throw InvalidArgument("option '" + std::string(name) + "' must be " +
-                            describing::with_article(describing::option_kind<Field>()) + ", got '" +
-                            std::string(text) + "'");
-    }
-  });
+  describing::each_option(
+      config, [&]<class Value>(std::string_view option, Value& value, std::string_view) {
+        names.emplace_back(option);
+        if (option != name) return;
+        known = true;
+        if (!describing::parse_option(text, value)) {
+          throw InvalidArgument("option '" + std::string(name) + "' must be " +
+                                describing::with_article(describing::option_kind<Value>()) +
+                                ", got '" + std::string(text) + "'");
+        }
+      });
   if (!known) {
     throw InvalidArgument("there is no option '" + std::string(name) + "'" +
                           (names.empty() ? ": this robot has none" : names_instead(name, names)));

@@ -77,6 +77,20 @@ struct Config {
 O80_DESCRIBE(Config, (address, "where the arm listens"), (gain, "of the loop [Nm/rad]"), count,
              fast, mode, offsets, small);
 
+/// The options of a part of a robot, in a struct of their own.
+struct GripperConfig {
+  double grip = 0.5;
+  std::array<double, 2> fingers{1, 2};
+};
+O80_DESCRIBE(GripperConfig, (grip, "how hard [N]"), fingers);
+
+struct ConfigOfParts {
+  std::string address = "192.168.0.1";
+  GripperConfig gripper;
+  int count = -3;
+};
+O80_DESCRIBE(ConfigOfParts, (address, "where the arm listens"), gripper, count);
+
 template <class Robot>
 o80::Schema schema_of() {
   o80::Schema schema;

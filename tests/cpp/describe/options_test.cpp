@@ -8,6 +8,7 @@ namespace o80 {
 namespace {
 
 using described::Config;
+using described::ConfigOfParts;
 using described::ControlMode;
 using described::message_of;
 using ::testing::AllOf;
@@ -52,6 +53,33 @@ TEST(Options, ReadBackWhatTheyPrint) {
   EXPECT_EQ(again.mode, config.mode);
   EXPECT_EQ(again.offsets, config.offsets);
   EXPECT_EQ(again.small, config.small);
+}
+
+TEST(Options, OfAStructAmongTheFieldsAreListedAndSetUnderTheirOwnNames) {
+  std::vector<std::string> names;
+  for (const Option& option : options_of<ConfigOfParts>()) names.push_back(option.name);
+  EXPECT_THAT(names, ElementsAre("address", "grip", "fingers", "count"));
+  EXPECT_EQ(options_of<ConfigOfParts>()[1].unit, "N");
+  EXPECT_EQ(options_of<ConfigOfParts>()[2].default_text, "1,2");
+
+  ConfigOfParts config;
+  set_option(config, "fingers", "3,4");
+  set_option(config, "count", "7");
+  EXPECT_EQ(config.gripper.fingers, (std::array<double, 2>{3, 4}));
+  EXPECT_EQ(config.count, 7);
+  EXPECT_THAT(message_of<InvalidArgument>([&] { set_option(config, "gripper", "1"); }),
+              AllOf(HasSubstr("no option 'gripper'"), HasSubstr("grip")));
+}
+
+struct GripperTwice {
+  double grip = 0;
+  described::GripperConfig gripper;
+};
+O80_DESCRIBE(GripperTwice, grip, gripper);
+
+TEST(Options, WithTheSameNameAreFoundWhenTheyAreCompiled) {
+  static_assert(describing::has_repeated_option<GripperTwice>());
+  static_assert(!describing::has_repeated_option<ConfigOfParts>());
 }
 
 std::string refusal(std::string_view name, std::string_view text) {

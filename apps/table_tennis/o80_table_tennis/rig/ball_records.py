@@ -24,24 +24,33 @@ from ..world.materials import (
 
 RECORDS = ("extended", "contacts")
 """Where in a row of the twin the records of its balls are."""
-TOUCHES = ("count",)
-"""Paths inside a record: contacts with the racket,"""
-NET_TOUCHES = ("net_count",)
-FLOOR_TOUCHES = ("floor_count",)
-LANDED_AT = ("landing_iteration",)
+TOUCHES = ("racket", "count")
+NET_TOUCHES = ("net", "count")
+FLOOR_TOUCHES = ("floor", "count")
+"""Paths inside a record,"""
+LANDED_AT = ("table", "iteration")
 """when the ball touched the table after the racket, or -1,"""
-LANDING = ("landing_position",)
-VELOCITY_AFTER = ("velocity_after",)
+LANDING = ("table", "position")
+VELOCITY_AFTER = ("racket", "velocity_after")
 """of the first contact with the racket,"""
-LARGEST_SPEED = ("largest_speed",)
-SMALLEST_DISTANCE = ("smallest_distance",)
+LARGEST_SPEED = ("racket", "largest_speed")
+SMALLEST_DISTANCE = ("racket", "smallest_distance")
 
 READ = {
     *(TOUCHES, NET_TOUCHES, FLOOR_TOUCHES, LANDED_AT, LANDING),
     *(VELOCITY_AFTER, LARGEST_SPEED, SMALLEST_DISTANCE),
 }
-CODES = {"u4": "I", "i8": "q", "f8": "d"}
+CODES = {"i8": "q", "f8": "d"}
 """Of numbers, for `struct`."""
+
+
+SURFACES = {
+    "racket": RACKET_RESTITUTION,
+    "table": TABLE_RESTITUTION,
+    "net": NET_RESTITUTION,
+    "floor": FLOOR_RESTITUTION,
+}
+"""What balls bounce on, by the names of its geoms; to the simulator they are all alike."""
 
 
 def ball_options(balls: int) -> dict[str, Any]:
@@ -49,14 +58,11 @@ def ball_options(balls: int) -> dict[str, Any]:
     return {
         "balls": "ball",
         "extra_balls": balls - 1,
-        "racket": "racket",
-        "table": "table",
-        "net": "net",
-        "floor": "floor",
-        "racket_restitution": RACKET_RESTITUTION.axes,
-        "table_restitution": TABLE_RESTITUTION.axes,
-        "net_restitution": NET_RESTITUTION.axes,
-        "floor_restitution": FLOOR_RESTITUTION.axes,
+        "surfaces": [
+            f"{geom}={' '.join(map(str, restitution.axes))}"
+            for geom, restitution in SURFACES.items()
+        ],
+        "watched": "racket",
         "air_density": AERODYNAMICS.air_density,
         "drag_coefficient": AERODYNAMICS.drag_coefficient,
         "lift_coefficient": AERODYNAMICS.lift_coefficient,

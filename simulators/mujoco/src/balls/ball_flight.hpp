@@ -7,7 +7,7 @@
 
 namespace o80::mujoco {
 
-/// Where a ball is and how it moves.
+/// Position, velocity and spin of a ball.
 struct Ball {
   Vector position{};  // [m]
   Vector velocity{};  // [m/s]
@@ -15,7 +15,7 @@ struct Ball {
   bool operator==(const Ball&) const = default;
 };
 
-/// What the air and gravity do to one kind of ball:
+/// The forces of air and gravity on one kind of ball:
 /// a = -drag |v| v + magnus (omega x v) + gravity.
 struct Air {
   double drag = 0;        // 1/2 rho Cd A/m [1/m]
@@ -25,8 +25,9 @@ struct Air {
 
   static Air of(double density, double drag_coefficient, double lift_coefficient, double radius,
                 double mass, double spin_decay, const Vector& gravity) noexcept {
-    const double pressed = 0.5 * density * std::numbers::pi * radius * radius / mass;
-    return {drag_coefficient * pressed, lift_coefficient * pressed * radius, spin_decay, gravity};
+    const double per_coefficient = 0.5 * density * std::numbers::pi * radius * radius / mass;
+    return {drag_coefficient * per_coefficient, lift_coefficient * per_coefficient * radius,
+            spin_decay, gravity};
   }
 };
 
@@ -36,7 +37,8 @@ inline Vector acceleration(const Air& air, const Vector& velocity, const Vector&
          air.gravity;
 }
 
-/// A ball `duration` [s] later, by the classical Runge-Kutta rule with the spin of the middle.
+/// A ball after `duration` [s] of free flight, by one classical Runge-Kutta step with the spin of
+/// the middle.
 inline Ball flown(const Ball& ball, const Air& air, double duration) noexcept {
   const double half = 0.5 * duration;
   const double halfway = std::exp(-air.spin_decay * half);
@@ -51,7 +53,7 @@ inline Ball flown(const Ball& ball, const Air& air, double duration) noexcept {
   const Vector a4 = acceleration(air, v4, spin);
   const double sixth = duration / 6;
   return {ball.position + sixth * (v1 + 2 * v2 + 2 * v3 + v4),
-          ball.velocity + sixth * (a1 + 2 * a2 + 2 * a3 + a4), halfway * spin};  // halfway, twice
+          ball.velocity + sixth * (a1 + 2 * a2 + 2 * a3 + a4), halfway * spin};
 }
 
 }  // namespace o80::mujoco

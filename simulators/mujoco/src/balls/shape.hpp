@@ -8,16 +8,16 @@
 
 namespace o80::mujoco {
 
-/// How near a point is to a shape: its distance from the surface [m], negative inside, and the
-/// direction away from it.
+/// A point beside a shape: its distance from the surface [m], negative inside, and the direction
+/// away from it.
 struct Near {
   double distance = 0;
   Vector normal{};
 };
 
-/// An elliptic plate of a racket, rounded at its rim: all points within half its thickness of a
+/// An elliptic plate, rounded at its rim: all points within half its thickness of a
 /// flat ellipse.
-struct Blade {
+struct Plate {
   Vector half{};  // half axes [m]
   int thin = 1;   // the axis along which its faces look
 
@@ -35,14 +35,14 @@ struct Plane {
   Near near(const Vector& point) const noexcept { return {point.z, {0, 0, 1}}; }
 };
 
-/// What a ball can bounce on, in the frame of the body it belongs to.
-using Shape = std::variant<Blade, Box, Plane>;
+/// The shape of a surface, in the frame of its geom.
+using Shape = std::variant<Plate, Box, Plane>;
 
 inline Near near(const Shape& shape, const Vector& point) noexcept {
   return std::visit([&](const auto& each) { return each.near(point); }, shape);
 }
 
-/// The point of an ellipse (half axes a, b) nearest to a point outside of it, of the first
+/// The point of an ellipse (half axes a, b) nearest to a point outside of it; both in the first
 /// quadrant.
 struct EllipsePoint {
   double x = 0, y = 0;
@@ -61,7 +61,7 @@ inline EllipsePoint nearest_on_ellipse(double a, double b, double x, double y) n
   return {a * a * x / (t + a * a), b * b * y / (t + b * b)};
 }
 
-inline Near Blade::near(const Vector& point) const noexcept {
+inline Near Plate::near(const Vector& point) const noexcept {
   const int i = (thin + 1) % 3;
   const int j = (thin + 2) % 3;
   const double x = point[i];

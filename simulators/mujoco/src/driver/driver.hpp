@@ -1,23 +1,16 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
 #include <vector>
 
+#include "balls/ball_rows.hpp"
 #include "driver/simulation.hpp"
 #include "o80/robot.hpp"
 
 namespace o80::mujoco {
 
-/// Forgets what happened to a ball, and begins to note it anew.
-struct ClearContacts {
-  static constexpr std::string_view kHelp = "forget what balls have met";
-  std::uint32_t ball = 0;
-};
-O80_DESCRIBE(ClearContacts, (ball, "which, counted from 1; 0: all of them"));
-
-/// Any MuJoCo model as a robot: joints or controls and balls in, their states, sensors and contacts
-/// out.
+/// Any MuJoCo model as a robot. Commands set joints or controls, and balls; rows hold their states
+/// and the model's sensors.
 class MujocoDriver {
  public:
   using Config = mujoco::Config;
@@ -38,27 +31,22 @@ class MujocoDriver {
   Served on(const Restore& restore) noexcept;
   Served on(const ClearContacts& which) noexcept;
 
-  const Simulation& simulation() const noexcept { return simulation_; }
-
  private:
   using Number = Place<double>;
-  /// Where everything lies in a row.
+  /// Offsets of all values in a row.
   struct Places {
     std::vector<Place<JointState>> joints;
     std::vector<Number> controls;
-    std::vector<Place<BallState>> balls;
-    std::vector<Place<BallRecord>> records;
-    std::vector<Place<JointState>> seen_joints;  // of controlled joints
-    std::vector<Number> sensors;
-    Place<std::array<double, 3>> racket_position;
-    Place<std::array<double, 3>> racket_velocity;
+    BallRows balls;
     Place<std::int64_t> clock;
+    std::vector<Place<JointState>> joint_sensors;  // in mode control
     Place<std::uint32_t> engine_contacts;
-    std::uint32_t first_ball = 0;  // actuator
+    std::vector<Number> sensors;
   };
   Places add_to(Schema& schema) const;
-  /// Throws DriverError if no whole number of steps lasts so long [ns].
-  std::uint32_t steps_in(std::int64_t period) const;
+  void add_actuators(Schema& schema, Places& places) const;
+  void add_sensors(Schema& schema, Places& places) const;
+  void read_sensors(Reading<MujocoDriver>& reading) const;
   void go_on_from_targets(Reading<MujocoDriver>& reading);
   Served no_such_slot() const noexcept;
 

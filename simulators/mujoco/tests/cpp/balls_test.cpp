@@ -1,34 +1,40 @@
-// Balls of the driver: imposed, replayed, hit, put elsewhere.
+// Balls of a running simulation: imposed, replayed, hit, teleported.
+
+#include "balls/balls.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "table_tennis_scene.hpp"
+#include "scenes.hpp"
 
 namespace o80::mujoco {
 namespace {
 
+using testing::AllOf;
 using testing::DoubleNear;
 using testing::HasSubstr;
 using testing::Pointwise;
+using testing::ThrowsMessage;
 
-using MujocoBallsTest = MujocoDriverTest;
+constexpr double kBenchTop = 0.55;
 
-TEST_F(MujocoBallsTest, ABallIsImposedWhileCommandedAndFliesOnAfterwards) {
-  Inline twin(table_tennis());
+using BallsTest = SceneTest;
+
+TEST_F(BallsTest, ABallIsImposedWhileCommandedAndFliesOnAfterwards) {
+  Inline robot(court());
   const Shot shot{{0.2, 1.0, 1.2}, {0.5, 2, 1}};
-  for (int i = 0; i < 10; ++i) twin.ask("ball", shot.at(i));
-  const Seen last = twin.burst(10);
+  for (int i = 0; i < 10; ++i) robot.ask("ball", shot.at(i));
+  const Seen last = robot.burst(10);
   EXPECT_EQ(last.observed<BallState>(4).position, shot.at(9).position);
   EXPECT_EQ(last.observed<BallState>(4).velocity, shot.at(9).velocity);
   EXPECT_TRUE(last.row.active(4));
 
-  const Seen free = twin.burst(1);
+  const Seen free = robot.burst(1);
   EXPECT_FALSE(free.row.active(4));
   const Ball before{vector(shot.at(9).position), vector(shot.at(9).velocity), {30, 0, 0}};
-  const Air air = Air::of(1.18, 0.40, 1.47, 0.02, 0.0027, 0.5, {0, 0, -9.81});
+  const Air air = Air::of(1.2, 0.47, 1.0, 0.02, 0.0027, 0.5, {0, 0, -9.81});
   const Ball after = flown(before, air, 0.002);
   EXPECT_THAT(free.observed<BallState>(4).position,
               Pointwise(DoubleNear(1e-15), numbers(after.position)));
@@ -36,49 +42,47 @@ TEST_F(MujocoBallsTest, ABallIsImposedWhileCommandedAndFliesOnAfterwards) {
               Pointwise(DoubleNear(1e-15), numbers(after.velocity)));
 }
 
-TEST_F(MujocoBallsTest, ABounceOfAReplayedBallIsPartOfTheReplay) {
-  Inline twin(table_tennis());
-  twin.ask("ball", Shot{{0.4, 1.0, 0.81}, {0, -2, -10}}.at(0));
-  for (int i = 0; i < 5; ++i) twin.ask("ball", Shot{{0.4, 1.0, 0.81}, {0, -2, -10}}.at(i));
-  const Seen inside = twin.burst(6);
+TEST_F(BallsTest, AnImposedBallPassesThroughSurfacesThatAreNotWatched) {
+  Inline robot(court());
+  for (int i = 0; i < 5; ++i) robot.ask("ball", Shot{{0.4, 1.0, 0.585}, {0, -2, -10}}.at(i));
+  const Seen inside = robot.burst(5);
 
-  EXPECT_LT(inside.observed<BallState>(4).position[2], 0.775);
-  EXPECT_EQ(inside.record().table_count, 0u);
+  EXPECT_LT(inside.observed<BallState>(4).position[2], kBenchTop);
+  EXPECT_EQ(inside.bench().count, 0);
 }
 
-TEST_F(MujocoBallsTest, AHitEndsTheReplayInThatVeryIteration) {
-  Inline twin(table_tennis());
-  const Shot shot = shot_at_the_racket(twin);
-  for (int i = 0; i < 60; ++i) twin.ask("ball", shot.at(i));
-  Batch batch = twin.frontend.pulse();
-  Seen seen = twin.burst(1);
+TEST_F(BallsTest, AWatchedSurfaceEndsTheReplayInTheIterationOfTheContact) {
+  Inline robot(court());
+  const Shot shot = shot_at_the_paddle(robot);
+  for (int i = 0; i < 60; ++i) robot.ask("ball", shot.at(i));
+  Batch batch = robot.frontend.pulse();
+  Seen seen = robot.burst(1);
   int i = 0;
-  while (seen.record().count == 0 && ++i < 60) {
+  while (seen.paddle().count == 0 && ++i < 60) {
     EXPECT_EQ(seen.observed<BallState>(4).position, shot.at(i - 1).position);
-    seen = twin.burst(1);
+    seen = robot.burst(1);
   }
 
-  const BallRecord record = seen.record();
-  ASSERT_EQ(record.count, 1u);
-  EXPECT_EQ(record.iteration, seen.row.iteration());
-  EXPECT_GT(record.fraction, 0.0);
-  EXPECT_LT(record.fraction, 1.0);
-  EXPECT_EQ(record.smallest_distance, 0.0);
-  EXPECT_EQ(record.velocity_before, numbers(shot.velocity));
-  EXPECT_EQ(record.racket_velocity, (Numbers{}));
-  // turned round along the normal, and kept by its share
-  EXPECT_THAT(
-      record.velocity_after,
-      Pointwise(DoubleNear(1e-12),
-                numbers(0.78 * (shot.velocity - 2 * dot(shot.velocity, vector(record.normal)) *
-                                                    vector(record.normal)))));
-  // the rest of the iteration was flown with it
-  const Vector moved = vector(seen.observed<BallState>(4).position) - vector(record.position);
-  const Vector expected = 0.02 * vector(record.normal) +
-                          (0.002 * (1 - record.fraction)) * vector(record.velocity_after);
+  const WatchedContacts paddle = seen.paddle();
+  ASSERT_EQ(paddle.count, 1);
+  EXPECT_EQ(paddle.iteration, seen.row.iteration());
+  EXPECT_GT(paddle.fraction, 0.0);
+  EXPECT_LT(paddle.fraction, 1.0);
+  EXPECT_EQ(paddle.smallest_distance, 0.0);
+  EXPECT_EQ(paddle.velocity_before, numbers(shot.velocity));
+  EXPECT_EQ(paddle.surface_velocity, (Numbers{}));
+  // the normal part changes its sign, and each part keeps its share
+  const Vector normal = vector(paddle.normal);
+  EXPECT_THAT(paddle.velocity_after,
+              Pointwise(DoubleNear(1e-12),
+                        numbers(0.78 * (shot.velocity - 2 * dot(shot.velocity, normal) * normal))));
+  // the rest of the iteration is flown with that velocity
+  const Vector moved = vector(seen.observed<BallState>(4).position) - vector(paddle.position);
+  const Vector expected =
+      0.02 * normal + (0.002 * (1 - paddle.fraction)) * vector(paddle.velocity_after);
   EXPECT_THAT(numbers(moved), Pointwise(DoubleNear(5e-5), numbers(expected)));
 
-  // all commands behind the one of this iteration ended as interrupted, in this iteration
+  // all later commands of the ball end as interrupted, in this iteration
   EXPECT_EQ(batch.handle(static_cast<std::size_t>(i)).status, Status::completed);
   for (const std::size_t n : {static_cast<std::size_t>(i + 1), std::size_t{59}}) {
     EXPECT_EQ(batch.handle(n).status, Status::interrupted);
@@ -86,86 +90,156 @@ TEST_F(MujocoBallsTest, AHitEndsTheReplayInThatVeryIteration) {
   }
 
   // and the ball flies freely from now on
-  const Seen next = twin.burst(1);
+  const Seen next = robot.burst(1);
   EXPECT_FALSE(next.row.active(4));
-  EXPECT_EQ(next.record().count, 1u);
+  EXPECT_EQ(next.paddle().count, 1);
   EXPECT_GT(next.observed<BallState>(4).velocity[1], 0.0);
 }
 
-TEST_F(MujocoBallsTest, AReturnLandsOnTheTableAndIsRecorded) {
-  Inline twin(table_tennis());
-  // a still racket, its face towards the opponent
+TEST_F(BallsTest, TheFirstContactWithTheBenchAfterThePaddleIsRecorded) {
+  Inline robot(court());
+  // a still paddle that faces the bench
   const std::array<double, 4> q{0.0, 0.9, 0.4, 0.0};
-  pose_arm(twin, q);
-  const Vector racket = vector(twin.burst(2).extended<Numbers>("racket_position"));
-  const Shot shot{racket + Vector{0, 0.1, 0}, {0, -4, 2}};
-  pose_arm(twin, q);
-  for (int i = 0; i < 40; ++i) twin.ask("ball", shot.at(i));
-  const Seen seen = twin.burst(600);
+  pose_arm(robot, q);
+  const Vector centre = vector(robot.burst(2).extended<Numbers>("paddle_position"));
+  const Shot shot{centre + Vector{0, 0.1, 0}, {0, -4, 2}};
+  for (int i = 0; i < 40; ++i) robot.ask("ball", shot.at(i));
+  const Seen seen = robot.burst(600);
 
-  const BallRecord record = seen.record();
-  ASSERT_EQ(record.count, 1u);
-  ASSERT_GT(record.landing_iteration, record.iteration);
-  EXPECT_GE(record.table_count, 1u);
-  EXPECT_NEAR(record.landing_position[2], 0.775, 1e-6);
-  EXPECT_GT(record.landing_position[1], 0.2);
-  EXPECT_LT(record.landing_position[1], 2.94);
-  EXPECT_GE(record.largest_speed, length(vector(record.velocity_after)));
-  EXPECT_LT(record.largest_speed, 10);
+  const WatchedContacts paddle = seen.paddle();
+  const SurfaceContacts bench = seen.bench();
+  ASSERT_EQ(paddle.count, 1);
+  ASSERT_GT(bench.iteration, paddle.iteration);
+  EXPECT_GE(bench.count, 1);
+  EXPECT_NEAR(bench.position[2], kBenchTop, 1e-6);
+  EXPECT_GT(bench.position[1], 0.3);
+  EXPECT_LT(bench.position[1], 2.7);
+  EXPECT_GE(paddle.largest_speed, length(vector(paddle.velocity_after)));
+  EXPECT_LT(paddle.largest_speed, 10);
 }
 
-TEST_F(MujocoBallsTest, ARacketThatIsPutElsewhereHitsNothingOnTheWay) {
-  Inline twin(table_tennis({{"spin", "0,0,0"}}));
-  pose_arm(twin, {-0.5, 1.2, 0.3, 0});
-  const Vector left = vector(twin.burst(2).extended<Numbers>("racket_position"));
-  pose_arm(twin, {0.5, 1.2, 0.3, 0});
-  const Vector right = vector(twin.burst(2).extended<Numbers>("racket_position"));
-  twin.ask("ball", BallState{numbers(0.5 * (left + right)), {}});
-  pose_arm(twin, {-0.5, 1.2, 0.3, 0});
-  const Seen seen = twin.burst(1);
+TEST_F(BallsTest, AMovingPaddleIsRecordedWithItsVelocity) {
+  Inline robot(court());
+  const Shot shot = shot_at_the_paddle(robot);
+  Numbers paddle_velocity{};
+  Seen seen = robot.latest();
+  for (int i = 0; i < 60 && seen.paddle().count == 0; ++i) {
+    paddle_velocity = seen.extended<Numbers>("paddle_velocity");
+    pose_arm(robot, {kPosture[0] + 0.004 * i, kPosture[1], kPosture[2], kPosture[3]}, {2, 0, 0, 0});
+    robot.ask("ball", shot.at(i));
+    seen = robot.burst(1);
+  }
 
-  EXPECT_EQ(seen.record().count, 0u);
-  EXPECT_GT(seen.record().smallest_distance, 0.05);
+  ASSERT_EQ(seen.paddle().count, 1);
+  EXPECT_GT(length(vector(paddle_velocity)), 1.0);
+  // at the point of contact, which is up to a paddle's radius away from the centre
+  EXPECT_LT(length(vector(seen.paddle().surface_velocity) - vector(paddle_velocity)),
+            2 * 0.1 + 0.02);
+  EXPECT_GT(seen.paddle().velocity_after[1], 0.78 * 4 * std::abs(seen.paddle().normal[1]) * 0.9);
 }
 
-TEST_F(MujocoBallsTest, ABallThatIsPutElsewhereHitsNothingOnTheWay) {
-  Inline twin(table_tennis());
-  pose_arm(twin, kPosture);
-  const Vector racket = vector(twin.burst(2).extended<Numbers>("racket_position"));
-  twin.ask("ball", BallState{numbers(racket + Vector{0, 0.5, 0}), {0, -1, 0}});
-  twin.ask("ball", BallState{numbers(racket - Vector{0, 0.5, 0}), {0, -1, 0}});
-  twin.burst(1);
+TEST_F(BallsTest, APaddleThatIsTeleportedHitsNothingOnTheWay) {
+  Inline robot(court({{"spin", "0,0,0"}}));
+  pose_arm(robot, {-0.5, 1.2, 0.3, 0});
+  const Vector left = vector(robot.burst(2).extended<Numbers>("paddle_position"));
+  pose_arm(robot, {0.5, 1.2, 0.3, 0});
+  const Vector right = vector(robot.burst(2).extended<Numbers>("paddle_position"));
+  robot.ask("ball", BallState{numbers(0.5 * (left + right)), {}});
+  pose_arm(robot, {-0.5, 1.2, 0.3, 0});
+  const Seen seen = robot.burst(1);
 
-  EXPECT_EQ(twin.burst(1).record().count, 0u);
+  EXPECT_EQ(seen.paddle().count, 0);
+  EXPECT_GT(seen.paddle().smallest_distance, 0.05);
 }
 
-TEST_F(MujocoBallsTest, ClearingForgetsTheContactsAndLeavesTheArmAlone) {
-  Inline twin(table_tennis({{"extra_balls", "1"}}));
-  const Shot shot = shot_at_the_racket(twin);
-  for (int i = 0; i < 60; ++i) twin.ask("ball", shot.at(i));
-  for (int i = 0; i < 60; ++i) twin.ask("ball_1", shot.at(i));
-  const Seen hit = twin.burst(60);
-  ASSERT_EQ(hit.record(0).count, 1u);
-  ASSERT_EQ(hit.record(1).count, 1u);
+TEST_F(BallsTest, ABallThatIsTeleportedHitsNothingOnTheWay) {
+  Inline robot(court());
+  pose_arm(robot, kPosture);
+  const Vector centre = vector(robot.burst(2).extended<Numbers>("paddle_position"));
+  robot.ask("ball", BallState{numbers(centre + Vector{0, 0.5, 0}), {0, -1, 0}});
+  robot.ask("ball", BallState{numbers(centre - Vector{0, 0.5, 0}), {0, -1, 0}});
+  robot.burst(1);
 
-  twin.request(ClearContacts{.ball = 2});
-  const Seen one = twin.burst(1);
-  EXPECT_EQ(one.record(0).count, 1u);
-  EXPECT_EQ(one.record(1).count, 0u);
-  EXPECT_EQ(one.record(1).iteration, -1);
-  EXPECT_GT(one.record(1).smallest_distance, 0.0);
-  EXPECT_LT(one.record(1).smallest_distance, 1.0);
+  EXPECT_EQ(robot.burst(1).paddle().count, 0);
+}
 
-  twin.request(ClearContacts{});
-  const Seen all = twin.burst(1);
-  EXPECT_EQ(all.record(0).count, 0u);
+TEST_F(BallsTest, ClearingForgetsTheContactsAndLeavesTheArmAlone) {
+  Inline robot(court({{"extra_balls", "1"}}));
+  const Shot shot = shot_at_the_paddle(robot);
+  for (const char* ball : {"ball", "ball_1"}) {
+    for (int i = 0; i < 60; ++i) robot.ask(ball, shot.at(i));
+  }
+  const Seen hit = robot.burst(60);
+  ASSERT_EQ(hit.paddle(0).count, 1);
+  ASSERT_EQ(hit.paddle(1).count, 1);
+
+  robot.request(ClearContacts{.ball = 2});
+  const Seen one = robot.burst(1);
+  EXPECT_EQ(one.paddle(0).count, 1);
+  EXPECT_EQ(one.paddle(1).count, 0);
+  EXPECT_EQ(one.paddle(1).iteration, -1);
+  EXPECT_GT(one.paddle(1).smallest_distance, 0.0);
+  EXPECT_LT(one.paddle(1).smallest_distance, 1.0);
+
+  robot.request(ClearContacts{});
+  const Seen all = robot.burst(1);
+  EXPECT_EQ(all.paddle(0).count, 0);
   EXPECT_EQ(all.observed<JointState>(1).position, kPosture[1]);
   EXPECT_EQ(unpack<RowHead>(all.row.bytes()).fresh, 0u);
 
-  twin.request(ClearContacts{.ball = 3});
-  Batch batch = twin.frontend.pulse();
-  twin.burst(1);
-  EXPECT_THAT(batch.handle(0).text, HasSubstr("there are 2 balls"));
+  robot.request(ClearContacts{.ball = 3});
+  Batch batch = robot.frontend.pulse();
+  robot.burst(1);
+  EXPECT_THAT(batch.handle(0).text, HasSubstr("ball must be from 1 to 2, or 0 for all balls"));
+}
+
+TEST_F(BallsTest, TheOrderOfTheSurfacesChangesOnlyTheOrderOfTheirRecords) {
+  Inline one(court());
+  Inline other(court(
+      {{"surfaces", "ground=0.7 0.7 0.75, fence=0.5 0.5 0.15, bench=0.7 0.7 0.92, paddle=0.78"}}));
+  for (Inline* robot : {&one, &other}) {
+    const Shot shot = shot_at_the_paddle(*robot);
+    for (int i = 0; i < 60; ++i) robot->ask("ball", shot.at(i));
+    robot->burst(600);
+  }
+
+  ASSERT_EQ(one.latest().paddle().count, 1);
+  EXPECT_EQ(one.latest().observed<BallState>(4).position,
+            other.latest().observed<BallState>(4).position);
+  EXPECT_EQ(one.latest().paddle().velocity_after, other.latest().paddle().velocity_after);
+  EXPECT_EQ(one.latest().bench().position, other.latest().bench().position);
+}
+
+TEST_F(BallsTest, WithoutAWatchedSurfaceTheFirstContactsAreRecorded) {
+  Inline robot(court({{"surfaces", "bench=0.8"}, {"watched", ""}}));
+  robot.ask("ball", BallState{{0.4, 1.0, 1.0}, {}});
+  const Seen seen = robot.burst(300);
+
+  EXPECT_GE(seen.bench().count, 1);
+  EXPECT_GT(seen.bench().iteration, 0);
+  EXPECT_NEAR(seen.bench().position[2], kBenchTop, 1e-6);
+}
+
+TEST_F(BallsTest, WithoutSurfacesBallsFlyAndNoContactsArePublished) {
+  Inline robot(court({{"surfaces", ""}, {"watched", ""}}));
+  robot.ask("ball", BallState{{0.4, 1.0, 0.6}, {}});
+  const Seen seen = robot.burst(300);
+
+  EXPECT_LT(seen.observed<BallState>(4).position[2], 0.0);
+  EXPECT_THROW(seen.sensor("contacts"), std::out_of_range);
+}
+
+TEST_F(BallsTest, ExplainsOptionsThatCannotBe) {
+  const auto start = [](const OptionValues& options) { return [=] { Inline robot(options); }; };
+  EXPECT_THAT(start(court({{"balls", "elbow"}})),
+              ThrowsMessage<Error>(HasSubstr("body 'elbow' is not a ball: its only joint must be a "
+                                             "free joint")));
+  EXPECT_THAT(start(court({{"balls", "bal"}})),
+              ThrowsMessage<Error>(HasSubstr("no body 'bal'. Did you mean 'ball'?")));
+  EXPECT_THAT(start(court({{"balls", ""}})),
+              ThrowsMessage<Error>(HasSubstr("name the balls with balls=...")));
+  EXPECT_THAT(start(court({{"surfaces", "bat"}, {"watched", ""}})),
+              ThrowsMessage<Error>(AllOf(HasSubstr("no geom 'bat'"), HasSubstr("paddle"))));
 }
 
 }  // namespace

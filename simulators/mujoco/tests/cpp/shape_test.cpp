@@ -13,16 +13,16 @@
 namespace o80::mujoco {
 namespace {
 
-const Blade kBlade{{0.07425, 0.0027, 0.0941}, 1};
+const Plate kPlate{{0.07425, 0.0027, 0.0941}, 1};
 
-TEST(Blade, IsFlatInsideItsRimAndLooksAlongItsThinAxis) {
-  const Near above = kBlade.near({0.03, 0.05, -0.06});
+TEST(Plate, IsFlatInsideItsRimAndLooksAlongItsThinAxis) {
+  const Near above = kPlate.near({0.03, 0.05, -0.06});
   EXPECT_NEAR(above.distance, 0.05 - 0.0027, 1e-15);
   expect_near(above.normal, {0, 1, 0}, 1e-15);
-  expect_near(kBlade.near({0.03, -0.05, -0.06}).normal, {0, -1, 0}, 1e-15);
+  expect_near(kPlate.near({0.03, -0.05, -0.06}).normal, {0, -1, 0}, 1e-15);
 }
 
-TEST(Blade, IsAsFarFromAPointBesideItAsItsRim) {
+TEST(Plate, IsAsFarFromAPointBesideItAsItsRim) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> draw(-0.3, 0.3);
   for (int n = 0; n < 300; ++n) {
@@ -35,24 +35,24 @@ TEST(Blade, IsAsFarFromAPointBesideItAsItsRim) {
       const Vector rim{0.07425 * std::cos(angle), 0, 0.0941 * std::sin(angle)};
       smallest = std::min(smallest, length(point - rim));
     }
-    const Near near = kBlade.near(point);
+    const Near near = kPlate.near(point);
     EXPECT_NEAR(near.distance, smallest - 0.0027, 1e-7);
     EXPECT_NEAR(length(near.normal), 1, 1e-12);
     // one distance along the normal leads onto the surface
-    EXPECT_NEAR(kBlade.near(point - near.distance * near.normal).distance, 0, 1e-9);
+    EXPECT_NEAR(kPlate.near(point - near.distance * near.normal).distance, 0, 1e-9);
   }
 }
 
-TEST(Blade, HasNoJumpAtItsRim) {
-  const Near in = kBlade.near({0.07425 - 1e-9, 0.01, 0});
-  const Near out = kBlade.near({0.07425 + 1e-9, 0.01, 0});
+TEST(Plate, HasNoJumpAtItsRim) {
+  const Near in = kPlate.near({0.07425 - 1e-9, 0.01, 0});
+  const Near out = kPlate.near({0.07425 + 1e-9, 0.01, 0});
   EXPECT_NEAR(in.distance, out.distance, 1e-12);
   expect_near(in.normal, out.normal, 1e-6);
 }
 
-TEST(Blade, TakesItsThinAxisFromWhereverItIs) {
-  EXPECT_NEAR((Blade{{0.1, 0.2, 0.003}, 2}.near({0.05, 0.1, 0.5}).distance), 0.497, 1e-15);
-  EXPECT_NEAR((Blade{{0.003, 0.1, 0.2}, 0}.near({-0.5, 0.05, 0.1}).distance), 0.497, 1e-15);
+TEST(Plate, TakesItsThinAxisFromWhereverItIs) {
+  EXPECT_NEAR((Plate{{0.1, 0.2, 0.003}, 2}.near({0.05, 0.1, 0.5}).distance), 0.497, 1e-15);
+  EXPECT_NEAR((Plate{{0.003, 0.1, 0.2}, 0}.near({-0.5, 0.05, 0.1}).distance), 0.497, 1e-15);
 }
 
 TEST(Box, GivesDistancesToFacesEdgesAndCorners) {

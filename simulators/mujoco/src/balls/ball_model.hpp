@@ -1,0 +1,47 @@
+#pragma once
+
+#include <mujoco/mujoco.h>
+
+#include <string>
+#include <vector>
+
+#include "balls/ball_options.hpp"
+#include "balls/surface.hpp"
+
+// The balls and surfaces of a MuJoCo model.
+
+namespace o80::mujoco {
+
+/// A free body that is a ball.
+struct BallPlace {
+  std::string name;
+  int position;   // in qpos
+  int velocity;   // in qvel
+  double radius;  // [m]
+  double mass;    // [kg]
+};
+
+/// A geom that balls bounce on.
+struct SurfacePlace {
+  std::string name;
+  int geom;
+  bool still;  // part of the world
+  Shape shape;
+  Restitution restitution;
+  bool watched;
+};
+
+/// True if the options name balls. Throws DriverError if they name surfaces only.
+bool has_balls(const BallOptions& options);
+
+/// Adds copies of the first ball to a model that is not compiled yet. Throws DriverError.
+void add_extra_balls(mjSpec& spec, const BallOptions& options);
+
+/// The balls that the options name. Their contacts in the engine are switched off: `Balls` computes
+/// them. Throws DriverError.
+std::vector<BallPlace> balls_in(mjModel& model, const BallOptions& options);
+
+/// The surfaces that the options name, in their order. Throws DriverError.
+std::vector<SurfacePlace> surfaces_in(const mjModel& model, const BallOptions& options);
+
+}  // namespace o80::mujoco

@@ -1,0 +1,112 @@
+#pragma once
+
+#include <mujoco/mujoco.h>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "balls/ball_model.hpp"
+#include "balls/bouncing_flight.hpp"
+#include "balls/contact_record.hpp"
+
+namespace o80::mujoco {
+
+/// State of a ball as an actuator.
+struct BallState {
+  std::array<double, 3> position{};
+  std::array<double, 3> velocity{};
+};
+O80_DESCRIBE(BallState, (position, "of the centre, in the world [m]"), (velocity, "[m/s]"));
+
+/// Target of one ball in an iteration.
+struct BallTarget {
+  BallState state;
+  bool imposed = false;  // false: the ball flies freely, and `state` has no meaning
+};
+
+/// The balls of a simulation: imposed, or in free flight among moving surfaces. Between the steps
+/// of the engine, which knows nothing of their contacts, each ball is moved by our own laws of
+/// flight (ball_flight.hpp) and bounce (bounce.hpp).
+///
+/// Realtime: everything but the constructor; no allocation, no lock.
+class Balls {
+ public:
+  struct BallNow {
+    Ball ball;
+    bool released = false;
+  };
+  /// Everything that changes; a restored state repeats bit for bit.
+  struct State {
+    std::vector<BallTarget> targets;
+    std::vector<BallNow> balls;
+    std::vector<WatchedContacts> watched;  // of each ball, in the order of the watched surfaces
+    std::vector<SurfaceContacts> others;   // of each ball, in the order of the other surfaces
+    std::vector<Pose> poses;               // of the surfaces, watched ones first
+  };
+
+  /// Throws DriverError. Switches off the contacts of the balls in `model`, which must outlive
+  /// this.
+  Balls(mjModel& model, const BallOptions& options);
+
+  std::size_t size() const noexcept { return places_.size(); }
+  /// Of the model, which the engine need not integrate.
+  std::size_t degrees_of_freedom() const noexcept { return 6 * size(); }
+  const std::vector<BallPlace>& places() const noexcept { return places_; }
+  /// In the order of the option.
+  const std::vector<SurfacePlace>& surfaces() const noexcept { return surface_places_; }
+
+  std::vector<BallTarget>& targets() noexcept { return now_.targets; }
+  const std::vector<BallTarget>& targets() const noexcept { return now_.targets; }
+  BallState ball(std::size_t i) const noexcept;
+  /// A watched surface ended the imposed motion of this ball in the last iteration.
+  bool released(std::size_t i) const noexcept { return now_.balls[i].released; }
+  std::span<const WatchedContacts> watched_contacts(std::size_t i) const noexcept;
+  std::span<const SurfaceContacts> other_contacts(std::size_t i) const noexcept;
+
+  /// Takes the start state of balls and surfaces from the engine.
+  void reset(const mjData& data) noexcept;
+  /// Clears the records of a ball.
+  void clear(std::size_t i) noexcept { records(i).clear(); }
+  /// Begins an iteration of `period` [s] towards the targets.
+  void begin_iteration(double period) noexcept;
+  /// Moves all balls by a step, after the engine has moved the surfaces.
+  void step(mjData& data, const StepOfIteration& step) noexcept;
+
+  const State& state() const noexcept { return now_; }
+  void restore(const State& state) noexcept { now_ = state; }
+
+ private:
+  /// A surface that balls meet, and the geom that it follows.
+  struct Follower {
+    int geom;
+    bool still;
+  };
+
+  void add_surfaces();
+  ContactRecords records(std::size_t i) noexcept;
+  Pose pose(const mjData& data, const Follower& follower) const noexcept;
+  void move_surfaces(const mjData& data, std::uint32_t steps) noexcept;
+  Ball start_of_imposed(const Ball& now, const BallState& target) const noexcept;
+  Path imposed_path(std::size_t i, const StepOfIteration& step) const noexcept;
+  void impose(std::size_t i, const StepOfIteration& step) noexcept;
+  void fly(std::size_t i, const Ball& from, double begin, const StepOfIteration& step) noexcept;
+  void store(mjData& data, std::size_t i) const noexcept;
+
+  const mjModel& model_;
+  double teleport_distance_;
+  Vector spin_;
+  double period_ = 0;  // of an iteration [s]
+  std::vector<BallPlace> places_;
+  std::vector<Air> air_;  // for each ball
+  std::vector<SurfacePlace> surface_places_;
+  std::vector<Surface> surfaces_;  // watched ones first
+  std::vector<Follower> followers_;
+  std::size_t watched_ = 0;
+  State now_;
+  std::vector<Ball> imposed_starts_;  // of this iteration
+};
+
+}  // namespace o80::mujoco

@@ -1,0 +1,70 @@
+#pragma once
+
+#include "balls/vector.hpp"
+
+namespace o80::mujoco {
+
+/// Position, orientation and velocities of a body.
+struct Pose {
+  Vector position{};  // [m]
+  Rotation rotation{};
+  Vector velocity{};  // of the position [m/s]
+  Vector spin{};      // [rad/s], in the world's axes
+};
+
+/// A rigid motion from one pose to another, by shares of a step from 0 to 1: straight, and turning
+/// evenly about one axis.
+class Motion {
+ public:
+  Motion() = default;
+  Motion(const Pose& from, const Pose& to) noexcept
+      : from_(from), to_(to), turn_(turn_between(from.rotation, to.rotation)) {}
+
+  Vector position(double share) const noexcept {
+    return between(from_.position, to_.position, share);
+  }
+  double angle() const noexcept { return turn_.angle; }
+  /// Displacement in the step [m].
+  Vector travel() const noexcept { return to_.position - from_.position; }
+  /// A point of the world in the frame of the body.
+  Vector inside(const Vector& point, double share) const noexcept {
+    const Vector relative = point - position(share);
+    return from_.rotation.in(turn_.angle == 0 ? relative
+                                              : turned(relative, turn_.axis, -share * turn_.angle));
+  }
+  /// A direction of the body in the frame of the world.
+  Vector outside(const Vector& direction, double share) const noexcept {
+    const Vector out = from_.rotation.out(direction);
+    return turn_.angle == 0 ? out : turned(out, turn_.axis, share * turn_.angle);
+  }
+  /// Velocity of a point of the body: v + omega x r [m/s].
+  Vector velocity(const Vector& point, double share) const noexcept {
+    return between(from_.velocity, to_.velocity, share) +
+           cross(between(from_.spin, to_.spin, share), point - position(share));
+  }
+
+ private:
+  Pose from_;
+  Pose to_;
+  Turn turn_;
+};
+
+/// A body that turns in a step by this much more than its spin explains was teleported [rad].
+inline constexpr double kTeleportAngle = 0.5;
+
+/// True if the velocities do not explain the way between two poses, `step` [s] apart.
+inline bool teleported(const Pose& from, const Pose& to, double step, double distance) noexcept {
+  const Vector predicted = from.position + (0.5 * step) * (from.velocity + to.velocity);
+  if (length(to.position - predicted) > distance) return true;
+  const double turned = turn_between(from.rotation, to.rotation).angle;
+  return turned > 0.5 * step * (length(from.spin) + length(to.spin)) + kTeleportAngle;
+}
+
+/// The motion into a pose after a teleport: as the velocity there says.
+inline Motion arriving_at(const Pose& pose, double step) noexcept {
+  Pose from = pose;
+  from.position = pose.position - step * pose.velocity;
+  return {from, pose};
+}
+
+}  // namespace o80::mujoco

@@ -1,0 +1,84 @@
+#include "balls/surface_list.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <string_view>
+
+#include "engine/names.hpp"
+#include "o80/base/error.hpp"
+#include "o80/base/nearest_name.hpp"
+
+namespace o80::mujoco {
+namespace {
+
+/// "0.8" => {0.8, 0.8, 0.8}; "0.7 0.7 0.9" => these. False if the text is neither.
+bool parse_restitution(std::string_view text, Restitution& restitution) {
+  std::size_t count = 0;
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  while (at != end) {
+    if (*at == ' ') {
+      ++at;
+      continue;
+    }
+    double number = 0;
+    const auto [rest, error] = std::from_chars(at, end, number);
+    if (error != std::errc() || count == 3 || (rest != end && *rest != ' ')) return false;
+    restitution[count++] = number;
+    at = rest;
+  }
+  if (count == 1) restitution.fill(restitution[0]);
+  return count == 1 || count == 3;
+}
+
+void check(const std::string& geom, const Restitution& restitution) {
+  for (const double share : restitution) {
+    if (share >= 0 && share <= 1) continue;
+    throw DriverError("the restitution of '" + geom + "' must be shares from 0 to 1, got " +
+                      std::to_string(share));
+  }
+}
+
+std::string without_spaces_at_end(std::string_view text) {
+  while (!text.empty() && text.back() == ' ') text.remove_suffix(1);
+  return std::string(text);
+}
+
+SurfaceEntry parsed_entry(const std::string& text, const Restitution& common) {
+  const auto equals = text.find('=');
+  SurfaceEntry entry{without_spaces_at_end(text.substr(0, equals)), common};
+  if (equals != std::string::npos &&
+      !parse_restitution(std::string_view(text).substr(equals + 1), entry.restitution)) {
+    throw DriverError("surfaces: '" + text +
+                      "' must have one number after '=', or three separated by spaces: the shares "
+                      "of the velocity that a bounce keeps (two tangents, normal)");
+  }
+  check(entry.geom, entry.restitution);
+  return entry;
+}
+
+}  // namespace
+
+std::vector<SurfaceEntry> surfaces_of(const BallOptions& options) {
+  std::vector<SurfaceEntry> surfaces;
+  std::vector<std::string> names;
+  for (const std::string& text : entries_of(options.surfaces)) {
+    surfaces.push_back(parsed_entry(text, options.restitution));
+    const std::string& name = surfaces.back().geom;
+    if (std::ranges::find(names, name) != names.end()) {
+      throw DriverError("surfaces names '" + name + "' twice");
+    }
+    names.push_back(name);
+  }
+  for (const std::string& name : entries_of(options.watched)) {
+    const auto at = std::ranges::find(names, name);
+    if (at == names.end()) {
+      throw DriverError("watched: '" + name + "' is not among the surfaces" +
+                        names_instead(name, names));
+    }
+    surfaces[static_cast<std::size_t>(at - names.begin())].watched = true;
+  }
+  return surfaces;
+}
+
+}  // namespace o80::mujoco

@@ -1,0 +1,12 @@
+#pragma once
+
+#include <cstdint>
+
+namespace o80::mujoco {
+
+/// The steps of the engine (each of `timestep` [s]) in a period [ns]; `steps` are asked for, 0: as
+/// many as the period holds. Throws DriverError, with what to ask for instead, if the period is not
+/// that number of steps.
+std::uint32_t steps_in_period(std::int64_t period, double timestep, std::uint32_t steps);
+
+}  // namespace o80::mujoco

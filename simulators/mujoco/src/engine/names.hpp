@@ -1,0 +1,23 @@
+#pragma once
+
+#include <mujoco/mujoco.h>
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+// Elements of a MuJoCo model by their names.
+
+namespace o80::mujoco {
+
+/// The entries of a comma-separated list, without spaces around them.
+std::vector<std::string> entries_of(std::string_view list);
+
+/// The name of an element; `<fallback>_<id>` if the model gives none.
+std::string name_of(const mjModel& model, mjtObj kind, int id, const char* fallback);
+
+/// The id of a named element. Throws DriverError with the names of the model, or the nearest one;
+/// `what` is the kind in words.
+int find(const mjModel& model, mjtObj kind, const std::string& name, const char* what);
+
+}  // namespace o80::mujoco

@@ -1,0 +1,46 @@
+#include "driver/simulation.hpp"
+
+#include <gtest/gtest.h>
+
+#include "count_allocations.hpp"
+#include "scenes.hpp"
+
+namespace o80::mujoco {
+namespace {
+
+Config config_of(const OptionValues& options) {
+  Config config;
+  for (const auto& [name, text] : options) set_option(config, name, text);
+  return config;
+}
+
+TEST(Simulation, AllocatesNothingInAnIteration) {
+  Simulation simulation(config_of(court({{"extra_balls", "3"}})));
+  std::vector<BallTarget>& balls = simulation.balls()->targets();
+  for (BallTarget& ball : balls) ball = {{{0, 0.3, 1.3}, {0, -4, 0}}, true};
+  simulation.advance();
+  for (BallTarget& ball : balls) ball.imposed = false;
+
+  const std::size_t before = allocations;
+  for (int i = 2; i < 600; ++i) simulation.advance();
+  simulation.snapshot(0);
+  simulation.restore(0);
+  simulation.reset();
+  EXPECT_EQ(allocations, before);
+}
+
+TEST(Simulation, HasBallsOnlyIfTheOptionsNameSome) {
+  EXPECT_EQ(Simulation(config_of(pendulum())).balls(), nullptr);
+  Simulation simulation(config_of(court({{"extra_balls", "3"}})));
+  ASSERT_NE(simulation.balls(), nullptr);
+  EXPECT_EQ(simulation.balls()->size(), 4u);
+}
+
+TEST(Simulation, LeavesTheEngineOutWhereItHasNothingToIntegrate) {
+  EXPECT_FALSE(Simulation(config_of(court())).integrates());
+  EXPECT_TRUE(Simulation(config_of(court({{"joints", "joint_1"}}))).integrates());
+  EXPECT_TRUE(Simulation(config_of(pendulum())).integrates());
+}
+
+}  // namespace
+}  // namespace o80::mujoco
