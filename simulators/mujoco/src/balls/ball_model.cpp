@@ -75,6 +75,7 @@ void add_extra_balls(mjSpec& spec, const BallOptions& options) {
 std::vector<BallPlace> balls_in(mjModel& model, const BallOptions& options) {
   std::vector<BallPlace> balls;
   const std::vector<std::string> names = entries_of(options.balls);
+  balls.reserve(names.size() + options.extra_balls);
   for (const std::string& name : names) balls.push_back(ball_in(model, name));
   for (std::uint32_t copy = 1; copy <= options.extra_balls; ++copy) {
     balls.push_back(ball_in(model, names.front() + copy_suffix(copy)));

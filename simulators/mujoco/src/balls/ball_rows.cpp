@@ -42,6 +42,7 @@ void BallRows::add_sensors(Schema& schema, const Balls& balls) {
   const TypeRow row = schema.types[contacts];
   contacts_size_ = row.size;
   std::vector<std::uint32_t> offsets;
+  offsets.reserve(row.fields);
   for (std::uint32_t i = 0; i < row.fields; ++i) {
     offsets.push_back(schema.fields[row.first_field + i].offset);
   }

@@ -56,6 +56,7 @@ std::vector<JointPlace> joints_in(const mjModel& model, const std::vector<std::s
 
 std::vector<SensorPlace> sensors_in(const mjModel& model) {
   std::vector<SensorPlace> sensors;
+  sensors.reserve(static_cast<std::size_t>(model.nsensor));
   for (int i = 0; i < static_cast<int>(model.nsensor); ++i) {
     sensors.push_back(
         {name_of(model, mjOBJ_SENSOR, i, "sensor"), model.sensor_adr[i], model.sensor_dim[i]});
