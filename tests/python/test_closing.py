@@ -1,6 +1,7 @@
 """Whatever is closed, or belongs to the parent of a forked process, says so."""
 
 import contextlib
+import operator
 import os
 import signal
 import threading
@@ -80,9 +81,9 @@ def uses_of(thing: Any) -> dict[str, Callable[[Any], Any]]:
         if member in CALLS[name]:
             uses[member] = CALLS[name][member]
         elif callable(getattr(type(thing), member)):
-            uses[member] = lambda it, member=member: getattr(it, member)()
+            uses[member] = operator.methodcaller(member)
         else:
-            uses[member] = lambda it, member=member: getattr(it, member)
+            uses[member] = operator.attrgetter(member)
     return uses
 
 

@@ -96,7 +96,7 @@ def test_says_what_a_timeout_is(timeout: object) -> None:
     with o80.robots.load("two_joints").inline() as arm:
         for wait in (arm.wait_for_next, arm.pulse_and_wait, arm.pulse().wait):
             with pytest.raises(o80.InvalidArgument, match="timeout must be a number of seconds"):
-                wait(timeout)  # type: ignore[arg-type, operator]
+                wait(timeout)  # type: ignore[arg-type]
         with pytest.raises(o80.InvalidArgument, match="timeout must be a number of seconds"):
             arm.burst(1, timeout=timeout)  # type: ignore[call-overload]
 

@@ -26,8 +26,12 @@ def mixed(segment: str) -> Any:
             yield frontend
 
 
+def content(observation: Any) -> bytes:
+    return bytes(memoryview(observation))
+
+
 def same(one: o80.Observation, other: o80.Observation) -> bool:
-    return bytes(memoryview(one)) == bytes(memoryview(other)) and one.missed == other.missed
+    return content(one) == content(other) and one.missed == other.missed
 
 
 @pytest.mark.parametrize("protocol", range(2, pickle.HIGHEST_PROTOCOL + 1))
@@ -140,6 +144,9 @@ def test_workers_get_frontends_and_give_observations_and_errors(
         assert arm.alive
 
 
+kept: Any = None
+
+
 def leave_open(names: Any) -> None:
     global kept
     kept = o80.robots.load("two_joints").inline()
@@ -149,7 +156,7 @@ def leave_open(names: Any) -> None:
 
 @pytest.mark.parametrize("way", ["fork", "spawn"])
 def test_a_worker_that_closes_nothing_leaves_no_segment(way: str) -> None:
-    context = multiprocessing.get_context(way)
+    context: Any = multiprocessing.get_context(way)
     names = context.SimpleQueue()
     worker = context.Process(target=leave_open, args=(names,))
     worker.start()

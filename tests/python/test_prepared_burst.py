@@ -87,7 +87,7 @@ def test_a_plain_burst_may_be_taken_later_too(arm: o80.Frontend) -> None:
     assert arm.burst(2, at=2).desired[0] == 0.5
     assert arm.history(since=1, until=1).desired[0, 0] == 0.0
     with pytest.raises(o80.InvalidArgument, match="late"):
-        arm.burst(1, at=9, late="never")
+        arm.burst(1, at=9, late="never")  # type: ignore[call-overload]
     with pytest.raises(o80.InvalidArgument, match="an iteration from 0 on, got -5"):
         arm.burst(1, at=-5, wait=False)
 
@@ -127,7 +127,7 @@ def test_a_backend_by_the_clock_has_none(process: o80.robots.Process) -> None:
 @pytest.mark.parametrize("wrong", [{"iterations": 0}, {"steps": 0}, {"each": 0}])
 def test_it_has_at_least_one_of_everything(arm: o80.Frontend, wrong: dict[str, int]) -> None:
     with pytest.raises(o80.InvalidArgument, match="at least 1"):
-        arm.prepared_burst(**wrong)
+        arm.prepared_burst(**wrong)  # type: ignore[arg-type]
 
 
 def test_its_rows_must_fit_into_the_history(segment: str) -> None:
@@ -171,7 +171,7 @@ def test_an_array_that_is_assigned_is_copied_into_its_targets(arm: o80.Frontend)
 def test_targets_of_another_shape_are_refused(arm: o80.Frontend, wrong: object) -> None:
     burst = arm.prepared_burst(1)
     with pytest.raises(o80.InvalidArgument, match=r"\(steps, actuators\) = \(1, 2\), got"):
-        burst.targets = wrong
+        burst.targets = wrong  # type: ignore[assignment]
 
 
 def test_targets_that_are_no_numbers_and_rows_cannot_be_assigned(arm: o80.Frontend) -> None:

@@ -2,6 +2,7 @@
 
 import resource
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -45,7 +46,9 @@ def test_the_mcap_library_reads_it(recorded: tuple[Path, o80.History]) -> None:
 def test_rosbags_reads_every_row_in_order(recorded: tuple[Path, o80.History]) -> None:
     path, history = recorded
     with AnyReader([path]) as reader:
-        rows = [reader.deserialize(raw, each.msgtype) for each, _, raw in reader.messages()]
+        rows: list[Any] = [
+            reader.deserialize(raw, each.msgtype) for each, _, raw in reader.messages()
+        ]
 
     assert [row.iteration for row in rows] == history.iteration.tolist()
     assert np.array_equal([row.desired for row in rows], history.desired)

@@ -42,7 +42,7 @@ def test_fields_with_a_default_may_be_left_out(arm: o80.Frontend) -> None:
 def test_fields_without_a_default_must_be_given(segment: str) -> None:
     gains = {"stiffness": float, "of": {"joint": int, "axis": int}}
     with o80.Backend(segment, ["a"], requests={"set_gains": gains}, bursting=True) as backend:
-        taken: list[tuple[float, int, int]] = []
+        taken: list[tuple[object, ...]] = []
 
         def set_gains(request: o80.Record) -> None:
             taken.append((request.stiffness, request.of.joint, request.of.axis))

@@ -1,6 +1,7 @@
 """Rows by their time and iteration, of a living segment and of a history."""
 
 import itertools
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ MILLISECOND = 1_000_000
 
 
 @pytest.fixture(scope="module")
-def old() -> o80.Frontend:
+def old() -> Iterator[o80.Frontend]:
     """A robot of which rows 69 to 100 are left, at 1000 Hz of simulated time."""
     with o80.robots.load("two_joints").inline(next(_names), history=32) as frontend:
         frontend.burst(100)

@@ -239,7 +239,7 @@ def test_ctrl_c_in_a_with_block_purges_what_the_frontend_sent(
         raise KeyboardInterrupt
 
     before = signal.signal(signal.SIGALRM, interrupt)
-    sent = []
+    sent: list[o80.Batch] = []
 
     def move() -> None:
         with arm:

@@ -91,4 +91,4 @@ def test_members_are_frontends(arm: o80.Frontend) -> None:
     with pytest.raises(o80.InvalidArgument, match="frontends of o80, got 'arm'"):
         o80.wait_for_first([arm, "arm"])  # type: ignore[list-item]
     with pytest.raises(o80.InvalidArgument, match="must be a whole number, got 'soon'"):
-        o80.wait_for_first({arm: "soon"})  # type: ignore[dict-item]
+        o80.wait_for_first({arm: "soon"})

@@ -261,7 +261,7 @@ def add_some(actor: Actor, robot: o80.Frontend, ledger: Ledger) -> None:
         target = struct.unpack("<d", struct.pack("<Q", bits))[0]
         actuator = actor.chance.randrange(2)
         ledger.command(bits, actuator)
-        mode = "overwrite" if actor.chance.random() < 0.2 else "queue"
+        mode = o80.Mode.OVERWRITE if actor.chance.random() < 0.2 else o80.Mode.QUEUE
         if actor.chance.random() < 0.4:
             robot.add_command(actuator, target, iterations=actor.chance.randint(1, 15), mode=mode)
         else:
