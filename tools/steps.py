@@ -44,6 +44,12 @@ def use_tools() -> None:
     LOGS.mkdir(parents=True, exist_ok=True)
 
 
+def processor_time() -> float:
+    """Of all programs that were run so far [s]."""
+    times = os.times()
+    return times.children_user + times.children_system
+
+
 def last_lines(step: Step, count: int) -> list[str]:
     with step.log.open(errors="replace") as text:
         return list(deque(text, count))
@@ -59,7 +65,7 @@ def closing_lines(step: Step) -> list[str]:
 def run(step: Step) -> bool:
     """Runs a step; shows its closing lines, or most of its log when it fails."""
     print(f"== {step.name}", flush=True)
-    begin = time.monotonic()
+    begin, used = time.monotonic(), processor_time()
     returned = 0
     with step.log.open("w") as output:
         for command in step.commands:
@@ -68,9 +74,10 @@ def run(step: Step) -> bool:
             if returned != 0:
                 break
     print(*(closing_lines(step) if returned == 0 else last_lines(step, 400)), sep="", end="")
-    seconds = time.monotonic() - begin
+    seconds, used = time.monotonic() - begin, processor_time() - used
     verdict = "passed" if returned == 0 else f"FAILED ({step.log.relative_to(ROOT)})"
-    print(f"== {step.name}: {verdict} in {seconds:.0f} s", flush=True)
+    how_long = f"{seconds:.0f} s ({used:.0f} s of processor time)"
+    print(f"== {step.name}: {verdict} in {how_long}", flush=True)
     return returned == 0
 
 
