@@ -27,5 +27,6 @@ NB_MODULE(_core, m) {
   bind_backend(m);
   bind_robots(m);
   bind_loop_state(m);
+  bind_journal(m);
   bind_nearest_name(m);
 }

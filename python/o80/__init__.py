@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from o80.halts import Halt, halt
     from o80.history import History
     from o80.installation import prefix
+    from o80.journal import Journal, JournalCommand, JournalEntry
     from o80.limits import Limits
     from o80.prepared_burst import PreparedBurst
     from o80.record import Record
@@ -74,6 +75,9 @@ _LAZY = {
     "halt": "o80.halts",
     "History": "o80.history",
     "prefix": "o80.installation",
+    "Journal": "o80.journal",
+    "JournalCommand": "o80.journal",
+    "JournalEntry": "o80.journal",
     "Limits": "o80.limits",
     "PreparedBurst": "o80.prepared_burst",
     "Record": "o80.record",
@@ -133,6 +137,9 @@ __all__ = [
     "Handle",
     "History",
     "InvalidArgument",
+    "Journal",
+    "JournalCommand",
+    "JournalEntry",
     "LaneFull",
     "Limits",
     "MissingExtra",

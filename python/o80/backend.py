@@ -73,7 +73,8 @@ class Backend:
     robot: what it calls itself (None: as the segment).
     history: observations kept (None: as many as 16 MiB hold, 100000 at most).
     while_halted: requests that are served during a halt too, because they move nothing.
-    lanes, lane_blocks, permission, stale, silence, resume: as for `o80.robots.Robot.start`.
+    lanes, lane_blocks, journal, permission, stale, silence, resume: as for
+        `o80.robots.Robot.start`.
     max_overruns: halt when so many rows within a second come half a period late, or later.
 
     Leaving a `with` block by an exception ends it as failed: frontends raise its text.
@@ -99,6 +100,7 @@ class Backend:
         history: int | None = None,
         lanes: int | None = None,
         lane_blocks: int | None = None,
+        journal: float | None = None,
         permission: int | None = None,
         stale: StaleWord | None = None,
         silence: int | None = None,
@@ -113,6 +115,7 @@ class Backend:
                 "history": history,
                 "lanes": lanes,
                 "lane_blocks": lane_blocks,
+                "journal": journal,
                 "permission": permission,
                 "stale": stale,
                 "silence": silence,

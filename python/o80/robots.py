@@ -152,6 +152,7 @@ class Robot:
         history: int | None = None,
         lanes: int | None = None,
         lane_blocks: int | None = None,
+        journal: float | None = None,
         permission: int | None = None,
         stale: Literal["hold", "purge", "halt", "stop"] | None = None,
         silence: int | None = None,
@@ -173,6 +174,8 @@ class Robot:
         history: number of observations kept (None: as many as 16 MiB hold, at most 100000).
         lanes, lane_blocks: frontends that may command at once, and blocks of 64 bytes that each
             may have in flight.
+        journal: size of the journal [MiB] (None: twice the largest batch). A batch may be half as
+            large.
         permission: the read bits permit users to observe, the write bits to command.
         stale: policy for a frontend that dies, or gives no sign of life for `silence` iterations
             while it has control or commands: "hold" does nothing, "purge" drops its commands,
@@ -196,6 +199,7 @@ class Robot:
                 "history": history,
                 "lanes": lanes,
                 "lane_blocks": lane_blocks,
+                "journal": journal,
                 "permission": permission,
                 "stale": stale,
                 "silence": silence,
@@ -224,6 +228,7 @@ class Robot:
         history: int | None = None,
         lanes: int | None = None,
         lane_blocks: int | None = None,
+        journal: float | None = None,
         permission: int | None = None,
         stale: Literal["hold", "purge", "halt", "stop"] | None = None,
         silence: int | None = None,
@@ -232,7 +237,7 @@ class Robot:
         """Starts the robot in this process. A burst runs in the thread that requests it.
 
         segment: name of its segment, to which others may attach (None: an unused name).
-        frequency, history, lanes, lane_blocks, permission, stale, silence: as for `start`.
+        frequency, history, lanes, lane_blocks, journal, permission, stale, silence: as for `start`.
         config: the robot's own options, see `options`.
 
         Closing the frontend stops the robot. Raises DriverError, SegmentTaken, InvalidArgument.
@@ -243,6 +248,7 @@ class Robot:
                 "history": history,
                 "lanes": lanes,
                 "lane_blocks": lane_blocks,
+                "journal": journal,
                 "permission": permission,
                 "stale": stale,
                 "silence": silence,

@@ -48,7 +48,8 @@ void Ledger::enter(std::uint32_t lane, BlockIndex block, const BlockChain& spare
   taken.lane = lane;
   taken.spare = spare;
   new (pool_.bytes(block)) TakenBatch(taken);
-  sink_.changed({lane, taken.id, Status::active, Reason::none, 0, iteration});
+  sink_.changed(
+      {lane, taken.id, Status::active, Reason::none, 0, iteration, StatusChange::Of::batch});
 }
 
 void Ledger::reject_from(BlockIndex block, std::uint32_t place, Reason reason, std::uint8_t detail,
@@ -81,7 +82,8 @@ void Ledger::reject(std::uint32_t lane, BlockIndex block, Reason reason, std::ui
   taken.spare = spare;
   taken.told_as = status;
   new (pool_.bytes(block)) TakenBatch(taken);
-  sink_.changed({lane, taken.id, Status::rejected, reason, detail, iteration});
+  sink_.changed(
+      {lane, taken.id, Status::rejected, reason, detail, iteration, StatusChange::Of::batch});
   reject_from(block, 0, reason, detail, iteration);
   close(block, iteration);
 }
@@ -139,7 +141,8 @@ void Ledger::ended(BlockIndex block, Iteration iteration) noexcept {
 
   const Reason reason = taken.end == Status::rejected ? taken.reason : Reason::none;
   const std::uint8_t detail = taken.end == Status::rejected ? taken.detail : std::uint8_t{0};
-  sink_.changed({taken.lane, taken.id + 1, taken.end, reason, detail, taken.last_end});
+  sink_.changed({taken.lane, taken.id + 1, taken.end, reason, detail, taken.last_end,
+                 StatusChange::Of::batch_end});
   sink_.freed(taken.lane, 1 + taken.spare.blocks);
   pool_.release(taken.spare);
   pool_.release(block, block, 1);
@@ -169,9 +172,11 @@ void Ledger::drop(BlockIndex first, Status status, Reason reason, Iteration iter
 
 bool Ledger::tell_rejected(BlockIndex block, std::uint32_t& budget) noexcept {
   TakenBatch& taken = batch(block);
+  const auto of =
+      taken.end == Status::rejected ? StatusChange::Of::of_rejected : StatusChange::Of::record;
   while (taken.told < taken.records && budget > 0) {
     sink_.changed({taken.lane, record_id(taken.id, taken.told), taken.told_as, taken.reason,
-                   taken.detail, taken.rejected_at});
+                   taken.detail, taken.rejected_at, of});
     ++taken.told;
     --taken.open;
     --budget;

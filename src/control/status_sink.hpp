@@ -8,12 +8,17 @@ namespace o80 {
 
 /// A change of the status of a record or a batch.
 struct StatusChange {
+  /// batch: it was taken or rejected; batch_end: its last record has ended; of_rejected: a record
+  /// that ends because its whole batch was rejected.
+  enum class Of : std::uint8_t { record, batch, batch_end, of_rejected };
+
   std::uint32_t lane = 0;
   CommandId id = 0;
   Status status = Status::none;
   Reason reason = Reason::none;
   std::uint8_t detail = 0;  // for `exclusive`: the lane that has control
   Iteration iteration = 0;
+  Of of = Of::record;
 };
 
 /// Receives status changes from the controller.

@@ -3,6 +3,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <bit>
 #include <cstring>
 #include <limits>
@@ -22,6 +23,13 @@ namespace o80 {
 
 namespace {
 
+std::uint64_t journal_bytes_of(const SegmentSpec& spec) {
+  if (spec.journal_bytes == 0) return 0;
+  if (spec.journal_bytes > (1ULL << 40))
+    throw InvalidArgument("segment '" + spec.name + "': the journal must be at most 1 TiB");
+  return std::bit_ceil(std::max(spec.journal_bytes, kLeastJournal));
+}
+
 SegmentShape shape_of(const SegmentSpec& spec) {
   if (spec.rows == 0 || spec.rows >= std::numeric_limits<std::uint64_t>::max() / 2)
     throw InvalidArgument("segment '" + spec.name + "': the history must have at least one row");
@@ -32,7 +40,8 @@ SegmentShape shape_of(const SegmentSpec& spec) {
           .row_bytes = spec.row_bytes,
           .slots = spec.rows + 1,
           .lanes = spec.lanes,
-          .lane_blocks = std::bit_ceil(spec.lane_blocks)};
+          .lane_blocks = std::bit_ceil(spec.lane_blocks),
+          .journal_bytes = journal_bytes_of(spec)};
 }
 
 void copy_text(char* to, std::size_t most, const std::string& text) { text.copy(to, most - 1); }

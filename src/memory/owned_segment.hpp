@@ -23,6 +23,7 @@ struct SegmentSpec {
   std::uint64_t rows = 1;             // length of the history
   std::uint32_t lanes = 8;            // most frontends that command at the same time
   std::uint32_t lane_blocks = 16384;  // 64-byte blocks of a lane, rounded up to a power of two
+  std::uint64_t journal_bytes = 0;    // rounded up to a power of two; 0: no journal
   mode_t permission = 0600;           // read: may observe; write: may command
   /// Starts halted if the replaced segment was halted, or if its backend died while commands were
   /// active.

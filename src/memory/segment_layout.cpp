@@ -17,13 +17,18 @@ bool SegmentOffsets::compute(const SegmentShape& shape, SegmentOffsets& offsets)
   if (shape.slots < 2 || shape.slots > kLargestSegment / shape.row_bytes) return false;
   if (shape.lanes > kMostLanes) return false;
   if (!std::has_single_bit(shape.lane_blocks) || shape.lane_blocks > (1U << 24)) return false;
+  if (shape.journal_bytes != 0 &&
+      (!std::has_single_bit(shape.journal_bytes) || shape.journal_bytes < kLeastJournal ||
+       shape.journal_bytes > (1ULL << 40)))
+    return false;
 
   const auto pages = [page](std::uint64_t bytes) { return (bytes + page - 1) / page * page; };
   const std::uint64_t blocks = shape.lane_blocks;
   offsets.schema = pages(sizeof(SegmentHeader));
   offsets.counters = offsets.schema + pages(shape.schema_bytes);
   offsets.history = offsets.counters + pages(sizeof(Counters));
-  offsets.file_bytes = offsets.history + pages(shape.slots * shape.row_bytes);
+  offsets.journal = offsets.history + pages(shape.slots * shape.row_bytes);
+  offsets.file_bytes = offsets.journal + pages(shape.journal_bytes);
 
   offsets.wakes = pages(sizeof(CommandsHeader));
   offsets.bell = offsets.wakes + pages(sizeof(Wakes));

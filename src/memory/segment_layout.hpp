@@ -14,6 +14,7 @@ namespace o80 {
 //   schema          written once, before the file gets its name
 //   Counters        written by the backend
 //   history         slots of row_bytes: written by the backend
+//   journal         a ring of entries (memory/journal.hpp): written by the backend
 //
 // The commanders' file belongs to one epoch of a segment. Only users who may command can open it:
 //
@@ -27,15 +28,16 @@ namespace o80 {
 
 inline constexpr std::uint64_t kSegmentMagic = 0x0a67'6573'2030'386fULL;   // "o80 seg\n"
 inline constexpr std::uint64_t kCommandsMagic = 0x0a64'6d63'2030'386fULL;  // "o80 cmd\n"
-inline constexpr std::uint32_t kSegmentVersion = 3;                        // format of both files
-inline constexpr std::size_t kLineBytes = 64;     // size of a cache line [bytes]
-inline constexpr std::size_t kBlockSize = 64;     // size of a block of a lane [bytes]
-inline constexpr std::size_t kMessages = 64;      // status texts kept for each lane
-inline constexpr std::size_t kBurstsKept = 256;   // burst results kept for each lane
-inline constexpr std::size_t kCancelsKept = 7;    // cancelled bursts kept for each lane
-inline constexpr std::size_t kHaltsKept = 8;      // halts whose reasons are kept
-inline constexpr std::size_t kMostRunning = 8;    // requests that run at the same time
-inline constexpr std::uint32_t kMostLanes = 256;  // a status has 8 bits for a lane
+inline constexpr std::uint32_t kSegmentVersion = 4;                        // format of both files
+inline constexpr std::size_t kLineBytes = 64;       // size of a cache line [bytes]
+inline constexpr std::size_t kBlockSize = 64;       // size of a block of a lane [bytes]
+inline constexpr std::size_t kMessages = 64;        // status texts kept for each lane
+inline constexpr std::size_t kBurstsKept = 256;     // burst results kept for each lane
+inline constexpr std::size_t kCancelsKept = 7;      // cancelled bursts kept for each lane
+inline constexpr std::size_t kHaltsKept = 8;        // halts whose reasons are kept
+inline constexpr std::size_t kMostRunning = 8;      // requests that run at the same time
+inline constexpr std::size_t kJournalSectors = 64;  // parts of the journal with a mark each
+inline constexpr std::uint32_t kMostLanes = 256;    // a status has 8 bits for a lane
 /// Most ids that the owners of a lane may skip between two batches; a larger jump is invalid.
 inline constexpr std::uint64_t kMostSkippedIds = 1ULL << 28;
 /// Most owners that a lane may have between two loads of `incarnation` by the backend.
@@ -48,8 +50,10 @@ struct SegmentShape {
   std::uint64_t row_bytes;  // multiple of 8
   std::uint64_t slots;      // length of the history + 1
   std::uint32_t lanes;
-  std::uint32_t lane_blocks;  // power of two
+  std::uint32_t lane_blocks;    // power of two
+  std::uint64_t journal_bytes;  // power of two, at least kLeastJournal; 0: no journal
 };
+inline constexpr std::uint64_t kLeastJournal = 4096;  // [bytes]
 
 struct SegmentHeader {
   std::uint64_t magic;
@@ -65,7 +69,7 @@ struct SegmentHeader {
   char user[32];
   char program[64];
 };
-static_assert(sizeof(SegmentHeader) == 192);
+static_assert(sizeof(SegmentHeader) == 200);
 
 /// Requester and reason of a halt.
 struct HaltSlot {
@@ -87,6 +91,15 @@ struct RunningSlot {
   std::atomic<std::uint64_t> progress[31];  // text
 };
 
+/// Positions in the journal: bytes written since the start (memory/journal.hpp).
+struct JournalCounters {
+  alignas(kLineBytes) std::atomic<std::uint64_t> begun;  // end of the newest entry that was begun
+  std::atomic<std::uint64_t> published;                  // end of the newest whole entry
+  /// For each sector: the first entry that begins in it, in the newest lap that has one.
+  alignas(kLineBytes) std::atomic<std::uint64_t> marks[kJournalSectors];
+};
+static_assert(sizeof(JournalCounters) == kLineBytes + kJournalSectors * 8);
+
 struct Counters {
   alignas(kLineBytes) std::atomic<std::int64_t> begun;  // newest row that was begun
   std::atomic<std::int64_t> published;                  // newest row, -1 before the first
@@ -100,11 +113,12 @@ struct Counters {
   std::atomic<std::int64_t> slow_since;  // time of that change [ns]
   HaltSlot halt;                         // the halt in force
   RunningSlot running[kMostRunning];
+  JournalCounters journal;
 };
 static_assert(sizeof(HaltSlot) == 6 * kLineBytes);
 static_assert(sizeof(RunningSlot) == 6 * kLineBytes);
-static_assert(sizeof(Counters) ==
-              3 * kLineBytes + 1024 + sizeof(HaltSlot) + kMostRunning * sizeof(RunningSlot));
+static_assert(sizeof(Counters) == 3 * kLineBytes + 1024 + sizeof(HaltSlot) +
+                                      kMostRunning * sizeof(RunningSlot) + sizeof(JournalCounters));
 
 struct CommandsHeader {
   std::uint64_t magic;
@@ -197,7 +211,7 @@ constexpr std::uint64_t possible_incarnation(std::uint64_t written, std::uint64_
 /// Offsets of the parts, computed from the shape: no offset is read from a file.
 struct SegmentOffsets {
   // in the segment file
-  std::uint64_t schema, counters, history, file_bytes;
+  std::uint64_t schema, counters, history, journal, file_bytes;
   // in the commanders' file
   std::uint64_t wakes, bell, lanes, lane_stride, transport, feedback, feedback_stride, statuses,
       commands_bytes;
@@ -216,6 +230,7 @@ struct SegmentView {
   const SegmentHeader& header() const noexcept { return at<SegmentHeader>(base, 0); }
   Counters& counters() const noexcept { return at<Counters>(base, offsets.counters); }
   std::byte* history() const noexcept { return base + offsets.history; }
+  std::byte* journal() const noexcept { return base + offsets.journal; }
 
   // valid only if the commanders' file is mapped
   Wakes& wakes() const noexcept { return at<Wakes>(commands, offsets.wakes); }

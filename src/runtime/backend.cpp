@@ -1,6 +1,7 @@
 #include "o80/runtime/backend.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cstdlib>
 #include <cstring>
 #include <limits>
@@ -21,6 +22,8 @@ constexpr std::uint64_t kDefaultHistoryBytes = 16U << 20;
 constexpr std::uint64_t kDefaultHistoryRows = 100'000;
 constexpr std::int64_t kDefaultPeriod = 1'000'000;  // [ns]
 constexpr std::int64_t kPeriodRounding = 100'000;
+/// Least journal of a backend [bytes]: a quarter holds the blocks that one iteration copies.
+constexpr std::uint64_t kLeastBackendJournal = 8 * kWorkPerIteration * kBlockBytes;
 constexpr std::int64_t kForEver = std::numeric_limits<std::int64_t>::max();
 
 std::string rate_text(std::int64_t period) {
@@ -78,6 +81,16 @@ std::uint64_t rows_of(const BackendOptions& options, std::uint32_t row_bytes) {
   return std::clamp<std::uint64_t>(kDefaultHistoryBytes / row_bytes, 16, kDefaultHistoryRows);
 }
 
+/// Size of the journal: twice the largest batch, unless the options say otherwise.
+std::uint64_t journal_bytes_of(const BackendOptions& options) {
+  if (options.journal == 0) return 0;
+  if (options.journal < 0) {
+    const std::uint64_t lane = std::uint64_t{std::bit_ceil(options.lane_blocks)} * kBlockBytes;
+    return std::max(2 * lane, kLeastBackendJournal);
+  }
+  return std::max(static_cast<std::uint64_t>(options.journal), kLeastBackendJournal);
+}
+
 OwnedSegment segment_of(const Schema& schema, const BackendOptions& options) {
   const std::vector<std::byte> bytes = to_bytes(schema);
   const std::uint32_t row_bytes = row_layout(schema).size;
@@ -88,6 +101,7 @@ OwnedSegment segment_of(const Schema& schema, const BackendOptions& options) {
   spec.rows = rows_of(options, row_bytes);
   spec.lanes = options.lanes;
   spec.lane_blocks = options.lane_blocks;
+  spec.journal_bytes = journal_bytes_of(options);
   spec.permission = options.permission;
   spec.inherits_halt = !options.bursting && !options.resume;
   return OwnedSegment::create(spec);
@@ -108,13 +122,14 @@ UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, Reques
       layout(row_layout(schema)),
       segment(segment_of(schema, options)),
       history(segment.view()),
+      journal(segment.view()),
       row_signal(segment.view()),
       bell(segment.view()),
       lanes(segment.view(), offsetof(BatchRecord, ticket)),
       liveness(segment),
       pool(lanes.size() * segment.view().shape.lane_blocks),
       controller(schema, pool, *this, lanes.size()),
-      staging(lanes, pool, controller),
+      staging(lanes, pool, controller, journal),
       schedule(lanes.size()),
       halts(segment.view()),
       running(schema, segment.view()),
@@ -129,7 +144,8 @@ UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, Reques
       silence_(options.silence),
       last_life_(lanes.size()),
       // ends of commands in one step: completed and late ones, and those of their batches
-      outbox_(lanes, 2 * (schema.actuators.size() + 2 * Controller::kStatusesPerIteration)),
+      outbox_(lanes, journal,
+              2 * (schema.actuators.size() + 2 * Controller::kStatusesPerIteration)),
       errors_(schema),
       overruns_(options.max_overruns) {
   express_lanes_.reserve(lanes.size());
@@ -255,7 +271,7 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
                 {.lanes = !fresh && lanes.announce(), .rows = row_signal.announce(current)});
   if (!begun_) segment.set_state(BackendState::running);
   begun_ = true;
-  ++current;
+  journal.set_iteration(++current);
 }
 
 void UntypedBackend::Body::end(BackendState state, std::string_view text) noexcept {
@@ -271,6 +287,7 @@ void UntypedBackend::Body::end(BackendState state, std::string_view text) noexce
   }
   wake_sleepers(segment.view(), {.lanes = lanes.announce()});
   segment.view().counters().acts.store(0, std::memory_order_relaxed);
+  journal.ended(state, text);
   segment.end(state, text);
 }
 
@@ -331,9 +348,7 @@ bool UntypedBackend::runs(std::uint32_t request) const noexcept {
   return body_->running.runs(request);
 }
 
-void UntypedBackend::interrupt(std::uint32_t actuator) noexcept {
-  body_->controller.interrupt(actuator, body_->current);
-}
+void UntypedBackend::interrupt(std::uint32_t actuator) noexcept { body_->interrupt(actuator); }
 
 void UntypedBackend::ask_to_stop() noexcept {
   body_->stop.store(true, std::memory_order_relaxed);

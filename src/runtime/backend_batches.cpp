@@ -12,6 +12,9 @@ namespace o80 {
 // ------------------------------------------------------------------------------ statuses out
 
 void UntypedBackend::Body::changed(const StatusChange& change) noexcept {
+  if (change.of == StatusChange::Of::batch && deciding_ != nullptr) {
+    journal.decided(*deciding_, change);
+  }
   outbox_.put(change);
   // a burst that runs until its batch has ended (pulse_to_end)
   if (burst_.ends_with(change.lane, change.id)) stop_burst();
@@ -39,11 +42,14 @@ Outcome UntypedBackend::Body::take_control(std::uint32_t lane) noexcept {
   // that has closed or lost its lane does not get control.
   if (taking_owner_ == 0 || taking_owner_ != lanes[lane].incarnation()) return {};
   holder_.take(lane, taking_owner_);
+  journal.control(JournalKind::control_taken, lane, taking_owner_);
   return {};
 }
 
 Outcome UntypedBackend::Body::release_control(std::uint32_t lane) noexcept {
-  if (holder_.is(lane, taking_owner_)) holder_.release();
+  if (!holder_.is(lane, taking_owner_)) return {};
+  holder_.release();
+  journal.control(JournalKind::control_released, lane, taking_owner_);
   return {};
 }
 
@@ -67,6 +73,7 @@ void UntypedBackend::Body::take_batches() noexcept {
   if (!lanes.look()) return;
   if (lanes.tickets_were_put_back()) {
     controller.forget_tickets();
+    journal.order_lost();
     halted_below_ = 0;
   }
   const bool all_taken = take_in_order();
@@ -171,6 +178,7 @@ void UntypedBackend::Body::accept(const StagedBatch& sent) noexcept {
   }
   if (bursts) grant(due, batch);
   if (is_for_later) {
+    journal.scheduled(due, batch.id);
     schedule.add(due);
   } else {
     take(due);
@@ -182,8 +190,12 @@ void UntypedBackend::Body::take(const StagedBatch& sent) noexcept {
   taking_owner_ = sent.had_left ? 0 : sent.incarnation;
   // if the ticket counter was reset since the batch was staged, a purge with the old ticket would
   // end batches that are sent from now on
-  pool.batch(sent.batch).ticket = lanes.drawn_at_most(sent.ticket);
+  StagedBatch taken = sent;
+  taken.ticket = lanes.drawn_at_most(sent.ticket);
+  pool.batch(sent.batch).ticket = taken.ticket;
+  deciding_ = &taken;
   controller.take(sent.lane, sent.batch, *this);
+  deciding_ = nullptr;
 }
 
 /// True if a batch may be taken in this iteration; otherwise ends it.
@@ -209,8 +221,16 @@ bool UntypedBackend::Body::is_of_dead(const StagedBatch& sent) noexcept {
 
 bool UntypedBackend::Body::reject(const StagedBatch& sent, Reason reason,
                                   std::uint32_t detail) noexcept {
-  controller.reject(sent.lane, sent.batch, reason, static_cast<std::uint8_t>(detail), current);
+  end_batch(sent, reason, static_cast<std::uint8_t>(detail), Status::rejected);
   return false;
+}
+
+/// Rejects a batch; its records end with `status`.
+void UntypedBackend::Body::end_batch(const StagedBatch& sent, Reason reason, std::uint8_t detail,
+                                     Status status) noexcept {
+  deciding_ = &sent;
+  controller.reject(sent.lane, sent.batch, reason, detail, current, status);
+  deciding_ = nullptr;
 }
 
 void UntypedBackend::Body::reject_all(Reason reason) noexcept {

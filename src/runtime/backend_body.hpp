@@ -24,6 +24,7 @@
 #include "o80/runtime/backend.hpp"
 #include "runtime/burst_grant.hpp"
 #include "runtime/control_holder.hpp"
+#include "runtime/decision_journal.hpp"
 #include "runtime/overrun_limit.hpp"
 #include "runtime/running_requests.hpp"
 #include "runtime/schedule.hpp"
@@ -70,6 +71,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   void ask_to_halt(HaltCause cause, std::string_view text) noexcept;
   void end_request(std::uint32_t request, const Served& how) noexcept;
   Step brake() noexcept;
+  void interrupt(std::uint32_t actuator) noexcept;
   bool acts() const noexcept { return shown_acts_ != 0 || controller.active() || running.moves(); }
   void set_timing(const Timing& now) noexcept;
   std::int64_t time() const noexcept {
@@ -80,6 +82,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   const RowLayout layout;
   OwnedSegment segment;
   HistoryWriter history;
+  DecisionJournal journal;
   RowSignal row_signal;
   BellWaiter bell;
   LaneReceivers lanes;
@@ -111,6 +114,8 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   bool is_of_dead(const StagedBatch& sent) noexcept;
   void take(const StagedBatch& sent) noexcept;
   bool reject(const StagedBatch& sent, Reason reason, std::uint32_t detail = 0) noexcept;
+  void end_batch(const StagedBatch& sent, Reason reason, std::uint8_t detail,
+                 Status status) noexcept;
   void reject_all(Reason reason) noexcept;
   void grant(const StagedBatch& sent, const BatchRecord& batch) noexcept;
   bool is_called_off() const noexcept;
@@ -170,7 +175,8 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   std::vector<std::uint32_t> express_lanes_;  // by ticket
 
   ControlHolder holder_;
-  std::uint64_t taking_owner_ = 0;  // incarnation that sent the batch being taken
+  std::uint64_t taking_owner_ = 0;         // incarnation that sent the batch being taken
+  const StagedBatch* deciding_ = nullptr;  // the batch that is being taken or rejected
 
   // for each cause: hash of the text of the last halt that this process requested; 0: none since
   // a resume

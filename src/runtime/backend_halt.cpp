@@ -34,6 +34,7 @@ void UntypedBackend::Body::watch_halt() noexcept {
     begin_halt();
   } else if (reason_missing_) {
     reason_missing_ = !halts.show(halts.halt().iteration);
+    if (!reason_missing_) journal.halt(JournalKind::halt_reason, halts.halt());
   }
   end_scheduled();
 }
@@ -66,6 +67,7 @@ void UntypedBackend::Body::watch_errors() noexcept {
 Step UntypedBackend::Body::brake() noexcept {
   if (!stopping_) {
     stopping_ = true;
+    journal.stopping();
     if (unreadable) return Step::ended;  // the position is unknown, so the robot cannot brake
     const bool acted = acts();
     controller.purge(kEveryActuator, current, Reason::stopped);
@@ -94,6 +96,7 @@ void UntypedBackend::Body::set_timing(const Timing& now) noexcept {
 /// Ends all commands and makes every actuator brake.
 void UntypedBackend::Body::begin_halt() noexcept {
   reason_missing_ = !halts.show(current);
+  journal.halt(JournalKind::halt, halts.halt());
   // batches with a lower ticket that are committed later were sent before the halt: they end as
   // halted when they are taken
   halted_below_ = segment.view().bell().tickets.load(std::memory_order_seq_cst);  // sync tickets
@@ -125,7 +128,7 @@ void UntypedBackend::Body::end_scheduled() noexcept {
 /// Ends a scheduled batch whose sender has become silent since; false if it has not.
 bool UntypedBackend::Body::ends_for_silence(const StagedBatch& sent) noexcept {
   if (!sent.silent) return false;
-  controller.reject(sent.lane, sent.batch, Reason::silence, 0, current, Status::purged);
+  end_batch(sent, Reason::silence, 0, Status::purged);
   return true;
 }
 
@@ -134,8 +137,7 @@ bool UntypedBackend::Body::ends_for_silence(const StagedBatch& sent) noexcept {
 bool UntypedBackend::Body::suits_halt(const StagedBatch& sent) noexcept {
   const bool before = sent.ticket < halted_below_;
   if ((!before && !halts.acts()) || !controller.effort(sent.batch).moves) return true;
-  controller.reject(sent.lane, sent.batch, Reason::halted, 0, current,
-                    before ? Status::halted : Status::rejected);
+  end_batch(sent, Reason::halted, 0, before ? Status::halted : Status::rejected);
   return false;
 }
 
@@ -185,8 +187,10 @@ Outcome UntypedBackend::Body::resume(std::uint32_t lane, CommandId id,
   }
   for (auto& last : own_halts_) last.store(0, std::memory_order_relaxed);
   reason_missing_ = false;
+  journal.resume(lane, number);
   if (server_ != nullptr) return start_afresh(lane, id);
   controller.restart(row() + layout.observed, nullptr, current);
+  journal.fresh_start(lane);
   publish(true);
   return {};
 }

@@ -55,6 +55,7 @@ void UntypedBackend::Body::look_at_lives() noexcept {
 void UntypedBackend::Body::on_owner_death(std::uint32_t lane, std::uint64_t incarnation) noexcept {
   if (incarnation <= handled_deaths_[lane]) return;
   handled_deaths_[lane] = incarnation;
+  journal.died(lane, incarnation, stale_);
   stale(lane, Reason::dead_frontend);
   if (burst_.runs_for(lane) && burst_.incarnation() <= incarnation) stop_burst();
   // it may have died between its commit and the bell
@@ -69,6 +70,7 @@ void UntypedBackend::Body::watch_holder() noexcept {
   const bool died = life.state == LaneState::died && life.incarnation == holder_.incarnation();
   if (died || lane.closed() >= holder_.incarnation() ||
       lane.incarnation() != holder_.incarnation()) {
+    journal.control(JournalKind::control_lost, holder_.lane(), holder_.incarnation());
     holder_.release();
   }
 }
@@ -93,8 +95,12 @@ void UntypedBackend::Body::watch_silence() noexcept {
       last_life_[i] = current;
       continue;
     }
+    journal.silent(i, lanes[i].incarnation(), stale_);
     stale(i, Reason::silence);
-    if (holder_.lane() == i) holder_.release();
+    if (holder_.lane() == i) {
+      journal.control(JournalKind::control_lost, i, holder_.incarnation());
+      holder_.release();
+    }
     last_life_[i] = current;
   }
 }

@@ -6,6 +6,11 @@
 
 namespace o80 {
 
+void UntypedBackend::Body::interrupt(std::uint32_t actuator) noexcept {
+  journal.interrupted(actuator);
+  controller.interrupt(actuator, current);
+}
+
 Outcome UntypedBackend::Body::request(std::uint32_t lane, CommandId id, BlockIndex record,
                                       std::uint32_t index, Cursor payload) noexcept {
   const std::size_t size = schema.types[schema.requests[index].type].size;
@@ -57,6 +62,7 @@ Outcome UntypedBackend::Body::start_afresh(std::uint32_t lane, CommandId id) noe
     return reject_request(lane, id, failure.data());
   }
   controller.restart(reading.observed, reading.has_desired ? reading.desired : nullptr, current);
+  journal.fresh_start(lane);
   publish(true);
   return {};
 }

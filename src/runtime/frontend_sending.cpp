@@ -296,6 +296,16 @@ void UntypedFrontend::refuse_if_too_much(const BatchBuilder& builder) const {
   };
   refuse(builder.requests(), kMostRequests, "requests");
   refuse(builder.control_orders(), kMostControlOrders, "orders to take or release control");
+
+  const std::uint64_t journal = link_->segment.view().shape.journal_bytes;
+  const std::uint64_t bytes = builder.blocks() * kBlockBytes;
+  if (journal == 0 || bytes <= journal / 2) return;
+  throw InvalidArgument(
+      "this batch takes " + std::to_string(bytes) + " bytes, and the journal of '" + segment() +
+      "' allows " + std::to_string(journal / 2) +
+      " (half of its size). Send the commands in several pulses, or start the "
+      "robot with a larger journal (--journal). Nothing was sent, all stays added "
+      "(forget_added() drops it)");
 }
 
 /// Refuses a batch for a later iteration if too many of them wait already.

@@ -6,10 +6,12 @@
 
 namespace o80 {
 
-Staging::Staging(LaneReceivers& lanes, BlockPool& pool, Controller& controller)
+Staging::Staging(LaneReceivers& lanes, BlockPool& pool, Controller& controller,
+                 DecisionJournal& journal)
     : lanes_(lanes),
       pool_(pool),
       controller_(controller),
+      journal_(journal),
       stages_(lanes.size()),
       tickets_(lanes.size(), kNoTicket),
       waiting_(pool.size()) {}
@@ -48,6 +50,26 @@ bool Staging::go_on(std::uint32_t lane, std::uint32_t& budget) noexcept {
 /// False when the budget ended first. An invalid batch is dropped.
 bool Staging::copy_and_check(std::uint32_t lane, std::uint32_t& budget) noexcept {
   Stage& stage = stages_[lane];
+  if (stage.left > 0 && budget > 0) {
+    const std::uint32_t first = stage.chain.blocks;
+    const Waiting& sender = stage.sender;
+    journal_.begin_blocks(lane, sender.had_left ? 0 : sender.incarnation,
+                          std::min(stage.left, budget));
+    const bool valid = copy(lane, budget);
+    if (stage.chain.blocks > 0) {
+      journal_.end_blocks(lane, pool_.batch(stage.chain.first).id, first);
+    }
+    if (!valid) {
+      drop(lane);
+      return true;
+    }
+  }
+  return stage.left == 0 && controller_.check(lane, stage.chain.first, budget);
+}
+
+/// Copies blocks of a batch into the pool and the journal; false if the batch is invalid.
+bool Staging::copy(std::uint32_t lane, std::uint32_t& budget) noexcept {
+  Stage& stage = stages_[lane];
   LaneReceiver& from = lanes_[lane];
   Block block{};
   while (stage.left > 0 && budget > 0) {
@@ -57,18 +79,20 @@ bool Staging::copy_and_check(std::uint32_t lane, std::uint32_t& budget) noexcept
     const bool expected = stage.chain.blocks > 0 || from.expects(first.id);
     --budget;
     if (!taken || !expected || !pool_.append(stage.chain, &block)) {
-      drop(lane, taken ? 1 : 0);
-      return true;
+      if (taken) from.free(1);
+      return false;
     }
+    journal_.add_block(block);
     --stage.left;
   }
-  return stage.left == 0 && controller_.check(lane, stage.chain.first, budget);
+  return true;
 }
 
 /// Discards a batch that is invalid or whose lane was reset.
-void Staging::drop(std::uint32_t lane, std::uint32_t blocks_outside) noexcept {
+void Staging::drop(std::uint32_t lane) noexcept {
   Stage& stage = stages_[lane];
-  lanes_[lane].free(stage.chain.blocks + blocks_outside);
+  if (stage.chain.blocks > 0) journal_.dropped(lane, pool_.batch(stage.chain.first).id);
+  lanes_[lane].free(stage.chain.blocks);
   lanes_[lane].reset();
   pool_.release(stage.chain);
   stage.copying = false;

@@ -8,12 +8,13 @@
 #include "control/controller.hpp"
 #include "control/pool.hpp"
 #include "memory/lane_receiver.hpp"
+#include "runtime/decision_journal.hpp"
 #include "runtime/schedule.hpp"
 
 namespace o80 {
 
-/// Copies batches from the lanes into the pool, where the controller checks them. Lanes are
-/// independent of each other.
+/// Copies batches from the lanes into the pool, where the controller checks them, and into the
+/// journal. Lanes are independent of each other.
 ///
 /// The staged batches of a lane wait in the order in which they were sent until they are popped.
 ///
@@ -21,7 +22,7 @@ namespace o80 {
 /// Realtime: everything but construction; each step takes its cost off a budget.
 class Staging {
  public:
-  Staging(LaneReceivers& lanes, BlockPool& pool, Controller& controller);
+  Staging(LaneReceivers& lanes, BlockPool& pool, Controller& controller, DecisionJournal& journal);
 
   /// Copies and checks the next batch of a lane and takes its blocks off `budget`. True when that
   /// batch is staged or was dropped as invalid; false when the budget ended first.
@@ -65,10 +66,11 @@ class Staging {
   };
 
   bool begin(std::uint32_t lane, std::uint32_t& budget) noexcept;
-  void drop(std::uint32_t lane, std::uint32_t blocks_outside) noexcept;
+  void drop(std::uint32_t lane) noexcept;
   BlockIndex complete(std::uint32_t lane) noexcept;
   void append(std::uint32_t lane, BlockIndex batch) noexcept;
   bool copy_and_check(std::uint32_t lane, std::uint32_t& budget) noexcept;
+  bool copy(std::uint32_t lane, std::uint32_t& budget) noexcept;
   bool overtakes(std::uint32_t lane, BlockIndex batch) const noexcept;
   StagedBatch staged(std::uint32_t lane, BlockIndex batch) const noexcept;
   void note_ticket(std::uint32_t lane) noexcept;
@@ -76,6 +78,7 @@ class Staging {
   LaneReceivers& lanes_;
   BlockPool& pool_;
   Controller& controller_;
+  DecisionJournal& journal_;
   std::vector<Stage> stages_;
   std::vector<std::uint64_t> tickets_;
   std::vector<Waiting> waiting_;  // one for each block

@@ -29,6 +29,7 @@ void StatusOutbox::report_no_row() noexcept {
 
 void StatusOutbox::report(const StatusChange& change) noexcept {
   O80_COUNT(status_told);
+  journal_.status(change);
   LaneReceiver& lane = lanes_[change.lane];
   lane.set_status(change.id,
                   {static_cast<std::uint8_t>(change.status),

@@ -5,18 +5,23 @@
 
 #include "control/status_sink.hpp"
 #include "memory/lane_receiver.hpp"
+#include "runtime/decision_journal.hpp"
 
 namespace o80 {
 
-/// Reports statuses to their lanes. An end that comes during a step is reported after its row is
-/// published, so that no command is reported as completed by a backend that dies before.
+/// Reports statuses to their lanes and to the journal. An end that comes during a step is reported
+/// after its row is published, so that no command is reported as completed by a backend that dies
+/// before.
 ///
 /// Writer:   the backend's thread.
 /// Realtime: everything but construction.
 class StatusOutbox {
  public:
   /// `most`: most ends of commands in one step.
-  StatusOutbox(LaneReceivers& lanes, std::size_t most) : lanes_(lanes) { waiting_.reserve(most); }
+  StatusOutbox(LaneReceivers& lanes, DecisionJournal& journal, std::size_t most)
+      : lanes_(lanes), journal_(journal) {
+    waiting_.reserve(most);
+  }
 
   void begin_step() noexcept { stepping_ = true; }
   void end_step() noexcept { stepping_ = false; }
@@ -30,6 +35,7 @@ class StatusOutbox {
   void report(const StatusChange& change) noexcept;
 
   LaneReceivers& lanes_;
+  DecisionJournal& journal_;
   std::vector<StatusChange> waiting_;
   bool stepping_ = false;
 };

@@ -28,7 +28,10 @@ struct BackendOptions {
   std::uint64_t history = 0;          // rows kept; 0: as many as 16 MiB hold, 1e5 at most
   std::uint32_t lanes = 8;            // frontends that may command at once
   std::uint32_t lane_blocks = 16384;  // blocks of 64 bytes that each of them may have in flight
-  mode_t permission = 0600;           // read: may observe; write: may command
+  /// Size of the journal [bytes], rounded up to a power of two; -1: twice the largest batch; 0: no
+  /// journal. `pulse` refuses a batch larger than half of it.
+  std::int64_t journal = -1;
+  mode_t permission = 0600;  // read: may observe; write: may command
   Stale stale = Stale::hold;
   /// Watchdog: iterations without a sign of life after which `stale` applies to a commander that
   /// has control or commands; 0: no watchdog. See ARCHITECTURE.md, Halts.

@@ -15,6 +15,7 @@ import o80
 from o80 import _core
 from o80.cli.attach import attach
 from o80.cli.condition import halt_text, pace_text
+from o80.cli.journal_lines import follow
 from o80.cli.screen import complain, style
 from o80.cli.values import RowValues, text
 
@@ -48,6 +49,12 @@ def echo(
     fields: Annotated[
         str, typer.Option(help="Print only these, for example observed.elbow,extended.effort")
     ] = "",
+    commands: Annotated[
+        bool,
+        typer.Option(
+            "--commands", help="Print the journal: who sent what, when it began and how it ended."
+        ),
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object a line.")] = False,
     wait: Annotated[
         bool, typer.Option("--wait", help="Wait for a robot that has not started yet.")
@@ -59,9 +66,13 @@ def echo(
 ) -> None:
     """Print rows: iteration, time, states, sensor values, active and braking actuators.
 
+    With --commands, the last decisions of the backend and those that follow.
     For a dead segment it prints the last rows and why the backend ended. Ctrl-C ends it.
     """
     with attach(segment, wait=wait) as frontend:
+        if commands:
+            follow(frontend, count, as_json, timeout)
+            return
         printer = _Printer(frontend, [path for path in fields.split(",") if path], as_json)
         if not frontend.alive:
             for row in frontend.history(max(count, 1)):

@@ -2,10 +2,21 @@
 
 from o80 import _core
 from o80.frontend.describing import Describing
+from o80.journal import Journal, JournalEntry
 
 
 class Watching(Describing):
     """The part of o80.Frontend that watches the loop of the backend."""
+
+    def journal(self, since: int | None = None) -> list[JournalEntry]:
+        """What the backend decided, oldest first: who sent what, when it was taken, how it ended.
+
+        since: number of the first entry to return (None: the oldest that there is). To follow a
+            backend, keep an `o80.Journal`, which reads each entry once.
+
+        Also for a read-only frontend, and after the end of the backend. Raises Closed.
+        """
+        return Journal(self, since).read()
 
     @property
     def rate_reached(self) -> float | None:

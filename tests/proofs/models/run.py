@@ -110,6 +110,7 @@ class Relacy:
     SOURCES = (
         "src/memory/halt_word.cpp",
         "src/memory/history.cpp",
+        "src/memory/journal.cpp",
         "src/memory/lane_receiver.cpp",
         "src/memory/lane_sender.cpp",
         "src/memory/segment_file.cpp",

@@ -48,18 +48,20 @@ class Segment {
   static constexpr std::size_t kRemembered = 4;  // bursts and messages that a model may use
 
   Segment(std::uint64_t row_words, std::uint64_t slots, std::uint32_t lanes,
-          std::uint32_t lane_blocks) {
+          std::uint32_t lane_blocks, std::uint64_t journal_bytes = 0) {
     view.shape = {.page_bytes = 4096,
                   .schema_bytes = 0,
                   .row_bytes = 8 * row_words,
                   .slots = slots,
                   .lanes = lanes,
-                  .lane_blocks = lane_blocks};
+                  .lane_blocks = lane_blocks,
+                  .journal_bytes = journal_bytes > 0 ? o80::kLeastJournal : 0};
     if (!o80::SegmentOffsets::compute(view.shape, view.offsets)) std::abort();
     static std::byte* memory =
         static_cast<std::byte*>(std::aligned_alloc(4096, view.offsets.file_bytes));
     static std::byte* commands =
         static_cast<std::byte*>(std::aligned_alloc(4096, view.offsets.commands_bytes));
+    view.shape.journal_bytes = journal_bytes;  // smaller than a real one
     view.base = memory;
     view.commands = commands;
     current() = this;
@@ -79,6 +81,12 @@ class Segment {
     make(view.counters().cleared);
     make(view.counters().halt);
     words(view.history(), row_words * slots, false);
+    if (journal_bytes > 0) {
+      make(view.counters().journal.begun);
+      make(view.counters().journal.published);
+      for (auto& mark : view.counters().journal.marks) make(mark);
+      words(view.journal(), journal_bytes / 8, false);
+    }
     for (std::uint32_t i = 0; i < lanes; ++i) make_lane(i);
   }
   Segment(const Segment&) = delete;

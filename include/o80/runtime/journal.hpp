@@ -1,0 +1,115 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "o80/base/time.hpp"
+#include "o80/control/command.hpp"
+#include "o80/control/status.hpp"
+#include "o80/memory/halt.hpp"
+#include "o80/memory/journal_kind.hpp"
+#include "o80/memory/life.hpp"
+
+namespace o80 {
+
+class UntypedFrontend;
+
+/// A command, a request or an order of a batch in the journal.
+struct JournalRecord {
+  enum class Kind : std::uint8_t { command, purge, request, take_control, release_control, resume };
+  /// What a command asks of one actuator.
+  struct Target {
+    std::uint16_t actuator = 0;
+    std::vector<std::uint64_t> mask;  // one bit for each number that was given; empty: all
+    std::vector<std::byte> states;    // the rows, one state each
+  };
+
+  Kind kind = Kind::command;
+  CommandId id = 0;
+  // of a command; `pace.amount` and `pace.per_second` as in PaceSpec
+  PaceSpec pace;
+  Mode mode = Mode::queue;
+  Profile profile = Profile::linear;
+  Start start = Start::desired;
+  std::uint32_t rows = 1;               // above 1: a trajectory
+  std::vector<std::int64_t> row_times;  // of a trajectory with its own times [ns]
+  std::vector<Target> targets;          // more than one: a command of several actuators
+  // of a purge
+  std::uint16_t actuator = kEveryActuator;
+  bool only_own = false;
+  // of a request: its index in the schema, and its struct
+  std::uint32_t request = 0;
+  std::vector<std::byte> payload;
+  // of a resume
+  std::uint64_t halt = 0;
+};
+
+/// One decision of a backend. Which members are set depends on `kind`.
+struct JournalEntry {
+  static constexpr std::uint32_t kNoLane = 0xFFFFFFFF;
+
+  JournalKind kind = JournalKind::none;
+  std::uint64_t number = 0;  // of the entry, from 0; entries of batches in transfer count too
+  std::uint64_t missed = 0;  // entries just before this one that were overwritten before the read
+  Iteration iteration = -1;
+  std::uint32_t lane = kNoLane;
+  std::uint64_t owner = 0;  // incarnation of the lane's owner that caused it; 0: unknown
+  std::string who;          // its process, "pid 4711 (python)"; empty: unknown
+  CommandId id = 0;         // of the batch, or, for a status, of the record
+
+  // taken, scheduled, rejected
+  std::uint64_t ticket = 0;
+  Iteration at = kNow;                 // the iteration that the batch was sent for
+  std::int64_t burst = 0;              // iterations; -1: until the batch has ended
+  std::vector<JournalRecord> records;  // empty with `records_lost`
+  bool records_lost = false;           // they were overwritten before they were read
+  std::vector<std::byte> blocks;       // the batch as it came; empty with `records_lost`
+  // status, rejected
+  Status status = Status::none;
+  Reason reason = Reason::none;
+  std::uint8_t detail = 0;
+  // halt, halt_reason, resume: the number; burst_ended: whether it was cut
+  std::uint64_t halt = 0;
+  HaltCause cause = HaltCause::none;
+  bool cut = false;
+  std::string text;                            // of a halt, and of the end of a failed backend
+  std::uint16_t actuator = 0;                  // interrupted
+  BackendState state = BackendState::running;  // ended
+};
+
+/// Reads the decisions of a backend from the journal in its segment, in their order: batches that
+/// it took or rejected, begins and ends of their commands, halts, control, bursts, deaths. See
+/// ARCHITECTURE.md, The journal.
+///
+/// The journal is a ring. A reader that is too slow misses entries; `missed` of the next entry says
+/// how many. The records of a batch are joined to the entry that decides on it.
+///
+/// Writer / Readers: one thread. Works on any attached segment, also read-only, also of a backend
+/// that is gone.
+class Journal {
+ public:
+  /// Starts at the oldest entry in the ring. Throws Closed.
+  explicit Journal(const UntypedFrontend& frontend);
+  Journal(Journal&&) noexcept;
+  Journal& operator=(Journal&&) noexcept;
+  ~Journal();
+
+  /// False if the backend was started without a journal.
+  bool exists() const;
+  /// Reads the next entry; false if there is none now. Does not wait. Throws Closed,
+  /// UsedAfterFork.
+  bool next(JournalEntry& entry);
+  /// Continues at the entry of this number; entries before the oldest are reported as missed.
+  void seek(std::uint64_t number);
+  /// Continues behind the newest entry.
+  void seek_end();
+
+ private:
+  class Body;
+  std::unique_ptr<Body> body_;
+};
+
+}  // namespace o80

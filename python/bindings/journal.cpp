@@ -1,0 +1,133 @@
+#include "o80/runtime/journal.hpp"
+
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <string>
+#include <vector>
+
+#include "bindings.hpp"
+#include "enums.hpp"
+#include "frontend.hpp"
+#include "waiting.hpp"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+
+namespace {
+
+std::string word_of(o80::JournalRecord::Kind kind) {
+  using enum o80::JournalRecord::Kind;
+  switch (kind) {
+    case command:
+      return "command";
+    case purge:
+      return "purge";
+    case request:
+      return "request";
+    case take_control:
+      return "take_control";
+    case release_control:
+      return "release_control";
+    case resume:
+      return "resume";
+  }
+  return "command";
+}
+
+nb::bytes bytes_of(const std::vector<std::byte>& bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+/// A getter of a member that is a word: a string.
+template <auto member>
+auto word() {
+  return [](const auto& self) {
+    const std::string_view text = to_text(self.*member);
+    return nb::str(text.data(), text.size());
+  };
+}
+
+/// A getter of a member that is an enumeration of o80.words.
+template <auto member>
+auto enumeration() {
+  return [](const o80::JournalEntry& self) { return python_word(self.*member); };
+}
+
+/// At most `most` entries that are there.
+std::vector<o80::JournalEntry> read(o80::Journal& journal, std::size_t most) {
+  std::vector<o80::JournalEntry> entries;
+  const Waiting waiting;
+  for (o80::JournalEntry entry; entries.size() < most && journal.next(entry);) {
+    entries.push_back(std::move(entry));
+  }
+  return entries;
+}
+
+void bind_record(nb::module_& m) {
+  using o80::JournalRecord;
+  using Target = JournalRecord::Target;
+  nb::class_<Target>(m, "JournalTarget")
+      .def_ro("actuator", &Target::actuator)
+      .def_ro("mask", &Target::mask)
+      .def_prop_ro("states", [](const Target& self) { return bytes_of(self.states); });
+  nb::class_<JournalRecord>(m, "JournalRecord")
+      .def_prop_ro("kind", [](const JournalRecord& self) { return word_of(self.kind); })
+      .def_ro("id", &JournalRecord::id)
+      .def_prop_ro("pace",
+                   [](const JournalRecord& self) { return std::string(to_text(self.pace.pace)); })
+      .def_prop_ro("amount", [](const JournalRecord& self) { return self.pace.amount; })
+      .def_prop_ro("per_second", [](const JournalRecord& self) { return self.pace.per_second; })
+      .def_prop_ro("mode", word<&JournalRecord::mode>())
+      .def_prop_ro("profile", word<&JournalRecord::profile>())
+      .def_prop_ro("start", word<&JournalRecord::start>())
+      .def_ro("rows", &JournalRecord::rows)
+      .def_ro("row_times", &JournalRecord::row_times)
+      .def_ro("targets", &JournalRecord::targets)
+      .def_ro("actuator", &JournalRecord::actuator)
+      .def_ro("only_own", &JournalRecord::only_own)
+      .def_ro("request", &JournalRecord::request)
+      .def_prop_ro("payload", [](const JournalRecord& self) { return bytes_of(self.payload); })
+      .def_ro("halt", &JournalRecord::halt);
+}
+
+}  // namespace
+
+void bind_journal(nb::module_& m) {
+  using o80::Journal;
+  using o80::JournalEntry;
+  bind_record(m);
+  nb::class_<JournalEntry>(m, "JournalEntry")
+      .def_prop_ro("kind", word<&JournalEntry::kind>())
+      .def_ro("number", &JournalEntry::number)
+      .def_ro("missed", &JournalEntry::missed)
+      .def_ro("iteration", &JournalEntry::iteration)
+      .def_ro("lane", &JournalEntry::lane)
+      .def_ro("owner", &JournalEntry::owner)
+      .def_ro("who", &JournalEntry::who)
+      .def_ro("id", &JournalEntry::id)
+      .def_ro("ticket", &JournalEntry::ticket)
+      .def_ro("at", &JournalEntry::at)
+      .def_ro("burst", &JournalEntry::burst)
+      .def_ro("records", &JournalEntry::records)
+      .def_ro("records_lost", &JournalEntry::records_lost)
+      .def_prop_ro("blocks", [](const JournalEntry& self) { return bytes_of(self.blocks); })
+      .def_prop_ro("status", enumeration<&JournalEntry::status>())
+      .def_prop_ro("reason", enumeration<&JournalEntry::reason>())
+      .def_ro("detail", &JournalEntry::detail)
+      .def_ro("halt", &JournalEntry::halt)
+      .def_prop_ro("cause", word<&JournalEntry::cause>())
+      .def_ro("cut", &JournalEntry::cut)
+      .def_ro("text", &JournalEntry::text)
+      .def_ro("actuator", &JournalEntry::actuator);
+  nb::class_<Journal>(m, "Journal")
+      .def(
+          "__init__",
+          [](Journal* self, const Frontend& frontend) { new (self) Journal(frontend.untyped()); },
+          "frontend"_a)
+      .def_prop_ro("exists", &Journal::exists)
+      .def("read", &read, "most"_a)
+      .def("seek", &Journal::seek, "number"_a)
+      .def("seek_end", &Journal::seek_end);
+}

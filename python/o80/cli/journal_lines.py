@@ -1,0 +1,183 @@
+"""Prints the journal of a backend, an entry a line (``o80 echo --commands``)."""
+
+from __future__ import annotations
+
+import json
+import time
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+import o80
+from o80.cli.screen import style
+from o80.journal import Journal, JournalCommand, JournalEntry
+
+_LOOK = 0.05  # between two looks for new entries [s]
+_BEFORE = 10  # entries of a living backend that are printed at the start
+_MOST_NUMBERS = 8  # of a target
+
+
+def follow(frontend: o80.Frontend, count: int, as_json: bool, timeout: float | None) -> None:
+    """Prints the last entries, then new ones; ends after `count` of them, 0: never.
+
+    Of a dead backend it prints the last `count` entries, and raises the reason of its end.
+    """
+    journal = Journal(frontend)
+    if not journal.exists:
+        raise o80.Error(f"'{frontend.segment}' has no journal: its backend was started without one")
+    lines = _Lines(as_json)
+    alive = frontend.alive
+    there = [(entry, lines.line(entry)) for entry in journal.read()]
+    shown = there[-(count or (_BEFORE if alive else len(there))) :] if there else []
+    for _, line in shown:
+        print(line, flush=True)
+    if not alive:
+        frontend.wait_for(frontend.published + 1, timeout=0)  # raises the reason of its end
+    printed = 0
+    waited_since = time.monotonic()
+    while True:
+        alive = frontend.alive
+        entries = journal.read()
+        for entry in entries:
+            print(lines.line(entry), flush=True)
+            printed += 1
+            if count and printed >= count:
+                return
+        if not alive:
+            frontend.wait_for(frontend.published + 1, timeout=0)
+        if entries:
+            waited_since = time.monotonic()
+        elif timeout is not None and time.monotonic() - waited_since >= timeout:
+            raise o80.TimeoutError(f"'{frontend.segment}' decided nothing for {timeout:g} s")
+        time.sleep(_LOOK)
+
+
+class _Lines:
+    """Lines of entries; remembers commands that have not ended, to name them at their end."""
+
+    def __init__(self, as_json: bool) -> None:
+        self._as_json = as_json
+        self._open: dict[tuple[int | None, int], str] = {}
+
+    def line(self, entry: JournalEntry) -> str:
+        if self._as_json:
+            return json.dumps(asdict(entry), default=_plain)
+        said = self._text(entry)
+        parts = [style(f"{entry.iteration:>8}", "bold"), said]
+        if entry.missed:
+            parts.insert(0, f"({entry.missed} entries were overwritten before they were read)\n")
+        return " ".join(parts)
+
+    def _text(self, entry: JournalEntry) -> str:
+        if entry.kind in ("taken", "scheduled", "rejected"):
+            return self._batch(entry)
+        if entry.kind == "status":
+            return self._status(entry)
+        who = f"{_sender(entry)}: "
+        if entry.kind in ("halt", "halt_reason"):
+            by = f" by {entry.sender}" if entry.sender else ""
+            word = "HALT" if entry.kind == "halt" else "reason of halt"
+            return style(f"{word} {entry.halt}", "yellow") + f" ({entry.cause}{by}): {entry.text}"
+        if entry.kind == "resume":
+            return f"{who}resumed halt {entry.halt}"
+        if entry.kind == "burst":
+            until = (
+                "until its batch has ended" if entry.burst == -1 else f"{entry.burst} iterations"
+            )
+            return f"{who}burst, {until}"
+        if entry.kind == "burst_ended":
+            return f"{who}burst ended{' early' if entry.cut else ''}"
+        if entry.kind == "interrupted":
+            return f"the robot interrupted {entry.actuator}"
+        if entry.kind == "ended":
+            return "the backend ended" + (f": {entry.text}" if entry.text else "")
+        said = {
+            "control_taken": f"{who}took control",
+            "control_released": f"{who}released control",
+            "control_lost": f"{who}lost control",
+            "died": f"{who}died",
+            "silent": f"{who}gave no sign of life",
+            "fresh_start": "fresh start",
+            "order_lost": "the ticket counter is damaged",
+            "stopping": "stopping: all commands are dropped",
+        }
+        return said.get(entry.kind, entry.kind)
+
+    def _batch(self, entry: JournalEntry) -> str:
+        texts = []
+        for command in entry.commands:
+            texts.append(command_text(command))
+            if entry.kind != "rejected":
+                self._open[entry.lane, command.id] = texts[-1]
+        what = "; ".join(texts) or ("commands were overwritten" if entry.commands_lost else "burst")
+        if entry.kind == "rejected":
+            return f"{_sender(entry)}: {what}: {style(f'rejected ({entry.reason})', 'red')}"
+        later = f" (for iteration {entry.at})" if entry.kind == "scheduled" else ""
+        return f"{_sender(entry)}: {what}{later}"
+
+    def _status(self, entry: JournalEntry) -> str:
+        key = (entry.lane, entry.id or 0)
+        what = self._open.get(key, f"command {entry.id} of lane {entry.lane}")
+        if entry.status != "active":
+            self._open.pop(key, None)
+        status = "begins" if entry.status == "active" else str(entry.status)
+        reason = f" ({entry.reason})" if entry.reason not in (None, "none") else ""
+        return f"  {what}: {status}{reason}"
+
+
+def _sender(entry: JournalEntry) -> str:
+    return entry.sender or f"lane {entry.lane}"
+
+
+def command_text(command: JournalCommand) -> str:
+    """A command in words: "elbow to 0.5 in 2 s"."""
+    if command.kind == "purge":
+        own = "own commands of " if command.only_own else ""
+        return f"purge {own}{', '.join(command.actuators) or 'all'}"
+    if command.kind == "request":
+        fields = ", ".join(f"{name}={value}" for name, value in (command.fields or {}).items())
+        return f"{command.request}({fields})"
+    if command.kind == "resume":
+        return f"resume halt {command.halt}"
+    if command.kind != "command":
+        return command.kind.replace("_", " ")
+    parts = [
+        f"{name} to {_target(target)}"
+        for name, target in zip(command.actuators, command.targets, strict=True)
+    ]
+    overwrite = ", overwriting" if command.mode == "overwrite" else ""
+    return f"{', '.join(parts)}{_pace(command)}{overwrite}"
+
+
+def _pace(command: JournalCommand) -> str:
+    if command.times:
+        return f" in {command.times[-1]:g} s"
+    amount = command.amount
+    return {
+        "duration": f" in {amount} s" if amount is None else f" in {amount:g} s",
+        "speed": f" at {amount}/s",
+        "until": f" until iteration {amount}",
+        "iterations": f" in {amount} iterations each"
+        if _is_trajectory(command)
+        else f" in {amount} iterations",
+        "fastest": " as fast as possible",
+    }.get(command.pace, "")
+
+
+def _is_trajectory(command: JournalCommand) -> bool:
+    return any(isinstance(target, np.ndarray) and target.ndim > 0 for target in command.targets)
+
+
+def _target(target: Any) -> str:
+    if isinstance(target, dict):
+        return "{" + ", ".join(f"{name}: {_target(value)}" for name, value in target.items()) + "}"
+    if isinstance(target, np.ndarray):
+        if target.size > _MOST_NUMBERS:
+            return f"{len(target)} waypoints, the last {target[-1]}"
+        return str(target.tolist())
+    return f"{target:g}" if isinstance(target, float) else str(target)
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else str(value)

@@ -1,0 +1,185 @@
+#include "memory/journal.hpp"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cstring>
+
+#include "base/crash_point.hpp"
+#include "memory/atomic_words.hpp"
+
+// As in history.cpp: the thread sanitizer does not model fences, and every word that they order is
+// atomic.
+#if defined(__SANITIZE_THREAD__) && !defined(__clang__)
+#pragma GCC diagnostic ignored "-Wtsan"
+#endif
+
+namespace o80 {
+
+namespace {
+// above any position of a writer; counters of a damaged file are clamped to it
+constexpr std::uint64_t kFarthestPosition = std::uint64_t{1} << 62;
+constexpr int kOvertakes = 8;  // attempts of one call of next()
+}  // namespace
+
+// ------------------------------------------------------------------------------ writer
+
+JournalWriter::JournalWriter(const SegmentView& view) noexcept
+    : counters_(&view.counters().journal),
+      ring_(view.journal()),
+      bytes_(view.shape.journal_bytes),
+      sector_bytes_(bytes_ / kJournalSectors),
+      most_(bytes_ == 0 ? 0 : std::min<std::uint64_t>(kMostJournalPayload, bytes_ / 4)) {}
+
+void JournalWriter::write(JournalHead head, const void* payload, std::size_t bytes) noexcept {
+  if (bytes_ == 0) return;
+  begin(bytes);
+  add(static_cast<const std::byte*>(payload), bytes);
+  publish(head, added_);
+}
+
+void JournalWriter::begin(std::size_t most) noexcept {
+  if (bytes_ == 0) return;
+  added_ = 0;
+  O80_CRASH_POINT("journal.before_begun");
+  counters_->begun.store(position_ + sizeof(JournalHead) + std::min(most, most_),
+                         std::memory_order_relaxed);
+  std::atomic_thread_fence(std::memory_order_release);  // sync entry
+  O80_CRASH_POINT("journal.before_entry");
+}
+
+void JournalWriter::add(const std::byte* piece, std::size_t bytes) noexcept {
+  if (added_ + bytes > most_) return;
+  store(position_ + sizeof(JournalHead) + added_, piece, bytes);
+  added_ += bytes;
+}
+
+void JournalWriter::end(JournalHead head) noexcept {
+  if (bytes_ != 0 && added_ > 0) publish(head, added_);
+}
+
+void JournalWriter::publish(JournalHead& head, std::size_t payload) noexcept {
+  const std::size_t bytes = sizeof head + payload;
+  head.number = number_++;
+  head.words = static_cast<std::uint16_t>(bytes / 8);
+  store(position_, reinterpret_cast<const std::byte*>(&head), sizeof head);
+  const std::uint64_t sector = position_ / sector_bytes_;
+  if (sector != marked_) {
+    marked_ = sector;
+    counters_->marks[sector % kJournalSectors].store(position_, std::memory_order_relaxed);
+  }
+  position_ += bytes;
+  O80_CRASH_POINT("journal.before_published");
+  counters_->published.store(position_, std::memory_order_release);  // sync journal
+  O80_CRASH_POINT("journal.after_published");
+}
+
+void JournalWriter::store(std::uint64_t position, const std::byte* from,
+                          std::size_t bytes) noexcept {
+  const std::uint64_t at = position & (bytes_ - 1);
+  const std::size_t before_end = std::min<std::uint64_t>(bytes, bytes_ - at);
+  store_words(ring_ + at, from, before_end);
+  store_words(ring_, from + before_end, bytes - before_end);
+}
+
+// ------------------------------------------------------------------------------ reader
+
+JournalReader::JournalReader(const SegmentView& view)
+    : counters_(&view.counters().journal), ring_(view.journal()), bytes_(view.shape.journal_bytes) {
+  go_to_oldest();
+}
+
+std::uint64_t JournalReader::published() const noexcept {
+  return std::min(counters_->published.load(std::memory_order_acquire),  // sync journal
+                  kFarthestPosition);
+}
+
+std::uint64_t JournalReader::first_intact() const noexcept {
+  std::atomic_thread_fence(std::memory_order_acquire);  // sync entry
+  const std::uint64_t begun =
+      std::min(counters_->begun.load(std::memory_order_relaxed), 2 * kFarthestPosition);
+  return begun - std::min(begun, bytes_);
+}
+
+void JournalReader::load(std::uint64_t position, std::byte* to, std::size_t bytes) const noexcept {
+  const std::uint64_t at = position & (bytes_ - 1);
+  const std::size_t before_end = std::min<std::uint64_t>(bytes, bytes_ - at);
+  load_words(to, ring_ + at, before_end);
+  load_words(to + before_end, ring_, bytes - before_end);
+}
+
+/// Reads the head of the entry at this position, and checks its length.
+JournalReader::Got JournalReader::read_head(std::uint64_t position,
+                                            JournalHead& head) const noexcept {
+  const std::uint64_t end = published();
+  if (position >= end) return Got::nothing;
+  std::array<std::byte, sizeof(JournalHead)> bytes;
+  load(position, bytes.data(), bytes.size());
+  if (position < first_intact()) return Got::overtaken;
+  std::memcpy(&head, bytes.data(), sizeof head);
+  const std::uint64_t length = std::uint64_t{head.words} * 8;
+  const bool fits = length >= sizeof head && length <= bytes_ && length <= end - position;
+  return fits ? Got::entry : Got::damaged;
+}
+
+JournalReader::Got JournalReader::read(JournalItem& item) {
+  const Got got = read_head(position_, item.head);
+  if (got != Got::entry) return got;
+  const std::uint64_t length = std::uint64_t{item.head.words} * 8;
+  item.payload.resize(length - sizeof item.head);
+  load(position_ + sizeof item.head, item.payload.data(), item.payload.size());
+  if (position_ < first_intact()) return Got::overtaken;
+  if (!jumped_ && item.head.number != expected_) return Got::damaged;
+  position_ += length;
+  return Got::entry;
+}
+
+bool JournalReader::next(JournalItem& item) {
+  if (bytes_ == 0) return false;
+  for (int i = 0; i < kOvertakes; ++i) {
+    switch (read(item)) {
+      case Got::entry:
+        item.missed = item.head.number - std::min(expected_, item.head.number);
+        expected_ = item.head.number + 1;
+        jumped_ = false;
+        return true;
+      case Got::nothing:
+        return false;
+      case Got::overtaken:
+        go_to_oldest();
+        break;
+      case Got::damaged:
+        skip_to_end();
+        return false;
+    }
+  }
+  skip_to_end();  // the writer is faster than this reader
+  return false;
+}
+
+/// Goes to the oldest entry that will not be overwritten soon.
+void JournalReader::go_to_oldest() noexcept {
+  if (bytes_ == 0) return;
+  const std::uint64_t end = published();
+  const std::uint64_t intact = first_intact();
+  // some room to the writer, unless nothing was overwritten yet
+  const std::uint64_t first = intact == 0 ? 0 : intact + bytes_ / 8;
+  position_ = end;
+  for (const std::atomic<std::uint64_t>& word : counters_->marks) {
+    const std::uint64_t mark = word.load(std::memory_order_relaxed);
+    if (mark >= first && mark < position_) position_ = mark;
+  }
+  jumped_ = true;
+}
+
+void JournalReader::skip_to_end() noexcept {
+  position_ = published();
+  jumped_ = true;
+}
+
+void JournalReader::seek_end() noexcept {
+  if (bytes_ != 0) skip_to_end();
+  expected_ = ~std::uint64_t{0};  // nothing counts as missed
+}
+
+}  // namespace o80

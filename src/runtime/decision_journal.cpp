@@ -1,0 +1,102 @@
+#include "runtime/decision_journal.hpp"
+
+#include <algorithm>
+#include <iterator>
+
+#include "memory/atomic_words.hpp"
+
+namespace o80 {
+
+DecisionJournal::DecisionJournal(const SegmentView& view)
+    : writer_(view), view_(view), named_(view.shape.lanes) {}
+
+void DecisionJournal::begin_blocks(std::uint32_t lane, std::uint64_t sender,
+                                   std::uint32_t most) noexcept {
+  if (!writer_.is_on()) return;
+  const Named& named = named_[lane];
+  // once in each half of the ring, so that whoever reads from the middle finds the name
+  const bool is_far = writer_.position() - named.position > writer_.bytes() / 2;
+  if (sender != 0 && (named.incarnation != sender || is_far)) name_owner(lane, sender);
+  writer_.begin(std::size_t{most} * kBlockBytes);
+}
+
+void DecisionJournal::end_blocks(std::uint32_t lane, CommandId batch,
+                                 std::uint32_t first) noexcept {
+  writer_.end(head(JournalKind::records, lane, batch, first));
+}
+
+void DecisionJournal::name_owner(std::uint32_t lane, std::uint64_t incarnation) noexcept {
+  named_[lane] = {incarnation, writer_.position()};
+  JournalOwner name{};
+  const auto& owner = view_.lane(lane).owner;
+  load_text(owner, std::size(owner), reinterpret_cast<char*>(name.data()));
+  writer_.write(head(JournalKind::owner, lane, incarnation), name.data(), sizeof name);
+}
+
+void DecisionJournal::dropped(std::uint32_t lane, CommandId batch) noexcept {
+  note(JournalKind::dropped, lane, batch);
+}
+
+namespace {
+JournalBatch payload_of(const StagedBatch& sent) noexcept {
+  return {sent.ticket, sent.had_left ? 0 : sent.incarnation, sent.at};
+}
+}  // namespace
+
+void DecisionJournal::scheduled(const StagedBatch& sent, CommandId batch) noexcept {
+  const JournalBatch payload = payload_of(sent);
+  writer_.write(head(JournalKind::scheduled, sent.lane, batch), &payload, sizeof payload);
+}
+
+void DecisionJournal::decided(const StagedBatch& sent, const StatusChange& change) noexcept {
+  const auto kind = change.status == Status::rejected ? JournalKind::rejected : JournalKind::taken;
+  const JournalBatch payload = payload_of(sent);
+  writer_.write(head(kind, change.lane, change.id,
+                     JournalHead::how(static_cast<std::uint8_t>(change.status),
+                                      static_cast<std::uint8_t>(change.reason), change.detail)),
+                &payload, sizeof payload);
+}
+
+void DecisionJournal::status(const StatusChange& change) noexcept {
+  // the entries of the batch tell the others
+  if (change.of != StatusChange::Of::record) return;
+  JournalHead entry =
+      head(JournalKind::status, change.lane, change.id,
+           JournalHead::how(static_cast<std::uint8_t>(change.status),
+                            static_cast<std::uint8_t>(change.reason), change.detail));
+  entry.iteration = change.iteration;
+  writer_.write(entry);
+}
+
+void DecisionJournal::halt(JournalKind halt_or_reason, const Halt& halt) noexcept {
+  const JournalHalt payload{static_cast<std::uint64_t>(halt.cause), halt.who, halt.text};
+  writer_.write(head(halt_or_reason, 0, halt.number), &payload, sizeof payload);
+}
+
+void DecisionJournal::died(std::uint32_t lane, std::uint64_t owner, Stale stale) noexcept {
+  note(JournalKind::died, lane, owner, static_cast<std::uint32_t>(stale));
+}
+
+void DecisionJournal::silent(std::uint32_t lane, std::uint64_t owner, Stale stale) noexcept {
+  note(JournalKind::silent, lane, owner, static_cast<std::uint32_t>(stale));
+}
+
+void DecisionJournal::burst(std::uint32_t lane, CommandId batch, std::int64_t iterations) noexcept {
+  writer_.write(head(JournalKind::burst, lane, batch), &iterations, sizeof iterations);
+}
+
+void DecisionJournal::burst_ended(std::uint32_t lane, CommandId batch, Iteration row,
+                                  BurstEnd how) noexcept {
+  JournalHead entry = head(JournalKind::burst_ended, lane, batch, static_cast<std::uint32_t>(how));
+  entry.iteration = row;
+  writer_.write(entry);
+}
+
+void DecisionJournal::ended(BackendState state, std::string_view text) noexcept {
+  JournalText payload{};
+  text.copy(payload.data(), payload.size() - 1);
+  writer_.write(head(JournalKind::ended, 0, 0, static_cast<std::uint32_t>(state)), payload.data(),
+                payload.size());
+}
+
+}  // namespace o80

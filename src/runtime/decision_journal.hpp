@@ -1,0 +1,119 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "control/record.hpp"
+#include "control/status_sink.hpp"
+#include "memory/journal.hpp"
+#include "o80/describe/rows.hpp"
+#include "o80/memory/halt.hpp"
+#include "o80/memory/life.hpp"
+#include "runtime/schedule.hpp"
+
+namespace o80 {
+
+/// Payload of `taken`, `scheduled` and `rejected`.
+struct JournalBatch {
+  std::uint64_t ticket = 0;
+  std::uint64_t sender = 0;  // incarnation of the owner of the lane; 0: it had left
+  Iteration at = kNow;       // the iteration that the batch was sent for
+};
+static_assert(sizeof(JournalBatch) == 24);
+
+/// Payload of `halt` and `halt_reason`.
+struct JournalHalt {
+  std::uint64_t cause = 0;
+  std::array<char, 64> who{};
+  std::array<char, 248> text{};
+};
+static_assert(sizeof(JournalHalt) == 320);
+
+/// Payload of `owner`: its process, as text.
+using JournalOwner = std::array<std::uint64_t, 8>;
+/// Payload of `ended`: the reason, as text.
+using JournalText = std::array<char, 248>;
+
+/// Writes the decisions of a backend into the journal of its segment. Each is one entry with its
+/// iteration; see ARCHITECTURE.md, The journal.
+///
+/// Writer:   the backend's thread.
+/// Realtime: everything but construction.
+class DecisionJournal {
+ public:
+  explicit DecisionJournal(const SegmentView& view);
+
+  // batches
+  /// The blocks of a batch, while they are copied: begin, add each, end. `first`: index of the
+  /// first of them. `sender`: incarnation that sends, 0 if it has left.
+  void begin_blocks(std::uint32_t lane, std::uint64_t sender, std::uint32_t most) noexcept;
+  void add_block(const Block& block) noexcept { writer_.add(block.bytes.data(), kBlockBytes); }
+  void end_blocks(std::uint32_t lane, CommandId batch, std::uint32_t first) noexcept;
+  void dropped(std::uint32_t lane, CommandId batch) noexcept;
+  void scheduled(const StagedBatch& sent, CommandId batch) noexcept;
+  /// The batch was taken or rejected.
+  void decided(const StagedBatch& sent, const StatusChange& change) noexcept;
+  void order_lost() noexcept { note(JournalKind::order_lost, 0, 0); }
+
+  void status(const StatusChange& change) noexcept;
+
+  // halts
+  void halt(JournalKind halt_or_reason, const Halt& halt) noexcept;
+  void resume(std::uint32_t lane, std::uint64_t halt) noexcept {
+    note(JournalKind::resume, lane, halt);
+  }
+  void fresh_start(std::uint32_t lane) noexcept { note(JournalKind::fresh_start, lane, 0); }
+  void interrupted(std::uint32_t actuator) noexcept { note(JournalKind::interrupted, 0, actuator); }
+
+  // commanders; `owner`: their incarnation
+  void control(JournalKind kind, std::uint32_t lane, std::uint64_t owner) noexcept {
+    note(kind, lane, owner);
+  }
+  /// `stale`: the policy that applies now.
+  void died(std::uint32_t lane, std::uint64_t owner, Stale stale) noexcept;
+  void silent(std::uint32_t lane, std::uint64_t owner, Stale stale) noexcept;
+
+  // bursts
+  /// `iterations`: -1 until the batch has ended.
+  void burst(std::uint32_t lane, CommandId batch, std::int64_t iterations) noexcept;
+  void burst_ended(std::uint32_t lane, CommandId batch, Iteration row, BurstEnd how) noexcept;
+
+  // ends
+  void stopping() noexcept { note(JournalKind::stopping, 0, 0); }
+  void ended(BackendState state, std::string_view text) noexcept;
+
+  /// Sets the iteration of the following entries.
+  void set_iteration(Iteration iteration) noexcept { iteration_ = iteration; }
+
+ private:
+  /// The newest entry with the name of a lane's owner.
+  struct Named {
+    std::uint64_t incarnation = 0;
+    std::uint64_t position = 0;
+  };
+
+  JournalHead head(JournalKind kind, std::uint32_t lane, std::uint64_t id,
+                   std::uint32_t what = 0) const noexcept {
+    JournalHead head;
+    head.kind = kind;
+    head.lane = static_cast<std::uint8_t>(lane);
+    head.what = what;
+    head.iteration = iteration_;
+    head.id = id;
+    return head;
+  }
+  void note(JournalKind kind, std::uint32_t lane, std::uint64_t id,
+            std::uint32_t what = 0) noexcept {
+    writer_.write(head(kind, lane, id, what));
+  }
+  void name_owner(std::uint32_t lane, std::uint64_t incarnation) noexcept;
+
+  JournalWriter writer_;
+  SegmentView view_;
+  std::vector<Named> named_;  // one for each lane
+  Iteration iteration_ = 0;
+};
+
+}  // namespace o80

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "o80/describe/schema.hpp"
+#include "o80/runtime/journal.hpp"
+
+namespace o80 {
+
+/// The records of a batch, from its blocks as they came from a lane. A record that is invalid ends
+/// the list: the backend has rejected it.
+std::vector<JournalRecord> records_of(const Schema& schema, std::span<const std::byte> blocks);
+
+}  // namespace o80
