@@ -37,26 +37,26 @@ std::string word_of(o80::JournalRecord::Kind kind) {
 }
 
 nb::bytes bytes_of(const std::vector<std::byte>& bytes) {
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+  return nb::bytes(reinterpret_cast<const char*>(bytes.data()), bytes.size());
 }
 
 /// A getter of a member that is a word: a string.
-template <auto member>
-auto word() {
-  return [](const auto& self) {
+template <class Owner, class Value>
+auto word(Value Owner::* member) {
+  return [member](const Owner& self) {
     const std::string_view text = to_text(self.*member);
     return nb::str(text.data(), text.size());
   };
 }
 
 /// A getter of a member that is an enumeration of o80.words.
-template <auto member>
-auto enumeration() {
-  return [](const o80::JournalEntry& self) { return python_word(self.*member); };
+template <class Value>
+auto enumeration(Value o80::JournalEntry::* member) {
+  return [member](const o80::JournalEntry& self) { return python_word(self.*member); };
 }
 
 /// At most `most` entries that are there.
-std::vector<o80::JournalEntry> read(o80::Journal& journal, std::size_t most) {
+std::vector<o80::JournalEntry> entries_of(o80::Journal& journal, std::size_t most) {
   std::vector<o80::JournalEntry> entries;
   const Waiting waiting;
   for (o80::JournalEntry entry; entries.size() < most && journal.next(entry);) {
@@ -79,9 +79,9 @@ void bind_record(nb::module_& m) {
                    [](const JournalRecord& self) { return std::string(to_text(self.pace.pace)); })
       .def_prop_ro("amount", [](const JournalRecord& self) { return self.pace.amount; })
       .def_prop_ro("per_second", [](const JournalRecord& self) { return self.pace.per_second; })
-      .def_prop_ro("mode", word<&JournalRecord::mode>())
-      .def_prop_ro("profile", word<&JournalRecord::profile>())
-      .def_prop_ro("start", word<&JournalRecord::start>())
+      .def_prop_ro("mode", word(&JournalRecord::mode))
+      .def_prop_ro("profile", word(&JournalRecord::profile))
+      .def_prop_ro("start", word(&JournalRecord::start))
       .def_ro("rows", &JournalRecord::rows)
       .def_ro("row_times", &JournalRecord::row_times)
       .def_ro("targets", &JournalRecord::targets)
@@ -99,7 +99,7 @@ void bind_journal(nb::module_& m) {
   using o80::JournalEntry;
   bind_record(m);
   nb::class_<JournalEntry>(m, "JournalEntry")
-      .def_prop_ro("kind", word<&JournalEntry::kind>())
+      .def_prop_ro("kind", word(&JournalEntry::kind))
       .def_ro("number", &JournalEntry::number)
       .def_ro("missed", &JournalEntry::missed)
       .def_ro("iteration", &JournalEntry::iteration)
@@ -113,11 +113,13 @@ void bind_journal(nb::module_& m) {
       .def_ro("records", &JournalEntry::records)
       .def_ro("records_lost", &JournalEntry::records_lost)
       .def_prop_ro("blocks", [](const JournalEntry& self) { return bytes_of(self.blocks); })
-      .def_prop_ro("status", enumeration<&JournalEntry::status>())
-      .def_prop_ro("reason", enumeration<&JournalEntry::reason>())
+      .def_prop_ro("status", enumeration(&JournalEntry::status),
+                   nb::sig("def status(self) -> Status"))
+      .def_prop_ro("reason", enumeration(&JournalEntry::reason),
+                   nb::sig("def reason(self) -> Reason"))
       .def_ro("detail", &JournalEntry::detail)
       .def_ro("halt", &JournalEntry::halt)
-      .def_prop_ro("cause", word<&JournalEntry::cause>())
+      .def_prop_ro("cause", word(&JournalEntry::cause))
       .def_ro("cut", &JournalEntry::cut)
       .def_ro("text", &JournalEntry::text)
       .def_ro("actuator", &JournalEntry::actuator);
@@ -127,7 +129,7 @@ void bind_journal(nb::module_& m) {
           [](Journal* self, const Frontend& frontend) { new (self) Journal(frontend.untyped()); },
           "frontend"_a)
       .def_prop_ro("exists", &Journal::exists)
-      .def("read", &read, "most"_a)
+      .def("read", &entries_of, "most"_a)
       .def("seek", &Journal::seek, "number"_a)
       .def("seek_end", &Journal::seek_end);
 }

@@ -60,7 +60,8 @@ void JournalWriter::end(JournalHead head) noexcept {
 
 void JournalWriter::publish(JournalHead& head, std::size_t payload) noexcept {
   const std::size_t bytes = sizeof head + payload;
-  head.number = number_++;
+  head.number = number_;
+  number_ += head.numbers();
   head.words = static_cast<std::uint16_t>(bytes / 8);
   store(position_, reinterpret_cast<const std::byte*>(&head), sizeof head);
   const std::uint64_t sector = position_ / sector_bytes_;
@@ -140,7 +141,7 @@ bool JournalReader::next(JournalItem& item) {
     switch (read(item)) {
       case Got::entry:
         item.missed = item.head.number - std::min(expected_, item.head.number);
-        expected_ = item.head.number + 1;
+        expected_ = item.head.number + item.head.numbers();
         jumped_ = false;
         return true;
       case Got::nothing:

@@ -22,11 +22,16 @@ struct JournalHead {
   std::uint16_t words = 0;  // length of the entry with this head [8 bytes]
   JournalKind kind = JournalKind::none;
   std::uint8_t lane = 0;
-  std::uint32_t what = 0;    // records: index of the first block; else as `how` packs it
-  std::uint64_t number = 0;  // of the entry, from 0
+  /// records: index of the first block; status: number of statuses; else as `how` packs it.
+  std::uint32_t what = 0;
+  std::uint64_t number = 0;  // of the entry, from 0; an entry of n statuses has n numbers
   Iteration iteration = 0;
   std::uint64_t id = 0;  // of a batch, record or halt; incarnation of an owner; an actuator
 
+  /// The numbers that the entry takes.
+  constexpr std::uint64_t numbers() const noexcept {
+    return kind == JournalKind::status && what > 0 ? what : 1;
+  }
   /// Packs a status, a reason and its detail into `what`.
   static constexpr std::uint32_t how(std::uint8_t status, std::uint8_t reason = 0,
                                      std::uint8_t detail = 0) noexcept {

@@ -180,6 +180,7 @@ Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
     }
     // before waiting, report all pending statuses
     const bool all_told = controller.finish_pending();
+    journal.flush();
     wake_sleepers(segment.view(), {.lanes = lanes.announce()});
     if (staging.busy() || !all_told) continue;
     // invalid blocks may have used up the budget of this scan: scan again, a limited number of
@@ -267,6 +268,7 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
     under_way_ = false;
     count_burst();
   }
+  journal.flush();
   wake_sleepers(segment.view(),
                 {.lanes = !fresh && lanes.announce(), .rows = row_signal.announce(current)});
   if (!begun_) segment.set_state(BackendState::running);

@@ -4,6 +4,7 @@
 #include <iterator>
 
 #include "memory/atomic_words.hpp"
+#include "memory/status_word.hpp"
 
 namespace o80 {
 
@@ -17,6 +18,7 @@ void DecisionJournal::begin_blocks(std::uint32_t lane, std::uint64_t sender,
   // once in each half of the ring, so that whoever reads from the middle finds the name
   const bool is_far = writer_.position() - named.position > writer_.bytes() / 2;
   if (sender != 0 && (named.incarnation != sender || is_far)) name_owner(lane, sender);
+  flush();
   writer_.begin(std::size_t{most} * kBlockBytes);
 }
 
@@ -30,7 +32,7 @@ void DecisionJournal::name_owner(std::uint32_t lane, std::uint64_t incarnation) 
   JournalOwner name{};
   const auto& owner = view_.lane(lane).owner;
   load_text(owner, std::size(owner), reinterpret_cast<char*>(name.data()));
-  writer_.write(head(JournalKind::owner, lane, incarnation), name.data(), sizeof name);
+  write(head(JournalKind::owner, lane, incarnation), name.data(), sizeof name);
 }
 
 void DecisionJournal::dropped(std::uint32_t lane, CommandId batch) noexcept {
@@ -45,32 +47,40 @@ JournalBatch payload_of(const StagedBatch& sent) noexcept {
 
 void DecisionJournal::scheduled(const StagedBatch& sent, CommandId batch) noexcept {
   const JournalBatch payload = payload_of(sent);
-  writer_.write(head(JournalKind::scheduled, sent.lane, batch), &payload, sizeof payload);
+  write(head(JournalKind::scheduled, sent.lane, batch), &payload, sizeof payload);
 }
 
 void DecisionJournal::decided(const StagedBatch& sent, const StatusChange& change) noexcept {
   const auto kind = change.status == Status::rejected ? JournalKind::rejected : JournalKind::taken;
   const JournalBatch payload = payload_of(sent);
-  writer_.write(head(kind, change.lane, change.id,
-                     JournalHead::how(static_cast<std::uint8_t>(change.status),
-                                      static_cast<std::uint8_t>(change.reason), change.detail)),
-                &payload, sizeof payload);
+  write(head(kind, change.lane, change.id,
+             JournalHead::how(static_cast<std::uint8_t>(change.status),
+                              static_cast<std::uint8_t>(change.reason), change.detail)),
+        &payload, sizeof payload);
 }
 
 void DecisionJournal::status(const StatusChange& change) noexcept {
   // the entries of the batch tell the others
-  if (change.of != StatusChange::Of::record) return;
-  JournalHead entry =
-      head(JournalKind::status, change.lane, change.id,
-           JournalHead::how(static_cast<std::uint8_t>(change.status),
-                            static_cast<std::uint8_t>(change.reason), change.detail));
-  entry.iteration = change.iteration;
-  writer_.write(entry);
+  if (!writer_.is_on() || change.of != StatusChange::Of::record) return;
+  if (statuses_ == kMostStatuses || status_lane_ != change.lane) flush();
+  if (statuses_ == 0) writer_.begin(kMostStatuses * sizeof(JournalStatus));
+  status_lane_ = change.lane;
+  ++statuses_;
+  const StatusWord word{static_cast<std::uint8_t>(change.status),
+                        static_cast<std::uint8_t>(change.reason), change.detail, change.iteration};
+  const JournalStatus status{change.id, word.packed()};
+  writer_.add(reinterpret_cast<const std::byte*>(&status), sizeof status);
+}
+
+void DecisionJournal::flush() noexcept {
+  if (statuses_ == 0) return;
+  writer_.end(head(JournalKind::status, status_lane_, 0, statuses_));
+  statuses_ = 0;
 }
 
 void DecisionJournal::halt(JournalKind halt_or_reason, const Halt& halt) noexcept {
   const JournalHalt payload{static_cast<std::uint64_t>(halt.cause), halt.who, halt.text};
-  writer_.write(head(halt_or_reason, 0, halt.number), &payload, sizeof payload);
+  write(head(halt_or_reason, 0, halt.number), &payload, sizeof payload);
 }
 
 void DecisionJournal::died(std::uint32_t lane, std::uint64_t owner, Stale stale) noexcept {
@@ -82,21 +92,21 @@ void DecisionJournal::silent(std::uint32_t lane, std::uint64_t owner, Stale stal
 }
 
 void DecisionJournal::burst(std::uint32_t lane, CommandId batch, std::int64_t iterations) noexcept {
-  writer_.write(head(JournalKind::burst, lane, batch), &iterations, sizeof iterations);
+  write(head(JournalKind::burst, lane, batch), &iterations, sizeof iterations);
 }
 
 void DecisionJournal::burst_ended(std::uint32_t lane, CommandId batch, Iteration row,
                                   BurstEnd how) noexcept {
   JournalHead entry = head(JournalKind::burst_ended, lane, batch, static_cast<std::uint32_t>(how));
   entry.iteration = row;
-  writer_.write(entry);
+  write(entry);
 }
 
 void DecisionJournal::ended(BackendState state, std::string_view text) noexcept {
   JournalText payload{};
   text.copy(payload.data(), payload.size() - 1);
-  writer_.write(head(JournalKind::ended, 0, 0, static_cast<std::uint32_t>(state)), payload.data(),
-                payload.size());
+  write(head(JournalKind::ended, 0, 0, static_cast<std::uint32_t>(state)), payload.data(),
+        payload.size());
 }
 
 }  // namespace o80

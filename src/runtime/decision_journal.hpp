@@ -33,6 +33,13 @@ static_assert(sizeof(JournalHalt) == 320);
 
 /// Payload of `owner`: its process, as text.
 using JournalOwner = std::array<std::uint64_t, 8>;
+/// One of the statuses of an entry `status`, which are all of one lane.
+struct JournalStatus {
+  std::uint64_t id = 0;
+  std::uint64_t word = 0;  // a StatusWord
+};
+static_assert(sizeof(JournalStatus) == 16);
+
 /// Payload of `ended`: the reason, as text.
 using JournalText = std::array<char, 248>;
 
@@ -57,7 +64,10 @@ class DecisionJournal {
   void decided(const StagedBatch& sent, const StatusChange& change) noexcept;
   void order_lost() noexcept { note(JournalKind::order_lost, 0, 0); }
 
+  /// Statuses of one lane are gathered in one entry, which ends with the next other entry, or with
+  /// flush().
   void status(const StatusChange& change) noexcept;
+  void flush() noexcept;
 
   // halts
   void halt(JournalKind halt_or_reason, const Halt& halt) noexcept;
@@ -88,6 +98,8 @@ class DecisionJournal {
   void set_iteration(Iteration iteration) noexcept { iteration_ = iteration; }
 
  private:
+  static constexpr std::uint32_t kMostStatuses = 64;  // of an entry
+
   /// The newest entry with the name of a lane's owner.
   struct Named {
     std::uint64_t incarnation = 0;
@@ -106,13 +118,21 @@ class DecisionJournal {
   }
   void note(JournalKind kind, std::uint32_t lane, std::uint64_t id,
             std::uint32_t what = 0) noexcept {
-    writer_.write(head(kind, lane, id, what));
+    write(head(kind, lane, id, what));
+  }
+  void write(const JournalHead& head, const void* payload = nullptr,
+             std::size_t bytes = 0) noexcept {
+    flush();
+    writer_.write(head, payload, bytes);
   }
   void name_owner(std::uint32_t lane, std::uint64_t incarnation) noexcept;
 
   JournalWriter writer_;
   SegmentView view_;
   std::vector<Named> named_;  // one for each lane
+  // the entry of statuses that is being written
+  std::uint32_t statuses_ = 0;
+  std::uint32_t status_lane_ = 0;
   Iteration iteration_ = 0;
 };
 

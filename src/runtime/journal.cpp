@@ -8,6 +8,7 @@
 
 #include "base/printable.hpp"
 #include "memory/journal.hpp"
+#include "memory/status_word.hpp"
 #include "o80/runtime/frontend.hpp"
 #include "runtime/decision_journal.hpp"
 #include "runtime/journal_records.hpp"
@@ -73,10 +74,12 @@ class Journal::Body {
     batches_.clear();
     kept_bytes_ = 0;
     missed_ = 0;
+    statuses_ = told_ = 0;
   }
   void keep_blocks();
   void drop(std::map<BatchKey, std::vector<std::byte>>::iterator batch);
   void keep_name();
+  bool next_status(JournalEntry& entry);
   void fill(JournalEntry& entry);
   void fill_batch(JournalEntry& entry);
   void name(JournalEntry& entry) const;
@@ -84,6 +87,8 @@ class Journal::Body {
   std::shared_ptr<Link> link_;
   JournalReader reader_;
   JournalItem item_;
+  std::size_t statuses_ = 0;                            // of item_
+  std::size_t told_ = 0;                                // of them
   std::uint64_t first_ = 0;                             // number of the first entry to give
   std::uint64_t missed_ = 0;                            // entries missed since the last one given
   std::map<BatchKey, std::vector<std::byte>> batches_;  // blocks of batches without a decision
@@ -93,7 +98,10 @@ class Journal::Body {
 
 bool Journal::Body::next(JournalEntry& entry) {
   link_->check_usable();
-  while (reader_.next(item_)) {
+  while (true) {
+    // the statuses of one entry come one by one
+    if (next_status(entry)) return true;
+    if (!reader_.next(item_)) return false;
     const std::uint64_t number = item_.head.number;
     if (number >= first_) missed_ += std::min(item_.missed, number - first_);
     switch (item_.head.kind) {
@@ -106,6 +114,11 @@ bool Journal::Body::next(JournalEntry& entry) {
       case JournalKind::owner:
         keep_name();
         break;
+      case JournalKind::status:
+        statuses_ =
+            std::min<std::size_t>(item_.head.what, item_.payload.size() / sizeof(JournalStatus));
+        told_ = number < first_ ? std::min<std::uint64_t>(first_ - number, statuses_) : 0;
+        break;
       default:
         entry = {};
         fill(entry);
@@ -114,7 +127,25 @@ bool Journal::Body::next(JournalEntry& entry) {
         return true;
     }
   }
-  return false;
+}
+
+/// The next status of the entry that was read last; false if it has no more.
+bool Journal::Body::next_status(JournalEntry& entry) {
+  if (told_ == statuses_) return false;
+  JournalStatus status;
+  std::memcpy(&status, item_.payload.data() + told_ * sizeof status, sizeof status);
+  const StatusWord word = StatusWord::unpack(status.word);
+  entry = {};
+  entry.kind = JournalKind::status;
+  entry.number = item_.head.number + told_++;
+  entry.missed = std::exchange(missed_, 0);
+  entry.iteration = word.iteration;
+  entry.lane = item_.head.lane;
+  entry.id = status.id;
+  entry.status = enum_of<Status>(word.status, kStatuses);
+  entry.reason = enum_of<Reason>(word.reason, kReasons);
+  entry.detail = word.detail;
+  return true;
 }
 
 /// Joins the blocks of a batch; a batch whose first blocks were missed is not kept.
@@ -160,8 +191,6 @@ void Journal::Body::fill(JournalEntry& entry) {
     case JournalKind::scheduled:
     case JournalKind::rejected:
       fill_batch(entry);
-      [[fallthrough]];
-    case JournalKind::status:
       entry.status = enum_of<Status>(head.status(), kStatuses);
       entry.reason = enum_of<Reason>(head.reason(), kReasons);
       entry.detail = head.detail();

@@ -9,11 +9,15 @@ void StatusOutbox::put(const StatusChange& change) noexcept {
   if (waits) {
     waiting_.push_back(change);
   } else {
+    journal_.status(change);
     report(change);
   }
 }
 
 void StatusOutbox::report_row() noexcept {
+  // first the journal: it has each end that a frontend sees
+  for (const StatusChange& change : waiting_) journal_.status(change);
+  journal_.flush();
   for (const StatusChange& change : waiting_) report(change);
   waiting_.clear();
 }
@@ -29,7 +33,6 @@ void StatusOutbox::report_no_row() noexcept {
 
 void StatusOutbox::report(const StatusChange& change) noexcept {
   O80_COUNT(status_told);
-  journal_.status(change);
   LaneReceiver& lane = lanes_[change.lane];
   lane.set_status(change.id,
                   {static_cast<std::uint8_t>(change.status),

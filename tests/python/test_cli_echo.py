@@ -182,3 +182,67 @@ def test_a_table_fits_a_terminal_of_80_columns(segment: str, backend: o80.Backen
     assert segment in printed.decode()
     assert "rate" in table[0]
     assert max(map(len, table)) <= 80
+
+
+def test_commands_are_shown_with_their_sender_their_begin_and_their_end(
+    segment: str, backend: o80.Backend
+) -> None:
+    with o80.Frontend(segment) as frontend:
+        frontend.add_command("elbow", 1.25, iterations=2)
+        frontend.add_purge("shoulder")
+        frontend.pulse()
+        for _ in range(3):
+            backend.step()
+            backend.publish([0.0, 0.5], {"gear": Gear.NEUTRAL, "force": 0.0})
+        frontend.halt("enough")
+        backend.step()
+        backend.publish([0.0, 0.5], {"gear": Gear.NEUTRAL, "force": 0.0})
+        frontend.add_command("elbow", 2.0)
+        frontend.pulse()
+        backend.step()
+        lines = echo(segment, "--commands", "--count", "6").splitlines()
+        entries = [
+            json.loads(line)
+            for line in echo(segment, "--commands", "--count", "6", "--json").splitlines()
+        ]
+    sender = f"pid {os.getpid()}"
+    assert sender in lines[0]
+    assert "elbow to 1.25 in 2 iterations; purge shoulder" in lines[0]
+    assert [line.split(maxsplit=1)[1] for line in lines[1:4]] == [
+        "purge shoulder: completed",
+        "elbow to 1.25 in 2 iterations: begins",
+        "elbow to 1.25 in 2 iterations: completed",
+    ]
+    assert "HALT 1 (frontend by pid" in lines[4]
+    assert "enough" in lines[4]
+    assert "elbow to 2: rejected (halted)" in lines[5]
+    assert [entry["kind"] for entry in entries] == [
+        "taken",
+        "status",
+        "status",
+        "status",
+        "halt",
+        "rejected",
+    ]
+    assert entries[0]["commands"][0]["targets"] == [1.25]
+
+
+def test_commands_that_come_later_are_shown_when_they_come(
+    segment: str, backend: o80.Backend
+) -> None:
+    with (
+        subprocess.Popen(
+            [O80, "echo", segment, "--commands", "--count", "1"], stdout=subprocess.PIPE, text=True
+        ) as echoing,
+        o80.Frontend(segment) as frontend,
+    ):
+        frontend.add_command("elbow", -0.5, duration=0.5)
+        frontend.pulse()
+        backend.step()
+        out, _ = echoing.communicate(timeout=WAIT)
+    assert "elbow to -0.5 in 0.5 s" in out
+
+
+def test_without_commands_a_timeout_says_so(segment: str, backend: o80.Backend) -> None:
+    said = echo(segment, "--commands", "--timeout", "0.2", fails=True)
+    assert f"'{segment}' decided nothing for 0.2 s" in said

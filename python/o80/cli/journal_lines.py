@@ -19,9 +19,9 @@ _MOST_NUMBERS = 8  # of a target
 
 
 def follow(frontend: o80.Frontend, count: int, as_json: bool, timeout: float | None) -> None:
-    """Prints the last entries, then new ones; ends after `count` of them, 0: never.
+    """Prints the last entries, then new ones; ends after `count` of both, 0: never.
 
-    Of a dead backend it prints the last `count` entries, and raises the reason of its end.
+    Of a dead backend it then raises the reason of its end.
     """
     journal = Journal(frontend)
     if not journal.exists:
@@ -34,7 +34,9 @@ def follow(frontend: o80.Frontend, count: int, as_json: bool, timeout: float | N
         print(line, flush=True)
     if not alive:
         frontend.wait_for(frontend.published + 1, timeout=0)  # raises the reason of its end
-    printed = 0
+    printed = len(shown)
+    if count and printed >= count:
+        return
     waited_since = time.monotonic()
     while True:
         alive = frontend.alive

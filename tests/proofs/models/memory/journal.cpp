@@ -20,10 +20,7 @@
 // mutant read_relaxed: src/memory/journal.cpp
 //   - counters_->published.load(std::memory_order_acquire)
 //   + counters_->published.load(std::memory_order_relaxed)
-// mutant head_unchecked: src/memory/journal.cpp
-//   - if (position < first_intact()) return Got::overtaken;
-//   +
-// mutant payload_unchecked: src/memory/journal.cpp
+// mutant overwritten_accepted: src/memory/journal.cpp
 //   - if (position_ < first_intact()) return Got::overtaken;
 //   +
 // mutant gap_not_counted: src/memory/journal.cpp
