@@ -6,7 +6,7 @@
 #include <cstring>
 
 #include "base/crash_point.hpp"
-#include "memory/atomic_words.hpp"
+#include "memory/prefetch.hpp"
 
 // As in history.cpp: the thread sanitizer does not model fences, and every word that they order is
 // atomic.
@@ -48,14 +48,17 @@ void JournalWriter::begin(std::size_t most) noexcept {
   O80_CRASH_POINT("journal.before_entry");
 }
 
-void JournalWriter::add(const std::byte* piece, std::size_t bytes) noexcept {
-  if (added_ + bytes > most_) return;
-  store(position_ + sizeof(JournalHead) + added_, piece, bytes);
-  added_ += bytes;
-}
-
 void JournalWriter::end(JournalHead head) noexcept {
   if (bytes_ != 0 && added_ > 0) publish(head, added_);
+}
+
+void JournalWriter::expect() noexcept {
+  if (position_ == expected_) return;
+  const std::uint64_t bytes = std::min<std::uint64_t>(position_ - expected_, kMostExpected);
+  for (std::uint64_t at = 0; at <= bytes; at += kLineBytes) {
+    prefetch_to_write(ring_ + ((position_ + at) & (bytes_ - 1)));
+  }
+  expected_ = position_;
 }
 
 void JournalWriter::publish(JournalHead& head, std::size_t payload) noexcept {
@@ -75,10 +78,10 @@ void JournalWriter::publish(JournalHead& head, std::size_t payload) noexcept {
   O80_CRASH_POINT("journal.after_published");
 }
 
-void JournalWriter::store(std::uint64_t position, const std::byte* from,
-                          std::size_t bytes) noexcept {
-  const std::uint64_t at = position & (bytes_ - 1);
-  const std::size_t before_end = std::min<std::uint64_t>(bytes, bytes_ - at);
+/// Stores bytes that wrap around the end of the ring.
+void JournalWriter::store_across(std::uint64_t at, const std::byte* from,
+                                 std::size_t bytes) noexcept {
+  const std::size_t before_end = bytes_ - at;
   store_words(ring_ + at, from, before_end);
   store_words(ring_, from + before_end, bytes - before_end);
 }

@@ -5,6 +5,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "memory/atomic_words.hpp"
 #include "memory/segment_layout.hpp"
 #include "o80/base/time.hpp"
 #include "o80/memory/journal_kind.hpp"
@@ -46,6 +47,9 @@ static_assert(sizeof(JournalHead) == 32 && std::is_trivially_copyable_v<JournalH
 /// Largest payload of an entry [bytes].
 inline constexpr std::size_t kMostJournalPayload = 0xFFFF * 8 - sizeof(JournalHead);
 
+/// Most bytes that JournalWriter::expect() prefetches.
+inline constexpr std::size_t kMostExpected = 4096;
+
 /// Appends entries to the journal. Without a journal in the segment every call does nothing.
 ///
 /// Writer:   one thread, wait-free.
@@ -66,12 +70,24 @@ class JournalWriter {
   // an entry whose payload comes in pieces: begin, add any number of times, end
   /// `most`: upper bound of the payload.
   void begin(std::size_t most) noexcept;
-  void add(const std::byte* piece, std::size_t bytes) noexcept;
+  void add(const std::byte* piece, std::size_t bytes) noexcept {
+    if (added_ + bytes > most_) return;
+    store(position_ + sizeof(JournalHead) + added_, piece, bytes);
+    added_ += bytes;
+  }
   /// Appends the entry; without any payload, nothing.
   void end(JournalHead head) noexcept;
 
+  /// Prefetches as many cache lines as were written since the last call, at most kMostExpected.
+  void expect() noexcept;
+
  private:
-  void store(std::uint64_t position, const std::byte* from, std::size_t bytes) noexcept;
+  void store(std::uint64_t position, const std::byte* from, std::size_t bytes) noexcept {
+    const std::uint64_t at = position & (bytes_ - 1);
+    if (at + bytes > bytes_) return store_across(at, from, bytes);
+    store_words(ring_ + at, from, bytes);
+  }
+  void store_across(std::uint64_t at, const std::byte* from, std::size_t bytes) noexcept;
   void publish(JournalHead& head, std::size_t payload) noexcept;
 
   JournalCounters* counters_;
@@ -82,7 +98,8 @@ class JournalWriter {
   std::uint64_t position_ = 0;
   std::uint64_t marked_ = ~std::uint64_t{0};  // last sector with a mark, counted over all laps
   std::uint64_t number_ = 0;
-  std::size_t added_ = 0;  // payload of the entry that was begun
+  std::size_t added_ = 0;       // payload of the entry that was begun
+  std::uint64_t expected_ = 0;  // position at the last expect()
 };
 
 /// An entry that was read.

@@ -68,6 +68,11 @@ class DecisionJournal {
   /// flush().
   void status(const StatusChange& change) noexcept;
   void flush() noexcept;
+  /// Call it at the end of an iteration.
+  void end_iteration() noexcept {
+    flush();
+    writer_.expect();
+  }
 
   // halts
   void halt(JournalKind halt_or_reason, const Halt& halt) noexcept;

@@ -24,6 +24,7 @@
 #include "o80/base/error.hpp"
 #include "o80/runtime/backend.hpp"
 #include "o80/runtime/frontend.hpp"
+#include "o80/runtime/journal.hpp"
 #include "o80/runtime/typed_frontend.hpp"
 #include "runtime/link.hpp"
 
@@ -76,13 +77,14 @@ class Original {
     const Part parts[] = {{0, 0, at.schema},
                           {0, at.schema, at.counters},
                           {0, at.counters, at.history},
-                          {0, at.history, at.file_bytes},
+                          {0, at.history, at.journal},
                           {1, 0, at.wakes},
                           {1, at.wakes, at.bell},
                           {1, at.bell, at.lanes},
                           {1, at.lanes, at.feedback},
                           {1, at.feedback, at.feedback + at.statuses},
-                          {1, at.feedback + at.statuses, at.commands_bytes}};
+                          {1, at.feedback + at.statuses, at.commands_bytes},
+                          {0, at.journal, at.file_bytes}};
     return parts[which % std::size(parts)];
   }
 
@@ -148,6 +150,15 @@ void read_all(UntypedFrontend& frontend) {
   Iteration position = 0;
   for (int i = 0; i < 8; ++i)
     may_refuse([&] { frontend.wait_for_next(position, row.data(), kAtOnce); });
+  may_refuse([&] {
+    Journal journal(frontend);
+    JournalEntry entry;
+    // no entry is shorter than the status that it gives
+    const std::uint64_t most = frontend.link()->segment.view().shape.journal_bytes / 16;
+    for (std::uint64_t i = 0; journal.next(entry); ++i) {
+      if (i > most) std::abort();
+    }
+  });
 }
 
 void command(UntypedFrontend& frontend) {

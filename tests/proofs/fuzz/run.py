@@ -18,7 +18,7 @@ from fuzz.corpus import UNPACKED, archive_of, pack, unpack
 FOUND = ROOT / "build" / "fuzz" / "found"
 LONGEST = 1500  # bytes of an input
 # how many inputs a bounded run tries: each some ten seconds on one processor
-RUNS = {"options": 10_000, "schema": 8_000, "segment": 2_000, "lane": 6_000}
+RUNS = {"options": 10_000, "schema": 8_000, "segment": 2_000, "lane": 6_000, "journal": 20_000}
 JOBS = len(os.sched_getaffinity(0))
 COMMON = [
     f"-max_len={LONGEST}",

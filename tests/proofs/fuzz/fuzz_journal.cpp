@@ -1,0 +1,108 @@
+// A journal with damaged counters, marks and entries: a reader ends, stays inside the ring, and
+// decodes what it gets.
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <vector>
+
+#include "fuzz/bytes.hpp"
+#include "fuzz/robot.hpp"
+#include "memory/journal.hpp"
+#include "o80/runtime/journal.hpp"
+#include "runtime/journal_records.hpp"
+
+namespace o80::fuzz {
+namespace {
+
+constexpr std::uint64_t kRing = kLeastJournal;
+
+/// A mapped segment file in private memory.
+class File {
+ public:
+  File() {
+    view.shape = {.page_bytes = 4096,
+                  .schema_bytes = 0,
+                  .row_bytes = 8,
+                  .slots = 2,
+                  .lanes = 1,
+                  .lane_blocks = 1,
+                  .journal_bytes = kRing};
+    if (!SegmentOffsets::compute(view.shape, view.offsets)) std::abort();
+    memory_.reset(static_cast<std::byte*>(std::aligned_alloc(4096, view.offsets.file_bytes)));
+    std::memset(memory_.get(), 0, view.offsets.file_bytes);
+    view.base = memory_.get();
+  }
+  /// One 8-byte word of the journal's counters or of its ring.
+  void set(std::uint32_t word, std::uint64_t value) {
+    constexpr std::uint32_t kCounters = sizeof(JournalCounters) / 8;
+    std::byte* counters = reinterpret_cast<std::byte*>(&view.counters().journal);
+    std::byte* at = word < kCounters ? counters + 8 * word
+                                     : view.journal() + 8 * ((word - kCounters) % (kRing / 8));
+    std::memcpy(at, &value, 8);
+  }
+
+  SegmentView view;
+
+ private:
+  struct Free {
+    void operator()(std::byte* memory) const { std::free(memory); }
+  };
+  std::unique_ptr<std::byte, Free> memory_;
+};
+
+void write_some(JournalWriter& writer, Bytes& bytes) {
+  std::vector<std::uint64_t> payload(64);
+  for (std::uint32_t left = bytes.below(200); left > 0; --left) {
+    JournalHead head;
+    head.kind = static_cast<JournalKind>(bytes.number<std::uint8_t>() % 32);
+    head.what = bytes.number<std::uint8_t>();
+    const std::uint32_t words = bytes.below(static_cast<std::uint32_t>(payload.size()));
+    payload[words] = bytes.word();
+    writer.write(head, payload.data(), words * 8UL);
+  }
+}
+
+/// What a reader may get without an end: no more entries than the ring has heads.
+void read_all(JournalReader& reader, const Schema& schema) {
+  JournalItem item;
+  std::uint64_t entries = 0;
+  while (reader.next(item)) {
+    if (++entries > kRing / sizeof(JournalHead)) std::abort();
+    if (item.payload.size() + sizeof(JournalHead) != item.head.words * 8UL) std::abort();
+    if (to_text(item.head.kind).empty()) std::abort();
+    records_of(schema, item.payload);
+  }
+}
+
+void run(Bytes bytes) {
+  static const Schema schema = schema_of_robot();
+  File file;
+  JournalWriter writer(file.view);
+  write_some(writer, bytes);
+  JournalReader before(file.view);
+  for (std::uint32_t left = bytes.below(64); left > 0; --left) {
+    const auto word = bytes.number<std::uint16_t>();
+    file.set(word, bytes.word());
+  }
+  read_all(before, schema);
+  JournalReader after(file.view);
+  read_all(after, schema);
+  after.seek_end();
+  write_some(writer, bytes);
+  read_all(before, schema);
+  read_all(after, schema);
+  // and as the blocks of a batch
+  const auto rest = bytes.rest();
+  records_of(schema, rest);
+}
+
+}  // namespace
+}  // namespace o80::fuzz
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  o80::fuzz::run({data, size});
+  return 0;
+}
