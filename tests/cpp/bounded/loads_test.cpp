@@ -9,10 +9,12 @@
 #include <ostream>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "benchmarks/cpp/flooded_backend.hpp"
 #include "bounded/counted_work.hpp"
+#include "memory/attached_segment.hpp"
 #include "memory/private_directory.hpp"
 
 namespace o80::test {
@@ -25,8 +27,10 @@ using flood::Sender;
 struct Most {
   CountedWork work;
   std::uint32_t requests = 0;
+  std::uint64_t journal = 0;  // [bytes]
 
-  void see(const CountedWork& of, std::uint32_t served) {
+  void see(const CountedWork& of, std::uint32_t served, std::uint64_t journalled) {
+    journal = std::max(journal, journalled);
     work.blocks = std::max(work.blocks, of.blocks);
     work.visits = std::max(work.visits, of.visits);
     work.batches = std::max(work.batches, of.batches);
@@ -43,7 +47,8 @@ struct Most {
 std::ostream& operator<<(std::ostream& out, const Most& most) {
   return out << most.work.blocks << " blocks, " << most.work.visits << " looks at them, "
              << most.work.batches << " batches, " << most.work.statuses << " statuses, "
-             << most.work.drops << " drops, " << most.requests << " requests";
+             << most.work.drops << " drops, " << most.requests << " requests, " << most.journal
+             << " bytes of journal";
 }
 
 /// Work units an iteration may use: its share, what is staged ahead, express batches, and one batch
@@ -61,7 +66,25 @@ void expect_bounded(const Most& most, std::uint32_t actuators, const std::string
   EXPECT_LE(most.work.statuses, kUnits + 1024 + dearest) << what << ": " << most;
   EXPECT_LE(most.work.drops, kUnits + dearest) << what << ": " << most;
   EXPECT_LE(most.requests, 8U) << what << ": " << most;
+  // blocks as they were staged; statuses of lanes in turn; a few entries for each batch
+  EXPECT_LE(most.journal,
+            kBlockBytes * kUnits + 48 * (kUnits + 1024 + dearest) + 256 * (kUnits / 6 + 1))
+      << what << ": " << most;
 }
+
+/// The bytes that a backend adds to its journal.
+class JournalWatch {
+ public:
+  std::uint64_t since_last_asked() {
+    const std::uint64_t now = segment_.view().counters().journal.published.load();
+    return now - std::exchange(before_, now);
+  }
+
+ private:
+  AttachedSegment segment_ = AttachedSegment::attach(
+      "flooded", Access::read_only, Deadline(std::chrono::seconds(60)), {.starting = true});
+  std::uint64_t before_ = segment_.view().counters().journal.published.load();
+};
 
 class LoadsTest : public ::testing::Test {
  protected:
@@ -71,6 +94,7 @@ class LoadsTest : public ::testing::Test {
 /// Iterates up to an iteration, and on until all that was sent has left the lanes.
 Most play(Robot& robot, const std::vector<std::unique_ptr<Sender>>& senders, Iteration at_least) {
   Most most;
+  JournalWatch journal;
   work_since_last_asked();
   const auto all_back = [&] {
     return std::ranges::all_of(
@@ -79,7 +103,7 @@ Most play(Robot& robot, const std::vector<std::unique_ptr<Sender>>& senders, Ite
   for (int i = 0; robot.backend.iteration() <= at_least || !all_back(); ++i) {
     const std::uint32_t before = robot.served;
     robot.iterate();
-    most.see(work_since_last_asked(), robot.served - before);
+    most.see(work_since_last_asked(), robot.served - before, journal.since_last_asked());
     if (i == 20'000) {
       ADD_FAILURE() << "what was sent is still there";
       break;
@@ -99,12 +123,13 @@ TEST_F(LoadsTest, TheHeaviestOfTheFirstVersionAreBounded) {
       for (const auto& sender : senders) load.fill(*sender, actuators, flood::kAt);
       const std::string what = load.name + (" of " + std::to_string(actuators));
       // what is queued would run for ever
+      JournalWatch journal;
       for (int i = 0; i < 700; ++i) {
         work_since_last_asked();
         const std::uint32_t before = robot.served;
         robot.iterate();
         Most most;
-        most.see(work_since_last_asked(), robot.served - before);
+        most.see(work_since_last_asked(), robot.served - before, journal.since_last_asked());
         expect_bounded(most, actuators, what);
         if (HasFailure()) return;
       }
@@ -217,6 +242,7 @@ Most run(const Mix& mix, std::uint32_t actuators) {
   }
   for (const auto& sender : senders) fill(*sender, mix, actuators, random);
   Most most;
+  JournalWatch journal;
   work_since_last_asked();
   // twice: what the first floods left in the queues is what the second ones drop
   for (Iteration i = 0; i < 2 * kLater; ++i) {
@@ -225,7 +251,7 @@ Most run(const Mix& mix, std::uint32_t actuators) {
     }
     const std::uint32_t before = robot.served;
     robot.iterate();
-    most.see(work_since_last_asked(), robot.served - before);
+    most.see(work_since_last_asked(), robot.served - before, journal.since_last_asked());
   }
   return most;
 }
