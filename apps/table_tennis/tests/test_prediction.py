@@ -1,4 +1,4 @@
-"""The flight model: against closed forms, bounces, planes, simulated shots."""
+"""Predicted flights: against closed forms, bounces, landings, crossings of planes."""
 
 import math
 
@@ -7,9 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from o80_table_tennis.balls.simulated_shots import ShotVariation, simulated_shot
-from o80_table_tennis.physics.aerodynamics import Aerodynamics, runge_kutta_step
-from o80_table_tennis.physics.interpolation import along_path
+from o80_table_tennis.physics.aerodynamics import Aerodynamics
 from o80_table_tennis.physics.prediction import (
     predict,
     predict_crossing,
@@ -49,14 +47,6 @@ def test_drag_alone_slows_a_ball_by_the_closed_form() -> None:
     np.testing.assert_allclose(flight.positions[:, 0], np.log(growth) / air.drag, atol=1e-6)
 
 
-def test_the_drag_is_the_published_formula() -> None:
-    air = Aerodynamics(drag_coefficient=0.47)
-
-    area = math.pi * 0.02**2
-    assert air.drag == pytest.approx(0.5 * 1.18 * 0.47 * area / 0.0027)
-    assert air.magnus == pytest.approx(0.5 * 1.18 * 1.47 * area * 0.02 / 0.0027)
-
-
 def test_top_spin_of_a_ball_towards_the_arm_pulls_it_down() -> None:
     spinning = predict(START, VELOCITY, 0.4, spin=(60.0, 0.0, 0.0), table=None)
     plain = predict(START, VELOCITY, 0.4, table=None)
@@ -70,23 +60,6 @@ def test_spin_decays() -> None:
     lost = predict(START, VELOCITY, 0.5, spin=(60.0, 0.0, 0.0), table=None)
 
     assert kept.positions[-1, 2] < lost.positions[-1, 2]
-
-
-def test_many_balls_in_one_step_fly_like_each_alone() -> None:
-    turns, drags = np.linspace(-0.4, 0.4, 5), np.linspace(0.0, 0.2, 5)
-    start = (0.0, 0.0, 1.0, 0.5, -4.0, 2.0)
-
-    many = runge_kutta_step(
-        tuple(np.full(5, value) for value in start),  # type: ignore[arg-type]
-        (turns, 0 * turns, 0 * turns),
-        drags,
-        9.81,
-        0.01,
-    )
-
-    for ball in range(5):
-        alone = runge_kutta_step(start, (turns[ball], 0.0, 0.0), drags[ball], 9.81, 0.01)
-        np.testing.assert_allclose([value[ball] for value in many], alone, rtol=1e-14)
 
 
 def test_a_bounce_keeps_the_named_shares_of_the_velocity() -> None:
@@ -157,46 +130,3 @@ def test_a_duration_that_is_none_is_refused(bad: float) -> None:
 def test_a_start_that_is_not_finite_is_refused() -> None:
     with pytest.raises(ValueError, match="finite"):
         predict((0.0, math.nan, 0.0), VELOCITY, 1.0)
-
-
-def test_the_same_generator_gives_the_same_shot() -> None:
-    first, again = (simulated_shot(np.random.default_rng(7)) for _ in range(2))
-    other = simulated_shot(np.random.default_rng(8))
-
-    np.testing.assert_array_equal(first.positions, again.positions)
-    assert not np.array_equal(first.positions, other.positions)
-
-
-def test_simulated_shots_bounce_once_and_come_into_reach_like_the_recorded_ones() -> None:
-    rng = np.random.default_rng(0)
-    for _ in range(30):
-        shot = simulated_shot(rng).resample()
-        arriving = int(np.argmax(shot.positions[:, 1] < 0.4))
-
-        assert len(shot.bounce_times) == 1
-        assert 0.5 < shot.bounce_times[0] < 0.7
-        assert 0.65 < arriving * shot.period < 0.9
-        assert 0.85 < shot.positions[arriving, 2] < 1.4
-        assert shot.duration == pytest.approx(1.28, abs=0.01)
-
-
-def test_a_shot_that_cannot_bounce_once_is_refused() -> None:
-    with pytest.raises(ValueError, match="bounces exactly once"):
-        simulated_shot(np.random.default_rng(0), variation=ShotVariation(velocity=(0.0, 5.0, 0.0)))
-
-
-def test_a_path_goes_through_its_nodes_and_jumps_at_a_bounce() -> None:
-    times = np.array([0.0, 1.0, 1.0, 2.0])
-    nodes = np.array(
-        [
-            [0.0, 0, 0, 1.0, 0, 0],
-            [1.0, 0, 0, 1.0, 0, 0],
-            [1.0, 0, 0, -2.0, 0, 0],
-            [-1.0, 0, 0, -2.0, 0, 0],
-        ]
-    )
-
-    positions, velocities = along_path(np.array([0.5, 1.0, 1.5, 2.5]), nodes, times)
-
-    np.testing.assert_allclose(positions[:, 0], [0.5, 1.0, 0.0, -2.0])
-    np.testing.assert_allclose(velocities[:, 0], [1.0, -2.0, -2.0, -2.0])

@@ -16,6 +16,7 @@ from o80_table_tennis.players.policies import default_policy
 from o80_table_tennis.settings import TASKS, RigSettings, TaskSettings
 from o80_table_tennis.task.actions import COARSE
 from o80_table_tennis.task.ball_play import ReturnTask
+from o80_table_tennis.task.ball_record import BallRecord
 from o80_table_tennis.task.end import End, EndRule
 from o80_table_tennis.task.reach import ReachTask
 from o80_table_tennis.task.state import State
@@ -111,6 +112,45 @@ def test_a_users_own_task_is_paid_in_every_step() -> None:
     assert sum(reward < 0 for reward in rewards) > len(rewards) / 2
     assert "speed" in info
     assert "hit" not in info
+
+
+def snapshot(state: State) -> State:
+    """A copy that the next step leaves alone."""
+    arrays = (state.motion, state.pressures, state.racket, state.ball)
+    return State(state.steps, *(np.array(a) for a in arrays), state.record, np.array(state.goal))
+
+
+def stacked(states: list[State]) -> State:
+    """Many states as one."""
+    names = ("steps", "motion", "pressures", "racket", "ball", "goal")
+    columns = {name: np.array([getattr(one, name) for one in states]) for name in names}
+    records = BallRecord(
+        *(np.array([getattr(one.record, name) for one in states]) for name in BallRecord.__slots__)
+    )
+    return State(**columns, record=records)
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_many_states_at_once_give_what_each_gives_alone_bit_for_bit(name: str) -> None:
+    states, policy = [], default_policy()
+    settings = TaskSettings(task=name, factor=COARSE)
+    with closing(TableTennisEnvironment(task=settings)) as environment:
+        for seed in (1, 2):
+            observation, _ = environment.reset(seed=seed)
+            over = False
+            while not over:
+                acts = settings.made().plays_ball
+                action = policy.act(observation) if acts else STILL
+                observation, _, terminated, truncated, _ = environment.step(action)
+                states.append(snapshot(environment._state))
+                over = terminated or truncated
+
+    task, together = settings.made(), stacked(states)
+    for method in (task.observe, task.eventful, task.end, task.reward):
+        np.testing.assert_array_equal(method(together), [method(one) for one in states])
+    ended = np.flatnonzero(task.end(together) != End.RUNNING)
+    assert len(ended) >= 2
+    np.testing.assert_array_equal(task.reward(together.at(ended)), task.reward(together)[ended])
 
 
 class TestReach:

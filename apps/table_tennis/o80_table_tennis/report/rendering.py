@@ -41,8 +41,8 @@ class Scene(AbstractContextManager["Scene"]):
     """
 
     def __init__(self, *, balls: int = 1, size: tuple[int, int] = SIZE) -> None:
-        _choose_renderer()
         needed("OpenGL", "rendering", "a picture", package="o80-table-tennis")
+        _choose_renderer()
         import mujoco
 
         self._mujoco = mujoco

@@ -16,7 +16,7 @@ import o80
 
 from ..balls.sampled_flight import SampledFlight
 from ..settings import Pacing, RigSettings
-from ..world.arm import PLAYING_POSTURE
+from ..world.arm import MUSCLES, PLAYING_POSTURE
 from ..world.scene import MODEL
 from ..world.timing import ITERATIONS
 from .arm import Arm
@@ -127,7 +127,14 @@ class Rig:
         settings = self.settings
         if settings.attach:
             assert settings.arm_segment is not None
-            return self._stack.enter_context(o80.Frontend(settings.arm_segment))
+            frontend = self._stack.enter_context(o80.Frontend(settings.arm_segment))
+            if len(frontend.actuators) != MUSCLES:
+                raise ValueError(
+                    f"segment '{settings.arm_segment}' is not a pneumatic arm: it has "
+                    f"{len(frontend.actuators)} actuators, not {MUSCLES} muscles. Start one with "
+                    "`o80 run pam` and give the name of its segment: arm_segment"
+                )
+            return frontend
         options = {
             "muscle": settings.muscle,
             "ranges": settings.ranges,

@@ -1,0 +1,30 @@
+"""Environments for the tests of them."""
+
+from typing import Any
+
+import numpy as np
+
+from o80_table_tennis.environment import TableTennisEnvironment
+from o80_table_tennis.settings import Pacing, RigSettings, TaskSettings
+from o80_table_tennis.task.actions import COARSE
+from o80_table_tennis.world.arm import MUSCLES
+
+STILL = np.zeros(MUSCLES, dtype=np.float32)
+PUSH = np.array([1, -1, 0, 0, 0, 0, 0, 0], dtype=np.float32)
+ALL_MODES = list(Pacing)
+PATIENT = TaskSettings(factor=COARSE, most_late=1_000_000)  # however slow the machine is
+WAITING = 10.0  # [s]
+
+
+def opened(
+    pacing: Pacing = Pacing.INLINE, *, task: TaskSettings | None = None, **rig: Any
+) -> TableTennisEnvironment:
+    return TableTennisEnvironment(rig=RigSettings(pacing=pacing, **rig), task=task or PATIENT)
+
+
+def played_out(environment: TableTennisEnvironment, action: np.ndarray = STILL) -> list[Any]:
+    """All steps of an episode."""
+    steps = []
+    while not steps or not (steps[-1][2] or steps[-1][3]):
+        steps.append(environment.step(action))
+    return steps

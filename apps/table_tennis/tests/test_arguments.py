@@ -1,0 +1,85 @@
+"""Wrong arguments are refused with what to give instead."""
+
+import sys
+import time
+import warnings
+from collections.abc import Iterator
+from contextlib import closing
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from opened_environment import STILL, opened, played_out
+
+import o80
+import o80_table_tennis
+from o80_table_tennis.environment import TableTennisEnvironment
+from o80_table_tennis.settings import Pacing, TaskSettings
+from o80_table_tennis.world.arm import MUSCLES
+
+
+@pytest.fixture
+def inline() -> Iterator[TableTennisEnvironment]:
+    with closing(opened()) as environment:
+        yield environment
+
+
+@pytest.mark.parametrize("action", [np.zeros(7), np.full(MUSCLES, np.nan)])
+def test_a_wrong_action_is_refused(inline: TableTennisEnvironment, action: np.ndarray) -> None:
+    inline.reset(seed=1)
+    with pytest.raises(ValueError, match="an action"):
+        inline.step(action)
+
+
+def test_a_step_needs_an_episode(inline: TableTennisEnvironment) -> None:
+    with pytest.raises(gymnasium.error.ResetNeeded, match="no episode has begun: call reset"):
+        inline.step(STILL)
+    inline.reset(seed=1)
+    played_out(inline)
+    with pytest.raises(gymnasium.error.ResetNeeded, match="the episode is over: call reset"):
+        inline.step(STILL)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "text"),
+    [
+        ({"rig": {"twins": 2}}, TypeError, r"write rig=.*settings\.RigSettings\(twins=2\)"),
+        ({"task": 3}, TypeError, r"task must be a TaskSettings, got 3: write task=.*\(\.\.\.\)"),
+        ({"render_mode": "human"}, ValueError, "use 'rgb_array', whose render.. returns pictures"),
+        ({"render_mode": "ansi"}, ValueError, "unknown render mode 'ansi'; there are: rgb_array"),
+    ],
+)
+def test_what_gymnasium_passes_on_is_checked(
+    arguments: dict[str, Any], error: type[Exception], text: str
+) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of Gymnasium, of modes it does not know
+        with pytest.raises(error, match=text):
+            gymnasium.make(o80_table_tennis.ACCELERATED, **arguments)
+
+
+def test_without_a_renderer_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "OpenGL", None)
+    with closing(gymnasium.make(o80_table_tennis.ACCELERATED, render_mode="rgb_array")) as made:
+        made.reset(seed=1)
+        with pytest.raises(o80.MissingExtra, match=r'pip install "o80-table-tennis\[rendering\]"'):
+            made.render()
+
+
+def test_wrong_options_are_refused_with_what_there_is(inline: TableTennisEnvironment) -> None:
+    with pytest.raises(ValueError, match="unknown options: bal; reset knows ball, flight"):
+        inline.reset(options={"bal": 3})
+    with pytest.raises(IndexError, match="there are 0 to 79"):
+        inline.reset(options={"ball": 80})
+    with pytest.raises(ValueError, match="simulated, real"):
+        opened(ranges="imagined")
+    with pytest.raises(ValueError, match="within its step"):
+        TaskSettings(delay=5)
+
+
+def test_another_robot_than_an_arm_is_refused() -> None:
+    with o80.robots.load("two_joints").start(f"no-arm-{time.monotonic_ns()}") as process:
+        settings = {"arm_segment": process.segment, "attach": True}
+        with pytest.raises(ValueError, match="not a pneumatic arm: it has 2 actuators"):
+            opened(Pacing.REAL_TIME, **settings)

@@ -1,0 +1,85 @@
+"""What Gymnasium asks of an environment."""
+
+import warnings
+from collections.abc import Iterator
+from contextlib import closing
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from opened_environment import PATIENT, PUSH, opened
+
+import o80_table_tennis
+from o80_table_tennis.environment import TableTennisEnvironment
+from o80_table_tennis.settings import RigSettings
+from o80_table_tennis.world.arm import MUSCLES
+
+
+@pytest.fixture
+def inline() -> Iterator[TableTennisEnvironment]:
+    with closing(opened()) as environment:
+        yield environment
+
+
+@pytest.mark.parametrize("render_mode", [None, "rgb_array"])
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        (o80_table_tennis.ACCELERATED, {}),
+        (o80_table_tennis.ACCELERATED, {"processes": True}),
+        (o80_table_tennis.ACCELERATED, {"rig": RigSettings(extra_balls=3, twins=2)}),
+        (o80_table_tennis.REAL_TIME, {"task": PATIENT}),
+    ],
+)
+def test_gymnasium_finds_nothing_to_complain_of(
+    name: str, options: dict[str, Any], render_mode: str | None
+) -> None:
+    environment = gymnasium.make(name, render_mode=render_mode, **options)
+    with closing(environment), warnings.catch_warnings():
+        warnings.simplefilter("error", UserWarning)
+        check_env(environment.unwrapped)
+
+
+def test_only_the_environment_by_the_clock_is_nondeterministic() -> None:
+    assert not gymnasium.spec(o80_table_tennis.ACCELERATED).nondeterministic
+    assert gymnasium.spec(o80_table_tennis.REAL_TIME).nondeterministic
+
+
+def test_observations_stay_in_their_box_under_wild_actions(inline: TableTennisEnvironment) -> None:
+    rng = np.random.default_rng(1)
+    observation, _ = inline.reset(seed=2)
+    over = False
+    while not over:
+        assert observation in inline.observation_space
+        action = rng.choice([-1.0, 1.0], MUSCLES).astype(np.float32)
+        observation, _, terminated, truncated, _ = inline.step(action)
+        over = terminated or truncated
+    assert observation in inline.observation_space
+
+
+def test_what_is_returned_is_the_callers_own(inline: TableTennisEnvironment) -> None:
+    first, _ = inline.reset(seed=1)
+    kept = first.copy()
+    second, *_ = inline.step(PUSH)
+    second[:] = 7.0
+    third, *_ = inline.step(PUSH)
+
+    np.testing.assert_array_equal(first, kept)
+    assert not np.shares_memory(second, third)
+    assert third in inline.observation_space
+
+
+def test_pictures_show_what_moves() -> None:
+    environment = TableTennisEnvironment(render_mode="rgb_array")
+    with closing(environment):
+        environment.reset(seed=1)
+        first = environment.render()
+        for _ in range(30):
+            environment.step(PUSH)
+        second = environment.render()
+
+    assert first.shape == second.shape == (480, 640, 3)
+    assert first.dtype == np.uint8
+    assert (first != second).any()
