@@ -21,6 +21,7 @@ TYPED_TESTS = (
     "tests/consumer",
     "robots/pam/tests",
     "simulators/mujoco/tests",
+    "apps/table_tennis/tests",
 )
 TORTURE = ("--kills", "2000", "--halts", "300", "--seed", "77")  # the same mixes in every run
 

@@ -24,7 +24,7 @@ def opened(
 
 def played_out(environment: TableTennisEnvironment, action: np.ndarray = STILL) -> list[Any]:
     """All steps of an episode."""
-    steps = []
+    steps: list[Any] = []
     while not steps or not (steps[-1][2] or steps[-1][3]):
         steps.append(environment.step(action))
     return steps

@@ -6,17 +6,22 @@ Python needs the laws for fits and predictions, the simulator for what happens. 
 
 import math
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from o80_table_tennis.balls.sampled_flight import SampledFlight
+from o80_table_tennis.environment import TableTennisEnvironment
 from o80_table_tennis.physics.aerodynamics import AERODYNAMICS, State, runge_kutta_step
-from o80_table_tennis.physics.impact import bounced
+from o80_table_tennis.physics.impact import bounced, outgoing_velocity
+from o80_table_tennis.players.policies import default_policy
 from o80_table_tennis.rig.rig import Rig
-from o80_table_tennis.settings import RigSettings
+from o80_table_tennis.settings import RigSettings, TaskSettings
+from o80_table_tennis.task.actions import COARSE
 from o80_table_tennis.world.ball import BALL_GUN_SPIN
+from o80_table_tennis.world.materials import RACKET_RESTITUTION
 from o80_table_tennis.world.table import TABLE
 from o80_table_tennis.world.timing import PERIOD
 
@@ -79,3 +84,20 @@ def test_a_ball_leaves_the_table_alike(flown: Numbers) -> None:
     rest = (1 - share) * PERIOD
     expected = later(after, number + share, rest)
     np.testing.assert_allclose(flown[number + 1], expected, rtol=0, atol=1e-7)
+
+
+def test_a_ball_leaves_the_racket_alike() -> None:
+    policy, task = default_policy(), TaskSettings(factor=COARSE)
+    with TableTennisEnvironment(task=task) as environment:
+        observation, info = environment.reset(seed=1)
+        while not info["hit"]:
+            observation, *_, info = environment.step(policy.act(observation))
+        record: Any = environment.rig.twins[0].all_records[0]["racket"]
+        expected = outgoing_velocity(
+            record["velocity_before"],
+            record["surface_velocity"],
+            record["normal"],
+            RACKET_RESTITUTION,
+        )
+        np.testing.assert_allclose(record["velocity_after"], expected, rtol=0, atol=SMALL)
+        assert np.linalg.norm(record["surface_velocity"]) > 0.5

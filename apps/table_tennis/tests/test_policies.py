@@ -19,7 +19,8 @@ def test_actions_lie_in_the_box(policy: Policy) -> None:
     policy.reset()
     for _ in range(20):
         action = policy.act(observed(0.5, -4.0))
-        assert (action.shape, action.dtype) == ((8,), np.float32)
+        assert action.shape == (8,)
+        assert action.dtype == np.float32
         assert np.abs(action).max() <= 1.0
 
 

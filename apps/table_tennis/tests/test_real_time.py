@@ -68,8 +68,9 @@ def test_a_real_arm_goes_back_to_its_start_by_commands() -> None:
 
 
 def test_an_arm_that_runs_already_can_be_attached_to() -> None:
-    settings = {"frequency": 500.0, "period": 0.002}
-    with o80.robots.load("pam").start(f"pam-test-{time.monotonic_ns()}", **settings) as process:
+    with o80.robots.load("pam").start(
+        f"pam-test-{time.monotonic_ns()}", frequency=500.0
+    ) as process:
         with closing(
             opened(Pacing.REAL_TIME, arm_segment=process.segment, attach=True)
         ) as environment:

@@ -74,7 +74,9 @@ def test_a_touch_is_never_worth_less_than_the_floor(x: float, y: float, speed: f
 
 def test_many_episodes_are_paid_as_each_alone_and_as_the_formula_says_bit_for_bit() -> None:
     rng = np.random.default_rng(1)
-    records = [landing_at(*rng.uniform(-2, 4, 2), rng.uniform(0, 9)) for _ in range(200)]
+    records = [
+        landing_at(rng.uniform(-2, 4), rng.uniform(-2, 4), rng.uniform(0, 9)) for _ in range(200)
+    ]
     records += [MISSED, TOUCHED]
     for rule in (RULE.returned, RULE.smashed):
         together = rule(stacked(records), np.tile(TARGET, (len(records), 1)))

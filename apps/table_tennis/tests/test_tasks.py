@@ -24,6 +24,7 @@ from o80_table_tennis.task.task import TASK_MEMBERS, Task
 from o80_table_tennis.world.arm import MUSCLES, PLAYING_POSTURE, racket_pose
 
 STILL = np.zeros(MUSCLES, dtype=np.float32)
+ARRAYS = ("motion", "pressures", "racket", "ball", "goal")
 
 
 @dataclass(frozen=True)
@@ -116,18 +117,18 @@ def test_a_users_own_task_is_paid_in_every_step() -> None:
 
 def snapshot(state: State) -> State:
     """A copy that the next step leaves alone."""
-    arrays = (state.motion, state.pressures, state.racket, state.ball)
-    return State(state.steps, *(np.array(a) for a in arrays), state.record, np.array(state.goal))
+    copied = {name: np.array(getattr(state, name)) for name in ARRAYS}
+    return State(steps=state.steps, record=state.record, **copied)
 
 
 def stacked(states: list[State]) -> State:
     """Many states as one."""
-    names = ("steps", "motion", "pressures", "racket", "ball", "goal")
-    columns = {name: np.array([getattr(one, name) for one in states]) for name in names}
+    columns = {name: np.array([getattr(one, name) for one in states]) for name in ARRAYS}
     records = BallRecord(
         *(np.array([getattr(one.record, name) for one in states]) for name in BallRecord.__slots__)
     )
-    return State(**columns, record=records)
+    steps = np.array([one.steps for one in states])
+    return State(steps=steps, record=records, **columns)
 
 
 @pytest.mark.parametrize("name", TASKS)
