@@ -79,7 +79,16 @@ def test_wrong_options_are_refused_with_what_there_is(inline: TableTennisEnviron
 
 
 def test_another_robot_than_an_arm_is_refused() -> None:
-    with o80.robots.load("two_joints").start(f"no-arm-{time.monotonic_ns()}") as process:
-        settings = {"arm_segment": process.segment, "attach": True}
-        with pytest.raises(ValueError, match="not a pneumatic arm: it has 2 actuators"):
-            opened(Pacing.REAL_TIME, **settings)
+    segment = f"no-arm-{time.monotonic_ns()}"
+    with (
+        o80.robots.load("two_joints").start(segment),
+        pytest.raises(ValueError, match="not a pneumatic arm: it has 2 actuators"),
+    ):
+        opened(Pacing.REAL_TIME, arm_segment=segment, attach=True)
+
+
+def test_an_arm_of_another_frequency_is_refused() -> None:
+    with o80.robots.load("pam").start(f"slow-{time.monotonic_ns()}", period=0.004) as process:
+        with pytest.raises(ValueError, match=r"runs at 250 Hz.*RigSettings\(frequency=250\)"):
+            opened(Pacing.REAL_TIME, arm_segment=process.segment, attach=True)
+        opened(Pacing.REAL_TIME, arm_segment=process.segment, attach=True, frequency=250.0).close()

@@ -126,15 +126,7 @@ class Rig:
     def _open_arm(self) -> o80.Frontend:
         settings = self.settings
         if settings.attach:
-            assert settings.arm_segment is not None
-            frontend = self._stack.enter_context(o80.Frontend(settings.arm_segment))
-            if len(frontend.actuators) != MUSCLES:
-                raise ValueError(
-                    f"segment '{settings.arm_segment}' is not a pneumatic arm: it has "
-                    f"{len(frontend.actuators)} actuators, not {MUSCLES} muscles. Start one with "
-                    "`o80 run pam` and give the name of its segment: arm_segment"
-                )
-            return frontend
+            return self._attach()
         options = {
             "muscle": settings.muscle,
             "ranges": settings.ranges,
@@ -143,6 +135,26 @@ class Rig:
             "period": settings.period,
         }
         return self._open("pam", settings.arm_segment, settings.pacing.real_time, options)
+
+    def _attach(self) -> o80.Frontend:
+        """A frontend to the arm that runs already. Raises ValueError for another robot."""
+        segment = self.settings.arm_segment
+        assert segment is not None
+        frontend = self._stack.enter_context(o80.Frontend(segment))
+        if len(frontend.actuators) != MUSCLES:
+            raise ValueError(
+                f"segment '{segment}' is not a pneumatic arm: it has {len(frontend.actuators)} "
+                f"actuators, not {MUSCLES} muscles. Start an arm with `o80 run pam` and give the "
+                "name of its segment: arm_segment"
+            )
+        if not np.isclose(frontend.period, self.settings.period):
+            frequency = 1.0 / frontend.period
+            raise ValueError(
+                f"the arm '{segment}' runs at {frequency:g} Hz, the rig at "
+                f"{self.settings.frequency:g} Hz: give RigSettings(frequency={frequency:g}), or "
+                "restart the arm"
+            )
+        return frontend
 
     def _open_twin(self, twin: int) -> o80.Frontend:
         options = {
