@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import gymnasium
+from o80.extras import needed
 
 ACCELERATED = "o80/TableTennis-v0"
 """As fast as the machine can; the same seed, the same episode, bit for bit."""
@@ -14,7 +14,12 @@ def register_environments() -> None:
     """Makes both ids known; may be called twice.
 
     The environments count steps and check their arguments themselves, without Gymnasium's wrappers.
+    Raises o80.MissingExtra if the package of a robot is not installed.
     """
+    for robot in ("mujoco", "pam"):
+        needed(f"o80_{robot}", None, "table tennis", package=f"o80-{robot}")
+    import gymnasium
+
     for name, entry, nondeterministic in (
         (ACCELERATED, "accelerated_environment", False),
         (REAL_TIME, "real_time_environment", True),

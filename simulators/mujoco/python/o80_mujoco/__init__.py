@@ -5,4 +5,6 @@ from pathlib import Path
 
 def library() -> Path:
     """The robot library, which o80 loads."""
-    return Path(__file__).parent / "lib" / "mujoco.so"
+    # an editable installation has two folders: the sources, and what was built
+    files = [Path(folder) / "lib" / "mujoco.so" for folder in __path__]
+    return next((file for file in files if file.exists()), files[0])

@@ -1,0 +1,15 @@
+"""The package o80-table-tennis: what its import says when something is missing."""
+
+import subprocess
+import sys
+
+import pytest
+
+
+@pytest.mark.parametrize("robot", ["mujoco", "pam"])
+def test_without_a_robot_the_import_says_what_to_install(robot: str) -> None:
+    program = f"import sys; sys.modules['o80_{robot}'] = None; import o80_table_tennis"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+
+    assert done.returncode != 0
+    assert f'pip install "o80-{robot}"' in done.stderr
