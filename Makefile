@@ -1,5 +1,5 @@
 # Everything made lies in .venv and build/. Options go through ARGS="...".
-.PHONY: demo test check scripts torture model fuzz rt systemd bench growth stress format clean distclean
+.PHONY: demo test check wheel scripts torture model fuzz rt systemd bench growth stress format clean distclean
 ARGS ?=
 export PYTHONDONTWRITEBYTECODE := 1
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
@@ -17,6 +17,11 @@ test:
 check:
 	@tools/setup.sh check
 	@.venv/bin/python tools/check.py $(ARGS)
+
+# wheels and source distributions of all packages: build/wheels, build/sdists
+wheel:
+	@tools/setup.sh wheels
+	@.venv/bin/python tools/wheels.py $(ARGS)
 
 # random scripts of motion, 100 000 by default: ARGS="--count 1000000" or ARGS="--replay FILE"
 scripts:

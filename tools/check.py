@@ -14,6 +14,7 @@ from sources import ROOT
 from steps import LOGS, PASSED, PYTHON, Step, build, cpp, pytest, run, use_tools
 
 PROOF = [sys.executable, "tests/proofs/run.py"]
+PACKAGES = ("o80", "o80_mujoco", "o80_pam", "o80_table_tennis")
 TYPED = ("tools", "benchmarks", "examples", "tests/proofs", "conftest.py")  # beside the packages
 TYPED_TESTS = (
     "tests/python",
@@ -33,7 +34,7 @@ def typed() -> Step:
     return Step(
         "mypy",
         [
-            [*mypy, "-p", "o80", "-p", "o80_table_tennis"],
+            [*mypy, *(word for name in PACKAGES for word in ("-p", name))],
             *([*mypy, folder] for folder in TYPED),
             *([*tests, folder] for folder in TYPED_TESTS),
         ],

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# Sets up what a make target needs: tools/setup.sh demo|tools|test|check|bench|systemd
+# Sets up what a make target needs: tools/setup.sh demo|tools|test|check|wheels|bench|systemd
 # `tools` is `test` without the packages of this repository: C++ tests do not use them installed.
 # Nothing is done twice; stamps of what was done lie in .venv/stamps.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 PATH=$PATH:/usr/sbin:/sbin # ldconfig, for users whose path lacks them
-purpose=${1:?demo, tools, test, check, bench or systemd}
+purpose=${1:?demo, tools, test, check, wheels, bench or systemd}
 
 mkdir -p build
 exec 9> build/setup.lock
@@ -93,6 +93,7 @@ case $purpose in
       llvm-19 g++-aarch64-linux-gnu qemu-user-static relacy-dev spin strace stress-ng rt-tests \
       qemu-system-x86 busybox-static cpio
     ;;
+  wheels) need_packages g++ ;;
   bench) need_packages g++ rt-tests stress-ng ;;
   systemd) # what `make systemd` needs beside what `check` brings
     need_packages systemd
@@ -108,7 +109,7 @@ esac
 .venv/bin/python -c '' 2> /dev/null || make_environment
 case $purpose in
   tools | test) group=test ;;
-  check) group=check ;;
+  check | wheels) group=$purpose ;;
   *) group= ;;
 esac
 once "tools-${group:-build}" "$(state_of pyproject.toml ./*/*/pyproject.toml)" install_tools "$group"
