@@ -307,7 +307,7 @@ def test_the_installation_is_found() -> None:
 def test_a_process_that_was_stopped_leaves_nothing_open(segment: str) -> None:
     before = set(os.listdir("/proc/self/fd"))
     with o80.robots.load("two_joints").start(segment) as process:
-        assert "runs on segment" in process.output
+        process.output  # noqa: B018, reading it opens nothing; it may still be empty
     assert "runs on segment" in process.output
     del process
     gc.collect()
