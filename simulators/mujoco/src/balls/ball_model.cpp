@@ -1,5 +1,6 @@
 #include "balls/ball_model.hpp"
 
+#include <cmath>
 #include <cstddef>
 
 #include "balls/surface_list.hpp"
@@ -10,6 +11,28 @@ namespace o80::mujoco {
 namespace {
 
 std::string copy_suffix(std::uint32_t copy) { return "_" + std::to_string(copy); }
+
+void check_not_negative(const char* option, double value) {
+  if (value >= 0 && std::isfinite(value)) return;
+  throw DriverError(std::string(option) + " must be finite and not negative, got " +
+                    std::to_string(value));
+}
+
+void check_numbers(const BallOptions& options) {
+  check_not_negative("air_density", options.air_density);
+  check_not_negative("drag_coefficient", options.drag_coefficient);
+  check_not_negative("lift_coefficient", options.lift_coefficient);
+  check_not_negative("spin_decay", options.spin_decay);
+  check_not_negative("teleport_distance", options.teleport_distance);
+  for (const double number : options.spin) {
+    if (std::isfinite(number)) continue;
+    throw DriverError("spin must be three finite numbers, got " + std::to_string(number));
+  }
+  if (options.extra_balls > kMostExtraBalls) {
+    throw DriverError("extra_balls must be at most " + std::to_string(kMostExtraBalls) + ", got " +
+                      std::to_string(options.extra_balls));
+  }
+}
 
 BallPlace ball_in(mjModel& model, const std::string& name) {
   const int body = find(model, mjOBJ_BODY, name, "body");
@@ -49,6 +72,7 @@ Shape shape_of(const mjModel& model, int geom, const std::string& name) {
 }  // namespace
 
 bool has_balls(const BallOptions& options) {
+  check_numbers(options);
   if (!entries_of(options.balls).empty()) return true;
   if (entries_of(options.surfaces).empty() && entries_of(options.watched).empty()) return false;
   throw DriverError("surfaces and watched are for balls: name the balls with balls=...");
@@ -56,6 +80,7 @@ bool has_balls(const BallOptions& options) {
 
 void add_extra_balls(mjSpec& spec, const BallOptions& options) {
   if (options.extra_balls == 0) return;
+  check_numbers(options);
   const std::vector<std::string> names = entries_of(options.balls);
   if (names.empty()) {
     throw DriverError("extra_balls adds copies of the first ball: name it with balls=...");

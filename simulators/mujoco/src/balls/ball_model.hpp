@@ -2,6 +2,7 @@
 
 #include <mujoco/mujoco.h>
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -31,7 +32,10 @@ struct SurfacePlace {
   bool watched;
 };
 
-/// True if the options name balls. Throws DriverError if they name surfaces only.
+inline constexpr std::uint32_t kMostExtraBalls = 1000;
+
+/// True if the options name balls. Throws DriverError if they name surfaces only, or if a number is
+/// out of its range.
 bool has_balls(const BallOptions& options);
 
 /// Adds copies of the first ball to a model that is not compiled yet. Throws DriverError.

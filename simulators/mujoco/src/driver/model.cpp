@@ -1,6 +1,7 @@
 #include "driver/model.hpp"
 
 #include <array>
+#include <cmath>
 
 #include "engine/names.hpp"
 #include "engine/version.hpp"
@@ -88,6 +89,10 @@ std::vector<ControlPlace> controls_in(const mjModel& model) {
 Model::Model(const Config& config, const std::function<void(mjSpec&)>& edit) {
   check_version(mj_version(), mj_versionString());
   model = compiled(config.model, edit);
+  if (!(config.timestep >= 0 && std::isfinite(config.timestep))) {
+    throw DriverError("timestep must be finite and positive [s], or 0 for the model's, got " +
+                      std::to_string(config.timestep));
+  }
   if (config.timestep > 0) model->opt.timestep = config.timestep;
   // a simulation that diverges is a fault, not a silent restart
   model->opt.disableflags |= mjDSBL_AUTORESET;

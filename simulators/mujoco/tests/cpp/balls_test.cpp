@@ -242,5 +242,22 @@ TEST_F(BallsTest, ExplainsOptionsThatCannotBe) {
               ThrowsMessage<Error>(AllOf(HasSubstr("no geom 'bat'"), HasSubstr("paddle"))));
 }
 
+TEST_F(BallsTest, RefusesNumbersOutOfTheirRange) {
+  const auto start = [](const char* name, const char* text) {
+    return [=] { Inline robot(court({{name, text}})); };
+  };
+  for (const char* option :
+       {"air_density", "drag_coefficient", "lift_coefficient", "spin_decay", "teleport_distance"}) {
+    for (const char* text : {"-1", "nan", "inf"}) {
+      EXPECT_THAT(start(option, text),
+                  ThrowsMessage<Error>(
+                      HasSubstr(std::string(option) + " must be finite and not negative")));
+    }
+  }
+  EXPECT_THAT(start("spin", "0,nan,0"), ThrowsMessage<Error>(HasSubstr("three finite numbers")));
+  EXPECT_THAT(start("extra_balls", "100000"),
+              ThrowsMessage<Error>(HasSubstr("extra_balls must be at most 1000, got 100000")));
+}
+
 }  // namespace
 }  // namespace o80::mujoco

@@ -166,6 +166,13 @@ TEST_F(DriverTest, AnswersWrongNamesWithTheNamesOfTheModel) {
   EXPECT_THAT(start({}), ThrowsMessage<Error>(HasSubstr("model=PATH")));
 }
 
+TEST_F(DriverTest, RefusesATimestepThatIsNone) {
+  for (const char* text : {"-0.001", "nan", "inf"}) {
+    EXPECT_THAT([&] { Inline robot(court({{"timestep", text}})); },
+                ThrowsMessage<Error>(HasSubstr("timestep must be finite and positive")));
+  }
+}
+
 TEST_F(DriverTest, AnyModelRunsWithItsJointsImposedAndTheRestAsPhysicsSays) {
   Inline robot(pendulum({{"mode", "imposed"}}));
   robot.ask("hinge", JointState{0.5, 0});
