@@ -8,6 +8,8 @@ from typing import Self
 from o80.checked import whole_or_none
 from o80.errors import InvalidArgument
 
+LONGEST = 2.0**62  # duration [ns], 146 years
+
 
 @dataclass(frozen=True)
 class Selection:
@@ -78,4 +80,4 @@ class Selection:
 def _nanoseconds(seconds: float) -> int:
     if isinstance(seconds, (bool, str)) or not math.isfinite(seconds) or seconds < 0:
         raise InvalidArgument(f"seconds must be a finite number of at least 0, got {seconds!r}")
-    return round(seconds * 1e9)
+    return round(min(seconds * 1e9, LONGEST))

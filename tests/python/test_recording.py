@@ -155,7 +155,7 @@ def test_a_closed_recording_says_so(arm: o80.Frontend, tmp_path: Path) -> None:
 def test_no_name_and_no_folder_are_refused(arm: o80.Frontend, tmp_path: Path) -> None:
     with pytest.raises(o80.InvalidArgument, match="at least one segment"):
         o80.Recording(tmp_path / "run.mcap", [])
-    with pytest.raises(o80.RecordingError, match="cannot be written: No such file"):
+    with pytest.raises(o80.RecordingError, match="cannot be written: there is no folder"):
         o80.Recording(tmp_path / "missing" / "run.mcap", arm)
 
 

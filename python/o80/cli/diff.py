@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated
 
 import typer
@@ -17,10 +18,13 @@ def _tolerances(texts: list[str] | None) -> dict[str, float]:
         try:
             found[field] = float(number)
         except ValueError:
+            found[field] = math.nan
+        if not found[field] >= 0:
             raise typer.BadParameter(
-                f"write FIELD=NUMBER, for example observed.elbow=1e-6, not '{text}'",
+                f"write FIELD=NUMBER with a number of at least 0, for example "
+                f"observed.elbow=1e-6, not '{text}'",
                 param_hint="--tolerance",
-            ) from None
+            )
     return found
 
 
@@ -45,6 +49,8 @@ def diff(
     tolerances = _tolerances(tolerance)
     left_out = [name for name in ignore.split(",") if name]
     pairs = _pairs(list(histories(one, segment)), list(histories(other, segment)))
+    if not pairs:
+        raise o80.InvalidArgument(f"{one} and {other} hold no segment")
     different = False
     for name, mine, others in pairs:
         found = first_difference(mine, others, ignore=left_out, tolerances=tolerances)

@@ -9,6 +9,7 @@ import typer
 
 import o80
 from o80.cli.histories import histories
+from o80.unwritable import writing
 
 
 def export(
@@ -29,6 +30,7 @@ def export(
         f"{each.name}/{each.number}" if each.name in restarted else each.name: each.history
         for each in found
     }
-    write(output, named)
+    with writing(output):
+        write(output, named)
     for name, history in named.items():
         print(f"{name}: {len(history)} rows in {output}")

@@ -9,6 +9,7 @@ import typer
 
 import o80
 from o80.cli.histories import histories
+from o80.unwritable import writing
 
 
 def plot(
@@ -29,17 +30,23 @@ def plot(
     from o80 import plot as plots
 
     found = {}
-    for source in sources:
+    for source in dict.fromkeys(sources):
         for each in histories(source, segment, seconds=seconds):
-            name = f"{each.name}/{each.number}" if each.number or each.name in found else each.name
+            name = f"{each.name}/{each.number}" if each.number else each.name
             if len(each.history):
-                found[name] = each.history
+                found[f"{source}: {name}" if name in found else name] = each.history
     if not found:
         raise o80.InvalidArgument(f"{', '.join(sources)}: no rows to plot")
     chosen = [field for field in fields.split(",") if field]
     figure = plots.plot(found, chosen, window=output is None)
     if output is not None:
-        figure.savefig(output, dpi=110)
+        known = figure.canvas.get_supported_filetypes()
+        if output.suffix[1:].lower() not in known:
+            raise o80.InvalidArgument(
+                f"unknown format '{output.suffix}' of {output}: choose one of .png, .pdf, .svg"
+            )
+        with writing(output):
+            figure.savefig(output, dpi=110)
         print(f"{sum(map(len, found.values()))} rows of {', '.join(found)} in {output}")
         return
     from matplotlib import pyplot

@@ -37,7 +37,9 @@ def _size(text: str | None) -> float | None:
     except ValueError:
         size = 0.0
     if not (size > 0 and math.isfinite(size)):
-        raise typer.BadParameter(f"size must be a number of bytes such as 500M or 2G, got '{text}'")
+        raise typer.BadParameter(
+            f"size must be a number of bytes such as 500M or 2G, got '{text}'", param_hint="--size"
+        )
     return size
 
 
@@ -66,8 +68,8 @@ def record(
     from o80.recording.recorder import Recorder
 
     most = _size(size)
-    recorder = Recorder(output, names, proceed=proceed, whole=whole)
     end = _Stop()
+    recorder = Recorder(output, names, proceed=proceed, whole=whole)
     report = _Report(recorder)
     begin = time.monotonic()
     try:

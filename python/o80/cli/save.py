@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fnmatch
 from pathlib import Path
 from typing import Annotated
 
@@ -20,12 +21,14 @@ def save(
     for name in names:
         if not any(sign in name for sign in "*?[") and name not in there:
             raise o80.SegmentError(f"there is no segment '{name}' (see `o80 list`)")
+        if not any(fnmatch.fnmatchcase(segment, name) for segment in there):
+            raise o80.SegmentError(f"no segment matches '{name}' (see `o80 list`)")
     recorder = Recorder(output, names, whole=True)
     try:
         recorder.catch_up()
     finally:
         recorder.finish()
-    print(f"{recorder.rows} rows of {', '.join(recorder.sources) or 'no segment'} in {output}")
+    print(f"{recorder.rows} rows of {', '.join(recorder.sources)} in {output}")
 
 
 def repair(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import io
-import math
 import sys
 import time
 from collections.abc import Iterator
@@ -15,13 +14,15 @@ import typer
 from o80.cli.segment_table import print_segments
 
 _ALTERNATE, _USUAL = "\033[?1049h\033[?25l", "\033[?1049l\033[?25h"  # screen, without the cursor
+LONGEST = 86400.0  # between two looks [s]
 _HOME, _CLEAR_LINE, _CLEAR_BELOW = "\033[H", "\033[K", "\033[J"
 
 
 def _interval(value: float) -> float:
-    if not (value > 0 and math.isfinite(value)):
+    if not 0 < value <= LONGEST:
         raise typer.BadParameter(
-            f"interval must be positive, got {value:g}", param_hint="--interval"
+            f"interval must be positive and at most {LONGEST:g} s, got {value:g}",
+            param_hint="--interval",
         )
     return value
 

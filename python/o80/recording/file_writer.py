@@ -5,6 +5,7 @@ behind it.
 """
 
 import contextlib
+import fcntl
 import os
 import struct
 import zlib
@@ -31,6 +32,7 @@ from mcap.records import (
 )
 
 import o80
+from o80.errors import RecordingError
 from o80.recording.scan import HEAD, MAGIC, Scan, scan
 from o80.recording.space import reserve
 
@@ -66,18 +68,28 @@ class FileWriter:
 
     @classmethod
     def continued(cls, path: Path, *, compression: str = "zstd") -> "FileWriter":
-        """Goes on behind the last whole group of a file. Raises NotARecording, OSError."""
+        """Goes on behind the last whole group of a file.
+
+        Raises RecordingError if it is being written, NotARecordingError, OSError.
+        """
         self = cls.__new__(cls)
         self._open(path, compression, 0)
+        try:
+            self._continue()
+        except BaseException:
+            os.close(self._descriptor)
+            raise
+        return self
+
+    def _continue(self) -> None:
         begun = os.pread(self._descriptor, len(_beginning()), 0)
         if len(begun) < len(_beginning()) and _beginning().startswith(begun):
             os.ftruncate(self._descriptor, 0)  # cut before its first group was whole
             self._found = Scan()
             self._append(_beginning())
-        self._found = found = scan(path)
+        self._found = found = scan(self.path)
         self.size = found.end
         os.ftruncate(self._descriptor, self.size)
-        return self
 
     def _open(self, path: Path, compression: str, flags: int) -> None:
         if compression not in COMPRESSIONS:
@@ -87,7 +99,14 @@ class FileWriter:
         self.path = path
         self.size = 0  #: [bytes]
         self._compressor = zstandard.ZstdCompressor(level=1) if compression == "zstd" else None
-        self._descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC | flags, 0o644)
+        self._descriptor: int = os.open(path, os.O_RDWR | os.O_CLOEXEC | flags, 0o644)
+        try:
+            _lock(self._descriptor)
+        except BlockingIOError:
+            os.close(self._descriptor)
+            raise RecordingError(
+                f"{path} is being written by another recorder: end it first, or choose another name"
+            ) from None
 
     # ------------------------------------------------------------------ groups
 
@@ -211,7 +230,16 @@ class FileWriter:
     # ------------------------------------------------------------------ the end
 
     def finish(self) -> None:
-        """Writes the summary and closes the file; after it any reader opens the file."""
+        """Writes the summary and closes the file; after it any reader opens the file.
+
+        Raises OSError: then the file is closed, and complete up to its last chunk.
+        """
+        try:
+            self._write_summary()
+        finally:
+            self.close()
+
+    def _write_summary(self) -> None:
         data_end = _bytes_of(DataEnd(0))
         summary_start = self.size + len(data_end)
         summary = bytearray()
@@ -226,7 +254,6 @@ class FileWriter:
         footer = _footer(bytes(summary + offsets), summary_start, offset_start)
         self._append(data_end + summary + offsets + footer + MAGIC, last=True)
         self._found.finished = True
-        self.close()
 
     def _summary(self) -> Iterable[tuple[Opcode, Sequence[McapRecord]]]:
         found = self._found
@@ -253,8 +280,25 @@ class FileWriter:
         """Closes the file as it is; may be called twice."""
         if self._descriptor >= 0:
             os.ftruncate(self._descriptor, self.size)  # gives reserved space back
+            _unlock(self._descriptor)
             os.close(self._descriptor)
             self._descriptor = -1
+
+
+def _lock(descriptor: int) -> None:
+    """Keeps other recorders from the file. Raises BlockingIOError if one has it."""
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise
+    except OSError:  # a file system without locks
+        pass
+
+
+def _unlock(descriptor: int) -> None:
+    """Also for forked children, which share the lock."""
+    with contextlib.suppress(OSError):
+        fcntl.flock(descriptor, fcntl.LOCK_UN)
 
 
 def _beginning() -> bytes:

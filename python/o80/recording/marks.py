@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import IO, Any
 
+import numpy as np
+
 from o80.recording.blocks import MESSAGE, MESSAGE_HEAD, MESSAGE_INDEX
 from o80.recording.file_writer import FileWriter
 from o80.recording.scan import Scan, content_of, index_of
@@ -26,7 +28,7 @@ class Mark:
     def message(self) -> bytes:
         """As JSON. Raises TypeError if a value has no form in JSON."""
         texts = {"name": self.name, "time": self.time, "rows": self.rows, "values": self.values}
-        return json.dumps(texts).encode()
+        return json.dumps(texts, default=_plain).encode()
 
     @classmethod
     def of(cls, message: bytes) -> "Mark":
@@ -57,6 +59,13 @@ class MarkBlock:
 
     def index(self, offset: int) -> bytes:
         return struct.pack("<BQHIQQ", MESSAGE_INDEX, 22, self.channel, 16, self.time, offset)
+
+
+def _plain(value: Any) -> Any:
+    """Numbers and lists of what NumPy computed."""
+    if isinstance(value, (np.generic, np.ndarray)):
+        return value.tolist()
+    raise TypeError(f"a mark holds what JSON can hold, not {type(value).__name__}: {value!r:.60}")
 
 
 def add_mark(file: FileWriter, mark: Mark) -> None:

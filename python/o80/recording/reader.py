@@ -1,6 +1,7 @@
 """Reads a recording: the same histories as from a live frontend."""
 
 import os
+import struct
 from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
@@ -8,7 +9,7 @@ from typing import IO, Any
 
 import numpy as np
 
-from o80.errors import InvalidArgument, RecordingError
+from o80.errors import InvalidArgument, RecordingError, SegmentError
 from o80.history import History
 from o80.layout import decoder_of
 from o80.recording.blocks import messages_in
@@ -55,9 +56,12 @@ class RecordingFile:
 
     @property
     def marks(self) -> list[Mark]:
-        """The notes of the program that recorded, in their order."""
-        with self.path.open("rb") as file:
-            return marks_in(file, self._scan)
+        """The notes of the program that recorded, in their order. Raises RecordingError."""
+        try:
+            with self.path.open("rb") as file:
+                return marks_in(file, self._scan)
+        except (ValueError, TypeError, struct.error) as error:
+            raise RecordingError(f"{self.path}: {error}") from error
 
     def __getitem__(self, name: str) -> "RecordedSegment":
         try:
@@ -156,7 +160,13 @@ class RecordedEpoch:
         for place in self._scan.attachments:
             if place.name == self._note.attachment:
                 with self._path.open("rb") as file:
-                    return decoder_of(attachment_of(file, place).data)
+                    data = attachment_of(file, place).data
+                try:
+                    return decoder_of(data)
+                except SegmentError as error:
+                    raise RecordingError(
+                        f"{self._path}: the description of '{self._note.segment}' is damaged"
+                    ) from error
         raise RecordingError(f"{self._path} lacks the description of '{self._note.segment}'")
 
     def history(

@@ -3,12 +3,13 @@
 import fnmatch
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 
-from o80.errors import InvalidArgument, RecordingError
+from o80.errors import Error, InvalidArgument, RecordingError
 from o80.recording.blocks import messages_in
 from o80.recording.epoch import EpochNote
 from o80.recording.file_writer import FileWriter
@@ -16,6 +17,7 @@ from o80.recording.message_plan import ENCAPSULATION
 from o80.recording.scan import NotARecordingError, content_of, index_of
 from o80.recording.source import Source, Written
 from o80.segment_list import segments
+from o80.unwritable import reason
 
 BETWEEN_SEARCHES = 0.5  # for segments that match a pattern [s]
 
@@ -35,19 +37,36 @@ class Recorder:
         whole: bool = False,
         compression: str = "zstd",
     ) -> None:
-        """names: of segments, or patterns such as "arm*". proceed: continue an existing file."""
+        """names: of segments, or patterns such as "arm*". proceed: continue an existing file.
+
+        path: ends in .mcap. Raises RecordingError, InvalidArgument: then no new file is left.
+        """
         if not names:
             raise InvalidArgument("give the name of at least one segment to record")
+        path = Path(path)
+        if path.suffix != ".mcap":
+            raise RecordingError(
+                f"the name of a recording ends in .mcap, got '{path}': o80 plot, export and diff "
+                f"know a recording by it"
+            )
         self._patterns = [name for name in names if any(sign in name for sign in "*?[")]
-        self.file = opened(Path(path), proceed=proceed, compression=compression)
-        self._written = _written_in(self.file) if proceed else {}
-        self._whole = whole
+        new = not path.exists()
+        self.file = opened(path, proceed=proceed, compression=compression)
         self.sources: dict[str, Source] = {}
         self._search_at = 0.0
-        for name in names:
-            if name not in self._patterns:
-                self._add(name, whole)
-        self._search(whole)
+        try:
+            self._written = _written_in(self.file) if proceed else {}
+            with self.writing():
+                for name in names:
+                    if name not in self._patterns:
+                        self._add(name, whole)
+                self._search(whole)
+        except BaseException:
+            self._close_sources()
+            self.file.close()
+            if new:
+                path.unlink(missing_ok=True)
+            raise
 
     @property
     def rows(self) -> int:
@@ -66,30 +85,45 @@ class Recorder:
 
     def poll(self) -> int:
         """Writes a chunk of the rows published since the last call; returns how many rows."""
-        if self._patterns and time.monotonic() >= self._search_at:
-            self._search(whole=True)
-        blocks = [block for source in self.sources.values() if (block := source.poll())]
-        if blocks:
-            try:
+        with self.writing():
+            if self._patterns and time.monotonic() >= self._search_at:
+                self._search(whole=True)
+            blocks = [block for source in self.sources.values() if (block := source.poll())]
+            if blocks:
                 self.file.add_chunk(blocks)
-            except OSError as error:
-                raise RecordingError(
-                    f"{self.file.path} cannot be written any more: {error.strerror}. What was "
-                    f"recorded until now is in it; make room, or record to another disk"
-                ) from error
         return sum(block.count for block in blocks)
+
+    @contextmanager
+    def writing(self) -> Iterator[None]:
+        """Makes an OSError of its block a RecordingError."""
+        try:
+            yield
+        except Error:
+            raise
+        except OSError as error:
+            raise RecordingError(
+                f"{self.file.path} cannot be written any more: {error.strerror}. What was "
+                f"recorded until now is in it; make room, or record to another disk"
+            ) from error
 
     def catch_up(self) -> None:
         """Polls until every row that was published before the call is written."""
-        while self.poll():
-            if all(source.behind == 0 for source in self.sources.values()):
+        if not self.poll():  # attaches to robots that have just started
+            return
+        positions = {name: source.position for name, source in self.sources.items()}
+        while not all(self.sources[name].has_read(at) for name, at in positions.items()):
+            if not self.poll():
                 return
 
     def finish(self) -> None:
         """Finishes the file: after this any MCAP reader opens it."""
+        self._close_sources()
+        with self.writing():
+            self.file.finish()
+
+    def _close_sources(self) -> None:
         for source in self.sources.values():
             source.close()
-        self.file.finish()
 
     def _add(self, name: str, whole: bool) -> None:
         self.sources[name] = Source(name, self.file, self._written.get(name, {}), whole=whole)
@@ -113,12 +147,15 @@ def opened(path: Path, *, proceed: bool, compression: str = "zstd") -> FileWrite
         return FileWriter(path, compression=compression)
     except FileExistsError:
         raise RecordingError(
-            f"{path} exists. Choose another name, continue it with --continue, or remove it"
+            f"{path} is a folder: give the name of a file"
+            if path.is_dir()
+            else f"{path} exists. Choose another name, or remove it; "
+            f"o80 record --continue appends to it"
         ) from None
     except NotARecordingError as error:
         raise RecordingError(f"{error}: choose another name, or remove it") from None
     except OSError as error:
-        raise RecordingError(f"{path} cannot be written: {error.strerror}") from error
+        raise RecordingError(f"{path} cannot be written: {reason(path, error)}") from error
 
 
 def _written_in(file: FileWriter) -> dict[str, dict[int, Written]]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from types import TracebackType
 from typing import Any, Self
 
-from o80.errors import Closed, RecordingError
+from o80.errors import Closed
 from o80.frontend import Frontend
 from o80.recording.marks import Mark, add_mark
 from o80.recording.recorder import Recorder
@@ -21,7 +21,7 @@ class Recording:
     with o80.Recording("run.mcap", [arm, "ball"]) as recording:
         recording.mark("episode", number=3)
 
-    path: the file, which must not exist.
+    path: the file, NAME.mcap, which must not exist.
     segments: names, patterns such as "arm*", or frontends. Rows are recorded from the newest one
         on, of robots that start later from the first.
     proceed: continue an existing file, also one that was cut.
@@ -44,7 +44,7 @@ class Recording:
         self._recorder = Recorder(path, names, proceed=proceed, whole=whole)
         self._lock = threading.Lock()
         self._end = threading.Event()
-        self._failure: RecordingError | None = None
+        self._failure: Exception | None = None
         self._closed = False
         self._thread = threading.Thread(target=self._run, name="o80-recording", daemon=True)
         self._thread.start()
@@ -70,15 +70,16 @@ class Recording:
             self._check()
             self._recorder.catch_up()
 
-    def mark(self, name: str, **values: Any) -> None:
+    def mark(self, name: str, /, **values: Any) -> None:
         """Writes a note: a name and values, with the newest iteration of each segment.
 
-        values: whatever JSON can hold. Raises TypeError.
+        values: whatever JSON can hold, and NumPy arrays, which become lists. Raises TypeError.
         """
         with self._lock:
             self._check()
             rows = self._recorder.newest
-            add_mark(self._recorder.file, Mark(name, time.time_ns(), rows, values))
+            with self._recorder.writing():
+                add_mark(self._recorder.file, Mark(name, time.time_ns(), rows, values))
 
     def close(self) -> None:
         """Records the rows published until now and finishes the file; may be called twice."""
@@ -117,6 +118,6 @@ class Recording:
             try:
                 with self._lock:
                     self._recorder.catch_up()
-            except RecordingError as error:
+            except Exception as error:  # told by the next call, at the latest by close
                 self._failure = error
                 return

@@ -14,6 +14,7 @@ from typing import IO
 
 import numpy as np
 from mcap.data_stream import ReadDataStream
+from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 from mcap.records import (
     Attachment,
@@ -29,6 +30,8 @@ from mcap.records import (
 )
 from mcap.stream_reader import breakup_chunk, get_chunk_data_stream
 from numpy.typing import NDArray
+
+from o80.errors import RecordingError
 
 MAGIC = b"\x89MCAP0\r\n"
 HEAD = struct.Struct("<BQ")
@@ -57,19 +60,22 @@ class Scan:
 
 
 def scan(path: str | os.PathLike[str]) -> Scan:
-    """Reads everything but messages. Raises NotARecordingError, OSError."""
+    """Reads everything but messages.
+
+    Raises NotARecordingError, RecordingError if a record is damaged, OSError.
+    """
     with Path(path).open("rb") as file:
         size = os.fstat(file.fileno()).st_size
         if file.read(len(MAGIC)) != MAGIC:
             raise NotARecordingError(f"{path} is not an MCAP file")
-        return _Scanner(file, size).run()
+        return _Scanner(file, size, path).run()
 
 
 def content_of(file: IO[bytes], chunk: ChunkIndex) -> bytes:
     """The decompressed content of a chunk. Raises ValueError if it is damaged."""
     file.seek(chunk.chunk_start_offset + HEAD.size)
-    record = Chunk.read(ReadDataStream(file))
     try:
+        record = Chunk.read(ReadDataStream(file))
         stream, length = get_chunk_data_stream(record, validate_crc=True)
         return stream.read(length)
     except Exception as error:  # each compression has exceptions of its own
@@ -92,8 +98,8 @@ def attachment_of(file: IO[bytes], place: AttachmentIndex) -> Attachment:
 
 
 class _Scanner:
-    def __init__(self, file: IO[bytes], size: int) -> None:
-        self._file, self._size = file, size
+    def __init__(self, file: IO[bytes], size: int, path: str | os.PathLike[str]) -> None:
+        self._file, self._size, self._path = file, size, path
         self._scan = Scan(end=len(MAGIC))
         self._chunk: ChunkIndex | None = None  # whose message indexes are being read
 
@@ -107,7 +113,11 @@ class _Scanner:
             if opcode == Opcode.DATA_END:
                 self._scan.finished = self._has_footer()
                 break
-            if not self._take(opcode, at, length):
+            try:
+                belongs = self._take(opcode, at, length)
+            except (EndOfFile, ValueError, struct.error) as error:
+                raise RecordingError(f"{self._path}: the record at byte {at} is damaged") from error
+            if not belongs:
                 break
             self._file.seek(after)
             at = after

@@ -54,6 +54,16 @@ class Source:
         return self._frontend is not None
 
     @property
+    def position(self) -> tuple[int, int]:
+        """Epoch and iteration of the newest row; -1: none."""
+        return (-1 if self._frontend is None else self._frontend.epoch), self.newest
+
+    def has_read(self, position: tuple[int, int]) -> bool:
+        """Whether the row at an earlier `position` was read, or lost with its backend."""
+        epoch, iteration = position
+        return self.position[0] != epoch or self._next > iteration
+
+    @property
     def newest(self) -> int:
         """Iteration of the newest row; -1: there is none."""
         return -1 if self._frontend is None else self._frontend.published

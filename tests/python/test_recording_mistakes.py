@@ -1,0 +1,234 @@
+"""Careless use of recordings: wrong names, two recorders, damaged files, formats that are not."""
+
+import itertools
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import o80
+from o80.recording import source
+from o80.recording.recorder import Recorder, opened
+
+O80 = Path(sys.executable).parent / "o80"
+
+
+def refused(*words: str | Path, code: int = 1) -> str:
+    """What a command says that fails with one line, not with a trace."""
+    done = subprocess.run(
+        [O80, *words],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        env=os.environ | {"COLUMNS": "200"},
+    )
+    assert done.returncode == code, done.stdout + done.stderr
+    assert "Traceback" not in done.stderr
+    return " ".join(done.stderr.split())
+
+
+# ---------------------------------------------------------------------- names
+
+
+@pytest.mark.parametrize("name", ["run", "run.npz", "", "run.mcap.gz"])
+def test_a_file_that_the_commands_would_take_for_a_segment_is_refused(
+    name: str, arm: o80.Frontend, tmp_path: Path
+) -> None:
+    with pytest.raises(o80.RecordingError, match=r"ends in \.mcap"):
+        o80.Recording(tmp_path / name, arm)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_as_file_and_a_missing_folder_are_named(tmp_path: Path) -> None:
+    (tmp_path / "run.mcap").mkdir()
+
+    for proceed in (False, True):
+        with pytest.raises(o80.RecordingError, match="is a folder"):
+            Recorder(tmp_path / "run.mcap", ["arm"], proceed=proceed)
+    with pytest.raises(o80.RecordingError, match=r"there is no folder .*results"):
+        Recorder(tmp_path / "results" / "run.mcap", ["arm"])
+
+
+def test_a_wrong_name_of_a_segment_leaves_no_file(tmp_path: Path) -> None:
+    with pytest.raises(o80.Error, match="'two/joints' cannot name a segment"):
+        o80.Recording(tmp_path / "run.mcap", ["two/joints"])
+    assert "no segment matches 'nobody-*'" in refused(
+        "save", "nobody-*", "-o", tmp_path / "run.mcap"
+    )
+    assert not list(tmp_path.iterdir())
+
+
+# ---------------------------------------------------------------------- two recorders
+
+
+def test_a_file_has_one_recorder(arm: o80.Frontend, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with o80.Recording(path, arm) as recording:
+        arm.burst(10)
+        recording.flush()
+        with pytest.raises(o80.RecordingError, match="is being written by another recorder"):
+            Recorder(path, [arm.segment], proceed=True)
+        assert "is being written by another recorder" in refused("repair", path)
+        arm.burst(10)
+
+    assert o80.open(path)[arm.segment].epochs[0].history().iteration.tolist() == [*range(21)]
+
+
+def test_a_forked_child_does_not_keep_a_finished_file_from_its_next_recorder(
+    arm: o80.Frontend, tmp_path: Path
+) -> None:
+    path = tmp_path / "run.mcap"
+    theirs, ours = os.pipe()
+    recorder = Recorder(path, [arm.segment])
+    child = os.fork()
+    if child == 0:
+        os.close(ours)
+        os.read(theirs, 1)  # until the parent has closed its end
+        os._exit(0)
+    try:
+        recorder.finish()
+        opened(path, proceed=True).finish()
+    finally:
+        os.close(ours)
+        os.waitpid(child, 0)
+        os.close(theirs)
+
+
+def test_the_end_of_a_recording_does_not_wait_for_rows_published_after_it(
+    arm: o80.Frontend, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(source, "LARGEST_BLOCK", 1)  # one row in a poll: never up to date
+    recorder = Recorder(tmp_path / "run.mcap", [arm.segment])
+    arm.burst(10)
+    polls = itertools.count()
+    poll = recorder.poll
+
+    def poll_while_the_robot_runs_on() -> int:
+        assert next(polls) < 100
+        arm.burst(1)
+        return poll()
+
+    monkeypatch.setattr(recorder, "poll", poll_while_the_robot_runs_on)
+    recorder.catch_up()
+    recorder.finish()
+
+    assert recorder.rows >= 11
+
+
+# ---------------------------------------------------------------------- marks
+
+
+def test_marks_hold_numbers_and_arrays_of_numpy(arm: o80.Frontend, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with o80.Recording(path, arm) as recording:
+        recording.mark("end", name="ball", hits=np.int64(3), target=np.zeros(2), won=np.True_)
+        with pytest.raises(TypeError, match="what JSON can hold, not set"):
+            recording.mark("end", balls={1, 2})
+
+    (mark,) = o80.open(path).marks
+    assert mark.name == "end"
+    assert mark.values == {"name": "ball", "hits": 3, "target": [0.0, 0.0], "won": True}
+
+
+# ---------------------------------------------------------------------- damaged files
+
+
+def test_a_damaged_file_is_a_recording_error_that_names_it(
+    arm: o80.Frontend, tmp_path: Path
+) -> None:
+    path = tmp_path / "run.mcap"
+    with o80.Recording(path, arm) as recording:
+        recording.mark("begin")
+        arm.burst(20)
+    whole = path.read_bytes()
+    random = np.random.default_rng(1)
+
+    errors = []
+    for _ in range(1000):
+        damaged = bytearray(whole)
+        for place in random.integers(8, len(whole), 3):
+            damaged[place] = random.integers(256)
+        path.write_bytes(damaged)
+        try:
+            file = o80.open(path)
+            for name in file:
+                for epoch in file[name].epochs:
+                    epoch.history()
+            len(file.marks)
+        except o80.RecordingError as error:
+            errors.append(str(error))
+    assert len(errors) > 100
+    assert all(str(path) in error for error in errors)
+
+
+# ---------------------------------------------------------------------- commands
+
+
+@pytest.fixture
+def run_file(arm: o80.Frontend, tmp_path: Path) -> Path:
+    path = tmp_path / "run.mcap"
+    with o80.Recording(path, arm):
+        arm.burst(20)
+    return path
+
+
+@pytest.mark.parametrize("name", ["rows.npz", "rows.h5", "rows.parquet"])
+def test_an_export_that_cannot_be_written_is_one_line(name: str, run_file: Path) -> None:
+    path = run_file.parent / "results" / name
+
+    assert f"{path} cannot be written: there is no folder" in refused(
+        "export", run_file, "-o", path
+    )
+
+
+def test_a_plot_that_cannot_be_written_is_one_line(run_file: Path) -> None:
+    results = run_file.parent / "results"
+
+    assert "there is no folder" in refused("plot", run_file, "-o", results / "run.png")
+    for name in ("run", "run.xyz"):
+        said = refused("plot", run_file, "-o", run_file.parent / name)
+        assert "choose one of .png, .pdf, .svg" in said
+
+
+def test_recordings_of_one_robot_are_plotted_beside_each_other(
+    arm: o80.Frontend, tmp_path: Path
+) -> None:
+    for name in "abc":
+        with o80.Recording(tmp_path / f"{name}.mcap", arm):
+            arm.burst(10)
+    files = [tmp_path / f"{name}.mcap" for name in "abc"]
+    done = subprocess.run(
+        [O80, "plot", *files, "-o", tmp_path / "abc.png"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+
+    assert done.returncode == 0, done.stderr
+    assert f"33 rows of {arm.segment}, {files[1]}: {arm.segment}, {files[2]}" in done.stdout
+
+
+def test_very_many_seconds_are_all_rows(arm: o80.Frontend, run_file: Path) -> None:
+    assert len(arm.history(seconds=1e300)) == len(arm.history())
+    assert len(o80.open(run_file)[arm.segment].history(seconds=1e300)) == 21
+
+
+@pytest.mark.parametrize("tolerance", ["observed", "observed=x", "observed=-1", "observed=nan"])
+def test_a_tolerance_is_a_number_from_0_on(tolerance: str, run_file: Path) -> None:
+    said = refused("diff", run_file, run_file, "--tolerance", tolerance, code=2)
+
+    assert "a number of at least 0" in said
+
+
+def test_empty_recordings_are_not_called_equal(tmp_path: Path) -> None:
+    path = tmp_path / "empty.mcap"
+    Recorder(path, ["nobody"]).finish()
+
+    assert "hold no segment" in refused("diff", path, path)
+
+
+def test_an_interval_that_no_clock_holds_is_refused() -> None:
+    assert "interval must be positive" in refused("top", "--interval", "1e300", code=2)
