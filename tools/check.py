@@ -20,6 +20,7 @@ TYPED_TESTS = (
     "tests/python",
     "tests/processes",
     "tests/consumer",
+    "tests/tools",
     "robots/pam/tests",
     "simulators/mujoco/tests",
     "apps/table_tennis/tests",

@@ -33,7 +33,7 @@ def _cpp_folders() -> dict[str, Path]:
 
 
 def _python_folders() -> dict[str, Path]:
-    own = ("python", "processes", "consumer", "proofs")
+    own = ("python", "processes", "consumer", "proofs", "tools")
     packages = {name: package / "tests" for name, package in _packages().items()}
     return {name: ROOT / "tests" / name for name in own} | {
         name: folder for name, folder in packages.items() if any(folder.glob("test_*.py"))
