@@ -36,7 +36,7 @@ Link elliptic_plate(double mass, double centre, double half_width, double half_l
   return {mass, centre, {mass * (y + z), mass * (x + z), mass * (x + y)}};
 }
 
-// The arm seen from axes that turn with joint 1: all links lie in the plane of x and z.
+// The arm in axes that turn with joint 1: all links lie in the plane of x and z.
 struct Plane {
   explicit Plane(const Joints& q)
       : c1(std::cos(q[0])),
@@ -52,11 +52,11 @@ struct Plane {
   }
 
   double c1, s1;
-  Vector upper, fore;  // where the upper arm and the forearm point
+  Vector upper, fore;  // directions of the upper arm and the forearm
   double c4, s4;
 };
 
-// A vector in the axes of a link (its x lies in the plane, its z along the link) and back.
+// A vector into the axes of a link (x lies in the plane, z along the link), and back.
 Vector into(const Vector& along, const Vector& v) {
   return {along[2] * v[0] - along[0] * v[2], v[1], along[0] * v[0] + along[2] * v[2]};
 }
@@ -64,7 +64,7 @@ Vector out_of(const Vector& along, const Vector& v) {
   return {along[2] * v[0] + along[0] * v[2], v[1], -along[0] * v[0] + along[2] * v[2]};
 }
 
-// Inertia of a link turned by the wrist about its own z: the x-y block, z stays.
+// Inertia of a link that the wrist turns about its z: the x-y block; z stays.
 struct Turned {
   Turned(const Vector& inertia, double c, double s)
       : xx(c * c * inertia[0] + s * s * inertia[1]),
@@ -102,7 +102,7 @@ Joints solve(const JointMatrix& lower, Joints b) {
   return b;
 }
 
-// Smallest impulses that keep every joint from passing its stop within `duration`.
+// The smallest impulses that keep every joint within its stops for `duration`.
 void stop_at_limits(const Joints& q, const JointMatrix& lower, double duration, Joints& dq) {
   const auto passes = [&](std::size_t j) {
     return std::abs(q[j] + duration * dq[j]) > kJointLimit;
@@ -111,7 +111,7 @@ void stop_at_limits(const Joints& q, const JointMatrix& lower, double duration, 
   for (std::size_t j = 0; j < kJoints; ++j) any = any || passes(j);
   if (!any) return;
 
-  // projected Gauss-Seidel on the impulses; a joint has at most one of its two stops near
+  // projected Gauss-Seidel on the impulses; at most one of the two stops of a joint is near
   JointMatrix response;
   for (std::size_t j = 0; j < kJoints; ++j) {
     Joints unit{};
@@ -170,7 +170,7 @@ JointMatrix Arm::mass_matrix(const Joints& q) const noexcept {
   const double su = plane.upper[0], sf = plane.fore[0], cf = plane.fore[2];
   const Turned i4(fore.inertia, plane.c4, plane.s4);
 
-  // distances from the axis of joint 1, and the lever of the forearm on joints 2 and 3
+  // distances from the axis of joint 1, and the lever arms of the forearm on joints 2 and 3
   const double xu = u * su, xe = l * su, xf = xe + f * sf;
   const double bend = f * l * dot(plane.upper, plane.fore);
 
@@ -199,7 +199,7 @@ Joints Arm::bias(const Joints& q, const Joints& dq) const noexcept {
   const Vector& zu = plane.upper;
   const Vector& zf = plane.fore;
 
-  // angular velocities and accelerations from the base outwards, the joints not accelerating
+  // angular velocities and accelerations from the base outwards, at constant joint velocities
   const Vector w1 = dq[0] * kUp;
   const Vector w2 = w1 + dq[1] * kAcross;
   const Vector w3 = w2 + dq[2] * kAcross;
@@ -211,7 +211,7 @@ Joints Arm::bias(const Joints& q, const Joints& dq) const noexcept {
     return cross(a, arm) + cross(w, cross(w, arm));
   };
 
-  // forces and moments that this takes, gravity as an acceleration upwards
+  // the forces and moments of that motion; gravity is an acceleration upwards
   const Vector up = config_.gravity * kUp;
   const Vector at_elbow = swing(w2, a2, kUpperArmLength * zu);
   const Vector force2 = upper.mass * (up + swing(w2, a2, upper.centre * zu));
@@ -282,7 +282,7 @@ RacketMotion Arm::racket(const Motion& motion) const noexcept {
   const Vector arm = kForearmLength * zf;
   const Vector position = plane.to_world(plane.elbow() + arm);
 
-  // axes of the racket: the forearm's, turned by the wrist
+  // axes of the racket: those of the forearm, turned by the wrist
   const Vector in_plane{zf[2], 0.0, -zf[0]};
   const Vector x = plane.to_world(plane.c4 * in_plane + plane.s4 * kAcross);
   const Vector y = plane.to_world(-plane.s4 * in_plane + plane.c4 * kAcross);
@@ -302,7 +302,7 @@ std::optional<Joints> Arm::posture_reaching(const Vector& point, double wrist) c
   const double out = std::hypot(target[0], target[1]);
   const double height = target[2] - kShoulderHeight;
 
-  // triangle of upper arm, forearm and the line from shoulder to racket
+  // the triangle of upper arm, forearm and the line from shoulder to racket
   const double a = kUpperArmLength, b = kForearmLength;
   const double square = out * out + height * height;
   const double cosine = (square - a * a - b * b) / (2.0 * a * b);

@@ -13,20 +13,20 @@ using Vector = std::array<double, 3>;
 using Rotation = std::array<double, 9>;  ///< row by row; its columns are the axes of the body
 using JointMatrix = std::array<Joints, kJoints>;
 
-// The chain, at angles of zero a straight line upwards from the base (all in [m]).
+// The kinematic chain [m]. At angles of zero it is a straight line upwards from the base.
 inline constexpr double kShoulderHeight = 0.075;    ///< joint 2 above the base
 inline constexpr double kUpperArmLength = 0.36742;  ///< joint 2 to joint 3
 inline constexpr double kForearmLength = 0.370;     ///< joint 3 to the centre of the racket
 inline constexpr double kJointLimit = 89.8 * std::numbers::pi / 180.0;  ///< [rad], either side
 
-/// Half axes of the elliptic blade, across and along the forearm, and its thickness [m]. Its face
-/// looks along its own y axis.
+/// Half axes of the elliptic blade, across and along the forearm, and its thickness [m]. The normal
+/// of the blade is the y axis of the racket.
 inline constexpr double kBladeHalfWidth = 0.5 * 0.1485;
 inline constexpr double kBladeHalfLength = 0.5 * 0.1882;
 inline constexpr double kBladeThickness = 0.0054;
 
-/// One moving part. Its centre of mass lies on the z axis of its joint's frame, its principal axes
-/// are those of the frame.
+/// One moving part. Its centre of mass lies on the z axis of its joint's frame; its principal axes
+/// are parallel to the axes of the frame.
 struct Link {
   double mass = 0.0;    ///< [kg]
   double centre = 0.0;  ///< [m], along z from the joint
@@ -36,15 +36,16 @@ struct Link {
 /// The links moved by joint 1 (shoulder), 2 (upper arm), 3 (elbow) and 4 (forearm with racket).
 using Links = std::array<Link, kJoints>;
 
-/// From the published masses. Fittings and handle are solid balls of 30 and 20 mm radius, tubes are
-/// thin-walled, the blade is a thin elliptic plate that carries the fitted mass of the racket.
+/// Links from the published masses. Fittings and handle are solid balls of 30 and 20 mm radius,
+/// tubes are thin-walled, and the blade is a thin elliptic plate with the fitted mass of the
+/// racket.
 Links published_links() noexcept;
 
-/// Forearm, handle and racket, of which the fourth link is made.
+/// The two parts of the fourth link: forearm with handle, and racket.
 Link published_forearm() noexcept;
 Link published_racket() noexcept;
 
-/// Several parts of one body as one.
+/// Two parts of one body as one link.
 Link joined(const Link& a, const Link& b) noexcept;
 
 /// Angles and speeds of the joints [rad, rad/s].
@@ -54,7 +55,7 @@ struct Motion {
 };
 static_assert(std::is_trivially_copyable_v<Motion>);
 
-/// Where the centre of the racket is in the world and how it moves.
+/// Pose and velocity of the centre of the racket in the world.
 struct RacketMotion {
   Vector position{};  ///< [m]
   Rotation rotation{};
@@ -69,7 +70,7 @@ class Arm {
     Vector base{0.0, 0.0, 1.21};                  ///< [m], in the world
     double gravity = 9.81;                        ///< [m/s^2]
     Joints damping{2.0, 2.0, 1.2, 1.5};           ///< [Nm s/rad], of bearings and tendons
-    Joints armature{0.003, 0.003, 0.003, 0.003};  ///< [kg m^2], pulley, tendon and muscle in motion
+    Joints armature{0.003, 0.003, 0.003, 0.003};  ///< [kg m^2], of pulleys, tendons and muscles
   };
 
   Arm() noexcept : Arm(Config{}) {}
@@ -80,17 +81,18 @@ class Arm {
   JointMatrix mass_matrix(const Joints& q) const noexcept;        ///< [kg m^2], with armature
   Joints bias(const Joints& q, const Joints& dq) const noexcept;  ///< [Nm], gravity and Coriolis
   Joints gravity(const Joints& q) const noexcept { return bias(q, Joints{}); }
-  Joints acceleration(const Motion& motion, const Joints& torque) const noexcept;  ///< no stops
-  double energy(const Motion& motion) const noexcept;  ///< [J], kinetic and of height
+  Joints acceleration(const Motion& motion,
+                      const Joints& torque) const noexcept;  ///< without stops
+  double energy(const Motion& motion) const noexcept;        ///< [J], kinetic and potential
 
-  /// Moves on by `duration` [s]: semi-implicit, damping implicit, the stops at ±kJointLimit
-  /// inelastic and never passed.
+  /// Integrates by `duration` [s]: semi-implicit Euler with implicit damping. The stops at
+  /// ±kJointLimit are inelastic and never passed.
   void advance(Motion& motion, const Joints& torque, double duration) const noexcept;
 
   RacketMotion racket(const Motion& motion) const noexcept;
 
-  /// Angles (joints 1 to 3, elbow up) that bring the centre of the racket to a point of the world,
-  /// with the given angle of the wrist; nothing if it is out of reach.
+  /// Inverse kinematics: the angles (elbow up) that bring the centre of the racket to a point of
+  /// the world, with the given angle of the wrist; nullopt if the point is out of reach.
   std::optional<Joints> posture_reaching(const Vector& point, double wrist) const noexcept;
 
  private:

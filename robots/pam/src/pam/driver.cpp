@@ -53,7 +53,7 @@ void PamDriver::describe(Schema& schema) const {
   }
 }
 
-/// Pressures at the start are exactly those asked for, without the rounding of a lag.
+/// At the start the observed pressures equal the desired ones exactly, without rounding.
 void PamDriver::begin() noexcept {
   std::ranges::copy(plant_.state().commanded, now_.desired.begin());
   now_.observed = now_.desired;
@@ -108,7 +108,7 @@ Served PamDriver::on(const Snapshot& snapshot) noexcept {
 Served PamDriver::on(const Restore& restore) noexcept {
   if (restore.slot >= slots_.size()) return no_such_slot();
   const State& slot = slots_[restore.slot];
-  if (slot.filled == 0) return Served::rejected("nothing was kept in this slot: snapshot it first");
+  if (slot.filled == 0) return Served::rejected("this slot holds no snapshot: snapshot it first");
   now_ = slot;
   plant_.restore(slot.plant);
   return Served::start_afresh();

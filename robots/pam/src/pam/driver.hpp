@@ -11,11 +11,11 @@ namespace o80::pam {
 
 O80_DESCRIBE_ENUM(MuscleModel, linear, hill);
 
-/// Whose pressures may be asked for.
+/// The pressure ranges of the muscles.
 enum class Ranges : std::uint8_t { simulated, real };
 O80_DESCRIBE_ENUM(Ranges, simulated, real);
 
-/// What the arm's sensors say beside the pressures.
+/// Sensor values beside the pressures.
 struct ArmSensors {
   Joints joint_positions{};
   Joints joint_velocities{};
@@ -28,16 +28,17 @@ struct ArmSensors {
   std::array<bool, kMuscles> clipped{};
 };
 O80_DESCRIBE(ArmSensors, (joint_positions, "[rad]"), (joint_velocities, "[rad/s]"),
-             (bars, "in the muscles now [bar]"), (activations, "of the muscles now, 0 to 1"),
+             (bars, "pressure in the muscles [bar]"), (activations, "of the muscles, 0 to 1"),
              (racket_position, "centre of the racket in the world [m]"),
-             (racket_rotation, "row by row; the blade looks along its second column"),
+             (racket_rotation, "row by row; its second column is the normal of the blade"),
              (racket_velocity, "[m/s]"), (racket_angular_velocity, "in the world's axes [rad/s]"),
-             (clipped, "a pressure asked for was out of range"));
+             (clipped, "the commanded pressure was out of range"));
 
-/// The pneumatic arm as a robot: raw pressures of eight muscles in, joint angles out.
+/// The pneumatic arm as a robot: commands are the raw pressures of eight muscles, rows hold joint
+/// angles.
 ///
-/// What is asked of a muscle is rounded to whole raw units, as its valve does; what is observed is
-/// the lagging pressure in it.
+/// A commanded pressure is rounded to whole raw units, as by the valve of the real arm. The
+/// observed pressure is the one in the muscle, which lags behind.
 class PamDriver {
  public:
   struct Config {
@@ -55,7 +56,7 @@ class PamDriver {
   using Extended = ArmSensors;
   using Requests = o80::Requests<Reset, Snapshot, Restore>;
 
-  /// Throws std::invalid_argument on a configuration that makes no arm.
+  /// Throws std::invalid_argument if an option is out of range.
   explicit PamDriver(const Config& config);
 
   void describe(Schema& schema) const;
@@ -82,19 +83,21 @@ class PamDriver {
   Served no_such_slot() const noexcept;
 
   Plant plant_;
-  State now_;  // but for the plant, which holds its own
+  State now_;  // without the plant's, which the plant holds
   std::vector<State> slots_;
   std::int64_t period_;  // [ns]
 };
 O80_DESCRIBE(PamDriver::Config,
              (muscle, "law of the muscles: linear, or of Hill type after Haeufle et al. (2014)"),
-             (ranges, "which pressures may be asked for: those of the simulation or the real arm"),
-             (period, "of an iteration; the frequency follows it [s]"),
+             (ranges, "pressure ranges: those of the published simulation, or of the real arm"),
+             (period, "of an iteration, which sets the frequency [s]"),
              (substeps, "integration steps in a period"),
-             (start_posture, "where the arm starts, unless start_pressures are given [rad]"),
+             (start_posture, "posture at the start, unless start_pressures are given [rad]"),
              (start_activation, "mean of two antagonists at the start, 0 to 1"),
-             (start_pressures, "that hold the arm where it starts; all 0: as its posture needs"),
-             (start_noise, "on each joint at a reset, uniform in +- this, from its seed [rad]"),
+             (start_pressures,
+              "raw pressures at the start, in equilibrium; all 0: those that hold start_posture"),
+             (start_noise,
+              "on each joint at a reset, uniform within +- this value, drawn from the seed [rad]"),
              (slots, "for snapshots"));
 
 }  // namespace o80::pam

@@ -20,7 +20,7 @@ double pair_torque(const Muscle& muscle, std::size_t joint, double angle, double
       muscle);
 }
 
-// the activations of two antagonists that differ by `difference` about a mean
+/// The activations of two antagonists with this mean and difference.
 std::pair<double, double> around(double mean, double difference) {
   return {std::clamp(mean + 0.5 * difference, 0.0, 1.0),
           std::clamp(mean - 0.5 * difference, 0.0, 1.0)};
@@ -41,7 +41,7 @@ Pressures Equilibrium::pressures_holding(const Joints& q, double activation) con
   const Joints needed = arm.gravity(q);
   Pressures pressures{};
   for (std::size_t j = 0; j < kJoints; ++j) {
-    // torque grows with the difference of the activations: halve
+    // the torque grows with the difference of the activations: bisect
     double low = -2.0, high = 2.0;
     for (int i = 0; i < 50; ++i) {
       const double middle = 0.5 * (low + high);
@@ -61,9 +61,8 @@ Pressures Equilibrium::pressures_holding(const Joints& q, double activation) con
 
 Joints Equilibrium::posture_held_by(const Pressures& pressures,
                                     const Joints& start) const noexcept {
-  // downhill on the energy of muscles and gravity: ends in a stable posture, not just a balanced
-  // one
-  constexpr double gravity_stiffness = 10.0;  // [Nm/rad], more than gravity ever changes by
+  // descend the potential energy of muscles and gravity, which leads to a stable equilibrium
+  constexpr double gravity_stiffness = 10.0;  // [Nm/rad], more than that of gravity
   constexpr double probe_angle = 1e-5;        // [rad]
   Joints q = start;
   for (int i = 0; i < 5000; ++i) {

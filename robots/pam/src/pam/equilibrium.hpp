@@ -6,20 +6,20 @@
 
 namespace o80::pam {
 
-/// An arm and its muscles at rest: which pressures belong to which posture, and back.
+/// An arm and its muscles at rest: from a posture to its pressures, and back.
 struct Equilibrium {
   const Arm& arm;
   const Muscle& muscle;
   const PressureRanges& ranges;
 
-  /// What the muscles do to the joints [Nm].
+  /// Torque of the muscles on the joints [Nm].
   Joints muscle_torque(const Joints& q, const Pressures& pressures) const noexcept;
 
-  /// Pressures that hold a posture; `activation` is the mean of two antagonists where the ends of
-  /// the ranges let it be. As near as they come if the posture cannot be held.
+  /// Pressures that hold a posture. `activation` is the mean of two antagonists, unless one of them
+  /// reaches the end of its range. If the posture cannot be held: the pressures nearest to that.
   Pressures pressures_holding(const Joints& q, double activation) const noexcept;
 
-  /// The posture into which these pressures pull the arm, slowly, from `start`.
+  /// The stable posture into which these pressures pull the arm from `start`, without dynamics.
   Joints posture_held_by(const Pressures& pressures, const Joints& start) const noexcept;
 };
 

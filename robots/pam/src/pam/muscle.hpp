@@ -6,14 +6,14 @@
 
 namespace o80::pam {
 
-/// What a muscle pulls with now, and how fast its contractile element changes length.
+/// The force of a muscle, and the velocity at which its contractile element changes length.
 struct Pull {
-  double force = 0.0;           ///< [N], never pushes
-  double fibre_velocity = 0.0;  ///< [m/s], 0 for a muscle without an inner length
+  double force = 0.0;           ///< [N], never negative: a muscle cannot push
+  double fibre_velocity = 0.0;  ///< [m/s], 0 for a muscle without a contractile element
 };
 
-/// A muscle: length and velocity of the whole, its inner (fibre) length and its activation in
-/// [0, 1] => pull. The law is constant; what changes is held by the caller.
+/// The law of a muscle: its length and velocity, the length of its contractile element (fibre) and
+/// its activation from 0 to 1 => pull. The law is constant; the caller holds the state.
 template <class T>
 concept MuscleLaw = requires(const T& law, double x) {
   { law.pull(x, x, x, x) } noexcept -> std::same_as<Pull>;  // length, velocity, fibre, act.
@@ -21,15 +21,15 @@ concept MuscleLaw = requires(const T& law, double x) {
   { law.resting_force(x, x) } noexcept -> std::same_as<double>;         // length, activation
 };
 
-/// Length of a muscle with its tendon when the joint is at zero [m].
+/// Length of a muscle with its tendon at a joint angle of zero [m].
 inline constexpr double kRestLength = 0.68;
 
 /// Pneumatic muscle whose force is linear in the pressure and in the contraction:
-/// F = F_max a (1 - contraction / stroke), slack beyond its stroke.
+/// F = F_max a (1 - contraction / stroke), slack beyond the stroke.
 struct LinearMuscle {
-  double maximum_force = 1500.0;    ///< [N], full pressure, not contracted
-  double full_force_length = 0.70;  ///< [m], contraction counts from here
-  double stroke = 0.10;             ///< [m], no force when contracted by so much
+  double maximum_force = 1500.0;    ///< [N], at full pressure, not contracted
+  double full_force_length = 0.70;  ///< [m], at which the contraction is zero
+  double stroke = 0.10;             ///< [m], contraction at which the force is zero
 
   Pull pull(double length, double velocity, double fibre_length, double activation) const noexcept;
   double resting_fibre_length(double length, double activation) const noexcept;
@@ -58,9 +58,9 @@ class HillMuscle {
     double damping_at_rest = 0.1;       ///< share of the largest damping
     double series_rest = 0.458792;      ///< [m]
     double series_toe = 0.042700;       ///< stretch at the end of the curved part
-    double series_linear = 0.017204;    ///< further stretch for `series_force` again
+    double series_linear = 0.017204;    ///< further stretch that adds `series_force` once more
     double series_force = 1499.576;     ///< [N], at the end of the curved part
-    double minimum_activation = 0.005;  ///< a living muscle is never quite off
+    double minimum_activation = 0.005;  ///< of a muscle that is not stimulated
   };
 
   HillMuscle() noexcept : HillMuscle(Parameters{}) {}
@@ -68,7 +68,7 @@ class HillMuscle {
 
   const Parameters& parameters() const noexcept { return p_; }
 
-  /// Share of the maximum force at full activation and no motion, 1 at the optimal length.
+  /// Isometric force at full activation as a share of the maximum force; 1 at the optimal length.
   double isometric(double fibre_length) const noexcept;
   double parallel_force(double fibre_length) const noexcept;  ///< [N]
   double series_force(double series_length) const noexcept;   ///< [N]
@@ -81,12 +81,12 @@ class HillMuscle {
   double resting_force(double length, double activation) const noexcept;
 
  private:
-  struct Fibre {  // all that follows from its length and activation
+  struct Fibre {  // values that depend on its length and activation only
     double isometric, parallel;
     double drive;           // activation x isometric
     double hill_a, hill_b;  // of the concentric curve, relative to maximum force and length
   };
-  struct Curve {  // force over velocity: a hyperbola on either side of rest
+  struct Curve {  // force over velocity: one hyperbola for each direction
     double a, b;
   };
   Fibre fibre(double fibre_length, double activation) const noexcept;
@@ -106,10 +106,10 @@ class HillMuscle {
 
 static_assert(MuscleLaw<LinearMuscle> && MuscleLaw<HillMuscle>);
 
-/// Which law a plant is built with.
+/// The law of the muscles of a plant.
 enum class MuscleModel : std::uint8_t { linear, hill };
 
-/// The law chosen at run time; visited once for all eight muscles.
+/// A law chosen at run time; visited once for all eight muscles.
 using Muscle = std::variant<LinearMuscle, HillMuscle>;
 
 Muscle make_muscle(MuscleModel model) noexcept;

@@ -10,7 +10,7 @@
 namespace o80::pam {
 namespace {
 
-// SplitMix64: the next of a sequence that any seed starts well.
+// A random number by SplitMix64, whose sequence is good from any seed.
 double uniform(std::uint64_t& seed, double low, double high) {
   seed += 0x9E3779B97F4A7C15u;
   std::uint64_t z = seed;
@@ -20,18 +20,19 @@ double uniform(std::uint64_t& seed, double low, double high) {
   return low + (high - low) * (static_cast<double>(z >> 11) * 0x1.0p-53);
 }
 
-void require(bool right, const std::string& what) {
-  if (!right) throw std::invalid_argument("pneumatic arm: " + what);
+void require(bool holds, const std::string& what) {
+  if (!holds) throw std::invalid_argument("pneumatic arm: " + what);
 }
 
 void check(const Plant::Config& config) {
-  require(config.period > 0.0,
-          "the period must be positive, it is " + std::to_string(config.period) + " s");
+  require(config.period > 0.0 && std::isfinite(config.period),
+          "period must be positive and finite, got " + std::to_string(config.period) + " s");
   require(config.substeps >= 1,
-          "at least 1 substep a period is needed, not " + std::to_string(config.substeps));
+          "substeps must be at least 1, got " + std::to_string(config.substeps));
   require(config.start_activation >= 0.0 && config.start_activation <= 1.0,
-          "start_activation is a share, 0 to 1, not " + std::to_string(config.start_activation));
-  require(config.start_noise >= 0.0, "start_noise must not be negative");
+          "start_activation must be from 0 to 1, got " + std::to_string(config.start_activation));
+  require(config.start_noise >= 0.0,
+          "start_noise must not be negative, got " + std::to_string(config.start_noise));
   for (std::size_t m = 0; m < kMuscles; ++m) {
     const auto [minimum, maximum] = config.ranges[m];
     require(minimum < maximum, "the range of muscle " + std::to_string(m) + ", " +
@@ -40,12 +41,13 @@ void check(const Plant::Config& config) {
     if (!config.start_pressures) continue;
     const std::int32_t start = (*config.start_pressures)[m];
     require(start >= minimum && start <= maximum,
-            "start pressure " + std::to_string(start) + " of muscle " + std::to_string(m) +
-                " is outside its range, " + std::to_string(minimum) + " to " +
-                std::to_string(maximum));
+            "start_pressures: muscle " + std::to_string(m) + " takes " + std::to_string(minimum) +
+                " to " + std::to_string(maximum) + ", got " + std::to_string(start));
   }
   for (double angle : config.start_posture) {
-    require(std::abs(angle) <= kJointLimit, "start_posture is beyond the stops at 89.8 degrees");
+    require(std::abs(angle) <= kJointLimit,
+            "start_posture must be within the stops at 89.8 degrees, got " + std::to_string(angle) +
+                " rad");
   }
 }
 
@@ -78,7 +80,7 @@ void Plant::reset(std::uint64_t seed) noexcept {
   settle_muscles();
 }
 
-// Every muscle as it is after a long time with its pressure and length.
+/// Puts every muscle into the steady state of its pressure and length.
 void Plant::settle_muscles() noexcept {
   for (std::size_t m = 0; m < kMuscles; ++m) {
     state_.activation[m] = config_.ranges[m].activation(state_.commanded[m]);
@@ -90,7 +92,7 @@ void Plant::settle_muscles() noexcept {
 }
 
 Plant::Clipped Plant::advance(const Pressures& pressures, const Joints& external) noexcept {
-  // pressures => activations asked for
+  // pressures => target activations
   Clipped clipped = 0;
   std::array<double, kMuscles> target;
   for (std::size_t m = 0; m < kMuscles; ++m) {

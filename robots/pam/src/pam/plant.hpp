@@ -11,7 +11,7 @@
 
 namespace o80::pam {
 
-/// Radius of the pulleys by which the muscles turn the joints [m].
+/// Radius of the pulleys through which the muscles turn the joints [m].
 inline constexpr double kPulleyRadius = 0.037;
 
 /// First-order lag between pressure and activation [s].
@@ -20,26 +20,27 @@ inline constexpr Joints kActivationLag{0.016, 0.044, 0.044, 0.044};
 /// Near the median posture of the real arm in recorded play [rad].
 inline constexpr Joints kPlayingPosture{0.17, 1.1, 1.04, 0.5};
 
-/// The pneumatic arm: eight pressures in, joint angles out, one period an iteration.
+/// The simulated arm: `advance` takes eight pressures and integrates one period.
 ///
-/// Realtime: everything but the constructor; no allocation, no lock, no exception. Two plants of
-/// one configuration with one state do the same for ever, bit for bit.
+/// Realtime: everything but the constructor; no allocation, no lock, no exception. Two plants with
+/// the same configuration and state stay equal bit for bit under the same pressures.
 class Plant {
  public:
   struct Config {
     MuscleModel muscle = MuscleModel::linear;
     PressureRanges ranges = kSimulatedRanges;
     double period = 0.002;  ///< [s]
-    int substeps = 4;       ///< integration steps a period
+    int substeps = 4;       ///< integration steps in a period
     Arm::Config arm{};
-    /// The arm starts at rest, as these pressures hold it; unset: as `start_posture` needs.
+    /// The arm starts at rest in the posture that these pressures hold; unset: the pressures that
+    /// hold `start_posture`.
     std::optional<Pressures> start_pressures{};
     Joints start_posture = kPlayingPosture;  ///< [rad]
-    double start_activation = 0.5;           ///< mean of two antagonists, when pressures are unset
-    double start_noise = 0.0;                ///< [rad], uniform in ± this, drawn from reset's seed
+    double start_activation = 0.5;  ///< mean of two antagonists, if start_pressures are unset
+    double start_noise = 0.0;       ///< [rad], uniform within ± this, from the seed of a reset
   };
 
-  /// Everything that changes. A copy is a snapshot, assigning it back restores the plant.
+  /// Everything that changes: a copy is a snapshot, which `restore` takes back.
   struct State {
     std::int64_t iteration = 0;
     Motion motion{};
@@ -56,21 +57,21 @@ class Plant {
 
   Plant() : Plant(Config{}) {}
 
-  /// Throws std::invalid_argument on a configuration that makes no arm.
+  /// Throws std::invalid_argument if a value of the configuration is out of range.
   explicit Plant(const Config& config);
 
   const Config& config() const noexcept { return config_; }
   const Arm& arm() const noexcept { return arm_; }
   const Muscle& muscle() const noexcept { return muscle_; }
 
-  /// The pressures that hold the arm where it starts.
+  /// The pressures that hold the arm in its start posture.
   const Pressures& start_pressures() const noexcept { return start_pressures_; }
 
-  /// One period with these pressures and, besides, torques from outside [Nm]. Out-of-range
-  /// pressures are clipped, and said.
+  /// Integrates one period with these pressures, and with further torques on the joints [Nm].
+  /// Pressures out of range are clipped; the result says which.
   Clipped advance(const Pressures& pressures, const Joints& external = {}) noexcept;
 
-  /// Back to the start. The seed matters only with `start_noise`.
+  /// Returns to the start. The seed has an effect only with `start_noise`.
   void reset(std::uint64_t seed) noexcept;
 
   const State& state() const noexcept { return state_; }
@@ -78,8 +79,8 @@ class Plant {
 
   const Joints& q() const noexcept { return state_.motion.q; }    ///< [rad]
   const Joints& dq() const noexcept { return state_.motion.dq; }  ///< [rad/s]
-  Pressures pressures() const noexcept;                           ///< raw, in the muscles now
-  std::array<double, kMuscles> bars() const noexcept;             ///< [bar], in the muscles now
+  Pressures pressures() const noexcept;                           ///< raw, in the muscles
+  std::array<double, kMuscles> bars() const noexcept;             ///< [bar], in the muscles
   RacketMotion racket() const noexcept { return arm_.racket(state_.motion); }
 
  private:
@@ -92,13 +93,13 @@ class Plant {
   Arm arm_;
   Muscle muscle_;
   double substep_;   // [s]
-  Joints lag_gain_;  // share of the way an activation goes in a substep
+  Joints lag_gain_;  // share of its difference that an activation covers in a substep
   Pressures start_pressures_{};
   Joints start_equilibrium_{};
   State state_{};
 };
 
-/// Length of a muscle when its joint is at `angle` [m]: agonists shorten as it grows.
+/// Length of a muscle [m] with its joint at `angle`: agonists shorten as the angle grows.
 constexpr double muscle_length(std::size_t muscle, double angle) noexcept {
   return kRestLength + (muscle % 2 == 0 ? -kPulleyRadius : kPulleyRadius) * angle;
 }

@@ -9,7 +9,7 @@ namespace o80::pam {
 inline constexpr std::size_t kJoints = 4;
 inline constexpr std::size_t kMuscles = 2 * kJoints;
 
-/// One number a joint, from the base to the wrist.
+/// One number for each joint, from the base to the wrist.
 using Joints = std::array<double, kJoints>;
 
 /// The muscle that turns `joint` towards larger angles.
@@ -17,7 +17,8 @@ constexpr std::size_t agonist(std::size_t joint) noexcept { return 2 * joint; }
 /// The muscle that turns `joint` towards smaller angles.
 constexpr std::size_t antagonist(std::size_t joint) noexcept { return 2 * joint + 1; }
 
-/// Raw pressures of the eight muscles: agonist and antagonist of joint 1, then of joint 2, and on.
+/// Raw pressures of the eight muscles: agonist and antagonist of joint 1, then those of joint 2, 3
+/// and 4.
 using Pressures = std::array<std::int32_t, kMuscles>;
 
 constexpr Pressures equal_pressures(std::int32_t raw) noexcept {
@@ -27,7 +28,7 @@ constexpr Pressures equal_pressures(std::int32_t raw) noexcept {
 /// Pressure above the atmosphere [bar]; 18000 is 1.81 bar.
 constexpr double to_bar(double raw) noexcept { return 0.0002 * raw - 1.7888; }
 
-/// What a muscle may be asked for, raw; the ends are no and full activation.
+/// Raw pressures that a muscle accepts: from no activation to full activation.
 struct PressureRange {
   std::int32_t minimum = 6000;
   std::int32_t maximum = 24000;

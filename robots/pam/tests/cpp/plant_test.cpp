@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
+#include <limits>
 #include <random>
 #include <stdexcept>
 
@@ -307,15 +308,17 @@ TEST(Plant, SaysPressuresInBar) {
   EXPECT_NEAR(to_bar(25000), 3.21, 0.005);
 }
 
-TEST(Plant, RefusesAConfigurationThatMakesNoArm) {
+TEST(Plant, RefusesValuesOutOfTheirRange) {
   const auto refusal = [](const Plant::Config& config, const char* text) {
     EXPECT_THAT([&] { Plant plant(config); },
                 ThrowsMessage<std::invalid_argument>(HasSubstr(text)));
   };
-  refusal({.period = 0.0}, "period must be positive");
-  refusal({.substeps = 0}, "at least 1 substep");
+  refusal({.period = 0.0}, "period must be positive and finite");
+  refusal({.period = std::numeric_limits<double>::infinity()},
+          "period must be positive and finite");
+  refusal({.substeps = 0}, "substeps must be at least 1");
   refusal({.start_pressures = equal_pressures(25000)}, "6000 to 24000");
-  refusal({.start_posture = {0.0, 2.0, 0.0, 0.0}}, "beyond the stops");
+  refusal({.start_posture = {0.0, 2.0, 0.0, 0.0}}, "within the stops");
   refusal({.start_activation = 1.5}, "0 to 1");
   Plant::Config empty;
   empty.ranges[3] = {9000, 9000};
