@@ -6,12 +6,13 @@ passed in no other step fails the check; --allow-skips only tells of it.
 
 import argparse
 import sys
+import time
 from collections.abc import Callable
 
 from checkout_state import PassedSteps
 from outcomes import Outcomes, of_ctest, of_log, of_pytest, of_real_time_machine
 from sources import ROOT
-from steps import LOGS, PASSED, PYTHON, Step, build, cpp, pytest, run, use_tools
+from steps import LOGS, PASSED, PYTHON, Step, build, cpp, processor_time, pytest, run, use_tools
 
 PROOF = [sys.executable, "tests/proofs/run.py"]
 PACKAGES = ("o80", "o80_mujoco", "o80_pam", "o80_table_tennis")
@@ -113,6 +114,7 @@ def main() -> int:
         parser.error(f"no step {', '.join(sorted(unknown))}; there are {', '.join(STEPS)}")
 
     use_tools()
+    begin = time.monotonic()
     found, failed = Outcomes(), []
     names = arguments.steps or [name for name in STEPS if name not in ON_DEMAND]
     for step in planned(names, PassedSteps(PASSED), found):
@@ -129,7 +131,10 @@ def main() -> int:
     if gaps and not arguments.steps and not failed and not arguments.allow_skips:
         print(f'failed: {len(gaps)} skipped; install what is missing, or ARGS="--allow-skips"')
         return 1
-    print(f"failed: {', '.join(failed)} (build/test)" if failed else "all checks passed")
+    how_long = f"in {time.monotonic() - begin:.0f} s ({processor_time():.0f} s of processor time)"
+    print(
+        f"failed: {', '.join(failed)} (build/test)" if failed else f"all checks passed {how_long}"
+    )
     return int(bool(failed))
 
 

@@ -7,12 +7,13 @@ fails. Tests marked `check` are left to `make check`, unless their file is named
 import argparse
 import subprocess
 import sys
+import time
 
 from checkout_state import PassedSteps
 from outcomes import Outcomes
 from selection import NoSuchTestsError, Selection, names, select
 from sources import ROOT
-from steps import PASSED, Step, build, ctest, pytest, run, use_tools
+from steps import PASSED, Step, build, ctest, processor_time, pytest, run, run_beside, use_tools
 
 
 def install() -> bool:
@@ -20,12 +21,38 @@ def install() -> bool:
     return subprocess.run(["tools/setup.sh", "test"], cwd=ROOT).returncode == 0
 
 
-def all_steps() -> list[Step]:
-    return [
-        Step("build", build("dev")),
+def test_everything() -> bool:
+    """The tests in C++ run beside those in Python: both wait a lot."""
+    tests = [
         ctest("dev", "-LE", "^check$", report="cpp"),
         pytest("-m", "not check", report="python"),
     ]
+    passed, found = PassedSteps(PASSED), Outcomes()
+    for step in tests:
+        passed.forget(step.name)
+    if not run(Step("build", build("dev"))) or not run_beside(tests):
+        return False
+    for step in tests:
+        passed.add(step.name)
+        found.add(step.outcomes())
+    tell(found)
+    print(f"left to make check: {left_to_check()} tests in C++")
+    return True
+
+
+def test_some(chosen: Selection, keyword: str | None) -> bool:
+    found = Outcomes()
+    for step in steps_of(chosen, keyword):
+        if not run(step):
+            return False
+        found.add(step.outcomes())
+    tell(found)
+    return True
+
+
+def tell(found: Outcomes) -> None:
+    for name, why in found.gaps().items():
+        print(f"skipped: {name}: {why}")
 
 
 def steps_of(chosen: Selection, keyword: str | None) -> list[Step]:
@@ -77,20 +104,12 @@ def main() -> int:
     if (everything or chosen.python) and not install():
         return 1
 
-    passed, found = PassedSteps(PASSED), Outcomes()
-    for step in all_steps() if everything else steps_of(chosen, arguments.keyword):
-        if everything:
-            passed.forget(step.name)
-        if not run(step):
-            return 1
-        if everything:
-            passed.add(step.name)
-        found.add(step.outcomes())
-    for name, why in found.gaps().items():
-        print(f"skipped: {name}: {why}")
-    if everything:
-        print(f"left to make check: {left_to_check()} tests in C++")
-    print("all tests passed" if everything else "these tests passed")
+    begin, used = time.monotonic(), processor_time()
+    if not (test_everything() if everything else test_some(chosen, arguments.keyword)):
+        return 1
+    what = "all tests passed" if everything else "these tests passed"
+    seconds, used = time.monotonic() - begin, processor_time() - used
+    print(f"{what} in {seconds:.0f} s ({used:.0f} s of processor time), set-up not counted")
     return 0
 
 
