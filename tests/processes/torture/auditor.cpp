@@ -5,6 +5,7 @@
 #include "describe/table.hpp"
 #include "runtime/link.hpp"
 #include "torture/actor.hpp"
+#include "torture/journal_audit.hpp"
 
 namespace torture {
 
@@ -31,7 +32,10 @@ class Auditor {
     for (Kept& kept : kept_) {
       if (kept.frontend.life() == o80::Life::running) drain(kept);
     }
-    for (Kept& kept : kept_) audit(kept);
+    for (Kept& kept : kept_) {
+      audit(kept);
+      audit_journal(actor_, kept.frontend, kept.generation);
+    }
   }
 
  private:
