@@ -94,8 +94,10 @@ JournalReader::JournalReader(const SegmentView& view)
 }
 
 std::uint64_t JournalReader::published() const noexcept {
+  // whole words: a damaged position must not lead to a misaligned one
   return std::min(counters_->published.load(std::memory_order_acquire),  // sync journal
-                  kFarthestPosition);
+                  kFarthestPosition) &
+         ~std::uint64_t{7};
 }
 
 std::uint64_t JournalReader::first_intact() const noexcept {
@@ -171,7 +173,7 @@ void JournalReader::go_to_oldest() noexcept {
   position_ = end;
   for (const std::atomic<std::uint64_t>& word : counters_->marks) {
     const std::uint64_t mark = word.load(std::memory_order_relaxed);
-    if (mark >= first && mark < position_) position_ = mark;
+    if (mark % 8 == 0 && mark >= first && mark < position_) position_ = mark;
   }
   jumped_ = true;
 }

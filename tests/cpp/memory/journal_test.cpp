@@ -193,6 +193,18 @@ TEST_F(JournalTest, ADamagedLengthEndsInAGapNotInALoop) {
   EXPECT_EQ(item_.missed, 19U);
 }
 
+TEST_F(JournalTest, PositionsOfADamagedFileThatAreNoMultipleOfAWordAreNotUsed) {
+  write(0, 200);
+  JournalCounters& counters = segment_.view().counters().journal;
+  for (auto& mark : counters.marks) mark.store(mark.load() + 3);
+  JournalReader late(attached_.view());
+  EXPECT_FALSE(late.next(item_)) << "no mark can be used";
+  counters.published.store(counters.published.load() + 4);
+  EXPECT_FALSE(late.next(item_));
+  late.seek_end();
+  EXPECT_FALSE(late.next(item_));
+}
+
 TEST_F(JournalTest, ReadersInOtherThreadsSeeWholeEntriesOnly) {
   std::atomic<bool> done{false};
   std::atomic<std::uint64_t> read{0};
