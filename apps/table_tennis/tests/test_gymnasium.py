@@ -23,7 +23,7 @@ def inline() -> Iterator[TableTennisEnvironment]:
         yield environment
 
 
-@pytest.mark.parametrize("render_mode", [None, "rgb_array"])
+@pytest.mark.parametrize("render_mode", [None, pytest.param("rgb_array", marks=pytest.mark.check)])
 @pytest.mark.parametrize(
     ("name", "options"),
     [
@@ -71,6 +71,7 @@ def test_what_is_returned_is_the_callers_own(inline: TableTennisEnvironment) -> 
     assert third in inline.observation_space
 
 
+@pytest.mark.check
 def test_pictures_show_what_moves() -> None:
     environment = TableTennisEnvironment(render_mode="rgb_array")
     with closing(environment):

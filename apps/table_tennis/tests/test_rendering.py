@@ -18,6 +18,7 @@ print(picture.shape, picture.std() > 1)
 """
 
 
+@pytest.mark.check
 @pytest.mark.parametrize("before", ["", "import mujoco"])
 def test_a_scene_is_drawn_without_a_screen(before: str) -> None:
     quiet = {k: v for k, v in os.environ.items() if k not in ("MUJOCO_GL", "DISPLAY")}
@@ -32,6 +33,7 @@ def test_a_scene_is_drawn_without_a_screen(before: str) -> None:
     assert done.stdout.strip() == "(480, 640, 3) True"
 
 
+@pytest.mark.check
 def test_an_unknown_camera_is_refused_with_those_there_are() -> None:
     with (
         Scene() as scene,
