@@ -103,7 +103,8 @@ def everything(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Environ
 def readme_program(package: str) -> str:
     """The first Python program in the README of a package."""
     text = (ROOT / package / "README.md").read_text()
-    return re.findall(r"```python\n(.*?)```", text, re.DOTALL)[0]
+    program: str = re.findall(r"```python\n(.*?)```", text, re.DOTALL)[0]
+    return program
 
 
 def test_there_is_a_wheel_of_every_package_for_every_machine_of_the_platform(built: Path) -> None:
