@@ -89,7 +89,7 @@ case $purpose in
   demo) ;;
   tools | test) need_packages g++ libgtest-dev libgmock-dev ;;
   check) # compilers of the sanitizers and of another machine, model checkers, emulators, stress
-    need_packages g++ libgtest-dev libgmock-dev googletest ccache clang-19 libclang-rt-19-dev \
+    need_packages g++ libgtest-dev libgmock-dev googletest clang-19 libclang-rt-19-dev \
       llvm-19 g++-aarch64-linux-gnu qemu-user-static relacy-dev spin strace stress-ng rt-tests \
       qemu-system-x86 busybox-static cpio
     ;;
