@@ -5,7 +5,7 @@ from __future__ import annotations
 from o80.extras import needed
 
 ACCELERATED = "o80/TableTennis-v0"
-"""As fast as the machine can; the same seed, the same episode, bit for bit."""
+"""Runs as fast as the machine can; the same seed gives the same episode, bit for bit."""
 REAL_TIME = "o80/TableTennisRealTime-v0"
 """The arm runs by the clock."""
 

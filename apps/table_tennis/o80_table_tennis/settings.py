@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from numbers import Real
+
+from o80.checked import whole
 
 from .task.actions import FINE
 from .task.ball_play import HitTask, ReturnTask, SmashTask
@@ -34,7 +38,7 @@ class Pacing(Enum):
 
 @dataclass(frozen=True)
 class RigSettings:
-    """The arm and its twins. Raises ValueError for settings that contradict each other."""
+    """The arm and its twins. Raises ValueError or TypeError."""
 
     pacing: Pacing = Pacing.INLINE
     arm_segment: str | None = None
@@ -57,10 +61,13 @@ class RigSettings:
     """Rows that arm and twins keep; None: as many as fit into o80's usual history."""
 
     def __post_init__(self) -> None:
-        if self.twins < 1:
-            raise ValueError(f"twins must be at least 1, got {self.twins}")
-        if self.extra_balls < 0:
-            raise ValueError(f"extra_balls must not be negative, got {self.extra_balls}")
+        if self.pacing not in tuple(Pacing):
+            there_are = ", ".join(str(each) for each in Pacing)
+            raise TypeError(f"pacing must be one of {there_are}, got {self.pacing!r}")
+        whole(self.twins, "twins", 1)
+        whole(self.extra_balls, "extra_balls", 0)
+        if not (math.isfinite(self.frequency) and self.frequency > 0):
+            raise ValueError(f"frequency must be a positive number [1/s], got {self.frequency}")
         if self.attach and self.arm_segment is None:
             raise ValueError("to attach to an arm, give the name of its segment: arm_segment")
         if self.attach and self.pacing is Pacing.INLINE:
@@ -114,14 +121,22 @@ class TaskSettings:
     """Rows of lateness above which an episode is given up as stalled, real time."""
 
     def __post_init__(self) -> None:
-        if not 0 <= self.delay < ITERATIONS:
+        for name in ("delay", "ball_seed", "most_late"):
+            whole(getattr(self, name), name, 0)
+        factor: object = self.factor
+        if not isinstance(factor, Real) or not 0 < float(factor) < math.inf:
+            raise ValueError(f"factor must be a positive number, got {factor!r}")
+        if self.delay >= ITERATIONS:
             raise ValueError(
                 f"delay must lie between 0 and {ITERATIONS - 1} iterations, so that an action acts "
                 f"within its step, got {self.delay}"
             )
+        task: object = self.task
         if isinstance(self.task, str):
             if self.task not in TASKS:
                 raise ValueError(f"unknown task '{self.task}'; there are: {', '.join(TASKS)}")
+        elif isinstance(task, type) and not missing_members(task):
+            raise TypeError(f"task must be an object: write {task.__name__}()")
         elif missing := missing_members(self.task):
             raise TypeError(
                 f"task must be one of {', '.join(TASKS)}, or an object with the members of "

@@ -1,5 +1,6 @@
 """Wrong arguments are refused with what to give instead."""
 
+import math
 import sys
 import time
 import warnings
@@ -15,7 +16,8 @@ from opened_environment import STILL, opened, played_out
 import o80
 import o80_table_tennis
 from o80_table_tennis.environment import TableTennisEnvironment
-from o80_table_tennis.settings import Pacing, TaskSettings
+from o80_table_tennis.settings import Pacing, RigSettings, TaskSettings
+from o80_table_tennis.task.reach import ReachTask
 from o80_table_tennis.world.arm import MUSCLES
 
 
@@ -92,3 +94,29 @@ def test_an_arm_of_another_frequency_is_refused() -> None:
         with pytest.raises(ValueError, match=r"runs at 250 Hz.*RigSettings\(frequency=250\)"):
             opened(Pacing.REAL_TIME, arm_segment=process.segment, attach=True)
         opened(Pacing.REAL_TIME, arm_segment=process.segment, attach=True, frequency=250.0).close()
+
+
+@pytest.mark.parametrize(
+    ("settings", "wrong", "text"),
+    [
+        (RigSettings, {"pacing": "inline"}, r"one of Pacing\.REAL_TIME, .*got 'inline'"),
+        (RigSettings, {"twins": 0}, "twins must be at least 1, got 0"),
+        (RigSettings, {"twins": 1.5}, "twins must be a whole number, got 1.5"),
+        (RigSettings, {"extra_balls": 2.5}, "extra_balls must be a whole number, got 2.5"),
+        (RigSettings, {"frequency": 0}, "frequency must be a positive number"),
+        (RigSettings, {"frequency": math.nan}, "frequency must be a positive number"),
+        (TaskSettings, {"factor": math.nan}, "factor must be a positive number, got nan"),
+        (TaskSettings, {"factor": -1}, "factor must be a positive number, got -1"),
+        (TaskSettings, {"factor": "fine"}, "factor must be a positive number, got 'fine'"),
+        (TaskSettings, {"delay": 1.5}, "delay must be a whole number, got 1.5"),
+        (TaskSettings, {"ball_seed": -1}, "ball_seed must be at least 0, got -1"),
+        (TaskSettings, {"most_late": -3}, "most_late must be at least 0, got -3"),
+        (TaskSettings, {"task": ReachTask}, r"task must be an object: write ReachTask\(\)"),
+        (TaskSettings, {"task": "retrun"}, "there are: return, smash, hit, reach"),
+    ],
+)
+def test_settings_that_no_rig_and_no_task_can_have_are_refused(
+    settings: type, wrong: dict[str, Any], text: str
+) -> None:
+    with pytest.raises((ValueError, TypeError), match=text):
+        settings(**wrong)

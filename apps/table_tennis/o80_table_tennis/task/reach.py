@@ -19,18 +19,18 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ReachTask:
-    """Each step costs the distance of the racket's centre from the goal; reaching it ends that.
+    """Each step costs the distance of the racket's centre from the goal until the racket is there.
 
     Goals are where the racket is at postures drawn about the one in which episodes begin. Observed
     are the joints (8), the pressures (8), the centre of the racket (3) and the goal (3).
     """
 
     tolerance: float = 0.03
-    """A racket this near to the goal has reached it [m]."""
+    """The racket has reached a goal that is at most this far away [m], unless it moves."""
     slowest: float = 0.5
-    """Unless a joint is faster [rad/s]."""
+    """It counts as moving if a joint is faster than this [rad/s]."""
     spread: float = 0.4
-    """Of the drawn postures, either way on each joint [rad]."""
+    """Largest difference of a drawn posture from the start, on each joint [rad]."""
     most_steps: int = MOST_STEPS
     """Steps of the environment after which an episode is truncated."""
     joint_velocity: float = JOINT_VELOCITY_BOUND

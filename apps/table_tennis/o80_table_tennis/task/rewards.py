@@ -20,7 +20,7 @@ from .ball_record import BallRecord, Numbers
 
 FloatArray = NDArray[np.float64]
 
-# NumPy's own power and hypot differ in the last bit from these, which one episode alone was paid by
+# of math, not of NumPy, which differ in the last bit: one episode and many get the same rewards
 _power = np.frompyfunc(math.pow, 2, 1)
 _hypot = np.frompyfunc(math.hypot, 2, 1)
 
@@ -58,7 +58,7 @@ class RewardRule:
         return self._paid(record, np.maximum(term * record.largest_speed, self.floor))
 
     def touched(self, record: BallRecord) -> FloatArray:
-        """(...) 1 for a touched ball."""
+        """(...) 1 for a touched ball, else minus the smallest distance [m]."""
         return np.where(record.touched, 1.0, -np.asarray(record.smallest_distance))
 
     def _paid(self, record: BallRecord, landing: FloatArray) -> FloatArray:
