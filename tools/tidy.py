@@ -56,6 +56,7 @@ def units_of(build: Path) -> dict[Path, tuple[str, ...]]:
 def sources_of(commands: list[dict[str, str]]) -> dict[Path, tuple[str, ...]]:
     """The checked files, those inside a unity source among them, each compiled as shipped."""
     found: dict[Path, tuple[str, ...]] = {}
+    tests = f"{os.sep}tests{os.sep}"  # of the packages; they are not shipped
     folders = tuple(f"{ROOT / folder}{os.sep}" for folder in CHECKED)
     for command in commands:
         file = Path(command["file"])
@@ -64,7 +65,9 @@ def sources_of(commands: list[dict[str, str]]) -> dict[Path, tuple[str, ...]]:
             lines = file.read_text().splitlines()
             files = [line.split('"')[1] for line in lines if line.startswith("#include")]
         options = compile_options(command["command"])
-        for name in filter(lambda name: name.startswith(folders), files):
+        for name in files:
+            if not name.startswith(folders) or tests in name.removeprefix(str(ROOT)):
+                continue
             # test builds define more
             found[Path(name)] = min(found.get(Path(name), options), options, key=len)
     return found
