@@ -4,7 +4,6 @@
 #include <iterator>
 
 #include "memory/atomic_words.hpp"
-#include "memory/status_word.hpp"
 
 namespace o80 {
 
@@ -57,19 +56,6 @@ void DecisionJournal::decided(const StagedBatch& sent, const StatusChange& chang
              JournalHead::how(static_cast<std::uint8_t>(change.status),
                               static_cast<std::uint8_t>(change.reason), change.detail)),
         &payload, sizeof payload);
-}
-
-void DecisionJournal::status(const StatusChange& change) noexcept {
-  // the entries of the batch tell the others
-  if (!writer_.is_on() || change.of != StatusChange::Of::record) return;
-  if (statuses_ == kMostStatuses || status_lane_ != change.lane) flush();
-  if (statuses_ == 0) writer_.begin(kMostStatuses * sizeof(JournalStatus));
-  status_lane_ = change.lane;
-  ++statuses_;
-  const StatusWord word{static_cast<std::uint8_t>(change.status),
-                        static_cast<std::uint8_t>(change.reason), change.detail, change.iteration};
-  const JournalStatus status{change.id, word.packed()};
-  writer_.add(reinterpret_cast<const std::byte*>(&status), sizeof status);
 }
 
 void DecisionJournal::flush() noexcept {

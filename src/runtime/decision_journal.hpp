@@ -8,6 +8,7 @@
 #include "control/record.hpp"
 #include "control/status_sink.hpp"
 #include "memory/journal.hpp"
+#include "memory/status_word.hpp"
 #include "o80/describe/rows.hpp"
 #include "o80/memory/halt.hpp"
 #include "o80/memory/life.hpp"
@@ -140,5 +141,18 @@ class DecisionJournal {
   std::uint32_t status_lane_ = 0;
   Iteration iteration_ = 0;
 };
+
+inline void DecisionJournal::status(const StatusChange& change) noexcept {
+  // the entries of the batch tell the others
+  if (!writer_.is_on() || change.of != StatusChange::Of::record) return;
+  if (statuses_ == kMostStatuses || status_lane_ != change.lane) flush();
+  if (statuses_ == 0) writer_.begin(kMostStatuses * sizeof(JournalStatus));
+  status_lane_ = change.lane;
+  ++statuses_;
+  const StatusWord word{static_cast<std::uint8_t>(change.status),
+                        static_cast<std::uint8_t>(change.reason), change.detail, change.iteration};
+  const JournalStatus status{change.id, word.packed()};
+  writer_.add(reinterpret_cast<const std::byte*>(&status), sizeof status);
+}
 
 }  // namespace o80

@@ -30,7 +30,7 @@ Payload unpacked(const JournalItem& item) {
   return payload;
 }
 
-std::string text_of(const char* chars, std::size_t most) {
+std::string clean_text(const char* chars, std::size_t most) {
   return printable({chars, strnlen(chars, most)});
 }
 
@@ -176,7 +176,7 @@ void Journal::Body::drop(std::map<BatchKey, std::vector<std::byte>>::iterator ba
 void Journal::Body::keep_name() {
   if (names_.size() >= kMostNames) names_.clear();
   const auto name = unpacked<std::array<char, sizeof(JournalOwner)>>(item_);
-  names_[{item_.head.lane, item_.head.id}] = text_of(name.data(), name.size());
+  names_[{item_.head.lane, item_.head.id}] = clean_text(name.data(), name.size());
 }
 
 void Journal::Body::fill(JournalEntry& entry) {
@@ -201,8 +201,8 @@ void Journal::Body::fill(JournalEntry& entry) {
       entry.lane = JournalEntry::kNoLane;
       entry.halt = head.id;
       entry.cause = enum_of<HaltCause>(halt.cause, kHaltCauses);
-      entry.who = text_of(halt.who.data(), halt.who.size());
-      entry.text = text_of(halt.text.data(), halt.text.size());
+      entry.who = clean_text(halt.who.data(), halt.who.size());
+      entry.text = clean_text(halt.text.data(), halt.text.size());
       break;
     }
     case JournalKind::resume:
@@ -228,7 +228,7 @@ void Journal::Body::fill(JournalEntry& entry) {
       break;
     case JournalKind::ended: {
       const auto text = unpacked<JournalText>(item_);
-      entry.text = text_of(text.data(), text.size());
+      entry.text = clean_text(text.data(), text.size());
       entry.state = enum_of<BackendState>(head.what, 5);
       entry.lane = JournalEntry::kNoLane;
       break;
