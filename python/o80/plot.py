@@ -48,7 +48,10 @@ def plot(
     ]
     panels = list(dict.fromkeys((curve.robot, curve.panel) for curve in chosen))
     if not panels:
-        raise InvalidArgument("there is nothing to plot: the robot has no states. Name fields")
+        raise InvalidArgument(
+            "there is nothing to plot: the robot has no actuators. Name sensor values in fields, "
+            "for example extended"
+        )
     if len(panels) > MOST_PANELS:
         raise InvalidArgument(
             f"{len(panels)} panels are too many for a picture (at most {MOST_PANELS}): name fields"

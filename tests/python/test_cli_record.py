@@ -109,7 +109,7 @@ def test_repair_finishes_a_cut_file_once(arm: o80.Frontend, tmp_path: Path) -> N
     path.write_bytes(whole[: scan(path).end + 5])
 
     assert not o80.open(path).finished
-    assert "5 bytes of an incomplete part removed" in run("repair", path)
+    assert "5 bytes behind them removed" in run("repair", path)
     assert path.read_bytes() == whole
     assert "is complete" in run("repair", path)
     assert path.read_bytes() == whole

@@ -211,6 +211,40 @@ def test_recordings_of_one_robot_are_plotted_beside_each_other(
     assert f"33 rows of {arm.segment}, {files[1]}: {arm.segment}, {files[2]}" in done.stdout
 
 
+def test_a_sensor_without_actuators_is_recorded_plotted_and_exported(
+    segment: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "run.mcap"
+    with o80.Backend(segment, extended={"force": float}, bursting=True) as sensor:
+        sensor.publish(None, {"force": 1.5})
+        recorder = Recorder(path, [segment], whole=True)
+        recorder.catch_up()
+        recorder.finish()
+    history = o80.open(path)[segment].history()
+
+    assert history.extended.force.tolist() == [1.5]
+    assert "has no actuators. Name sensor values in fields" in refused(
+        "plot", path, "-o", tmp_path / "run.png"
+    )
+    for words in (("plot", "--fields", "force", "-o", "run.png"), ("export", "-o", "run.npz")):
+        subprocess.run([O80, words[0], path, *words[1:]], cwd=tmp_path, check=True, timeout=60)
+    assert np.load(tmp_path / "run.npz")[f"{segment}/extended.force"].tolist() == [1.5]
+
+
+def test_the_size_of_a_small_file_is_not_0(arm: o80.Frontend, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    done = subprocess.run(
+        [O80, "record", arm.segment, "-o", path, "--seconds", "0.1"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+
+    assert done.returncode == 0
+    assert " kB in" in done.stderr
+    assert " 0.0 " not in done.stderr
+
+
 def test_very_many_seconds_are_all_rows(arm: o80.Frontend, run_file: Path) -> None:
     assert len(arm.history(seconds=1e300)) == len(arm.history())
     assert len(o80.open(run_file)[arm.segment].history(seconds=1e300)) == 21

@@ -43,6 +43,10 @@ def _size(text: str | None) -> float | None:
     return size
 
 
+def _bytes(size: float) -> str:
+    return f"{size / 1e6:.1f} MB" if size >= 1e5 else f"{size / 1e3:.1f} kB"
+
+
 def record(
     names: Annotated[
         list[str], typer.Argument(help="Segments; a pattern such as 'arm*' includes later ones.")
@@ -132,7 +136,7 @@ class _Report:
             if not last:
                 line += f", {rate:.0f} a second, {behind} behind"
             line += f", {recorder.missed} missed" if recorder.missed else ""
-            line += f", {recorder.file.size / 1e6:.1f} MB in {recorder.file.path}"
+            line += f", {_bytes(recorder.file.size)} in {recorder.file.path}"
             begin = "\r\033[K" if self._terminal else ""
             print(f"{begin}{line}", end="\n" if last else "", file=sys.stderr, flush=True)
 

@@ -45,4 +45,4 @@ def repair(
     file = opened(path, proceed=True)
     kept = file.size
     file.finish()
-    print(f"{path}: {kept} bytes kept, {size - kept} bytes of an incomplete part removed")
+    print(f"{path} is complete now: {kept} bytes kept, {size - kept} bytes behind them removed")
