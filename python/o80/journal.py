@@ -53,7 +53,7 @@ class JournalEntry:
     sender: str = ""  #: its process, or that of the halt; empty if unknown
     id: int | None = None  #: of the batch; of a `status`: of the command
     ticket: int | None = None  #: place of a batch in the order of all pulses
-    at: int | None = None  #: the iteration that a batch was sent for
+    at: int | None = None  #: the iteration that a batch was sent for, if it is another one
     burst: int | None = None  #: iterations that a burst may run; -1 until its batch has ended
     cut: bool = False  #: of burst_ended: it ended early
     commands: tuple[JournalCommand, ...] = ()
@@ -124,7 +124,7 @@ class _Decoder:
             sender=native.who,
             id=native.id if of_batch or kind in ("status", "burst", "burst_ended") else None,
             ticket=native.ticket if of_batch else None,
-            at=native.at if of_batch and native.at >= 0 else None,
+            at=native.at if of_batch and native.at not in (-1, native.iteration) else None,
             burst=native.burst if native.burst != 0 else None,
             cut=native.cut,
             commands=tuple(self._command(record) for record in native.records),

@@ -123,6 +123,20 @@ def test_of_a_backend_that_has_failed_the_journal_is_still_there(segment: str) -
         assert "it broke" in late.journal()[-1].text
 
 
+def test_a_batch_for_later_says_for_which_iteration(segment: str) -> None:
+    with o80.Backend(segment, ["a"]) as backend:
+        backend.publish()
+        with o80.Frontend(segment) as frontend:
+            frontend.add_command("a", 1.0)
+            frontend.pulse(at=2)
+            for _ in range(2):
+                backend.step()
+                backend.publish([0.0])
+            scheduled, taken = of_kind(frontend.journal(), "scheduled", "taken")
+    assert (scheduled.iteration, scheduled.at) == (1, 2)
+    assert (taken.iteration, taken.at) == (2, None)
+
+
 def test_a_request_comes_with_its_values(arm: o80.Frontend) -> None:
     arm.request("reset", seed=7)
     (taken,) = [
