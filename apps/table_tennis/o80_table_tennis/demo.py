@@ -21,6 +21,8 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+import o80
+
 from .balls.sources import balls_from
 from .environment import TableTennisEnvironment
 from .players.policies import DEFAULT_FACTOR, default_policy
@@ -166,7 +168,15 @@ def main(
         balls_from(settings.task().balls)
     except (OSError, ValueError) as error:
         raise typer.BadParameter(str(error), param_hint="--balls") from error
-    run_demo(settings, console).print(console)
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise typer.BadParameter(str(error), param_hint="--output") from error
+    try:
+        run_demo(settings, console).print(console)
+    except o80.Error as error:
+        print(f"o80: {error}", file=sys.stderr)
+        raise typer.Exit(1) from error
     console.print(f"report, plots, film and history: {output}")
 
 

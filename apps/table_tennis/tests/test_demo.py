@@ -168,3 +168,23 @@ def test_wrong_recordings_are_refused_in_words(tmp_path: Path) -> None:
     assert done.returncode != 0
     assert "no such file" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("output", "options", "said"),
+    [
+        ("taken", [], "--output"),
+        ("new", ["--muscle", "steel", "--real-time-episodes", "0"], "one of: linear, hill"),
+    ],
+)
+def test_what_the_demo_cannot_do_is_said_in_a_line(
+    output: str, options: list[str], said: str, tmp_path: Path
+) -> None:
+    (tmp_path / "taken").touch()
+    done = subprocess.run(
+        demo(tmp_path / output, *options), capture_output=True, text=True, timeout=STARTING
+    )
+
+    assert done.returncode != 0
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
