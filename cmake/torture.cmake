@@ -7,7 +7,7 @@ if(NOT O80_SANITIZE AND NOT CMAKE_CROSSCOMPILING)
     o80_crash_points PUBLIC o80_headers Threads::Threads ${CMAKE_DL_LIBS} PRIVATE o80_private_headers o80_warnings
   )
   file(GLOB torture_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tests/processes/torture/*.cpp)
-  add_executable(o80-torture ${torture_sources})
+  add_executable(o80-torture EXCLUDE_FROM_ALL ${torture_sources}) # built when it is to run
   target_include_directories(o80-torture PRIVATE ${PROJECT_SOURCE_DIR}/tests/processes)
   target_compile_definitions(
     o80-torture
