@@ -203,10 +203,10 @@ def _percentiles(name: str, values: Any) -> dict[str, Value]:
 def _percentile_label(key: str) -> str:
     name, _, percentile = key.rpartition("_p")
     what = {
-        "arm_lateness_us": "lateness of an iteration of the arm",
-        "arm_jitter_us": "jitter of its period",
+        "arm_lateness_us": "arm late by at most",
+        "arm_jitter_us": "arm's period off by at most",
     }.get(name, name)
-    return f"{what}, {percentile} % below [us]"
+    return f"{what}, {percentile} % of rows [us]"
 
 
 def _text(value: Value) -> str:
