@@ -1,4 +1,4 @@
-"""The experiment from end to end: `python -m o80_table_tennis.demo`.
+"""The experiment from end to end: the program `o80-table-tennis`.
 
 Starts the arm in real time (500 Hz, a process of its own), its simulated twin (bursting, another
 one) and an environment between them, plays episodes, then plays accelerated, as processes and
@@ -180,5 +180,10 @@ def main(
     console.print(f"report, plots, film and history: {output}")
 
 
-if __name__ == "__main__":
+def run() -> None:
+    """The program `o80-table-tennis`."""
     typer.run(main)
+
+
+if __name__ == "__main__":
+    run()

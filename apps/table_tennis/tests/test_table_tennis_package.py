@@ -1,7 +1,8 @@
-"""The package o80-table-tennis: what its import says when something is missing."""
+"""The package o80-table-tennis: its program, what its import says when something is missing."""
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -13,3 +14,11 @@ def test_without_a_robot_the_import_says_what_to_install(robot: str) -> None:
 
     assert done.returncode != 0
     assert f'pip install "o80-{robot}"' in done.stderr
+
+
+def test_the_program_says_what_it_does() -> None:
+    program = Path(sys.executable).parent / "o80-table-tennis"
+    done = subprocess.run([program, "--help"], capture_output=True, text=True)
+
+    assert done.returncode == 0, done.stderr
+    assert "Plays table tennis in real time, then accelerated" in done.stdout
