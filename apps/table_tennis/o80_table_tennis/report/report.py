@@ -204,7 +204,7 @@ def _percentile_label(key: str) -> str:
     name, _, percentile = key.rpartition("_p")
     what = {
         "arm_lateness_us": "arm late by at most",
-        "arm_jitter_us": "arm's period off by at most",
+        "arm_jitter_us": "arm period off by",
     }.get(name, name)
     return f"{what}, {percentile} % of rows [us]"
 
