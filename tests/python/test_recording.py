@@ -1,6 +1,9 @@
 """Recording robots: restarts, patterns, gaps, marks, and what stands in the way."""
 
+import contextlib
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -114,6 +117,44 @@ def test_a_recorder_reads_to_the_end_of_a_robot_that_has_ended(
     recorder.finish()
 
     assert o80.open(tmp_path / "run.mcap")[segment].epochs[0].rows == 41
+
+
+class RestartsWhenAsked:
+    """A frontend whose backend publishes five rows and is restarted when its life is asked for."""
+
+    def __init__(self, frontend: Any, restart: Callable[[], None]) -> None:
+        self._frontend, self._restart = frontend, restart
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._frontend, name)
+
+    @property
+    def alive(self) -> bool:
+        self._restart()
+        return False
+
+
+def test_the_last_rows_before_a_restart_are_not_lost(segment: str, tmp_path: Path) -> None:
+    load = o80.robots.load("two_joints").inline
+    with contextlib.ExitStack() as stack:
+        arm = load(segment)
+        recorder = Recorder(tmp_path / "run.mcap", [segment])
+        recorder.catch_up()
+
+        def restart() -> None:
+            if not arm.closed:
+                arm.burst(5)
+                arm.close()
+                stack.enter_context(load(segment))
+
+        source: Any = recorder.sources[segment]
+        source._frontend = RestartsWhenAsked(source._frontend, restart)
+        source._look_at = 0.0  # it may attach at once
+        while not arm.closed or source.newest != 0:
+            recorder.poll()
+        recorder.finish()
+
+    assert [epoch.rows for epoch in o80.open(tmp_path / "run.mcap")[segment].epochs] == [6, 1]
 
 
 def test_log_times_are_the_wall_clock(process: o80.robots.Process, tmp_path: Path) -> None:

@@ -80,8 +80,10 @@ class Source:
             return None
         assert self._frontend is not None
         block = self._read(self._frontend)
-        if block is None and not self._frontend.alive and self._attach():
-            block = self._read(self._frontend)
+        if block is None and not self._frontend.alive:
+            block = self._read(self._frontend)  # rows published just before its end
+            if block is None and self._attach():
+                block = self._read(self._frontend)
         return block
 
     # ------------------------------------------------------------------ which backend
