@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from o80 import _core
+from o80.checked import whole
 from o80.layout import dtype_of_type, is_plain
 from o80.words import Reason, Status
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from o80.frontend.describing import Describing
 
 _MOST = 4096  # native entries converted at a time
+_NEVER = 2**62  # a number that no entry reaches
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,7 @@ class Journal:
         if new:
             self._core.seek_end()
         elif since is not None:
-            self._core.seek(since)
+            self._core.seek(min(whole(since, "since", 0), _NEVER))
 
     @property
     def exists(self) -> bool:

@@ -1,8 +1,10 @@
 """What a frontend reads of the decisions of its backend, also of commands of others."""
 
 import contextlib
+from typing import Any
 
 import numpy as np
+import pytest
 
 import o80
 from o80.journal import Journal, JournalEntry
@@ -146,3 +148,13 @@ def test_a_request_comes_with_its_values(arm: o80.Frontend) -> None:
     ]
     assert taken.commands[0].request == "reset"
     assert taken.commands[0].fields == {"seed": 7}
+
+
+@pytest.mark.parametrize("since", [-1, "first", 1.5, True])
+def test_a_first_entry_that_cannot_be_is_refused(since: Any, arm: o80.Frontend) -> None:
+    with pytest.raises(o80.InvalidArgument, match="since must be"):
+        arm.journal(since=since)
+
+
+def test_there_is_nothing_after_the_newest_entry(arm: o80.Frontend) -> None:
+    assert arm.journal(since=2**80) == []

@@ -27,7 +27,7 @@ class ReachTask:
 
     tolerance: float = 0.03
     """The racket has reached a goal that is at most this far away [m], unless it moves."""
-    slowest: float = 0.5
+    resting_speed: float = 0.5
     """It counts as moving if a joint is faster than this [rad/s]."""
     spread: float = 0.4
     """Largest difference of a drawn posture from the start, on each joint [rad]."""
@@ -66,7 +66,7 @@ class ReachTask:
 
     def end(self, state: State) -> NDArray[np.int64]:
         """(...) the goal is reached, or the steps are over."""
-        slow = np.abs(state.joint_velocities).max(axis=-1) <= self.slowest
+        slow = np.abs(state.joint_velocities).max(axis=-1) <= self.resting_speed
         reached = (self._distance(state) <= self.tolerance) & slow
         over = np.where(np.asarray(state.steps) >= self.most_steps, End.OUT_OF_STEPS, End.RUNNING)
         return np.where(reached, End.GOAL, over).astype(np.int64)
