@@ -63,7 +63,7 @@ install_tools() {
   say "installing what building, running ${1:+and testing }needs"
   pip install 'pip>=25.1'
   .venv/bin/python tools/build_requirements.py build > build/requirements.txt
-  .venv/bin/python tools/build_requirements.py run rendering >> build/requirements.txt
+  .venv/bin/python tools/build_requirements.py run rendering record >> build/requirements.txt
   pip install -r build/requirements.txt --group build ${1:+--group "$1"}
 }
 

@@ -2,7 +2,7 @@
 
 Starts the arm in real time (500 Hz, a process of its own), its simulated twin (bursting, another
 one) and an environment between them, plays episodes, then plays accelerated, as processes and
-inline. Prints rates, lateness and hits; writes plots, a film, the recorded history and a report.
+inline. Prints rates, lateness and hits; writes a recording, plots, a film and a report.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import signal
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,8 +27,9 @@ from .balls.sources import balls_from
 from .environment import TableTennisEnvironment
 from .players.policies import DEFAULT_FACTOR, default_policy
 from .playing import play
-from .report.episode_record import EpisodeSummary, load_records
+from .report.episode_summary import EpisodeSummary
 from .report.played import Played
+from .report.recorded_episodes import RecordedEpisode, recorded_episodes
 from .report.report import Report, write_report
 from .settings import Pacing, RigSettings, TaskSettings
 
@@ -57,6 +58,11 @@ class DemoSettings:
         """The arm and its twin, running like this."""
         return RigSettings(pacing=pacing, extra_balls=self.extra_balls, muscle=self.muscle)
 
+    @property
+    def recording(self) -> Path:
+        """The file with every row of all modes."""
+        return self.output / "run.mcap"
+
     def episodes_of(self, pacing: Pacing) -> int:
         """How many episodes are played like this."""
         return self.real_time_episodes if pacing.real_time else self.episodes
@@ -66,6 +72,7 @@ def run_demo(settings: DemoSettings, console: Console) -> Report:
     """Plays all modes, writes all files, returns the report."""
     begin = time.monotonic()
     settings.output.mkdir(parents=True, exist_ok=True)
+    settings.recording.unlink(missing_ok=True)
     available = len(balls_from(settings.task().balls))
     modes: dict[Pacing, Played] = {}
     with _progress(console) as progress:
@@ -80,7 +87,7 @@ def run_demo(settings: DemoSettings, console: Console) -> Report:
         report = write_report(
             settings.output,
             modes,
-            {pacing: load_records(_history(settings, pacing)) for pacing in modes},
+            _recorded(settings, modes),
             film=settings.film,
             begin=begin,
         )
@@ -94,19 +101,24 @@ def _play_mode(
     available: int,
     after_each: Callable[[EpisodeSummary], None],
 ) -> Played:
-    """Episodes of one mode, recorded by a logger of their own."""
-    folder = _history(settings, pacing)
-    folder.mkdir(parents=True, exist_ok=True)
-    for old in folder.glob("episode_*.npz"):
-        old.unlink()
-    environment = TableTennisEnvironment(rig=settings.rig(pacing), task=settings.task(), log=folder)
+    """Episodes of one mode, added to the recording."""
+    environment = TableTennisEnvironment(
+        rig=settings.rig(pacing), task=settings.task(), record=settings.recording
+    )
     with closing(environment):
         balls = (number % available for number in range(settings.episodes_of(pacing)))
         return play(environment, default_policy(), balls, seed=settings.seed, after_each=after_each)
 
 
-def _history(settings: DemoSettings, pacing: Pacing) -> Path:
-    return settings.output / "history" / pacing.name.lower()
+def _recorded(
+    settings: DemoSettings, modes: Iterable[Pacing]
+) -> dict[Pacing, list[RecordedEpisode]]:
+    """The recorded episodes of each mode."""
+    episodes = recorded_episodes(settings.recording)
+    return {
+        pacing: [episode for episode in episodes if episode.pacing == pacing.value]
+        for pacing in modes
+    }
 
 
 def _progress(console: Console) -> Progress:
@@ -177,7 +189,14 @@ def main(
     except o80.Error as error:
         print(f"o80: {error}", file=sys.stderr)
         raise typer.Exit(1) from error
-    console.print(f"report, plots, film and history: {output}")
+    _say_where(settings, console)
+
+
+def _say_where(settings: DemoSettings, console: Console) -> None:
+    """What was written, and how to look at it."""
+    console.print(f"report, plots and film: {settings.output}", soft_wrap=True)
+    console.print("recording, to be looked at with", soft_wrap=True)
+    console.print(f"  o80 plot {settings.recording}", soft_wrap=True)
 
 
 def run() -> None:

@@ -25,8 +25,9 @@ from .arguments import (
 )
 from .balls.draw import NO_BALLS, draw_balls
 from .balls.sources import balls_from
-from .report.episode_record import EpisodeSummary
-from .report.logger import EpisodeLogger
+from .report.episode_recorder import EpisodeRecorder
+from .report.episode_summary import EpisodeSummary
+from .report.pictures import Pictures
 from .report.statistics import Statistics, StepCounts, statistics_of
 from .rig.rig import Rig
 from .rig.virtual_balls import VirtualBalls
@@ -63,6 +64,9 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
     `options` of `reset`: `ball`, the number of the ball to be played (else drawn from the seed), or
     `flight`, a SampledFlight of the caller's own. `statistics()` tells rates and lateness.
 
+    `record="run.mcap"` records every row of arm and twins, and marks the episodes; a file that
+    exists is continued. `report.recorded_episodes` reads it, see also `o80.open`.
+
     Closing it, or leaving its `with` block, ends the arm and the twins that it started.
     """
 
@@ -75,11 +79,10 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         task: TaskSettings | None = None,
         render_mode: str | None = None,
         camera: str = "side",
-        log: Path | None = None,
+        record: str | Path | None = None,
     ) -> None:
         refuse_wrong_arguments(rig, task, render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode
-        self._camera = camera
         self._settings, self._rig_settings = task or TaskSettings(), rig or RigSettings()
         self._task = self._settings.made()
         refuse_extra_balls_without_ball(self._rig_settings, plays_ball=self._task.plays_ball)
@@ -96,16 +99,16 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         self._begun = False
         self._over = True
         self._summary: EpisodeSummary | None = None
-        self._scene: Any = None
-        self._logger: EpisodeLogger | None = None
+        self._pictures: Pictures | None = None
+        self._recorder: EpisodeRecorder | None = None
         self._rig = Rig(self._rig_settings)
         try:
             self._arm, self._twin = self._rig.arm, self._rig.twins[0]
             self._virtual = VirtualBalls(self._rig.twins, self._rig_settings, self._task)
-            if log is not None:
-                self._logger = EpisodeLogger(
-                    log, arm=self._arm.frontend.segment, twin=self._twin.frontend.segment
-                )
+            if render_mode is not None:
+                self._pictures = Pictures(self._rig, self._virtual, camera=camera)
+            if record is not None:
+                self._recorder = EpisodeRecorder(Path(record), self._rig, self._settings)
         except BaseException:
             self.close()
             raise
@@ -131,9 +134,11 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
             arm_seed=arm_seed, twin_seed=twin_seed, flights=self._virtual.share(drawn.flights)
         )
 
+        self._drawn = drawn
+        self._seeds = {"seed": self.np_random_seed, "arm_seed": arm_seed, "twin_seed": twin_seed}
         self._twin_first = self._rig.twin_row
         self._asked = self._arm.asked
-        self._ball, self._steps, self._paid = drawn.numbers[0], 0, 0.0
+        self._steps, self._paid = 0, 0.0
         self._begun, self._over, self._summary = False, False, None
         self._episode += 1
         self._virtual.begin(drawn.numbers[1:])
@@ -141,7 +146,9 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         self._state = state = State(
             0, arm.last_motion, arm.pressures, arm.last_racket, twin.ball, twin.record, goal
         )
-        return self._box.clip(self._task.observe(state)), self._info(state, End.RUNNING)
+        observation = self._box.clip(self._task.observe(state))
+        self._first_observation = observation.copy()
+        return observation, self._info(state, End.RUNNING)
 
     def step(self, action: Action) -> Outcome:
         """Five iterations of the arm and of every twin; see the module for their order."""
@@ -159,11 +166,20 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         rig.ask(self._changed(action), delay=self._settings.delay)
         rig.step_arm()
         rig.step_twins()
-        return self._outcome(called)
+        return self._outcome(called, action)
 
     def _begin(self) -> None:
         """The first step: an episode begins with it, however long the caller took to think."""
         self._begun = True
+        if self._recorder is not None:
+            self._recorder.begin(
+                self._first_observation,
+                number=self._episode,
+                ball=self._drawn.numbers[0],
+                extra_balls=self._drawn.numbers[1:],
+                goal=self._state.goal,
+                **self._seeds,
+            )
         self._first_step_at = time.monotonic()
         self._rig.begin()
         self._arm_first = self._rig.row
@@ -173,10 +189,11 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         self._asked = changed_pressures(self._asked, action, factor=self._settings.factor)
         return self._asked
 
-    def _outcome(self, called: float) -> Outcome:
+    def _outcome(self, called: float, action: Action) -> Outcome:
         """The result of a step that began at `called` on the clock [s]."""
         self._steps += 1
-        self._count()
+        lateness = self._rig.lateness if self._real_time else 0
+        self._counts.add_step(exact=self._rig.exact, lateness=lateness, late=self._arm.late)
         state = self._look()
         observation = self._box.clip(self._task.observe(state))
         end, reward = End.RUNNING, 0.0
@@ -184,40 +201,43 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
             end, reward = End(int(self._task.end(state))), float(self._task.reward(state))
         self._paid += reward
         info = self._info(state, end)
+        if self._recorder is not None:
+            self._recorder.step(action, reward, observation)
         self._counts.seconds_stepping += time.perf_counter() - called
         if end is End.RUNNING:
             return observation, reward, False, False, info
-        self._finish(end.text)
+        self._finish(end.text, terminated=end.terminated)
         return observation, reward, end.terminated, end.truncated, info
 
     def _stall(self) -> Outcome:
         """The arm has moved on too far for the twin to follow: the episode is given up."""
         self._counts.stalled_episodes += 1
-        self._finish(STALLED)
+        self._finish(STALLED, terminated=False)
         observation = self._box.clip(self._task.observe(self._state))
         info = self._task.info(self._state) | {"stalled": True, "end": STALLED}
         return observation, 0.0, False, True, info
 
-    def _finish(self, end: str) -> None:
-        """The episode is over: its summary, its record."""
+    def _finish(self, end: str, *, terminated: bool) -> None:
+        """The episode is over: its summary, its mark in the recording."""
         self._over = True
         self._counts.episodes += 1
         self._counts.seconds += time.monotonic() - self._first_step_at
         self._summary = EpisodeSummary(
-            episode=self._episode,
-            ball=self._ball,
+            number=self._episode,
+            ball=self._drawn.numbers[0],
             steps=self._steps,
             reward=self._paid,
             hit=bool(self._state.record.touched),
             returned=bool(self._state.record.flew_back),
+            terminated=terminated,
             end=end,
             arm_first=self._arm_first,
             arm_last=self._rig.row,
             twin_first=self._twin_first,
             twin_last=self._rig.twin_row,
         )
-        if self._logger is not None:
-            self._logger.add(self._summary)
+        if self._recorder is not None:
+            self._recorder.end(self._summary)
 
     # ------------------------------------------------------------------ rows => observation, info
 
@@ -236,17 +256,6 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         if self._rig_settings.extra_balls:
             info["virtual"] = self._virtual.look(state, over=end is not End.RUNNING)
         return info
-
-    def _count(self) -> None:
-        """Whether the step was exact, by the numbers of the iterations, and how late it was."""
-        counts = self._counts
-        counts.steps += 1
-        counts.exact_steps += self._rig.exact
-        if self._real_time:
-            lateness = self._rig.lateness
-            counts.summed_lateness += lateness
-            counts.largest_lateness = max(counts.largest_lateness, lateness)
-            counts.late_actions += self._arm.late
 
     # ------------------------------------------------------------------ beside the episode
 
@@ -268,22 +277,17 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
 
     def render(self) -> Any:
         """A picture (480, 640, 3) of arm and balls as they were last published."""
-        if self.render_mode is None:
+        if self._pictures is None:
             gymnasium.logger.warn("no render mode was chosen: make it with render_mode='rgb_array'")
             return None
-        if self._scene is None:
-            from .report.rendering import Scene
-
-            self._scene = Scene(balls=1 + self._rig_settings.extra_balls)
-        return self._scene.draw(
-            self._twin.joint_positions, self._virtual.positions(), camera=self._camera
-        )
+        return self._pictures.render()
 
     def close(self) -> None:
         """Ends everything that was started; may be called twice."""
-        if self._logger is not None:
-            self._logger.close()
-        if self._scene is not None:
-            self._scene.close()
-            self._scene = None
-        self._rig.close()
+        try:
+            if self._recorder is not None:
+                self._recorder.close()
+        finally:
+            if self._pictures is not None:
+                self._pictures.close()
+            self._rig.close()

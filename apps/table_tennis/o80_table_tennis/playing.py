@@ -10,7 +10,7 @@ import gymnasium
 
 from .environment import TableTennisEnvironment
 from .players.policies import Policy
-from .report.episode_record import EpisodeSummary
+from .report.episode_summary import EpisodeSummary
 from .report.played import Played
 
 

@@ -1,5 +1,6 @@
 """Environments for the tests of them."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,9 +18,14 @@ WAITING = 10.0  # [s]
 
 
 def opened(
-    pacing: Pacing = Pacing.INLINE, *, task: TaskSettings | None = None, **rig: Any
+    pacing: Pacing = Pacing.INLINE,
+    *,
+    task: TaskSettings | None = None,
+    record: Path | None = None,
+    **rig: Any,
 ) -> TableTennisEnvironment:
-    return TableTennisEnvironment(rig=RigSettings(pacing=pacing, **rig), task=task or PATIENT)
+    settings = RigSettings(pacing=pacing, **rig)
+    return TableTennisEnvironment(rig=settings, task=task or PATIENT, record=record)
 
 
 def played_out(environment: TableTennisEnvironment, action: np.ndarray = STILL) -> list[Any]:

@@ -9,11 +9,10 @@ import time
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 import o80
-from o80_table_tennis.report.episode_record import EpisodeRecord, load_records
+from o80_table_tennis.report.recorded_episodes import recorded_episodes
 
 RECORDINGS = Path(__file__).resolve().parents[4] / "shared" / "data" / "ball_gun_2019"
 EPISODES = 4
@@ -114,27 +113,18 @@ def test_the_film_is_there(played: tuple[Path, str], report: dict[str, Any]) -> 
     assert (played[0] / "episode.mp4").stat().st_size > 1_000
 
 
-@pytest.mark.parametrize("mode", ["real_time", "processes", "inline"])
-def test_the_logger_kept_every_row(played: tuple[Path, str], mode: str) -> None:
-    records = load_records(played[0] / "history" / mode)
-    assert len(records) == (1 if mode == "real_time" else EPISODES)
-    for record in records:
-        rows = 5 * record.summary.steps + 1
-        for iterations in (record.arm_iterations, record.twin_iterations):
-            np.testing.assert_array_equal(np.diff(iterations), 1)
-            assert len(iterations) == rows
-        # from the first step on, the twin is the arm
-        np.testing.assert_array_equal(record.twin_joint_positions[1:], record.joint_positions[1:])
-        assert record.balls.shape == (rows, 1, 3)
+@pytest.mark.parametrize("mode", MODES)
+def test_every_episode_is_in_the_recording(played: tuple[Path, str], mode: str) -> None:
+    episodes = [each for each in recorded_episodes(played[0] / "run.mcap") if each.pacing == mode]
+    assert len(episodes) == (1 if mode == "real time" else EPISODES)
+    for episode in episodes:
+        rows = 5 * episode.summary.steps + 1
+        assert len(episode.arm) == len(episode.twin) == rows
 
 
-def test_a_record_comes_back_as_it_was_saved(played: tuple[Path, str], tmp_path: Path) -> None:
-    record = load_records(played[0] / "history" / "inline")[0]
-    record.save(tmp_path / "again.npz")
-    again = EpisodeRecord.load(tmp_path / "again.npz")
-    assert again.summary == record.summary
-    np.testing.assert_array_equal(again.balls, record.balls)
-    np.testing.assert_array_equal(again.times, record.times)
+def test_it_says_how_to_look_at_the_recording(played: tuple[Path, str]) -> None:
+    folder, text = played
+    assert f"o80 plot {folder / 'run.mcap'}" in text
 
 
 @pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from .episode_record import EpisodeSummary
+from .episode_summary import EpisodeSummary
 from .statistics import Statistics
 
 

@@ -13,7 +13,8 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from ..world.table import NET_HEIGHT, TABLE
-from .episode_record import EpisodeRecord, EpisodeSummary
+from .episode_summary import EpisodeSummary
+from .recorded_episodes import RecordedEpisode
 
 FloatArray = NDArray[np.float64]
 
@@ -22,21 +23,21 @@ RESOLUTION = 110
 BALL, RACKET, HIT = "tab:orange", "tab:red", "tab:green"
 
 
-def plot_motion(path: Path, record: EpisodeRecord) -> None:
+def plot_motion(path: Path, episode: RecordedEpisode) -> None:
     """Joint angles and velocities, and the pressures of all muscles, over time."""
     figure = Figure(figsize=(10, 9), layout="constrained")
     angles, velocities, pressures = figure.subplots(3, 1, sharex=True)
-    figure.suptitle(_title(record, "motion of the arm"))
-    times = record.times
+    figure.suptitle(_title(episode, "motion of the arm"))
+    times, motion = episode.times, episode.arm.extended
 
-    for joint in range(record.joint_positions.shape[1]):
+    for joint in range(motion.joint_positions.shape[1]):
         label, colour = f"joint {joint + 1}", f"C{joint}"
-        angles.plot(times, record.joint_positions[:, joint], color=colour, label=label)
-        velocities.plot(times, record.joint_velocities[:, joint], color=colour, label=label)
+        angles.plot(times, motion.joint_positions[:, joint], color=colour, label=label)
+        velocities.plot(times, motion.joint_velocities[:, joint], color=colour, label=label)
         for muscle, style, name in ((2 * joint, "-", "agonist"), (2 * joint + 1, "--", "antag.")):
             pressures.plot(
                 times,
-                record.pressures[:, muscle] / 1000,
+                episode.arm.observed[:, muscle] / 1000,
                 style,
                 color=colour,
                 label=f"{name} {joint + 1}",
@@ -45,7 +46,7 @@ def plot_motion(path: Path, record: EpisodeRecord) -> None:
     velocities.set_ylabel("velocity [rad/s]")
     pressures.set_ylabel("pressure [1000 raw units]")
     pressures.set_xlabel("time since the first step [s]")
-    touch = _touch_time(record)
+    touch = _touch_time(episode)
     for axes in (angles, velocities, pressures):
         axes.grid(alpha=0.3)
         if touch is not None:
@@ -54,13 +55,13 @@ def plot_motion(path: Path, record: EpisodeRecord) -> None:
     figure.savefig(path, dpi=RESOLUTION)
 
 
-def plot_paths(path: Path, record: EpisodeRecord) -> None:
+def plot_paths(path: Path, episode: RecordedEpisode) -> None:
     """Ball and racket seen from the side and from above."""
     figure = Figure(figsize=(10, 7.5), layout="constrained")
     side, above = figure.subplots(2, 1)
-    figure.suptitle(_title(record, "paths of ball and racket"))
-    _draw_paths(side, record, vertical=2)
-    _draw_paths(above, record, vertical=0)
+    figure.suptitle(_title(episode, "paths of ball and racket"))
+    _draw_paths(side, episode, vertical=2)
+    _draw_paths(above, episode, vertical=0)
 
     near, far = _edges(1)
     side.add_patch(
@@ -130,26 +131,27 @@ def plot_overview(
     figure.savefig(path, dpi=RESOLUTION)
 
 
-def _draw_paths(axes: Axes, record: EpisodeRecord, *, vertical: int) -> None:
-    ball, racket = record.balls[:, 0], record.racket_positions
+def _draw_paths(axes: Axes, episode: RecordedEpisode, *, vertical: int) -> None:
+    ball, racket = episode.balls[:, 0], episode.arm.extended.racket_position
     axes.plot(ball[:, 1], ball[:, vertical], ".-", markersize=2, color=BALL, label="ball")
     axes.plot(ball[0, 1], ball[0, vertical], "o", color=BALL, label="first row")
     axes.plot(racket[:, 1], racket[:, vertical], color=RACKET, label="racket centre")
-    touch = _touch_row(record)
+    touch = _touch_row(episode)
     if touch is not None:
         axes.plot(ball[touch, 1], ball[touch, vertical], "*", markersize=12, color=HIT, label="hit")
 
 
-def _touch_row(record: EpisodeRecord) -> int | None:
+def _touch_row(episode: RecordedEpisode) -> int | None:
     """The row in which the racket met the ball: the largest change of its velocity to the front."""
-    if not record.summary.hit:
+    if not episode.summary.hit:
         return None
-    return int(np.argmax(np.diff(record.ball_velocities[:, 0, 1]))) + 1
+    velocities = episode.twin.observed.balls["velocity"]
+    return int(np.argmax(np.diff(velocities[:, 0, 1]))) + 1
 
 
-def _touch_time(record: EpisodeRecord) -> float | None:
-    row = _touch_row(record)
-    return None if row is None else float(record.times[row])
+def _touch_time(episode: RecordedEpisode) -> float | None:
+    row = _touch_row(episode)
+    return None if row is None else float(episode.times[row])
 
 
 def _histogram(axes: Axes, values: FloatArray, label: str) -> None:
@@ -169,7 +171,7 @@ def _edges(axis: int) -> tuple[float, float]:
     return TABLE.centre[axis] - half, TABLE.centre[axis] + half
 
 
-def _title(record: EpisodeRecord, what: str) -> str:
-    summary = record.summary
+def _title(episode: RecordedEpisode, what: str) -> str:
+    summary = episode.summary
     touched = "hit" if summary.hit else "no hit"
-    return f"{what}: episode {summary.episode}, {touched}, reward {summary.reward:.2f}"
+    return f"{what}: episode {summary.number}, {touched}, reward {summary.reward:.2f}"

@@ -16,8 +16,8 @@ from rich.table import Table as Grid
 
 from ..settings import Pacing
 from ..world.timing import ITERATIONS
-from .episode_record import EpisodeRecord
 from .played import Played
+from .recorded_episodes import RecordedEpisode
 
 Value = float | int | bool | str | None
 PERCENTILES = (50, 90, 99, 99.9, 100)
@@ -41,7 +41,7 @@ LABELS = {
     "arm_rate": "iterations of the arm a second [1/s]",
     "arm_overruns": "overruns of the arm",
     "arm_skipped": "periods the arm left out",
-    "recorded_episodes": "episodes in the recorded history",
+    "recorded_episodes": "episodes in the recording",
     "seconds": "seconds played",
 }
 
@@ -75,15 +75,15 @@ class Report:
 def write_report(
     output: Path,
     modes: Mapping[Pacing, Played],
-    records: Mapping[Pacing, Sequence[EpisodeRecord]],
+    recorded: Mapping[Pacing, Sequence[RecordedEpisode]],
     *,
     film: bool,
     begin: float,
 ) -> Report:
     """Draws the plots and the film, and writes report.json; `begin` is monotonic time [s]."""
-    drawn = _draw(output, modes, records, film=film)
+    drawn = _draw(output, modes, recorded, film=film)
     numbers = {
-        pacing.value: mode_numbers(pacing, played, records[pacing])
+        pacing.value: mode_numbers(pacing, played, recorded[pacing])
         for pacing, played in modes.items()
     }
     report = Report(modes=numbers, whole={**drawn, "seconds": round(time.monotonic() - begin, 1)})
@@ -92,7 +92,7 @@ def write_report(
 
 
 def mode_numbers(
-    pacing: Pacing, played: Played, records: Sequence[EpisodeRecord]
+    pacing: Pacing, played: Played, recorded: Sequence[RecordedEpisode]
 ) -> dict[str, Value]:
     """All numbers of one mode."""
     statistics = played.statistics
@@ -110,7 +110,7 @@ def mode_numbers(
         "bare_steps_per_second": round(statistics.bare_steps_per_second, 1),
         "times_real_time": round(statistics.steps_per_second * statistics.step_seconds, 2),
         "arm_iterations": statistics.arm_iterations,
-        "recorded_episodes": len(records),
+        "recorded_episodes": len(recorded),
         "seconds": round(played.seconds, 2),
     }
     if pacing.real_time:
@@ -131,7 +131,7 @@ def mode_numbers(
 def _draw(
     output: Path,
     modes: Mapping[Pacing, Played],
-    records: Mapping[Pacing, Sequence[EpisodeRecord]],
+    recorded: Mapping[Pacing, Sequence[RecordedEpisode]],
     *,
     film: bool,
 ) -> dict[str, Value]:
@@ -151,11 +151,11 @@ def _draw(
             statistics.arm_periods_us,
             period=1e6 * statistics.step_seconds / ITERATIONS,
         )
-    shown = best_record([record for played in records.values() for record in played])
+    shown = best_of([episode for episodes in recorded.values() for episode in episodes])
     if shown is not None:
         plot_motion(output / "motion.png", shown)
         plot_paths(output / "paths.png", shown)
-        files["shown_episode"] = shown.summary.episode
+        files["shown_episode"] = shown.summary.number
         files["shown_episode_hit"] = shown.summary.returned
         files["shown_episode_reward"] = round(shown.summary.reward, 4)
         if film:
@@ -163,29 +163,29 @@ def _draw(
     return files
 
 
-def best_record(records: Sequence[EpisodeRecord]) -> EpisodeRecord | None:
+def best_of(recorded: Sequence[RecordedEpisode]) -> RecordedEpisode | None:
     """The best paid in which the ball flew back, else the best paid of all that came to an end."""
     return max(
-        records,
-        key=lambda record: (
-            record.summary.returned,
-            record.summary.end != "stalled",
-            record.summary.reward,
+        recorded,
+        key=lambda episode: (
+            episode.summary.returned,
+            episode.summary.end != "stalled",
+            episode.summary.reward,
         ),
         default=None,
     )
 
 
-def _film(output: Path, record: EpisodeRecord) -> dict[str, Value]:
+def _film(output: Path, episode: RecordedEpisode) -> dict[str, Value]:
     """A machine that cannot draw has no film, and says why; all else goes on."""
     from .rendering import film_episode
 
     try:
         frames = film_episode(
             output / "episode.mp4",
-            record.twin_joint_positions,
-            record.balls,
-            period=record.period,
+            episode.twin.observed.joints["position"],
+            episode.balls,
+            period=episode.period,
         )
     except Exception as error:
         return {"film_frames": 0, "no_film_because": f"{type(error).__name__}: {error}"}

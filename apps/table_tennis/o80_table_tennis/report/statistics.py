@@ -32,6 +32,14 @@ class StepCounts:
     largest_lateness: int = 0
     """[rows]"""
 
+    def add_step(self, *, exact: bool, lateness: int, late: bool) -> None:
+        """Whether the step was exact, by the numbers of the iterations, and how late it was."""
+        self.steps += 1
+        self.exact_steps += exact
+        self.summed_lateness += lateness
+        self.largest_lateness = max(self.largest_lateness, lateness)
+        self.late_actions += late
+
 
 @dataclass(frozen=True)
 class Statistics:

@@ -1,0 +1,170 @@
+"""Recordings of environments: every row, every episode, what each step was worth."""
+
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from opened_environment import PATIENT, PUSH, STILL, WAITING, opened, played_out
+
+import o80
+import o80_table_tennis
+from o80_table_tennis.report.recorded_episodes import RecordedEpisode, recorded_episodes
+from o80_table_tennis.settings import Pacing, TaskSettings
+
+SHORT = 200  # rows of a history
+Rows = dict[str, NDArray[Any]]
+
+
+def rows_in(path: Path) -> Rows:
+    """All rows of a recording, by segment."""
+    recording = o80.open(path)
+    assert recording.finished
+    assert not any(epoch.gaps for name in recording for epoch in recording[name].epochs)
+    return {name: recording[name].history().rows for name in recording}
+
+
+@pytest.mark.parametrize("pacing", list(Pacing))
+def test_a_recording_holds_every_row_bit_for_bit(pacing: Pacing, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with opened(pacing, record=path, twins=2, extra_balls=1) as environment:
+        environment.reset(seed=1)
+        played_out(environment)
+        rig = environment.rig
+        frontends = [rig.arm.frontend, *(twin.frontend for twin in rig.twins)]
+        live = {each.segment: each.history().rows for each in frontends}
+    recorded = rows_in(path)
+
+    assert list(recorded) == list(live)
+    for name, rows in live.items():
+        assert rows["iteration"][0] == recorded[name]["iteration"][0] == 0
+        assert recorded[name][: len(rows)].tobytes() == rows.tobytes()
+
+
+@pytest.mark.parametrize("pacing", [Pacing.INLINE, Pacing.PROCESSES])
+def test_no_row_is_lost_where_the_history_is_short(pacing: Pacing, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with opened(pacing, record=path, history=SHORT) as environment:
+        for _ in range(3):
+            environment.reset(seed=1)
+            played_out(environment)
+        published = environment.rig.arm.newest
+
+    arm, twin = rows_in(path).values()
+    assert published > 5 * SHORT
+    np.testing.assert_array_equal(arm["iteration"], np.arange(published + 1))
+    np.testing.assert_array_equal(twin["iteration"], np.arange(len(twin)))
+
+
+@pytest.mark.parametrize("pacing", list(Pacing))
+def test_an_episode_comes_back_as_it_was_played(pacing: Pacing, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    rng = np.random.default_rng(3)
+    with opened(pacing, record=path) as environment:
+        first, _ = environment.reset(seed=7, options={"ball": 3})
+        actions: list[Any] = []
+        steps: list[Any] = []
+        while not steps or not (steps[-1][2] or steps[-1][3]):
+            actions.append(rng.uniform(-1, 1, 8).astype(np.float32))
+            steps.append(environment.step(actions[-1]))
+        summary = environment.summary
+        observations = [first.copy(), *(step[0].copy() for step in steps)]
+        first[:] = steps[0][0][:] = 7.0  # the caller's own
+
+    (episode,) = recorded_episodes(path)
+    assert episode.summary == summary
+    assert episode.pacing == pacing.value
+    assert episode.begun["seed"] == 7
+    assert episode.begun["ball"] == summary.ball == 3
+    assert episode.rewards.sum() == summary.reward
+    assert episode.environment["task"]["factor"] == PATIENT.factor
+    np.testing.assert_array_equal(episode.actions, actions)
+    np.testing.assert_array_equal(episode.rewards, [step[1] for step in steps])
+    np.testing.assert_array_equal(episode.observations, observations)
+    check_rows(episode)
+
+
+def check_rows(episode: RecordedEpisode) -> None:
+    """One row before the first step, five for each step, and the twin is the arm."""
+    rows = 5 * episode.summary.steps + 1
+    for history in (episode.arm, episode.twin):
+        np.testing.assert_array_equal(np.diff(history.iteration), 1)
+        assert len(history) == rows
+    mirrored = episode.twin.observed.joints["position"][1:]
+    np.testing.assert_array_equal(mirrored, episode.arm.extended.joint_positions[1:])
+    assert episode.balls.shape == (rows, 1, 3)
+    assert episode.times[-1] == pytest.approx((rows - 1) * episode.period)
+
+
+def test_each_environment_continues_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    for pacing in (Pacing.INLINE, Pacing.PROCESSES):
+        with opened(pacing, record=path) as environment:
+            for _ in range(2):
+                environment.reset(seed=1)
+                played_out(environment)
+
+    episodes = recorded_episodes(path)
+    assert [(each.pacing, each.summary.number) for each in episodes] == [
+        ("inline", 0),
+        ("inline", 1),
+        ("processes", 0),
+        ("processes", 1),
+    ]
+    for one, other in zip(episodes[:2], episodes[2:], strict=True):
+        assert one.arm.observed.tobytes() == other.arm.observed.tobytes()
+        assert one.balls.tobytes() == other.balls.tobytes()
+
+
+def test_an_abandoned_episode_is_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with opened(record=path) as environment:
+        environment.reset(seed=1)
+        environment.step(PUSH)
+        environment.reset()
+        played_out(environment)
+
+    assert [episode.summary.number for episode in recorded_episodes(path)] == [1]
+    assert [mark.name for mark in o80.open(path).marks] == [
+        "environment",
+        "episode",
+        "episode",
+        "episode_end",
+    ]
+
+
+def test_a_stalled_episode_is_recorded_as_such(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    task = TaskSettings(most_late=200)
+    with opened(Pacing.REAL_TIME, task=task, record=path) as environment:
+        environment.reset(seed=1)
+        environment.step(STILL)
+        arm = environment.rig.arm
+        arm.frontend.wait_for(arm.newest + 250, timeout=WAITING)
+        environment.step(STILL)
+
+    (episode,) = recorded_episodes(path)
+    assert (episode.summary.end, episode.summary.terminated) == ("stalled", False)
+    assert len(episode.actions) == len(episode.rewards) == episode.summary.steps
+
+
+def test_a_recording_through_gymnasium_needs_no_import(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with closing(gymnasium.make(o80_table_tennis.ACCELERATED, record=str(path))) as environment:
+        environment.reset(seed=1)
+        environment.step(STILL)
+
+    assert [mark.name for mark in o80.open(path).marks] == ["environment", "episode"]
+
+
+def test_a_recording_that_cannot_be_made_leaves_nothing_behind(tmp_path: Path) -> None:
+    with pytest.raises(o80.RecordingError, match=r"ends in \.mcap"):
+        opened(record=tmp_path / "run.npz")
+    assert not [segment.name for segment in o80.segments() if segment.life == "running"]
+
+    path = tmp_path / "run.mcap"
+    with opened(record=path), pytest.raises(o80.RecordingError, match="another recorder"):
+        opened(record=path)
