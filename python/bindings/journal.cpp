@@ -1,15 +1,21 @@
 #include "o80/runtime/journal.hpp"
 
 #include <nanobind/nanobind.h>
+#include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <memory>
+#include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bindings.hpp"
 #include "enums.hpp"
 #include "frontend.hpp"
+#include "runtime/raw_journal.hpp"
+#include "runtime/recorded_journal.hpp"
 #include "waiting.hpp"
 
 namespace nb = nanobind;
@@ -65,6 +71,36 @@ std::vector<o80::JournalEntry> entries_of(o80::Journal& journal, std::size_t mos
   return entries;
 }
 
+/// Bytes, number of the first entry, number after the last one, whether there may be more.
+nb::tuple read_raw(o80::RawJournal& journal, std::size_t most) {
+  const o80::RawJournal::Entries entries = journal.read(most);
+  return nb::make_tuple(bytes_of(entries.bytes), entries.first, entries.next, entries.more);
+}
+
+std::vector<o80::JournalEntry> decoded(o80::RecordedJournal& journal, const nb::bytes& bytes) {
+  std::vector<o80::JournalEntry> entries;
+  journal.decode({reinterpret_cast<const std::byte*>(bytes.c_str()), bytes.size()}, entries);
+  return entries;
+}
+
+/// Journals as they are in a segment and in a file.
+void bind_raw(nb::module_& m) {
+  nb::class_<o80::RawJournal>(m, "RawJournal")
+      .def(
+          "__init__",
+          [](o80::RawJournal* self, const Frontend& frontend, std::uint64_t first) {
+            new (self) o80::RawJournal(frontend.untyped(), first);
+          },
+          "frontend"_a, "first"_a)
+      .def_prop_ro("exists", &o80::RawJournal::exists)
+      .def("read", &read_raw, "most"_a,
+           nb::sig("def read(self, most: int) -> tuple[bytes, int, int, bool]"));
+  nb::class_<o80::RecordedJournal>(m, "RecordedJournal")
+      .def(nb::init<std::shared_ptr<const o80::Description>, std::uint64_t>(), "description"_a,
+           "first"_a)
+      .def("decode", &decoded, "entries"_a);
+}
+
 void bind_record(nb::module_& m) {
   using o80::JournalRecord;
   using Target = JournalRecord::Target;
@@ -98,6 +134,7 @@ void bind_journal(nb::module_& m) {
   using o80::Journal;
   using o80::JournalEntry;
   bind_record(m);
+  bind_raw(m);
   nb::class_<JournalEntry>(m, "JournalEntry")
       .def_prop_ro("kind", word(&JournalEntry::kind))
       .def_ro("number", &JournalEntry::number)

@@ -81,7 +81,7 @@ class Journal:
         self, frontend: "Describing", since: int | None = None, *, new: bool = False
     ) -> None:
         self._core = _core.Journal(frontend)
-        self._decoder = _Decoder(frontend._layout.schema)
+        self._decoder = EntryDecoder(frontend._layout.schema)
         if new:
             self._core.seek_end()
         elif since is not None:
@@ -102,7 +102,7 @@ class Journal:
         return found
 
 
-class _Decoder:
+class EntryDecoder:
     """Converts native entries with the schema of a robot."""
 
     def __init__(self, schema: dict[str, Any]) -> None:

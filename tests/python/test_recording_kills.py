@@ -1,4 +1,4 @@
-"""A recorder that is killed at any moment loses no row, and its successor repeats none."""
+"""A recorder killed at any moment loses no row and no decision; its successor repeats none."""
 
 import os
 import random
@@ -44,30 +44,46 @@ def kill_a_recorder(path: Path, name: str, chance: random.Random) -> None:
     os.close(read)
 
 
+def command(robot: o80.Frontend, chance: random.Random) -> None:
+    """Gives the journal something to tell."""
+    for _ in range(chance.randint(0, 3)):
+        robot.add_command(0, chance.random(), iterations=chance.randint(1, 30))
+        robot.pulse()
+
+
 def recorded_iterations(path: Path, name: str) -> "np.ndarray[tuple[int], np.dtype[np.int64]]":
     file = RecordingFile(path)
     return file[name].history().iteration if len(file) else np.empty(0, np.int64)
 
 
 @pytest.mark.check
-def test_no_row_is_lost_and_none_is_written_twice(tmp_path: Path) -> None:
+def test_nothing_is_lost_and_nothing_is_written_twice(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     chance = random.Random(7)
-    with o80.robots.load("two_joints").start(frequency=1000, history=200_000) as process:
+    with (
+        o80.robots.load("two_joints").start(
+            frequency=1000, history=200_000 + 200 * KILLS, journal=1 << 26
+        ) as process,
+        process.frontend() as robot,
+    ):
         name = process.segment
         for _ in range(KILLS):
+            command(robot, chance)
             kill_a_recorder(path, name, chance)
             if path.exists() and path.stat().st_size > 100:
                 assert np.all(np.diff(recorded_iterations(path, name)) == 1)
         recorder = Recorder(path, [name], proceed=True)
         recorder.catch_up()
         recorder.finish()
-        with process.frontend() as robot:
-            recorded = RecordingFile(path)[name].history()
-            first, last = int(recorded.iteration[0]), int(recorded.iteration[-1])
-            there = robot.history(since=first, until=last)
+        epoch = RecordingFile(path)[name].epochs[0]
+        recorded, journal = epoch.history(), epoch.journal()
+        first, last = int(recorded.iteration[0]), int(recorded.iteration[-1])
+        there = robot.history(since=first, until=last)
+        decisions = robot.journal(journal[0].number)
 
     assert len(recorded) > KILLS
     assert np.array_equal(recorded.iteration, np.arange(first, last + 1))
     assert recorded.rows.tobytes() == there.rows.tobytes()
-    assert RecordingFile(path)[name].epochs[0].gaps == []
+    assert epoch.gaps == epoch.journal_gaps == []
+    assert len(journal) > KILLS
+    assert list(map(repr, journal)) == list(map(repr, decisions[: len(journal)]))

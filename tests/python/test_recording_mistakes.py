@@ -11,7 +11,8 @@ import pytest
 
 import o80
 from o80.recording import source
-from o80.recording.recorder import Recorder, opened
+from o80.recording.output import opened
+from o80.recording.recorder import Recorder
 
 O80 = Path(sys.executable).parent / "o80"
 

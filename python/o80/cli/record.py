@@ -1,4 +1,4 @@
-"""``o80 record``: writes the rows of segments to a file."""
+"""``o80 record``: writes rows and journals of segments to a file."""
 
 from __future__ import annotations
 
@@ -51,12 +51,21 @@ def record(
     names: Annotated[
         list[str], typer.Argument(help="Segments; a pattern such as 'arm*' includes later ones.")
     ],
-    output: Annotated[Path, typer.Option("--output", "-o", help="File to write, NAME.mcap.")],
+    output: Annotated[
+        Path,
+        typer.Option("--output", "-o", help="File to write, NAME.mcap; a folder with --split."),
+    ],
     seconds: Annotated[
         float | None, typer.Option(callback=_seconds, help="Stop after this many seconds.")
     ] = None,
     size: Annotated[
-        str | None, typer.Option(help="Stop when the file has this size, for example 2G.")
+        str | None, typer.Option(help="Stop when the recording has this size, for example 2G.")
+    ] = None,
+    split: Annotated[
+        str | None,
+        typer.Option(
+            help="Go on in a new file after this size or time: 500M, 2G, 600s, 10min, 1h."
+        ),
     ] = None,
     proceed: Annotated[
         bool, typer.Option("--continue", help="Append to the file, also to one that was cut.")
@@ -65,7 +74,7 @@ def record(
         bool, typer.Option(help="Begin with the oldest row that a segment still holds.")
     ] = False,
 ) -> None:
-    """Record rows of robots to an MCAP file until Ctrl-C.
+    """Record rows and decisions of robots to an MCAP file until Ctrl-C.
 
     A robot that is not there yet is waited for; one that restarts is recorded on in the same file.
     """
@@ -73,7 +82,7 @@ def record(
 
     most = _size(size)
     end = _Stop()
-    recorder = Recorder(output, names, proceed=proceed, whole=whole)
+    recorder = Recorder(output, names, proceed=proceed, whole=whole, split=split)
     report = _Report(recorder)
     begin = time.monotonic()
     try:
@@ -83,7 +92,7 @@ def record(
             report.show()
             if seconds is not None and started - begin >= seconds:
                 break
-            if most is not None and recorder.file.size >= most:
+            if most is not None and recorder.size >= most:
                 break
             busy = any(source.behind for source in recorder.sources.values())
             if not busy:
@@ -136,7 +145,7 @@ class _Report:
             if not last:
                 line += f", {rate:.0f} a second, {behind} behind"
             line += f", {recorder.missed} missed" if recorder.missed else ""
-            line += f", {_bytes(recorder.file.size)} in {recorder.file.path}"
+            line += f", {_bytes(recorder.size)} in {recorder.path}"
             begin = "\r\033[K" if self._terminal else ""
             print(f"{begin}{line}", end="\n" if last else "", file=sys.stderr, flush=True)
 

@@ -35,14 +35,17 @@ def repair(
     path: Annotated[Path, typer.Argument(help="A recording that was cut.")],
 ) -> None:
     """Complete a recording whose recorder was killed, so that every MCAP reader opens it."""
-    from o80.recording.reader import RecordingFile
-    from o80.recording.recorder import opened
+    from o80.recording.output import opened
+    from o80.recording.reader import RecordingFile, files_of
 
     if RecordingFile(path).finished:
         print(f"{path} is complete")
         return
-    size = path.stat().st_size
-    file = opened(path, proceed=True)
-    kept = file.size
-    file.finish()
-    print(f"{path} is complete now: {kept} bytes kept, {size - kept} bytes behind them removed")
+    for each in files_of(path):
+        if RecordingFile(each).finished:
+            continue
+        size = each.stat().st_size
+        file = opened(each, proceed=True)
+        kept = file.size
+        file.finish()
+        print(f"{each} is complete now: {kept} bytes kept, {size - kept} bytes behind them removed")

@@ -1,4 +1,4 @@
-"""Parts of an MCAP chunk: many messages of one channel, built as one array."""
+"""Parts of an MCAP chunk: many messages of one channel, built as one array; single messages."""
 
 import struct
 from dataclasses import dataclass
@@ -72,6 +72,32 @@ class Block:
         content = entries.tobytes()
         head = struct.pack("<BQHI", MESSAGE_INDEX, 6 + len(content), self.channel, len(content))
         return head + content
+
+
+@dataclass(frozen=True)
+class SingleMessage:
+    """A message in a chunk in which its channel has no other."""
+
+    channel: int
+    time: int  #: log time [ns]
+    message: bytes
+
+    @property
+    def content(self) -> bytes:
+        length = MESSAGE_HEAD.itemsize - LENGTH_ENDS_AT + len(self.message)
+        head = struct.pack("<BQHIQQ", MESSAGE, length, self.channel, 0, self.time, self.time)
+        return head + self.message
+
+    @property
+    def count(self) -> int:
+        return 1
+
+    @property
+    def time_range(self) -> tuple[int, int]:
+        return self.time, self.time
+
+    def index(self, offset: int) -> bytes:
+        return struct.pack("<BQHIQQ", MESSAGE_INDEX, 22, self.channel, 16, self.time, offset)
 
 
 def messages_in(content: bytes, index: NDArray[np.uint64]) -> NDArray[np.uint8]:

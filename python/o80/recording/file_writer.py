@@ -97,6 +97,7 @@ class FileWriter:
                 f"unknown compression '{compression}': choose {' or '.join(COMPRESSIONS)}"
             )
         self.path = path
+        self.compression = compression
         self.size = 0  #: [bytes]
         self._compressor = zstandard.ZstdCompressor(level=1) if compression == "zstd" else None
         self._descriptor: int = os.open(path, os.O_RDWR | os.O_CLOEXEC | flags, 0o644)

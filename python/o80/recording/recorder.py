@@ -7,23 +7,18 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-import numpy as np
-
 from o80.errors import Error, InvalidArgument, RecordingError
-from o80.recording.blocks import messages_in
-from o80.recording.epoch import EpochNote
-from o80.recording.file_writer import FileWriter
-from o80.recording.message_plan import ENCAPSULATION
-from o80.recording.scan import NotARecordingError, content_of, index_of
-from o80.recording.source import Source, Written
+from o80.recording.output import next_file, opened, opened_in, written_in
+from o80.recording.reader import files_of
+from o80.recording.source import Source
+from o80.recording.split import Split
 from o80.segment_list import segments
-from o80.unwritable import reason
 
 BETWEEN_SEARCHES = 0.5  # for segments that match a pattern [s]
 
 
 class Recorder:
-    """Reads segments and writes their rows; `poll` does a part of the work. One thread."""
+    """Reads segments and writes rows and journals; `poll` does a part of the work. One thread."""
 
     between_chunks = 0.1
     """Longest time that `poll` should not be called [s]: what a killed recorder has not written."""
@@ -36,14 +31,17 @@ class Recorder:
         proceed: bool = False,
         whole: bool = False,
         compression: str = "zstd",
+        split: str | None = None,
     ) -> None:
         """names: of segments, or patterns such as "arm*". proceed: continue an existing file.
 
-        path: ends in .mcap. Raises RecordingError, InvalidArgument: then no new file is left.
+        path: ends in .mcap. split: go on in a new file after this size or time, see Split; `path`
+        is a folder of files then. Raises RecordingError, InvalidArgument: then no new file is left.
         """
         if not names:
             raise InvalidArgument("give the name of at least one segment to record")
-        path = Path(path)
+        self.path = path = Path(path)
+        self._split = None if split is None else Split.of(split)
         if path.suffix != ".mcap":
             raise RecordingError(
                 f"the name of a recording ends in .mcap, got '{path}': o80 plot, export and diff "
@@ -51,11 +49,15 @@ class Recorder:
             )
         self._patterns = [name for name in names if any(sign in name for sign in "*?[")]
         new = not path.exists()
-        self.file = opened(path, proceed=proceed, compression=compression)
+        open_file = opened if self._split is None else opened_in
+        self.file = open_file(path, proceed=proceed, compression=compression)
+        before = [each for each in files_of(path) if each != self.file.path]
+        self._bytes_before = sum(each.stat().st_size for each in before)
+        self._file_begun = time.monotonic()
         self.sources: dict[str, Source] = {}
         self._search_at = 0.0
         try:
-            self._written = _written_in(self.file) if proceed else {}
+            self._written = written_in(self.file, before) if proceed else {}
             with self.writing():
                 for name in names:
                     if name not in self._patterns:
@@ -65,8 +67,15 @@ class Recorder:
             self._close_sources()
             self.file.close()
             if new:
-                path.unlink(missing_ok=True)
+                self.file.path.unlink(missing_ok=True)
+                if path.is_dir():
+                    path.rmdir()
             raise
+
+    @property
+    def size(self) -> int:
+        """Of all files so far [bytes]."""
+        return self._bytes_before + self.file.size
 
     @property
     def rows(self) -> int:
@@ -84,11 +93,13 @@ class Recorder:
         return {name: source.newest for name, source in self.sources.items()}
 
     def poll(self) -> int:
-        """Writes a chunk of the rows published since the last call; returns how many rows."""
+        """Writes a chunk of what was published since the last call; returns how many messages."""
         with self.writing():
+            if self._is_full():
+                self._go_on_in_next_file()
             if self._patterns and time.monotonic() >= self._search_at:
                 self._search(whole=True)
-            blocks = [block for source in self.sources.values() if (block := source.poll())]
+            blocks = [block for source in self.sources.values() for block in source.poll()]
             if blocks:
                 self.file.add_chunk(blocks)
         return sum(block.count for block in blocks)
@@ -107,7 +118,7 @@ class Recorder:
             ) from error
 
     def catch_up(self) -> None:
-        """Polls until every row that was published before the call is written."""
+        """Polls until rows and decisions that were published before the call are written."""
         if not self.poll():  # attaches to robots that have just started
             return
         positions = {name: source.position for name, source in self.sources.items()}
@@ -125,6 +136,23 @@ class Recorder:
         for source in self.sources.values():
             source.close()
 
+    def _is_full(self) -> bool:
+        """Whether the next rows belong in another file."""
+        if self._split is None or not self.file.found.chunks:
+            return False
+        return self._split.is_due(self.file.size, self._file_begun)
+
+    def _go_on_in_next_file(self) -> None:
+        """Another recorder that continues finds one of the two files locked at any moment."""
+        full, self.file = self.file, next_file(self.file)
+        self._file_begun = time.monotonic()
+        try:
+            for source in self.sources.values():
+                source.go_on_in(self.file)
+        finally:
+            full.finish()
+            self._bytes_before += full.size
+
     def _add(self, name: str, whole: bool) -> None:
         self.sources[name] = Source(name, self.file, self._written.get(name, {}), whole=whole)
 
@@ -137,45 +165,3 @@ class Recorder:
             matches = any(fnmatch.fnmatchcase(segment.name, each) for each in self._patterns)
             if matches and segment.readable and segment.name not in self.sources:
                 self._add(segment.name, whole)
-
-
-def opened(path: Path, *, proceed: bool, compression: str = "zstd") -> FileWriter:
-    """A new file; or, to `proceed`, the one that is there. Raises RecordingError."""
-    try:
-        if proceed and path.exists():
-            return FileWriter.continued(path, compression=compression)
-        return FileWriter(path, compression=compression)
-    except FileExistsError:
-        raise RecordingError(
-            f"{path} is a folder: give the name of a file"
-            if path.is_dir()
-            else f"{path} exists. Choose another name, or remove it; "
-            f"o80 record --continue appends to it"
-        ) from None
-    except NotARecordingError as error:
-        raise RecordingError(f"{error}: choose another name, or remove it") from None
-    except OSError as error:
-        raise RecordingError(f"{path} cannot be written: {reason(path, error)}") from error
-
-
-def _written_in(file: FileWriter) -> dict[str, dict[int, Written]]:
-    """What the file holds, by segment and epoch."""
-    result: dict[str, dict[int, Written]] = {}
-    with file.path.open("rb") as stream:
-        for channel in file.found.channels.values():
-            note = EpochNote.of(channel.metadata)
-            if note is None:
-                continue
-            last, log_time = -1, 0
-            for chunk in reversed(file.found.chunks):
-                if channel.id not in chunk.message_index_offsets:
-                    continue
-                index = index_of(stream, chunk, channel.id)
-                messages = messages_in(content_of(stream, chunk), index)
-                begin = len(ENCAPSULATION)  # the iteration is the first member
-                last = int(messages[-1, begin : begin + 8].copy().view(np.int64)[0])
-                log_time = int(index[-1, 0])
-                break
-            epochs = result.setdefault(note.segment, {})
-            epochs[note.epoch] = Written(note, channel.id, last, log_time)
-    return result

@@ -16,7 +16,7 @@ BETWEEN_POLLS = 0.05  # [s]
 
 
 class Recording:
-    """Records segments in a thread while its `with` block runs.
+    """Records rows and journals of segments in a thread while its `with` block runs.
 
     with o80.Recording("run.mcap", [arm, "ball"]) as recording:
         recording.mark("episode", number=3)
@@ -26,6 +26,8 @@ class Recording:
         on, of robots that start later from the first.
     proceed: continue an existing file, also one that was cut.
     whole: begin with the oldest rows that the segments still hold.
+    split: go on in a new file after a size ("500M", "2G") or a time ("600s", "10min", "1h"): `path`
+        is then a folder of complete files, which `o80.open` reads as one recording.
 
     A robot whose history is overwritten before the thread reads it leaves a gap: a program that
     bursts very many iterations at once calls `flush` between them. Raises RecordingError.
@@ -38,10 +40,11 @@ class Recording:
         *,
         proceed: bool = False,
         whole: bool = False,
+        split: str | None = None,
     ) -> None:
         several = [segments] if isinstance(segments, (str, Frontend)) else segments
         names = [each.segment if isinstance(each, Frontend) else each for each in several]
-        self._recorder = Recorder(path, names, proceed=proceed, whole=whole)
+        self._recorder = Recorder(path, names, proceed=proceed, whole=whole, split=split)
         self._lock = threading.Lock()
         self._end = threading.Event()
         self._failure: Exception | None = None
@@ -61,8 +64,8 @@ class Recording:
 
     @property
     def size(self) -> int:
-        """Of the file so far [bytes]."""
-        return self._recorder.file.size
+        """Of the recording so far [bytes]."""
+        return self._recorder.size
 
     def flush(self) -> None:
         """Returns when every row that was published before the call is in the file."""
@@ -109,7 +112,7 @@ class Recording:
 
     def _check(self) -> None:
         if self._closed:
-            raise Closed(f"the recording {self._recorder.file.path} was closed")
+            raise Closed(f"the recording {self._recorder.path} was closed")
         if self._failure is not None:
             raise self._failure
 

@@ -7,6 +7,7 @@ group that is not whole.
 
 import os
 import struct
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
@@ -32,6 +33,7 @@ from mcap.stream_reader import breakup_chunk, get_chunk_data_stream
 from numpy.typing import NDArray
 
 from o80.errors import RecordingError
+from o80.recording.blocks import LENGTH_ENDS_AT, MESSAGE_HEAD
 
 MAGIC = b"\x89MCAP0\r\n"
 HEAD = struct.Struct("<BQ")
@@ -88,6 +90,17 @@ def index_of(file: IO[bytes], chunk: ChunkIndex, channel: int) -> NDArray[np.uin
     file.seek(chunk.message_index_offsets[channel] + HEAD.size + 2)
     (length,) = struct.unpack("<I", file.read(4))
     return np.frombuffer(file.read(length), "<u8").reshape(-1, 2)
+
+
+def messages_of(file: IO[bytes], chunk: ChunkIndex, channel: int) -> Iterator[bytes]:
+    """The data of a channel's messages in a chunk, of any size. Raises ValueError."""
+    content = content_of(file, chunk)
+    for _, offset in index_of(file, chunk, channel):
+        begin = int(offset)
+        if begin + MESSAGE_HEAD.itemsize > len(content):
+            raise ValueError("a message index leads out of its chunk")
+        (length,) = struct.unpack_from("<Q", content, begin + 1)
+        yield content[begin + MESSAGE_HEAD.itemsize : begin + LENGTH_ENDS_AT + length]
 
 
 def attachment_of(file: IO[bytes], place: AttachmentIndex) -> Attachment:

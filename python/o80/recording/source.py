@@ -1,14 +1,17 @@
-"""One segment that is recorded: its rows in order, through restarts of its backend."""
+"""One segment that is recorded: rows and journal in order, through restarts of its backend."""
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 
 from o80.errors import BackendGone, SegmentError, TimeoutError
 from o80.frontend import Frontend
-from o80.recording.blocks import Block
-from o80.recording.epoch import EpochNote, RowWriter, note_of
-from o80.recording.file_writer import FileWriter
+from o80.recording.blocks import Block, SingleMessage
+from o80.recording.epoch import RowWriter, note_of
+from o80.recording.file_writer import FileWriter, MessageBlock
+from o80.recording.journal_channel import GAP as JOURNAL_GAP
+from o80.recording.journal_channel import JournalWriter
+from o80.recording.output import Written
 
 GAP = "o80.gap"
 """Name of the metadata record of rows that were overwritten before they were read."""
@@ -16,18 +19,8 @@ LARGEST_BLOCK = 4 << 20  # of the rows read at once [bytes]
 BETWEEN_LOOKS = 0.05  # for a backend that is not there [s]
 
 
-@dataclass(frozen=True)
-class Written:
-    """What a file holds of one epoch already."""
-
-    note: EpochNote
-    channel: int
-    last: int  #: iteration; -1: no row
-    last_log_time: int  #: [ns]
-
-
 class Source:
-    """Reads the rows of a segment by name. Not for several threads."""
+    """Reads rows and journal of a segment by name. Not for several threads."""
 
     def __init__(
         self, name: str, file: FileWriter, written: Mapping[int, Written], *, whole: bool
@@ -42,6 +35,7 @@ class Source:
         self._whole = whole
         self._frontend: Frontend | None = None
         self._writer: RowWriter | None = None
+        self._journal: JournalWriter | None = None
         self._next = 0
         self._last_log_time = max((each.last_log_time for each in written.values()), default=0)
         self._look_at = 0.0
@@ -59,9 +53,13 @@ class Source:
         return (-1 if self._frontend is None else self._frontend.epoch), self.newest
 
     def has_read(self, position: tuple[int, int]) -> bool:
-        """Whether the row at an earlier `position` was read, or lost with its backend."""
+        """Whether the row at an earlier `position` and the decisions until then were read.
+
+        Also if they were lost with their backend.
+        """
         epoch, iteration = position
-        return self.position[0] != epoch or self._next > iteration
+        drained = self._journal is None or self._journal.drained
+        return self.position[0] != epoch or (self._next > iteration and drained)
 
     @property
     def newest(self) -> int:
@@ -74,17 +72,23 @@ class Source:
             self._frontend.close()
             self._frontend = None
 
-    def poll(self) -> Block | None:
-        """The rows that were published since the last call, at most LARGEST_BLOCK bytes."""
+    def poll(self) -> list[MessageBlock]:
+        """The rows and decisions since the last call; at most LARGEST_BLOCK bytes of rows."""
         if self._frontend is None and not self._attach():
-            return None
+            return []
         assert self._frontend is not None
-        block = self._read(self._frontend)
-        if block is None and not self._frontend.alive:
-            block = self._read(self._frontend)  # rows published just before its end
-            if block is None and self._attach():
-                block = self._read(self._frontend)
-        return block
+        blocks = self._read(self._frontend)
+        if not blocks and not self._frontend.alive:
+            blocks = self._read(self._frontend)  # what was published just before its end
+            if not blocks and self._attach():
+                blocks = self._read(self._frontend)
+        return blocks
+
+    def _read(self, frontend: Frontend) -> list[MessageBlock]:
+        """Rows, then the journal, which so has the decisions of all these rows."""
+        rows = self._read_rows(frontend)
+        journal = self._read_journal()
+        return [block for block in (rows, journal) if block is not None]
 
     # ------------------------------------------------------------------ which backend
 
@@ -108,23 +112,44 @@ class Source:
     def _begin(self, frontend: Frontend) -> None:
         self._frontend = frontend
         known = self._written.get(frontend.epoch)
-        if known is not None:
-            self._writer = RowWriter(frontend._layout, known.note, known.channel)
-            self._next = max(known.last + 1, known.note.begin)
+        if known is None:
+            known = self._first_time(frontend)
+            self._written[frontend.epoch] = known
+        note = known.note
+        self._next = max(known.last + 1, note.begin)
+        self._writer = (
+            RowWriter(frontend._layout, note, known.channel)
+            if known.channel is not None
+            else RowWriter.added_to(self._file, frontend, note)
+        )
+        journal = JournalWriter(frontend, known.journal, known.journal_next)
+        self._journal = journal if journal.exists else None
+        if self._journal is not None and known.journal is None:
+            self._journal.add_channel(self._file, note)
+
+    def go_on_in(self, file: FileWriter) -> None:
+        """Writes what follows into another file."""
+        self._file = file
+        if self._frontend is None or self._writer is None:
             return
+        note = replace(self._writer.note, begin=self._next)
+        self._writer = RowWriter.added_to(file, self._frontend, note)
+        if self._journal is not None:
+            self._journal.add_channel(file, note)
+
+    def _first_time(self, frontend: Frontend) -> Written:
+        """Of an epoch that is not in the recording yet."""
         first = frontend.oldest if self._whole or self._written else frontend.published
         note = note_of(frontend, len(self._written), first)
         if self._written:
             first_time = frontend.history(since=first, until=first).time
             if len(first_time):
                 note = note.not_before(int(first_time[0]), self._last_log_time)
-        self._writer = RowWriter.added_to(self._file, frontend, note)
-        self._written[frontend.epoch] = Written(note, self._writer.channel, first - 1, 0)
-        self._next = first
+        return Written(note)
 
-    # ------------------------------------------------------------------ its rows
+    # ------------------------------------------------------------------ what it reads
 
-    def _read(self, frontend: Frontend) -> Block | None:
+    def _read_rows(self, frontend: Frontend) -> Block | None:
         assert self._writer is not None
         newest = frontend.published
         if newest < self._next:
@@ -137,7 +162,8 @@ class Source:
             return None
         first, last = int(rows["iteration"][0]), int(rows["iteration"][-1])
         if first > self._next:
-            self._note_gap(self._next, first - 1)
+            self.missed += first - self._next
+            self._note_gap(GAP, self._next, first - 1)
         self._next = last + 1
         self.rows += len(rows)
         self.behind = newest - last
@@ -145,9 +171,16 @@ class Source:
         self._last_log_time = block.time_range[1]
         return block
 
-    def _note_gap(self, first: int, last: int) -> None:
+    def _read_journal(self) -> SingleMessage | None:
+        if self._journal is None:
+            return None
+        message, gap = self._journal.read(self._last_log_time)
+        if gap is not None:
+            self._note_gap(JOURNAL_GAP, *gap)
+        return message
+
+    def _note_gap(self, name: str, first: int, last: int) -> None:
         assert self._writer is not None
-        self.missed += last - first + 1
         note = self._writer.note
         values = {"segment": note.segment, "epoch": str(note.epoch), "number": str(note.number)}
-        self._file.add_metadata(GAP, values | {"first": str(first), "last": str(last)})
+        self._file.add_metadata(name, values | {"first": str(first), "last": str(last)})

@@ -1,18 +1,22 @@
 // A journal with damaged counters, marks and entries: a reader ends, stays inside the ring, and
-// decodes what it gets.
+// decodes what it gets; also from a damaged recording.
 
 #include <algorithm>
 #include <array>
 #include <cstdlib>
 #include <cstring>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "fuzz/bytes.hpp"
 #include "fuzz/robot.hpp"
 #include "memory/journal.hpp"
+#include "o80/base/error.hpp"
 #include "o80/runtime/journal.hpp"
+#include "runtime/decision_journal.hpp"
 #include "runtime/journal_records.hpp"
+#include "runtime/recorded_journal.hpp"
 
 namespace o80::fuzz {
 namespace {
@@ -65,8 +69,9 @@ void write_some(JournalWriter& writer, Bytes& bytes) {
   }
 }
 
-/// What a reader may get without an end: no more entries than the ring has heads.
-void read_all(JournalReader& reader, const Schema& schema) {
+/// What a reader may get without an end: no more entries than the ring has heads. Adds them to
+/// `copy` as a recorder does.
+void read_all(JournalReader& reader, const Schema& schema, std::vector<std::byte>& copy) {
   JournalItem item;
   std::uint64_t entries = 0;
   while (reader.next(item)) {
@@ -74,11 +79,34 @@ void read_all(JournalReader& reader, const Schema& schema) {
     if (item.payload.size() + sizeof(JournalHead) != item.head.words * 8UL) std::abort();
     if (to_text(item.head.kind).empty()) std::abort();
     records_of(schema, item.payload);
+    const auto* head = reinterpret_cast<const std::byte*>(&item.head);
+    copy.insert(copy.end(), head, head + sizeof item.head);
+    copy.insert(copy.end(), item.payload.begin(), item.payload.end());
   }
 }
 
+/// What a damaged recording may give: no more entries than statuses fit into its bytes.
+void decode(const std::shared_ptr<const Description>& description,
+            std::span<const std::byte> recorded) {
+  std::vector<JournalEntry> entries;
+  try {
+    RecordedJournal(description).decode(recorded, entries);
+  } catch (const InvalidArgument&) {
+  }
+  if (entries.size() > recorded.size() / sizeof(JournalStatus)) std::abort();
+}
+
+std::shared_ptr<const Description> description_of_robot() {
+  auto description = std::make_shared<Description>();
+  description->schema = schema_of_robot();
+  description->layout = row_layout(description->schema);
+  return description;
+}
+
 void run(Bytes bytes) {
-  static const Schema schema = schema_of_robot();
+  static const std::shared_ptr<const Description> description = description_of_robot();
+  const Schema& schema = description->schema;
+  std::vector<std::byte> copy;
   File file;
   JournalWriter writer(file.view);
   write_some(writer, bytes);
@@ -87,16 +115,25 @@ void run(Bytes bytes) {
     const auto word = bytes.number<std::uint16_t>();
     file.set(word, bytes.word());
   }
-  read_all(before, schema);
+  read_all(before, schema, copy);
   JournalReader after(file.view);
-  read_all(after, schema);
+  read_all(after, schema, copy);
   after.seek_end();
   write_some(writer, bytes);
-  read_all(before, schema);
-  read_all(after, schema);
+  read_all(before, schema, copy);
+  read_all(after, schema, copy);
+  // as a recording that was damaged
+  decode(description, copy);
+  for (std::uint32_t left = bytes.below(16); left > 0 && copy.size() >= 8; --left) {
+    const std::size_t word = bytes.number<std::uint16_t>() % (copy.size() / 8);
+    const std::uint64_t value = bytes.word();
+    std::memcpy(copy.data() + 8 * word, &value, 8);
+  }
+  decode(description, copy);
   // and as the blocks of a batch
   const auto rest = bytes.rest();
   records_of(schema, rest);
+  decode(description, rest);
 }
 
 }  // namespace

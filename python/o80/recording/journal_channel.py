@@ -1,0 +1,138 @@
+"""The journal of a backend in a recording: a channel whose messages hold its entries as bytes.
+
+The bytes are those of the segment (ARCHITECTURE.md, The journal), so nothing is lost, and they cost
+a recorder one copy. `_core.RecordedJournal` decodes them.
+"""
+
+import struct
+from dataclasses import dataclass
+from typing import IO, TYPE_CHECKING
+
+from o80 import _core
+from o80.recording.blocks import SingleMessage
+from o80.recording.message_plan import ENCAPSULATION
+from o80.recording.scan import Scan, messages_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from o80.frontend import Frontend
+    from o80.recording.epoch import EpochNote
+    from o80.recording.file_writer import FileWriter
+
+TYPE = "o80/msg/Journal"
+DEFINITION = """\
+uint64 first  # number of the first entry
+uint64 next  # number after the last entry
+uint8[] entries  # as in the journal of the segment; o80.open decodes them
+"""
+FORMAT = "1"  # of the entries
+GAP = "o80.journal_gap"
+"""Name of the metadata record of entries that were overwritten before they were read."""
+MOST = 4 << 20  # bytes that are read at once
+_HEAD = struct.Struct("<4sQQI")  # encapsulation, first, next, number of bytes
+
+
+@dataclass(frozen=True)
+class Entries:
+    """Consecutive entries of a journal."""
+
+    first: int  #: number of the first entry
+    next: int  #: number after the last one
+    content: bytes
+
+    def message(self) -> bytes:
+        """In CDR."""
+        head = _HEAD.pack(ENCAPSULATION, self.first, self.next, len(self.content))
+        return head + self.content
+
+    @classmethod
+    def of(cls, message: bytes) -> "Entries":
+        """Raises ValueError if it is damaged."""
+        content = message[_HEAD.size :]
+        if len(message) >= _HEAD.size:
+            _, first, end, length = _HEAD.unpack_from(message)
+            if len(content) == length:
+                return cls(first, end, content)
+        raise ValueError("a message of the journal is damaged")
+
+
+def topic_of(segment: str) -> str:
+    """Topic of the journal of a segment."""
+    return f"/{segment}/journal"
+
+
+def channel_texts(note: "EpochNote") -> dict[str, str]:
+    """The metadata of the channel of an epoch's journal."""
+    return {
+        "content": "journal",
+        "format": FORMAT,
+        "segment": note.segment,
+        "epoch": str(note.epoch),
+        "number": str(note.number),
+    }
+
+
+def channels_in(found: Scan) -> dict[tuple[str, int], int]:
+    """The channels of journals in a file, by segment and number of the epoch."""
+    return {
+        (each.metadata["segment"], int(each.metadata["number"])): each.id
+        for each in found.channels.values()
+        if each.metadata.get("content") == "journal"
+        and each.metadata.get("number", "").isdecimal()
+        and "segment" in each.metadata
+    }
+
+
+class JournalWriter:
+    """Reads the journal of one backend and makes messages of it."""
+
+    def __init__(self, frontend: "Frontend", channel: int | None, first: int) -> None:
+        """first: number of the first entry to read, if it is still there; 0: the oldest."""
+        self.channel = channel
+        self.missed = 0  #: entries that were overwritten before they were read
+        self.drained = False  #: nothing was left at the last read
+        self._core = _core.RawJournal(frontend, first)
+        self._next = first if first > 0 else None  # None: begins with the oldest entry
+
+    @property
+    def exists(self) -> bool:
+        """The backend was started with a journal."""
+        return self._core.exists
+
+    def add_channel(self, file: "FileWriter", note: "EpochNote") -> None:
+        """Adds a channel to a file, in which the next entries are written."""
+        schema = file.add_schema(TYPE, DEFINITION)
+        self.channel = file.add_channel(topic_of(note.segment), schema, channel_texts(note))
+
+    def read(self, log_time: int) -> tuple[SingleMessage | None, tuple[int, int] | None]:
+        """The entries since the last call, and the first and last number of a gap before them."""
+        assert self.channel is not None
+        content, first, end, more = self._core.read(MOST)
+        self.drained = not more
+        if not content:
+            return None, None
+        gap = None
+        if self._next is not None and first > self._next:
+            gap = self._next, first - 1
+            self.missed += first - self._next
+        self._next = end
+        message = Entries(first, end, content).message()
+        return SingleMessage(self.channel, log_time, message), gap
+
+
+def entries_in(file: IO[bytes], found: Scan, channel: int) -> "Iterator[Entries]":
+    """All parts of a journal, in their order. Raises ValueError if one is damaged."""
+    for chunk in found.chunks:
+        if channel in chunk.message_index_offsets:
+            for message in messages_of(file, chunk, channel):
+                yield Entries.of(message)
+
+
+def last_entry_in(file: IO[bytes], found: Scan, channel: int) -> int:
+    """The number after the last entry of a journal in a file; 0: none."""
+    for chunk in reversed(found.chunks):
+        if channel in chunk.message_index_offsets:
+            parts = [Entries.of(message) for message in messages_of(file, chunk, channel)]
+            return parts[-1].next
+    return 0

@@ -1,0 +1,209 @@
+"""One run of a backend in a recording: its rows and its journal, as from a live frontend."""
+
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from o80 import _core
+from o80.checked import whole
+from o80.errors import InvalidArgument, RecordingError, SegmentError
+from o80.history import History
+from o80.journal import EntryDecoder, JournalEntry
+from o80.layout import decoder_of
+from o80.recording.blocks import messages_in
+from o80.recording.epoch import EpochNote
+from o80.recording.journal_channel import GAP as JOURNAL_GAP
+from o80.recording.journal_channel import entries_in
+from o80.recording.message_plan import MessagePlan
+from o80.recording.message_types import row_type
+from o80.recording.scan import Scan, attachment_of, content_of, index_of
+from o80.recording.source import GAP
+
+
+@dataclass(frozen=True)
+class EpochPart:
+    """What one file holds of a run."""
+
+    path: Path
+    found: Scan
+    channel: int  #: of the rows
+    note: EpochNote
+    journal: int | None  #: the channel of the journal
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return self.found.counts.get(self.channel, 0)
+
+    def gaps(self, name: str) -> Iterator[tuple[int, int]]:
+        """First and last number of what is missing, from metadata records of this name."""
+        number = str(self.note.number)
+        for each in self.found.metadata:
+            texts = each.metadata
+            if each.name != name or texts["segment"] != self.note.segment:
+                continue
+            if texts["number"] == number:
+                yield int(texts["first"]), int(texts["last"])
+
+    def table(self) -> bytes:
+        """The description of the robot. Raises RecordingError."""
+        for place in self.found.attachments:
+            if place.name == self.note.attachment:
+                with self.path.open("rb") as file:
+                    return attachment_of(file, place).data
+        raise RecordingError(f"{self.path} lacks the description of '{self.note.segment}'")
+
+    @contextmanager
+    def reading(self) -> Iterator[IO[bytes]]:
+        """The file; errors in its content are RecordingError and name it."""
+        try:
+            with self.path.open("rb") as file:
+                yield file
+        except (ValueError, struct.error) as error:
+            raise RecordingError(f"{self.path}: {error}") from error
+
+
+class RecordedEpoch:
+    """The rows and the journal of one run of a backend."""
+
+    def __init__(self, parts: list[EpochPart]) -> None:
+        """parts: in their order, at least one."""
+        self._parts = parts
+        self._note = parts[0].note
+
+    @property
+    def epoch(self) -> int:
+        """The number of the run; see `Frontend.epoch`."""
+        return self._note.epoch
+
+    @property
+    def wall_offset(self) -> int:
+        """Wall-clock time [ns since 1970] less row time."""
+        return self._note.wall_offset
+
+    @property
+    def rows(self) -> int:
+        """Number of recorded rows."""
+        return sum(part.rows for part in self._parts)
+
+    @property
+    def gaps(self) -> list[tuple[int, int]]:
+        """First and last iteration of rows that are missing, because the recorder was too late."""
+        return [gap for part in self._parts for gap in part.gaps(GAP)]
+
+    @property
+    def journal_gaps(self) -> list[tuple[int, int]]:
+        """First and last number of journal entries that are missing for the same reason."""
+        return [gap for part in self._parts for gap in part.gaps(JOURNAL_GAP)]
+
+    @property
+    def schema(self) -> dict[str, Any]:
+        """The description of the robot."""
+        schema: dict[str, Any] = self._decoder.layout.schema
+        return schema
+
+    @cached_property
+    def _decoder(self) -> Any:
+        table = self._parts[0].table()
+        try:
+            return decoder_of(table)
+        except SegmentError as error:
+            raise RecordingError(
+                f"{self._parts[0].path}: the description of '{self._note.segment}' is damaged"
+            ) from error
+
+    @cached_property
+    def description(self) -> _core.Description:
+        """The description of the robot as the compiled library reads it."""
+        self._decoder  # noqa: B018  tells a damaged description
+        return _core.Description(self._parts[0].table())
+
+    # ------------------------------------------------------------------ rows
+
+    def history(
+        self,
+        n: int | None = None,
+        *,
+        since: int | None = None,
+        until: int | None = None,
+        seconds: float | None = None,
+        from_time: int | None = None,
+        to_time: int | None = None,
+    ) -> History:
+        """Many observations at once; the arguments are those of `Frontend.history`.
+
+        Raises RecordingError if the file is damaged there.
+        """
+        layout = self._decoder.layout
+        plan = MessagePlan(row_type(layout), layout.size)
+        parts = [
+            plan.decode(messages)
+            for part in self._parts
+            for messages in self._messages(part, plan.size, from_time, to_time)
+        ]
+        raw = np.concatenate(parts) if parts else np.empty((0, layout.size), np.uint8)
+        rows = np.ascontiguousarray(raw).view(layout.row).reshape(len(raw))
+        history = History(self._decoder, rows)
+        return history.select(
+            n, since=since, until=until, seconds=seconds, from_time=from_time, to_time=to_time
+        )
+
+    def _messages(
+        self, part: EpochPart, size: int, from_time: int | None, to_time: int | None
+    ) -> Iterator[Any]:
+        """The messages (n, size) of each chunk that may have rows of these times."""
+        offset = self.wall_offset
+        with part.reading() as file:
+            for chunk in part.found.chunks:
+                if part.channel not in chunk.message_index_offsets:
+                    continue
+                if from_time is not None and chunk.message_end_time < from_time + offset:
+                    continue
+                if to_time is not None and chunk.message_start_time > to_time + offset:
+                    continue
+                index = index_of(file, chunk, part.channel)
+                messages = messages_in(content_of(file, chunk), index)
+                if messages.shape[1] != size:
+                    raise ValueError(f"rows of '{self._note.segment}' have another size")
+                yield messages
+
+    # ------------------------------------------------------------------ journal
+
+    def journal(self, since: int = 0) -> list[JournalEntry]:
+        """What the backend decided, oldest first, as `Frontend.journal` gives it.
+
+        It begins with the oldest entry that the segment held when recording began, which may be
+        older than the first row. since: number of the first entry to return.
+
+        Raises RecordingError if the file is damaged there.
+        """
+        native = _core.RecordedJournal(self.description, whole(since, "since", 0))
+        decoder = EntryDecoder(self.schema)
+        try:
+            return [
+                decoder.entry(entry)
+                for content in self.journal_parts()
+                for entry in native.decode(content)
+            ]
+        except (InvalidArgument, ValueError, LookupError) as error:
+            raise RecordingError(f"{self._parts[0].path}: {error}") from error
+
+    def journal_parts(self) -> Iterator[bytes]:
+        """The entries of the journal as they were in the segment, for `_core.RecordedJournal`.
+
+        Raises RecordingError if the file is damaged there.
+        """
+        for part in self._parts:
+            if part.journal is not None:
+                with part.reading() as file:
+                    for entries in entries_in(file, part.found, part.journal):
+                        yield entries.content
+
+    def __repr__(self) -> str:
+        return f"<epoch of {self._note.segment}: {self.rows} rows>"

@@ -1,0 +1,176 @@
+"""The journal in a recording: the same entries as a frontend reads, gaps, restarts, damage."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import o80
+from o80.recording.recorded_epoch import RecordedEpoch
+from o80.recording.recorder import Recorder
+from o80.recording.scan import scan
+
+
+def recorded(path: Path) -> RecordedEpoch:
+    (segment,) = o80.open(path).segments.values()
+    return segment.epochs[-1]
+
+
+def texts(entries: list[o80.JournalEntry]) -> list[str]:
+    """Entries as texts, because arrays have no truth value."""
+    return [repr(entry) for entry in entries]
+
+
+def play(arm: o80.Frontend, commands: int) -> None:
+    for i in range(commands):
+        arm.add_command("elbow", 0.1 * (i % 20), iterations=3)
+        arm.add_command("shoulder", 0.05 * (i % 20), mode="overwrite")
+        arm.burst(3)
+
+
+def test_the_journal_of_a_file_is_that_of_the_robot(arm: o80.Frontend, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with o80.Recording(path, arm) as recording:
+        play(arm, 10)
+        arm.request("reset", seed=3)
+        recording.flush()
+        arm.add_trajectory(np.linspace([0.0, 0.1], [0.5, 0.2], 20), iterations=2)
+        arm.pulse_and_wait()
+        arm.halt("enough")
+        arm.burst(2)
+    entries = recorded(path).journal()
+
+    assert texts(entries) == texts(arm.journal())
+    assert {"taken", "status", "halt", "burst_ended", "fresh_start"} <= {
+        entry.kind for entry in entries
+    }
+    assert recorded(path).journal_gaps == []
+
+
+def test_it_begins_with_what_the_segment_still_holds(arm: o80.Frontend, tmp_path: Path) -> None:
+    play(arm, 5)
+    before = arm.journal()
+    with o80.Recording(tmp_path / "run.mcap", arm):
+        pass
+
+    assert texts(recorded(tmp_path / "run.mcap").journal()) == texts(before)
+
+
+def test_entries_are_chosen_by_their_number(arm: o80.Frontend, tmp_path: Path) -> None:
+    with o80.Recording(tmp_path / "run.mcap", arm):
+        play(arm, 10)
+    epoch = recorded(tmp_path / "run.mcap")
+
+    assert texts(epoch.journal(since=40)) == texts(arm.journal(since=40))
+    with pytest.raises(o80.InvalidArgument, match="since must be"):
+        epoch.journal(since=-1)
+
+
+def test_each_run_of_a_robot_has_its_own_journal(segment: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    recorder = Recorder(path, [segment])
+    journals = []
+    for commands in (3, 5):
+        arm = o80.robots.load("two_joints").inline(segment)
+        play(arm, commands)
+        while recorder.sources[segment].newest != 3 * commands:
+            recorder.catch_up()
+        journals.append(texts(arm.journal()))
+        arm.close()
+        recorder.catch_up()
+    recorder.finish()
+    found = [epoch.journal() for epoch in o80.open(path)[segment].epochs]
+
+    assert [texts(entries)[:-1] for entries in found] == journals
+    assert [entries[-1].kind for entries in found] == ["ended", "ended"]
+
+
+def test_entries_that_were_overwritten_are_a_gap(segment: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with o80.robots.load("two_joints").inline(segment, journal=0.5) as arm:
+        recorder = Recorder(path, [segment])
+        play(arm, 5)
+        recorder.catch_up()
+        play(arm, 3000)
+        recorder.catch_up()
+        recorder.finish()
+        there = arm.journal()
+    epoch = recorded(path)
+    ((first, last),) = epoch.journal_gaps
+    entries = epoch.journal()
+    (after,) = (entry for entry in entries if entry.missed)
+
+    assert first <= last < after.number
+    assert after.missed >= last - first + 1
+    # the recording still knows names and blocks that the ring has lost
+    numbers = [(entry.number, entry.kind, entry.id) for entry in there if entry.number > last]
+    assert [(entry.number, entry.kind, entry.id) for entry in entries][-len(numbers) :] == numbers
+
+
+def test_a_successor_goes_on_with_the_next_entry(arm: o80.Frontend, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    for commands in (4, 0, 7):
+        recorder = Recorder(path, [arm.segment], proceed=True, whole=True)
+        play(arm, commands)
+        recorder.catch_up()
+        recorder.finish()
+
+    assert texts(recorded(path).journal()) == texts(arm.journal())
+
+
+def test_wherever_a_file_is_cut_its_journal_is_continued(arm: o80.Frontend, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    recorder = Recorder(path, [arm.segment])
+    for _ in range(8):
+        play(arm, 2)
+        recorder.poll()
+    recorder.finish()
+    whole = path.read_bytes()
+    entries = texts(arm.journal())
+    chance = np.random.default_rng(5)
+    cuts = {each.chunk_start_offset for each in scan(path).chunks}
+    for cut in [*cuts, *chance.integers(0, len(whole), 30)]:
+        path.write_bytes(whole[: int(cut)])
+        recorder = Recorder(path, [arm.segment], proceed=True, whole=True)
+        recorder.catch_up()
+        recorder.finish()
+        assert texts(recorded(path).journal()) == entries, f"cut at {cut}"
+
+
+def test_decisions_without_a_row_after_them_are_recorded(segment: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with o80.Backend(segment, ["a"]) as backend:
+        backend.publish()
+        with o80.Frontend(segment) as frontend, o80.Recording(path, segment) as recording:
+            recording.flush()
+            frontend.add_command("a", 1.0)
+            frontend.pulse()
+            backend.step()
+            recording.flush()
+            assert [entry.kind for entry in recorded(path).journal()] == ["taken"]
+
+
+def test_a_damaged_journal_is_an_error_that_names_the_file(
+    arm: o80.Frontend, tmp_path: Path
+) -> None:
+    path = tmp_path / "run.mcap"
+    recorder = Recorder(path, [arm.segment], compression="none")
+    play(arm, 50)
+    recorder.catch_up()
+    recorder.finish()
+    whole = path.read_bytes()
+    chance = np.random.default_rng(1)
+    errors = []
+    for _ in range(300):
+        damaged = bytearray(whole)
+        for place in chance.integers(8, len(whole), 3):
+            damaged[place] = chance.integers(256)
+        path.write_bytes(damaged)
+        try:
+            for segment in o80.open(path).segments.values():
+                for epoch in segment.epochs:
+                    epoch.journal()
+        except o80.RecordingError as error:
+            errors.append(str(error))
+    assert len(errors) > 50
+    assert all(str(path) in error for error in errors)

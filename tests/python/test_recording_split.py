@@ -1,0 +1,202 @@
+"""Recordings in several files: complete files, read as one, continued and repaired."""
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+
+import o80
+from o80.recording.recorder import Recorder
+
+O80 = Path(sys.executable).parent / "o80"
+
+
+def texts(entries: list[o80.JournalEntry]) -> list[str]:
+    return [repr(entry) for entry in entries]
+
+
+def play(arm: o80.Frontend, recorder: Recorder, polls: int) -> None:
+    for i in range(polls):
+        arm.add_command("elbow", 0.1 * (i % 9), iterations=20)
+        arm.burst(20)
+        recorder.poll()
+
+
+def messages_of(path: Path) -> int:
+    with path.open("rb") as file:
+        return sum(1 for _ in make_reader(file, validate_crcs=True).iter_messages())
+
+
+def test_a_folder_of_complete_files_is_read_as_one(arm: o80.Frontend, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    recorder = Recorder(path, [arm.segment], split="8k")
+    play(arm, recorder, 30)
+    recorder.finish()
+    files = sorted(path.iterdir())
+    recording = o80.open(path)
+    (epoch,) = recording[arm.segment].epochs
+
+    assert len(files) > 3
+    assert all(file.stat().st_size < 16_000 for file in files)
+    assert all(messages_of(file) > 0 for file in files)
+    assert recording.finished
+    assert epoch.history().rows.tobytes() == arm.history().rows.tobytes()
+    assert texts(epoch.journal()) == texts(arm.journal())
+    assert epoch.gaps == epoch.journal_gaps == []
+    assert sum(o80.open(file)[arm.segment].epochs[0].rows for file in files) == epoch.rows == 601
+
+
+def test_rows_are_chosen_across_files(arm: o80.Frontend, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    recorder = Recorder(path, [arm.segment], split="8k")
+    play(arm, recorder, 30)
+    recorder.finish()
+    read, there = o80.open(path)[arm.segment], arm.history()
+
+    assert read.history(since=95, until=405).iteration.tolist() == list(range(95, 406))
+    late = int(there.time[-250])
+    assert read.history(from_time=late).time.tolist() == there.time.tolist()[-250:]
+    assert read.history(7).iteration.tolist() == there.iteration.tolist()[-7:]
+
+
+def test_files_end_after_a_time(process: o80.robots.Process, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with process.frontend() as arm, o80.Recording(path, arm, split="0.05s") as recording:
+        end = time.monotonic() + 30
+        while len(list(path.iterdir())) < 4 and time.monotonic() < end:
+            arm.wait_for_next(timeout=10)
+        recording.mark("end")
+    iteration = o80.open(path)[process.segment].history().iteration
+
+    assert len(list(path.iterdir())) >= 4
+    assert np.all(np.diff(iteration) == 1)
+    assert [mark.name for mark in o80.open(path).marks] == ["end"]
+
+
+def test_robots_restart_across_files(segment: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    recorder = Recorder(path, [segment], split="8k")
+    rows = []
+    for _ in range(2):
+        with o80.robots.load("two_joints").inline(segment) as arm:
+            while recorder.sources[segment].newest != 0:
+                recorder.catch_up()
+            play(arm, recorder, 15)
+            rows.append(arm.history().rows.tobytes())
+        recorder.catch_up()
+    recorder.finish()
+    epochs = o80.open(path)[segment].epochs
+
+    assert [epoch.history().rows.tobytes() for epoch in epochs] == rows
+    first, second = epochs
+    assert first.history().time[-1] + first.wall_offset < (
+        second.history().time[0] + second.wall_offset
+    )
+
+
+def test_it_is_continued_wherever_its_last_file_was_cut(arm: o80.Frontend, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    recorder = Recorder(path, [arm.segment], split="8k")
+    play(arm, recorder, 20)
+    recorder.finish()
+    last = sorted(path.iterdir())[-1]
+    whole = last.read_bytes()
+    chance = np.random.default_rng(2)
+    for cut in [0, 1, len(whole) - 1, *chance.integers(0, len(whole), 20)]:
+        for file in sorted(path.iterdir())[int(last.stem) + 1 :]:
+            file.unlink()
+        last.write_bytes(whole[: int(cut)])
+        recorder = Recorder(path, [arm.segment], proceed=True, split="8k")
+        play(arm, recorder, 2)
+        recorder.catch_up()
+        recorder.finish()
+        (epoch,) = o80.open(path)[arm.segment].epochs
+
+        assert epoch.history().rows.tobytes() == arm.history().rows.tobytes(), f"cut at {cut}"
+        assert texts(epoch.journal()) == texts(arm.journal())
+
+
+def test_a_recorder_killed_between_two_files_is_continued(
+    arm: o80.Frontend, tmp_path: Path
+) -> None:
+    path = tmp_path / "run.mcap"
+    recorder = Recorder(path, [arm.segment], split="8k")
+    play(arm, recorder, 20)
+    recorder.finish()
+    *_, before, last = sorted(path.iterdir())
+    before.write_bytes(before.read_bytes()[:-100])  # not finished
+    last.write_bytes(last.read_bytes()[:20])  # just created
+    recorder = Recorder(path, [arm.segment], proceed=True, split="8k")
+    recorder.catch_up()
+    recorder.finish()
+    recording = o80.open(path)
+
+    assert recording.finished
+    assert recording[arm.segment].history().rows.tobytes() == arm.history().rows.tobytes()
+    assert all(messages_of(file) > 0 for file in sorted(path.iterdir()))
+
+
+def test_repair_completes_every_file(arm: o80.Frontend, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    recorder = Recorder(path, [arm.segment], split="8k")
+    play(arm, recorder, 20)
+    recorder.finish()
+    for file in sorted(path.iterdir())[-2:]:
+        file.write_bytes(file.read_bytes()[:-50])
+    done = subprocess.run([O80, "repair", path], capture_output=True, text=True, timeout=60)
+
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("is complete now") == 2
+    assert o80.open(path).finished
+
+
+def test_a_folder_has_one_recorder(arm: o80.Frontend, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with (
+        o80.Recording(path, arm, split="1M"),
+        pytest.raises(o80.RecordingError, match="is being written by another recorder"),
+    ):
+        Recorder(path, [arm.segment], proceed=True, split="1M")
+
+
+def test_a_folder_that_exists_is_not_written_to(arm: o80.Frontend, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    path.mkdir()
+    with pytest.raises(o80.RecordingError, match="exists"):
+        Recorder(path, [arm.segment], split="1M")
+    with pytest.raises(o80.RecordingError, match="holds no recording"):
+        o80.open(path)
+    path.rmdir()
+    path.write_bytes(b"")
+    with pytest.raises(o80.RecordingError, match="is a file"):
+        Recorder(path, [arm.segment], split="1M", proceed=True)
+    with pytest.raises(o80.Error):
+        Recorder(tmp_path / "other.mcap", ["two/joints"], split="1M")
+    assert not (tmp_path / "other.mcap").exists()
+
+
+@pytest.mark.parametrize("text", ["", "1", "M", "-1M", "0s", "nans", "10 parsec", "1e400G"])
+def test_a_split_that_is_neither_size_nor_time_is_refused(
+    text: str, arm: o80.Frontend, tmp_path: Path
+) -> None:
+    with pytest.raises(o80.InvalidArgument, match="split must be a size such as 500M"):
+        o80.Recording(tmp_path / "run.mcap", arm, split=text)
+
+
+def test_the_command_writes_a_folder(arm: o80.Frontend, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    options = ["--seconds", "0.3", "--split", "0.1s", "--whole"]
+    done = subprocess.run(
+        [O80, "record", arm.segment, "-o", path, *options],
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+
+    assert done.returncode == 0, done.stderr
+    assert f"in {path}" in done.stderr
+    assert o80.open(path)[arm.segment].epochs[0].rows == 1
