@@ -62,7 +62,7 @@ def test_nothing_is_lost_and_nothing_is_written_twice(tmp_path: Path) -> None:
     chance = random.Random(7)
     with (
         o80.robots.load("two_joints").start(
-            frequency=1000, history=200_000 + 200 * KILLS, journal=1 << 26
+            frequency=1000, history=200_000 + 200 * KILLS, journal=64
         ) as process,
         process.frontend() as robot,
     ):

@@ -2,6 +2,7 @@
 
 import itertools
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -96,6 +97,65 @@ def test_a_forked_child_does_not_keep_a_finished_file_from_its_next_recorder(
         os.close(ours)
         os.waitpid(child, 0)
         os.close(theirs)
+
+
+def test_a_forked_child_does_not_keep_the_file_of_a_killed_recorder(
+    arm: o80.Frontend, tmp_path: Path
+) -> None:
+    path = tmp_path / "run.mcap"
+    theirs, ours = os.pipe()
+    told, tells = os.pipe()
+    recorder_process = os.fork()
+    if recorder_process == 0:
+        recorder = Recorder(path, [arm.segment])
+        recorder.poll()
+        if os.fork() == 0:
+            os.close(ours)
+            os.write(tells, b".")
+            os.read(theirs, 1)  # until the test has closed its end
+            os._exit(0)
+        signal.pause()
+    try:
+        os.read(told, 1)
+        os.kill(recorder_process, signal.SIGKILL)
+        os.waitpid(recorder_process, 0)
+        opened(path, proceed=True).finish()
+    finally:
+        for end in (ours, theirs, told, tells):
+            os.close(end)
+
+
+def test_a_recording_that_is_open_when_its_program_ends_is_finished(tmp_path: Path) -> None:
+    program = (
+        "import o80\n"
+        "arm = o80.robots.load('two_joints').inline()\n"
+        f"recording = o80.Recording({str(tmp_path / 'run.mcap')!r}, arm)\n"
+        "recording.mark('begin')\n"
+        "arm.burst(40)\n"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True, timeout=60)
+    file = o80.open(tmp_path / "run.mcap")
+    (segment,) = file.segments.values()
+
+    assert file.finished
+    assert segment.epochs[0].rows == 41
+
+
+def test_the_extra_is_named_when_a_part_of_it_is_missing() -> None:
+    program = (
+        "import sys\n"
+        "sys.modules['zstandard'] = None\n"
+        "import o80\n"
+        "try:\n"
+        "    o80.open('run.mcap')\n"
+        "except o80.MissingExtra as error:\n"
+        "    print(error)\n"
+    )
+    said = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=60
+    ).stdout
+
+    assert 'needs zstandard, which is not installed: pip install "o80[record]"' in said
 
 
 def test_the_end_of_a_recording_does_not_wait_for_rows_published_after_it(

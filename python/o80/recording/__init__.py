@@ -2,4 +2,5 @@
 
 from o80.extras import needed
 
-needed("mcap", "record", "a recording")
+for module in ("mcap", "zstandard"):
+    needed(module, "record", "a recording")

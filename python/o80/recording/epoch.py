@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o80.recording.blocks import Block
+from o80.recording.joint_states import JointWriter
 from o80.recording.message_plan import MessagePlan
 from o80.recording.message_types import PACKAGE, row_type
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from o80.frontend import Frontend
     from o80.layout import Layout
     from o80.recording.file_writer import FileWriter
+    from o80.recording.scan import Scan
 
 DESCRIPTION = "application/x-o80-description"
 """Media type of the attachment with the description of a robot, as it is in a segment."""
@@ -52,6 +54,11 @@ class EpochNote:
         except (KeyError, ValueError):
             return None
 
+    def channel_texts(self, content: str) -> dict[str, str]:
+        """The metadata of a channel of this run that holds something else than its rows."""
+        run = {"segment": self.segment, "epoch": str(self.epoch), "number": str(self.number)}
+        return {"content": content} | run
+
     @property
     def attachment(self) -> str:
         """Name of the attachment with the robot's description."""
@@ -84,29 +91,45 @@ def note_of(frontend: "Frontend", number: int, begin: int) -> EpochNote:
     )
 
 
-class RowWriter:
-    """Writes the rows of one epoch: rows in, blocks of messages out."""
+def channels_of(found: "Scan", content: str) -> dict[tuple[str, int], int]:
+    """The channels with this content, by segment and number of the run."""
+    return {
+        (each.metadata["segment"], int(each.metadata["number"])): each.id
+        for each in found.channels.values()
+        if each.metadata.get("content") == content
+        and each.metadata.get("number", "").isdecimal()
+        and "segment" in each.metadata
+    }
 
-    def __init__(self, layout: "Layout", note: EpochNote, channel: int) -> None:
+
+class RowWriter:
+    """Makes messages of the rows of one epoch."""
+
+    def __init__(
+        self, layout: "Layout", note: EpochNote, channel: int, joints: JointWriter | None
+    ) -> None:
         self.note = note
         self.channel = channel
+        self._joints = joints
         self._plan = MessagePlan(row_type(layout), layout.size)
 
     @classmethod
     def added_to(cls, file: "FileWriter", frontend: "Frontend", note: EpochNote) -> "RowWriter":
-        """Adds message type, description and channel of an epoch to a file."""
+        """Adds message types, description and channels of an epoch to a file."""
         layout = frontend._layout
         message = row_type(layout)
         schema = file.add_schema(f"{PACKAGE}/msg/{message.name}", message.definition)
         file.attach(note.attachment, DESCRIPTION, frontend._description.table(), time.time_ns())
         channel = file.add_channel(topic_of(note.segment), schema, note.texts())
-        return cls(layout, note, channel)
+        return cls(layout, note, channel, JointWriter.added_to(file, layout, note, None))
 
-    def block(self, rows: NDArray[np.void]) -> Block:
-        """The messages of consecutive rows."""
+    def blocks(self, rows: NDArray[np.void]) -> list[Block]:
+        """The messages of consecutive rows; of a robot with joints, also their states."""
         raw = np.ascontiguousarray(rows).view(np.uint8).reshape(len(rows), -1)
         log_times = (rows["time"] + self.note.wall_offset).astype(np.uint64)
         first = int(rows["iteration"][0])
         block = Block.reserved(self.channel, log_times, first, self._plan.size)
         self._plan.encode(raw, block.messages)
-        return block
+        if self._joints is None:
+            return [block]
+        return [block, self._joints.block(raw, log_times, first)]

@@ -5,41 +5,35 @@ behind it.
 """
 
 import contextlib
-import fcntl
 import os
 import struct
 import zlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import zstandard
-from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import (
     Attachment,
     AttachmentIndex,
     Channel,
     ChunkIndex,
-    DataEnd,
     Header,
-    McapRecord,
     Metadata,
     MetadataIndex,
     Schema,
-    Statistics,
-    SummaryOffset,
 )
 
 import o80
 from o80.errors import RecordingError
+from o80.recording.locked_file import LockedFile
 from o80.recording.scan import HEAD, MAGIC, Scan, scan
 from o80.recording.space import reserve
+from o80.recording.summary import bytes_of, end_of_file, room_for_end
 
 PROFILE = "ros2"
 COMPRESSIONS = ("zstd", "none")
-SUMMARY_OF_A_CHUNK = 128  # most bytes of the summary that a chunk adds, with one channel
-SUMMARY_OF_THE_REST = 65536
 CHUNK_HEAD = struct.Struct("<BQQQQI")
 
 
@@ -77,19 +71,19 @@ class FileWriter:
         try:
             self._continue()
         except BaseException:
-            os.close(self._descriptor)
+            self._file.close()
             raise
         return self
 
     def _continue(self) -> None:
-        begun = os.pread(self._descriptor, len(_beginning()), 0)
+        begun = os.pread(self._file.descriptor, len(_beginning()), 0)
         if len(begun) < len(_beginning()) and _beginning().startswith(begun):
-            os.ftruncate(self._descriptor, 0)  # cut before its first group was whole
+            os.ftruncate(self._file.descriptor, 0)  # cut before its first group was whole
             self._found = Scan()
             self._append(_beginning())
         self._found = found = scan(self.path)
         self.size = found.end
-        os.ftruncate(self._descriptor, self.size)
+        os.ftruncate(self._file.descriptor, self.size)
 
     def _open(self, path: Path, compression: str, flags: int) -> None:
         if compression not in COMPRESSIONS:
@@ -100,11 +94,9 @@ class FileWriter:
         self.compression = compression
         self.size = 0  #: [bytes]
         self._compressor = zstandard.ZstdCompressor(level=1) if compression == "zstd" else None
-        self._descriptor: int = os.open(path, os.O_RDWR | os.O_CLOEXEC | flags, 0o644)
         try:
-            _lock(self._descriptor)
+            self._file: LockedFile = LockedFile(path, flags)
         except BlockingIOError:
-            os.close(self._descriptor)
             raise RecordingError(
                 f"{path} is being written by another recorder: end it first, or choose another name"
             ) from None
@@ -123,7 +115,7 @@ class FileWriter:
                 return schema.id
         number = 1 + max(self._found.schemas, default=0)
         schema = Schema(id=number, data=definition.encode(), encoding=encoding, name=name)
-        self._append(_bytes_of(schema))
+        self._append(bytes_of(schema))
         self._found.schemas[number] = schema
         return number
 
@@ -139,13 +131,13 @@ class FileWriter:
             metadata=dict(metadata),
             schema_id=schema,
         )
-        self._append(_bytes_of(channel))
+        self._append(bytes_of(channel))
         self._found.channels[number] = channel
         return number
 
     def attach(self, name: str, media_type: str, data: bytes, time: int) -> None:
         """Adds an attachment. time: [ns] since 1970."""
-        record = _bytes_of(Attachment(time, time, name, media_type, data))
+        record = bytes_of(Attachment(time, time, name, media_type, data))
         self._found.attachments.append(
             AttachmentIndex(
                 offset=self.size,
@@ -162,7 +154,7 @@ class FileWriter:
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Adds a record of texts."""
         metadata = Metadata(name, dict(values))
-        record = _bytes_of(metadata)
+        record = bytes_of(metadata)
         self._found.metadata_places.append(MetadataIndex(self.size, len(record), name))
         self._found.metadata.append(metadata)
         self._append(record)
@@ -211,22 +203,15 @@ class FileWriter:
         """Writes a group whole, or restores the file and raises OSError."""
         try:
             if not last:
-                reserve(self._descriptor, self.size, len(data) + self._summary_room())
+                reserve(self._file.descriptor, self.size, len(data) + room_for_end(self._found))
             written = 0
             while written < len(data):
-                written += os.pwrite(self._descriptor, data[written:], self.size + written)
+                written += os.pwrite(self._file.descriptor, data[written:], self.size + written)
         except OSError:
             with contextlib.suppress(OSError):
-                os.ftruncate(self._descriptor, self.size)
+                os.ftruncate(self._file.descriptor, self.size)
             raise
         self.size += len(data)
-
-    def _summary_room(self) -> int:
-        found = self._found
-        texts = sum(len(each.data) for each in found.schemas.values())
-        per_chunk = SUMMARY_OF_A_CHUNK + 10 * len(found.channels)
-        rest = 512 * len(found.channels) + 256 * (len(found.metadata) + len(found.attachments))
-        return SUMMARY_OF_THE_REST + texts + rest + per_chunk * (1 + len(found.chunks))
 
     # ------------------------------------------------------------------ the end
 
@@ -236,85 +221,18 @@ class FileWriter:
         Raises OSError: then the file is closed, and complete up to its last chunk.
         """
         try:
-            self._write_summary()
+            self._append(end_of_file(self._found, self.size), last=True)
+            self._found.finished = True
         finally:
             self.close()
 
-    def _write_summary(self) -> None:
-        data_end = _bytes_of(DataEnd(0))
-        summary_start = self.size + len(data_end)
-        summary = bytearray()
-        offsets = bytearray()
-        for opcode, records in self._summary():
-            begin = summary_start + len(summary)
-            group = _bytes_of(*records)
-            if group:
-                summary += group
-                offsets += _bytes_of(SummaryOffset(opcode, begin, len(group)))
-        offset_start = summary_start + len(summary)
-        footer = _footer(bytes(summary + offsets), summary_start, offset_start)
-        self._append(data_end + summary + offsets + footer + MAGIC, last=True)
-        self._found.finished = True
-
-    def _summary(self) -> Iterable[tuple[Opcode, Sequence[McapRecord]]]:
-        found = self._found
-        chunks = found.chunks
-        yield Opcode.SCHEMA, list(found.schemas.values())
-        yield Opcode.CHANNEL, list(found.channels.values())
-        statistics = Statistics(
-            attachment_count=len(found.attachments),
-            channel_count=len(found.channels),
-            channel_message_counts=found.counts,
-            chunk_count=len(chunks),
-            message_count=sum(found.counts.values()),
-            message_end_time=max((chunk.message_end_time for chunk in chunks), default=0),
-            message_start_time=min((chunk.message_start_time for chunk in chunks), default=0),
-            metadata_count=len(found.metadata),
-            schema_count=len(found.schemas),
-        )
-        yield Opcode.STATISTICS, [statistics]
-        yield Opcode.CHUNK_INDEX, chunks
-        yield Opcode.ATTACHMENT_INDEX, found.attachments
-        yield Opcode.METADATA_INDEX, found.metadata_places
-
     def close(self) -> None:
         """Closes the file as it is; may be called twice."""
-        if self._descriptor >= 0:
-            os.ftruncate(self._descriptor, self.size)  # gives reserved space back
-            _unlock(self._descriptor)
-            os.close(self._descriptor)
-            self._descriptor = -1
-
-
-def _lock(descriptor: int) -> None:
-    """Keeps other recorders from the file. Raises BlockingIOError if one has it."""
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise
-    except OSError:  # a file system without locks
-        pass
-
-
-def _unlock(descriptor: int) -> None:
-    """Also for forked children, which share the lock."""
-    with contextlib.suppress(OSError):
-        fcntl.flock(descriptor, fcntl.LOCK_UN)
+        if self._file.descriptor >= 0:
+            os.ftruncate(self._file.descriptor, self.size)  # gives reserved space back
+            self._file.close()
 
 
 def _beginning() -> bytes:
     """What every file begins with."""
-    return MAGIC + _bytes_of(Header(PROFILE, f"o80 {o80.__version__}"))
-
-
-def _bytes_of(*records: McapRecord) -> bytes:
-    builder: Any = RecordBuilder()
-    for record in records:
-        record.write(builder)
-    return bytes(builder.end())
-
-
-def _footer(summary: bytes, summary_start: int, offset_start: int) -> bytes:
-    """The footer record; its checksum covers the summary and itself up to the checksum."""
-    head = HEAD.pack(Opcode.FOOTER, 20) + struct.pack("<QQ", summary_start, offset_start)
-    return head + struct.pack("<I", zlib.crc32(head, zlib.crc32(summary)))
+    return MAGIC + bytes_of(Header(PROFILE, f"o80 {o80.__version__}"))

@@ -26,6 +26,8 @@ uint64 first  # number of the first entry
 uint64 next  # number after the last entry
 uint8[] entries  # as in the journal of the segment; o80.open decodes them
 """
+CONTENT = "journal"
+"""What the metadata of the channel call it."""
 FORMAT = "1"  # of the entries
 GAP = "o80.journal_gap"
 """Name of the metadata record of entries that were overwritten before they were read."""
@@ -62,28 +64,6 @@ def topic_of(segment: str) -> str:
     return f"/{segment}/journal"
 
 
-def channel_texts(note: "EpochNote") -> dict[str, str]:
-    """The metadata of the channel of an epoch's journal."""
-    return {
-        "content": "journal",
-        "format": FORMAT,
-        "segment": note.segment,
-        "epoch": str(note.epoch),
-        "number": str(note.number),
-    }
-
-
-def channels_in(found: Scan) -> dict[tuple[str, int], int]:
-    """The channels of journals in a file, by segment and number of the epoch."""
-    return {
-        (each.metadata["segment"], int(each.metadata["number"])): each.id
-        for each in found.channels.values()
-        if each.metadata.get("content") == "journal"
-        and each.metadata.get("number", "").isdecimal()
-        and "segment" in each.metadata
-    }
-
-
 class JournalWriter:
     """Reads the journal of one backend and makes messages of it."""
 
@@ -103,7 +83,9 @@ class JournalWriter:
     def add_channel(self, file: "FileWriter", note: "EpochNote") -> None:
         """Adds a channel to a file, in which the next entries are written."""
         schema = file.add_schema(TYPE, DEFINITION)
-        self.channel = file.add_channel(topic_of(note.segment), schema, channel_texts(note))
+        self.channel = file.add_channel(
+            topic_of(note.segment), schema, note.channel_texts(CONTENT) | {"format": FORMAT}
+        )
 
     def read(self, log_time: int) -> tuple[SingleMessage | None, tuple[int, int] | None]:
         """The entries since the last call, and the first and last number of a gap before them."""

@@ -7,10 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from o80.errors import RecordingError
+from o80.recording import joint_states
 from o80.recording.blocks import messages_in
-from o80.recording.epoch import EpochNote
+from o80.recording.epoch import EpochNote, channels_of
 from o80.recording.file_writer import FileWriter
-from o80.recording.journal_channel import channels_in, last_entry_in
+from o80.recording.journal_channel import CONTENT as JOURNAL
+from o80.recording.journal_channel import last_entry_in
 from o80.recording.message_plan import ENCAPSULATION
 from o80.recording.scan import NotARecordingError, Scan, content_of, index_of, scan
 from o80.unwritable import reason
@@ -28,6 +30,7 @@ class Written:
     journal_next: int = 0  #: number after the last entry of the journal
     channel: int | None = None  #: of the rows in the file that is written now
     journal: int | None = None  #: the channel of the journal there
+    joints: int | None = None  #: the channel of joint states there
 
 
 def opened(path: Path, *, proceed: bool, compression: str = "zstd") -> FileWriter:
@@ -93,7 +96,8 @@ def written_in(file: FileWriter, before: Sequence[Path]) -> dict[str, dict[int, 
 
 
 def _add(result: dict[str, dict[int, Written]], path: Path, found: Scan, *, is_last: bool) -> None:
-    journals = channels_in(found)
+    journals = channels_of(found, JOURNAL)
+    joints = channels_of(found, joint_states.CONTENT)
     for channel in found.channels.values():
         note = EpochNote.of(channel.metadata)
         if note is None:
@@ -108,7 +112,8 @@ def _add(result: dict[str, dict[int, Written]], path: Path, found: Scan, *, is_l
             entry = _last_entry(path, found, journal)
             written = replace(written, journal_next=max(entry, written.journal_next))
         if is_last:
-            written = replace(written, channel=channel.id, journal=journal)
+            own = joints.get((note.segment, note.number))
+            written = replace(written, channel=channel.id, journal=journal, joints=own)
         epochs[note.epoch] = written
 
 

@@ -8,8 +8,8 @@ from typing import Any
 
 from o80.errors import InvalidArgument, RecordingError
 from o80.history import History
-from o80.recording.epoch import EpochNote
-from o80.recording.journal_channel import channels_in
+from o80.recording.epoch import EpochNote, channels_of
+from o80.recording.journal_channel import CONTENT as JOURNAL
 from o80.recording.marks import Mark, marks_in
 from o80.recording.recorded_epoch import EpochPart, RecordedEpoch
 from o80.recording.scan import NotARecordingError, Scan, scan
@@ -97,7 +97,7 @@ def _scanned(path: Path) -> Scan:
 
 
 def _parts_of(path: Path, found: Scan) -> Iterator[EpochPart]:
-    journals = channels_in(found)
+    journals = channels_of(found, JOURNAL)
     for channel in found.channels.values():
         note = EpochNote.of(channel.metadata)
         if note is not None:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from types import TracebackType
 from typing import Any, Self
 
+from o80.at_exit import close_later
 from o80.errors import Closed
 from o80.frontend import Frontend
 from o80.recording.marks import Mark, add_mark
@@ -51,6 +52,7 @@ class Recording:
         self._closed = False
         self._thread = threading.Thread(target=self._run, name="o80-recording", daemon=True)
         self._thread.start()
+        close_later(self)
 
     @property
     def rows(self) -> int:
@@ -98,6 +100,9 @@ class Recording:
             self._recorder.finish()
         if self._failure is not None:
             raise self._failure
+
+    def _close_at_exit(self) -> None:
+        self.close()
 
     def __enter__(self) -> Self:
         return self

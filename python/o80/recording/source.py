@@ -9,6 +9,7 @@ from o80.frontend import Frontend
 from o80.recording.blocks import Block, SingleMessage
 from o80.recording.epoch import RowWriter, note_of
 from o80.recording.file_writer import FileWriter, MessageBlock
+from o80.recording.joint_states import JointWriter
 from o80.recording.journal_channel import GAP as JOURNAL_GAP
 from o80.recording.journal_channel import JournalWriter
 from o80.recording.output import Written
@@ -86,9 +87,9 @@ class Source:
 
     def _read(self, frontend: Frontend) -> list[MessageBlock]:
         """Rows, then the journal, which so has the decisions of all these rows."""
-        rows = self._read_rows(frontend)
+        blocks: list[MessageBlock] = [*self._read_rows(frontend)]
         journal = self._read_journal()
-        return [block for block in (rows, journal) if block is not None]
+        return blocks if journal is None else [*blocks, journal]
 
     # ------------------------------------------------------------------ which backend
 
@@ -117,11 +118,12 @@ class Source:
             self._written[frontend.epoch] = known
         note = known.note
         self._next = max(known.last + 1, note.begin)
-        self._writer = (
-            RowWriter(frontend._layout, note, known.channel)
-            if known.channel is not None
-            else RowWriter.added_to(self._file, frontend, note)
-        )
+        if known.channel is None:
+            self._writer = RowWriter.added_to(self._file, frontend, note)
+        else:
+            layout = frontend._layout
+            joints = JointWriter.added_to(self._file, layout, note, known.joints)
+            self._writer = RowWriter(layout, note, known.channel, joints)
         journal = JournalWriter(frontend, known.journal, known.journal_next)
         self._journal = journal if journal.exists else None
         if self._journal is not None and known.journal is None:
@@ -149,17 +151,17 @@ class Source:
 
     # ------------------------------------------------------------------ what it reads
 
-    def _read_rows(self, frontend: Frontend) -> Block | None:
+    def _read_rows(self, frontend: Frontend) -> list[Block]:
         assert self._writer is not None
         newest = frontend.published
         if newest < self._next:
             self.behind = 0
-            return None
+            return []
         most = max(1, LARGEST_BLOCK // frontend._layout.size)
         last = min(newest, self._next + most - 1)
         rows = frontend.history(since=self._next, until=last).rows
         if not len(rows):  # all of them were overwritten meanwhile
-            return None
+            return []
         first, last = int(rows["iteration"][0]), int(rows["iteration"][-1])
         if first > self._next:
             self.missed += first - self._next
@@ -167,9 +169,9 @@ class Source:
         self._next = last + 1
         self.rows += len(rows)
         self.behind = newest - last
-        block = self._writer.block(rows)
-        self._last_log_time = block.time_range[1]
-        return block
+        blocks = self._writer.blocks(rows)
+        self._last_log_time = blocks[0].time_range[1]
+        return blocks
 
     def _read_journal(self) -> SingleMessage | None:
         if self._journal is None:

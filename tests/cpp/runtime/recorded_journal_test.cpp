@@ -28,6 +28,7 @@ auto facts_of(const JournalEntry& entry) {
 
 auto facts_of(const std::vector<JournalEntry>& entries) {
   std::vector<decltype(facts_of(entries.front()))> facts;
+  facts.reserve(entries.size());
   for (const JournalEntry& entry : entries) facts.push_back(facts_of(entry));
   return facts;
 }

@@ -1,0 +1,107 @@
+"""Joint states in a recording, as ROS tools read them."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rosbags.highlevel import AnyReader
+
+import o80
+from o80.recording.joint_states import joints_of
+from o80.recording.recorder import Recorder
+
+JOINT = np.dtype([("position", "f8"), ("velocity", "f4"), ("torque", "f8")])
+
+
+def joint_states(path: Path, segment: str) -> list[Any]:
+    topic = f"/{segment}/joint_states"
+    with AnyReader([path]) as reader:
+        return [
+            reader.deserialize(raw, each.msgtype)
+            for each, _, raw in reader.messages()
+            if each.topic == topic
+        ]
+
+
+def recorded(segment: str, path: Path) -> o80.History:
+    recorder = Recorder(path, [segment], whole=True)
+    recorder.catch_up()
+    recorder.finish()
+    return o80.open(path)[segment].history()
+
+
+def test_every_row_of_a_robot_with_joints_is_a_joint_state(
+    arm: o80.Frontend, tmp_path: Path
+) -> None:
+    arm.add_command("elbow", 0.5, iterations=30)
+    arm.burst(30)
+    history = recorded(arm.segment, tmp_path / "run.mcap")
+    states = joint_states(tmp_path / "run.mcap", arm.segment)
+    offset = o80.open(tmp_path / "run.mcap")[arm.segment].epochs[0].wall_offset
+
+    assert len(states) == len(history) == 31
+    assert states[0].name == ["shoulder", "elbow"]
+    assert np.array_equal([state.position for state in states], history.observed)
+    assert np.array_equal([state.effort for state in states], history.extended.effort)
+    assert all(len(state.velocity) == 0 for state in states)
+    stamps = [state.header.stamp.sec * 10**9 + state.header.stamp.nanosec for state in states]
+    assert stamps == (history.time + offset).tolist()
+    assert {state.header.frame_id for state in states} == {""}
+
+
+def test_fields_of_a_state_are_position_velocity_and_effort(segment: str, tmp_path: Path) -> None:
+    with o80.Backend(segment, {"joints": (JOINT, 3), "grip": "f8"}, bursting=True) as backend:
+        observed = np.zeros(3, JOINT)
+        for name in JOINT.names or ():
+            observed[name] = np.arange(3) + ord(name[0])
+        backend.publish({"joints": observed, "grip": 7.0})
+        names = [actuator.name for actuator in o80.Frontend(segment).actuators]
+        recorded(segment, tmp_path / "run.mcap")
+    (state,) = joint_states(tmp_path / "run.mcap", segment)
+
+    assert state.name == names[:3]
+    assert state.position.tolist() == observed["position"].tolist()
+    assert state.velocity.tolist() == observed["velocity"].tolist()
+    assert state.effort.tolist() == observed["torque"].tolist()
+
+
+def test_sensor_values_that_are_joint_positions_are_joints(segment: str, tmp_path: Path) -> None:
+    sensors = np.dtype([("joint_positions", "f8", 4), ("joint_velocities", "f8", 4)])
+    with o80.Backend(segment, ["a", "b"], extended=sensors, bursting=True) as backend:
+        values = {"joint_positions": [1.0, 2, 3, 4], "joint_velocities": [5.0, 6, 7, 8]}
+        backend.publish([0.0, 0.0], values)
+        recorded(segment, tmp_path / "run.mcap")
+    (state,) = joint_states(tmp_path / "run.mcap", segment)
+
+    assert state.name == ["joint_0", "joint_1", "joint_2", "joint_3"]
+    assert state.position.tolist() == values["joint_positions"]
+    assert state.velocity.tolist() == values["joint_velocities"]
+    assert len(state.effort) == 0
+
+
+@pytest.mark.parametrize(
+    "state", ["f8", "i8", np.dtype([("pressure", "f8")]), np.dtype([("position", "f8", 3)])]
+)
+def test_a_robot_without_joints_has_no_joint_states(
+    state: Any, segment: str, tmp_path: Path
+) -> None:
+    with o80.Backend(segment, ["a", "b"], state, bursting=True) as backend:
+        backend.publish()
+        assert joints_of(o80.Frontend(segment)._layout) is None
+        recorded(segment, tmp_path / "run.mcap")
+
+    assert joint_states(tmp_path / "run.mcap", segment) == []
+
+
+def test_a_successor_goes_on_in_the_same_channel(arm: o80.Frontend, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    for _ in range(2):
+        arm.burst(10)
+        recorder = Recorder(path, [arm.segment], proceed=True, whole=True)
+        recorder.catch_up()
+        recorder.finish()
+
+    assert len(joint_states(path, arm.segment)) == 21
+    with AnyReader([path]) as reader:
+        assert sum(each.topic.endswith("/joint_states") for each in reader.connections) == 1
