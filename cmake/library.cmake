@@ -17,6 +17,21 @@ target_include_directories(o80_private_headers INTERFACE ${PROJECT_SOURCE_DIR}/s
 
 file(GLOB o80_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/*/*.cpp)
 list(FILTER o80_sources EXCLUDE REGEX "/src/programs/")
+# the hash of all sources is a source of its own, compiled alone because it changes with each of them
+file(GLOB_RECURSE hashed_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/include/o80/*.hpp
+     ${PROJECT_SOURCE_DIR}/src/*.hpp ${PROJECT_SOURCE_DIR}/src/*.cpp
+)
+set(source_hash ${PROJECT_BINARY_DIR}/source_hash.cpp)
+add_custom_command(
+  OUTPUT ${source_hash}
+  COMMAND ${CMAKE_COMMAND} -DROOT=${PROJECT_SOURCE_DIR} -DOUTPUT=${source_hash} -P
+          ${PROJECT_SOURCE_DIR}/cmake/source_hash.cmake
+  DEPENDS ${hashed_sources} ${PROJECT_SOURCE_DIR}/cmake/source_hash.cmake
+  COMMENT "Hashing the sources of the library" VERBATIM
+)
+set_source_files_properties(${source_hash} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+list(APPEND o80_sources ${source_hash})
+
 if(O80_STATIC)
   add_library(o80 STATIC ${o80_sources})
   add_link_options(-static)

@@ -15,4 +15,5 @@ void bind_backend(nanobind::module_& module);
 void bind_robots(nanobind::module_& module);
 void bind_loop_state(nanobind::module_& module);
 void bind_journal(nanobind::module_& module);
+void bind_provenance(nanobind::module_& module);
 void bind_nearest_name(nanobind::module_& module);

@@ -28,5 +28,6 @@ NB_MODULE(_core, m) {
   bind_robots(m);
   bind_loop_state(m);
   bind_journal(m);
+  bind_provenance(m);
   bind_nearest_name(m);
 }

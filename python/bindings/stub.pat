@@ -1,6 +1,7 @@
 # what the stub of o80._core takes from the Python side of the package
 _core.__prefix__:
     import numpy.typing
+    import typing
     from o80.record import Record
     from o80.states import States
     from o80.words import Reason, Status

@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from o80.journal import Journal, JournalCommand, JournalEntry
     from o80.limits import Limits
     from o80.prepared_burst import PreparedBurst
+    from o80.provenance import Provenance, ProvenanceFile
     from o80.record import Record
     from o80.recording.reader import RecordingFile
     from o80.recording.reader import open as open
@@ -80,6 +81,8 @@ _LAZY = {
     "JournalEntry": "o80.journal",
     "Limits": "o80.limits",
     "PreparedBurst": "o80.prepared_burst",
+    "Provenance": "o80.provenance",
+    "ProvenanceFile": "o80.provenance",
     "Record": "o80.record",
     "Recording": "o80.recording.recording",
     "RecordingFile": "o80.recording.reader",
@@ -150,6 +153,8 @@ __all__ = [
     "Observation",
     "PreparedBurst",
     "Profile",
+    "Provenance",
+    "ProvenanceFile",
     "ReadOnly",
     "Reason",
     "Record",

@@ -276,7 +276,7 @@ class Robot:
                 near = did_you_mean(name, [*kinds, "segment", *loop])
                 own = f": its own are {', '.join([*kinds][:5])}" if kinds else ": it has none"
                 raise InvalidArgument(f"robot '{self.name}' has no option '{name}'{near or own}")
-            if kinds[name] in ("number", "integer") and not isinstance(value, numbers.Real):
+            if kinds[name] in ("number", "integer", "seed") and not isinstance(value, numbers.Real):
                 raise InvalidArgument(
                     f"option '{name}' of robot '{self.name}' must be a {kinds[name]}, got {value!r}"
                 )

@@ -209,6 +209,10 @@ std::span<const std::byte> AttachedSegment::schema() const noexcept {
   return {view_.base + view_.offsets.schema, view_.shape.schema_bytes};
 }
 
+std::span<const std::byte> AttachedSegment::provenance() const noexcept {
+  return {view_.base + view_.offsets.provenance, view_.shape.provenance_bytes};
+}
+
 Life AttachedSegment::life() const noexcept {
   // only observers query the segment file: they can place many read locks on it, which would slow
   // the query of a commander

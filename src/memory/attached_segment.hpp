@@ -52,6 +52,8 @@ class AttachedSegment {
   Access access() const noexcept { return access_; }
   /// The schema, from the mapping.
   std::span<const std::byte> schema() const noexcept;
+  /// How the backend was started, from the mapping (runtime/provenance_bytes.hpp).
+  std::span<const std::byte> provenance() const noexcept;
   const SegmentView& view() const noexcept { return view_; }
   /// Descriptor of the segment file.
   int descriptor() const noexcept { return file_.descriptor(); }

@@ -37,6 +37,7 @@ SegmentShape shape_of(const SegmentSpec& spec) {
     throw InvalidArgument("segment '" + spec.name + "': a lane must have 1 to 16777216 blocks");
   return {.page_bytes = static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE)),
           .schema_bytes = spec.schema.size(),
+          .provenance_bytes = spec.provenance.size(),
           .row_bytes = spec.row_bytes,
           .slots = spec.rows + 1,
           .lanes = spec.lanes,
@@ -68,6 +69,9 @@ void fill(const SegmentView& view, const SegmentSpec& spec, std::uint64_t epoch)
   std::memcpy(view.commands, &commands, sizeof commands);
   if (!spec.schema.empty())
     std::memcpy(view.base + view.offsets.schema, spec.schema.data(), spec.schema.size());
+  if (!spec.provenance.empty())
+    std::memcpy(view.base + view.offsets.provenance, spec.provenance.data(),
+                spec.provenance.size());
 
   // relaxed: no other process can see the files yet
   view.counters().begun.store(-1, std::memory_order_relaxed);

@@ -19,9 +19,10 @@ namespace o80 {
 struct SegmentSpec {
   std::string name;
   std::span<const std::byte> schema;
-  std::uint32_t row_bytes = 0;        // multiple of 8
-  std::uint64_t rows = 1;             // length of the history
-  std::uint32_t lanes = 8;            // most frontends that command at the same time
+  std::span<const std::byte> provenance{};  // at most 16 MiB
+  std::uint32_t row_bytes = 0;              // multiple of 8
+  std::uint64_t rows = 1;                   // length of the history
+  std::uint32_t lanes = 8;                  // most frontends that command at the same time
   std::uint32_t lane_blocks = 16384;  // 64-byte blocks of a lane, rounded up to a power of two
   std::uint64_t journal_bytes = 0;    // rounded up to a power of two; 0: no journal
   mode_t permission = 0600;           // read: may observe; write: may command

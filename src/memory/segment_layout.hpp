@@ -12,6 +12,7 @@ namespace o80 {
 //
 //   SegmentHeader   written once, before the file gets its name
 //   schema          written once, before the file gets its name
+//   provenance      written once, before the file gets its name (runtime/provenance_bytes.hpp)
 //   Counters        written by the backend
 //   history         slots of row_bytes: written by the backend
 //   journal         a ring of entries (memory/journal.hpp): written by the backend
@@ -28,7 +29,7 @@ namespace o80 {
 
 inline constexpr std::uint64_t kSegmentMagic = 0x0a67'6573'2030'386fULL;   // "o80 seg\n"
 inline constexpr std::uint64_t kCommandsMagic = 0x0a64'6d63'2030'386fULL;  // "o80 cmd\n"
-inline constexpr std::uint32_t kSegmentVersion = 4;                        // format of both files
+inline constexpr std::uint32_t kSegmentVersion = 5;                        // format of both files
 inline constexpr std::size_t kLineBytes = 64;       // size of a cache line [bytes]
 inline constexpr std::size_t kBlockSize = 64;       // size of a block of a lane [bytes]
 inline constexpr std::size_t kMessages = 64;        // status texts kept for each lane
@@ -47,6 +48,7 @@ inline constexpr std::uint64_t kMostUnmetOwners = 1ULL << 20;
 struct SegmentShape {
   std::uint64_t page_bytes;
   std::uint64_t schema_bytes;
+  std::uint64_t provenance_bytes;
   std::uint64_t row_bytes;  // multiple of 8
   std::uint64_t slots;      // length of the history + 1
   std::uint32_t lanes;
@@ -69,7 +71,7 @@ struct SegmentHeader {
   char user[32];
   char program[64];
 };
-static_assert(sizeof(SegmentHeader) == 200);
+static_assert(sizeof(SegmentHeader) == 208);
 
 /// Requester and reason of a halt.
 struct HaltSlot {
@@ -211,7 +213,7 @@ constexpr std::uint64_t possible_incarnation(std::uint64_t written, std::uint64_
 /// Offsets of the parts, computed from the shape: no offset is read from a file.
 struct SegmentOffsets {
   // in the segment file
-  std::uint64_t schema, counters, history, journal, file_bytes;
+  std::uint64_t schema, provenance, counters, history, journal, file_bytes;
   // in the commanders' file
   std::uint64_t wakes, bell, lanes, lane_stride, transport, feedback, feedback_stride, statuses,
       commands_bytes;

@@ -1,5 +1,7 @@
 #include "robot/driver_instance.hpp"
 
+#include <sys/random.h>
+
 #include <algorithm>
 #include <cstdio>
 
@@ -28,6 +30,14 @@ void check_table(const RobotTable& table, const std::string& where) {
 
 namespace {
 
+/// A random number as text. It fits in 53 bits, so that every language reads it exactly.
+std::string drawn_seed() {
+  std::uint64_t bits = 0;
+  while (getrandom(&bits, sizeof bits, 0) != sizeof bits) {
+  }
+  return std::to_string(bits >> 11);
+}
+
 std::vector<OptionValue> plain(const OptionValues& options) {
   std::vector<OptionValue> values;
   values.reserve(options.size());
@@ -45,11 +55,23 @@ void check_options(const RobotTable& table, const OptionValues& options) {
   }
 }
 
+OptionValues effective_options(const RobotTable& table, const OptionValues& given) {
+  OptionValues effective;
+  for (const Option& option : options_of(table)) {
+    std::string text = option.kind == kSeedKind ? drawn_seed() : option.default_text;
+    for (const auto& [name, value] : given)
+      if (name == option.name) text = value;
+    effective.emplace_back(option.name, std::move(text));
+  }
+  return effective;
+}
+
 DriverInstance::DriverInstance(const RobotTable& table, const OptionValues& options)
     : table_(table) {
   check_table(table, table.name);
   check_options(table, options);
-  const std::vector<OptionValue> values = plain(options);
+  options_ = effective_options(table, options);
+  const std::vector<OptionValue> values = plain(options_);
   driver_ = table.create(values.data(), static_cast<std::uint32_t>(values.size()), &fault_);
   if (driver_ == nullptr) {
     throw DriverError("robot '" + std::string(table.name) +

@@ -24,6 +24,10 @@ void check_table(const RobotTable& table, const std::string& where);
 /// Throws InvalidArgument for an unknown option or an invalid value.
 void check_options(const RobotTable& table, const OptionValues& options);
 
+/// Each option of the robot with the text that it is started with: the given one, or the default. A
+/// Seed that is not given is drawn.
+OptionValues effective_options(const RobotTable& table, const OptionValues& given);
+
 /// One driver object behind its table of functions.
 ///
 /// Not copyable. The destructor stops and destroys the driver.
@@ -36,6 +40,8 @@ class DriverInstance {
   ~DriverInstance();
 
   const RobotTable& table() const { return table_; }
+  /// The effective options it was started with.
+  const OptionValues& options() const { return options_; }
   /// `period`: the period that the user requested [ns]; 0: none. Throws DriverError.
   Schema describe(std::int64_t period = 0) const;
 
@@ -57,6 +63,7 @@ class DriverInstance {
   Served served(RequestAnswer answer, const FaultText& text) noexcept;
 
   const RobotTable& table_;
+  OptionValues options_;
   void* driver_ = nullptr;
   FaultText fault_{};
   bool started_ = false;

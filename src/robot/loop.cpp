@@ -8,16 +8,24 @@
 #include "memory/verb_word.hpp"
 #include "o80/base/error.hpp"
 #include "o80/base/time.hpp"
+#include "robot/robot_provenance.hpp"
 
 namespace o80 {
 
 namespace {
 constexpr std::int64_t kLongestBraking = 1'000'000'000;  // [ns]
+
+BackendOptions with_provenance(BackendOptions options, const DriverInstance& robot) {
+  Provenance provenance = provenance_of(robot.table(), robot.options());
+  provenance.run_options = std::move(options.provenance.run_options);
+  options.provenance = std::move(provenance);
+  return options;
 }
+}  // namespace
 
 Loop::Loop(std::unique_ptr<DriverInstance> robot, const BackendOptions& options)
     : robot_(std::move(robot)),
-      backend_(robot_->describe(options.period), options, this),
+      backend_(robot_->describe(options.period), with_provenance(options, *robot_), this),
       pacer_(backend_.schema().head.period),
       paced_(!options.bursting),
       interrupted_(backend_.layout().mask_words + 1),

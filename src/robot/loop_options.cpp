@@ -100,12 +100,12 @@ constexpr std::array kOptions = {
     LoopOption{"lane_blocks", OptionKind::integer, "a whole number from 16 to 4194304", 16, 1 << 22,
                "16384", "blocks of 64 bytes that each of them may have in flight", kEverywhere,
                O80_SET(backend.lane_blocks)},
-    LoopOption{"journal", OptionKind::number, "a number from 0.5 to 65536 [MiB]", 0.5, 65536,
-               "twice the largest batch", "size of the journal [MiB]; a batch may be half as large",
-               kEverywhere,
+    LoopOption{"journal", OptionKind::number, "0 or a number from 0.5 to 65536 [MiB]", 0, 65536,
+               "twice the largest batch",
+               "size of the journal [MiB], 0: none; a batch may be half as large", kEverywhere,
                [](LoopOptions& options, std::string_view, double number) {
                  options.backend.journal = std::llround(number * (1 << 20));
-                 return true;
+                 return number == 0 || number >= 0.5;
                }},
     LoopOption{"permission", OptionKind::octal, "an octal mode such as 600, 640 or 660", 0, 0,
                "600", "read bits: who may observe, write bits: who may command", kEverywhere,

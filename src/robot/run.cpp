@@ -23,6 +23,7 @@
 #include "o80/robot/real_time.hpp"
 #include "robot/loop.hpp"
 #include "robot/loop_report.hpp"
+#include "robot/robot_provenance.hpp"
 #include "robot/run_options.hpp"
 #include "robot/service_manager.hpp"
 
@@ -113,7 +114,8 @@ void complain(const char* text) {
 
 /// Publishes the fault of a robot that cannot be constructed in a small segment, so that waiting
 /// frontends raise it.
-void leave_fault(const BackendOptions& options, const char* why) noexcept {
+void leave_fault(const RobotTable& table, const RunOptions& run, const char* why) noexcept {
+  const BackendOptions& options = run.backend;
   try {
     BackendOptions least;
     least.segment = options.segment;
@@ -121,6 +123,7 @@ void leave_fault(const BackendOptions& options, const char* why) noexcept {
     least.history = 1;
     least.lanes = 1;
     least.lane_blocks = 16;
+    least.provenance = provenance_of(table, run.robot);
     UntypedBackend backend(Schema(), least);
     backend.end(BackendState::failed, why);
   } catch (const std::exception& error) {
@@ -133,12 +136,13 @@ void leave_fault(const BackendOptions& options, const char* why) noexcept {
 std::unique_ptr<Loop> make_loop(const RobotTable& table, const RunOptions& options) {
   OwnedSegment::refuse_if_taken(options.backend.segment);
   try {
-    return std::make_unique<Loop>(std::make_unique<DriverInstance>(table, options.robot),
-                                  options.backend);
+    BackendOptions backend = options.backend;
+    backend.provenance.run_options = texts_of(options.real_time);
+    return std::make_unique<Loop>(std::make_unique<DriverInstance>(table, options.robot), backend);
   } catch (const SegmentTaken&) {
     throw;
   } catch (const std::exception& error) {
-    leave_fault(options.backend, error.what());
+    leave_fault(table, options, error.what());
     throw;
   }
 }

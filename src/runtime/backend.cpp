@@ -12,7 +12,10 @@
 #include "base/crash_point.hpp"
 #include "control/number_name.hpp"
 #include "describe/table.hpp"
+#include "o80/base/version.hpp"
 #include "runtime/backend_body.hpp"
+#include "runtime/provenance_bytes.hpp"
+#include "runtime/run_option_texts.hpp"
 
 namespace o80 {
 
@@ -88,20 +91,61 @@ std::uint64_t journal_bytes_of(const BackendOptions& options) {
     const std::uint64_t lane = std::uint64_t{std::bit_ceil(options.lane_blocks)} * kBlockBytes;
     return std::max(2 * lane, kLeastBackendJournal);
   }
-  return std::max(static_cast<std::uint64_t>(options.journal), kLeastBackendJournal);
+  return std::bit_ceil(std::max(static_cast<std::uint64_t>(options.journal), kLeastBackendJournal));
 }
 
-OwnedSegment segment_of(const Schema& schema, const BackendOptions& options) {
+/// The options with the values that take the place of the defaults.
+BackendOptions effective(const Schema& schema, const BackendOptions& options) {
+  BackendOptions effective = options;
+  effective.period = schema.head.period;
+  effective.history = rows_of(options, row_layout(schema).size);
+  effective.lane_blocks = std::bit_ceil(options.lane_blocks);
+  effective.journal = static_cast<std::int64_t>(journal_bytes_of(options));
+  return effective;
+}
+
+/// Wall-clock time of the moment at which the clock of the rows is 0 [ns].
+std::int64_t wall_clock_offset(const Schema& schema) {
+  if (schema.head.clock == Clock::simulated) return wall_clock_now();
+  // of several readings the one with the shortest time in between
+  std::int64_t offset = 0;
+  std::int64_t shortest = std::numeric_limits<std::int64_t>::max();
+  for (int i = 0; i < 5; ++i) {
+    const std::int64_t before = monotonic_now();
+    const std::int64_t wall = wall_clock_now();
+    const std::int64_t took = monotonic_now() - before;
+    if (took >= shortest) continue;
+    shortest = took;
+    offset = wall - before - took / 2;
+  }
+  return offset;
+}
+
+Provenance provenance_of(const Schema& schema, const BackendOptions& options) {
+  Provenance provenance = options.provenance;
+  if (provenance.robot.empty()) provenance.robot = schema.head.robot.str();
+  for (auto& option : texts_of(effective(schema, options)))
+    provenance.run_options.push_back(std::move(option));
+  provenance.version = version();
+  provenance.source_hash = source_hash();
+  provenance.wall_clock_offset = wall_clock_offset(schema);
+  return provenance;
+}
+
+OwnedSegment segment_of(const Schema& schema, const Provenance& provenance,
+                        const BackendOptions& given) {
+  const BackendOptions options = effective(schema, given);
   const std::vector<std::byte> bytes = to_bytes(schema);
-  const std::uint32_t row_bytes = row_layout(schema).size;
+  const std::vector<std::byte> provenance_bytes = to_bytes(provenance);
   SegmentSpec spec;
   spec.name = options.segment;
   spec.schema = bytes;
-  spec.row_bytes = row_bytes;
-  spec.rows = rows_of(options, row_bytes);
+  spec.provenance = provenance_bytes;
+  spec.row_bytes = row_layout(schema).size;
+  spec.rows = options.history;
   spec.lanes = options.lanes;
   spec.lane_blocks = options.lane_blocks;
-  spec.journal_bytes = journal_bytes_of(options);
+  spec.journal_bytes = static_cast<std::uint64_t>(options.journal);
   spec.permission = options.permission;
   spec.inherits_halt = !options.bursting && !options.resume;
   return OwnedSegment::create(spec);
@@ -120,7 +164,8 @@ std::size_t largest_request(const Schema& schema) {
 UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, RequestServer* server)
     : schema(prepared(std::move(given), options)),
       layout(row_layout(schema)),
-      segment(segment_of(schema, options)),
+      provenance(provenance_of(schema, options)),
+      segment(segment_of(schema, provenance, options)),
       history(segment.view()),
       journal(segment.view()),
       row_signal(segment.view()),
@@ -305,6 +350,7 @@ UntypedBackend::~UntypedBackend() {
 const Schema& UntypedBackend::schema() const noexcept { return body_->schema; }
 const RowLayout& UntypedBackend::layout() const noexcept { return body_->layout; }
 const std::string& UntypedBackend::name() const noexcept { return body_->segment.name(); }
+const Provenance& UntypedBackend::provenance() const noexcept { return body_->provenance; }
 
 std::byte* UntypedBackend::observed() noexcept { return body_->row() + body_->layout.observed; }
 std::byte* UntypedBackend::extended() noexcept { return body_->row() + body_->layout.extended; }

@@ -80,6 +80,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
 
   const Schema schema;
   const RowLayout layout;
+  const Provenance provenance;
   OwnedSegment segment;
   HistoryWriter history;
   DecisionJournal journal;

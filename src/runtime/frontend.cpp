@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "o80/base/nearest_name.hpp"
+#include "runtime/provenance_bytes.hpp"
 
 namespace o80 {
 
@@ -43,6 +44,9 @@ std::shared_ptr<const Description> UntypedFrontend::description() const {
   return link_->description;
 }
 std::uint64_t UntypedFrontend::epoch() const { return link_->segment.epoch(); }
+Provenance UntypedFrontend::provenance() const {
+  return provenance_from_bytes(link_->segment.provenance());
+}
 bool UntypedFrontend::bursting() const { return schema().head.bursting != 0; }
 std::int64_t UntypedFrontend::period() const { return schema().head.period; }
 Life UntypedFrontend::life() const {

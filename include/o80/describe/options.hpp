@@ -20,11 +20,21 @@ struct Option {
   std::string unit;
 };
 
+/// The seed of what a driver draws at random, as a field of its Config. If the option is not given,
+/// o80 draws a seed when it starts the robot, and records it with the other options; so each run
+/// can be repeated. 0 in a Config that a program makes by itself.
+struct Seed {
+  std::uint64_t value = 0;
+};
+inline constexpr std::string_view kSeedKind = "seed";
+
 namespace describing {
 
 template <class T>
 std::string option_kind() {
-  if constexpr (std::is_same_v<T, bool>) {
+  if constexpr (std::is_same_v<T, Seed>) {
+    return std::string(kSeedKind);
+  } else if constexpr (std::is_same_v<T, bool>) {
     return "boolean";
   } else if constexpr (std::is_integral_v<T>) {
     return "integer";
@@ -48,7 +58,9 @@ std::string option_kind() {
 
 template <class T>
 std::string option_text(const T& value) {
-  if constexpr (std::is_same_v<T, bool>) {
+  if constexpr (std::is_same_v<T, Seed>) {
+    return option_text(value.value);
+  } else if constexpr (std::is_same_v<T, bool>) {
     return value ? "true" : "false";
   } else if constexpr (std::is_arithmetic_v<T>) {
     std::array<char, 64> text{};
@@ -71,6 +83,7 @@ std::string option_text(const T& value) {
 
 /// "an integer" for "integer"; "one of: a, b" and "3 x number" stay as they are.
 inline std::string with_article(const std::string& kind) {
+  if (kind == kSeedKind) return "a whole number, at least 0";
   if (kind.starts_with("one of") || (kind[0] >= '0' && kind[0] <= '9')) return kind;
   return (kind == "integer" ? "an " : "a ") + kind;
 }
@@ -78,7 +91,9 @@ inline std::string with_article(const std::string& kind) {
 /// Parses a text into `value`; false if the text is invalid.
 template <class T>
 bool parse_option(std::string_view text, T& value) {
-  if constexpr (std::is_same_v<T, bool>) {
+  if constexpr (std::is_same_v<T, Seed>) {
+    return parse_option(text, value.value);
+  } else if constexpr (std::is_same_v<T, bool>) {
     const bool yes = text == "true" || text == "1" || text == "yes" || text == "True";
     const bool no = text == "false" || text == "0" || text == "no" || text == "False";
     value = yes;
@@ -176,8 +191,10 @@ std::vector<Option> options_of() {
       defaults, [&]<class Value>(std::string_view name, const Value& value, std::string_view text) {
         FieldRow row;
         set_text(row, text);
-        options.push_back({std::string(name), describing::option_kind<Value>(),
-                           describing::option_text(value), row.help.str(), row.unit.str()});
+        const std::string otherwise =
+            std::is_same_v<Value, Seed> ? "drawn at each start" : describing::option_text(value);
+        options.push_back({std::string(name), describing::option_kind<Value>(), otherwise,
+                           row.help.str(), row.unit.str()});
       });
   return options;
 }

@@ -14,6 +14,7 @@
 #include "o80/describe/schema.hpp"
 #include "o80/memory/halt.hpp"
 #include "o80/memory/life.hpp"
+#include "o80/runtime/provenance.hpp"
 #include "o80/runtime/request_server.hpp"
 
 namespace o80 {
@@ -41,6 +42,10 @@ struct BackendOptions {
   /// Real time only: starts without a halt even if the previous backend of this name was halted, or
   /// was killed while commands acted.
   bool resume = false;
+  /// What the caller knows of the robot: its options, library and files, and further run options.
+  /// The backend adds its own options, the versions and the clock, and the robot's name if none is
+  /// given.
+  Provenance provenance{};
 };
 
 /// Timing of the last period, set by the loop.
@@ -75,6 +80,8 @@ class UntypedBackend {
   const Schema& schema() const noexcept;
   const RowLayout& layout() const noexcept;
   const std::string& name() const noexcept;
+  /// How it was started, with the effective options.
+  const Provenance& provenance() const noexcept;
 
   /// The observed and extended parts of the current row; fill them before `publish`.
   std::byte* observed() noexcept;

@@ -20,6 +20,7 @@
 #include "o80/memory/life.hpp"
 #include "o80/runtime/batch.hpp"
 #include "o80/runtime/observation.hpp"
+#include "o80/runtime/provenance.hpp"
 
 namespace o80 {
 
@@ -70,6 +71,8 @@ class UntypedFrontend {
   const RowLayout& layout() const;
   std::shared_ptr<const Description> description() const;
   std::uint64_t epoch() const;
+  /// How the backend was started. Throws SegmentError if that part of the segment is damaged.
+  Provenance provenance() const;
   bool bursting() const;
   /// [ns]
   std::int64_t period() const;

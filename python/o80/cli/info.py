@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -11,16 +12,19 @@ from o80.cli.attach import attach
 from o80.cli.condition import halt_text, pace_text, running_texts, watchdog_text
 from o80.cli.screen import Column, print_json, print_table, style
 
+if TYPE_CHECKING:
+    from o80.provenance import Provenance
+
 
 def info(
     segment: Annotated[str, typer.Argument(help="Name of a segment; see o80 list.")],
-    as_json: Annotated[bool, typer.Option("--json", help="The whole schema, for tools.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="All of it, for tools.")] = False,
 ) -> None:
     """Describe a robot: state of its loop, actuators, limits, sensor values, requests."""
     with attach(segment) as frontend:
         schema = frontend.schema
         if as_json:
-            print_json(schema)
+            print_json({**schema, "provenance": asdict(frontend.provenance)})
             return
         loop = _core.loop_state(frontend)
         print(
@@ -50,6 +54,34 @@ def info(
                 served = ", also while halted" if request["while_halted"] else ""
                 told = style(f"{request['help']}{served}", "dim")
                 print(f"  {request['name']}({fields})  {told}".rstrip())
+        print(style("\nstarted with", "bold"))
+        for line in _started_with(frontend.provenance):
+            print(f"  {line}")
+
+
+def _started_with(provenance: Provenance) -> list[str]:
+    """Library, options and versions, in lines."""
+    lines = []
+    if provenance.library:
+        built = f"  {style(_plain(provenance.built_with), 'dim')}" if provenance.built_with else ""
+        lines.append(f"library  {_plain(provenance.library)}{built}")
+    if provenance.options:
+        lines.append(f"options  {_assignments(provenance.options)}")
+    lines.append(f"loop     {_assignments(provenance.run_options)}")
+    for file in provenance.files:
+        hashed = f"sha256 {file.sha256[:12]}" if file.sha256 else "not read"
+        lines.append(f"file     {_plain(file.path)}  {style(hashed, 'dim')}")
+    version = f"{provenance.version}, sources {provenance.source_hash[:12]}"
+    return [*lines, f"o80      {_plain(version)}"]
+
+
+def _assignments(options: dict[str, str]) -> str:
+    return ", ".join(f"{_plain(name)}={_plain(text)}" for name, text in options.items())
+
+
+def _plain(text: str) -> str:
+    """A text from shared memory, safe for a terminal."""
+    return "".join(c if c.isprintable() else "?" for c in text)
 
 
 def _print_actuators(schema: dict[str, Any]) -> None:

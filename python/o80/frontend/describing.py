@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 from o80 import _core
 from o80.actuator import Actuator, actuators_of
 from o80.layout import Layout
+from o80.provenance import Provenance
 from o80.words import LifeWord
 
 
@@ -47,6 +48,11 @@ class Describing(_core.Frontend):
     def schema(self) -> dict[str, Any]:
         """The description of the robot."""
         return self._layout.schema
+
+    @property
+    def provenance(self) -> Provenance:
+        """How the backend was started: options, versions, and the offset to the wall clock."""
+        return Provenance.from_fields(_core.provenance_fields(self))
 
     @property
     def robot(self) -> str:

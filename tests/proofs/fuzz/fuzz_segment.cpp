@@ -75,7 +75,7 @@ class Original {
   Part part(std::uint32_t which) const {
     const SegmentOffsets& at = offsets_;
     const Part parts[] = {{0, 0, at.schema},
-                          {0, at.schema, at.counters},
+                          {0, at.schema, at.provenance},
                           {0, at.counters, at.history},
                           {0, at.history, at.journal},
                           {1, 0, at.wakes},
@@ -84,7 +84,8 @@ class Original {
                           {1, at.lanes, at.feedback},
                           {1, at.feedback, at.feedback + at.statuses},
                           {1, at.feedback + at.statuses, at.commands_bytes},
-                          {0, at.journal, at.file_bytes}};
+                          {0, at.journal, at.file_bytes},
+                          {0, at.provenance, at.counters}};
     return parts[which % std::size(parts)];
   }
 
@@ -141,6 +142,7 @@ void may_refuse(Call&& call) {
 
 void read_all(UntypedFrontend& frontend) {
   if (to_json(frontend.schema()).empty()) std::abort();
+  may_refuse([&] { frontend.provenance(); });
   may_refuse([&] { frontend.latest(); });
   may_refuse([&] { frontend.history(3); });
   may_refuse([&] { frontend.history(0, 1'000'000); });

@@ -1,0 +1,56 @@
+"""How a backend was started."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from typing import Any, Self
+
+
+@dataclass(frozen=True)
+class ProvenanceFile:
+    """A file that an option of a robot names."""
+
+    option: str
+    path: str  #: absolute
+    sha256: str  #: of its content, as ``sha256sum`` prints it; empty: not read
+
+
+@dataclass(frozen=True, kw_only=True)
+class Provenance:
+    """How a backend was started: what is needed to start the same robot again.
+
+    Texts of options are those that ``o80 run`` takes.
+    """
+
+    robot: str  #: name, as `o80.robots.load` takes it
+    options: dict[str, str]  #: of the robot, with defaults and drawn seeds
+    run_options: dict[str, str]  #: of the backend and its loop, with defaults
+    version: str  #: of o80
+    source_hash: str  #: of the sources of the o80 that ran it
+    #: A row's time plus this is wall-clock time, in ns since 1970. As of the start: the clocks may
+    #: drift apart, or be set, while the backend runs.
+    wall_clock_offset: int
+    library: str = ""  #: absolute path of the robot's library or program; empty: none
+    library_sha256: str = ""  #: of its content
+    built_with: str = ""  #: versions of what the robot was built with
+    files: tuple[ProvenanceFile, ...] = ()  #: that the robot's options name
+
+    def as_json(self) -> str:
+        """As one line of JSON, which `from_json` reads. Pure ASCII."""
+        return json.dumps(asdict(self), sort_keys=True)
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """The provenance that `as_json` has written; fields of later versions are left out."""
+        found = json.loads(text)
+        known = {field.name for field in fields(cls)}
+        return cls.from_fields({name: found[name] for name in found if name in known})
+
+    @classmethod
+    def from_fields(cls, given: Mapping[str, Any]) -> Self:
+        """From a mapping of its fields; `files` as mappings or as sequences."""
+        files = tuple(
+            ProvenanceFile(**file) if isinstance(file, Mapping) else ProvenanceFile(*file)
+            for file in given.get("files", ())
+        )
+        return cls(**{**given, "files": files})

@@ -1,0 +1,98 @@
+#include "robot/robot_provenance.hpp"
+
+#include <dlfcn.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <system_error>
+#include <tuple>
+#include <utility>
+
+#include "base/sha256.hpp"
+
+namespace o80 {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::uintmax_t kLargestHashed = 64U << 20;  // [bytes]
+
+/// SHA-256 of the content of a file; empty if it cannot be read or is larger than kLargestHashed.
+std::string sha256_of(const fs::path& path) {
+  std::error_code error;
+  if (!fs::is_regular_file(path, error) || fs::file_size(path, error) > kLargestHashed || error)
+    return {};
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rbe"),
+                                                             &std::fclose);
+  if (file == nullptr) return {};
+  Sha256 hash;
+  std::array<std::byte, 1U << 16> part;
+  while (const std::size_t size = std::fread(part.data(), 1, part.size(), file.get()))
+    hash.add({part.data(), size});
+  return std::ferror(file.get()) != 0 ? std::string{} : hash.hex();
+}
+
+/// The library or program that holds a table; empty if it is not known.
+fs::path holder_of(const RobotTable& table) {
+  Dl_info info{};
+  if (dladdr(&table, &info) == 0 || info.dli_fname == nullptr) return {};
+  std::error_code error;
+  const fs::path name = info.dli_fname;
+  // a program that was found through PATH is called by its bare name
+  return fs::canonical(name.has_parent_path() ? name : fs::path("/proc/self/exe"), error);
+}
+
+/// The library of a robot and its hash, which are computed once: a library stays loaded until the
+/// process ends.
+std::pair<std::string, std::string> library_of(const RobotTable& table) {
+  static std::mutex guard;
+  static std::map<const RobotTable*, std::pair<std::string, std::string>> known;
+  const std::scoped_lock lock(guard);
+  const auto [found, is_new] = known.try_emplace(&table);
+  if (is_new) {
+    const fs::path path = holder_of(table);
+    found->second = {path.string(), sha256_of(path)};
+  }
+  return found->second;
+}
+
+}  // namespace
+
+Provenance provenance_of(const RobotTable& table, const OptionValues& options) {
+  Provenance provenance;
+  provenance.robot = table.name;
+  provenance.built_with = table.built_with;
+  std::tie(provenance.library, provenance.library_sha256) = library_of(table);
+  provenance.options = options;
+  const std::vector<Option> rows = options_of(table);
+  for (const auto& [name, text] : options) {
+    const auto row = std::ranges::find(rows, name, &Option::name);
+    std::error_code error;
+    if (text.empty() || row == rows.end() || row->kind != "text") continue;
+    if (!fs::is_regular_file(text, error)) continue;
+    provenance.files.push_back({name, fs::absolute(text, error).string(), sha256_of(text)});
+  }
+  return provenance;
+}
+
+Provenance::Options texts_of(const RealTimeOptions& options) {
+  constexpr std::array<const char*, 3> kPolicies{"other", "fifo", "rr"};
+  Provenance::Options texts{{"policy", kPolicies[static_cast<std::size_t>(options.policy)]},
+                            {"lock_memory", options.lock_memory ? "true" : "false"}};
+  if (options.policy != RealTimeOptions::Policy::other)
+    texts.emplace_back("priority", std::to_string(options.priority));
+  std::string processors;
+  for (const int processor : options.processors)
+    processors += (processors.empty() ? "" : ",") + std::to_string(processor);
+  if (!processors.empty()) texts.emplace_back("cpus", processors);
+  return texts;
+}
+
+}  // namespace o80

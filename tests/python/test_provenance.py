@@ -1,0 +1,127 @@
+"""What a segment says about how its backend was started."""
+
+import hashlib
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import o80
+from o80.installation import prefix
+
+
+def test_of_an_inline_robot_has_the_effective_options(segment: str) -> None:
+    with o80.robots.load("two_joints").inline(segment, reach=2.5, history=100) as arm:
+        found = arm.provenance
+    assert found.robot == "two_joints"
+    assert found.options["reach"] == "2.5"
+    assert set(found.options) == {option.name for option in o80.robots.load("two_joints").options}
+    assert found.run_options["bursting"] == "true"
+    assert found.run_options["history"] == "100"
+    assert found.run_options["frequency"] == "1000"
+    assert found.version == o80.version()
+    assert Path(found.library) == o80.robots.load("two_joints").path.resolve()
+    assert found.library_sha256 == hashlib.sha256(Path(found.library).read_bytes()).hexdigest()
+
+
+def test_of_a_process_has_the_options_of_its_loop(segment: str) -> None:
+    robot = o80.robots.load("two_joints")
+    with robot.start(segment, frequency=250, stale="purge", silence=50, journal=1) as process:
+        found = process.frontend(read_only=True).provenance
+    assert found.run_options["frequency"] == "250"
+    assert found.run_options["stale"] == "purge"
+    assert found.run_options["silence"] == "50"
+    assert found.run_options["journal"] == "1"
+    assert found.run_options["policy"] == "other"
+    assert "max_overruns" not in found.run_options
+
+
+def test_starts_the_same_robot_again(segment: str) -> None:
+    robot = o80.robots.load("two_joints")
+    with robot.inline(segment, reach=1.25) as arm:
+        first, schema = arm.provenance, arm.schema
+    given: dict[str, Any] = {name: float(text) for name, text in first.options.items()}
+    with o80.robots.load(first.robot).inline(segment, **given) as again:
+        options = again.provenance.options
+        assert {name: float(text) for name, text in options.items()} == given
+        assert again.schema["actuators"] == schema["actuators"]
+
+
+def test_of_a_backend_in_a_program_has_its_options(segment: str) -> None:
+    with o80.Backend(segment, ["a"], robot="gripper", frequency=100, journal=0) as backend:
+        backend.publish([0.0])
+        with o80.Frontend(segment) as frontend:
+            found = frontend.provenance
+    assert found.robot == "gripper"
+    assert found.library == ""
+    assert found.options == {}
+    assert found.run_options["frequency"] == "100"
+    assert found.run_options["journal"] == "0"
+
+
+def test_leads_from_the_time_of_a_row_to_the_wall_clock(process: o80.robots.Process) -> None:
+    with process.frontend() as arm:
+        before = time.time_ns()
+        row = arm.wait_for_next(timeout=30)
+        after = time.time_ns()
+        wall = row.time + arm.provenance.wall_clock_offset
+    assert before - 10_000_000 < wall < after + 10_000_000
+
+
+def test_reads_back_from_json(arm: o80.Frontend) -> None:
+    found = arm.provenance
+
+    assert o80.Provenance.from_json(found.as_json()) == found
+    later = json.loads(found.as_json()) | {"of_a_later_version": 1}
+    assert o80.Provenance.from_json(json.dumps(later)) == found
+
+
+def test_keeps_texts_that_are_not_utf_8(segment: str, tmp_path: Path) -> None:
+    library = Path(os.fsdecode(bytes(tmp_path) + b"/two\xff\njoints.so"))
+    library.write_bytes(o80.robots.load("two_joints").path.read_bytes())
+    popen = subprocess.Popen(
+        [prefix() / "bin" / "o80-run", library, f"--segment={segment}", "--until-eof"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+    )
+    try:
+        with o80.Frontend(segment, timeout=30, read_only=True) as arm:
+            found = arm.provenance
+        told = subprocess.run(
+            [Path(sys.executable).parent / "o80", "info", segment],
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+    finally:
+        popen.communicate()
+    assert Path(found.library) == library
+    assert o80.Provenance.from_json(found.as_json()) == found
+    assert "two??joints.so" in told
+
+
+def test_is_read_after_the_backend_was_killed(segment: str) -> None:
+    with o80.robots.load("two_joints").start(segment) as process:
+        arm = process.frontend(read_only=True)
+        os.kill(process.pid, 9)
+        process.wait(30)
+    with arm:
+        assert arm.provenance.robot == "two_joints"
+
+
+def test_info_shows_it(segment: str) -> None:
+    with o80.robots.load("two_joints").inline(segment, reach=2.5):
+        command = Path(sys.executable).parent / "o80"
+        told = subprocess.run(
+            [command, "info", segment], capture_output=True, text=True, check=True
+        ).stdout
+        described = subprocess.run(
+            [command, "info", segment, "--json"], capture_output=True, text=True, check=True
+        ).stdout
+    assert "reach=2.5" in told
+    assert "frequency=1000" in told
+    assert f"{o80.version()}, sources " in told
+    assert json.loads(described)["provenance"]["options"]["reach"] == "2.5"
