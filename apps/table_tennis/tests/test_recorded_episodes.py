@@ -1,5 +1,8 @@
 """Recordings of environments: every row, every episode, what each step was worth."""
 
+import signal
+import subprocess
+import sys
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -17,6 +20,20 @@ from o80_table_tennis.settings import Pacing, TaskSettings
 
 SHORT = 200  # rows of a history
 Rows = dict[str, NDArray[Any]]
+KILLED = """
+import os, signal, sys
+import numpy as np
+from o80_table_tennis.environment import TableTennisEnvironment
+
+with TableTennisEnvironment(record=sys.argv[1]) as environment:
+    environment.reset(seed=1)
+    while environment.statistics().episodes < 2:
+        _, _, terminated, truncated, _ = environment.step(np.zeros(8))
+        if terminated or truncated:
+            environment.reset()
+    environment.step(np.zeros(8))
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
 
 
 def rows_in(path: Path) -> Rows:
@@ -134,6 +151,22 @@ def test_an_abandoned_episode_is_left_out(tmp_path: Path) -> None:
         "episode",
         "episode_end",
     ]
+
+
+def test_what_a_killed_program_recorded_is_there_and_is_continued(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    done = subprocess.run([sys.executable, "-c", KILLED, str(path)], timeout=60, check=False)
+    assert done.returncode == -signal.SIGKILL
+    o80.clean()  # what is left of its arm and twin
+
+    assert not o80.open(path).finished
+    first = recorded_episodes(path)
+    assert [episode.summary.number for episode in first] == [0, 1]
+    with opened(record=path) as environment:
+        environment.reset(seed=1)
+        played_out(environment)
+    assert [episode.summary.number for episode in recorded_episodes(path)] == [0, 1, 0]
+    check_rows(first[1])
 
 
 def test_a_stalled_episode_is_recorded_as_such(tmp_path: Path) -> None:

@@ -92,6 +92,7 @@ class EpisodeRecorder(AbstractContextManager["EpisodeRecorder"]):
 
     def end(self, summary: EpisodeSummary) -> None:
         """The episode has ended."""
+        self.flush()  # before the mark: an episode that is marked has its rows
         self._recording.mark(
             EPISODE_END,
             **asdict(summary),
@@ -99,7 +100,6 @@ class EpisodeRecorder(AbstractContextManager["EpisodeRecorder"]):
             rewards=self._rewards,
             observations=packed(self._observations),
         )
-        self.flush()
 
     def flush(self) -> None:
         """Returns when every row published so far is in the file."""

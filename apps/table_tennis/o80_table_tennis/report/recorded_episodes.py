@@ -75,19 +75,22 @@ class _Reader:
         self._recording = recording
         self._environment: Mapping[str, Any] = {}
         self._begun: Mapping[str, Any] = {}
+        self._arm: o80.History | None = None
+        self._twin: o80.History | None = None
 
     def episodes(self) -> Iterator[RecordedEpisode]:
         for mark in self._recording.marks:
             if mark.name == ENVIRONMENT:
-                self._environment = mark.values
-                self._arm = self._rows_of(mark.values["arm"])
-                self._twin = self._rows_of(mark.values["twins"][0])
+                self._environment, self._arm, self._twin = mark.values, None, None
             elif mark.name == EPISODE:
                 self._begun = mark.values
             elif mark.name == EPISODE_END:
                 yield self._episode(mark.values)
 
     def _episode(self, ended: Mapping[str, Any]) -> RecordedEpisode:
+        if self._arm is None or self._twin is None:
+            self._arm = self._rows_of(self._environment["arm"])
+            self._twin = self._rows_of(self._environment["twins"][0])
         summary = EpisodeSummary(**{each.name: ended[each.name] for each in fields(EpisodeSummary)})
         return RecordedEpisode(
             summary=summary,
