@@ -170,6 +170,33 @@ def test_log_times_are_the_wall_clock(process: o80.robots.Process, tmp_path: Pat
     assert before - 1e9 < walls[0] < walls[-1] < after + 1e9
 
 
+def test_log_times_are_those_of_the_segment(arm: o80.Frontend, tmp_path: Path) -> None:
+    offsets = []
+    for name in ("a.mcap", "b.mcap"):
+        with o80.Recording(tmp_path / name, arm):
+            arm.burst(10)
+        offsets.append(o80.open(tmp_path / name)[arm.segment].epochs[0].wall_offset)
+
+    assert offsets == [arm.provenance.wall_clock_offset] * 2
+
+
+def test_a_recording_says_how_its_robots_were_started(segment: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    started = []
+    recorder = Recorder(path, [segment], split="1G")
+    for gain in (2.5, 3.5):
+        with o80.robots.load("two_joints").inline(segment, gain=gain) as arm:
+            while recorder.sources[segment].position != (arm.epoch, 0):
+                recorder.catch_up()
+            started.append(arm.provenance)
+        recorder.catch_up()
+    recorder.finish()
+    epochs = o80.open(path)[segment].epochs
+
+    assert [epoch.provenance for epoch in epochs] == started
+    assert [epoch.provenance.options["gain"] for epoch in epochs] == ["2.5", "3.5"]
+
+
 @pytest.mark.parametrize("value", [object(), {1, 2}])
 def test_a_mark_that_is_no_json_changes_nothing(
     value: object, arm: o80.Frontend, tmp_path: Path

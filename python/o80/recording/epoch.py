@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 DESCRIPTION = "application/x-o80-description"
 """Media type of the attachment with the description of a robot, as it is in a segment."""
+PROVENANCE = "o80.provenance"
+"""Name of the metadata record that says how a backend was started."""
 
 
 @dataclass(frozen=True)
@@ -54,10 +56,13 @@ class EpochNote:
         except (KeyError, ValueError):
             return None
 
+    def run_texts(self) -> dict[str, str]:
+        """Texts that name this run."""
+        return {"segment": self.segment, "epoch": str(self.epoch), "number": str(self.number)}
+
     def channel_texts(self, content: str) -> dict[str, str]:
         """The metadata of a channel of this run that holds something else than its rows."""
-        run = {"segment": self.segment, "epoch": str(self.epoch), "number": str(self.number)}
-        return {"content": content} | run
+        return {"content": content} | self.run_texts()
 
     @property
     def attachment(self) -> str:
@@ -76,18 +81,15 @@ def topic_of(segment: str) -> str:
 
 
 def note_of(frontend: "Frontend", number: int, begin: int) -> EpochNote:
-    """What is to be said about rows from `begin` on; the newest row was published about now."""
-    clock: str = frontend.schema["clock"]
-    now = time.time_ns()
-    row_time = frontend.latest().time if clock == "simulated" else time.monotonic_ns()
+    """What is to be said about rows from `begin` on."""
     return EpochNote(
         segment=frontend.segment,
         robot=frontend.robot,
         epoch=frontend.epoch,
         number=number,
         begin=begin,
-        wall_offset=now - row_time,
-        clock=clock,
+        wall_offset=frontend.provenance.wall_clock_offset,
+        clock=frontend.schema["clock"],
     )
 
 
@@ -120,6 +122,7 @@ class RowWriter:
         message = row_type(layout)
         schema = file.add_schema(f"{PACKAGE}/msg/{message.name}", message.definition)
         file.attach(note.attachment, DESCRIPTION, frontend._description.table(), time.time_ns())
+        file.add_metadata(PROVENANCE, note.run_texts() | {"json": frontend.provenance.as_json()})
         channel = file.add_channel(topic_of(note.segment), schema, note.texts())
         return cls(layout, note, channel, JointWriter.added_to(file, layout, note, None))
 

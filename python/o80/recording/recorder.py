@@ -6,8 +6,10 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from o80.errors import Error, InvalidArgument, RecordingError
+from o80.recording.marks import Mark, add_mark
 from o80.recording.output import next_file, opened, opened_in, written_in
 from o80.recording.reader import files_of
 from o80.recording.source import Source
@@ -116,6 +118,11 @@ class Recorder:
                 f"{self.file.path} cannot be written any more: {error.strerror}. What was "
                 f"recorded until now is in it; make room, or record to another disk"
             ) from error
+
+    def mark(self, name: str, /, **values: Any) -> None:
+        """Writes a note with the newest iteration of each segment. Raises TypeError."""
+        with self.writing():
+            add_mark(self.file, Mark(name, time.time_ns(), self.newest, values))
 
     def catch_up(self) -> None:
         """Polls until rows and decisions that were published before the call are written."""

@@ -2,7 +2,6 @@
 
 import os
 import threading
-import time
 from collections.abc import Sequence
 from types import TracebackType
 from typing import Any, Self
@@ -10,7 +9,6 @@ from typing import Any, Self
 from o80.at_exit import close_later
 from o80.errors import Closed
 from o80.frontend import Frontend
-from o80.recording.marks import Mark, add_mark
 from o80.recording.recorder import Recorder
 
 BETWEEN_POLLS = 0.05  # [s]
@@ -82,9 +80,7 @@ class Recording:
         """
         with self._lock:
             self._check()
-            rows = self._recorder.newest
-            with self._recorder.writing():
-                add_mark(self._recorder.file, Mark(name, time.time_ns(), rows, values))
+            self._recorder.mark(name, **values)
 
     def close(self) -> None:
         """Records the rows published until now and finishes the file; may be called twice."""

@@ -183,6 +183,5 @@ class Source:
 
     def _note_gap(self, name: str, first: int, last: int) -> None:
         assert self._writer is not None
-        note = self._writer.note
-        values = {"segment": note.segment, "epoch": str(note.epoch), "number": str(note.number)}
-        self._file.add_metadata(name, values | {"first": str(first), "last": str(last)})
+        values = self._writer.note.run_texts() | {"first": str(first), "last": str(last)}
+        self._file.add_metadata(name, values)

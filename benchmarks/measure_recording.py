@@ -1,0 +1,129 @@
+"""What a recorder takes of a processor, and what a recording takes of an inline training loop.
+
+A second process publishes rows of 512 bytes in 1, 4 and 16 segments, 1000 times a second each, with
+a command for each of eight actuators in every iteration.
+"""
+
+import select
+import subprocess
+import sys
+import tempfile
+import time
+from contextlib import nullcontext
+from pathlib import Path
+
+import numpy as np
+
+import o80
+from o80.recording.recorder import Recorder
+from sampling import rounds, sample
+
+SEGMENTS = (1, 4, 16)
+ACTUATORS = 8
+SENSORS = np.dtype([("force", "f8", 40)])  # makes a row of 512 bytes
+PERIOD = 1e-3  # [s]
+SECONDS = 2.0  # of a measurement
+STEPS = 20_000  # of the training loop
+LAYER = 64
+
+
+def publish(count: int) -> None:
+    """Publishes until its input ends."""
+    random = np.random.default_rng(1)
+    values = random.standard_normal((997, 48))
+    names = [f"bench-recording-{i}" for i in range(count)]
+    backends = [
+        o80.Backend(name, ACTUATORS, extended=SENSORS, frequency=1 / PERIOD, history=4000)
+        for name in names
+    ]
+    for backend in backends:
+        backend.publish(values[0, :8], {"force": values[0, 8:]})
+    frontends = [o80.Frontend(name) for name in names]
+    print("ready", flush=True)
+    begin, i = time.monotonic(), 0
+    while not select.select([sys.stdin], [], [], 0)[0]:
+        i += 1
+        for k, (backend, frontend) in enumerate(zip(backends, frontends, strict=True)):
+            row = values[(i + 59 * k) % len(values)]
+            frontend.add_command(None, row[:8])
+            frontend.pulse()
+            backend.step()
+            backend.publish(row[:8], {"force": row[8:]})
+        time.sleep(max(0.0, begin + i * PERIOD - time.monotonic()))
+
+
+def measure_recorder(count: int, folder: Path) -> int:
+    """Processor time of a recorder of so many segments. Returns how many rows it missed."""
+    command = [sys.executable, __file__, "publish", str(count)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as publisher:
+        assert publisher.stdin is not None
+        assert publisher.stdout is not None
+        publisher.stdout.readline()
+        names = [f"bench-recording-{i}" for i in range(count)]
+        recorder = Recorder(folder / f"{count}.mcap", names)
+        assert all(each._frontend._layout.size == 512 for each in recorder.sources.values())
+        poll_for(recorder, 0.3)  # warms up
+        rows, begin = recorder.rows, time.process_time()
+        poll_for(recorder, SECONDS)
+        used, rows = time.process_time() - begin, recorder.rows - rows
+        missed, size = recorder.missed, recorder.size
+        recorder.finish()
+        publisher.stdin.close()
+    (folder / f"{count}.mcap").unlink()
+    # a busy machine publishes less: as if there had been 1000 rows a second
+    sample(f"recording_{count}", "%", 100 * used * (count / PERIOD) / rows)
+    sample(f"recording_{count}_bytes", "B/row", size / max(1, recorder.rows))
+    return missed
+
+
+def poll_for(recorder: Recorder, seconds: float) -> None:
+    """As o80 record does."""
+    end = time.monotonic() + seconds
+    while (now := time.monotonic()) < end:
+        recorder.poll()
+        time.sleep(max(0.0, now + recorder.between_chunks - time.monotonic()))
+
+
+def measure_training(folder: Path) -> int:
+    """Steps a second of an inline robot and a small policy, with and without a recording.
+
+    Returns how many rows the recording missed.
+    """
+    missed = 0
+    random = np.random.default_rng(2)
+    layers = [random.standard_normal(shape) / 8 for shape in ((6, LAYER), (LAYER, 2))]
+    robot = o80.robots.load("two_joints")
+    for recorded in (False, True):
+        path = folder / "training.mcap"
+        with robot.inline(history=50_000) as arm:
+            recording = o80.Recording(path, arm) if recorded else nullcontext()
+            with recording as recorder:
+                begin = time.perf_counter()
+                observation = arm.latest()
+                for _ in range(STEPS):
+                    seen = np.concatenate([observation.flat(np.float64), observation.desired])
+                    action = np.tanh(np.tanh(seen @ layers[0]) @ layers[1])
+                    arm.add_command(None, action)
+                    observation = arm.burst(5)
+                used = time.perf_counter() - begin
+            if recorder is not None:
+                missed = recorder.missed
+        path.unlink(missing_ok=True)
+        sample("training_recorded" if recorded else "training_alone", "steps/s", STEPS / used)
+    return missed
+
+
+def main() -> None:
+    if sys.argv[1] == "publish":
+        publish(int(sys.argv[2]))
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        missed = 0
+        for _ in range(min(rounds(), 5)):
+            missed += sum(measure_recorder(count, Path(folder)) for count in SEGMENTS)
+            missed += measure_training(Path(folder))
+        sample("recording_missed", "rows", missed)  # once: a median would hide a loss
+
+
+if __name__ == "__main__":
+    main()
