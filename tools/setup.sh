@@ -88,10 +88,10 @@ install_packages() {
 case $purpose in
   demo) ;;
   tools | test) need_packages g++ libgtest-dev libgmock-dev ;;
-  check) # compilers of the sanitizers and of another machine, model checkers, emulators, stress
+  check) # compilers of the sanitizers and of another machine, model checkers, emulators, stress, browser
     need_packages g++ libgtest-dev libgmock-dev googletest clang-19 libclang-rt-19-dev \
       llvm-19 g++-aarch64-linux-gnu qemu-user-static relacy-dev spin strace stress-ng rt-tests \
-      qemu-system-x86 busybox-static cpio
+      qemu-system-x86 busybox-static cpio chromium
     ;;
   wheels) need_packages g++ ;;
   bench) need_packages g++ rt-tests stress-ng ;;

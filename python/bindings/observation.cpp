@@ -87,6 +87,7 @@ void bind_observation(nb::module_& m) {
       .def(nb::new_(&description_from), "schema"_a)
       .def("json", [](const o80::Description& self) { return o80::to_json(self.schema); })
       .def("table", &table_of)
+      .def("model", [](const o80::Description& self) { return self.schema.shown.mjcf; })
       .def("hash", [](const o80::Description& self) { return o80::hash(self.schema); });
 
   nb::class_<Decoder>(m, "Decoder", "Converts rows of one robot to arrays.")

@@ -57,6 +57,7 @@ if TYPE_CHECKING:
     from o80.segment_list import Segment, clean, segments
     from o80.states import States
     from o80.stopping import stop
+    from o80.view import View
     from o80.words import Mode, Profile, Reason, Start, Status
 
 # Imported when they are first used: they need NumPy, which takes most of the time of `import o80`,
@@ -93,6 +94,7 @@ _LAZY = {
     "segments": "o80.segment_list",
     "States": "o80.states",
     "stop": "o80.stopping",
+    "View": "o80.view",
     "Mode": "o80.words",
     "Profile": "o80.words",
     "Reason": "o80.words",
@@ -176,6 +178,7 @@ __all__ = [
     "Stream",
     "TimeoutError",
     "UsedAfterFork",
+    "View",
     "__version__",
     "burst",
     "clean",

@@ -138,6 +138,7 @@ class Layout:
         schema: dict[str, Any] = json.loads(description.json())
         row = schema["row"]
         self.schema = schema
+        self._description = description
         self.size: int = row["size"]
         self.actuators = len(schema["actuators"])
         self.states = dtype_of_block(schema["groups"], row["observed"] - row["desired"])
@@ -277,6 +278,11 @@ class Layout:
         if not self.extras.itemsize:
             return Record(np.empty(len(rows), np.dtype([])))
         return Record(rows["extended"], self._extended_labels)
+
+    @property
+    def model(self) -> str:
+        """The model (MJCF) that draws the robot; empty: none."""
+        return self._description.model()
 
     def many_masks(self, rows: NDArray[Any], part: str) -> NDArray[np.bool_]:
         """A mask of an array of rows: bool (T, actuators)."""

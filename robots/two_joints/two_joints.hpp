@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "o80/robot.hpp"
+#include "two_joints_model.hpp"
 
 /// A request that takes time: the robot moves by itself until its joints are at 0.
 struct Home {
@@ -40,6 +41,9 @@ class TwoJoints {
     const o80::Limits limits{.minimum = -config_.reach, .maximum = config_.reach};
     schema.actuator(0).name("shoulder").limits(limits).unit("rad");
     schema.actuator(1).name("elbow").limits(limits);
+    schema.shown.mjcf = kTwoJointsModel;
+    schema.actuator("shoulder").moves_joint("shoulder");
+    schema.actuator("elbow").moves_joint("elbow");
   }
 
   void start() {}

@@ -200,6 +200,31 @@ void write_layout(JsonWriter& json, const RowLayout& layout) {
   json.close('}');
 }
 
+/// Without the text of the model, which is long.
+void write_shown(JsonWriter& json, const ShownModel& shown) {
+  json.open('{');
+  json.key("file");
+  json.value(std::string_view(shown.file));
+  json.key("bytes");
+  json.value(static_cast<std::int64_t>(shown.mjcf.size()));
+  json.key("values");
+  json.open('[');
+  for (const ShownRow& row : shown.values) {
+    json.open('{');
+    json.key("name");
+    json.value(row.name.view());
+    json.key("what");
+    json.value(std::string_view(row.what == Shown::joint ? "joint" : "position"));
+    json.key("from");
+    json.value(std::string_view(row.from == ShownFrom::states ? "states" : "extended"));
+    json.key("offset");
+    json.value(std::int64_t{row.offset});
+    json.close('}');
+  }
+  json.close(']');
+  json.close('}');
+}
+
 }  // namespace
 
 std::string to_json(const Schema& schema) {
@@ -261,6 +286,10 @@ std::string to_json(const Schema& schema) {
     json.close('}');
   }
   json.close(']');
+  if (!schema.shown.empty()) {
+    json.key("model");
+    write_shown(json, schema.shown);
+  }
   json.close('}');
   return json.str();
 }

@@ -38,6 +38,16 @@ void each_table(SchemaLike& schema, Visit&& visit) {
   visit(7, schema.defaults);
 }
 
+/// Follows the tables if the robot names a model, then the rows, the file and the text.
+/// Descriptions without a model are as they were before models were described.
+struct ShownHead {
+  std::uint64_t magic = 0x6E776F6853303880;  // "80Shown" behind a byte that is no text
+  std::uint32_t rows = 0;
+  std::uint32_t row_size = sizeof(ShownRow);
+  std::uint32_t file = 0;  // [bytes]
+  std::uint32_t mjcf = 0;  // [bytes]
+};
+
 [[noreturn]] void refuse(const std::string& why) {
   throw InvalidArgument("invalid description: " + why);
 }
@@ -264,6 +274,54 @@ void check_groups(const Schema& schema) {
   if (next != schema.actuators.size()) refuse("an actuator belongs to no group");
 }
 
+void check_shown(const Schema& schema) {
+  const ShownModel& shown = schema.shown;
+  if (shown.mjcf.size() > ShownModel::kLargest || shown.file.size() > ShownModel::kLargest ||
+      shown.values.size() > kMostRows) {
+    refuse("the model that shows the robot is too large");
+  }
+  if (!is_utf8(shown.mjcf) || !is_utf8(shown.file)) refuse("the model is not valid UTF-8");
+  const std::uint64_t extended =
+      schema.head.extended == kNoType ? 0 : schema.types[schema.head.extended].size;
+  for (const ShownRow& row : shown.values) {
+    check_text(row.name, "the name of a joint or a body");
+    if (row.what > Shown::position || row.from > ShownFrom::extended) {
+      refuse("a value of the model is of an unknown kind");
+    }
+    const std::uint64_t size = sizeof(double) * (row.what == Shown::joint ? 1 : 3);
+    const std::uint64_t block = row.from == ShownFrom::states ? schema.head.block : extended;
+    if (row.offset + size > block) {
+      refuse("the value of '" + row.name.str() + "' in the model lies outside the row");
+    }
+  }
+}
+
+std::size_t size_of(const ShownModel& shown) {
+  if (shown.empty()) return 0;
+  return sizeof(ShownHead) + shown.values.size() * sizeof(ShownRow) + shown.file.size() +
+         shown.mjcf.size();
+}
+
+/// Reads the part behind the tables; nothing there, or something else, is no model.
+ShownModel shown_from(std::span<const std::byte> bytes) {
+  ShownModel shown;
+  ShownHead head;
+  const ShownHead known;
+  if (bytes.size() < sizeof head) return shown;
+  std::memcpy(&head, bytes.data(), sizeof head);
+  if (head.magic != known.magic) return shown;
+  if (head.row_size != known.row_size || head.rows > kMostRows) refuse("a model of another size");
+  bytes = bytes.subspan(sizeof head);
+  const std::size_t rows = head.rows * sizeof(ShownRow);
+  if (bytes.size() < rows + head.file + head.mjcf) refuse("the model is cut off");
+  shown.values.resize(head.rows);
+  if (rows > 0) std::memcpy(shown.values.data(), bytes.data(), rows);
+  const char* texts = reinterpret_cast<const char*>(bytes.data() + rows);
+  shown.file.assign(texts, head.file);
+  shown.mjcf.assign(texts + head.file, head.mjcf);
+  return shown;
+}
+
 }  // namespace
 
 void check(const Schema& schema) {
@@ -290,6 +348,7 @@ void check(const Schema& schema) {
     }
   }
   check_groups(schema);
+  check_shown(schema);
   if (schema.requests.size() >= kMostActuators) refuse("too many requests");
   std::set<std::string_view> names;
   for (const RequestRow& request : schema.requests) {
@@ -312,7 +371,7 @@ std::vector<std::byte> to_bytes(const Schema& schema) {
     head.sizes[i] = sizeof(Row);
     size += rows.size() * sizeof(Row);
   });
-  std::vector<std::byte> bytes(size);
+  std::vector<std::byte> bytes(size + size_of(schema.shown));
   std::byte* out = bytes.data();
   const auto put = [&](const void* from, std::size_t count) {
     if (count > 0) std::memcpy(out, from, count);
@@ -323,6 +382,15 @@ std::vector<std::byte> to_bytes(const Schema& schema) {
   each_table(schema, [&]<class Row>(int, const std::vector<Row>& rows) {
     put(rows.data(), rows.size() * sizeof(Row));
   });
+  const ShownModel& shown = schema.shown;
+  if (shown.empty()) return bytes;
+  const ShownHead shown_head{.rows = static_cast<std::uint32_t>(shown.values.size()),
+                             .file = static_cast<std::uint32_t>(shown.file.size()),
+                             .mjcf = static_cast<std::uint32_t>(shown.mjcf.size())};
+  put(&shown_head, sizeof shown_head);
+  put(shown.values.data(), shown.values.size() * sizeof(ShownRow));
+  put(shown.file.data(), shown.file.size());
+  put(shown.mjcf.data(), shown.mjcf.size());
   return bytes;
 }
 
@@ -351,6 +419,7 @@ Schema schema_from_bytes(std::span<const std::byte> bytes) {
   schema.hooks.resize(schema.types.size());
   schema.keys.resize(schema.types.size());
   try {
+    schema.shown = shown_from(bytes.subspan(at));
     check(schema);
   } catch (const InvalidArgument& error) {
     throw foreign(error.what());

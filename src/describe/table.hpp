@@ -24,7 +24,7 @@ void check(const Schema& schema);
 std::uint64_t hash(const Schema& schema);
 
 /// The first five differences, a line each, in words, and how many more there are; empty if nothing
-/// differs. A watchdog may be set otherwise.
+/// differs. A watchdog may be set otherwise, and the model that viewers draw may differ.
 std::string difference(const Schema& expected, const Schema& found);
 
 /// The differences that matter to a program compiled for `expected`: offsets and kinds of the

@@ -100,6 +100,9 @@ Schema DriverInstance::describe(std::int64_t period) const {
     out.limits.assign(rows->limits, rows->limits + rows->limit_count);
     out.requests.assign(rows->requests, rows->requests + rows->request_count);
     out.defaults.assign(rows->defaults, rows->defaults + rows->default_count);
+    out.shown = {.mjcf = rows->mjcf,
+                 .file = rows->mjcf_file,
+                 .values = {rows->shown, rows->shown + rows->shown_count}};
   };
   if (table_.describe(driver_, period, &schema, copy, &fault) != 0) {
     throw DriverError("robot '" + std::string(table_.name) + "' cannot be started: " + fault.text);

@@ -11,6 +11,7 @@
 #include "o80/base/nearest_name.hpp"
 #include "o80/describe/hooks.hpp"
 #include "o80/describe/rows.hpp"
+#include "o80/describe/shown_model.hpp"
 
 namespace o80 {
 
@@ -53,6 +54,8 @@ class ActuatorDescription {
   /// Unit of a state that is a plain number, for example "rad". It holds for all actuators of the
   /// group; the fields of a described struct have theirs from O80_DESCRIBE.
   ActuatorDescription& unit(std::string_view unit);
+  /// The first number of the state, a double, is the position of this joint of `Schema::shown`.
+  ActuatorDescription& moves_joint(std::string_view joint);
 
  private:
   /// Calls `visit(LimitRow&)` for every number of a named field.
@@ -77,6 +80,7 @@ class Schema {
   std::vector<LimitRow> limits;
   std::vector<RequestRow> requests;
   std::vector<std::byte> defaults;  // default values of the types that have some
+  ShownModel shown;                 // for viewers
   std::vector<TypeHooks> hooks;     // one for each type; not in the segment
   std::vector<const void*> keys;    // one for each type: identifies its C++ type, or null
 
@@ -96,6 +100,8 @@ class Schema {
                               bool is_array = true);
   /// Adds a sensor value to the extended type; returns its offset in the extended block [bytes].
   std::uint32_t add_sensor(FieldRow sensor);
+  /// Element `index` of an extended field of doubles is the position of this joint of `shown`.
+  void sensor_moves_joint(std::string_view field, std::uint32_t index, std::string_view joint);
   /// `while_halted`: serve the request also while the backend is halted; it must move nothing.
   std::uint32_t add_request(std::string_view name, std::uint32_t type, std::string_view help,
                             bool while_halted = false);
@@ -108,7 +114,8 @@ class Schema {
   bool operator==(const Schema& other) const {
     return head == other.head && types == other.types && fields == other.fields &&
            labels == other.labels && groups == other.groups && actuators == other.actuators &&
-           limits == other.limits && requests == other.requests && defaults == other.defaults;
+           limits == other.limits && requests == other.requests && defaults == other.defaults &&
+           shown == other.shown;
   }
 
   /// Adds a group of actuators at a given offset; used by describe_actuators().
@@ -287,6 +294,26 @@ inline std::uint32_t Schema::add_sensor(FieldRow sensor) {
   return fields.back().offset;
 }
 
+inline void Schema::sensor_moves_joint(std::string_view field, std::uint32_t index,
+                                       std::string_view joint) {
+  const TypeRow none;
+  const TypeRow& type = head.extended == kNoType ? none : types.at(head.extended);
+  std::vector<std::string> known;
+  for (std::uint32_t i = 0; i < type.fields; ++i) {
+    const FieldRow& sensor = fields.at(type.first_field + i);
+    known.push_back(sensor.name.str());
+    if (sensor.name.view() != field) continue;
+    if (sensor.kind != Kind::float64 || index >= sensor.count()) {
+      throw InvalidArgument("extended field '" + known.back() + "' has no double with index " +
+                            std::to_string(index) + " for joint '" + std::string(joint) + "'");
+    }
+    shown.joint(joint, sensor.offset + index * sensor.size, ShownFrom::extended);
+    return;
+  }
+  throw InvalidArgument("there is no extended field '" + std::string(field) + "'" +
+                        names_instead(field, known));
+}
+
 inline std::uint32_t Schema::add_request(std::string_view name, std::uint32_t type,
                                          std::string_view help, bool while_halted) {
   RequestRow row;
@@ -332,6 +359,18 @@ inline ActuatorDescription& ActuatorDescription::limits(const Limits& limits) {
     LimitRow& first = schema_.limits[row.first_limit];
     first = limits.row(first.rest, first.resting != 0);
   }
+  return *this;
+}
+
+inline ActuatorDescription& ActuatorDescription::moves_joint(std::string_view joint) {
+  const ActuatorRow& row = schema_.actuators[index_];
+  const TypeRow& type = schema_.types.at(row.type);
+  if (type.fields == 0 || schema_.fields.at(type.first_field).kind != Kind::float64) {
+    throw InvalidArgument("the state of actuator '" + row.name.str() +
+                          "' does not begin with a double: it cannot move joint '" +
+                          std::string(joint) + "'");
+  }
+  schema_.shown.joint(joint, row.offset + schema_.fields[type.first_field].offset);
   return *this;
 }
 

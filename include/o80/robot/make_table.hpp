@@ -132,6 +132,9 @@ const RobotTable* robot_table(const char* name, const char* versions = "") {
                              schema.limits.data(),
                              schema.requests.data(),
                              schema.defaults.data(),
+                             schema.shown.values.data(),
+                             schema.shown.mjcf.c_str(),
+                             schema.shown.file.c_str(),
                              count(schema.types),
                              count(schema.fields),
                              count(schema.labels),
@@ -139,7 +142,8 @@ const RobotTable* robot_table(const char* name, const char* versions = "") {
                              count(schema.actuators),
                              count(schema.limits),
                              count(schema.requests),
-                             count(schema.defaults)};
+                             count(schema.defaults),
+                             count(schema.shown.values)};
         rows(context, &all);
         return 0;
       });

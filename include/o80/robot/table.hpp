@@ -45,8 +45,11 @@ struct SchemaRows {
   const LimitRow* limits;
   const RequestRow* requests;
   const std::byte* defaults;
+  const ShownRow* shown;
+  const char* mjcf;       // of the model that viewers draw, with its terminating 0
+  const char* mjcf_file;  // likewise
   std::uint32_t type_count, field_count, label_count, group_count, actuator_count, limit_count,
-      request_count, default_count;
+      request_count, default_count, shown_count;
 };
 
 /// The desired states that a driver writes.
@@ -125,7 +128,7 @@ struct RobotTable {
 
 inline constexpr std::uint32_t kSchemaRowSizes =
     sizeof(SchemaHead) + sizeof(TypeRow) + sizeof(FieldRow) + sizeof(LabelRow) + sizeof(GroupRow) +
-    sizeof(ActuatorRow) + sizeof(LimitRow) + sizeof(RequestRow);
+    sizeof(ActuatorRow) + sizeof(LimitRow) + sizeof(RequestRow) + sizeof(ShownRow);
 
 /// The only symbol that a robot library exports.
 inline constexpr const char* kRobotSymbol = "o80_robot_table";

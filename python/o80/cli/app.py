@@ -20,6 +20,7 @@ from o80.cli.run import run
 from o80.cli.save import repair, save
 from o80.cli.stop import stop
 from o80.cli.top import top
+from o80.cli.view import view
 
 app = typer.Typer(
     name="o80",
@@ -45,6 +46,7 @@ app.command("record")(record)
 app.command("save")(save)
 app.command("repair")(repair)
 app.command("plot")(plot)
+app.command("view")(view)
 app.command("export")(export)
 app.command("diff")(diff)
 app.command("halt")(halt)

@@ -100,6 +100,28 @@ class RecordedEpoch:
         return sum(part.rows for part in self._parts)
 
     @property
+    def chunk_times(self) -> list[tuple[int, int]]:
+        """First and last time [ns] of each chunk of the files in which this run has rows.
+
+        A chunk may also hold rows of other runs, so that the times may lie outside this run.
+        """
+        return [
+            (
+                chunk.message_start_time - self.wall_offset,
+                chunk.message_end_time - self.wall_offset,
+            )
+            for part in self._parts
+            for chunk in part.found.chunks
+            if part.channel in chunk.message_index_offsets
+        ]
+
+    @property
+    def model(self) -> str:
+        """The model (MJCF) that draws the robot; empty if its driver names none."""
+        mjcf: str = self._decoder.layout.model
+        return mjcf
+
+    @property
     def gaps(self) -> list[tuple[int, int]]:
         """First and last iteration of rows that are missing, because the recorder was too late."""
         return [gap for part in self._parts for gap in part.gaps(GAP)]

@@ -30,6 +30,13 @@ TEST(Difference, OfAWatchdogMakesNoOtherRobot) {
   EXPECT_EQ(difference(schema, watched), "");
 }
 
+TEST(Difference, OfAModelMakesNoOtherRobot) {
+  const Schema schema = schema_of<MixedRobot>();
+  Schema shown = schema;
+  shown.shown.file = "/models/arm.xml";
+  EXPECT_EQ(difference(schema, shown), "");
+}
+
 TEST(Difference, SaysWhatDiffersInWords) {
   const Schema expected = schema_of<MixedRobot>();
   Schema found = expected;

@@ -34,6 +34,79 @@ TEST(Table, TheHashTellsSchemasApart) {
   EXPECT_NE(hash(other), hash(schema));
 }
 
+/// A robot whose first joint and force sensor move a model.
+Schema shown_robot() {
+  Schema schema = schema_of<MixedRobot>();
+  schema.shown.mjcf = "<mujoco/>";
+  schema.shown.file = "/models/arm.xml";
+  schema.actuator(0).moves_joint("elbow");
+  schema.sensor_moves_joint("force", 2, "slide");
+  schema.shown.position("ball", 0, ShownFrom::extended);
+  return schema;
+}
+
+TEST(Table, AModelSurvivesTheWayThroughItsBytes) {
+  const Schema schema = shown_robot();
+  EXPECT_EQ(schema.shown.values[1].offset, 2 * sizeof(double));
+  const Schema again = schema_from_bytes(to_bytes(schema));
+  EXPECT_EQ(again, schema);
+  EXPECT_EQ(again.shown.file, "/models/arm.xml");
+  EXPECT_EQ(again.shown.values.size(), 3u);
+}
+
+TEST(Table, ADescriptionWithoutAModelHasTheBytesOfEarlierVersions) {
+  const std::vector<std::byte> shown = to_bytes(shown_robot());
+  const std::vector<std::byte> plain = to_bytes(schema_of<MixedRobot>());
+  ASSERT_LT(plain.size(), shown.size());
+  EXPECT_EQ(std::memcmp(plain.data(), shown.data(), plain.size()), 0);
+  EXPECT_EQ(schema_from_bytes(std::span(shown).first(plain.size())), schema_of<MixedRobot>());
+}
+
+TEST(Table, RefusesADamagedModel) {
+  const std::vector<std::byte> good = to_bytes(shown_robot());
+  const std::size_t begin = to_bytes(schema_of<MixedRobot>()).size();
+  std::vector<std::byte> cut(good.begin(), good.end() - 1);
+  EXPECT_THAT(message_of<SegmentError>([&] { schema_from_bytes(cut); }), HasSubstr("cut off"));
+  std::mt19937 random(1);
+  for (int i = 0; i < 20000; ++i) {
+    std::vector<std::byte> bytes = good;
+    const std::size_t at = begin + random() % (good.size() - begin);
+    bytes[at] = static_cast<std::byte>(random());
+    try {
+      (void)schema_from_bytes(bytes);
+    } catch (const SegmentError&) {
+      continue;
+    }
+  }
+}
+
+/// What `check` says of a change to the robot with a model.
+template <class Change>
+std::string model_refusal(Change&& change) {
+  Schema schema = shown_robot();
+  change(schema);
+  return message_of<InvalidArgument>([&] { check(schema); });
+}
+
+TEST(Table, RefusesAModelThatCannotBeShown) {
+  check(shown_robot());
+  EXPECT_THAT(model_refusal([](Schema& s) { s.shown.values[0].offset = s.head.block - 7; }),
+              HasSubstr("'elbow' in the model lies outside the row"));
+  EXPECT_THAT(model_refusal([](Schema& s) { s.shown.values[2].offset = 0xFFFFFFFF; }),
+              HasSubstr("'ball' in the model lies outside the row"));
+  EXPECT_THAT(model_refusal([](Schema& s) { s.shown.mjcf = "\xff"; }), HasSubstr("UTF-8"));
+  EXPECT_THAT(model_refusal([](Schema& s) { s.shown.mjcf.resize(ShownModel::kLargest + 1); }),
+              HasSubstr("too large"));
+  EXPECT_THAT(
+      message_of<InvalidArgument>([] { shown_robot().sensor_moves_joint("forces", 0, "a"); }),
+      HasSubstr("Did you mean 'force'"));
+  EXPECT_THAT(
+      message_of<InvalidArgument>([] { shown_robot().sensor_moves_joint("count", 0, "a"); }),
+      HasSubstr("has no double"));
+  EXPECT_THAT(message_of<InvalidArgument>([] { shown_robot().actuator("mode").moves_joint("a"); }),
+              HasSubstr("does not begin with a double"));
+}
+
 /// What `check` says after a change.
 template <class Change>
 std::string refusal(Change&& change) {

@@ -56,6 +56,12 @@ void BallRows::add_sensors(Schema& schema, const Balls& balls) {
   }
 }
 
+void BallRows::show(ShownModel& shown, const Balls& balls) const {
+  for (std::size_t i = 0; i < balls.size(); ++i) {
+    shown.position(balls.places()[i].name, states_[i].offset);
+  }
+}
+
 void BallRows::go_on_from_targets(const Balls& balls, std::byte* desired) const {
   for (std::size_t i = 0; i < balls.size(); ++i) {
     pack(balls.targets()[i].state, desired + states_[i].offset);

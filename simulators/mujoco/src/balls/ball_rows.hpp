@@ -22,6 +22,8 @@ class BallRows {
  public:
   void add_actuators(Schema& schema, const Balls& balls);
   void add_sensors(Schema& schema, const Balls& balls);
+  /// Names the positions of the balls for viewers.
+  void show(ShownModel& shown, const Balls& balls) const;
 
   template <class Driver>
   void write(const Desired<Driver>& desired, Balls& balls) const {

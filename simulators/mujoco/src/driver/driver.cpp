@@ -49,7 +49,22 @@ MujocoDriver::Places MujocoDriver::add_to(Schema& schema) const {
   Places places;
   add_actuators(schema, places);
   add_sensors(schema, places);
+  show(schema, places);
   return places;
+}
+
+/// Names the model for viewers, and the values that move its joints and balls.
+void MujocoDriver::show(Schema& schema, const Places& places) const {
+  const Model& model = simulation_.model();
+  schema.shown.mjcf = model.mjcf;
+  schema.shown.file = model.file;
+  for (std::size_t i = 0; i < places.joints.size(); ++i) {
+    schema.shown.joint(model.joints[i].name, places.joints[i].offset);
+  }
+  for (std::size_t i = 0; i < places.joint_sensors.size(); ++i) {
+    schema.shown.joint(model.joints[i].name, places.joint_sensors[i].offset, ShownFrom::extended);
+  }
+  if (const Balls* balls = simulation_.balls()) places.balls.show(schema.shown, *balls);
 }
 
 void MujocoDriver::add_actuators(Schema& schema, Places& places) const {

@@ -46,6 +46,7 @@ class MujocoDriver {
   Places add_to(Schema& schema) const;
   void add_actuators(Schema& schema, Places& places) const;
   void add_sensors(Schema& schema, Places& places) const;
+  void show(Schema& schema, const Places& places) const;
   void read_sensors(Reading<MujocoDriver>& reading) const;
   void go_on_from_targets(Reading<MujocoDriver>& reading);
   Served no_such_slot() const noexcept;

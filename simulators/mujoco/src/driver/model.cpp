@@ -2,10 +2,12 @@
 
 #include <array>
 #include <cmath>
+#include <filesystem>
 
 #include "engine/names.hpp"
 #include "engine/version.hpp"
 #include "o80/base/error.hpp"
+#include "o80/describe/shown_model.hpp"
 
 namespace o80::mujoco {
 namespace {
@@ -18,14 +20,31 @@ SpecPointer parsed(const std::string& path) {
   return spec;
 }
 
-ModelPointer compiled(const std::string& path, const std::function<void(mjSpec&)>& edit) {
-  const SpecPointer spec = parsed(path);
-  edit(*spec);
-  ModelPointer model(mj_compile(spec.get(), nullptr));
+ModelPointer compiled(const std::string& path, mjSpec& spec) {
+  ModelPointer model(mj_compile(&spec, nullptr));
   if (!model) {
-    throw DriverError("the model '" + path + "' cannot be compiled: " + mjs_getError(spec.get()));
+    throw DriverError("the model '" + path + "' cannot be compiled: " + mjs_getError(&spec));
   }
   return model;
+}
+
+/// The model as MJCF, with what was added to it; empty if it is longer than a description takes.
+std::string text_of(const mjSpec& spec) {
+  std::string text(std::size_t{1} << 14, '\0');
+  for (int tries = 0; tries < 2; ++tries) {
+    const int wanted =
+        mj_saveXMLString(&spec, text.data(), static_cast<int>(text.size()), nullptr, 0);
+    if (wanted < 0 || static_cast<std::size_t>(wanted) > ShownModel::kLargest) return "";
+    if (wanted == 0) return text.c_str();
+    text.assign(static_cast<std::size_t>(wanted) + 1, '\0');
+  }
+  return "";
+}
+
+std::string absolute(const std::string& path) {
+  std::error_code failed;
+  const std::filesystem::path found = std::filesystem::absolute(path, failed);
+  return failed ? path : found.lexically_normal().string();
 }
 
 bool is_hinge_or_slide(const mjModel& model, int joint) {
@@ -88,7 +107,11 @@ std::vector<ControlPlace> controls_in(const mjModel& model) {
 
 Model::Model(const Config& config, const std::function<void(mjSpec&)>& edit) {
   check_version(mj_version(), mj_versionString());
-  model = compiled(config.model, edit);
+  const SpecPointer spec = parsed(config.model);
+  edit(*spec);
+  model = compiled(config.model, *spec);
+  mjcf = text_of(*spec);
+  file = absolute(config.model);
   if (!(config.timestep >= 0 && std::isfinite(config.timestep))) {
     throw DriverError("timestep must be finite and positive [s], or 0 for the model's, got " +
                       std::to_string(config.timestep));

@@ -39,6 +39,8 @@ struct Model {
   Model(const Config& config, const std::function<void(mjSpec&)>& edit);
 
   ModelPointer model;
+  std::string mjcf;  // the compiled model as text, for viewers; empty if it is too large
+  std::string file;  // absolute path of the model
   int keyframe = -1;
   std::vector<JointPlace> joints;
   std::vector<ControlPlace> controls;  // empty if joints are imposed

@@ -35,6 +35,18 @@ TEST_F(DriverTest, NamesJointsAndBallsAsTheModelDoes) {
   EXPECT_EQ(robot.latest().sensor("contacts").rows, 3u);
 }
 
+TEST_F(DriverTest, DescribesItsModelForViewers) {
+  Inline robot(court({{"extra_balls", "2"}}));
+
+  const ShownModel& shown = robot.frontend.schema().shown;
+  EXPECT_THAT(shown.mjcf, AllOf(HasSubstr("<mujoco"), HasSubstr("ball_2")));
+  EXPECT_TRUE(std::filesystem::path(shown.file).is_absolute());
+  ASSERT_EQ(shown.values.size(), 7u);
+  EXPECT_EQ(shown.values[3].name.view(), "joint_4");
+  EXPECT_EQ(shown.values[6].name.view(), "ball_2");
+  EXPECT_EQ(shown.values[6].what, Shown::position);
+}
+
 TEST_F(DriverTest, ImposedJointsAreWhereTheyAreAskedToBeBitForBit) {
   Inline robot(court());
   for (int i = 0; i < 200; ++i) {

@@ -1,0 +1,48 @@
+"""``o80 view``: robots and recordings in the browser."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from o80.cli.screen import complain
+
+
+def view(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(
+            help="Segments, patterns such as 'arm*', recordings (.mcap). Default: all segments."
+        ),
+    ] = None,
+    host: Annotated[
+        str, typer.Option(help="Address to listen on; 0.0.0.0 lets other computers in.")
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="0: any free one.")] = 0,
+    control: Annotated[
+        bool, typer.Option("--control", help="The page may also resume a halted robot.")
+    ] = False,
+    browser: Annotated[
+        bool | None, typer.Option(help="Open the page (default: if there is a screen).")
+    ] = None,
+) -> None:
+    """Show robots and recordings in the browser: in 3D, as curves, and back in time.
+
+    The page can always halt a robot. Its address holds a secret token: share it with care.
+    """
+    from o80.view.browser import has_screen, open_browser
+    from o80.view.guard import is_loopback
+    from o80.view.serve import page_server, wait_for_end
+
+    with page_server(names or [], host=host, port=port, control=control) as server:
+        print(server.url, flush=True)
+        if not is_loopback(host):
+            complain(
+                "anyone on the network who learns this address can watch and halt the robots; "
+                "what is sent is not encrypted"
+            )
+        if has_screen() if browser is None else browser:
+            open_browser(server.url)
+        complain("serving; Ctrl-C ends it")
+        wait_for_end(until_eof=False)

@@ -1,0 +1,23 @@
+"""The process of an `o80.View`: prints its address, or why there is none, as a line of JSON."""
+
+import json
+import sys
+
+import o80
+from o80.view.serve import page_server, wait_for_end
+
+
+def main() -> int:
+    """The options of `page_server` are the argument, as JSON."""
+    try:
+        with page_server(**json.loads(sys.argv[1])) as server:
+            print(json.dumps({"url": server.url, "port": server.port}), flush=True)
+            wait_for_end(until_eof=True)
+    except o80.Error as error:
+        print(json.dumps({"error": str(error)}), flush=True)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

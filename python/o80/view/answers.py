@@ -1,0 +1,200 @@
+"""What the server answers to the requests of a page."""
+
+import math
+import threading
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import o80
+from o80.view.curves import Panels
+from o80.view.kept import Kept
+from o80.view.scene import Scene
+from o80.view.source import NothingToShow, Source
+from o80.view.source_list import SourceList
+
+LONGEST_WINDOW = 60.0  # [s]
+LONGEST_REASON = 80  # of a halt
+
+
+class Answers:
+    """Answers requests from several threads. Keeps nothing about pages."""
+
+    def __init__(self, sources: SourceList, *, control: bool) -> None:
+        self._sources = sources
+        self._control = control
+        self._shown: dict[str, _Shown] = {}
+        self._lock = threading.Lock()
+
+    def look(self, asked: dict[str, Any]) -> dict[str, Any]:
+        """The list of segments, and what is asked about one of them at one time."""
+        sources = self._sources.now()
+        answer: dict[str, Any] = {
+            "control": self._control,
+            "list": [source.state() for source in sources],
+            "waiting": self._sources.waiting,
+        }
+        chosen = _chosen(sources, asked.get("source"))
+        if chosen is not None:
+            answer["source"] = chosen.label
+            try:
+                answer |= self._row(chosen, asked)
+            except NothingToShow as error:
+                answer["problem"] = str(error)
+        return answer
+
+    def _row(self, source: Source, asked: dict[str, Any]) -> dict[str, Any]:
+        shown = self._shown_of(source)
+        first, last = source.extent()
+        at = _time_asked(source, asked)
+        row = source.row(at)
+        answer: dict[str, Any] = {
+            "key": source.key,
+            "live": source.live,
+            "first": source.seconds(first),
+            "last": source.seconds(last),
+            "at": source.seconds(row.time),
+            "overwritten": source.live and at is not None and at < row.time,
+            "iteration": row.iteration,
+            "halted": bool(row.halted),
+            "overruns": row.overruns,
+        }
+        if asked.get("key") != source.key:
+            answer["new"] = shown.introduction(source)
+        if shown.scene is not None:
+            answer |= shown.scene.poses(_bytes_of(row))
+        panels = asked.get("panels")
+        panels = shown.panels.first if not isinstance(panels, list) else [str(p) for p in panels]
+        answer["values"] = shown.panels.values(_as_rows(row), panels)
+        if asked.get("curves"):
+            answer["curves"] = shown.curves(source, panels, _window(asked), at)
+        return answer
+
+    def _shown_of(self, source: Source) -> "_Shown":
+        schema = source.schema  # NothingToShow, if there is no row
+        with self._lock:
+            shown = self._shown.get(source.label)
+            if shown is None or shown.key != source.key:
+                shown = self._shown[source.label] = _Shown(source, schema)
+            return shown
+
+    def halt(self, asked: dict[str, Any]) -> dict[str, Any]:
+        """Halts a live segment."""
+        source = self._live(asked)
+        reason = str(asked.get("reason", ""))[:LONGEST_REASON] or "from o80 view"
+        return {"halt": o80.halt(source.name, reason)}
+
+    def resume(self, asked: dict[str, Any]) -> dict[str, Any]:
+        """Clears a halt; only with --control."""
+        source = self._live(asked)
+        if not self._control:
+            raise o80.ReadOnly(
+                f"this view does not control: start it with --control, or use "
+                f"`o80 resume {source.name}`"
+            )
+        with o80.Frontend(source.name, 1.0) as frontend:
+            frontend.resume(int(asked["number"]), timeout=5.0)
+        return {}
+
+    def _live(self, asked: dict[str, Any]) -> Source:
+        """The view halts and resumes nothing that it does not show."""
+        for source in self._sources.now():
+            if source.live and source.name == asked.get("segment"):
+                return source
+        raise o80.InvalidArgument(f"this view does not show a segment {asked.get('segment')!r}")
+
+
+class _Shown:
+    """What is worked out once for a run of a robot."""
+
+    def __init__(self, source: Source, schema: dict[str, Any]) -> None:
+        self.key = source.key
+        self.panels = Panels(schema)
+        self.scene: Scene | None = None
+        self.no_scene = "The driver of this robot names no model, so there is no 3D view."
+        self._kept = Kept()
+        if "model" in schema:
+            try:
+                self.scene = Scene(schema, source.model)
+            except o80.Error as error:
+                self.no_scene = str(error)
+
+    def introduction(self, source: Source) -> dict[str, Any]:
+        """What a page needs once."""
+        schema = source.schema
+        return {
+            "robot": schema["robot"],
+            "clock": schema["clock"],
+            "panels": self.panels.names,
+            "first_panels": self.panels.first,
+            "scene": None if self.scene is None else self.scene.geometry,
+            "no_scene": "" if self.scene is not None else self.no_scene,
+        }
+
+    def curves(
+        self, source: Source, panels: list[str], window: float, at: int | None
+    ) -> dict[str, Any]:
+        """Curves of the last seconds, or around a time; shared by pages that ask the same."""
+
+        def read() -> dict[str, Any]:
+            first, last = source.extent()
+            length = round(window * 1e9)
+            end = last if at is None else max(first, min(at + length // 2, last))
+            begin = end - length
+            rows = source.rows(begin, end)
+            return {
+                "begin": source.seconds(begin),
+                "end": source.seconds(end),
+                "panels": self.panels.curves(rows, panels, begin),
+            }
+
+        if at is not None:
+            return read()
+        found: dict[str, Any] = self._kept.get((source.key, tuple(panels), window), read)
+        return found
+
+
+def _bytes_of(row: Any) -> bytes:
+    return bytes(memoryview(row))
+
+
+def _as_rows(row: o80.Observation) -> NDArray[Any]:
+    """The bytes of one row as an array of rows."""
+    whole = _bytes_of(row)
+    return np.frombuffer(whole, np.dtype((np.void, len(whole))))
+
+
+def _chosen(sources: Sequence[Source], label: Any) -> Source | None:
+    for source in sources:
+        if source.label == label:
+            return source
+    for source in sources:
+        if source.key and _has_model(source):
+            return source
+    return sources[0] if sources else None
+
+
+def _has_model(source: Source) -> bool:
+    try:
+        return "model" in source.schema
+    except o80.Error:
+        return False
+
+
+def _time_asked(source: Source, asked: dict[str, Any]) -> int | None:
+    at = asked.get("at")
+    if at is None:
+        return None
+    seconds = float(at)
+    if not math.isfinite(seconds) or abs(seconds) > 1e9:
+        raise ValueError(f"at must be a time in seconds, got {at}")
+    return source.nanoseconds(seconds)
+
+
+def _window(asked: dict[str, Any]) -> float:
+    window = float(asked.get("window", 5.0))
+    if not 0.0 < window <= LONGEST_WINDOW:
+        raise ValueError(f"window must be positive and at most {LONGEST_WINDOW:g} s, got {window}")
+    return window

@@ -1,0 +1,119 @@
+"""A segment in shared memory as the source of a page."""
+
+import threading
+from typing import Any
+
+import o80
+from o80 import _core
+from o80.cli.condition import age_text, rate_text
+from o80.history import History
+from o80.view.source import NothingToShow, Source
+
+GUARD_ROWS = 16  # the oldest rows may be overwritten while they are read
+
+
+class LiveSource(Source):
+    """Follows the segment of a name through restarts of its backend. Reads only."""
+
+    live = True
+
+    def __init__(self, name: str) -> None:
+        self.name = self.label = name
+        self._frontend: o80.Frontend | None = None
+        self._lock = threading.Lock()
+        self._problem = ""
+
+    def refresh(self) -> None:
+        with self._lock:
+            known = self._frontend
+            if known is not None and known.alive:
+                return
+            try:
+                found = o80.Frontend(self.name, 0.0, read_only=True, dead=True)
+            except o80.Error as error:
+                self._problem = str(error)
+                return
+            if found.published < 0 or (known is not None and known.epoch == found.epoch):
+                self._problem = "" if known is not None else "there is no row yet"
+                found.close()
+                return
+            self._frontend, self._problem = found, ""
+            self.key = f"{self.name} {found.epoch}"
+            self.zero = self.extent_of(found)[0]
+            # the former frontend is not closed: another thread may be reading with it
+
+    @property
+    def _attached(self) -> o80.Frontend:
+        if self._frontend is None:
+            raise NothingToShow(self._problem or f"waiting for segment '{self.name}'")
+        return self._frontend
+
+    @property
+    def schema(self) -> dict[str, Any]:
+        return self._attached.schema
+
+    @property
+    def model(self) -> str:
+        return self._attached._layout.model
+
+    def extent(self) -> tuple[int, int]:
+        return self.extent_of(self._attached)
+
+    @staticmethod
+    def extent_of(frontend: o80.Frontend) -> tuple[int, int]:
+        last = frontend.latest().time
+        oldest = frontend.oldest
+        first = frontend.history(since=oldest, until=oldest + GUARD_ROWS)
+        return (int(first.time[0]) if len(first) else last), last
+
+    def row(self, time: int | None) -> o80.Observation:
+        frontend = self._attached
+        if time is None:
+            return frontend.latest()
+        try:
+            return frontend.at_time(time)
+        except o80.RowOverwritten:
+            oldest = frontend.oldest
+            first = frontend.history(since=oldest, until=oldest + GUARD_ROWS)
+            return first[0] if len(first) else frontend.latest()
+
+    def rows(self, begin: int, end: int) -> History:
+        return self._attached.history(from_time=begin, to_time=end)
+
+    def state(self) -> dict[str, Any]:
+        line: dict[str, Any] = {
+            "name": self.name,
+            "live": True,
+            "state": "waiting",
+            "problem": self._problem,
+        }
+        frontend = self._frontend
+        if frontend is None:
+            return line
+        loop = _core.loop_state(frontend)
+        alive = frontend.alive
+        halt = frontend.halted if alive else None
+        rate = "bursting" if loop.bursting else rate_text(loop.rate, loop.frequency)
+        state: str = frontend.life
+        if alive and loop.hang:
+            state = "hangs"
+        elif halt is not None:
+            state = "halted"
+        return line | {
+            "robot": frontend.robot,
+            "state": state,
+            "alive": alive,
+            "rate": rate if alive else "",
+            "overruns": loop.overruns,
+            "missed": loop.skipped,
+            "age": "" if loop.row_age is None else age_text(loop.row_age),
+            "row_age": loop.row_age,
+            "halt": None if halt is None else _halt(halt),
+            "problem": loop.trouble if alive else "",
+        }
+
+
+def _halt(halt: o80.Halt) -> dict[str, Any]:
+    reason = f": {halt.text}" if halt.text else ""
+    by = f" by {halt.who}" if halt.who else ""
+    return {"number": halt.number, "text": f"halted{by} (halt {halt.number}, {halt.cause}){reason}"}

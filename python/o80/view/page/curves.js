@@ -1,0 +1,133 @@
+// Curves over time, one chart for each field: desired dashed, observed solid.
+
+const COLOURS = { desired: "#e8730c", observed: "#1f6feb", extended: "#1a7f4b" };
+
+function element(tag, text = "", kind = "") {
+  const made = document.createElement(tag);
+  made.textContent = text; // never HTML: names come from other programs
+  if (kind) made.className = kind;
+  return made;
+}
+
+class Chart {
+  constructor(name) {
+    this.name = name;
+    this.box = element("div", "", "chart");
+    this.head = element("header");
+    this.canvas = element("canvas");
+    this.box.append(this.head, this.canvas);
+    this.parts = {};
+    this.values(undefined);
+  }
+
+  values(texts) {
+    this.head.replaceChildren(element("b", this.name));
+    for (const [part, text] of Object.entries(texts || {})) {
+      this.head.append(element("span", `${part === "extended" ? "" : `${part} `}${text}`, part));
+    }
+  }
+
+  // seconds from `begin` to `end`; `cursor` is the row that is shown
+  show(parts, begin, end, cursor) {
+    this.parts = {};
+    for (const [part, [seconds, low, high]] of Object.entries(parts || {})) {
+      const lows = floats(low);
+      this.parts[part] = { seconds: floats(seconds), low: lows, high: high ? floats(high) : lows };
+    }
+    [this.begin, this.end, this.cursor] = [begin, end, cursor];
+    this.draw();
+  }
+
+  range() {
+    let [low, high] = [Infinity, -Infinity];
+    for (const curve of Object.values(this.parts)) {
+      for (const value of curve.low) if (value < low && value > -Infinity) low = value;
+      for (const value of curve.high) if (value > high && value < Infinity) high = value;
+    }
+    if (low > high) [low, high] = [0, 1];
+    const margin = 0.06 * (high - low) || 0.05 * Math.abs(high) || 0.5;
+    return [low - margin, high + margin];
+  }
+
+  draw() {
+    const scale = window.devicePixelRatio || 1;
+    const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
+    if (!width || !height) return;
+    this.canvas.width = Math.round(width * scale);
+    this.canvas.height = Math.round(height * scale);
+    const pen = this.canvas.getContext("2d");
+    pen.scale(scale, scale);
+    pen.clearRect(0, 0, width, height);
+    const [low, high] = this.range();
+    const left = 46;
+    const bottom = height - 14;
+    const length = this.end - this.begin;
+    const x = (seconds) => left + ((width - left - 4) * seconds) / length;
+    const y = (value) => 4 + ((bottom - 8) * (high - value)) / (high - low);
+    this.axes(pen, { low, high, left, bottom, width, length, x, y });
+    pen.save();
+    pen.beginPath();
+    pen.rect(left, 0, width - left, bottom);
+    pen.clip();
+    for (const part of ["extended", "observed", "desired"]) {
+      if (this.parts[part]) this.curve(pen, this.parts[part], part, x, y);
+    }
+    pen.restore();
+    pen.strokeStyle = "#30363d";
+    pen.beginPath();
+    pen.moveTo(x(this.cursor - this.begin), 0);
+    pen.lineTo(x(this.cursor - this.begin), bottom);
+    pen.stroke();
+  }
+
+  axes(pen, { low, high, left, bottom, width, length, x, y }) {
+    pen.font = "10px system-ui, sans-serif";
+    pen.fillStyle = "#66707d";
+    pen.strokeStyle = "#eceff3";
+    pen.lineWidth = 1;
+    pen.textAlign = "right";
+    for (const value of ticks(low, high, 4)) {
+      pen.beginPath();
+      pen.moveTo(left, y(value));
+      pen.lineTo(width - 4, y(value));
+      pen.stroke();
+      pen.fillText(String(+value.toPrecision(6)), left - 4, y(value) + 3);
+    }
+    pen.textAlign = "center";
+    for (const seconds of ticks(this.begin, this.end, 5)) {
+      const at = x(seconds - this.begin);
+      if (at > left + 12 && at < width - 14) pen.fillText(`${+seconds.toFixed(3)} s`, at, bottom + 12);
+    }
+  }
+
+  curve(pen, { seconds, low, high }, part, x, y) {
+    pen.strokeStyle = COLOURS[part];
+    pen.lineWidth = 1.5;
+    pen.setLineDash(part === "desired" ? [5, 4] : []);
+    pen.beginPath();
+    let drawing = false;
+    for (let i = 0; i < seconds.length; ++i) {
+      if (!Number.isFinite(low[i]) || !Number.isFinite(high[i])) {
+        drawing = false; // a gap where a value is NaN
+        continue;
+      }
+      const at = x(seconds[i]);
+      if (drawing) pen.lineTo(at, y(low[i]));
+      else pen.moveTo(at, y(low[i]));
+      if (high[i] !== low[i]) pen.lineTo(at, y(high[i]));
+      drawing = true;
+    }
+    pen.stroke();
+    pen.setLineDash([]);
+  }
+}
+
+// round numbers between two ends
+function ticks(low, high, most) {
+  const raw = (high - low) / most;
+  const power = 10 ** Math.floor(Math.log10(raw));
+  const step = [1, 2, 5, 10].map((f) => f * power).find((each) => each >= raw);
+  const found = [];
+  for (let i = Math.ceil(low / step); i * step <= high && found.length < 20; ++i) found.push(i * step);
+  return found;
+}

@@ -1,0 +1,162 @@
+"""The bodies of a MuJoCo model, and where they are in a row."""
+
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import o80
+from o80.view.packed import packed, packed_indices
+
+SHAPES = {0: "plane", 2: "sphere", 3: "capsule", 4: "ellipsoid", 5: "cylinder", 6: "box", 7: "mesh"}
+DRAWN_GROUPS = 3  # geoms of groups 0 to 2; the others are shapes for collisions
+USUAL_COLOUR = (0.5, 0.5, 0.5, 1.0)  # of a geom that has none
+
+
+class Scene:
+    """Draws one model. May be used from several threads."""
+
+    def __init__(self, schema: dict[str, Any], mjcf: str) -> None:
+        """Raises o80.Error if the model cannot be read, MissingExtra without mujoco."""
+        described = schema["model"]
+        self._mujoco = _mujoco()
+        self._model = self._compiled(mjcf, described["file"])
+        self._data = self._mujoco.MjData(self._model)
+        self._lock = threading.Lock()
+        self._start: NDArray[np.float64] = np.array(self._data.qpos)
+        row = schema["row"]
+        self._places = [
+            place for value in described["values"] if (place := self._place(value, row)) is not None
+        ]
+        weld = self._model.body_weldid
+        self._moving = [body for body in range(self._model.nbody) if weld[body] != 0]
+        self._has_ghost = any(value["from"] == "states" for value in described["values"])
+        self.geometry = self._geometry()
+
+    def _compiled(self, mjcf: str, file: str) -> Any:
+        try:
+            if not mjcf:
+                return self._mujoco.MjModel.from_xml_path(file)
+            spec = self._mujoco.MjSpec.from_string(mjcf)
+            if file:
+                spec.modelfiledir = str(Path(file).parent)
+            return spec.compile()
+        except ValueError as error:
+            raise o80.Error(f"the model of the robot cannot be read: {error}") from error
+
+    def _place(self, value: dict[str, Any], row: dict[str, Any]) -> "_Place | None":
+        """None if the model has no such joint or body."""
+        kind = self._mujoco.mjtObj
+        joint = value["what"] == "joint"
+        if joint:
+            found = self._mujoco.mj_name2id(self._model, kind.mjOBJ_JOINT, value["name"])
+        else:
+            body = self._mujoco.mj_name2id(self._model, kind.mjOBJ_BODY, value["name"])
+            found = int(self._model.body_jntadr[body]) if body >= 0 else -1
+        if found < 0:
+            return None
+        extended = value["from"] == "extended"
+        observed = row["extended" if extended else "observed"] + value["offset"]
+        desired = observed if extended else row["desired"] + value["offset"]
+        address = int(self._model.jnt_qposadr[found])
+        return _Place(value["name"], address, 1 if joint else 3, observed, desired)
+
+    def poses(self, row: bytes) -> dict[str, Any]:
+        """Positions and quaternions of the moving bodies (bodies, 7), observed and desired."""
+        found: dict[str, Any] = {"pose": None, "ghost": None, "not_finite": []}
+        with self._lock:
+            found["pose"] = packed(self._pose(row, "observed", found["not_finite"]))
+            if self._has_ghost:
+                found["ghost"] = packed(self._pose(row, "desired", []))
+        return found
+
+    def _pose(self, row: bytes, part: str, not_finite: list[str]) -> NDArray[np.float32]:
+        self._data.qpos[:] = self._start
+        for place in self._places:
+            numbers = np.frombuffer(row, np.float64, place.count, getattr(place, part))
+            if np.isfinite(numbers).all():
+                self._data.qpos[place.address : place.address + place.count] = numbers
+            else:
+                not_finite.append(place.name)
+        self._mujoco.mj_kinematics(self._model, self._data)
+        moving = self._moving
+        poses = np.hstack([self._data.xpos[moving], self._data.xquat[moving]])
+        return poses.astype(np.float32)
+
+    def _geometry(self) -> dict[str, Any]:
+        self._mujoco.mj_kinematics(self._model, self._data)
+        model = self._model
+        shown = [geom for geom in range(model.ngeom) if self._is_shown(geom)]
+        meshes = sorted(
+            {int(model.geom_dataid[geom]) for geom in shown if model.geom_type[geom] == 7}
+        )
+        return {
+            "moving": self._moving,
+            "bodies": packed(np.hstack([self._data.xpos, self._data.xquat])),
+            "geoms": [self._geom(geom) for geom in shown],
+            "meshes": {mesh: self._mesh(mesh) for mesh in meshes},
+            "centre": [float(number) for number in model.stat.center],
+            "extent": float(model.stat.extent),
+        }
+
+    def _is_shown(self, geom: int) -> bool:
+        model = self._model
+        return (
+            int(model.geom_type[geom]) in SHAPES
+            and model.geom_group[geom] < DRAWN_GROUPS
+            and self._colour(geom)[3] > 0
+        )
+
+    def _colour(self, geom: int) -> list[float]:
+        model = self._model
+        material = int(model.geom_matid[geom])
+        colour = [float(number) for number in model.geom_rgba[geom]]
+        if material >= 0 and np.allclose(colour, USUAL_COLOUR):
+            colour = [float(number) for number in model.mat_rgba[material]]
+            if model.mat_texid[material].max() >= 0 and np.allclose(colour, 1.0):
+                colour = [0.62, 0.64, 0.66, 1.0]  # textures are not drawn
+        return colour
+
+    def _geom(self, geom: int) -> dict[str, Any]:
+        model = self._model
+        return {
+            "body": int(model.geom_bodyid[geom]),
+            "shape": SHAPES[int(model.geom_type[geom])],
+            "size": [float(number) for number in model.geom_size[geom]],
+            "pos": [float(number) for number in model.geom_pos[geom]],
+            "quat": [float(number) for number in model.geom_quat[geom]],
+            "colour": self._colour(geom),
+            "mesh": int(model.geom_dataid[geom]),
+        }
+
+    def _mesh(self, mesh: int) -> dict[str, str]:
+        model = self._model
+        vertices = slice(
+            model.mesh_vertadr[mesh], model.mesh_vertadr[mesh] + model.mesh_vertnum[mesh]
+        )
+        faces = slice(model.mesh_faceadr[mesh], model.mesh_faceadr[mesh] + model.mesh_facenum[mesh])
+        return {
+            "vertices": packed(model.mesh_vert[vertices]),
+            "faces": packed_indices(model.mesh_face[faces]),
+        }
+
+
+class _Place:
+    """Where a value lies in a row, and where it goes in qpos."""
+
+    def __init__(self, name: str, address: int, count: int, observed: int, desired: int) -> None:
+        self.name, self.address, self.count = name, address, count
+        self.observed, self.desired = observed, desired
+
+
+def _mujoco() -> Any:
+    try:
+        import mujoco
+    except ImportError as error:
+        raise o80.MissingExtra(
+            'the 3D view needs mujoco, which is not installed: pip install "o80[view]"',
+            name="mujoco",
+        ) from error
+    return mujoco

@@ -1,0 +1,64 @@
+"""What a page can show: one run of a robot, live or recorded."""
+
+from abc import ABC, abstractmethod
+from typing import Any
+
+import o80
+from o80.history import History
+
+NANOSECONDS = 1e9
+
+
+class NothingToShow(o80.Error):
+    """There is no row yet, or no longer."""
+
+
+class Source(ABC):
+    """Rows by time. Times are in seconds since `zero`, the time of the first row that was there."""
+
+    name: str  #: of the segment
+    label: str  #: for the list of a page
+    live: bool
+    key: str = ""  #: changes when another run takes the name
+    zero: int = 0  #: [ns]
+
+    @property
+    @abstractmethod
+    def schema(self) -> dict[str, Any]:
+        """The description of the robot. Raises NothingToShow."""
+
+    @property
+    @abstractmethod
+    def model(self) -> str:
+        """Text of the model (MJCF) that draws the robot; empty: none."""
+
+    @abstractmethod
+    def refresh(self) -> None:
+        """Looks whether another run has begun."""
+
+    @abstractmethod
+    def extent(self) -> tuple[int, int]:
+        """Times of the first and last row [ns]. Raises NothingToShow."""
+
+    @abstractmethod
+    def row(self, time: int | None) -> o80.Observation:
+        """The newest row at or before a time [ns], else the first; None: the newest row.
+
+        Raises NothingToShow.
+        """
+
+    @abstractmethod
+    def rows(self, begin: int, end: int) -> History:
+        """Rows from one time to another [ns]. Raises NothingToShow."""
+
+    @abstractmethod
+    def state(self) -> dict[str, Any]:
+        """Its line in the list of segments."""
+
+    def seconds(self, time: int) -> float:
+        """A time [ns] as the page shows it [s]."""
+        return (time - self.zero) / NANOSECONDS
+
+    def nanoseconds(self, seconds: float) -> int:
+        """The reverse."""
+        return self.zero + round(seconds * NANOSECONDS)

@@ -1,0 +1,79 @@
+"""The sources of a page: segments by name or pattern, and the runs in recordings."""
+
+import fnmatch
+import threading
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import o80
+from o80.view.live_source import LiveSource
+from o80.view.source import Source
+
+BETWEEN_LOOKS = 0.25  # for new segments and restarts [s]
+
+
+class SourceList:
+    """Finds segments that come later too. May be used from several threads."""
+
+    def __init__(self, names: Sequence[str]) -> None:
+        """names: segments, patterns such as "arm*", recordings (.mcap files, or folders of
+            them); none: all segments.
+
+        Raises RecordingError.
+        """
+        self._recorded: list[Source] = []
+        self._names: list[str] = []
+        self._patterns: list[str] = []
+        for name in dict.fromkeys(names):
+            if name.endswith(".mcap") or Path(name).is_dir():
+                self._recorded += _runs_of(name)
+            elif any(character in name for character in "*?["):
+                self._patterns.append(name)
+            else:
+                self._names.append(name)
+        if not names:
+            self._patterns.append("*")
+        self._live: dict[str, LiveSource] = {name: LiveSource(name) for name in self._names}
+        self._lock = threading.Lock()
+        self._look_at = 0.0
+
+    @property
+    def waiting(self) -> str:
+        """What a page says while there is nothing to show."""
+        if self._patterns == ["*"]:
+            return "No robot runs. Start one, for example with: o80 run two_joints"
+        return f"No segment matches {', '.join(self._patterns)} yet."
+
+    def now(self) -> list[Source]:
+        """All sources; live ones are attached to the backend of now."""
+        with self._lock:
+            if time.monotonic() >= self._look_at:
+                self._look()
+                self._look_at = time.monotonic() + BETWEEN_LOOKS
+            return [*self._live.values(), *self._recorded]
+
+    def _look(self) -> None:
+        if self._patterns:
+            for entry in o80.segments():
+                if entry.name not in self._live and any(
+                    fnmatch.fnmatchcase(entry.name, pattern) for pattern in self._patterns
+                ):
+                    self._live[entry.name] = LiveSource(entry.name)
+        for source in self._live.values():
+            source.refresh()
+
+
+def _runs_of(path: str) -> list[Source]:
+    from o80.recording.reader import RecordingFile
+    from o80.view.recorded_source import RecordedSource
+
+    recording = RecordingFile(path)
+    found: list[Source] = [
+        RecordedSource(name, number, epoch)
+        for name, segment in recording.segments.items()
+        for number, epoch in enumerate(segment.epochs)
+    ]
+    if not found:
+        raise o80.RecordingError(f"{path} holds no segment")
+    return found

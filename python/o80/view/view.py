@@ -1,0 +1,153 @@
+"""A page in the browser, served by a process of its own."""
+
+import json
+import os
+import select
+import subprocess
+import sys
+import time
+from collections.abc import Iterable
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+from weakref import WeakSet
+
+from o80 import at_exit
+from o80.errors import Error, InvalidArgument, TimeoutError
+from o80.frontend import Frontend
+from o80.recording.reader import RecordingFile
+from o80.view.browser import open_browser as open_in_browser
+
+GRACE = 5.0  # [s] for the server to stop
+STARTS_WITHIN = 30.0  # [s]
+
+What = str | Path | Frontend | RecordingFile
+
+
+class View:
+    """A page in the browser that shows robots and recordings: `o80 view` for programs.
+
+    what: names of segments, patterns such as "arm*", paths of recordings (.mcap), frontends, or
+        recordings; one or several. Without any: all segments.
+    host: address to listen on. The default is reachable from this computer only.
+    port: 0 is any free one.
+    control: pages may resume a halted robot. They may always halt.
+    open_browser: also opens the page.
+
+    The server is a process of its own, so that it takes no time of this one. It ends with `close`,
+    with the `with` block, and with this process. Raises Error if the port is taken, RecordingError.
+    """
+
+    def __init__(
+        self,
+        *what: What | Iterable[What],
+        host: str = "127.0.0.1",
+        port: int = 0,
+        control: bool = False,
+        open_browser: bool = False,
+    ) -> None:
+        self._owner = os.getpid()
+        names = [_name(each) for group in what for each in _several(group)]
+        options = {"names": names, "host": host, "port": port, "control": control}
+        self._popen = subprocess.Popen(
+            [sys.executable, "-m", "o80.view", json.dumps(options)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            process_group=0,  # Ctrl-C reaches only this program, which then ends it
+        )
+        _open.add(self)
+        at_exit.close_later(self)
+        try:
+            said = self._first_line()
+        except BaseException:
+            self.close()
+            raise
+        if "error" in said:
+            self.close()
+            raise Error(said["error"])
+        self.url: str = said["url"]  #: address of the page, with its token: whoever has it may halt
+        self.port: int = said["port"]  #: the one that is bound
+        if open_browser:
+            open_in_browser(self.url)
+
+    @property
+    def alive(self) -> bool:
+        """True while the page is served."""
+        return self._popen.poll() is None
+
+    def close(self) -> None:
+        """Ends the server; pages say so. May be called twice; does nothing in a forked child."""
+        if self._owner != os.getpid():
+            return
+        assert self._popen.stdin is not None
+        assert self._popen.stdout is not None
+        self._popen.stdin.close()  # ends it
+        try:
+            self._popen.wait(GRACE)
+        except subprocess.TimeoutExpired:
+            self._popen.kill()
+            self._popen.wait()
+        self._popen.stdout.close()
+
+    def _first_line(self) -> dict[str, Any]:
+        assert self._popen.stdout is not None
+        end = time.monotonic() + STARTS_WITHIN
+        ready, _, _ = select.select([self._popen.stdout], [], [], end - time.monotonic())
+        if not ready:
+            raise TimeoutError(f"the view did not start within {STARTS_WITHIN:g} s")
+        line = self._popen.stdout.readline()
+        if not line:
+            raise Error(f"the view ended with exit code {self._popen.wait()} before it was ready")
+        said: dict[str, Any] = json.loads(line)
+        return said
+
+    def _let_go(self) -> None:
+        for pipe in (self._popen.stdin, self._popen.stdout):
+            if pipe is not None:
+                pipe.close()
+        self._popen.returncode = 0
+
+    def _close_at_exit(self) -> None:
+        self.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"<o80.View on port {self.port}, {'open' if self.alive else 'closed'}>"
+
+
+_open: WeakSet[View] = WeakSet()
+
+
+def _let_go_of_all() -> None:
+    """In a forked child: closes the pipes, so that the views end with the parent."""
+    for view in list(_open):
+        view._let_go()
+    _open.clear()
+
+
+os.register_at_fork(after_in_child=_let_go_of_all)
+
+
+def _several(what: What | Iterable[What]) -> Iterable[What]:
+    return (what,) if isinstance(what, (str, Path, Frontend, RecordingFile)) else what
+
+
+def _name(what: Any) -> str:
+    if isinstance(what, Frontend):
+        return what.segment
+    path = what.path if isinstance(what, RecordingFile) else what
+    if not isinstance(path, (str, Path)):
+        raise InvalidArgument(
+            f"a view shows names of segments, recordings and frontends, got {what!r}"
+        )
+    return str(path)

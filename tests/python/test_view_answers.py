@@ -1,0 +1,220 @@
+"""What `o80 view` answers to a page about robots and recordings."""
+
+import base64
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import o80
+from o80.view.answers import Answers
+from o80.view.source_list import SourceList
+
+Look = Callable[..., dict[str, Any]]
+
+
+def looks_at(*names: str, control: bool = False) -> Look:
+    """Asks as a page does."""
+    answers = Answers(SourceList(names), control=control)
+    return lambda **asked: answers.look(asked)
+
+
+def numbers(text: str) -> Any:
+    return np.frombuffer(base64.b64decode(text), np.float32)
+
+
+def pose_of(answer: dict[str, Any], kind: str = "pose") -> Any:
+    return numbers(answer[kind]).reshape(-1, 7)
+
+
+def turn_about_y(angle: float) -> list[float]:
+    """Quaternion (w, x, y, z)."""
+    return [math.cos(angle / 2), 0, math.sin(angle / 2), 0]
+
+
+def test_a_page_learns_about_a_robot_once(arm: o80.Frontend) -> None:
+    look = looks_at(arm.segment)
+    answer = look()
+    assert answer["source"] == arm.segment
+    assert answer["new"]["panels"][:2] == ["shoulder", "elbow"]
+    scene = answer["new"]["scene"]
+    assert scene["moving"] == [1, 2]
+    assert {geom["shape"] for geom in scene["geoms"]} == {"plane", "cylinder", "capsule"}
+    assert "new" not in look(key=answer["key"])
+
+
+def test_the_model_stands_as_the_row_says_and_the_ghost_as_desired(arm: o80.Frontend) -> None:
+    arm.add_command(["shoulder", "elbow"], [0.5, -0.25], iterations=50)
+    arm.burst(50)
+    row = arm.latest()
+    answer = looks_at(arm.segment)()
+    shoulder, elbow = (float(angle) for angle in row.observed)
+    pose = pose_of(answer)
+    assert pose[0, 3:] == pytest.approx(turn_about_y(shoulder), abs=1e-6)
+    assert pose[1, :3] == pytest.approx(
+        [0.4 * math.sin(shoulder), 0, 0.3 + 0.4 * math.cos(shoulder)], abs=1e-6
+    )
+    assert pose[1, 3:] == pytest.approx(turn_about_y(shoulder + elbow), abs=1e-6)
+    ghost = pose_of(answer, "ghost")
+    assert ghost[0, 3:] == pytest.approx(turn_about_y(0.5), abs=1e-6)
+    assert answer["values"]["shoulder"]["desired"] == "0.5"
+
+
+def test_a_page_looks_back_through_the_ring_while_the_robot_goes_on(arm: o80.Frontend) -> None:
+    look = looks_at(arm.segment)
+    arm.burst(1000)
+    answer = look()
+    back = arm.history()[500]
+    seconds = answer["last"] - (arm.latest().time - back.time) * 1e-9
+    arm.burst(100)
+    answer = look(at=seconds)
+    assert answer["iteration"] == back.iteration
+    assert answer["last"] - answer["at"] == pytest.approx((arm.latest().time - back.time) * 1e-9)
+    assert look()["iteration"] == arm.published
+
+
+def test_a_row_that_was_overwritten_is_replaced_by_the_oldest(segment: str) -> None:
+    with o80.robots.load("two_joints").inline(segment, history=100) as arm:
+        look = looks_at(segment)
+        first = look()["first"]
+        arm.burst(1000)
+        answer = look(at=first)
+        assert answer["overwritten"]
+        assert answer["at"] == pytest.approx(answer["first"])
+        assert answer["iteration"] >= arm.oldest
+
+
+def test_curves_show_every_peak_with_few_points(arm: o80.Frontend) -> None:
+    arm.burst(1500)
+    arm.add_command("elbow", 1.0)
+    arm.add_command("elbow", 0.0)
+    arm.burst(1500)
+    curves = looks_at(arm.segment)(curves=True, panels=["elbow"], window=10.0)["curves"]
+    seconds, low, high = (numbers(text) for text in curves["panels"]["elbow"]["desired"])
+    assert len(seconds) == len(low) == len(high) <= 400
+    assert high.max() == 1.0, "one row of 3000"
+    assert (low <= high).all()
+    assert (np.diff(seconds) > 0).all()
+
+
+def test_curves_of_a_past_time_lie_around_it(arm: o80.Frontend) -> None:
+    arm.burst(3000)
+    look = looks_at(arm.segment)
+    middle = (look()["first"] + look()["last"]) / 2
+    curves = look(curves=True, at=middle, window=0.2)["curves"]
+    assert curves["begin"] == pytest.approx(middle - 0.1)
+    assert curves["end"] == pytest.approx(middle + 0.1)
+
+
+def test_numbers_that_are_not_finite_are_named_and_leave_the_model_whole(segment: str) -> None:
+    with o80.Backend(segment, actuators=["a", "b"]) as backend:
+        backend.publish([0.0, 1.0])
+        backend.step()
+        backend.publish([math.nan, 1.0])
+        answer = looks_at(segment)(curves=True, panels=["a", "b"])
+        [seconds, values] = answer["curves"]["panels"]["a"]["observed"]
+        assert np.isnan(numbers(values)).tolist() == [False, True]
+        assert answer["values"]["a"]["observed"] == "nan"
+        assert "names no model" in answer["new"]["no_scene"]
+
+
+def test_sixty_four_actuators_are_offered_and_few_are_drawn_at_once(segment: str) -> None:
+    with o80.Backend(segment, actuators=64) as backend:
+        backend.publish(np.zeros(64))
+        look = looks_at(segment)
+        answer = look(curves=True)
+        assert len(answer["new"]["panels"]) == 64
+        assert len(answer["curves"]["panels"]) == 3
+        everything = look(curves=True, panels=answer["new"]["panels"])
+        assert len(everything["curves"]["panels"]) == 12
+
+
+def test_no_segment_is_said_and_one_that_starts_later_is_shown(segment: str) -> None:
+    look = looks_at(segment + "*")
+    answer = look()
+    assert answer["list"] == []
+    assert segment in answer["waiting"]
+    with o80.robots.load("two_joints").inline(segment):
+        assert wait_for(look, lambda answer: "at" in answer)["source"] == segment
+
+
+def test_a_named_segment_is_waited_for(segment: str) -> None:
+    look = looks_at(segment)
+    answer = look()
+    assert answer["list"][0]["state"] == "waiting"
+    assert segment in answer["problem"]
+
+
+def test_a_robot_that_dies_is_read_on_and_its_successor_is_shown_anew(segment: str) -> None:
+    look = looks_at(segment)
+    with o80.robots.load("two_joints").inline(segment) as arm:
+        arm.burst(10)
+        first = look()
+    stopped = look(key=first["key"])
+    assert stopped["list"][0]["state"] == "stopped"
+    assert stopped["iteration"] == 10
+    with o80.Backend(segment, actuators=["other"]) as backend:
+        backend.publish([0.0])
+        answer = wait_for(look, lambda answer: answer["key"] != first["key"], key=first["key"])
+        assert answer["new"]["panels"] == ["other"]
+        assert answer["iteration"] == 0
+
+
+def wait_for(look: Look, ready: Callable[[dict[str, Any]], bool], **asked: Any) -> dict[str, Any]:
+    """Looks until the list of segments was read anew."""
+    for _ in range(100000):
+        answer = look(**asked)
+        if ready(answer):
+            return answer
+    raise AssertionError("it was never shown")
+
+
+@pytest.fixture
+def recording(tmp_path: Path, segment: str) -> Path:
+    """A move of the elbow in a file."""
+    path = tmp_path / "run.mcap"
+    with o80.robots.load("two_joints").inline(segment) as arm:
+        with o80.Recording(path, segment):
+            arm.add_command("elbow", 1.0, iterations=2000)
+            arm.burst(4000)
+    return path
+
+
+def test_a_recording_is_shown_like_a_robot(recording: Path, segment: str) -> None:
+    look = looks_at(str(recording))
+    answer = look()
+    history = o80.open(recording)[segment].history()
+    assert answer["source"] == segment
+    assert not answer["live"]
+    assert not answer["list"][0]["alive"]
+    assert answer["iteration"] == history.iteration[-1]
+    assert answer["new"]["scene"]["moving"] == [1, 2]
+    for place in (0, 1234, len(history) - 1):
+        seconds = (history.time[place] - history.time[0]) * 1e-9
+        answer = look(at=seconds, key=answer["key"])
+        assert answer["iteration"] == history.iteration[place]
+        angle = float(history.observed[place, 1])
+        assert pose_of(answer)[1, 3:] == pytest.approx(turn_about_y(angle), abs=1e-6)
+
+
+def test_a_recording_that_was_cut_is_shown_up_to_its_last_whole_chunk(
+    recording: Path, segment: str, tmp_path: Path
+) -> None:
+    cut = tmp_path / "cut.mcap"
+    whole = recording.read_bytes()
+    cut.write_bytes(whole[: len(whole) // 2])
+    rows = len(o80.open(cut)[segment].history())
+    answer = looks_at(str(cut))()
+    if rows:
+        assert answer["iteration"] == o80.open(cut)[segment].history().iteration[-1]
+    else:
+        assert "no row" in answer["problem"]
+
+
+def test_a_file_that_is_no_recording_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "no.mcap").write_bytes(b"nothing")
+    with pytest.raises(o80.RecordingError, match=r"no\.mcap"):
+        looks_at(str(tmp_path / "no.mcap"))
