@@ -115,7 +115,7 @@ def test_numbers_that_are_not_finite_are_named_and_leave_the_model_whole(segment
         backend.step()
         backend.publish([math.nan, 1.0])
         answer = looks_at(segment)(curves=True, panels=["a", "b"])
-        [seconds, values] = answer["curves"]["panels"]["a"]["observed"]
+        [_, values] = answer["curves"]["panels"]["a"]["observed"]
         assert np.isnan(numbers(values)).tolist() == [False, True]
         assert answer["values"]["a"]["observed"] == "nan"
         assert "names no model" in answer["new"]["no_scene"]
@@ -176,10 +176,9 @@ def wait_for(look: Look, ready: Callable[[dict[str, Any]], bool], **asked: Any) 
 def recording(tmp_path: Path, segment: str) -> Path:
     """A move of the elbow in a file."""
     path = tmp_path / "run.mcap"
-    with o80.robots.load("two_joints").inline(segment) as arm:
-        with o80.Recording(path, segment):
-            arm.add_command("elbow", 1.0, iterations=2000)
-            arm.burst(4000)
+    with o80.robots.load("two_joints").inline(segment) as arm, o80.Recording(path, segment):
+        arm.add_command("elbow", 1.0, iterations=2000)
+        arm.burst(4000)
     return path
 
 
