@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
 DESCRIPTION = "application/x-o80-description"
 """Media type of the attachment with the description of a robot, as it is in a segment."""
-PROVENANCE = "o80.provenance"
-"""Name of the metadata record that says how a backend was started."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +66,11 @@ class EpochNote:
     def attachment(self) -> str:
         """Name of the attachment with the robot's description."""
         return f"{self.segment}/{self.number}/description"
+
+    @property
+    def provenance(self) -> str:
+        """Name of the metadata record that says how the backend was started."""
+        return f"{self.segment}/{self.number}/provenance"
 
     def not_before(self, first_time: int, log_time: int) -> "EpochNote":
         """The same; the log time of a row at `first_time` is later than `log_time`."""
@@ -122,7 +125,7 @@ class RowWriter:
         message = row_type(layout)
         schema = file.add_schema(f"{PACKAGE}/msg/{message.name}", message.definition)
         file.attach(note.attachment, DESCRIPTION, frontend._description.table(), time.time_ns())
-        file.add_metadata(PROVENANCE, note.run_texts() | {"json": frontend.provenance.as_json()})
+        file.add_metadata(note.provenance, {"json": frontend.provenance.as_json()})
         channel = file.add_channel(topic_of(note.segment), schema, note.texts())
         return cls(layout, note, channel, JointWriter.added_to(file, layout, note, None))
 

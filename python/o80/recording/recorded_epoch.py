@@ -18,7 +18,7 @@ from o80.journal import EntryDecoder, JournalEntry
 from o80.layout import decoder_of
 from o80.provenance import Provenance
 from o80.recording.blocks import messages_in
-from o80.recording.epoch import PROVENANCE, EpochNote
+from o80.recording.epoch import EpochNote
 from o80.recording.journal_channel import GAP as JOURNAL_GAP
 from o80.recording.journal_channel import entries_in
 from o80.recording.message_plan import MessagePlan
@@ -42,17 +42,13 @@ class EpochPart:
         """Number of rows."""
         return self.found.counts.get(self.channel, 0)
 
-    def metadata(self, name: str) -> Iterator[dict[str, str]]:
-        """The metadata records with this name of this run."""
-        run = (self.note.segment, str(self.note.number))
-        for each in self.found.metadata:
-            texts: dict[str, str] = each.metadata
-            if each.name == name and (texts.get("segment"), texts.get("number")) == run:
-                yield texts
-
     def gaps(self, name: str) -> Iterator[tuple[int, int]]:
         """First and last number of what is missing. Raises RecordingError."""
-        for texts in self.metadata(name):
+        run = (self.note.segment, str(self.note.number))
+        for each in self.found.metadata:
+            texts = each.metadata
+            if each.name != name or (texts.get("segment"), texts.get("number")) != run:
+                continue
             try:
                 yield int(texts["first"]), int(texts["last"])
             except (KeyError, ValueError) as error:
@@ -141,11 +137,14 @@ class RecordedEpoch:
     def provenance(self) -> Provenance:
         """How the backend was started; as `Frontend.provenance`. Raises RecordingError."""
         part = self._parts[0]
-        for texts in part.metadata(PROVENANCE):
+        name = self._note.provenance
+        for each in part.found.metadata:
+            if each.name != name:
+                continue
             try:
-                return Provenance.from_json(texts["json"])
+                return Provenance.from_json(each.metadata["json"])
             except (KeyError, TypeError, ValueError) as error:
-                raise RecordingError(f"{part.path}: a record {PROVENANCE} is damaged") from error
+                raise RecordingError(f"{part.path}: the record {name} is damaged") from error
         raise RecordingError(f"{part.path} does not say how '{self._note.segment}' was started")
 
     @cached_property
