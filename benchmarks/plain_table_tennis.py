@@ -86,7 +86,7 @@ class PlainEnvironment(gymnasium.Env[Float32Array, Float32Array]):
         super().reset(seed=seed)
         arm_seed = int(self.np_random.integers(2**32))
         flight: SampledFlight = (options or {})["flight"]
-        self._flight = np.ascontiguousarray(np.hstack([flight.positions, flight.velocities]))
+        self._flight = flight.states
         self._library.plain_reset(
             self._plain,
             ctypes.c_uint64(arm_seed),

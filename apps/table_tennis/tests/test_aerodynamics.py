@@ -9,7 +9,7 @@ from o80_table_tennis.physics.aerodynamics import Aerodynamics, runge_kutta_step
 
 
 def test_the_drag_is_the_published_formula() -> None:
-    air = Aerodynamics(drag_coefficient=0.47)
+    air = Aerodynamics(drag_coefficient=0.47, lift_coefficient=1.47)
 
     area = math.pi * 0.02**2
     assert air.drag == pytest.approx(0.5 * 1.18 * 0.47 * area / 0.0027)

@@ -64,7 +64,8 @@ def test_rows_of_a_bounce_too_short_to_be_seen_are_left_out(rows_after: int) -> 
 
     assert len(sampled.bounce_times) == 0
     assert shot.stamps[lowest - 2] <= sampled.duration + 0.002 <= shot.stamps[lowest] + 0.004
-    assert sampled.residual < 0.001
+    # the lowest row may lie a little behind the bounce, and off the flight
+    assert sampled.residual < 0.0025
 
 
 @pytest.mark.recordings("ball_gun_2019")

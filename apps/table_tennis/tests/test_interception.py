@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from o80_table_tennis.balls.simulated_shots import simulated_shot
-from o80_table_tennis.physics.impact import outgoing_velocity
+from o80_table_tennis.physics.impact import leaving
 from o80_table_tennis.physics.prediction import predict_landing
 from o80_table_tennis.players.interception import (
     TOUCH,
@@ -36,8 +36,8 @@ def test_a_planned_strike_sends_the_ball_to_the_target(seed: int) -> None:
     assert offset @ normal == pytest.approx(TOUCH, abs=0.002)
     assert np.linalg.norm(offset - TOUCH * normal) < NARROW
     racket = np.cross([0.0, 0.0, strike.speeds[0]], pose.position)
-    outgoing = outgoing_velocity(velocity, racket, normal, RACKET_RESTITUTION)
-    landing = predict_landing(position, outgoing, spin=settings.spin)
+    outgoing = leaving(velocity, ball.spin, racket, normal, RACKET_RESTITUTION)
+    landing = predict_landing(position, outgoing.velocity, spin=outgoing.spin)
     assert landing is not None
     assert landing.position[:2] == pytest.approx((0.0, 2.5), abs=0.1)
 

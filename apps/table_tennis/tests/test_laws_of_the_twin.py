@@ -14,19 +14,19 @@ from numpy.typing import NDArray
 
 from o80_table_tennis.balls.sampled_flight import SampledFlight
 from o80_table_tennis.environment import TableTennisEnvironment
-from o80_table_tennis.physics.aerodynamics import AERODYNAMICS, State, runge_kutta_step
-from o80_table_tennis.physics.impact import bounced, outgoing_velocity
+from o80_table_tennis.physics.aerodynamics import AERODYNAMICS, runge_kutta_step
+from o80_table_tennis.physics.impact import bounced, leaving
 from o80_table_tennis.players.policies import default_policy
 from o80_table_tennis.rig.rig import Rig
 from o80_table_tennis.settings import RigSettings, TaskSettings
 from o80_table_tennis.task.actions import COARSE
-from o80_table_tennis.world.ball import BALL_GUN_SPIN
 from o80_table_tennis.world.materials import RACKET_RESTITUTION
 from o80_table_tennis.world.table import TABLE
 from o80_table_tennis.world.timing import PERIOD
 
 START = (0.3, 2.6, 1.3)
 VELOCITY = (0.5, -4.0, 1.0)
+SPIN = (80.0, -40.0, 30.0)
 SMALL = 1e-12  # what the order of the terms may change [m, m/s]
 ROWS = 250
 
@@ -35,27 +35,39 @@ Numbers = NDArray[np.float64]
 
 @pytest.fixture(scope="module")
 def flown() -> Iterator[Numbers]:
-    """Position and velocity (ROWS, 6) of a ball that a twin lets fly after its first row."""
+    """Position, velocity and spin (ROWS, 9) of a ball that a twin lets fly after its first row."""
     start = SampledFlight(
-        "start", PERIOD, np.array([START]), np.array([VELOCITY]), np.empty(0), np.zeros(1)
+        "start",
+        PERIOD,
+        np.array([START]),
+        np.array([VELOCITY]),
+        np.empty(0),
+        np.zeros(1),
+        spins=np.array([SPIN]),
     )
     with Rig(RigSettings()) as rig:
         rig.reset(arm_seed=1, twin_seed=1, flights=[[start]])
         twin = rig.twins[0].frontend
         twin.burst(ROWS - 1)
         rows = twin.history(ROWS).observed.balls
-        yield np.hstack([rows["position"][:, 0], rows["velocity"][:, 0]])
+        yield np.hstack([rows[name][:, 0] for name in ("position", "velocity", "spin")])
 
 
-def later(row: Numbers, number: int, duration: float) -> State[float]:
-    """Row `number` of a free flight, `duration` [s] later, with the spin of the middle."""
-    now = number * PERIOD + duration / 2
-    share = AERODYNAMICS.magnus * math.exp(-AERODYNAMICS.spin_decay * now)
-    wx, wy, wz = BALL_GUN_SPIN
-    turn = (share * wx, share * wy, share * wz)
-    x, y, z, vx, vy, vz = row.tolist()
-    state = (x, y, z, vx, vy, vz)
-    return runge_kutta_step(state, turn, AERODYNAMICS.drag, AERODYNAMICS.gravity, duration)
+def later(row: Numbers, duration: float) -> Numbers:
+    """A row of a free flight, `duration` [s] later, with the spin of the middle."""
+    halfway = math.exp(-AERODYNAMICS.spin_decay * duration / 2)
+    x, y, z, vx, vy, vz, wx, wy, wz = row.tolist()
+    share = AERODYNAMICS.magnus * halfway
+    state = runge_kutta_step(
+        (x, y, z, vx, vy, vz),
+        (share * wx, share * wy, share * wz),
+        AERODYNAMICS.drag,
+        AERODYNAMICS.gravity,
+        duration,
+        AERODYNAMICS.halved_at(halfway * math.hypot(wx, wy, wz)),
+    )
+    decay = halfway * halfway
+    return np.array([*state, decay * wx, decay * wy, decay * wz])
 
 
 def bounce_row(flown: Numbers) -> int:
@@ -67,23 +79,26 @@ def test_a_ball_flies_alike(flown: Numbers) -> None:
     bounce = bounce_row(flown)
     assert 100 < bounce < ROWS - 10
     for number in range(bounce):
-        expected = later(flown[number], number, PERIOD)
+        expected = later(flown[number], PERIOD)
         np.testing.assert_allclose(flown[number + 1], expected, rtol=0, atol=SMALL)
 
 
 def test_a_ball_leaves_the_table_alike(flown: Numbers) -> None:
     number = bounce_row(flown)
-    row, end = flown[number], np.array(later(flown[number], number, PERIOD))
+    row, end = flown[number], later(flown[number], PERIOD)
     # within a step the twin takes the way to the table as straight
     share = (row[2] - TABLE.bounce_height) / (row[2] - end[2])
     touching = row + share * (end - row)
-    x, y, z, vx, vy, vz = touching.tolist()
-    after = np.array(bounced((x, y, z, vx, vy, vz)))
+    x, y, z, vx, vy, vz, wx, wy, wz = touching.tolist()
+    state, spin = bounced((x, y, z, vx, vy, vz), (wx, wy, wz))
+    after = np.array([*state, *spin])
     assert after[2] == pytest.approx(TABLE.bounce_height)
 
     rest = (1 - share) * PERIOD
-    expected = later(after, number + share, rest)
-    np.testing.assert_allclose(flown[number + 1], expected, rtol=0, atol=1e-7)
+    expected = later(after, rest)
+    np.testing.assert_allclose(flown[number + 1, :6], expected[:6], rtol=0, atol=1e-7)
+    np.testing.assert_allclose(flown[number + 1, 6:], expected[6:], rtol=0, atol=1e-4)
+    assert np.linalg.norm(spin - np.array(SPIN)) > 50
 
 
 def test_a_ball_leaves_the_racket_alike() -> None:
@@ -93,11 +108,19 @@ def test_a_ball_leaves_the_racket_alike() -> None:
         while not info["hit"]:
             observation, *_, info = environment.step(policy.act(observation))
         record: Any = environment.rig.twins[0].all_records[0]["racket"]
-        expected = outgoing_velocity(
+        # the spin before the touch is the one that was imposed in that iteration
+        history = environment.rig.twins[0].frontend.history(5)
+        clock = np.array(history.extended.clock)
+        row = int(np.flatnonzero(clock == record["iteration"])[0])
+        before = np.array(history.desired.balls["spin"][row, 0])
+        after = leaving(
             record["velocity_before"],
+            before,
             record["surface_velocity"],
             record["normal"],
             RACKET_RESTITUTION,
         )
-        np.testing.assert_allclose(record["velocity_after"], expected, rtol=0, atol=SMALL)
+        np.testing.assert_allclose(record["velocity_after"], after.velocity, rtol=0, atol=SMALL)
+        seen = np.array(history.observed.balls["spin"][row, 0])
+        np.testing.assert_allclose(seen, after.spin, rtol=2e-3)  # it decays within the iteration
         assert np.linalg.norm(record["surface_velocity"]) > 0.5

@@ -62,8 +62,8 @@ def test_spin_decays() -> None:
     assert kept.positions[-1, 2] < lost.positions[-1, 2]
 
 
-def test_a_bounce_keeps_the_named_shares_of_the_velocity() -> None:
-    table = Table(normal_restitution=0.9, tangential_restitution=0.6)
+def test_a_bounce_without_spin_keeps_the_named_shares_of_the_velocity() -> None:
+    table = Table(normal_restitution=0.9, tangential_restitution=0.6, friction=math.inf)
     touch = predict_landing(START, VELOCITY, table=table)
     assert touch is not None
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ..physics.aerodynamics import AERODYNAMICS, runge_kutta_step
 from ..physics.interpolation import along_path
+from .bounce_spin import spin_after
 
 FloatArray = NDArray[np.float64]
 
@@ -28,6 +29,7 @@ POSITION_NOISE = 0.003
 """Expected error of a recorded position [m]."""
 TURN_BELIEF = 0.3
 """Standard deviation expected of each number of the turn [1/s]: a strong top spin has 0.3."""
+UNKNOWN_TURN = np.zeros(3)
 DRAG_BELIEF = 0.25
 """Standard deviation expected of the drag, as a share of the drag of the model."""
 ANCHOR_NOISE = 1e-5
@@ -98,6 +100,22 @@ class FlightFit:
                 positions[mine], velocities[mine] = flight.at(times[mine])
         return positions, velocities
 
+    def spins(self, times: FloatArray, velocities: FloatArray) -> FloatArray:
+        """Spins (T, 3) [rad/s] at `times` (T,) [s], where the ball has `velocities` (T, 3) [m/s].
+
+        Before the first bounce, those with which a simulated ball turns as the fitted one does.
+        After a bounce, those that the law of the bounce gives: the ball then spins so much that
+        the turn of its flight says little about its spin.
+        """
+        spins = AERODYNAMICS.spins(self.flights[0].turn, np.linalg.norm(velocities, axis=1))
+        spin: FloatArray | None = None
+        for index, time in enumerate(self.bounce_times):
+            before = self.flights[index]
+            spin = spin_after(before.at(np.array([time]))[1], before.turn, spin)
+            mine = times >= time
+            spins[mine] = spin * np.exp(-AERODYNAMICS.spin_decay * (times[mine] - time))[:, None]
+        return spins
+
 
 def fit_flight(stamps: FloatArray, positions: FloatArray) -> FlightFit:
     """The flights and bounces behind `positions` (N, 3) [m] at `stamps` (N,) [s], rising.
@@ -115,6 +133,7 @@ def fit_flight(stamps: FloatArray, positions: FloatArray) -> FlightFit:
         for before, after, row in zip(flights, flights[1:], bounces, strict=False)
     ]
     times = np.array([time for time, _ in meetings])
+    turns = _expected_turns(flights, times)
     which = np.searchsorted(times, stamps, side="right")
     inside = (np.arange(len(stamps)) >= first) & (np.arange(len(stamps)) <= last)
     refined = tuple(
@@ -123,6 +142,7 @@ def fit_flight(stamps: FloatArray, positions: FloatArray) -> FlightFit:
             positions[(which == index) & inside],
             anchors=meetings[max(0, index - 1) : index + 1],
             start=flight,
+            expected_turn=turns[index],
         )
         for index, flight in enumerate(flights)
     )
@@ -135,6 +155,17 @@ def fit_flight(stamps: FloatArray, positions: FloatArray) -> FlightFit:
     )
     fitted, _ = fit.at(stamps[inside])
     return replace(fit, residuals=np.linalg.norm(fitted - positions[inside], axis=1))
+
+
+def _expected_turns(flights: Sequence[Flight], bounce_times: FloatArray) -> list[FloatArray]:
+    """The turn (3,) of each flight before it is fitted: unknown, or what the last bounce gives."""
+    turns = [np.zeros(3)]
+    spin: FloatArray | None = None
+    for before, after, time in zip(flights, flights[1:], bounce_times, strict=False):
+        spin = spin_after(before.at(np.array([time]))[1], before.turn, spin)
+        speed = float(np.linalg.norm(after.at(np.array([time]))[1]))
+        turns.append(AERODYNAMICS.turn(spin, speed))
+    return turns
 
 
 def bounce_rows(positions: FloatArray) -> tuple[list[int], int]:
@@ -193,10 +224,12 @@ def fit_segment(
     *,
     anchors: Sequence[tuple[float, FloatArray]] = (),
     start: Flight | None = None,
+    expected_turn: FloatArray = UNKNOWN_TURN,
 ) -> Flight:
     """The flight without bounce through `positions` (n, 3) at `stamps` (n,).
 
-    `anchors` are times and points it goes through exactly; `start` is a first guess.
+    `anchors` are times and points it goes through exactly; `start` is a first guess. What the
+    positions leave open is drawn towards `expected_turn` (3,) [1/s].
     """
     origin = float(stamps[0]) if start is None else start.origin
     unknowns = _guess(stamps - origin, positions) if start is None else start.unknowns
@@ -204,7 +237,7 @@ def fit_segment(
     points = np.concatenate([positions, *(point[None] for _, point in anchors)])
     noise = np.full(len(points), POSITION_NOISE)
     noise[len(stamps) :] = ANCHOR_NOISE
-    centre = np.concatenate([np.zeros(6), [AERODYNAMICS.drag], np.zeros(3)])
+    centre = np.concatenate([np.zeros(6), [AERODYNAMICS.drag], expected_turn])
 
     for _ in range(MOST_ROUNDS):
         flown, slopes = sloped(unknowns, times)

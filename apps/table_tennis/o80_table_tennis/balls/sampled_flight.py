@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..world.ball import BALL_GUN_SPIN
+
 FloatArray = NDArray[np.float64]
 
 
@@ -25,6 +27,15 @@ class SampledFlight:
     """(bounces,), since the first row [s]"""
     residuals: FloatArray
     """(N,) distance of each recorded row from the fit [m]"""
+    spins: FloatArray | None = None
+    """(T, 3), in the axes of the world [rad/s]; None: that of the ball gun in every row"""
+
+    @property
+    def states(self) -> FloatArray:
+        """(T, 9) positions, velocities and spins, a fresh array."""
+        spins = BALL_GUN_SPIN if self.spins is None else self.spins
+        shape = self.positions.shape
+        return np.hstack([self.positions, self.velocities, np.broadcast_to(spins, shape)])
 
     @property
     def residual(self) -> float:

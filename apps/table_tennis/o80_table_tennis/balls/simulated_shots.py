@@ -61,7 +61,7 @@ def simulated_shot(
         )
         if len(flight.bounce_times) == 1:
             return BallTrajectory(
-                "simulated shot", flight.stamps, flight.positions, flight.velocities
+                "simulated shot", flight.stamps, flight.positions, flight.velocities, flight.spins
             )
     raise ValueError(
         f"no shot of {variation} bounces exactly once on the table; choose other means"

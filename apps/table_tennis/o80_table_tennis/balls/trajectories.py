@@ -41,6 +41,8 @@ class BallTrajectory:
     """(N, 3), world frame [m]"""
     velocities: FloatArray
     """(N, 3), world frame [m/s]; of a recording: as the vision system gave them, a rough value"""
+    spins: FloatArray | None = None
+    """(N, 3) [rad/s], if they are known: a simulated ball"""
 
     def __post_init__(self) -> None:
         rows = len(self.stamps)
@@ -79,6 +81,22 @@ class BallTrajectory:
         require_enough_rows(self.name, len(self.stamps))
         return fit_flight(self.stamps, self.positions)
 
+    def _spins(self, times: FloatArray, velocities: FloatArray) -> FloatArray:
+        """Spins (T, 3) [rad/s] along the fitted flight."""
+        if self.spins is None:
+            return self.fit.spins(times, velocities)
+        # constant between bounces, but for a slow decay: of the nearest row of the same flight
+        flights = np.searchsorted(self.fit.bounce_times, self.stamps, side="right")
+        which = np.searchsorted(self.fit.bounce_times, times, side="right")
+        spins = np.empty((len(times), 3))
+        for flight in np.unique(which):
+            rows, mine = flights == flight, which == flight
+            for axis in range(3):
+                spins[mine, axis] = np.interp(
+                    times[mine], self.stamps[rows], self.spins[rows, axis]
+                )
+        return spins
+
     def resample(self, period: float = PERIOD) -> SampledFlight:
         """The fitted flight in steps of `period` [s], from the first row to the last one fitted.
 
@@ -98,4 +116,5 @@ class BallTrajectory:
             velocities=velocities,
             bounce_times=fit.bounce_times - fit.start,
             residuals=fit.residuals,
+            spins=self._spins(times, velocities),
         )

@@ -1,8 +1,9 @@
 """Drag, Magnus force and gravity on a flying ball, and one Runge-Kutta step of its motion.
 
-    a = -1/2 rho Cd A/m |v| v + 1/2 rho Cl A r/m (omega x v) - g z
+    a = -1/2 rho Cd A/m |v| v + 1/2 rho Cl A r/m / (1 + s r |omega| / |v|) (omega x v) - g z
 
-as published for the ball of the experiment; rho is the density of air, A = pi r^2, m the mass.
+rho is the density of air, A = pi r^2, m the mass. With s = 0 this is the law published for the
+ball of the experiment; the saturation s is what recorded shots of different spins show.
 The functions take floats (one ball, fast without NumPy) or arrays (many balls at once). The twins
 follow the same law in C++ (simulators/mujoco/src/balls/ball_flight.hpp); a test compares the two.
 """
@@ -29,8 +30,11 @@ class Aerodynamics:
     """[kg/m^3]"""
     drag_coefficient: float = 0.40
     """Cd: 0.34 to 0.44 on recorded shots without spin (the published configuration says 0.47)."""
-    lift_coefficient: float = 1.47
-    """Cl of the published configuration."""
+    lift_coefficient: float = 1.14
+    """Cl of a slow spin: fitted with the bounces of recorded shots (published: 1.47, without
+    saturation)."""
+    lift_saturation: float = 3.0
+    """s: the lift of a spin is halved where r |omega| / |v| is 1 / s. Fitted likewise."""
     spin_decay: float = 0.5
     """Share of the spin lost in a second [1/s]: the published 0.005 a step, of 10 ms (with steps of
     2 ms the recorded shots would lose their spin five times faster than is seen)."""
@@ -56,22 +60,53 @@ class Aerodynamics:
         """1/2 rho Cl A r/m []: the Magnus acceleration is magnus * (omega x v)."""
         return self.lift_coefficient * self.drag_per_coefficient * self.radius
 
+    def halved_at(self, spin: float) -> float:
+        """The speed at which saturation halves the lift of a spin [rad/s], in [m/s]."""
+        return self.lift_saturation * self.radius * spin
 
+    def turn(self, spin: NDArray[np.float64], speed: float) -> NDArray[np.float64]:
+        """The turn (3,) [1/s] of a ball with a spin (3,) [rad/s] at a speed [m/s]."""
+        halved_at = self.halved_at(float(np.linalg.norm(spin)))
+        turn: NDArray[np.float64] = self.magnus * speed / (speed + halved_at) * spin
+        return turn
+
+    def spins(self, turn: NDArray[np.float64], speeds: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The spins (T, 3) [rad/s] with which a ball at `speeds` (T,) turns by `turn` (3,) [1/s].
+
+        A turn near the largest that saturation allows says little about the spin: it gives at most
+        `MOST_SATURATED` times the spin that it would have without saturation.
+        """
+        lost = self.lift_saturation * self.radius * float(np.linalg.norm(turn)) / self.magnus
+        share = np.maximum(1.0 - lost / np.maximum(speeds, 1e-9), 1.0 / MOST_SATURATED)
+        spins: NDArray[np.float64] = turn / (self.magnus * share[:, None])
+        return spins
+
+
+MOST_SATURATED = 10.0
 AERODYNAMICS = Aerodynamics()
 
 State = tuple[Number, Number, Number, Number, Number, Number]
 """x, y, z [m], vx, vy, vz [m/s]."""
 Turn = tuple[Number, Number, Number]
-"""magnus * omega [1/s]: the Magnus acceleration is its cross product with the velocity."""
+"""magnus * omega [1/s]: the Magnus acceleration, without saturation, is its cross product with the
+velocity."""
 
 
 def derivative(
-    state: State[Number], turn: Turn[Number], drag: Number, gravity: float
+    state: State[Number],
+    turn: Turn[Number],
+    drag: Number,
+    gravity: float,
+    halved_at: float = 0.0,
 ) -> State[Number]:
     """Velocity [m/s] and acceleration [m/s^2] of the ball."""
     _, _, _, vx, vy, vz = state
     tx, ty, tz = turn
-    slowing = drag * (vx * vx + vy * vy + vz * vz) ** 0.5
+    speed = (vx * vx + vy * vy + vz * vz) ** 0.5
+    slowing = drag * speed
+    if halved_at > 0.0:
+        share = speed / (speed + halved_at)
+        tx, ty, tz = share * tx, share * ty, share * tz
     return (
         vx,
         vy,
@@ -90,13 +125,21 @@ def moved(state: State[Number], rate: State[Number], dt: float) -> State[Number]
 
 
 def runge_kutta_step(
-    state: State[Number], turn: Turn[Number], drag: Number, gravity: float, dt: float
+    state: State[Number],
+    turn: Turn[Number],
+    drag: Number,
+    gravity: float,
+    dt: float,
+    halved_at: float = 0.0,
 ) -> State[Number]:
-    """The state `dt` [s] later, by the classical fourth-order rule with constant spin."""
-    k1 = derivative(state, turn, drag, gravity)
-    k2 = derivative(moved(state, k1, dt / 2), turn, drag, gravity)
-    k3 = derivative(moved(state, k2, dt / 2), turn, drag, gravity)
-    k4 = derivative(moved(state, k3, dt), turn, drag, gravity)
+    """The state `dt` [s] later, by the classical fourth-order rule with constant spin.
+
+    `halved_at` is the speed at which saturation halves the lift [m/s]; 0: there is none.
+    """
+    k1 = derivative(state, turn, drag, gravity, halved_at)
+    k2 = derivative(moved(state, k1, dt / 2), turn, drag, gravity, halved_at)
+    k3 = derivative(moved(state, k2, dt / 2), turn, drag, gravity, halved_at)
+    k4 = derivative(moved(state, k3, dt), turn, drag, gravity, halved_at)
     state = moved(state, k1, dt / 6)
     state = moved(state, k2, dt / 3)
     state = moved(state, k3, dt / 3)

@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..world.ball import NO_SPIN
+from ..world.scene import Vector
 from ..world.table import TABLE, Table
-from .aerodynamics import AERODYNAMICS, Aerodynamics, State, runge_kutta_step
+from .aerodynamics import AERODYNAMICS, Aerodynamics, State, Turn, runge_kutta_step
 from .impact import bounced
 from .interpolation import along_path
 
 FloatArray = NDArray[np.float64]
-Vector = Sequence[float] | FloatArray
+Numbers = Sequence[float] | FloatArray
 
 STEP = 0.02
 """Step of the integration [s]; the error over a second of flight stays below 10 um."""
@@ -38,6 +39,8 @@ class PredictedFlight:
     """(N, 3), world frame [m/s]"""
     bounce_times: FloatArray
     """(bounces,) since the start [s]"""
+    spins: FloatArray
+    """(N, 3), in the axes of the world [rad/s]"""
 
 
 @dataclass(frozen=True)
@@ -56,15 +59,16 @@ class Crossing:
 class _Node:
     time: float
     state: State[float]
+    spin: Vector
     after_bounce: bool = False
 
 
 def predict(
-    position: Vector,
-    velocity: Vector,
+    position: Numbers,
+    velocity: Numbers,
     duration: float,
     *,
-    spin: Vector = NO_SPIN,
+    spin: Numbers = NO_SPIN,
     period: float = 0.01,
     aerodynamics: Aerodynamics = AERODYNAMICS,
     table: Table | None = TABLE,
@@ -80,17 +84,21 @@ def predict(
         times, np.array([node.state for node in nodes]), np.array([node.time for node in nodes])
     )
     bounces = np.array([node.time for node in nodes if node.after_bounce])
-    return PredictedFlight(times, positions, velocities, bounces)
+    starts = np.array([node.time for node in nodes])
+    last = np.searchsorted(starts, times, side="right") - 1
+    decayed = np.exp(-aerodynamics.spin_decay * (times - starts[last]))
+    spins = np.array([node.spin for node in nodes])[last] * decayed[:, None]
+    return PredictedFlight(times, positions, velocities, bounces, spins)
 
 
 def predict_crossing(
-    position: Vector,
-    velocity: Vector,
+    position: Numbers,
+    velocity: Numbers,
     *,
     axis: int,
     at: float,
     duration: float = 2.0,
-    spin: Vector = NO_SPIN,
+    spin: Numbers = NO_SPIN,
     aerodynamics: Aerodynamics = AERODYNAMICS,
     table: Table | None = TABLE,
 ) -> Crossing | None:
@@ -107,11 +115,11 @@ def predict_crossing(
 
 
 def predict_landing(
-    position: Vector,
-    velocity: Vector,
+    position: Numbers,
+    velocity: Numbers,
     *,
     duration: float = 2.0,
-    spin: Vector = NO_SPIN,
+    spin: Numbers = NO_SPIN,
     aerodynamics: Aerodynamics = AERODYNAMICS,
     table: Table = TABLE,
 ) -> Crossing | None:
@@ -125,9 +133,9 @@ def predict_landing(
 
 
 def _nodes(
-    position: Vector,
-    velocity: Vector,
-    spin: Vector,
+    position: Numbers,
+    velocity: Numbers,
+    spin: Numbers,
     duration: float,
     aerodynamics: Aerodynamics,
     table: Table | None,
@@ -136,25 +144,41 @@ def _nodes(
     state = _start(position, velocity)
     wx, wy, wz = (float(value) for value in spin)
     now = 0.0
-    yield _Node(now, state)
+    yield _Node(now, state, (wx, wy, wz))
     while duration - now > SHORTEST_STEP:
         dt = min(STEP, duration - now)
         # the spin halfway through the step => the turn of the velocity
-        share = aerodynamics.magnus * math.exp(-aerodynamics.spin_decay * (now + dt / 2))
+        halfway = math.exp(-aerodynamics.spin_decay * dt / 2)
+        share = aerodynamics.magnus * halfway
         turn = (share * wx, share * wy, share * wz)
-        fly = partial(runge_kutta_step, state, turn, aerodynamics.drag, aerodynamics.gravity)
+        halved_at = aerodynamics.halved_at(halfway * math.sqrt(wx * wx + wy * wy + wz * wz))
+        drag, gravity = aerodynamics.drag, aerodynamics.gravity
+        fly = partial(_flown, state, turn, drag, gravity, halved_at)
 
         # a touch of the table ends the step early
         touch = None if table is None else _touch(state, fly, dt, table)
         dt = dt if touch is None else touch
         state, now = fly(dt), now + dt
-        yield _Node(now, state)
+        decay = math.exp(-aerodynamics.spin_decay * dt)
+        wx, wy, wz = decay * wx, decay * wy, decay * wz
+        yield _Node(now, state, (wx, wy, wz))
         if touch is not None and table is not None:
-            state = bounced(state, table)
-            yield _Node(now, state, after_bounce=True)
+            state, (wx, wy, wz) = bounced(state, (wx, wy, wz), table)
+            yield _Node(now, state, (wx, wy, wz), after_bounce=True)
 
 
-def _start(position: Vector, velocity: Vector) -> State[float]:
+def _flown(
+    state: State[float],
+    turn: Turn[float],
+    drag: float,
+    gravity: float,
+    halved_at: float,
+    dt: float,
+) -> State[float]:
+    return runge_kutta_step(state, turn, drag, gravity, dt, halved_at)
+
+
+def _start(position: Numbers, velocity: Numbers) -> State[float]:
     x, y, z = (float(value) for value in position)
     vx, vy, vz = (float(value) for value in velocity)
     if not all(math.isfinite(value) for value in (x, y, z, vx, vy, vz)):

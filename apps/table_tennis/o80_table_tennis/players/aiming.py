@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,7 +18,7 @@ def velocity_to_land(
     target: FloatArray,
     duration: float,
     *,
-    spin: Vector,
+    spin: Vector | FloatArray,
     aerodynamics: Aerodynamics,
     steps: int = 6,
     corrections: int = 2,
@@ -31,12 +33,15 @@ def velocity_to_land(
         aerodynamics.magnus * spin[1],
         aerodynamics.magnus * spin[2],
     )
+    halved_at = aerodynamics.halved_at(math.hypot(*(float(value) for value in spin)))
     # start with a flight without air, then add the miss that the air causes
     velocity = (target - position) / duration
     velocity[2] += 0.5 * aerodynamics.gravity * duration
     for _ in range(corrections):
         state: State[float] = (*position.tolist(), *velocity.tolist())
         for _ in range(steps):
-            state = runge_kutta_step(state, turn, aerodynamics.drag, aerodynamics.gravity, dt)
+            state = runge_kutta_step(
+                state, turn, aerodynamics.drag, aerodynamics.gravity, dt, halved_at
+            )
         velocity = velocity + (target - np.array(state[:3])) / duration
     return velocity

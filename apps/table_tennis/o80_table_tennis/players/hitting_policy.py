@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ..physics.impact import bounced
 from ..task.actions import COARSE
 from ..task.observations import (
     BALL_POSITION,
@@ -17,6 +18,8 @@ from ..task.observations import (
     Float32Array,
 )
 from ..world.arm import JOINT_LIMIT, JOINTS
+from ..world.scene import Vector
+from ..world.table import TABLE
 from ..world.timing import STEP
 from .arm_dynamics import ArmModel
 from .interception import ComingBall, InterceptionSettings, Strike, StrikePlanner, coming_ball
@@ -27,6 +30,8 @@ FloatArray = NDArray[np.float64]
 
 WRIST = 3
 """Index of joint 4."""
+LOW = 0.1
+"""A ball that begins to rise this near above the table has bounced [m]."""
 PREDICTED_EVERY = 4
 """A predicted path of the ball is used for so many steps."""
 
@@ -90,6 +95,8 @@ class HittingPolicy:
         self._swing: Swing | None = None
         self._ball: ComingBall | None = None
         self._steps = 0
+        self._seen: FloatArray | None = None
+        self._spin: Vector = self._settings.interception.spin
         self._over = False
         self.strike: Strike | None = None
         """What is planned now."""
@@ -128,11 +135,23 @@ class HittingPolicy:
 
     def _follow(self, position: FloatArray, velocity: FloatArray) -> None:
         """Predicts the ball, or goes on along its last predicted path."""
+        self._spin = self._spin_after(position, velocity)
+        self._seen = np.concatenate([position, velocity])
         if self._steps % PREDICTED_EVERY == 0:
-            self._ball = coming_ball(position, velocity, self._settings.interception)
+            self._ball = coming_ball(
+                position, velocity, self._settings.interception, spin=self._spin
+            )
         elif self._ball is not None:
             self._ball = self._ball.later(STEP)
         self._steps += 1
+
+    def _spin_after(self, position: FloatArray, velocity: FloatArray) -> Vector:
+        """The spin of the ball, which a bounce since the last observation has changed."""
+        low = position[2] < TABLE.bounce_height + LOW
+        if self._seen is None or not (low and self._seen[5] < 0.0 < velocity[2]):
+            return self._spin
+        x, y, z, vx, vy, vz = self._seen.tolist()
+        return bounced((x, y, z, vx, vy, vz), self._spin)[1]
 
     def _drive(
         self, q: FloatArray, dq: FloatArray, pressures: FloatArray, swing: Swing

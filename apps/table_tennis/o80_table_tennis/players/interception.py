@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..physics.aerodynamics import AERODYNAMICS, Aerodynamics
-from ..physics.impact import outgoing_velocity
+from ..physics.impact import Leaving, leaving
 from ..physics.prediction import predict
 from ..world.arm import BLADE_THICKNESS, racket_pose
 from ..world.ball import BALL_GUN_SPIN, BALL_RADIUS
@@ -81,7 +81,7 @@ class InterceptionSettings:
     off_middle: float = 8.0
     """Weight of a touch off the middle of the blade, relative to the same error [1/s]."""
     spin: Vector = BALL_GUN_SPIN
-    """Of the ball, before and after the strike [rad/s]."""
+    """Of a ball that comes, before its bounce [rad/s]."""
     racket: Restitution = RACKET_RESTITUTION
     aerodynamics: Aerodynamics = AERODYNAMICS
     table: Table = TABLE
@@ -97,10 +97,12 @@ class ComingBall:
     """(N, 3) [m]"""
     velocities: FloatArray
     """(N, 3) [m/s]"""
+    spin: FloatArray
+    """(3,) [rad/s], which changes little while the ball can be met"""
 
     def later(self, time: float) -> ComingBall:
         """The same path, seen `time` [s] later."""
-        return ComingBall(self.times - time, self.positions, self.velocities)
+        return replace(self, times=self.times - time)
 
     def at(self, time: float) -> tuple[FloatArray, FloatArray]:
         """Position and velocity (3,) at `time` from now, between the first row and the last."""
@@ -117,9 +119,15 @@ class ComingBall:
 
 
 def coming_ball(
-    position: FloatArray, velocity: FloatArray, settings: InterceptionSettings
+    position: FloatArray,
+    velocity: FloatArray,
+    settings: InterceptionSettings,
+    spin: Vector | FloatArray | None = None,
 ) -> ComingBall | None:
-    """The path of a ball while it can be met, after its bounce; None if it does not come."""
+    """The path of a ball while it can be met, after its bounce; None if it does not come.
+
+    `spin` is that of the ball now [rad/s]; None: that of a ball before its bounce.
+    """
     if velocity[1] > -0.5 or position[1] < settings.nearest:
         return None
     duration = min(LATEST, 1.6 * (position[1] - settings.nearest) / -velocity[1] + 0.1)
@@ -127,7 +135,7 @@ def coming_ball(
         position,
         velocity,
         duration,
-        spin=settings.spin,
+        spin=settings.spin if spin is None else spin,
         period=PATH_PERIOD,
         aerodynamics=settings.aerodynamics,
         table=settings.table,
@@ -140,7 +148,10 @@ def coming_ball(
     if len(near) < 2:
         return None
     rows = slice(int(near[0]), int(near[-1]) + 1)
-    return ComingBall(path.stamps[rows], path.positions[rows], path.velocities[rows])
+    middle = (rows.start + rows.stop) // 2
+    return ComingBall(
+        path.stamps[rows], path.positions[rows], path.velocities[rows], path.spins[middle]
+    )
 
 
 class StrikePlanner:
@@ -195,20 +206,23 @@ class StrikePlanner:
         s = self._settings
         position, _ = ball.at(float(guess[0]))
         target = np.array([s.target_x, s.target_y, s.table.bounce_height])
-        return velocity_to_land(
-            position, target, s.flight, spin=s.spin, aerodynamics=s.aerodynamics
-        )
+        spin = self._leaving(ball, guess)[0].spin
+        return velocity_to_land(position, target, s.flight, spin=spin, aerodynamics=s.aerodynamics)
 
     def _error(self, ball: ComingBall, guess: FloatArray, wanted: FloatArray) -> FloatArray:
         """Velocity of the leaving ball less `wanted`, and the racket's offset from it, (6,)."""
+        after, off = self._leaving(ball, guess)
+        return np.concatenate([after.velocity - wanted, self._settings.off_middle * off])
+
+    def _leaving(self, ball: ComingBall, guess: FloatArray) -> tuple[Leaving, FloatArray]:
+        """The ball after the strike, and its offset from the middle of the blade (3,) [m]."""
         position, velocity = ball.at(float(guess[0]))
         speed = float(guess[2])
         pose = racket_pose(touching_posture(position, float(guess[1])))
         normal = np.array(pose.normal)
         racket = np.array([-speed * position[1], speed * position[0], 0.0])
-        leaving = outgoing_velocity(velocity, racket, normal, self._settings.racket)
-        off = position - TOUCH * normal - pose.position
-        return np.concatenate([leaving - wanted, self._settings.off_middle * off])
+        after = leaving(velocity, ball.spin, racket, normal, self._settings.racket)
+        return after, position - TOUCH * normal - np.array(pose.position)
 
 
 def touching_posture(ball: FloatArray, wrist: float) -> FloatArray:

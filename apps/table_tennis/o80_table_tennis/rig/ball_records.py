@@ -58,14 +58,12 @@ def ball_options(balls: int) -> dict[str, Any]:
     return {
         "balls": "ball",
         "extra_balls": balls - 1,
-        "surfaces": [
-            f"{geom}={' '.join(map(str, restitution.axes))}"
-            for geom, restitution in SURFACES.items()
-        ],
+        "surfaces": [f"{geom}={restitution.text}" for geom, restitution in SURFACES.items()],
         "watched": "racket",
         "air_density": AERODYNAMICS.air_density,
         "drag_coefficient": AERODYNAMICS.drag_coefficient,
         "lift_coefficient": AERODYNAMICS.lift_coefficient,
+        "lift_saturation": AERODYNAMICS.lift_saturation,
         "spin_decay": AERODYNAMICS.spin_decay,
         "spin": BALL_GUN_SPIN,
     }

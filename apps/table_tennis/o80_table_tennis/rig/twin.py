@@ -21,8 +21,10 @@ FloatArray = NDArray[np.float64]
 
 TIMEOUT = 5.0
 """Longest wait for a burst [s]."""
-BALL_NUMBERS = 6
-"""Position and velocity."""
+BALL_NUMBERS = 9
+"""Position, velocity and spin."""
+SEEN_NUMBERS = 6
+"""Position and velocity: what is observed."""
 
 
 class Twin:
@@ -35,7 +37,7 @@ class Twin:
         self._balls = words(dtype, "observed", "balls")
         self.balls = (self._balls.stop - self._balls.start) // BALL_NUMBERS
         """How many there are."""
-        self._first_ball = slice(self._balls.start, self._balls.start + BALL_NUMBERS)
+        self._first_ball = slice(self._balls.start, self._balls.start + SEEN_NUMBERS)
         self._records_at = words(dtype, *RECORDS).start * WORD
         self._record_dtype = dtype[RECORDS[0]][RECORDS[1]].base
         self._reader = BallReader(self._record_dtype, self._records_at)
@@ -51,7 +53,7 @@ class Twin:
         self.iteration = -1
         """Of that row."""
         self._ball_state = np.dtype(
-            [("position", np.float64, (3,)), ("velocity", np.float64, (3,))]
+            [(name, np.float64, (3,)) for name in ("position", "velocity", "spin")]
         )
 
     def reset(self, seed: int) -> None:
@@ -66,8 +68,7 @@ class Twin:
         targets = {"position": q[None, :], "velocity": dq[None, :]}
         self.frontend.add_trajectory(targets, self._joint_names)
         for ball, flight in zip(self._ball_names, flights, strict=bool(flights)):
-            states = np.empty(len(flight.positions), self._ball_state)
-            states["position"], states["velocity"] = flight.positions, flight.velocities
+            states = flight.states.view(self._ball_state)[:, 0]
             self.frontend.add_trajectory(states, ball)
 
     def step(self, motion: FloatArray) -> None:
@@ -94,7 +95,7 @@ class Twin:
     @property
     def all_balls(self) -> FloatArray:
         """Positions and velocities (balls, 6) in the newest row; a view."""
-        return self.row[self._balls].reshape(self.balls, BALL_NUMBERS)
+        return self.row[self._balls].reshape(self.balls, BALL_NUMBERS)[:, :SEEN_NUMBERS]
 
     @property
     def joint_positions(self) -> FloatArray:

@@ -10,7 +10,9 @@ BALL_MASS = numbers(element(".//body[@name='ball']/inertial"), "mass")[0]
 """[kg]"""
 GRAVITY = -vector(element("option"), "gravity")[2]
 """Downwards [m/s^2]."""
+BALL_INERTIA = 2.0 / 3.0
+"""Moment of inertia over mass and radius squared: a hollow ball."""
 NO_SPIN: Vector = (0.0, 0.0, 0.0)
-BALL_GUN_SPIN: Vector = (30.0, 0.0, 0.0)
-"""Top spin of the recorded shots of the ball gun [rad/s]: with it, a prediction from y = 2 m
-through the bounce to the arm is off by 7 mm, 14 mm in height and 6 ms; without it by 70 mm."""
+BALL_GUN_SPIN: Vector = (64.0, 0.0, 0.0)
+"""Top spin of the recorded shots of the ball gun before their bounce [rad/s]: the median of what
+their fitted flights show, by `python -m o80_table_tennis.fit_bounces`."""

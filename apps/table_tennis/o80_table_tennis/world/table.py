@@ -27,7 +27,9 @@ class Table:
     normal_restitution: float = TABLE_RESTITUTION.normal
     """Share of the vertical speed kept."""
     tangential_restitution: float = TABLE_RESTITUTION.tangential
-    """Share of the horizontal velocity kept."""
+    """Share of the horizontal velocity that a ball without spin keeps."""
+    friction: float = TABLE_RESTITUTION.friction
+    """Coefficient of friction."""
 
     @property
     def top(self) -> float:

@@ -16,25 +16,34 @@ struct Ball {
 };
 
 /// The forces of air and gravity on one kind of ball:
-/// a = -drag |v| v + magnus (omega x v) + gravity.
+/// a = -drag |v| v + magnus / (1 + saturation |omega| / |v|) (omega x v) + gravity.
+/// The lift of a ball grows less than its spin: the surface cannot turn the flow ever further.
 struct Air {
   double drag = 0;        // 1/2 rho Cd A/m [1/m]
   double magnus = 0;      // 1/2 rho Cl A r/m []
   double spin_decay = 0;  // share of the spin lost in a second [1/s]
   Vector gravity{0, 0, -9.81};
+  double saturation = 0;  // of the lift [m]
 
-  static Air of(double density, double drag_coefficient, double lift_coefficient, double radius,
-                double mass, double spin_decay, const Vector& gravity) noexcept {
+  struct Coefficients {
+    double drag = 0;             // Cd
+    double lift = 0;             // Cl per r |omega| / |v|, of a slow spin
+    double lift_saturation = 0;  // the lift is halved where r |omega| / |v| is 1 over this
+  };
+  static Air of(double density, const Coefficients& coefficients, double radius, double mass,
+                double spin_decay, const Vector& gravity) noexcept {
     const double per_coefficient = 0.5 * density * std::numbers::pi * radius * radius / mass;
-    return {drag_coefficient * per_coefficient, lift_coefficient * per_coefficient * radius,
-            spin_decay, gravity};
+    return {coefficients.drag * per_coefficient, coefficients.lift * per_coefficient * radius,
+            spin_decay, gravity, coefficients.lift_saturation * radius};
   }
 };
 
 /// The acceleration of a ball [m/s^2].
 inline Vector acceleration(const Air& air, const Vector& velocity, const Vector& spin) noexcept {
-  return air.magnus * cross(spin, velocity) - (air.drag * length(velocity)) * velocity +
-         air.gravity;
+  const double speed = length(velocity);
+  const double turning = air.saturation * length(spin);
+  const double magnus = turning > 0 ? air.magnus * (speed / (speed + turning)) : air.magnus;
+  return magnus * cross(spin, velocity) - (air.drag * speed) * velocity + air.gravity;
 }
 
 /// A ball after `duration` [s] of free flight, by one classical Runge-Kutta step with the spin of

@@ -22,6 +22,7 @@ void check_numbers(const BallOptions& options) {
   check_not_negative("air_density", options.air_density);
   check_not_negative("drag_coefficient", options.drag_coefficient);
   check_not_negative("lift_coefficient", options.lift_coefficient);
+  check_not_negative("lift_saturation", options.lift_saturation);
   check_not_negative("spin_decay", options.spin_decay);
   check_not_negative("teleport_distance", options.teleport_distance);
   for (const double number : options.spin) {
@@ -48,7 +49,15 @@ BallPlace ball_in(mjModel& model, const std::string& name) {
     model.geom_conaffinity[geom] = 0;
   }
   if (radius <= 0) throw DriverError("body '" + name + "' is not a ball: it has no sphere");
-  return {name, model.jnt_qposadr[joint], model.jnt_dofadr[joint], radius, model.body_mass[body]};
+  // moment of inertia as a share of that of a ring: 2/3 of a hollow ball, 2/5 of a solid one
+  const mjtNum* inertia = model.body_inertia + 3 * static_cast<std::ptrdiff_t>(body);
+  const double mass = model.body_mass[body];
+  const double mean = (inertia[0] + inertia[1] + inertia[2]) / 3;
+  return {name,
+          model.jnt_qposadr[joint],
+          model.jnt_dofadr[joint],
+          {radius, mean / (mass * radius * radius)},
+          mass};
 }
 
 Shape shape_of(const mjModel& model, int geom, const std::string& name) {
@@ -114,7 +123,7 @@ std::vector<SurfacePlace> surfaces_in(const mjModel& model, const BallOptions& o
     const int geom = find(model, mjOBJ_GEOM, entry.geom, "geom");
     const bool still = model.body_weldid[model.geom_bodyid[geom]] == 0;
     surfaces.push_back({entry.geom, geom, still, shape_of(model, geom, entry.geom),
-                        entry.restitution, entry.watched});
+                        entry.restitution, entry.friction, entry.watched});
   }
   return surfaces;
 }

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "balls/ball_options.hpp"
-#include "balls/surface.hpp"
+#include "balls/bounce.hpp"
 
 // The balls and surfaces of a MuJoCo model.
 
@@ -16,10 +16,10 @@ namespace o80::mujoco {
 /// A free body that is a ball.
 struct BallPlace {
   std::string name;
-  int position;   // in qpos
-  int velocity;   // in qvel
-  double radius;  // [m]
-  double mass;    // [kg]
+  int position;  // in qpos
+  int velocity;  // in qvel
+  Sphere sphere;
+  double mass;  // [kg]
 };
 
 /// A geom that balls bounce on.
@@ -29,6 +29,7 @@ struct SurfacePlace {
   bool still;  // part of the world
   Shape shape;
   Restitution restitution;
+  double friction;
   bool watched;
 };
 

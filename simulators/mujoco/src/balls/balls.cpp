@@ -12,9 +12,10 @@ Balls::Balls(mjModel& model, const BallOptions& options)
       surface_places_(surfaces_in(model, options)) {
   const mjtNum* gravity = model.opt.gravity;
   for (const BallPlace& ball : places_) {
-    air_.push_back(Air::of(options.air_density, options.drag_coefficient, options.lift_coefficient,
-                           ball.radius, ball.mass, options.spin_decay,
-                           {gravity[0], gravity[1], gravity[2]}));
+    air_.push_back(Air::of(
+        options.air_density,
+        {options.drag_coefficient, options.lift_coefficient, options.lift_saturation},
+        ball.sphere.radius, ball.mass, options.spin_decay, {gravity[0], gravity[1], gravity[2]}));
   }
   add_surfaces();
   now_.targets.resize(places_.size());
@@ -32,7 +33,7 @@ void Balls::add_surfaces() {
     for (std::size_t i = 0; i < surface_places_.size(); ++i) {
       const SurfacePlace& place = surface_places_[i];
       if (place.watched != watched) continue;
-      surfaces_.push_back({place.shape, place.restitution, watched, record++, {}});
+      surfaces_.push_back({place.shape, place.restitution, place.friction, watched, record++, {}});
       followers_.push_back({place.geom, place.still});
     }
     if (watched) watched_ = record;
@@ -55,7 +56,7 @@ void Balls::reset(const mjData& data) noexcept {
     clear(i);
     for (const Surface& surface : surfaces_) {
       const Near here = near(surface.shape, surface.motion.inside(now.ball.position, 1));
-      records(i).add_gap(surface, std::max(0.0, here.distance - places_[i].radius));
+      records(i).add_gap(surface, std::max(0.0, here.distance - places_[i].sphere.radius));
     }
   }
 }
@@ -127,13 +128,14 @@ void Balls::impose(std::size_t i, const StepOfIteration& step) noexcept {
   BallNow& now = now_.balls[i];
   const ContactRecords contacts = records(i);
   const Path path = imposed_path(i, step);
-  now.ball = {path.to, path.velocity_to, spin_};
+  const Vector spin = vector(now_.targets[i].state.spin);
+  now.ball = {path.to, path.velocity_to, spin};
   const std::optional<Contact> contact =
-      first_contact(std::span(surfaces_).first(watched_), path, places_[i].radius,
+      first_contact(std::span(surfaces_).first(watched_), path, places_[i].sphere.radius,
                     [&](const Surface& surface, double gap) { contacts.add_gap(surface, gap); });
   if (!contact) return;
-  const Ball before{path.position(contact->share), path.velocity(contact->share), spin_};
-  const Ball after = bounced(before, *contact);
+  const Ball before{path.position(contact->share), path.velocity(contact->share), spin};
+  const Ball after = bounced(before, *contact, places_[i].sphere);
   contacts.add(step, *contact, before, after);
   now.released = true;
   fly(i, after, contact->share, step);
@@ -143,7 +145,7 @@ void Balls::fly(std::size_t i, const Ball& from, double begin,
                 const StepOfIteration& step) noexcept {
   const ContactRecords contacts = records(i);
   now_.balls[i].ball = flown_among(
-      surfaces_, from, air_[i], places_[i].radius, model_.opt.timestep, begin,
+      surfaces_, from, air_[i], places_[i].sphere, model_.opt.timestep, begin,
       [&](const Contact& contact, const Ball& before, const Ball& after) {
         contacts.add(step, contact, before, after);
       },
@@ -177,7 +179,8 @@ Pose Balls::pose(const mjData& data, const Follower& follower) const noexcept {
 }
 
 BallState Balls::ball(std::size_t i) const noexcept {
-  return {numbers(now_.balls[i].ball.position), numbers(now_.balls[i].ball.velocity)};
+  const Ball& ball = now_.balls[i].ball;
+  return {numbers(ball.position), numbers(ball.velocity), numbers(ball.spin)};
 }
 
 std::span<const WatchedContacts> Balls::watched_contacts(std::size_t i) const noexcept {

@@ -18,8 +18,10 @@ namespace o80::mujoco {
 struct BallState {
   std::array<double, 3> position{};
   std::array<double, 3> velocity{};
+  std::array<double, 3> spin{};
 };
-O80_DESCRIBE(BallState, (position, "of the centre, in the world [m]"), (velocity, "[m/s]"));
+O80_DESCRIBE(BallState, (position, "of the centre, in the world [m]"), (velocity, "[m/s]"),
+             (spin, "[rad/s], in the world's axes"));
 
 /// Target of one ball in an iteration.
 struct BallTarget {

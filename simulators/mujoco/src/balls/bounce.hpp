@@ -7,43 +7,92 @@
 #include "balls/ball_flight.hpp"
 #include "balls/sweep.hpp"
 
-// The law of the bounce, one for all surfaces: shares of the relative velocity are kept, the spin
-// stays as it is.
+// The law of the bounce, one for all surfaces. Along the normal a share of the velocity is kept. In
+// the tangent plane friction acts on the slip, the velocity of the ball's surface relative to the
+// other one: it takes a share of the slip from the velocity of the ball while the ball grips, and
+// no more than the friction allows where it slides. What friction does to the velocity, it also
+// does to the spin.
 
 namespace o80::mujoco {
 
 /// A ball leaves a surface at least this fast [m/s], so that it hops and never rests.
 inline constexpr double kSlowestRebound = 0.05;
 
-/// The velocity after a bounce [m/s]: the shares `kept` of the velocity relative to the surface,
-/// along two tangents and the normal; the normal part changes its sign.
-inline Vector reflected(const Vector& ball, const Vector& surface, const Vector& normal,
-                        const std::array<Vector, 3>& axes, const Restitution& kept) noexcept {
-  // the surface's axis nearest to the normal; the two others are projected on the tangent plane
-  std::size_t k = 0;
-  for (std::size_t i = 1; i < 3; ++i) {
-    if (std::abs(dot(axes[i], normal)) > std::abs(dot(axes[k], normal))) k = i;
-  }
-  const Vector& axis = axes[(k + 1) % 3];
-  const Vector first = unit(axis - dot(axis, normal) * normal);
-  const Vector second = cross(normal, first);
+/// What the bounce needs to know of a ball.
+struct Sphere {
+  double radius = 0.02;        // [m]
+  double inertia = 2.0 / 3.0;  // moment of inertia / (mass radius^2): 2/3 of a hollow ball
 
-  const Vector relative = ball - surface;
-  const double rebound = std::max(-kept[2] * dot(relative, normal), kSlowestRebound);
-  return surface + (kept[0] * dot(relative, first)) * first +
-         (kept[1] * dot(relative, second)) * second + rebound * normal;
+  /// The share of a slip that friction takes from the velocity until the ball rolls.
+  double rolling() const noexcept { return inertia / (1 + inertia); }
+};
+
+/// Normal, then two tangents: unit vectors at right angles. The first tangent is along an axis of
+/// the surface.
+struct Directions {
+  Vector normal, first, second;
+
+  /// The axis of the surface nearest to the normal is left out; the next one is projected on the
+  /// tangent plane.
+  static Directions of(const Vector& normal, const std::array<Vector, 3>& axes) noexcept {
+    std::size_t k = 0;
+    for (std::size_t i = 1; i < 3; ++i) {
+      if (std::abs(dot(axes[i], normal)) > std::abs(dot(axes[k], normal))) k = i;
+    }
+    const Vector& axis = axes[(k + 1) % 3];
+    const Vector first = unit(axis - dot(axis, normal) * normal);
+    return {normal, first, cross(normal, first)};
+  }
+};
+
+/// What friction does along one tangent of a surface.
+struct Friction {
+  double taken = 0;  // from the velocity of the ball [m/s]
+  double given = 0;  // to its spin, times inertia and radius [m/s]
+
+  /// `velocity` of the ball relative to the surface, and `slip` of the ball's surface [m/s].
+  static Friction of(double kept, double velocity, double slip, const Sphere& sphere) noexcept {
+    const double grip = 1 - kept;
+    if (grip <= 2 * sphere.rolling()) return {grip * slip, grip * slip};
+    // more than any push at one point can take: the ball leaves rolling, and slower
+    const double after = kept / (1 - sphere.rolling()) * (velocity - sphere.rolling() * slip);
+    return {velocity - after, sphere.inertia * (slip - velocity + after)};
+  }
+};
+
+/// A ball after a bounce off a point that moves with `surface_velocity`.
+inline Ball bounced(const Ball& before, const Vector& surface_velocity, const Directions& along,
+                    const Restitution& kept, double friction, const Sphere& sphere) noexcept {
+  const Vector relative = before.velocity - surface_velocity;
+  const double approach = -dot(relative, along.normal);
+  const double rebound = std::max(kept[2] * approach, kSlowestRebound);
+
+  // velocity and slip => what a grip takes, or less where the ball slides
+  const Vector slip = relative - sphere.radius * cross(before.spin, along.normal);
+  const double velocity[2] = {dot(relative, along.first), dot(relative, along.second)};
+  const Friction first = Friction::of(kept[0], velocity[0], dot(slip, along.first), sphere);
+  const Friction second = Friction::of(kept[1], velocity[1], dot(slip, along.second), sphere);
+  const double gripping = std::hypot(first.taken, second.taken);
+  const double most = friction * (approach + rebound);
+  const double share = gripping > most ? most / gripping : 1.0;
+
+  Ball after = before;
+  after.velocity = surface_velocity + (velocity[0] - share * first.taken) * along.first +
+                   (velocity[1] - share * second.taken) * along.second + rebound * along.normal;
+  const Vector given = first.given * along.first + second.given * along.second;
+  after.spin =
+      before.spin + (share / (sphere.inertia * sphere.radius)) * cross(along.normal, given);
+  return after;
 }
 
 /// A ball after a bounce; `before` is the ball at the contact.
-inline Ball bounced(const Ball& before, const Contact& contact) noexcept {
+inline Ball bounced(const Ball& before, const Contact& contact, const Sphere& sphere) noexcept {
   const Motion& motion = contact.surface->motion;
   const std::array<Vector, 3> axes{motion.outside({1, 0, 0}, contact.share),
                                    motion.outside({0, 1, 0}, contact.share),
                                    motion.outside({0, 0, 1}, contact.share)};
-  Ball after = before;
-  after.velocity = reflected(before.velocity, contact.surface_velocity, contact.normal, axes,
-                             contact.surface->restitution);
-  return after;
+  return bounced(before, contact.surface_velocity, Directions::of(contact.normal, axes),
+                 contact.surface->restitution, contact.surface->friction, sphere);
 }
 
 }  // namespace o80::mujoco

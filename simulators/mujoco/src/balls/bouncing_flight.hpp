@@ -15,17 +15,17 @@ inline constexpr int kMostBounces = 8;  // in one step
 /// `bounced_off(contact, before, after)` is told of each bounce, `passed(surface, gap)` of the
 /// smallest gap to each surface.
 template <class BouncedOff, class Passed>
-Ball flown_among(std::span<const Surface> surfaces, Ball ball, const Air& air, double radius,
+Ball flown_among(std::span<const Surface> surfaces, Ball ball, const Air& air, const Sphere& sphere,
                  double step, double begin, BouncedOff&& bounced_off, Passed&& passed) noexcept {
   for (int n = 0; n < kMostBounces && begin < 1; ++n) {
     const Ball end = flown(ball, air, (1 - begin) * step);
     const Path path{ball.position, end.position, ball.velocity, end.velocity, begin};
-    const std::optional<Contact> contact = first_contact(surfaces, path, radius, passed);
+    const std::optional<Contact> contact = first_contact(surfaces, path, sphere.radius, passed);
     if (!contact) return end;
     const double share = contact->share;
     const Ball before{path.position(share), path.velocity(share),
                       between(ball.spin, end.spin, path.part(share))};
-    ball = bounced(before, *contact);
+    ball = bounced(before, *contact, sphere);
     bounced_off(*contact, before, ball);
     begin = share;
   }

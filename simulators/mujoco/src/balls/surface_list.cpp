@@ -1,6 +1,7 @@
 #include "balls/surface_list.hpp"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <string_view>
 
@@ -11,8 +12,10 @@
 namespace o80::mujoco {
 namespace {
 
-/// "0.8" => {0.8, 0.8, 0.8}; "0.7 0.7 0.9" => these. False if the text is neither.
-bool parse_restitution(std::string_view text, Restitution& restitution) {
+/// "0.8" => 0.8 three times; "0.7 0.7 0.9" => these; a fourth number is the friction. False if the
+/// text is none of these.
+bool parse_bounce(std::string_view text, SurfaceEntry& entry) {
+  std::array<double, 4> numbers{};
   std::size_t count = 0;
   const char* at = text.data();
   const char* const end = at + text.size();
@@ -23,19 +26,29 @@ bool parse_restitution(std::string_view text, Restitution& restitution) {
     }
     double number = 0;
     const auto [rest, error] = std::from_chars(at, end, number);
-    if (error != std::errc() || count == 3 || (rest != end && *rest != ' ')) return false;
-    restitution[count++] = number;
+    if (error != std::errc() || count == numbers.size() || (rest != end && *rest != ' '))
+      return false;
+    numbers[count++] = number;
     at = rest;
   }
-  if (count == 1) restitution.fill(restitution[0]);
-  return count == 1 || count == 3;
+  if (count == 1) {
+    entry.restitution.fill(numbers[0]);
+    return true;
+  }
+  std::copy_n(numbers.begin(), 3, entry.restitution.begin());
+  if (count == 4) entry.friction = numbers[3];
+  return count >= 3;
 }
 
-void check(const std::string& geom, const Restitution& restitution) {
-  for (const double share : restitution) {
+void check(const SurfaceEntry& entry) {
+  for (const double share : entry.restitution) {
     if (share >= 0 && share <= 1) continue;
-    throw DriverError("the restitution of '" + geom + "' must be shares from 0 to 1, got " +
+    throw DriverError("the restitution of '" + entry.geom + "' must be shares from 0 to 1, got " +
                       std::to_string(share));
+  }
+  if (!(entry.friction >= 0)) {
+    throw DriverError("the friction of '" + entry.geom + "' must not be negative, got " +
+                      std::to_string(entry.friction));
   }
 }
 
@@ -46,14 +59,15 @@ std::string without_spaces_at_end(std::string_view text) {
 
 SurfaceEntry parsed_entry(const std::string& text, const Restitution& common) {
   const auto equals = text.find('=');
-  SurfaceEntry entry{without_spaces_at_end(text.substr(0, equals)), common};
+  SurfaceEntry entry{.geom = without_spaces_at_end(text.substr(0, equals)), .restitution = common};
   if (equals != std::string::npos &&
-      !parse_restitution(std::string_view(text).substr(equals + 1), entry.restitution)) {
+      !parse_bounce(std::string_view(text).substr(equals + 1), entry)) {
     throw DriverError("surfaces: '" + text +
-                      "' must have one number after '=', or three separated by spaces: the shares "
-                      "of the velocity that a bounce keeps (two tangents, normal)");
+                      "' must have one number after '=', or three or four separated by spaces: the "
+                      "shares of the velocity that a bounce keeps (two tangents, normal), and the "
+                      "coefficient of friction");
   }
-  check(entry.geom, entry.restitution);
+  check(entry);
   return entry;
 }
 

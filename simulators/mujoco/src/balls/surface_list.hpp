@@ -11,7 +11,8 @@ namespace o80::mujoco {
 /// One entry of the option `surfaces`.
 struct SurfaceEntry {
   std::string geom;
-  Restitution restitution;
+  Restitution restitution{1, 1, 1};
+  double friction = kNoSliding;
   bool watched = false;
 };
 

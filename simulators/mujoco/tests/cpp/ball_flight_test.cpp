@@ -9,7 +9,7 @@ namespace {
 
 const Air kVacuum{0, 0, 0, {0, 0, -9.81}};
 
-Air room_air() { return Air::of(1.18, 0.40, 1.47, 0.02, 0.0027, 0.5, {0, 0, -9.81}); }
+Air room_air() { return Air::of(1.18, {0.40, 1.47}, 0.02, 0.0027, 0.5, {0, 0, -9.81}); }
 
 Ball flown_for(Ball ball, const Air& air, double duration, double step) {
   for (int i = 0; i < std::lround(duration / step); ++i) ball = flown(ball, air, step);
@@ -40,6 +40,22 @@ TEST(BallFlight, TopSpinPullsTheBallDown) {
 
   EXPECT_LT(top.position.z, plain.position.z - 0.03);
   EXPECT_NEAR(top.spin.x, 30 * std::exp(-0.5 * 0.3), 1e-9);
+}
+
+TEST(BallFlight, LiftSaturatesAsTheSpinGrows) {
+  const Air linear = room_air();
+  const Air saturating = Air::of(1.18, {0.40, 1.47, 4.0}, 0.02, 0.0027, 0.5, {0, 0, -9.81});
+  const auto lift = [](const Air& air, double spin) {
+    return acceleration(air, {0, -5, 0}, {0, 0, spin}).x;
+  };
+
+  EXPECT_EQ(lift(saturating, 0), 0);
+  EXPECT_NEAR(lift(saturating, 0.01), lift(linear, 0.01), 1e-3 * lift(linear, 0.01));
+  // r |omega| / |v| is 1/4: half the lift
+  EXPECT_NEAR(lift(saturating, 62.5), 0.5 * lift(linear, 62.5), 1e-12);
+  EXPECT_GT(lift(saturating, 1000), lift(saturating, 500));
+  EXPECT_LT(lift(saturating, 1e9), 5 * linear.magnus / (4 * 0.02) * 5 + 1e-6);
+  EXPECT_TRUE(std::isfinite(length(acceleration(saturating, {}, {0, 0, 50}))));
 }
 
 TEST(BallFlight, DoesNotDependOnTheStep) {

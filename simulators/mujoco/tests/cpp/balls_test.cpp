@@ -34,7 +34,7 @@ TEST_F(BallsTest, ABallIsImposedWhileCommandedAndFliesOnAfterwards) {
   const Seen free = robot.burst(1);
   EXPECT_FALSE(free.row.active(4));
   const Ball before{vector(shot.at(9).position), vector(shot.at(9).velocity), {30, 0, 0}};
-  const Air air = Air::of(1.2, 0.47, 1.0, 0.02, 0.0027, 0.5, {0, 0, -9.81});
+  const Air air = Air::of(1.2, {0.47, 1.0}, 0.02, 0.0027, 0.5, {0, 0, -9.81});
   const Ball after = flown(before, air, 0.002);
   EXPECT_THAT(free.observed<BallState>(4).position,
               Pointwise(DoubleNear(1e-15), numbers(after.position)));
@@ -51,9 +51,44 @@ TEST_F(BallsTest, AnImposedBallPassesThroughSurfacesThatAreNotWatched) {
   EXPECT_EQ(inside.bench().count, 0);
 }
 
+TEST_F(BallsTest, AnImposedSpinIsObservedAndTurnsTheFreeFlight) {
+  const double spins[] = {-100, 0, 100};
+  double heights[3];
+  for (int n = 0; n < 3; ++n) {
+    Inline robot(court({{"spin_decay", "0"}}));
+    const Shot shot{{0.4, 2.0, 1.2}, {0, -4, 0}, {spins[n], 0, 0}};
+    for (int i = 0; i < 5; ++i) robot.ask("ball", shot.at(i));
+    EXPECT_EQ(robot.burst(5).observed<BallState>(4).spin, numbers(shot.spin));
+    const Seen free = robot.burst(50);
+    EXPECT_EQ(free.observed<BallState>(4).spin, numbers(shot.spin));
+    heights[n] = free.observed<BallState>(4).position[2];
+  }
+  EXPECT_GT(heights[0], heights[1] + 0.005);
+  EXPECT_GT(heights[1], heights[2] + 0.005);
+}
+
+TEST_F(BallsTest, TheSpinOfAnImposedBallActsAtItsContact) {
+  Inline robot(court());
+  Shot shot = shot_at_the_paddle(robot);
+  shot.spin = {40, -20, 60};
+  for (int i = 0; i < 60; ++i) robot.ask("ball", shot.at(i));
+  Seen seen = robot.burst(1);
+  for (int i = 0; i < 60 && seen.paddle().count == 0; ++i) seen = robot.burst(1);
+
+  const WatchedContacts paddle = seen.paddle();
+  ASSERT_EQ(paddle.count, 1);
+  const Vector normal = vector(paddle.normal);
+  const Vector plain = 0.78 * (shot.velocity - 2 * dot(shot.velocity, normal) * normal);
+  // the surface of the ball moves by spin, and friction takes 0.22 of that
+  const Vector by_spin = (0.22 * 0.02) * cross(shot.spin, normal);
+  EXPECT_THAT(paddle.velocity_after, Pointwise(DoubleNear(1e-12), numbers(plain + by_spin)));
+  EXPECT_GT(length(vector(seen.observed<BallState>(4).spin) - shot.spin), 1.0);
+}
+
 TEST_F(BallsTest, AWatchedSurfaceEndsTheReplayInTheIterationOfTheContact) {
   Inline robot(court());
-  const Shot shot = shot_at_the_paddle(robot);
+  Shot shot = shot_at_the_paddle(robot);
+  shot.spin = {};
   for (int i = 0; i < 60; ++i) robot.ask("ball", shot.at(i));
   Batch batch = robot.frontend.pulse();
   Seen seen = robot.burst(1);
@@ -144,7 +179,7 @@ TEST_F(BallsTest, APaddleThatIsTeleportedHitsNothingOnTheWay) {
   const Vector left = vector(robot.burst(2).extended<Numbers>("paddle_position"));
   pose_arm(robot, {0.5, 1.2, 0.3, 0});
   const Vector right = vector(robot.burst(2).extended<Numbers>("paddle_position"));
-  robot.ask("ball", BallState{numbers(0.5 * (left + right)), {}});
+  robot.ask("ball", BallState{numbers(0.5 * (left + right)), {}, {}});
   pose_arm(robot, {-0.5, 1.2, 0.3, 0});
   const Seen seen = robot.burst(1);
 
@@ -156,8 +191,8 @@ TEST_F(BallsTest, ABallThatIsTeleportedHitsNothingOnTheWay) {
   Inline robot(court());
   pose_arm(robot, kPosture);
   const Vector centre = vector(robot.burst(2).extended<Numbers>("paddle_position"));
-  robot.ask("ball", BallState{numbers(centre + Vector{0, 0.5, 0}), {0, -1, 0}});
-  robot.ask("ball", BallState{numbers(centre - Vector{0, 0.5, 0}), {0, -1, 0}});
+  robot.ask("ball", BallState{numbers(centre + Vector{0, 0.5, 0}), {0, -1, 0}, {}});
+  robot.ask("ball", BallState{numbers(centre - Vector{0, 0.5, 0}), {0, -1, 0}, {}});
   robot.burst(1);
 
   EXPECT_EQ(robot.burst(1).paddle().count, 0);
@@ -212,7 +247,7 @@ TEST_F(BallsTest, TheOrderOfTheSurfacesChangesOnlyTheOrderOfTheirRecords) {
 
 TEST_F(BallsTest, WithoutAWatchedSurfaceTheFirstContactsAreRecorded) {
   Inline robot(court({{"surfaces", "bench=0.8"}, {"watched", ""}}));
-  robot.ask("ball", BallState{{0.4, 1.0, 1.0}, {}});
+  robot.ask("ball", BallState{{0.4, 1.0, 1.0}, {}, {}});
   const Seen seen = robot.burst(300);
 
   EXPECT_GE(seen.bench().count, 1);
@@ -222,7 +257,7 @@ TEST_F(BallsTest, WithoutAWatchedSurfaceTheFirstContactsAreRecorded) {
 
 TEST_F(BallsTest, WithoutSurfacesBallsFlyAndNoContactsArePublished) {
   Inline robot(court({{"surfaces", ""}, {"watched", ""}}));
-  robot.ask("ball", BallState{{0.4, 1.0, 0.6}, {}});
+  robot.ask("ball", BallState{{0.4, 1.0, 0.6}, {}, {}});
   const Seen seen = robot.burst(300);
 
   EXPECT_LT(seen.observed<BallState>(4).position[2], 0.0);

@@ -15,6 +15,7 @@ namespace o80::mujoco {
 namespace {
 
 constexpr double kRadius = 0.02;
+constexpr double kHollow = 2.0 / 3.0;  // moment of inertia / (mass radius^2)
 constexpr double kStep = 0.002;
 constexpr double kThickness = 0.0027;  // half
 const Air kWeightless{0, 0, 0, {0, 0, 0}};
@@ -45,7 +46,7 @@ Flight step(const Ball& ball, std::vector<Surface> surfaces, const Air& air = kW
   Flight flight;
   const ContactRecords records{{&flight.paddle, 1}, flight.others};
   flight.end = flown_among(
-      surfaces, ball, air, kRadius, kStep, 0,
+      surfaces, ball, air, {kRadius, kHollow}, kStep, 0,
       [&](const Contact& contact, const Ball& before, const Ball& after) {
         records.add({.iteration = 7}, contact, before, after);
       },
@@ -190,6 +191,79 @@ TEST(BouncingFlight, OnABoxKeepsTheSharesOfItsRestitution) {
   expect_near(flight.end.velocity, {0.70, -0.70 * 4, 0.92 * 2});
   // three quarters of the way down, the rest up again
   EXPECT_NEAR(flight.end.position.z, 0.795 + 0.92 * 2 * (kStep - 0.001), 1e-8);
+}
+
+/// A bounce on the bench of a ball that comes along -y.
+Ball off_the_bench(double speed, double spin, const Restitution& kept, double friction) {
+  Surface surface = bench();
+  surface.restitution = kept;
+  surface.friction = friction;
+  return step({{0.3, 1.0, 0.797}, {0, -speed, -2}, {spin, 0, 0}}, {surface}).end;
+}
+
+TEST(BouncingFlight, AGrippedBallExchangesVelocityAndSpin) {
+  // what friction takes from the velocity it gives to the spin: m r dv = I d(omega)
+  for (const double spin : {-150.0, 0.0, 60.0, 150.0, 300.0}) {
+    const Ball end = off_the_bench(4, spin, {0.55, 0.55, 0.9}, kNoSliding);
+    const double slip = -4 + kRadius * spin;
+    EXPECT_NEAR(end.velocity.y, -4 - 0.45 * slip, 1e-9) << spin;
+    EXPECT_NEAR(end.spin.x, spin - 0.45 * slip / (kHollow * kRadius), 1e-6) << spin;
+    EXPECT_NEAR(end.spin.y, 0, 1e-9);
+    EXPECT_NEAR(end.spin.z, 0, 1e-9);
+  }
+}
+
+TEST(BouncingFlight, ABallThatKeepsThreeFifthsRollsAndARollingOneGoesOn) {
+  const Ball rolls = off_the_bench(4, 20, {0.6, 0.6, 0.9}, kNoSliding);
+  EXPECT_NEAR(rolls.velocity.y + kRadius * rolls.spin.x, 0, 1e-9);
+
+  const Ball goes_on = off_the_bench(4, 4 / kRadius, {0.6, 0.6, 0.9}, 0.25);
+  EXPECT_NEAR(goes_on.velocity.y, -4, 1e-9);
+  EXPECT_NEAR(goes_on.spin.x, 4 / kRadius, 1e-6);
+}
+
+TEST(BouncingFlight, ASlidingBallLosesWhatFrictionAllows) {
+  const Ball slides = off_the_bench(6, -100, {0.55, 0.55, 0.9}, 0.25);
+  const double taken = 0.25 * (1 + 0.9) * 2;
+  EXPECT_NEAR(slides.velocity.y, -6 + taken, 1e-9);
+  EXPECT_NEAR(slides.spin.x, -100 + taken / (kHollow * kRadius), 1e-6);
+
+  const Ball frictionless = off_the_bench(6, -100, {0.55, 0.55, 0.9}, 0);
+  EXPECT_EQ(frictionless.velocity.y, -6);
+  EXPECT_EQ(frictionless.spin.x, -100);
+}
+
+TEST(BouncingFlight, SideSpinAloneCarriesTheBallSideways) {
+  Surface surface = bench();
+  surface.friction = 0.25;
+  const Ball end = step({{0.3, 1.0, 0.797}, {0, 0, -2}, {0, 80, 0}}, {surface}).end;
+  EXPECT_GT(end.velocity.x, 0.3);
+  EXPECT_LT(end.spin.y, 80);
+  // spin about the normal stays
+  const Ball drilling = step({{0.3, 1.0, 0.797}, {0, -1, -2}, {0, 0, 70}}, {surface}).end;
+  EXPECT_NEAR(drilling.spin.z, 70, 1e-9);
+}
+
+TEST(BouncingFlight, NeverAddsEnergyOnAStillSurfaceWithAnySpin) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> velocity(-8, 8);
+  std::uniform_real_distribution<double> spin(-500, 500);
+  std::uniform_real_distribution<double> share(0, 1);
+  const auto energy = [](const Ball& ball) {
+    return dot(ball.velocity, ball.velocity) +
+           kHollow * kRadius * kRadius * dot(ball.spin, ball.spin);
+  };
+  for (int n = 0; n < 5000; ++n) {
+    Surface surface = bench();
+    surface.restitution = {share(random), share(random), share(random)};
+    if (n % 2 == 0) surface.friction = share(random);
+    const Ball before{{0.3, 1.0, 0.7951},
+                      {velocity(random), velocity(random), -1 - std::abs(velocity(random))},
+                      {spin(random), spin(random), spin(random)}};
+    const Ball after = step(before, {surface}).end;
+    ASSERT_LE(energy(after), energy(before) + 2 * kSlowestRebound * kSlowestRebound)
+        << before.velocity.x << ' ' << before.velocity.y << ' ' << before.velocity.z;
+  }
 }
 
 TEST(BouncingFlight, NeverAddsEnergyOnAStillSurface) {

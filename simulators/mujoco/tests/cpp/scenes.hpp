@@ -115,7 +115,10 @@ inline void pose_arm(Inline& twin, const std::array<double, 4>& q,
 /// A straight path of a ball, which ends behind the paddle.
 struct Shot {
   Vector from, velocity;
-  BallState at(int i) const { return {numbers(from + (i * 0.002) * velocity), numbers(velocity)}; }
+  Vector spin{30, 0, 0};
+  BallState at(int i) const {
+    return {numbers(from + (i * 0.002) * velocity), numbers(velocity), numbers(spin)};
+  }
 };
 inline Shot shot_at_the_paddle(Inline& twin) {
   pose_arm(twin, kPosture);

@@ -32,11 +32,23 @@ TEST(SurfaceList, GivesEachGeomItsRestitutionOrTheCommonOne) {
   EXPECT_EQ(surfaces[1].restitution, (Restitution{0.5, 0.5, 0.5}));
   EXPECT_EQ(surfaces[2].restitution, (Restitution{0.7, 0.6, 0.9}));
   EXPECT_TRUE(surfaces[2].watched);
+  EXPECT_EQ(surfaces[0].friction, kNoSliding);
   EXPECT_TRUE(surfaces_of(options("")).empty());
 }
 
-TEST(SurfaceList, RefusesRestitutionsThatAreNotOneOrThreeShares) {
-  for (const char* text : {"floor=", "floor=0.7 0.7", "floor=0.7 0.7 0.7 0.7", "floor=bouncy",
+TEST(SurfaceList, TakesAFourthNumberAsTheFriction) {
+  const std::vector<SurfaceEntry> surfaces = surfaces_of(options("floor=0.7 0.6 0.9 0.25"));
+  EXPECT_EQ(surfaces[0].restitution, (Restitution{0.7, 0.6, 0.9}));
+  EXPECT_EQ(surfaces[0].friction, 0.25);
+  for (const char* text : {"floor=0.7 0.7 0.7 -0.1", "floor=0.7 0.7 0.7 nan"}) {
+    EXPECT_THAT([&] { surfaces_of(options(text)); },
+                ThrowsMessage<DriverError>(HasSubstr("friction of 'floor' must not be negative")))
+        << text;
+  }
+}
+
+TEST(SurfaceList, RefusesRestitutionsThatAreNotOneThreeOrFourNumbers) {
+  for (const char* text : {"floor=", "floor=0.7 0.7", "floor=0.7 0.7 0.7 0.2 0.1", "floor=bouncy",
                            "floor=0.7x", "floor=0.7;0.7;0.9", "floor=0.5=0.6"}) {
     EXPECT_THAT([&] { surfaces_of(options(text)); },
                 ThrowsMessage<DriverError>(AllOf(HasSubstr(std::string("'") + text + "'"),

@@ -1,0 +1,146 @@
+"""Lift and grip, fitted to what recorded bounces did to the balls.
+
+The spin of a recorded ball is not seen, only how far it turns the flight. Lift (how much a spin
+turns a flight) and grip (what a spin does at the bounce) are therefore fitted together: to the
+velocity along the table after each bounce and, more weakly, to how the flight turns after it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..physics.aerodynamics import AERODYNAMICS, Aerodynamics
+from ..physics.impact import bounced
+from ..world.table import TABLE, Table
+from .flight_fit import FlightFit
+
+FloatArray = NDArray[np.float64]
+
+SPEED_ERROR = 0.1
+"""Expected error of a velocity after a bounce [m/s]."""
+TURN_ERROR = 0.1
+"""Expected error of a turn after a bounce [1/s]."""
+LONG_FLIGHT = 30
+"""Rows after a bounce from which a flight says how it turns."""
+ROLLING = 0.4
+"""Grip of a hollow ball that rolls when it leaves."""
+GRIP_ERROR = 0.03
+"""Expected difference of the grip from that."""
+BOUNDS = np.array([[0.2, 0.0, 0.2], [3.0, 3.0, 0.6]])
+"""Of lift coefficient, lift saturation and grip. With more saturation a turn would say little about
+the spin."""
+STARTS = [(lift, saturation, 0.43) for lift in (0.5, 1.0, 1.5) for saturation in (0.5, 2.7)]
+MOST_ROUNDS = 60
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedBounce:
+    """A bounce, and the flights before and after it."""
+
+    before: FloatArray
+    """(3,) velocity [m/s]"""
+    after: FloatArray
+    """(3,) velocity [m/s]"""
+    turn_before: FloatArray
+    """(3,) [1/s]"""
+    turn_after: FloatArray
+    """(3,) [1/s]"""
+    speed_after: float
+    """Mean of the flight after it [m/s]."""
+    rows_after: int
+
+    @classmethod
+    def of(cls, fit: FlightFit, stamps: FloatArray) -> RecordedBounce | None:
+        """The first bounce of a fitted flight; None if there is none."""
+        if len(fit.bounce_times) == 0:
+            return None
+        at = fit.bounce_times[:1]
+        end = fit.end if len(fit.bounce_times) == 1 else float(fit.bounce_times[1])
+        later = np.linspace(float(at[0]), end, 20)
+        return cls(
+            before=fit.flights[0].at(at)[1][0],
+            after=fit.flights[1].at(at)[1][0],
+            turn_before=fit.flights[0].turn,
+            turn_after=fit.flights[1].turn,
+            speed_after=float(np.linalg.norm(fit.flights[1].at(later)[1], axis=1).mean()),
+            rows_after=int(np.sum((stamps > at[0]) & (stamps <= end))),
+        )
+
+
+@dataclass(frozen=True)
+class Law:
+    """Air and table with which a bounce is predicted."""
+
+    air: Aerodynamics = AERODYNAMICS
+    table: Table = TABLE
+
+    @classmethod
+    def of(cls, numbers: FloatArray) -> Law:
+        """With another lift coefficient, lift saturation and grip (3,)."""
+        lift, saturation, grip = numbers.tolist()
+        return cls(
+            replace(AERODYNAMICS, lift_coefficient=lift, lift_saturation=saturation),
+            replace(TABLE, tangential_restitution=1.0 - grip),
+        )
+
+    def spin(self, bounce: RecordedBounce) -> FloatArray:
+        """Of the ball before the bounce (3,) [rad/s]."""
+        speed = np.array([np.linalg.norm(bounce.before)])
+        spin: FloatArray = self.air.spins(bounce.turn_before, speed)[0]
+        return spin
+
+    def predicted(self, bounce: RecordedBounce) -> tuple[FloatArray, FloatArray]:
+        """Velocity [m/s] and turn [1/s] after the bounce, each (3,)."""
+        vx, vy, vz = bounce.before.tolist()
+        wx, wy, wz = self.spin(bounce).tolist()
+        state, after = bounced((0.0, 0.0, 0.0, vx, vy, vz), (wx, wy, wz), self.table)
+        return np.array(state[3:]), self.air.turn(np.array(after), bounce.speed_after)
+
+
+def errors(law: Law, bounces: Sequence[RecordedBounce]) -> FloatArray:
+    """Predicted less recorded velocity along the table (N,) [m/s]."""
+    return np.array([law.predicted(bounce)[0][1] - bounce.after[1] for bounce in bounces])
+
+
+def fitted(bounces: Sequence[RecordedBounce]) -> FloatArray:
+    """Lift coefficient, lift saturation and grip (3,) that explain the bounces best."""
+
+    def misses(numbers: FloatArray) -> FloatArray:
+        law = Law.of(numbers)
+        found = [(float(numbers[2]) - ROLLING) / GRIP_ERROR]
+        for bounce in bounces:
+            velocity, turn = law.predicted(bounce)
+            found.append((float(velocity[1]) - float(bounce.after[1])) / SPEED_ERROR)
+            if bounce.rows_after >= LONG_FLIGHT:
+                found.append(float(turn[0] - bounce.turn_after[0]) / TURN_ERROR)
+        return np.array(found)
+
+    found = [_least_squares(misses, np.array(start)) for start in STARTS]
+    return min(found, key=lambda each: each[1])[0]
+
+
+def _least_squares(
+    misses: Callable[[FloatArray], FloatArray], numbers: FloatArray
+) -> tuple[FloatArray, float]:
+    """Levenberg and Marquardt's search within the bounds, and the sum of squares at its end."""
+    damping, error = 1e-2, misses(numbers)
+    for _ in range(MOST_ROUNDS):
+        slopes = np.column_stack([(misses(numbers + 1e-5 * e) - error) / 1e-5 for e in np.eye(3)])
+        for _ in range(8):
+            matrix = slopes.T @ slopes + damping * np.eye(3)
+            there = np.clip(numbers - np.linalg.solve(matrix, slopes.T @ error), *BOUNDS)
+            error_there = misses(there)
+            if error_there @ error_there < error @ error:
+                break
+            damping *= 4.0
+        else:
+            break
+        moved = float(np.abs(there - numbers).max())
+        numbers, error, damping = there, error_there, damping / 3.0
+        if moved < 1e-5:
+            break
+    return numbers, float(error @ error)

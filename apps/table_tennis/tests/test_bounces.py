@@ -1,0 +1,148 @@
+"""Recorded bounces: what the law of the bounce predicts, and how flights are handed over."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from recorded_rows import DATA, ball_gun_shots
+from typer.testing import CliRunner
+
+import o80_table_tennis.fit_bounces
+from o80_table_tennis.balls.bounce_fit import Law, errors, fitted
+from o80_table_tennis.balls.recordings import load_trajectories
+from o80_table_tennis.balls.trajectories import BallTrajectory
+from o80_table_tennis.fit_bounces import SPINLESS, BounceSet, bounce_set, rms
+from o80_table_tennis.physics.aerodynamics import AERODYNAMICS, derivative
+from o80_table_tennis.physics.impact import bounced, leaving
+from o80_table_tennis.world.ball import BALL_GUN_SPIN, BALL_RADIUS
+from o80_table_tennis.world.materials import TABLE_RESTITUTION, Restitution
+from o80_table_tennis.world.table import TABLE, Table
+
+FloatArray = NDArray[np.float64]
+SETS = ("ball_gun_2019", "spin_2022/mn5008_no_spin.hdf5", "spin_2022/mn5008_topspin.hdf5")
+
+
+@cache
+def shots(name: str) -> list[BallTrajectory]:
+    return ball_gun_shots() if name == SETS[0] else load_trajectories(DATA / name)
+
+
+@pytest.fixture(scope="module")
+def sets() -> list[BounceSet]:
+    return [bounce_set(name, shots(name)) for name in SETS]
+
+
+@pytest.mark.recordings("spin_2022")
+@pytest.mark.recordings("ball_gun_2019")
+def test_every_set_is_predicted_by_a_law_fitted_to_the_other_ones(sets: list[BounceSet]) -> None:
+    for each in sets:
+        others = [bounce for other in sets if other is not each for bounce in other.bounces]
+        left_out = rms(errors(Law.of(fitted(others)), each.bounces))
+        most = 0.25 if len(each.bounces) >= 10 else 0.5
+        assert left_out < most, each.name
+
+
+@pytest.mark.recordings("spin_2022")
+@pytest.mark.recordings("ball_gun_2019")
+def test_the_constants_are_those_of_the_fit(sets: list[BounceSet]) -> None:
+    bounces = [bounce for each in sets for bounce in each.bounces]
+    lift, saturation, grip = fitted(bounces).tolist()
+
+    assert lift == pytest.approx(AERODYNAMICS.lift_coefficient, abs=0.03)
+    assert saturation == pytest.approx(AERODYNAMICS.lift_saturation, abs=0.1)
+    assert grip == pytest.approx(TABLE_RESTITUTION.grip, abs=0.01)
+    spins = [Law().spin(bounce)[0] for bounce in sets[0].bounces]
+    assert np.median(spins) == pytest.approx(BALL_GUN_SPIN[0], abs=2.0)
+    for each, most in zip(sets, (0.095, 0.1, 0.3), strict=True):
+        found = rms(errors(Law(), each.bounces))
+        assert found < most, each.name
+        assert found < rms(errors(SPINLESS, each.bounces)), each.name
+
+
+def lift(row: FloatArray) -> FloatArray:
+    """Magnus acceleration (3,) of a ball in free flight: position, velocity and spin (9,)."""
+    air = AERODYNAMICS
+    x, y, z, vx, vy, vz, wx, wy, wz = row.tolist()
+    halved_at = air.halved_at(float(np.linalg.norm([wx, wy, wz])))
+    turn = (air.magnus * wx, air.magnus * wy, air.magnus * wz)
+    return np.array(derivative((x, y, z, vx, vy, vz), turn, 0.0, 0.0, halved_at)[3:])
+
+
+@pytest.mark.recordings("spin_2022")
+@pytest.mark.parametrize("name", SETS)
+def test_the_lift_does_not_jump_where_a_recorded_flight_is_handed_over(name: str) -> None:
+    jumps = []
+    for shot in shots(name)[:20]:
+        fit, sampled = shot.fit, shot.resample()
+        times = fit.start + np.arange(len(sampled.positions)) * sampled.period
+        bounce = fit.bounce_times[0] if len(fit.bounce_times) else np.inf
+        falling = sampled.velocities[:, 2] < -1.0
+        for row in np.flatnonzero((times < bounce) & falling)[::-10]:
+            recorded = np.cross(fit.flights[0].turn, sampled.velocities[row])
+            np.testing.assert_allclose(lift(sampled.states[row]), recorded, rtol=0, atol=0.02)
+        if bounce < times[-1]:
+            recorded = np.cross(fit.flights[1].turn, sampled.velocities[-1])
+            jumps.append(np.linalg.norm(lift(sampled.states[-1]) - recorded))
+    # after a bounce, spins come from the law of the bounce: nearly as fitted, where there are rows
+    assert np.median(jumps) < 0.5
+
+
+@pytest.mark.recordings("spin_2022")
+def test_the_command_prints_a_row_for_each_set() -> None:
+    runner = CliRunner()
+    paths = [str(DATA / name) for name in SETS[1:]]
+    app = o80_table_tennis.fit_bounces.app
+    result = runner.invoke(app, paths)
+    assert result.exit_code == 0, result.output
+    assert "mn5008_no_spin          10" in result.output
+    assert "mn5008_topspin          15" in result.output
+
+
+def test_top_spin_carries_a_ball_on_and_backspin_holds_it() -> None:
+    def kept(spin: float, table: Table = TABLE) -> float:
+        return bounced((0, 0, 0, 0, -4.0, -3.0), (spin, 0.0, 0.0), table)[0][4] / -4.0
+
+    rough = replace(TABLE, friction=np.inf)
+    assert kept(-150.0, rough) < kept(0.0, rough) < kept(100.0, rough) < kept(250.0, rough)
+    assert kept(0.0, rough) == pytest.approx(TABLE.tangential_restitution)
+    assert kept(4.0 / BALL_RADIUS) == pytest.approx(1.0)
+    # a ball with backspin slides: friction alone decides
+    most = TABLE.friction * (1 + TABLE.normal_restitution) * 3.0
+    assert kept(-150.0) == pytest.approx(1 - most / 4.0)
+    assert kept(-300.0) == pytest.approx(1 - most / 4.0)
+
+
+def test_a_bounce_gives_to_the_spin_what_it_takes_from_the_velocity() -> None:
+    (*_, vx, vy, _), spin = bounced((0, 0, 0, 1.0, -4.0, -3.0), (20.0, -10.0, 5.0))
+
+    # about the point of contact: velocity x radius + 2/3 radius^2 x spin
+    assert vy - 2 / 3 * BALL_RADIUS * spin[0] == pytest.approx(-4.0 - 2 / 3 * BALL_RADIUS * 20.0)
+    assert vx + 2 / 3 * BALL_RADIUS * spin[1] == pytest.approx(1.0 - 2 / 3 * BALL_RADIUS * 10.0)
+    assert spin[2] == 5.0
+
+
+def test_a_racket_and_the_table_follow_the_same_law() -> None:
+    table = replace(TABLE, friction=np.inf)
+    state, spin = bounced((0, 0, 0, 0.5, -4.0, -3.0), (60.0, 20.0, 10.0), table)
+    after = leaving(
+        np.array([0.5, -4.0, -3.0]),
+        np.array([60.0, 20.0, 10.0]),
+        np.zeros(3),
+        np.array([0.0, 0.0, 1.0]),
+        Restitution(table.tangential_restitution, table.normal_restitution),
+    )
+    np.testing.assert_allclose(after.velocity, state[3:], rtol=1e-12)
+    np.testing.assert_allclose(after.spin, spin, rtol=1e-12)
+
+
+def test_spins_are_found_from_turns_and_never_run_away() -> None:
+    air = AERODYNAMICS
+    for spin in (0.0, 20.0, 60.0, 120.0):
+        halved_at = air.halved_at(spin)
+        turn = np.array([air.magnus * spin * 5.0 / (5.0 + halved_at), 0.0, 0.0])
+        np.testing.assert_allclose(air.spins(turn, np.array([5.0]))[0], [spin, 0.0, 0.0])
+    absurd = air.spins(np.array([3.0, 0.0, 0.0]), np.array([5.0, 0.0]))
+    assert np.isfinite(absurd).all()
+    assert absurd.max() < 5000
