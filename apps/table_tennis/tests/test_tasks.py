@@ -88,7 +88,7 @@ def test_a_hit_ends_with_the_touch_and_is_worth_one() -> None:
     assert rewards[-1] == 1.0
     assert (info["hit"], info["end"]) == (True, "goal")
     assert len(rewards) < len(returned)
-    rewards, info = played("hit", scripted=False, seed=5)
+    rewards, info = played("hit", scripted=False, seed=2)
     assert rewards[-1] == -info["smallest_distance"]
 
 
