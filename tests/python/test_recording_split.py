@@ -120,8 +120,9 @@ def test_it_is_continued_wherever_its_last_file_was_cut(arm: o80.Frontend, tmp_p
         assert texts(epoch.journal()) == texts(arm.journal())
 
 
+@pytest.mark.parametrize("size", [0, 5, 20])
 def test_a_recorder_killed_between_two_files_is_continued(
-    arm: o80.Frontend, tmp_path: Path
+    size: int, arm: o80.Frontend, tmp_path: Path
 ) -> None:
     path = tmp_path / "run.mcap"
     recorder = Recorder(path, [arm.segment], split="8k")
@@ -129,7 +130,8 @@ def test_a_recorder_killed_between_two_files_is_continued(
     recorder.finish()
     *_, before, last = sorted(path.iterdir())
     before.write_bytes(before.read_bytes()[:-100])  # not finished
-    last.write_bytes(last.read_bytes()[:20])  # just created
+    last.write_bytes(last.read_bytes()[:size])  # just created
+    assert o80.open(path)[arm.segment].epochs[0].rows > 300
     recorder = Recorder(path, [arm.segment], proceed=True, split="8k")
     recorder.catch_up()
     recorder.finish()

@@ -35,15 +35,12 @@ def repair(
     path: Annotated[Path, typer.Argument(help="A recording that was cut.")],
 ) -> None:
     """Complete a recording whose recorder was killed, so that every MCAP reader opens it."""
-    from o80.recording.output import opened
-    from o80.recording.reader import RecordingFile, files_of
+    from o80.recording.output import opened, unfinished_in
 
-    if RecordingFile(path).finished:
+    unfinished = unfinished_in(path)
+    if not unfinished:
         print(f"{path} is complete")
-        return
-    for each in files_of(path):
-        if RecordingFile(each).finished:
-            continue
+    for each in unfinished:
         size = each.stat().st_size
         file = opened(each, proceed=True)
         kept = file.size

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 DESCRIPTION = "application/x-o80-description"
 """Media type of the attachment with the description of a robot, as it is in a segment."""
+GAP = "o80.gap"
+"""Name of the metadata record of rows that were overwritten before they were read."""
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,8 @@ from o80.recording.file_writer import FileWriter
 from o80.recording.journal_channel import CONTENT as JOURNAL
 from o80.recording.journal_channel import last_entry_in
 from o80.recording.message_plan import ENCAPSULATION
-from o80.recording.scan import NotARecordingError, Scan, content_of, index_of, scan
+from o80.recording.reader import RecordingFile, files_of
+from o80.recording.scan import MAGIC, NotARecordingError, Scan, content_of, index_of, scan
 from o80.unwritable import reason
 
 FILES = "*.mcap"
@@ -74,10 +75,21 @@ def opened_in(folder: Path, *, proceed: bool, compression: str = "zstd") -> File
         raise RecordingError(f"{folder} cannot be written: {reason(folder, error)}") from error
     files = sorted(folder.glob(FILES)) or [folder / "0000.mcap"]
     last = opened(files[-1], proceed=True, compression=compression)  # locks the folder
-    for file in files[:-1]:
-        if not scan(file).finished:
+    for file in unfinished_in(folder):
+        if file != last.path:
             opened(file, proceed=True).finish()
     return last
+
+
+def unfinished_in(path: Path) -> list[Path]:
+    """The files of a recording that were cut. Raises RecordingError."""
+    begun = [] if not path.is_dir() else [file for file in path.glob(FILES) if not _has_begun(file)]
+    cut = [file for file in files_of(path) if not RecordingFile(file).finished]
+    return sorted(begun + cut)
+
+
+def _has_begun(file: Path) -> bool:
+    return file.stat().st_size >= len(MAGIC)
 
 
 def next_file(file: FileWriter) -> FileWriter:

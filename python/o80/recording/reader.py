@@ -12,7 +12,7 @@ from o80.recording.epoch import EpochNote, channels_of
 from o80.recording.journal_channel import CONTENT as JOURNAL
 from o80.recording.marks import Mark, marks_in
 from o80.recording.recorded_epoch import EpochPart, RecordedEpoch
-from o80.recording.scan import NotARecordingError, Scan, scan
+from o80.recording.scan import MAGIC, NotARecordingError, Scan, scan
 
 
 class RecordingFile:
@@ -78,10 +78,13 @@ def open(path: str | os.PathLike[str]) -> RecordingFile:
 
 
 def files_of(path: Path) -> list[Path]:
-    """The files of a recording in their order. Raises RecordingError for a folder without any."""
+    """The files of a recording in their order. Raises RecordingError for a folder without any.
+
+    A file that was being created when its recorder was killed is left out.
+    """
     if not path.is_dir():
         return [path]
-    files = sorted(path.glob("*.mcap"))
+    files = [file for file in sorted(path.glob("*.mcap")) if file.stat().st_size >= len(MAGIC)]
     if not files:
         raise RecordingError(f"the folder {path} holds no recording (NAME.mcap)")
     return files

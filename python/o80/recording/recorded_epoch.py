@@ -18,13 +18,12 @@ from o80.journal import EntryDecoder, JournalEntry
 from o80.layout import decoder_of
 from o80.provenance import Provenance
 from o80.recording.blocks import messages_in
-from o80.recording.epoch import EpochNote
+from o80.recording.epoch import GAP, EpochNote
 from o80.recording.journal_channel import GAP as JOURNAL_GAP
 from o80.recording.journal_channel import entries_in
 from o80.recording.message_plan import MessagePlan
 from o80.recording.message_types import row_type
 from o80.recording.scan import Scan, attachment_of, content_of, index_of
-from o80.recording.source import GAP
 
 
 @dataclass(frozen=True)

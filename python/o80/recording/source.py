@@ -7,15 +7,13 @@ from dataclasses import replace
 from o80.errors import BackendGone, SegmentError, TimeoutError
 from o80.frontend import Frontend
 from o80.recording.blocks import Block, SingleMessage
-from o80.recording.epoch import RowWriter, note_of
+from o80.recording.epoch import GAP, RowWriter, note_of
 from o80.recording.file_writer import FileWriter, MessageBlock
 from o80.recording.joint_states import JointWriter
 from o80.recording.journal_channel import GAP as JOURNAL_GAP
 from o80.recording.journal_channel import JournalWriter
 from o80.recording.output import Written
 
-GAP = "o80.gap"
-"""Name of the metadata record of rows that were overwritten before they were read."""
 LARGEST_BLOCK = 4 << 20  # of the rows read at once [bytes]
 BETWEEN_LOOKS = 0.05  # for a backend that is not there [s]
 
@@ -176,7 +174,7 @@ class Source:
     def _read_journal(self) -> SingleMessage | None:
         if self._journal is None:
             return None
-        message, gap = self._journal.read(self._last_log_time)
+        message, gap = self._journal.read(self._last_log_time or time.time_ns())
         if gap is not None:
             self._note_gap(JOURNAL_GAP, *gap)
         return message
