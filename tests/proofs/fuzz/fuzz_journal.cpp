@@ -29,6 +29,7 @@ class File {
   File() {
     view.shape = {.page_bytes = 4096,
                   .schema_bytes = 0,
+                  .provenance_bytes = 0,
                   .row_bytes = 8,
                   .slots = 2,
                   .lanes = 1,

@@ -51,6 +51,7 @@ class Segment {
           std::uint32_t lane_blocks, std::uint64_t journal_bytes = 0) {
     view.shape = {.page_bytes = 4096,
                   .schema_bytes = 0,
+                  .provenance_bytes = 0,
                   .row_bytes = 8 * row_words,
                   .slots = slots,
                   .lanes = lanes,
