@@ -26,11 +26,6 @@ def refuse_wrong_arguments(
             f"{name} must be a {wanted.__name__}, got {given!r}: write "
             f"{name}={wanted.__module__}.{wanted.__name__}({inside})"
         )
-    if render_mode == "human":
-        raise ValueError(
-            "there is no render mode 'human': use 'rgb_array', whose render() returns pictures "
-            "(gymnasium.wrappers.HumanRendering shows them in a window)"
-        )
     if render_mode is not None and render_mode not in modes:
         raise ValueError(f"unknown render mode '{render_mode}'; there are: {', '.join(modes)}")
 

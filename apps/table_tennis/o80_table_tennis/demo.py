@@ -194,9 +194,16 @@ def main(
 
 def _say_where(settings: DemoSettings, console: Console) -> None:
     """What was written, and how to look at it."""
-    console.print(f"report, plots and film: {settings.output}", soft_wrap=True)
-    console.print("recording, to be looked at with", soft_wrap=True)
-    console.print(f"  o80 plot {settings.recording}", soft_wrap=True)
+    recording = settings.recording
+    arm = next(iter(o80.open(recording)))
+    lines = (
+        f"report, plots and film: {settings.output}",
+        f"recording of every row: {recording}",
+        f"  o80 view {recording}      # arm, table and balls in the browser, back in time too",
+        f"  o80 plot {recording} --segment {arm} --fields agonist_1,extended.joint_positions",
+    )
+    for line in lines:
+        console.print(line, soft_wrap=True, highlight=False)
 
 
 def run() -> None:

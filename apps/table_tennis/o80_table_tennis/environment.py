@@ -10,6 +10,7 @@ One step, in both modes, with the arm's iterations as the only clock; k is its n
 from __future__ import annotations
 
 import time
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -25,9 +26,9 @@ from .arguments import (
 )
 from .balls.draw import NO_BALLS, draw_balls
 from .balls.sources import balls_from
+from .report.display import RENDER_MODES, Display, display_of
 from .report.episode_recorder import EpisodeRecorder
 from .report.episode_summary import EpisodeSummary
-from .report.pictures import Pictures
 from .report.statistics import Statistics, StepCounts, statistics_of
 from .rig.rig import Rig
 from .rig.virtual_balls import VirtualBalls
@@ -70,7 +71,7 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
     Closing it, or leaving its `with` block, ends the arm and the twins that it started.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 100}  # noqa: RUF012
+    metadata: dict[str, Any] = {"render_modes": RENDER_MODES, "render_fps": 100}  # noqa: RUF012
 
     def __init__(
         self,
@@ -99,14 +100,16 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         self._begun = False
         self._over = True
         self._summary: EpisodeSummary | None = None
-        self._pictures: Pictures | None = None
+        self._display: Display | None = None
         self._recorder: EpisodeRecorder | None = None
         self._rig = Rig(self._rig_settings)
         try:
             self._arm, self._twin = self._rig.arm, self._rig.twins[0]
             self._virtual = VirtualBalls(self._rig.twins, self._rig_settings, self._task)
             if render_mode is not None:
-                self._pictures = Pictures(self._rig, self._virtual, camera=camera)
+                self._display = display_of(
+                    self._rig, self._virtual, render_mode=render_mode, camera=camera
+                )
             if record is not None:
                 self._recorder = EpisodeRecorder(Path(record), self._rig, self._settings)
         except BaseException:
@@ -204,6 +207,8 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         if self._recorder is not None:
             self._recorder.step(action, reward, observation)
         self._counts.seconds_stepping += time.perf_counter() - called
+        if self._display is not None:
+            self._display.after_step()
         if end is End.RUNNING:
             return observation, reward, False, False, info
         self._finish(end.text, terminated=end.terminated)
@@ -276,18 +281,18 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         return statistics_of(self._counts, self._rig.arm.frontend, step=self._rig_settings.step)
 
     def render(self) -> Any:
-        """A picture (480, 640, 3) of arm and balls as they were last published."""
-        if self._pictures is None:
-            gymnasium.logger.warn("no render mode was chosen: make it with render_mode='rgb_array'")
+        """`rgb_array`: a picture (480, 640, 3) of the newest rows; `human`: None, see `Page`."""
+        if self._display is None:
+            modes = " or ".join(f"render_mode='{mode}'" for mode in RENDER_MODES)
+            gymnasium.logger.warn(f"no render mode was chosen: make it with {modes}")
             return None
-        return self._pictures.render()
+        return self._display.render()
 
     def close(self) -> None:
         """Ends everything that was started; may be called twice."""
-        try:
+        with ExitStack() as stack:  # each is closed even if another one fails
+            stack.callback(self._rig.close)
+            if self._display is not None:
+                stack.callback(self._display.close)
             if self._recorder is not None:
-                self._recorder.close()
-        finally:
-            if self._pictures is not None:
-                self._pictures.close()
-            self._rig.close()
+                stack.callback(self._recorder.close)

@@ -122,9 +122,18 @@ def test_every_episode_is_in_the_recording(played: tuple[Path, str], mode: str) 
         assert len(episode.arm) == len(episode.twin) == rows
 
 
-def test_it_says_how_to_look_at_the_recording(played: tuple[Path, str]) -> None:
+def test_what_it_says_about_the_recording_works(played: tuple[Path, str]) -> None:
     folder, text = played
-    assert f"o80 plot {folder / 'run.mcap'}" in text
+    recording = str(folder / "run.mcap")
+    printed = [line.split("#")[0].split() for line in text.splitlines() if "o80 " in line]
+    commands = {words[1]: words[2:] for words in printed if words[:1] == ["o80"]}
+    assert all(words[0] == recording for words in commands.values())
+    assert sorted(commands) == ["plot", "view"]
+
+    o80_program = str(Path(sys.executable).with_name("o80"))
+    words = [o80_program, "plot", *commands["plot"], "-o", str(folder / "p.png")]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 @pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])

@@ -94,7 +94,7 @@ def test_an_episode_comes_back_as_it_was_played(pacing: Pacing, tmp_path: Path) 
     (episode,) = recorded_episodes(path)
     assert episode.summary == summary
     assert episode.pacing == pacing.value
-    assert episode.begun["seed"] == 7
+    assert (episode.begun["seed"], episode.begun["task"]) == (7, "return")
     assert episode.begun["ball"] == summary.ball == 3
     assert episode.rewards.sum() == summary.reward
     assert episode.environment["task"]["factor"] == PATIENT.factor

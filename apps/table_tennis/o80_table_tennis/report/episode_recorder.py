@@ -6,9 +6,10 @@ plays and what its steps were worth: this is what the marks hold.
 | mark | when | values |
 |---|---|---|
 | `environment` | when it is made | segments and epochs of arm and twins, settings |
-| `episode` | with its first step | number, seeds, balls, goal |
+| `episode` | with its first step | number, task, seeds, balls, goal |
 | `episode_end` | after its last step | `EpisodeSummary`; all actions, rewards and observations |
 
+They follow the rules of docs/recording.md for episodes, so `o80 export` makes data sets of them.
 Of n steps: actions (n, 8), rewards (n,), observations (1 + n, M), from that of the reset on. The
 observations are packed (see `packed`): as texts in JSON they would take a fifth of a fast step.
 """
@@ -54,6 +55,7 @@ class EpisodeRecorder(AbstractContextManager["EpisodeRecorder"]):
     def __init__(self, path: Path, rig: Rig, task: TaskSettings) -> None:
         self._frontends = [rig.arm.frontend, *(twin.frontend for twin in rig.twins)]
         self._recording = o80.Recording(path, self._frontends, proceed=path.exists(), whole=True)
+        self._task = task.task if isinstance(task.task, str) else type(task.task).__name__
         self._flushed = [-1] * len(self._frontends)
         """Iteration of each segment at the last flush."""
         try:
@@ -78,7 +80,7 @@ class EpisodeRecorder(AbstractContextManager["EpisodeRecorder"]):
         self._actions: list[Float32Array] = []
         self._rewards: list[float] = []
         self._observations = [observation]
-        self._recording.mark(EPISODE, **values)
+        self._recording.mark(EPISODE, **values, task=self._task)
 
     def step(self, action: Float32Array, reward: float, observation: Float32Array) -> None:
         """A step was taken: action (8,), and what came of it, with the observation (M,)."""
@@ -96,6 +98,7 @@ class EpisodeRecorder(AbstractContextManager["EpisodeRecorder"]):
         self._recording.mark(
             EPISODE_END,
             **asdict(summary),
+            truncated=not summary.terminated,
             actions=self._actions,
             rewards=self._rewards,
             observations=packed(self._observations),

@@ -26,7 +26,7 @@ class RecordedEpisode:
     environment: Mapping[str, Any]
     """Values of the mark of its environment: segments, settings."""
     begun: Mapping[str, Any]
-    """Values of the mark at its beginning: seeds, balls, goal."""
+    """Values of the mark at its beginning: task, seeds, balls, goal."""
     arm: o80.History
     """(T,) rows of the arm"""
     twin: o80.History
