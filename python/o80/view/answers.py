@@ -49,6 +49,8 @@ class Answers:
         shown = self._shown_of(source)
         first, last = source.extent()
         at = _time_asked(source, asked)
+        if at is None and not source.live and asked.get("key") != source.key:
+            at = first  # a page begins at the begin of a recording
         row = source.row(at)
         answer: dict[str, Any] = {
             "key": source.key,

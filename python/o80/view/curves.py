@@ -23,6 +23,12 @@ class Panels:
             part, _, rest = column.name.partition(".")
             panel = column.name if part == "extended" else rest
             self.columns.setdefault(panel, {})[part] = column
+        actuators = [actuator["name"] for actuator in schema["actuators"]][:FIRST_PANELS]
+        of_actuators = (
+            next((panel for panel in self.columns if panel.split(".")[0].split("[")[0] == name), "")
+            for name in actuators
+        )
+        self._first = [panel for panel in of_actuators if panel] or self.names[:FIRST_PANELS]
 
     @property
     def names(self) -> list[str]:
@@ -31,8 +37,8 @@ class Panels:
 
     @property
     def first(self) -> list[str]:
-        """The panels that are shown before the user chooses."""
-        return self.names[:FIRST_PANELS]
+        """The panels that are shown before the user chooses: one for each actuator."""
+        return self._first
 
     def curves(
         self, rows: History, panels: list[str], begin: int

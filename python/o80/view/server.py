@@ -34,6 +34,8 @@ class PageServer(ThreadingHTTPServer):
     request_queue_size = 32
 
     def __init__(self, host: str, port: int, answers: Mapping[str, Answer]) -> None:
+        self._connections: set[socket.socket] = set()
+        self._lock = threading.Lock()
         try:
             found = socket.getaddrinfo(host or None, port, type=socket.SOCK_STREAM)
             self.address_family = found[0][0]
@@ -46,7 +48,6 @@ class PageServer(ThreadingHTTPServer):
         self.guard = Guard(host, self.port, self.token)
         self.answers = answers
         self.page = page_text()
-        self._free = threading.BoundedSemaphore(MOST_CONNECTIONS)
 
     @property
     def url(self) -> str:
@@ -56,16 +57,27 @@ class PageServer(ThreadingHTTPServer):
         return f"http://{host}:{self.port}/?token={self.token}"
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        if not self._free.acquire(blocking=False):
+        with self._lock:
+            full = len(self._connections) >= MOST_CONNECTIONS
+            if not full:
+                self._connections.add(request)
+        if full:
             self.shutdown_request(request)
-            return
-        super().process_request(request, client_address)
+        else:
+            super().process_request(request, client_address)
 
-    def process_request_thread(self, request: Any, client_address: Any) -> None:
-        try:
-            super().process_request_thread(request, client_address)
-        finally:
-            self._free.release()
+    def shutdown_request(self, request: Any) -> None:
+        with self._lock:
+            self._connections.discard(request)
+        super().shutdown_request(request)
+
+    def server_close(self) -> None:
+        """Stops listening, and ends the connections that pages keep."""
+        super().server_close()
+        with self._lock:
+            for connection in self._connections:
+                with contextlib.suppress(OSError):
+                    connection.shutdown(socket.SHUT_RDWR)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """A page that was closed while an answer was sent is no error."""

@@ -91,7 +91,7 @@ class Scene {
     const floor = this.geoms.find((geom) => geom.shape === "plane" && !geom.moves);
     this.floor = floor && Math.abs(floor.quat[0]) > 0.999 ? this.bodies[floor.body][14] + floor.pos[2] : null;
     this.target = geometry.centre.slice();
-    this.distance = 1.9 * this.extent;
+    this.distance = 2.1 * this.extent;
     this.azimuth = -0.9;
     this.elevation = 0.38;
     this.dirty = true;

@@ -1,0 +1,197 @@
+"""What the page of `o80 view` shows, in a real browser."""
+
+import os
+import signal
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from chromium import Chromium, Page
+
+import o80
+from o80.view.serve import page_server
+
+pytestmark = pytest.mark.check
+
+SHOWN = "page.scene.frames > 0 && page.charts.length && page.charts[0].parts.observed"
+COLOURS = """(() => {
+  page.scene.dirty = true;
+  page.scene.draw();
+  const gl = page.scene.gl, [w, h] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
+  const pixels = new Uint8Array(4 * w * h);
+  gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+  const found = new Set();
+  for (let i = 0; i < pixels.length; i += 4) {
+    found.add(`${pixels[i] >> 4} ${pixels[i + 1] >> 4} ${pixels[i + 2] >> 4}`);
+  }
+  return found.size;
+})()"""
+POSE = "Array.from(page.scene.pose)"
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Chromium]:
+    with Chromium() as started:
+        yield started
+
+
+def curve(part: str, what: str = "low", chart: int = 0) -> str:
+    return f"Array.from(page.charts[{chart}].parts.{part}.{what})"
+
+
+def scrub(page: Page, seconds: float) -> None:
+    """Moves the slider as a user does."""
+    page.value(
+        f"(() => {{ const s = document.getElementById('slider'); s.value = {seconds};"
+        f"s.dispatchEvent(new Event('input')); }})()"
+    )
+
+
+def click(page: Page, button: str) -> None:
+    page.value(f"document.getElementById('{button}').click()")
+
+
+def test_a_page_shows_the_robot_its_curves_and_its_state(browser: Chromium, segment: str) -> None:
+    with o80.robots.load("two_joints").start(segment, frequency=200) as process:
+        arm = process.frontend()
+        arm.add_command("shoulder", 0.6, iterations=20)
+        arm.pulse_and_wait(60.0)
+        with page_server([segment]) as server:
+            begin = time.monotonic()
+            page = browser.page(server.url)
+            page.wait_for("page.looks > 0")
+            answered = time.monotonic() - begin
+            page.wait_for("page.scene.frames > 0")
+            print(f"answer after {answered:.2f} s, pose after {time.monotonic() - begin:.2f} s")
+            page.wait_for(SHOWN)
+            text = page.text()
+            assert f"Halt {segment}" in text
+            assert "of 200 Hz" in text
+            assert "overruns" in text
+            assert "observed 0.6" in text
+            assert page.value(COLOURS) > 20, "robot, floor and background"
+            # the pose of the first body: turned about y by what the shoulder says
+            page.wait_for(f"Math.abs({POSE}[5] - Math.sin(0.3)) < 1e-4")
+            assert page.value(f"{curve('desired')}.at(-1)") == pytest.approx(0.6)
+            assert page.value("document.getElementById('resume').hidden")
+            page.close()
+        arm.close()
+
+
+def test_the_halt_button_halts_and_the_resume_button_resumes(
+    browser: Chromium, process: o80.robots.Process
+) -> None:
+    with (
+        process.frontend() as arm,
+        page_server([process.segment], control=True) as server,
+    ):
+        page = browser.page(server.url)
+        page.wait_for(SHOWN)
+        click(page, "halt")
+        page.wait_for("!document.getElementById('resume').hidden")
+        halt = arm.halted
+        assert halt is not None
+        assert halt.text == "from o80 view"
+        assert "halted by pid" in page.text()
+        click(page, "resume")
+        page.wait_for("document.getElementById('resume').hidden")
+        assert arm.halted is None
+        page.close()
+
+
+def test_the_slider_goes_back_through_the_ring_and_live_returns(
+    browser: Chromium, process: o80.robots.Process
+) -> None:
+    with process.frontend() as arm, page_server([process.segment]) as server:
+        arm.add_command("elbow", 1.0, iterations=400)
+        arm.pulse_and_wait(60.0)
+        page = browser.page(server.url)
+        page.wait_for(SHOWN)
+        rows = arm.history()
+        row = rows[len(rows) // 2]
+        zero = page.value("page.answer.last") - 0.0
+        assert zero > 0
+        first = page.value("page.answer.first")
+        scrub(page, first + (row.time - int(rows.time[0])) * 1e-9 + 1e-6)
+        page.wait_for("page.timeline.at !== null && page.answer.last - page.answer.at > 0.01")
+        shown = arm.history(since=page.value("page.answer.iteration"))[0]
+        assert page.value("page.answer.values.elbow.observed") == f"{shown.observed[1]:.4g}"
+        assert "s ago" in page.text()
+        before = page.value("page.answer.last")
+        page.wait_for(f"page.answer.last > {before}")  # the robot goes on
+        assert page.value("page.answer.iteration") == shown.iteration
+        click(page, "live")
+        page.wait_for("page.answer.last === page.answer.at")
+        page.close()
+
+
+def test_a_page_that_stalled_shows_a_fresh_row_at_once(
+    browser: Chromium, process: o80.robots.Process
+) -> None:
+    with process.frontend() as arm, page_server([process.segment]) as server:
+        page = browser.page(server.url)
+        page.wait_for(SHOWN)
+        looks = page.value("page.looks")
+        os.killpg(browser.pid, signal.SIGSTOP)
+        try:
+            arm.wait_for(arm.published + 3000, timeout=60.0)  # 3 s
+        finally:
+            os.killpg(browser.pid, signal.SIGCONT)
+        woken, iteration = time.monotonic(), arm.published
+        # one answer may have been on its way; the next one was asked for afterwards
+        shown = page.wait_for(f"page.looks >= {looks + 2} && page.answer.iteration")
+        print(f"after {time.monotonic() - woken:.2f} s: {arm.published - shown} ms old")
+        page.wait_for(f"page.answer.iteration > {iteration}")
+        assert page.value("page.looks") <= looks + 12, "no backlog of old answers was shown"
+        page.close()
+
+
+def test_another_robot_that_takes_the_name_is_shown_anew(browser: Chromium, segment: str) -> None:
+    with page_server([segment]) as server:
+        page = browser.page(server.url)
+        page.wait_for("document.body.innerText.includes('waiting')")
+        with o80.robots.load("two_joints").inline(segment):
+            page.wait_for(SHOWN)
+            assert page.value("page.scene.geoms.length") == 7
+        page.wait_for("document.body.innerText.includes('stopped')")
+        assert page.value("document.getElementById('halt').disabled")
+        with o80.Backend(segment, actuators=["<b>lift</b>"]) as backend:
+            backend.publish([2.5])
+            page.wait_for("page.charts.length && page.charts[0].name.includes('lift')")
+            assert "<b>lift</b>" in page.text(), "names are text, never HTML"
+            assert "names no model" in page.text()
+            assert page.value("page.scene.canvas.hidden")
+        page.close()
+
+
+def test_a_recording_is_played_and_scrubbed(
+    browser: Chromium, segment: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "run.mcap"
+    with o80.robots.load("two_joints").inline(segment) as arm, o80.Recording(path, segment):
+        arm.add_command("elbow", 1.0, iterations=2000)
+        arm.burst(4000)
+    with page_server([str(path)]) as server:
+        page = browser.page(server.url)
+        page.wait_for(SHOWN)
+        assert page.value("page.answer.iteration") == 0
+        assert page.value("document.getElementById('halt').disabled")
+        assert "4001 rows" in page.text()
+        scrub(page, 1.0)
+        page.wait_for("page.answer.iteration === 1000")
+        assert page.value("page.answer.values.elbow.desired") == "0.5"
+        click(page, "play")
+        page.wait_for("page.answer.iteration > 1100")
+        click(page, "play")
+        page.wait_for("!page.timeline.playing")
+        assert page.value("page.answer.iteration") < 4000
+        page.close()
+
+
+def test_a_page_says_when_its_server_has_ended(browser: Chromium, arm: o80.Frontend) -> None:
+    with page_server([arm.segment]) as server:
+        page = browser.page(server.url)
+        page.wait_for(SHOWN)
+    page.wait_for("document.body.innerText.includes('No answer')")
+    page.close()
