@@ -1,5 +1,7 @@
 """The journal in a recording: the same entries as a frontend reads, gaps, restarts, damage."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -174,3 +176,26 @@ def test_a_damaged_journal_is_an_error_that_names_the_file(
             errors.append(str(error))
     assert len(errors) > 50
     assert all(str(path) in error for error in errors)
+
+
+def echo(*words: str | Path) -> subprocess.CompletedProcess[str]:
+    program = Path(sys.executable).parent / "o80"
+    return subprocess.run([program, "echo", *words], capture_output=True, text=True, timeout=60)
+
+
+def test_the_command_prints_the_decisions_in_a_file(arm: o80.Frontend, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with o80.Recording(path, arm):
+        arm.add_command("elbow", 0.25, iterations=5)
+        arm.burst(5)
+        arm.halt("enough")
+        arm.burst(1)
+    said = echo(path, "--commands").stdout
+    last = echo(path, "--commands", "--count", "1").stdout
+    rows = echo(path)
+
+    assert "elbow to 0.25 in 5 iterations: completed" in said
+    assert "HALT 1 (frontend by pid" in said
+    assert last.splitlines() == said.splitlines()[-1:]
+    assert rows.returncode == 1
+    assert "is a recording: `o80 echo --commands" in " ".join(rows.stderr.split())

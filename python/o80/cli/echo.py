@@ -15,7 +15,7 @@ import o80
 from o80 import _core
 from o80.cli.attach import attach
 from o80.cli.condition import halt_text, pace_text
-from o80.cli.journal_lines import follow
+from o80.cli.journal_lines import follow, print_recorded
 from o80.cli.screen import complain, style
 from o80.cli.values import RowValues, text
 
@@ -40,7 +40,10 @@ def _timeout(value: float | None) -> float | None:
 
 
 def echo(
-    segment: Annotated[str, typer.Argument(help="Name of a segment; see o80 list.")],
+    segment: Annotated[
+        str,
+        typer.Argument(help="Name of a segment; see o80 list. With --commands also a recording."),
+    ],
     rate: Annotated[float, typer.Option(callback=_rate, help="Most rows printed a second.")] = 10.0,
     count: Annotated[
         int, typer.Option(min=0, help="Stop after this number of rows; 0: never.")
@@ -66,9 +69,18 @@ def echo(
 ) -> None:
     """Print rows: iteration, time, states, sensor values, active and braking actuators.
 
-    With --commands, the last decisions of the backend and those that follow.
+    With --commands, the last decisions of the backend and those that follow, or those in a
+    recording (NAME.mcap).
     For a dead segment it prints the last rows and why the backend ended. Ctrl-C ends it.
     """
+    if segment.endswith(".mcap"):
+        if not commands:
+            raise o80.InvalidArgument(
+                f"{segment} is a recording: `o80 echo --commands {segment}` prints its decisions, "
+                f"and `o80 play {segment}` makes it a segment, whose rows o80 echo prints"
+            )
+        print_recorded(segment, count, as_json)
+        return
     with attach(segment, wait=wait) as frontend:
         if commands:
             follow(frontend, count, as_json, timeout)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 import time
 from dataclasses import asdict
 from typing import Any
@@ -53,6 +54,20 @@ def follow(frontend: o80.Frontend, count: int, as_json: bool, timeout: float | N
         elif timeout is not None and time.monotonic() - waited_since >= timeout:
             raise o80.TimeoutError(f"'{frontend.segment}' decided nothing for {timeout:g} s")
         time.sleep(_LOOK)
+
+
+def print_recorded(path: str, count: int, as_json: bool) -> None:
+    """Prints the entries in a recording; with `count` the last ones of each run of a robot."""
+    recording = o80.open(path)
+    for name in recording:
+        epochs = recording[name].epochs
+        for number, epoch in enumerate(epochs):
+            lines = _Lines(as_json)
+            found = [lines.line(entry) for entry in epoch.journal()]
+            if not as_json and (len(recording) > 1 or len(epochs) > 1):
+                print(f"{name}, run {number}:", file=sys.stderr, flush=True)
+            for line in found[-count:]:  # all of them if count is 0
+                print(line, flush=True)
 
 
 class _Lines:
