@@ -11,6 +11,7 @@
 
 #include "memory/atomic_words.hpp"
 #include "memory/file_owner.hpp"
+#include "memory/owned_segment.hpp"
 #include "memory/segment_file.hpp"
 #include "memory/segment_name.hpp"
 #include "memory/verb_word.hpp"
@@ -87,13 +88,33 @@ std::optional<AttachedSegment> AttachedSegment::open(std::string_view name, Acce
                        ". Start its backend anew with this o80, or remove it with `o80 clean " +
                        std::string(name) + "`.");
   if (access == Access::read_write && !segment.open_commands(reason)) return std::nullopt;
-
-  segment.mapping_ = Mapping(segment.descriptor(), segment.view_.offsets.file_bytes,
-                             Mapping::Protection::read, Mapping::Faults::later);
-  segment.view_.base = segment.mapping_.data();
-  segment.view_.shape = segment.header_.shape;
-  if (access == Access::read_write) segment.map_commands();
+  segment.map();
   return segment;
+}
+
+AttachedSegment AttachedSegment::attach(const OwnedSegment& owner) {
+  owner.check_process();
+  AttachedSegment segment;
+  segment.name_ = owner.name();
+  segment.access_ = Access::read_write;
+  segment.file_ = owner.open_segment_again(O_RDONLY);
+  segment.commands_ = owner.open_commands_again(O_RDWR);
+  if (!segment.file_.is_open() || !segment.commands_.is_open())
+    throw SegmentError(segment_called(segment.name_) +
+                       " cannot be opened again: " + std::strerror(errno));
+  segment.header_ = owner.view().header();
+  segment.view_.offsets = owner.view().offsets;
+  segment.map();
+  return segment;
+}
+
+/// Maps the open files: all for reading, with Access::read_write the bell for writing.
+void AttachedSegment::map() {
+  mapping_ = Mapping(descriptor(), view_.offsets.file_bytes, Mapping::Protection::read,
+                     Mapping::Faults::later);
+  view_.base = mapping_.data();
+  view_.shape = header_.shape;
+  if (access_ == Access::read_write) map_commands();
 }
 
 /// False, with a reason, if the file is missing: the segment was replaced or is being removed.

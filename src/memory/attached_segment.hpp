@@ -19,6 +19,8 @@
 
 namespace o80 {
 
+class OwnedSegment;
+
 struct AttachOptions {
   enum class Dead { wait, accept };
   Dead dead = Dead::wait;          // accept: also attach to the segment of an ended backend
@@ -42,6 +44,10 @@ class AttachedSegment {
   /// InvalidArgument.
   static AttachedSegment attach(std::string_view name, Access access, const Deadline& deadline,
                                 const AttachOptions& options = {});
+
+  /// Attaches to a segment of this process, with Access::read_write; it needs no name. Throws
+  /// SegmentError.
+  static AttachedSegment attach(const OwnedSegment& owner);
 
   AttachedSegment(AttachedSegment&& other) noexcept;
   AttachedSegment& operator=(AttachedSegment&& other) noexcept;
@@ -86,6 +92,7 @@ class AttachedSegment {
   static std::optional<AttachedSegment> open(std::string_view name, Access access,
                                              std::string& reason);
   bool open_commands(std::string& reason);
+  void map();
   void map_commands();
 
   std::string name_;

@@ -82,7 +82,7 @@ void fill(const SegmentView& view, const SegmentSpec& spec, std::uint64_t epoch)
 }  // namespace
 
 OwnedSegment OwnedSegment::create(const SegmentSpec& spec) {
-  const std::string path = segment_path(spec.name);
+  const std::string path = spec.anonymous ? "" : segment_path(spec.name);
   SegmentView view;
   view.shape = shape_of(spec);
   if (!SegmentOffsets::compute(view.shape, view.offsets))
@@ -92,11 +92,14 @@ OwnedSegment OwnedSegment::create(const SegmentSpec& spec) {
         " lanes. A row must be a multiple of 8 bytes, a segment must be below 64 TiB, and there "
         "must be at most " +
         std::to_string(kMostLanes) + " lanes.");
-  refuse_if_taken(spec.name);
-  sweep_orphans();
+  if (!spec.anonymous) {
+    refuse_if_taken(spec.name);
+    sweep_orphans();
+  }
 
   // build two complete and locked files that have no name yet
-  SegmentDraft draft(spec.name);
+  SegmentDraft draft(spec.name, spec.anonymous ? SegmentDraft::Files::anonymous
+                                               : SegmentDraft::Files::named);
   draft.reserve(view.offsets);
   draft.permit(spec.permission);
   const LockFile mapped = draft.open_segment();
@@ -110,12 +113,13 @@ OwnedSegment OwnedSegment::create(const SegmentSpec& spec) {
   view.commands = commands_mapping.data();
   fill(view, spec, draft.epoch());
 
-  draft.publish([&](const Predecessor& former) {
+  const auto inherit = [&](const Predecessor& former) {
     if (!spec.inherits_halt || !(former.was_halted || former.died_acting)) return;
     ask_for_halt(view, HaltCause::predecessor, {},
                  former.was_halted ? "the former backend was halted and not resumed"
                                    : "the former backend was killed while commands were active");
-  });
+  };
+  if (!spec.anonymous) draft.publish(inherit);
   segment.name_ = spec.name;
   segment.path_ = path;
   segment.commands_path_ = draft.commands_path();
@@ -133,6 +137,31 @@ void OwnedSegment::refuse_if_taken(std::string_view name) {
   if (!bearer.is_open()) return;
   bearer.check_owner();
   if (bearer.is_alive()) throw SegmentTaken(bearer.taken_text());
+}
+
+void OwnedSegment::publish(const std::string& name) {
+  check_process();
+  const std::string path = segment_path(name);
+  if (!path_.empty())
+    throw Error("segment '" + name_ + "' has a name already: " + path_.substr(path_.rfind('/') + 1));
+  refuse_if_taken(name);
+  sweep_orphans();
+  SegmentDraft draft(name, epoch_, std::move(lock_), std::move(commands_lock_));
+  const auto take_back = [&] {
+    draft.abandon();
+    lock_ = draft.take_segment_lock();
+    commands_lock_ = draft.take_commands_lock();
+  };
+  try {
+    draft.give_names();
+    draft.publish([](const Predecessor&) {});
+  } catch (...) {
+    take_back();
+    throw;
+  }
+  path_ = path;
+  commands_path_ = draft.commands_path();
+  take_back();
 }
 
 OwnedSegment& OwnedSegment::operator=(OwnedSegment&& other) noexcept {
@@ -184,6 +213,7 @@ void OwnedSegment::end(BackendState stopped_or_failed, std::string_view text) no
 }
 
 void OwnedSegment::remove() noexcept {
+  if (path_.empty()) return;  // anonymous
   // we hold byte 0, so no other segment can get the name between the check and the unlink
   O80_CRASH_POINT("segment.before_unlink");
   if (leads_to(path_, lock_.descriptor())) unlink(path_.c_str());

@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+#include "memory/anonymous_file.hpp"
 #include "memory/file_lock.hpp"
 #include "memory/fork.hpp"
 #include "memory/mapping.hpp"
@@ -29,6 +30,8 @@ struct SegmentSpec {
   /// Starts halted if the replaced segment was halted, or if its backend died while commands were
   /// active.
   bool inherits_halt = false;
+  /// The files get no name until OwnedSegment::publish(); `name` is for messages only.
+  bool anonymous = false;
 };
 
 /// Move-only: the segment of a living backend.
@@ -44,6 +47,9 @@ class OwnedSegment {
   /// Throws SegmentTaken if a living backend has the name, SegmentError if the file of a user
   /// without trust has it. Call it before the hardware is touched.
   static void refuse_if_taken(std::string_view name);
+  /// Gives an anonymous segment a name, so that other processes can attach. name() keeps its value.
+  /// Throws as create(), and Error if the segment has a name already.
+  void publish(const std::string& name);
 
   OwnedSegment(OwnedSegment&&) noexcept = default;
   OwnedSegment& operator=(OwnedSegment&& other) noexcept;
@@ -56,6 +62,9 @@ class OwnedSegment {
   const SegmentView& view() const noexcept { return view_; }
   /// A descriptor of the commanders' file without a lock.
   int commands_descriptor() const noexcept { return query_.descriptor(); }
+  /// Opens a file once more, for a frontend in this process.
+  LockFile open_segment_again(int flags) const { return open_again(lock_, flags); }
+  LockFile open_commands_again(int flags) const { return open_again(query_, flags); }
   BackendState state() const noexcept;
   /// Stores the state, from starting to running.
   void set_state(BackendState state) noexcept;
@@ -72,8 +81,8 @@ class OwnedSegment {
   void release() noexcept;
 
   std::string name_;
-  std::string path_;
-  std::string commands_path_;
+  std::string path_;           // empty while it is anonymous
+  std::string commands_path_;  // empty while it is anonymous
   std::uint64_t epoch_ = 0;
   LockFile lock_;           // the segment file: holds the lock of byte 0, not mapped
   LockFile commands_lock_;  // the commanders' file: holds the lock of byte 0, not mapped

@@ -1,7 +1,6 @@
 #include "memory/segment_draft.hpp"
 
 #include <fcntl.h>
-#include <sys/random.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
@@ -11,9 +10,11 @@
 #include <cstring>
 
 #include "base/crash_point.hpp"
+#include "memory/anonymous_file.hpp"
 #include "memory/file_owner.hpp"
 #include "memory/mapping.hpp"
 #include "memory/named_segment.hpp"
+#include "memory/random_bits.hpp"
 #include "memory/segment_file.hpp"
 #include "memory/segment_name.hpp"
 #include "o80/base/error.hpp"
@@ -24,13 +25,6 @@ namespace {
 
 constexpr int kOpen = O_RDWR | O_NOFOLLOW;
 constexpr int kAttempts = 100;
-
-std::uint64_t random_bits() {
-  std::uint64_t bits = 0;
-  while (bits == 0)
-    if (getrandom(&bits, sizeof bits, 0) != sizeof bits) bits = 0;
-  return bits;
-}
 
 [[noreturn]] void fail_for_space(const std::string& name, std::uint64_t bytes) {
   throw SegmentError("cannot create segment '" + name + "': " + segment_directory() +
@@ -94,7 +88,12 @@ Predecessor supersede(const NamedSegment& former) {
 
 }  // namespace
 
-SegmentDraft::SegmentDraft(const std::string& name) : name_(name) {
+SegmentDraft::SegmentDraft(const std::string& name, Files files)
+    : name_(name), has_names_(files == Files::named) {
+  if (files == Files::anonymous) {
+    create_anonymous_files();
+    return;
+  }
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     epoch_ = random_bits();
     commands_path_ = o80::commands_path(name, epoch_);
@@ -104,6 +103,35 @@ SegmentDraft::SegmentDraft(const std::string& name) : name_(name) {
   throw SegmentError("cannot create segment '" + name +
                      "': another process has removed its files " + std::to_string(kAttempts) +
                      " times. Try again; does `o80 clean` run in a loop?");
+}
+
+SegmentDraft::SegmentDraft(const std::string& name, std::uint64_t epoch, LockFile segment,
+                           LockFile commands)
+    : name_(name),
+      epoch_(epoch),
+      path_(draft_path(name, epoch)),
+      commands_path_(o80::commands_path(name, epoch)),
+      segment_(std::move(segment)),
+      commands_(std::move(commands)) {}
+
+void SegmentDraft::create_anonymous_files() {
+  epoch_ = random_bits();
+  for (LockFile* file : {&commands_, &segment_}) {
+    *file = create_anonymous();
+    if (!file->is_open()) fail("no file can be made in " + segment_directory(), errno);
+    // cannot fail: no other process can open the file
+    file->try_lock(kBackendByte);
+  }
+}
+
+void SegmentDraft::give_names() {
+  has_names_ = true;
+  // the commanders' file first: a segment file without one would be taken for a foreign file
+  if (!link_open_file(commands_, commands_path_) || !link_open_file(segment_, path_))
+    fail(errno == ENOENT ? "the file system of " + segment_directory() +
+                               " cannot name a file that was made without a name"
+                         : "its files cannot be named",
+         errno);
 }
 
 /// False if sweep_orphans() of another process has removed the file before it was locked.
@@ -130,8 +158,10 @@ bool SegmentDraft::create_segment() {
   return segment_.try_lock(kBackendByte);
 }
 
-SegmentDraft::~SegmentDraft() {
-  if (published_) return;
+SegmentDraft::~SegmentDraft() { abandon(); }
+
+void SegmentDraft::abandon() noexcept {
+  if (published_ || !has_names_) return;
   if (segment_.is_open()) unlink(path_.c_str());
   if (commands_.is_open()) unlink(commands_path_.c_str());
 }
@@ -143,8 +173,8 @@ void SegmentDraft::fail(const std::string& what, int error) const {
                      std::strerror(error));
 }
 
-LockFile SegmentDraft::open_again(const std::string& path) const {
-  LockFile file = LockFile::open(path, kOpen);
+LockFile SegmentDraft::opened_again(const LockFile& original) const {
+  LockFile file = open_again(original, O_RDWR);
   if (!file.is_open()) fail("its file cannot be opened again", errno);
   return file;
 }

@@ -24,8 +24,11 @@ struct Predecessor {
 /// sweep_orphans() removes them later.
 class SegmentDraft {
  public:
-  /// Throws SegmentError.
-  explicit SegmentDraft(const std::string& name);
+  enum class Files : std::uint8_t { named, anonymous };
+  /// `anonymous`: both files have no name, and publish() cannot be called. Throws SegmentError.
+  explicit SegmentDraft(const std::string& name, Files files = Files::named);
+  /// Takes the locked files of an anonymous segment, to name them (give_names) and publish them.
+  SegmentDraft(const std::string& name, std::uint64_t epoch, LockFile segment, LockFile commands);
   SegmentDraft(const SegmentDraft&) = delete;
   SegmentDraft& operator=(const SegmentDraft&) = delete;
   ~SegmentDraft();
@@ -36,22 +39,28 @@ class SegmentDraft {
   /// Sets who may observe (read bits) and who may command (write bits). Throws SegmentError.
   void permit(mode_t permission);
   /// Opens one of the files again, for a mapping: locked descriptors must not be mapped.
-  LockFile open_segment() const { return open_again(path_); }
-  LockFile open_commands() const { return open_again(commands_path_); }
+  LockFile open_segment() const { return opened_again(segment_); }
+  LockFile open_commands() const { return opened_again(commands_); }
+  /// Links anonymous files to the names of a draft. Throws SegmentError.
+  void give_names();
   /// Gives the complete segment its name, which it takes over from the segment of a dead backend.
   /// Then `inherit` is called before the rename, so that a halt is kept if this process is killed
   /// right after it. Throws SegmentTaken, SegmentError.
   void publish(const std::function<void(const Predecessor&)>& inherit);
 
-  // for the owner of the published segment
+  /// Removes the names of both files, unless publish() has succeeded.
+  void abandon() noexcept;
+
+  // for the owner of the published or abandoned segment
   const std::string& commands_path() const noexcept { return commands_path_; }
   LockFile take_segment_lock() noexcept { return std::move(segment_); }
   LockFile take_commands_lock() noexcept { return std::move(commands_); }
 
  private:
+  void create_anonymous_files();
   bool create_commands();
   bool create_segment();
-  LockFile open_again(const std::string& path) const;
+  LockFile opened_again(const LockFile& file) const;
   bool try_replace(const std::function<void(const Predecessor&)>& inherit);
   [[noreturn]] void fail(const std::string& what, int error) const;
 
@@ -61,6 +70,7 @@ class SegmentDraft {
   std::string commands_path_;
   LockFile segment_;   // holds the lock of byte 0
   LockFile commands_;  // holds the lock of byte 0
+  bool has_names_ = false;
   bool published_ = false;
 };
 

@@ -105,6 +105,12 @@ void InlineRobot::stop() noexcept {
   loop_.stop();
 }
 
+void InlineRobot::publish_as(const std::string& name) {
+  refuse_nested();
+  const Turn turn(*this, keep_waiting_);
+  loop_.publish_as(name);
+}
+
 std::string unused_segment_name(const std::string& robot) {
   static std::atomic<unsigned> count{0};
   return robot + "-" + std::to_string(getpid()) + "-" + std::to_string(count++);

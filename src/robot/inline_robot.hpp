@@ -32,6 +32,9 @@ class InlineRobot final : public InlineRunner {
   /// BackendStopped. From any thread, also from within `keep_waiting`; no effect in a forked child.
   void stop() noexcept;
   const std::string& segment() const noexcept { return loop_.backend().name(); }
+  const UntypedBackend& backend() const noexcept { return loop_.backend(); }
+  /// Names an anonymous segment (BackendOptions::anonymous) between two iterations.
+  void publish_as(const std::string& name);
 
  private:
   class Turn;

@@ -47,6 +47,8 @@ class Loop final : public RequestServer {
 
   void ask_to_stop() noexcept { backend_.ask_to_stop(); }
   const UntypedBackend& backend() const noexcept { return backend_; }
+  /// Names an anonymous segment. Call it between two iterations.
+  void publish_as(const std::string& name) { backend_.publish_as(name); }
   std::string fault() const { return fault_; }
 
  private:

@@ -148,6 +148,7 @@ OwnedSegment segment_of(const Schema& schema, const Provenance& provenance,
   spec.journal_bytes = static_cast<std::uint64_t>(options.journal);
   spec.permission = options.permission;
   spec.inherits_halt = !options.bursting && !options.resume;
+  spec.anonymous = options.anonymous;
   return OwnedSegment::create(spec);
 }
 
@@ -351,6 +352,8 @@ const Schema& UntypedBackend::schema() const noexcept { return body_->schema; }
 const RowLayout& UntypedBackend::layout() const noexcept { return body_->layout; }
 const std::string& UntypedBackend::name() const noexcept { return body_->segment.name(); }
 const Provenance& UntypedBackend::provenance() const noexcept { return body_->provenance; }
+const OwnedSegment& UntypedBackend::segment() const noexcept { return body_->segment; }
+void UntypedBackend::publish_as(const std::string& name) { body_->segment.publish(name); }
 
 std::byte* UntypedBackend::observed() noexcept { return body_->row() + body_->layout.observed; }
 std::byte* UntypedBackend::extended() noexcept { return body_->row() + body_->layout.extended; }

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "o80/base/nearest_name.hpp"
+#include "o80/runtime/backend.hpp"
 #include "runtime/provenance_bytes.hpp"
 
 namespace o80 {
@@ -23,6 +24,11 @@ UntypedFrontend::UntypedFrontend(const std::string& segment, std::shared_ptr<Inl
     : link_(std::make_shared<Link>(
           AttachedSegment::attach(segment, Access::read_write, Deadline(std::chrono::seconds(5))),
           std::move(runner))) {}
+
+UntypedFrontend::UntypedFrontend(const UntypedBackend& backend,
+                                 std::shared_ptr<InlineRunner> runner)
+    : link_(std::make_shared<Link>(AttachedSegment::attach(backend.segment()),
+                                   std::move(runner))) {}
 
 UntypedFrontend::UntypedFrontend(UntypedFrontend&&) noexcept = default;
 UntypedFrontend& UntypedFrontend::operator=(UntypedFrontend&& other) noexcept {

@@ -19,6 +19,7 @@
 
 namespace o80 {
 
+class OwnedSegment;
 enum class Verb : std::uint8_t;
 
 /// Options of a backend that do not depend on the robot.
@@ -46,6 +47,9 @@ struct BackendOptions {
   /// The backend adds its own options, the versions and the clock, and the robot's name if none is
   /// given.
   Provenance provenance{};
+  /// The segment has no name (`segment` is for messages): only this process can attach, until
+  /// UntypedBackend::publish_as().
+  bool anonymous = false;
 };
 
 /// Timing of the last period, set by the loop.
@@ -82,6 +86,10 @@ class UntypedBackend {
   const std::string& name() const noexcept;
   /// How it was started, with the effective options.
   const Provenance& provenance() const noexcept;
+  const OwnedSegment& segment() const noexcept;
+  /// Names an anonymous segment, so that other processes can attach. Call it between two
+  /// iterations. Throws SegmentTaken, SegmentError, InvalidArgument, Error if it has a name.
+  void publish_as(const std::string& name);
 
   /// The observed and extended parts of the current row; fill them before `publish`.
   std::byte* observed() noexcept;

@@ -28,6 +28,7 @@ class BatchBuilder;
 class CommandCheck;
 class InlineRunner;
 class LaneSender;
+class UntypedBackend;
 struct BatchRecord;
 struct RecordHead;
 
@@ -62,6 +63,8 @@ class UntypedFrontend {
   explicit UntypedFrontend(const std::string& segment, const FrontendOptions& options = {});
   /// A frontend of an inline robot: its bursts run in the calling thread.
   UntypedFrontend(const std::string& segment, std::shared_ptr<InlineRunner> runner);
+  /// The same for a robot whose segment may have no name.
+  UntypedFrontend(const UntypedBackend& backend, std::shared_ptr<InlineRunner> runner);
   UntypedFrontend(UntypedFrontend&&) noexcept;
   UntypedFrontend& operator=(UntypedFrontend&&) noexcept;
   ~UntypedFrontend();

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <thread>
+#include <vector>
+
+#include "memory/fork.hpp"
+#include "memory/spinner.hpp"
+
+namespace o80 {
+
+/// Threads that share the tasks of one call with the calling thread.
+///
+/// Between two calls the workers sleep on a futex (after a spin of at most 50 us, as every wait of
+/// o80). They block all signals, which belong to the threads of the program. Tasks are handed out
+/// one after the other by one counter, so a slow task delays only its own thread.
+///
+/// Writer:   one thread at a time calls run().
+/// Realtime: no; run() allocates nothing.
+class WorkerPool {
+ public:
+  /// `workers`: threads besides the caller.
+  explicit WorkerPool(std::size_t workers);
+  WorkerPool(const WorkerPool&) = delete;
+  WorkerPool& operator=(const WorkerPool&) = delete;
+  /// In a forked child it leaves the threads of the parent alone.
+  ~WorkerPool();
+
+  std::size_t workers() const noexcept { return threads_.size(); }
+
+  /// Calls task(i) once for each i below `count`, in all threads; returns when all have returned.
+  /// `look_around` is called in the calling thread between its tasks, and about every 50 ms while
+  /// it waits for the workers. Neither may throw.
+  template <class Task, class Look>
+  void run(std::uint32_t count, Task& task, Look& look_around) noexcept {
+    const auto call = [](void* object, std::uint32_t i) { (*static_cast<Task*>(object))(i); };
+    begin(count, call, &task);
+    std::uint32_t i = 0;
+    while (take(round_.load(std::memory_order_relaxed), i)) {
+      task(i);
+      finished();
+      look_around();
+    }
+    while (!wait_for_workers(count)) look_around();
+  }
+
+ private:
+  using Call = void (*)(void* object, std::uint32_t i);
+
+  void begin(std::uint32_t count, Call call, void* object) noexcept;
+  bool take(std::uint32_t round, std::uint32_t& i) noexcept;
+  /// True if it was the last task of the call.
+  bool finished() noexcept;
+  bool wait_for_workers(std::uint32_t count) noexcept;
+  void work() noexcept;
+
+  // written by the caller before `next_` changes; a worker reads call_ and object_ only after it
+  // has taken a task, and the call cannot end before that task
+  Call call_ = nullptr;
+  void* object_ = nullptr;
+  std::atomic<std::uint32_t> count_{0};
+  alignas(64) std::atomic<std::uint32_t> round_{0};  // futex of the workers; number of the call
+  std::atomic<bool> stop_{false};
+  alignas(64) std::atomic<std::uint64_t> next_{0};  // the round << 32 | the next task
+  alignas(64) std::atomic<std::uint32_t> done_{0};  // futex of the caller; tasks that have returned
+  std::atomic<bool> waiting_{false};                // the caller sleeps on done_
+  Spinner caller_spin_;
+  std::vector<std::thread> threads_;
+  ForkGuard guard_;
+};
+
+}  // namespace o80
