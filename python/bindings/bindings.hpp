@@ -12,6 +12,7 @@ void bind_canceller(nanobind::module_& module);
 void bind_frontend(nanobind::module_& module);
 void bind_prepared_burst(nanobind::module_& module);
 void bind_backend(nanobind::module_& module);
+void bind_inline_group(nanobind::module_& module);
 void bind_robots(nanobind::module_& module);
 void bind_loop_state(nanobind::module_& module);
 void bind_journal(nanobind::module_& module);

@@ -5,10 +5,39 @@
 #include "bindings.hpp"
 #include "errors.hpp"
 #include "o80/base/error.hpp"
+#include "robot/inline_group.hpp"
 
 namespace nb = nanobind;
 
 namespace {
+
+void translate(const std::exception_ptr& thrown, void*);
+
+/// The Python exception for a C++ exception.
+nb::object exception_of(const std::exception_ptr& thrown) {
+  try {
+    translate(thrown, nullptr);
+  } catch (nb::python_error& error) {
+    return nb::borrow(error.value());
+  } catch (const std::exception& error) {
+    set_error(python_error("Error"), error.what());
+  } catch (...) {
+    set_error(python_error("Error"), "an unknown C++ exception");
+  }
+  return nb::borrow(nb::python_error().value());
+}
+
+/// Raises CopyFailed from the error of the first copy.
+void set_copy_failed(const o80::CopyFailed& failed) {
+  nb::dict errors;
+  for (const o80::CopyFailed::Failure& failure : failed.failures()) {
+    errors[nb::int_(failure.copy)] = exception_of(failure.error);
+  }
+  const nb::object error = python_error("CopyFailed")(failed.what(), errors);
+  const nb::object first = errors[nb::int_(failed.failures().front().copy)];
+  PyException_SetCause(error.ptr(), nb::object(first).release().ptr());
+  PyErr_SetObject(reinterpret_cast<PyObject*>(Py_TYPE(error.ptr())), error.ptr());
+}
 
 /// Raises the class of o80.errors with the name of the C++ class.
 void translate(const std::exception_ptr& thrown, void*) {
@@ -18,6 +47,8 @@ void translate(const std::exception_ptr& thrown, void*) {
   }
   try {
     std::rethrow_exception(thrown);
+  } catch (const o80::CopyFailed& failed) {
+    set_copy_failed(failed);
   }
   O80_TRANSLATE(InvalidArgument)
   O80_TRANSLATE(TimeoutError)

@@ -26,6 +26,7 @@ NB_MODULE(_core, m) {
   bind_prepared_burst(m);
   bind_backend(m);
   bind_robots(m);
+  bind_inline_group(m);
   bind_loop_state(m);
   bind_journal(m);
   bind_provenance(m);

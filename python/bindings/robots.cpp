@@ -52,8 +52,8 @@ Attachment start_inline(const o80::RobotLibrary& library, const std::string& seg
 
 }  // namespace
 
-o80::LoopOptions loop_options_of(const o80::OptionValues& values) {
-  o80::LoopOptions options;
+o80::LoopOptions loop_options_of(const o80::OptionValues& values, o80::LoopOptions otherwise) {
+  o80::LoopOptions options = std::move(otherwise);
   for (const auto& [name, text] : values) {
     const o80::LoopOption* option = o80::find_loop_option(name);
     if (option == nullptr) throw o80::InvalidArgument("there is no option '" + name + "'");

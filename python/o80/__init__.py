@@ -16,6 +16,7 @@ from o80.errors import (
     Cancelled,
     Closed,
     ControlTaken,
+    CopyFailed,
     DriverError,
     Error,
     InvalidArgument,
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
     from o80.frontend_classes import register_frontend
     from o80.halts import Halt, halt
     from o80.history import History
+    from o80.inline_group import Gather, Gathered, GroupBurst, InlineGroup
     from o80.installation import prefix
     from o80.journal import Journal, JournalCommand, JournalEntry
     from o80.limits import Limits
@@ -76,6 +78,10 @@ _LAZY = {
     "Halt": "o80.halts",
     "halt": "o80.halts",
     "History": "o80.history",
+    "Gather": "o80.inline_group",
+    "Gathered": "o80.inline_group",
+    "GroupBurst": "o80.inline_group",
+    "InlineGroup": "o80.inline_group",
     "prefix": "o80.installation",
     "Journal": "o80.journal",
     "JournalCommand": "o80.journal",
@@ -135,12 +141,17 @@ __all__ = [
     "Cancelled",
     "Closed",
     "ControlTaken",
+    "CopyFailed",
     "DriverError",
     "Error",
     "Frontend",
+    "Gather",
+    "Gathered",
+    "GroupBurst",
     "Halt",
     "Handle",
     "History",
+    "InlineGroup",
     "InvalidArgument",
     "Journal",
     "JournalCommand",

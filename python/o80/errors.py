@@ -4,7 +4,7 @@ import builtins
 from typing import TYPE_CHECKING, Any, Optional
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from o80._core import Batch, Handle
 
@@ -114,6 +114,20 @@ class Cancelled(Error):
 
 class DriverError(Error, RuntimeError):
     """A robot library or its driver failed."""
+
+
+class CopyFailed(Error):
+    """Copies of an inline group failed in a call; all others have done it.
+
+    The text names the copies. `errors` has the exception of each; the first one is the cause.
+    """
+
+    def __init__(self, text: str = "", errors: "Mapping[int, Exception] | None" = None) -> None:
+        super().__init__(text)
+        self.errors: dict[int, Exception] = dict(errors or {})
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (str(self), self.errors)
 
 
 class RequestRejected(Error):

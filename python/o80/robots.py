@@ -14,10 +14,11 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 from o80 import _core
 from o80.announced import announced
+from o80.checked import whole
 from o80.errors import DriverError, InvalidArgument
 from o80.frontend import Frontend
 from o80.loop_options import did_you_mean, loop_options, loop_texts, text_of
@@ -25,6 +26,8 @@ from o80.process import Process, start_process
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
+
+    from o80.inline_group import InlineGroup
 
 __all__ = ["Option", "Process", "Robot", "RobotFile", "list", "load", "path_of"]
 
@@ -220,6 +223,7 @@ class Robot:
         words += [f"--{name}={text}" for name, text in self._config(config, known)]
         return start_process(self._library.path, segment or self.name, words, timeout)
 
+    @overload
     def inline(
         self,
         segment: str | None = None,
@@ -232,15 +236,56 @@ class Robot:
         permission: int | None = None,
         stale: Literal["hold", "purge", "halt", "stop"] | None = None,
         silence: int | None = None,
+        copies: None = None,
+        threads: None = None,
         **config: Any,
-    ) -> Frontend:
+    ) -> Frontend: ...
+    @overload
+    def inline(
+        self,
+        segment: None = None,
+        *,
+        copies: int,
+        threads: int | None = None,
+        frequency: float | None = None,
+        history: int | None = None,
+        lanes: int | None = None,
+        lane_blocks: int | None = None,
+        journal: float | None = None,
+        permission: int | None = None,
+        stale: Literal["hold", "purge", "halt", "stop"] | None = None,
+        silence: int | None = None,
+        **config: Any,
+    ) -> "InlineGroup": ...
+    def inline(
+        self,
+        segment: str | None = None,
+        *,
+        frequency: float | None = None,
+        history: int | None = None,
+        lanes: int | None = None,
+        lane_blocks: int | None = None,
+        journal: float | None = None,
+        permission: int | None = None,
+        stale: Literal["hold", "purge", "halt", "stop"] | None = None,
+        silence: int | None = None,
+        copies: int | None = None,
+        threads: int | None = None,
+        **config: Any,
+    ) -> "Frontend | InlineGroup":
         """Starts the robot in this process. A burst runs in the thread that requests it.
 
         segment: name of its segment, to which others may attach (None: an unused name).
         frequency, history, lanes, lane_blocks, journal, permission, stale, silence: as for `start`.
+        copies: start so many of them as an InlineGroup, which steps them together. Their segments
+            have no names. Copies keep 64 rows, two lanes of 256 blocks and no journal, unless these
+            options say otherwise.
+        threads: threads that step the copies, the calling one included (None: one for each
+            processor).
         config: the robot's own options, see `options`.
 
-        Closing the frontend stops the robot. Raises DriverError, SegmentTaken, InvalidArgument.
+        Closing the frontend or the group stops the robot. Raises DriverError, SegmentTaken,
+        InvalidArgument.
         """
         texts = loop_texts(
             {
@@ -256,6 +301,10 @@ class Robot:
         )
         known = [option.name for option in loop_options().values() if option.of_inline]
         own = self._config(config, known)
+        if copies is not None:
+            return self._group(copies, threads, segment, texts, own)
+        if threads is not None:
+            raise InvalidArgument("threads is for several copies: give copies too")
         name = segment or _core.unused_segment_name(self.name)
         try:
             attachment = self._library.start_inline(name, texts, own)
@@ -264,6 +313,25 @@ class Robot:
                 _core.clean(name)  # no other process can know this name
             raise
         return Frontend._of(attachment, unnamed=segment is None)
+
+    def _group(
+        self,
+        copies: int,
+        threads: int | None,
+        segment: str | None,
+        texts: builtins.list[tuple[str, str]],
+        own: builtins.list[tuple[str, str]],
+    ) -> "InlineGroup":
+        from o80.inline_group import InlineGroup
+
+        if segment is not None:
+            raise InvalidArgument(
+                "the copies of a group have no names: leave out segment, and name one of them with "
+                "`group.publish(copy, name)`"
+            )
+        count = whole(copies, "copies", 1)
+        workers = 0 if threads is None else whole(threads, "threads", 1)
+        return InlineGroup(_core.start_group(self._library, count, workers, texts, own))
 
     def _config(
         self, config: Mapping[str, Any], loop: Sequence[str]

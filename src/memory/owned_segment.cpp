@@ -98,8 +98,8 @@ OwnedSegment OwnedSegment::create(const SegmentSpec& spec) {
   }
 
   // build two complete and locked files that have no name yet
-  SegmentDraft draft(spec.name, spec.anonymous ? SegmentDraft::Files::anonymous
-                                               : SegmentDraft::Files::named);
+  SegmentDraft draft(spec.name,
+                     spec.anonymous ? SegmentDraft::Files::anonymous : SegmentDraft::Files::named);
   draft.reserve(view.offsets);
   draft.permit(spec.permission);
   const LockFile mapped = draft.open_segment();
@@ -143,7 +143,8 @@ void OwnedSegment::publish(const std::string& name) {
   check_process();
   const std::string path = segment_path(name);
   if (!path_.empty())
-    throw Error("segment '" + name_ + "' has a name already: " + path_.substr(path_.rfind('/') + 1));
+    throw Error("segment '" + name_ +
+                "' has a name already: " + path_.substr(path_.rfind('/') + 1));
   refuse_if_taken(name);
   sweep_orphans();
   SegmentDraft draft(name, epoch_, std::move(lock_), std::move(commands_lock_));

@@ -43,7 +43,8 @@ class CopyFailed : public Error {
 /// Each copy is an InlineRobot with a frontend of its own, so it does what a single inline robot
 /// does, bit for bit, with any number of threads. Its segment has no name (SegmentSpec::anonymous).
 ///
-/// Writer:   one thread at a time; a second one gets an Error. Frontends of single copies (`attach`)
+/// Writer:   one thread at a time; a second one gets an Error. Frontends of single copies
+/// (`attach`)
 ///           may be used by other threads at any time.
 /// Realtime: no. burst() allocates nothing, unless a copy fails.
 class InlineGroup {
@@ -70,6 +71,10 @@ class InlineGroup {
     std::span<std::uint8_t> flags;
   };
 
+  /// Options for little memory, because the threads write one copy after the other: a short
+  /// history, two small lanes, no journal.
+  static BackendOptions default_options();
+
   /// Starts the copies one after the other. Throws as InlineRobot, and Error if the process may not
   /// open so many files.
   InlineGroup(const RobotTable& table, const OptionValues& options, const Options& group,
@@ -80,7 +85,9 @@ class InlineGroup {
 
   std::size_t copies() const noexcept { return copies_.size(); }
   std::size_t threads() const noexcept { return pool_.workers() + 1; }
-  const Description& description() const { return *copies_.front()->frontend.description(); }
+  const Description& description() const;
+  /// Throws InvalidArgument with the known requests.
+  std::uint32_t request_index(const std::string& name) const;
   /// Another frontend of one copy; it takes the second lane. Throws InvalidArgument.
   std::shared_ptr<UntypedFrontend> attach(std::size_t copy) const;
   /// Gives the segment of one copy a name. Throws as UntypedBackend::publish_as.
@@ -89,9 +96,9 @@ class InlineGroup {
   /// Throws InvalidArgument if the memory of the plan does not have the size it needs, or if its
   /// iterations do not fit into the history.
   void check(const BurstPlan& plan) const;
-  /// Sends the targets of the chosen copies and runs their iterations. `chosen`: their numbers, each
-  /// once. Copies between two iterations when it throws: CopyFailed; TimeoutError, Cancelled and
-  /// what `keep_waiting` throws, after which copies whose turn had not come have run nothing.
+  /// Sends the targets of the chosen copies and runs their iterations. `chosen`: their numbers,
+  /// each once. Copies between two iterations when it throws: CopyFailed; TimeoutError, Cancelled
+  /// and what `keep_waiting` throws, after which copies whose turn had not come have run nothing.
   void burst(const BurstPlan& plan, std::span<const std::uint32_t> chosen, Timeout timeout = {},
              const KeepWaiting& keep_waiting = {});
   /// Sends a request to the chosen copies, with a payload for each, and runs each until its request
@@ -100,7 +107,7 @@ class InlineGroup {
                std::span<const std::byte> payloads, Timeout timeout = {},
                const KeepWaiting& keep_waiting = {});
   /// Copies the newest rows of the chosen copies.
-  void latest(std::span<const std::uint32_t> chosen, std::span<std::byte> rows) const;
+  void latest(std::span<const std::uint32_t> chosen, std::span<std::byte> rows);
 
   /// From now on every call reads the newest row of each of its copies into `memory`, which must
   /// outlive the group or the next call of this function. Reads all copies now.
@@ -117,30 +124,34 @@ class InlineGroup {
 
   void add_copy(const RobotTable& table, const OptionValues& options,
                 const BackendOptions& backend);
-  bool go_on() noexcept;
+  Copy& at(std::size_t copy) const;
+  bool go_on();
+  void look_around() noexcept;
   template <class Each>
   void for_each(std::span<const std::uint32_t> chosen, Timeout timeout,
                 const KeepWaiting& keep_waiting, Each&& each);
-  void finish_call(std::span<const std::uint32_t> chosen);
+  void choose(std::span<const std::uint32_t> chosen);
+  [[noreturn]] void throw_failures();
+  void throw_unless_completed(std::uint32_t request, const Batch& batch) const;
   void read_gathered(std::uint32_t copy, const std::byte* row) noexcept;
-  void end_request(std::uint32_t copy, std::uint32_t request, const Batch& batch);
 
   std::string name_;
   std::vector<std::unique_ptr<Copy>> copies_;
   RowGather gather_;
   Gathered gathered_;
-  KeepWaiting go_on_;  // calls go_on()
+  KeepWaiting otherwise_;  // asked in bursts that are no call of the group
+  KeepWaiting go_on_;      // calls go_on()
 
   // of the call that runs
-  std::atomic<bool> running_{false};
+  std::atomic<std::uint32_t> running_{0};  // 1: a call runs
   std::atomic<bool> cancelled_{false};
   std::thread::id caller_;
   const KeepWaiting* ask_ = nullptr;
-  std::exception_ptr asked_;        // what it threw
+  std::exception_ptr asked_;  // what it threw
   Deadline deadline_{Timeout()};
   bool timed_out_ = false;
-  std::int64_t ask_at_ = 0;         // time of the next question [ns]
-  std::atomic<std::size_t> failures_{0};
+  std::int64_t ask_at_ = 0;          // time of the next question [ns]
+  std::atomic<bool> failed_{false};  // at least one copy
 
   std::atomic<bool> closed_{false};
   ForkGuard guard_;

@@ -32,7 +32,7 @@ WorkerPool::~WorkerPool() {
   for (std::thread& thread : threads_) thread.join();
 }
 
-void WorkerPool::begin(std::uint32_t count, Call call, void* object) noexcept {
+void WorkerPool::begin(std::uint32_t count, Call call, const void* object) noexcept {
   call_ = call;
   object_ = object;
   count_.store(count, std::memory_order_relaxed);

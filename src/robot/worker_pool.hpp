@@ -34,8 +34,10 @@ class WorkerPool {
   /// `look_around` is called in the calling thread between its tasks, and about every 50 ms while
   /// it waits for the workers. Neither may throw.
   template <class Task, class Look>
-  void run(std::uint32_t count, Task& task, Look& look_around) noexcept {
-    const auto call = [](void* object, std::uint32_t i) { (*static_cast<Task*>(object))(i); };
+  void run(std::uint32_t count, const Task& task, const Look& look_around) noexcept {
+    const auto call = [](const void* object, std::uint32_t i) {
+      (*static_cast<const Task*>(object))(i);
+    };
     begin(count, call, &task);
     std::uint32_t i = 0;
     while (take(round_.load(std::memory_order_relaxed), i)) {
@@ -47,9 +49,9 @@ class WorkerPool {
   }
 
  private:
-  using Call = void (*)(void* object, std::uint32_t i);
+  using Call = void (*)(const void* object, std::uint32_t i);
 
-  void begin(std::uint32_t count, Call call, void* object) noexcept;
+  void begin(std::uint32_t count, Call call, const void* object) noexcept;
   bool take(std::uint32_t round, std::uint32_t& i) noexcept;
   /// True if it was the last task of the call.
   bool finished() noexcept;
@@ -59,7 +61,7 @@ class WorkerPool {
   // written by the caller before `next_` changes; a worker reads call_ and object_ only after it
   // has taken a task, and the call cannot end before that task
   Call call_ = nullptr;
-  void* object_ = nullptr;
+  const void* object_ = nullptr;
   std::atomic<std::uint32_t> count_{0};
   alignas(64) std::atomic<std::uint32_t> round_{0};  // futex of the workers; number of the call
   std::atomic<bool> stop_{false};

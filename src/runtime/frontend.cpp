@@ -27,8 +27,8 @@ UntypedFrontend::UntypedFrontend(const std::string& segment, std::shared_ptr<Inl
 
 UntypedFrontend::UntypedFrontend(const UntypedBackend& backend,
                                  std::shared_ptr<InlineRunner> runner)
-    : link_(std::make_shared<Link>(AttachedSegment::attach(backend.segment()),
-                                   std::move(runner))) {}
+    : link_(std::make_shared<Link>(AttachedSegment::attach(backend.segment()), std::move(runner))) {
+}
 
 UntypedFrontend::UntypedFrontend(UntypedFrontend&&) noexcept = default;
 UntypedFrontend& UntypedFrontend::operator=(UntypedFrontend&& other) noexcept {

@@ -1,10 +1,10 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <optional>
 
+#include "base/ring.hpp"
 #include "control/record.hpp"
 
 namespace o80 {
@@ -45,7 +45,7 @@ class IdsInFlight {
 
   std::uint64_t places_;
   std::uint64_t kept_;
-  std::deque<Run> runs_;  // by `begin`, all within one revolution
+  Ring<Run> runs_;  // by `begin`, all within one revolution
 };
 
 }  // namespace o80

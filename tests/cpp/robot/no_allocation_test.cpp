@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <new>
 
+#include "robot/drifter.hpp"
 #include "robot/loop.hpp"
 #include "robot/puppet.hpp"
 
@@ -11,6 +12,8 @@ namespace {
 
 thread_local bool counting = false;
 thread_local long taken = 0;
+std::atomic<bool> counting_everywhere{false};
+std::atomic<long> taken_everywhere{0};
 
 }  // namespace
 
@@ -18,6 +21,7 @@ thread_local long taken = 0;
 #ifndef O80_TEST_THREAD_SANITIZED
 __attribute__((noinline)) void* operator new(std::size_t size) {
   if (counting) ++taken;
+  if (counting_everywhere.load(std::memory_order_relaxed)) ++taken_everywhere;
   if (void* memory = std::malloc(size == 0 ? 1 : size)) return memory;
   throw std::bad_alloc();
 }
@@ -113,6 +117,28 @@ TEST_F(AllocationTest, AnIterationTakesNothingWithCommandsRequestsBurstsAndWaite
   done = true;
   waiter.join();
   EXPECT_EQ(total, 0);
+}
+
+TEST_F(AllocationTest, ABurstOfAGroupTakesNothingInAnyOfItsThreads) {
+  for (const std::size_t threads : {1U, 3U}) {
+    InlineGroup group(drifter(), {},
+                      {.copies = 6, .threads = threads, .backend = InlineGroup::default_options()});
+    GroupBurst burst(group, 2, 3, 9);
+    burst.plan.command.pace = iterations(3);
+    std::vector<float> observations(6);
+    std::vector<std::uint8_t> flags(6);
+    const RowNumber number{.at = group.description().layout.observed, .kind = Kind::float64};
+    group.gather({.numbers = {{.from = number}}, .flags = {{.from = number}}},
+                 {observations, flags});
+    const KeepWaiting keep_waiting = [] { return true; };
+    // until queues that keep their memory have had their largest size
+    for (int i = 0; i < 400; ++i) group.burst(burst.plan, burst.all, kPatience, keep_waiting);
+    taken_everywhere = 0;
+    counting_everywhere = true;
+    for (int i = 0; i < 1000; ++i) group.burst(burst.plan, burst.all, kPatience, keep_waiting);
+    counting_everywhere = false;
+    EXPECT_EQ(taken_everywhere, 0) << threads << " threads";
+  }
 }
 
 }  // namespace

@@ -1,0 +1,181 @@
+"""Observations and event flags that an inline group reads from its newest rows, in C++."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from o80.checked import mapping, sequence
+from o80.columns import Column, columns_of
+from o80.errors import InvalidArgument
+from o80.loop_options import did_you_mean
+
+#: A path of a number, a comparison, and a value (or the label of an enumeration).
+Comparison = tuple[str, Literal["==", "!=", "<", "<=", ">", ">="], float | str]
+
+
+@dataclass(frozen=True)
+class Gathered:
+    """Numbers of a row for an observation: clip((number - offset) * scale, *clip).
+
+    path: for example "observed", "observed.elbow", "extended.force[2]".
+    offset, scale: a number, or one for each number of the path.
+    clip: the lowest and the highest value (None: no limits).
+
+    Computed in double precision, then rounded to float32.
+    """
+
+    path: str
+    offset: ArrayLike = 0.0
+    scale: ArrayLike = 1.0
+    clip: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class GatheredNumber:
+    """One number of an observation."""
+
+    column: Column
+    offset: float
+    scale: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class EventFlag:
+    """One event flag."""
+
+    name: str
+    column: Column
+    compare: str
+    value: float
+
+
+class Gather:
+    """What `InlineGroup.gather` reads of each copy.
+
+    observations: float32 (copies, numbers).
+    flags: bool (copies, flags); `gather["name"]` is one flag of all copies.
+
+    The group overwrites both arrays in every call.
+    """
+
+    def __init__(
+        self, copies: int, numbers: Sequence[GatheredNumber], flags: Sequence[EventFlag]
+    ) -> None:
+        self._numbers = numbers
+        self._flags = flags
+        self.observations: NDArray[np.float32] = np.zeros((copies, len(numbers)), np.float32)
+        self.flags: NDArray[np.bool_] = np.zeros((copies, len(flags)), np.bool_)
+
+    @property
+    def names(self) -> list[str]:
+        """The name of each number of an observation."""
+        return [number.column.name for number in self._numbers]
+
+    @property
+    def flag_names(self) -> list[str]:
+        """The name of each flag."""
+        return [flag.name for flag in self._flags]
+
+    def __getitem__(self, name: str) -> NDArray[np.bool_]:
+        """One flag of all copies: (copies,)."""
+        if name not in self.flag_names:
+            near = did_you_mean(name, self.flag_names)
+            raise KeyError(f"no flag is named '{name}'{near}")
+        return self.flags[:, self.flag_names.index(name)]
+
+    def _arguments(self) -> tuple[Any, ...]:
+        """For C++."""
+        numbers = [
+            (_place(each.column), each.offset, each.scale, each.low, each.high)
+            for each in self._numbers
+        ]
+        flags = [(_place(each.column), each.compare, each.value) for each in self._flags]
+        return numbers, flags, self.observations.view(np.uint8), self.flags.view(np.uint8)
+
+
+def numbers_from(wanted: Sequence[str | Gathered], schema: dict[str, Any]) -> list[GatheredNumber]:
+    """The numbers of an observation. Raises InvalidArgument."""
+    found: list[GatheredNumber] = []
+    for each in sequence(wanted, "numbers", "['observed']"):
+        gathered = Gathered(each) if isinstance(each, str) else each
+        if not isinstance(gathered, Gathered):
+            raise InvalidArgument(f"numbers holds paths and o80.Gathered, got {each!r}")
+        found += _numbers_of(gathered, schema)
+    return found
+
+
+def _numbers_of(gathered: Gathered, schema: dict[str, Any]) -> Iterator[GatheredNumber]:
+    columns = _columns_at(gathered.path, schema)
+    try:
+        offsets = np.broadcast_to(np.asarray(gathered.offset, np.float64), len(columns))
+        scales = np.broadcast_to(np.asarray(gathered.scale, np.float64), len(columns))
+    except ValueError as error:
+        raise InvalidArgument(
+            f"offset and scale of '{gathered.path}' must be a number or one for each of its "
+            f"{len(columns)} numbers: {error}"
+        ) from None
+    low, high = gathered.clip or (0.0, 0.0)
+    if gathered.clip is not None and not low < high:
+        raise InvalidArgument(f"clip of '{gathered.path}' must be (low, high), got {gathered.clip}")
+    for column, offset, scale in zip(columns, offsets, scales, strict=True):
+        yield GatheredNumber(column, float(offset), float(scale), float(low), float(high))
+
+
+def flags_from(wanted: Mapping[str, str | Comparison], schema: dict[str, Any]) -> list[EventFlag]:
+    """The event flags. Raises InvalidArgument."""
+    flags = []
+    for name, given in mapping(wanted, "flags", "names to comparisons").items():
+        comparison = (given, "!=", 0) if isinstance(given, str) else given
+        if not isinstance(comparison, tuple) or len(comparison) != 3:
+            raise InvalidArgument(
+                f"flag '{name}' must be a path or (path, comparison, value), got {given!r}"
+            )
+        path, compare, value = comparison
+        columns = _columns_at(path, schema)
+        if len(columns) != 1:
+            raise InvalidArgument(
+                f"flag '{name}' must look at one number, and '{path}' has {len(columns)}: "
+                f"name one, such as '{columns[0].name}'"
+            )
+        flags.append(EventFlag(name, columns[0], compare, _value_of(value, columns[0], name)))
+    return flags
+
+
+def _value_of(value: Any, column: Column, flag: str) -> float:
+    if isinstance(value, str):
+        labels = column.labels or {}
+        if value not in labels:
+            raise InvalidArgument(
+                f"flag '{flag}': '{column.name}' has no label '{value}'"
+                + (did_you_mean(value, labels) or f", its labels are {', '.join(labels) or 'none'}")
+            )
+        return float(labels[value])
+    return float(value)
+
+
+def _columns_at(path: str, schema: dict[str, Any]) -> list[Column]:
+    """The numbers of a row whose names begin with a path. Raises InvalidArgument."""
+    columns = list(columns_of(schema))
+    found = [column for column in columns if _is_below(column.name, path)]
+    if not found:
+        names = [column.name for column in columns]
+        near = did_you_mean(path, names)
+        raise InvalidArgument(
+            f"a row has no number '{path}'" + (near or f": it has {', '.join(names[:5])}")
+        )
+    return found
+
+
+def _is_below(name: str, path: str) -> bool:
+    return name == path or (name.startswith(path) and name[len(path)] in ".[")
+
+
+def _place(column: Column) -> tuple[int, str]:
+    return column.offset, column.dtype.str[1:]

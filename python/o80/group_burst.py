@@ -1,0 +1,104 @@
+"""A burst of the copies of an inline group that is repeated."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from o80 import _core
+from o80.errors import InvalidArgument
+from o80.trajectory import states_from
+
+#: Numbers of copies, each once, or a mask with a bool for each copy; None: all of them.
+Copies = ArrayLike | None
+
+
+class GroupBurst:
+    """A burst that sends targets to copies and returns all rows; from `InlineGroup.prepared_burst`.
+
+    targets: (copies, steps, actuators), to be filled before a run: numbers for states of one
+        number, otherwise structured. Floats that are not filled are NaN and refused. Targets keep
+        their values from run to run. An array that is assigned is copied into them.
+    rows: (copies, iterations), structured like `history().rows`: the rows of the last run of each
+        copy. Every run overwrites them: copy rows that you keep.
+    """
+
+    def __init__(
+        self,
+        group: _core.InlineGroup,
+        actuators: list[int],
+        states: NDArray[Any],
+        rows: NDArray[Any],
+        *,
+        pace: tuple[int, str, str, str],
+        everybody: NDArray[np.uint32],
+    ) -> None:
+        states.view(np.uint8).fill(255)
+        self._targets: NDArray[Any] = states.swapaxes(1, 2)
+        self._rows = rows
+        self._group = group
+        self._everybody = everybody
+        self._all = everybody.view(np.uint8)
+        memory = states.view(np.uint8), rows.view(np.uint8)
+        self._plan = _core.GroupPlan(actuators, states.shape[2], *pace, rows.shape[1], *memory)
+        group.check(self._plan)
+
+    @property
+    def targets(self) -> NDArray[Any]:
+        """The targets of the next run, (copies, steps, actuators)."""
+        return self._targets
+
+    @targets.setter
+    def targets(self, values: ArrayLike) -> None:
+        wanted = self._targets.dtype
+        given = np.asarray(values) if wanted.names is None else states_from(values, wanted)
+        if given.shape != self._targets.shape:
+            raise InvalidArgument(
+                f"targets must have the shape (copies, steps, actuators) = {self._targets.shape}, "
+                f"got {given.shape}"
+            )
+        if wanted.names is None and not np.can_cast(given.dtype, wanted, "same_kind"):
+            raise InvalidArgument(f"targets must have dtype {wanted}, got {given.dtype}")
+        self._targets[...] = given
+
+    @property
+    def rows(self) -> NDArray[Any]:
+        """The rows of the last run of each copy, (copies, iterations)."""
+        return self._rows
+
+    def run(self, copies: Copies = None, *, timeout: float | None = None) -> None:
+        """Sends the targets, with all else that was added, and bursts; fills `rows`.
+
+        copies: numbers of the copies that run, or a mask (None: all).
+        timeout: for all of them together [s].
+
+        Raises CopyFailed with the exception of each copy that failed (for example targets that the
+        robot cannot follow, a halt, a fault of its driver); all others are done. TimeoutError and
+        Ctrl-C leave each copy between two iterations; some have not run at all then.
+        """
+        chosen = self._all
+        if copies is not None:
+            chosen = chosen_copies(copies, self._everybody).view(np.uint8)
+        self._group.burst(self._plan, chosen, timeout)
+
+
+def chosen_copies(copies: Copies, everybody: NDArray[np.uint32]) -> NDArray[np.uint32]:
+    """Numbers of copies. Raises InvalidArgument."""
+    if copies is None:
+        return everybody
+    given = np.asarray(copies)
+    if given.dtype == np.bool_:
+        if given.shape != everybody.shape:
+            raise InvalidArgument(
+                f"a mask of copies must have the shape {everybody.shape}, got {given.shape}"
+            )
+        return np.flatnonzero(given).astype(np.uint32)
+    if given.ndim != 1 or (given.size and given.dtype.kind not in "iu"):
+        raise InvalidArgument(
+            f"copies must be a list of numbers of copies or a mask of bools, got {copies!r}"
+        )
+    if given.size and not 0 <= given.min() <= given.max() < len(everybody):
+        raise InvalidArgument(f"there are copies 0 to {len(everybody) - 1}, got {copies!r}")
+    return np.ascontiguousarray(given, np.uint32)

@@ -1,0 +1,229 @@
+"""Copies of one robot in this process, stepped together by threads of C++.
+
+with o80.robots.load("two_joints").inline(copies=64) as group:
+    burst = group.prepared_burst(10)
+    burst.targets[...] = 0.5
+    burst.run()
+    burst.rows["observed"]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o80 import _core, at_exit
+from o80.checked import whole
+from o80.errors import InvalidArgument
+from o80.frontend import Frontend
+from o80.gather import Comparison, Gather, Gathered, flags_from, numbers_from
+from o80.group_burst import GroupBurst, chosen_copies
+from o80.layout import Layout
+from o80.prepared_burst import checked_count
+from o80.trajectory import common_type
+from o80.words import ModeWord, ProfileWord, StartWord
+
+if TYPE_CHECKING:
+    from o80.group_burst import Copies
+
+__all__ = ["Gather", "Gathered", "GroupBurst", "InlineGroup"]
+
+
+class InlineGroup:
+    """Copies of one robot in this process; made by `Robot.inline(copies=...)`.
+
+    Each copy does what a single inline robot does, bit for bit, with any number of threads. A call
+    runs the copies in all threads of the group, without the GIL. A copy that fails in it raises
+    CopyFailed with its number; the others are done. Ctrl-C ends a call within about 50 ms and
+    leaves each copy between two iterations.
+
+    One thread at a time may call the group. In a forked child its calls raise UsedAfterFork.
+    """
+
+    def __init__(self, group: _core.InlineGroup) -> None:
+        self._group = group
+        self._layout = Layout(group.description)
+        self._all = np.arange(group.copies, dtype=np.uint32)
+        self._frontends: dict[int, Frontend] = {}
+        self._closed = False
+        at_exit.close_later(self)
+
+    @property
+    def copies(self) -> int:
+        """Number of copies."""
+        return self._group.copies
+
+    @property
+    def threads(self) -> int:
+        """Number of threads that run them, the calling one included."""
+        return self._group.threads
+
+    @property
+    def robot(self) -> str:
+        """Name of the robot."""
+        return self._group.robot
+
+    @property
+    def closed(self) -> bool:
+        """True after `close`."""
+        return self._closed
+
+    def __len__(self) -> int:
+        return self.copies
+
+    def __getitem__(self, copy: int) -> Frontend:
+        """A frontend of one copy: to see what the robot is, and to command, halt or read that copy.
+
+        A burst of it runs that copy alone, in the calling thread.
+        """
+        number = self._number(copy)
+        found = self._frontends.get(number)
+        if found is None or found.closed:
+            found = Frontend._of(self._group.attach(number), unnamed=False)
+            self._frontends[number] = found
+        return found
+
+    def prepared_burst(
+        self,
+        iterations: int = 1,
+        actuators: int | str | Sequence[int | str] | None = None,
+        *,
+        steps: int = 1,
+        each: int = 1,
+        mode: ModeWord = "queue",
+        profile: ProfileWord = "linear",
+        start: StartWord = "desired",
+    ) -> GroupBurst:
+        """Prepares a burst of the copies that is repeated: it sends targets and returns all rows.
+
+        iterations: number of iterations of each burst.
+        actuators: indices or names of the actuators that get targets (None: all).
+        steps: number of targets of each actuator in a burst.
+        each: iterations to reach each target.
+        mode, profile, start: as in `Frontend.add_command`.
+
+        Raises InvalidArgument, also if the history is too short for so many rows.
+        """
+        self._group.check_usable()
+        chosen, _ = self[0]._chosen(actuators)
+        shape = self.copies, len(chosen), checked_count(steps, "steps")
+        count = checked_count(iterations, "iterations")
+        return GroupBurst(
+            self._group,
+            chosen,
+            np.empty(shape, common_type(chosen, self._layout)),
+            np.zeros((self.copies, count), self._layout.row),
+            pace=(checked_count(each, "each"), mode, profile, start),
+            everybody=self._all,
+        )
+
+    def request(
+        self, name: str, /, *, copies: Copies = None, timeout: float | None = None, **fields: Any
+    ) -> None:
+        """Sends a request to copies and runs each until its request has ended.
+
+        name: name of the request.
+        copies: numbers of the copies, or a mask (None: all).
+        timeout: for all of them together [s].
+        fields: fields of the request. A value with one dimension more than the field has one entry
+            for each of these copies: `seed=[3, 4]`.
+
+        Raises CopyFailed for requests that were not completed, TimeoutError, InvalidArgument.
+        """
+        chosen = chosen_copies(copies, self._all)
+        spread = {field: self._spread(name, field, fields[field], len(chosen)) for field in fields}
+        each = [{field: values[i] for field, values in spread.items()} for i in range(len(chosen))]
+        self._group.request(name, chosen.view(np.uint8), each, timeout)
+
+    def latest(self, copies: Copies = None) -> NDArray[Any]:
+        """The newest row of each copy, structured like `history().rows`: (copies,)."""
+        chosen = chosen_copies(copies, self._all)
+        rows = np.zeros(len(chosen), self._layout.row)
+        self._group.latest(chosen.view(np.uint8), rows.view(np.uint8))
+        return rows
+
+    def gather(
+        self,
+        numbers: Sequence[str | Gathered],
+        flags: Mapping[str, str | Comparison] | None = None,
+    ) -> Gather:
+        """Reads observations and event flags of the newest rows from now on, in C++.
+
+        numbers: paths in a row ("observed", "observed.elbow", "extended.force[2]"), or Gathered
+            with an offset, a scale and limits. A path of several numbers stands for all of them.
+        flags: for each name a path of a number that is not 0, or a comparison such as
+            `("extended.height", "<", 0.1)`.
+
+        Every burst and request of this group refreshes them for its copies, on the threads of the
+        group, before it returns. A later call of `gather` replaces them.
+        """
+        gather = Gather(
+            self.copies,
+            numbers_from(numbers, self._layout.schema),
+            flags_from(flags or {}, self._layout.schema),
+        )
+        self._group.gather(*gather._arguments())
+        return gather
+
+    def publish(self, copy: int, name: str) -> None:
+        """Gives the segment of one copy a name, so that other processes can attach to it.
+
+        `o80 view`, `o80 record` and `o80.Frontend(name)` then work as for any backend, until the
+        group is closed. Raises SegmentTaken, and Error if that copy has a name already.
+        """
+        self._group.publish(self._number(copy), name)
+
+    def close(self) -> None:
+        """Stops all copies. May be called twice."""
+        if self._closed:
+            return
+        self._closed = True
+        for frontend in self._frontends.values():
+            frontend.close()
+        self._group.close()
+
+    def _close_at_exit(self) -> None:
+        self.close()
+
+    def _number(self, copy: int) -> int:
+        number = whole(copy, "the number of a copy")
+        if not -self.copies <= number < self.copies:
+            raise IndexError(f"there are copies 0 to {self.copies - 1}, there is no copy {number}")
+        return number % self.copies
+
+    def _spread(self, name: str, field: str, value: Any, count: int) -> Sequence[Any]:
+        """A value for each of `count` copies."""
+        if isinstance(value, str) or np.ndim(value) <= self._dimensions(name, field):
+            return [value] * count
+        if len(value) != count:
+            raise InvalidArgument(
+                f"{field} of request '{name}' has {len(value)} entries for {count} copies"
+            )
+        return value if isinstance(value, list) else list(value)
+
+    def _dimensions(self, name: str, field: str) -> int:
+        for request in self._layout.schema["requests"]:
+            if request["name"] == name:
+                for known in request["type"]["fields"]:
+                    if known["name"] == field:
+                        return len(known["shape"])
+        return 0  # C++ says what is unknown
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        state = "closed" if self._closed else f"{self.threads} threads"
+        return f"<o80.InlineGroup of {self.copies} copies of '{self.robot}', {state}>"

@@ -1,0 +1,323 @@
+"""Inline groups: copies of one robot in this process (o80.InlineGroup)."""
+
+import os
+import pickle
+import resource
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import o80
+
+COPIES = 5
+
+
+@pytest.fixture
+def group() -> Iterator[o80.InlineGroup]:
+    with o80.robots.load("two_joints").inline(copies=COPIES, threads=2) as group:
+        yield group
+
+
+def files() -> list[str]:
+    folder = Path(os.environ.get("O80_DIRECTORY", "/dev/shm"))
+    return [file.name for file in folder.glob("o80-*")]
+
+
+@pytest.mark.parametrize("threads", [1, 2, 4])
+def test_gives_the_rows_of_single_robots_bit_for_bit(threads: int) -> None:
+    random = np.random.default_rng(3)
+    robot = o80.robots.load("two_joints")
+    with robot.inline(copies=COPIES, threads=threads, gain=30.0) as group:
+        singles = [robot.inline(gain=30.0) for _ in range(COPIES)]
+        burst = group.prepared_burst(6, steps=2, each=3)
+        bursts = [single.prepared_burst(6, steps=2, each=3) for single in singles]
+        for turn in range(20):
+            burst.targets = random.uniform(-2, 2, (COPIES, 2, 2))
+            burst.run()
+            for i, one in enumerate(bursts):
+                one.targets = burst.targets[i]
+                one.run()
+                assert burst.rows[i].tobytes() == one.rows.tobytes()
+            if turn % 5 == 2:
+                some = random.permutation(COPIES)[:3]
+                group.request("reset", copies=some, seed=some)
+                for i in some:
+                    singles[i].request("reset", seed=i)
+                for i, single in enumerate(singles):
+                    assert group.latest()[i].tobytes() == single.history(1).rows[0].tobytes()
+        for single in singles:
+            single.close()
+
+
+def test_leaves_no_file_and_names_a_copy_on_request(group: o80.InlineGroup) -> None:
+    assert files() == []
+    group.publish(2, "shown")
+    with o80.Frontend("shown", read_only=True) as watcher:
+        group[2].burst(4)
+        assert watcher.published == 4
+    with pytest.raises(o80.Error, match="has a name already"):
+        group.publish(2, "again")
+    group.close()
+    assert files() == []
+
+
+def test_a_failed_copy_is_named_and_the_others_are_done(group: o80.InlineGroup) -> None:
+    burst = group.prepared_burst(4)
+    burst.targets = np.zeros((COPIES, 1, 2))
+    burst.targets[3, 0, 1] = np.nan
+    group[1].halt("a test")
+    with pytest.raises(o80.CopyFailed, match=r"copy 1 of 'two_joints' failed.*a test") as failed:
+        burst.run()
+    assert set(failed.value.errors) == {1, 3}
+    assert isinstance(failed.value.errors[1], o80.BackendHalted)
+    assert isinstance(failed.value.errors[3], o80.InvalidArgument)
+    assert failed.value.__cause__ is failed.value.errors[1]
+    assert burst.rows["iteration"][[0, 2, 4], -1].tolist() == [4, 4, 4]
+    again = pickle.loads(pickle.dumps(failed.value))
+    assert str(again) == str(failed.value)
+    assert set(again.errors) == {1, 3}
+
+    burst.targets[3] = 0
+    burst.run([True, False, True, True, True])
+    assert burst.rows["iteration"][[0, 2, 3, 4], -1].tolist() == [8, 8, 4, 8]
+
+
+def test_gathers_what_numpy_would(group: o80.InlineGroup) -> None:
+    gather = group.gather(
+        [
+            o80.Gathered("observed", offset=[0.1, 0.2], scale=3, clip=(-0.5, 0.5)),
+            "desired.elbow",
+            o80.Gathered("extended.effort", scale=[0.5, 2]),
+        ],
+        {"far": ("observed.elbow", ">", 0.25), "moves": "extended.effort[0]"},
+    )
+    assert gather.names == [
+        "observed.shoulder",
+        "observed.elbow",
+        "desired.elbow",
+        "extended.effort[0]",
+        "extended.effort[1]",
+    ]
+    assert not gather.flags.any()
+    burst = group.prepared_burst(7)
+    burst.targets = np.random.default_rng(1).uniform(-2, 2, (COPIES, 1, 2))
+    for _ in range(4):
+        burst.run()
+    rows = burst.rows[:, -1]
+    expected = np.concatenate(
+        [
+            np.clip((rows["observed"] - [0.1, 0.2]) * 3, -0.5, 0.5),
+            rows["desired"][:, 1:],
+            rows["extended"]["effort"] * [0.5, 2],
+        ],
+        axis=1,
+    ).astype(np.float32)
+    assert np.array_equal(gather.observations, expected)
+    assert np.array_equal(gather["far"], rows["observed"][:, 1] > 0.25)
+    assert gather["moves"].all()
+
+    group.request("reset", copies=[1, 2])
+    reset = np.array([False, True, True, False, False])
+    assert not gather["moves"][reset].any()
+    assert np.array_equal(gather.observations[~reset], expected[~reset])
+
+
+@pytest.mark.parametrize(
+    ("numbers", "flags", "words"),
+    [
+        (["observed.elbo"], {}, "Did you mean 'observed.elbow'"),
+        (["nothing"], {}, "a row has no number 'nothing': it has desired.shoulder"),
+        ([o80.Gathered("observed", scale=[1, 2, 3])], {}, "one for each of its 2 numbers"),
+        ([o80.Gathered("observed", clip=(1, 0))], {}, r"must be \(low, high\)"),
+        ([], {"far": "observed"}, "must look at one number, and 'observed' has 2"),
+        ([], {"far": ("observed.elbow", "~", 1)}, "compares with ==, !="),
+        ([], {"far": ("observed.elbow", "==", "open")}, "has no label 'open'"),
+        ("observed", {}, "must be a list"),
+    ],
+)
+def test_says_what_cannot_be_gathered(
+    group: o80.InlineGroup, numbers: list[str], flags: dict[str, str], words: str
+) -> None:
+    with pytest.raises(o80.InvalidArgument, match=words):
+        group.gather(numbers, flags)
+
+
+def test_refuses_wrong_arguments(group: o80.InlineGroup) -> None:
+    robot = o80.robots.load("two_joints")
+    with pytest.raises(o80.InvalidArgument, match="copies must be at least 1, got 0"):
+        robot.inline(copies=0)
+    with pytest.raises(o80.InvalidArgument, match="give copies too"):
+        robot.inline(threads=2)  # type: ignore[call-overload]
+    with pytest.raises(o80.InvalidArgument, match="leave out segment"):
+        robot.inline("arm", copies=2)  # type: ignore[call-overload]
+    with pytest.raises(o80.InvalidArgument, match="history=65"):
+        group.prepared_burst(65)
+    burst = group.prepared_burst(4)
+    with pytest.raises(o80.InvalidArgument, match=r"\(copies, steps, actuators\) = \(5, 1, 2\)"):
+        burst.targets = np.zeros((5, 2))
+    burst.targets = np.zeros((5, 1, 2))
+    for copies, words in (
+        ([5], "copies 0 to 4"),
+        ([-1], "copies 0 to 4"),
+        ([1, 1], "named twice"),
+        ([True], "must have the shape"),
+        ([0.5], "list of numbers"),
+        (3, "list of numbers"),
+    ):
+        with pytest.raises(o80.InvalidArgument, match=words):
+            burst.run(copies)
+    burst.run([])
+    assert not burst.rows["iteration"].any()
+    with pytest.raises(o80.InvalidArgument, match="seed of request 'reset' has 2 entries for 5"):
+        group.request("reset", seed=[1, 2])
+    with pytest.raises(o80.InvalidArgument, match=r"'rest'.*Did you mean 'reset'"):
+        group.request("rest")
+    with pytest.raises(IndexError, match="copies 0 to 4"):
+        group[5]
+    with pytest.raises(TypeError, match="cannot be pickled"):
+        pickle.dumps(burst)
+
+
+def test_serves_requests_that_take_time(group: o80.InlineGroup) -> None:
+    burst = group.prepared_burst(30)
+    burst.targets = np.full((COPIES, 1, 2), 0.4)
+    burst.run()
+    group.request("home", copies=[0, 3], speed=[2.0, 1.0])
+    home = group.latest()
+    assert np.abs(home["observed"][[0, 3]]).max() < 1e-6
+    assert np.abs(home["observed"][[1, 2, 4]]).min() > 0.1
+    assert home["iteration"][3] > home["iteration"][0] > home["iteration"][1]
+
+
+def test_a_frontend_of_a_copy_may_be_closed(group: o80.InlineGroup) -> None:
+    with group[1] as frontend:
+        frontend.burst(3)
+    burst = group.prepared_burst(4)
+    burst.targets = np.zeros((COPIES, 1, 2))
+    burst.run()
+    assert burst.rows["iteration"][1, -1] == 7
+    assert group[1].published == 7
+    assert group[-1].published == 4
+
+
+def test_is_closed_and_says_so(group: o80.InlineGroup) -> None:
+    burst = group.prepared_burst(4)
+    frontend = group[0]
+    group.close()
+    group.close()
+    assert group.closed
+    assert frontend.closed
+    with pytest.raises(o80.Closed):
+        burst.run()
+    with pytest.raises(o80.Closed):
+        group.latest()
+
+
+CTRL_C = """
+import os, signal, sys, threading, time
+import o80
+group = o80.robots.load("two_joints").inline(copies=4, threads=2)
+burst = group.prepared_burst(30)
+burst.targets[...] = 0.5
+for _ in range(10):
+    burst.run()
+def interrupt():
+    while group[3].published < 301:  # the long request of the last copy has begun
+        time.sleep(0.001)
+    os.kill(os.getpid(), signal.SIGINT)
+threading.Thread(target=interrupt, daemon=True).start()
+try:
+    group.request("home", speed=1e-9)  # takes years
+except KeyboardInterrupt:
+    reached = group.latest()["iteration"].copy()
+    for i in range(4):
+        group[i].burst(5)
+    assert (group.latest()["iteration"] == reached + 5).all()
+    print("interrupted")
+"""
+
+
+def test_ctrl_c_ends_a_call_between_two_iterations() -> None:
+    program = CTRL_C.replace("copies=4, threads=2", "copies=4, threads=4")
+    ended = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", program], capture_output=True, text=True, timeout=60
+    )
+    assert ended.stdout == "interrupted\n", ended.stderr
+
+
+def test_a_forked_child_is_told_to_open_its_own(group: o80.InlineGroup) -> None:
+    burst = group.prepared_burst(4)
+    burst.targets = np.zeros((COPIES, 1, 2))
+    burst.run()
+    child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            burst.run()
+        except o80.UsedAfterFork:
+            code = 7
+        os._exit(code)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
+    burst.run()
+    assert burst.rows["iteration"][:, -1].tolist() == [8] * COPIES
+
+
+KILLED = """
+import o80
+group = o80.robots.load("two_joints").inline(copies=8)
+burst = group.prepared_burst(30)
+burst.targets[...] = 0.5
+print("ready", flush=True)
+while True:
+    burst.run()
+"""
+
+
+def test_a_killed_trainer_leaves_nothing() -> None:
+    process = subprocess.Popen([sys.executable, "-c", KILLED], stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    assert process.stdout.readline() == "ready\n"
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    process.stdout.close()
+    assert files() == []
+
+
+def test_its_threads_release_the_interpreter(group: o80.InlineGroup) -> None:
+    """Another Python thread runs while a call of the group waits for it."""
+    ended = threading.Event()
+
+    def end() -> None:
+        while frontend.published < 50:
+            pass
+        frontend.halt("a test")
+        ended.set()
+
+    frontend = group[0]
+    burst = group.prepared_burst(30)
+    burst.targets = np.full((COPIES, 1, 2), 0.4)
+    burst.run()
+    thread = threading.Thread(target=end)
+    thread.start()
+    with pytest.raises(o80.CopyFailed, match="a test"):
+        group.request("home", copies=[0], speed=1e-9)
+    thread.join()
+    assert ended.is_set()
+
+
+def test_many_copies_fit_into_the_files_of_a_process() -> None:
+    soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    with o80.robots.load("two_joints").inline(copies=200) as group:
+        burst = group.prepared_burst(2)
+        burst.targets = np.ones((200, 1, 2))
+        burst.run()
+        assert (burst.rows["desired"][:, -1] == 1).all()
+    now, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    assert now >= soft
+    resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
