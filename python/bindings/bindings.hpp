@@ -18,3 +18,4 @@ void bind_loop_state(nanobind::module_& module);
 void bind_journal(nanobind::module_& module);
 void bind_provenance(nanobind::module_& module);
 void bind_nearest_name(nanobind::module_& module);
+void bind_replay(nanobind::module_& module);

@@ -31,4 +31,5 @@ NB_MODULE(_core, m) {
   bind_journal(m);
   bind_provenance(m);
   bind_nearest_name(m);
+  bind_replay(m);
 }

@@ -55,6 +55,8 @@ if TYPE_CHECKING:
     from o80.recording.reader import RecordingFile
     from o80.recording.reader import open as open
     from o80.recording.recording import Recording
+    from o80.replaying.replay import replay
+    from o80.replaying.report import ReplayReport, RunReport
     from o80.running_request import RunningRequest
     from o80.segment_list import Segment, clean, segments
     from o80.states import States
@@ -94,6 +96,9 @@ _LAZY = {
     "Recording": "o80.recording.recording",
     "RecordingFile": "o80.recording.reader",
     "open": "o80.recording.reader",
+    "replay": "o80.replaying.replay",
+    "ReplayReport": "o80.replaying.report",
+    "RunReport": "o80.replaying.report",
     "RunningRequest": "o80.running_request",
     "Segment": "o80.segment_list",
     "clean": "o80.segment_list",
@@ -174,8 +179,10 @@ __all__ = [
     "Recording",
     "RecordingError",
     "RecordingFile",
+    "ReplayReport",
     "RequestRejected",
     "RowOverwritten",
+    "RunReport",
     "Running",
     "RunningRequest",
     "SchemaMismatch",
@@ -196,6 +203,7 @@ __all__ = [
     "halt",
     "prefix",
     "register_frontend",
+    "replay",
     "robots",
     "segments",
     "stop",

@@ -17,6 +17,7 @@ class Column(NamedTuple):
     dtype: np.dtype[Any]
     offset: int  #: in the row
     labels: dict[str, int] | None  #: of an enumeration
+    origin: str = "robot"  #: or "clock" or "world", from which its value comes (docs/drivers.md)
 
 
 def columns_of(schema: dict[str, Any]) -> Iterator[Column]:
@@ -34,9 +35,12 @@ def columns_of(schema: dict[str, Any]) -> Iterator[Column]:
         yield from _numbers(schema["extended"], "extended", row["extended"])
 
 
-def _numbers(described: dict[str, Any], path: str, start: int) -> Iterator[Column]:
-    """The columns of a described type, in order."""
+def _numbers(
+    described: dict[str, Any], path: str, start: int, outer: str = "robot"
+) -> Iterator[Column]:
+    """The columns of a described type, in order. outer: origin of the field that holds it."""
     for field in described["fields"]:
+        origin = field.get("origin", outer)
         inner = f"{path}.{field['name']}" if field["name"] else path
         dtype = dtype_of_field(field)
         places = itertools.product(*map(range, field["shape"]))
@@ -44,10 +48,10 @@ def _numbers(described: dict[str, Any], path: str, start: int) -> Iterator[Colum
             name = inner + "".join(f"[{k}]" for k in place)
             offset = start + field["offset"] + i * dtype.itemsize
             if field["kind"] == "struct":
-                yield from _numbers(field["type"], name, offset)
+                yield from _numbers(field["type"], name, offset, origin)
             else:
                 labels = field["labels"] if field["kind"] == "enum" else None
-                yield Column(name, dtype, offset, labels)
+                yield Column(name, dtype, offset, labels, origin)
 
 
 def values_of(rows: NDArray[Any], column: Column) -> NDArray[Any]:

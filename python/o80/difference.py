@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o80 import _core
+from o80.columns import columns_of
 from o80.errors import InvalidArgument
 from o80.export import columns_in
 from o80.history import History
@@ -41,8 +42,8 @@ def first_difference(
 ) -> Difference | None:
     """The earliest iteration in which two histories differ, or None.
 
-    Numbers are compared bit for bit, except that the columns `time`, `lateness`, `overruns` and
-    `skipped` of a robot in real time are left out.
+    Numbers are compared bit for bit. The fields of the clock are left out: `time`, `lateness`,
+    `overruns` and `skipped` of a robot in real time, and those that its driver marks so.
     ignore: columns to leave out, such as "lateness" or "extended" (all sensor values).
     tolerances: by column, likewise, the largest absolute difference that counts as equal.
     Raises InvalidArgument if the robots differ, or a column is unknown.
@@ -63,6 +64,7 @@ def first_difference(
     found = [] if lacking is None else [lacking]
     real_time = "monotonic" in (one.schema["clock"], other.schema["clock"])
     left_out = [*ignore, *(OF_THE_CLOCK if real_time else ())]
+    left_out += [each.name for each in columns_of(one.schema) if each.origin == "clock"]
     for column in mine:
         if column == "iteration" or any(_belongs(column, named) for named in left_out):
             continue

@@ -100,6 +100,10 @@ void write_field(JsonWriter& json, const Schema& schema, const TypeRow& type,
     json.key("rest");
     json.value(field.rest);
   }
+  if (field.origin != Origin::robot) {
+    json.key("origin");
+    json.value(std::string_view(field.origin == Origin::clock ? "clock" : "world"));
+  }
   if (field.has_default != 0) {
     json.key("default");
     write_value(json, schema, field, schema.defaults.data() + type.first_default + field.offset);
@@ -242,6 +246,8 @@ std::string to_json(const Schema& schema) {
   json.value(schema.head.silence);
   json.key("stale");
   json.value(name_of(schema.head.stale));
+  json.key("of_the_world");
+  json.value(schema.head.of_the_world != 0);
   json.key("row");
   write_layout(json, row_layout(schema));
   json.key("groups");

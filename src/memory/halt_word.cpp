@@ -64,6 +64,13 @@ std::uint64_t ask_for_halt(const SegmentView& view, HaltCause cause, std::string
   return number;
 }
 
+void put_halt(const SegmentView& view, std::uint64_t number, HaltCause cause, std::string_view who,
+              std::string_view text) noexcept {
+  Bell& bell = view.bell();
+  write_halt(bell.reasons[number % kHaltsKept], number, cause, -1, who, text);
+  bell.halts.store(number, std::memory_order_seq_cst);  // sync halts
+}
+
 HaltLatch::HaltLatch(const SegmentView& view) noexcept : view_(view) {}
 
 bool HaltLatch::look() noexcept {

@@ -23,6 +23,11 @@ namespace o80 {
 std::uint64_t ask_for_halt(const SegmentView& view, HaltCause cause, std::string_view who,
                            std::string_view text) noexcept;
 
+/// Sets the counter to the number of a recorded halt, with its reason: for a replay, whose backend
+/// gets halts from nowhere else.
+void put_halt(const SegmentView& view, std::uint64_t number, HaltCause cause, std::string_view who,
+              std::string_view text) noexcept;
+
 /// The backend's side: finds requested halts, and shows the halt in force to all processes.
 ///
 /// Any change of the counter counts as a halt, also an invalid one (a decrease).

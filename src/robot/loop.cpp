@@ -23,11 +23,12 @@ BackendOptions with_provenance(BackendOptions options, const DriverInstance& rob
 }
 }  // namespace
 
-Loop::Loop(std::unique_ptr<DriverInstance> robot, const BackendOptions& options)
+Loop::Loop(std::unique_ptr<DriverInstance> robot, const BackendOptions& options,
+           RecordedDecisions* recorded)
     : robot_(std::move(robot)),
-      backend_(robot_->describe(options.period), with_provenance(options, *robot_), this),
+      backend_(robot_->describe(options.period), with_provenance(options, *robot_), this, recorded),
       pacer_(backend_.schema().head.period),
-      paced_(!options.bursting),
+      paced_(!options.bursting && recorded == nullptr),
       interrupted_(backend_.layout().mask_words + 1),
       reports_(backend_.schema().requests.size()) {
   fault_.reserve(1024);
@@ -88,6 +89,13 @@ Step Loop::run_granted(std::uint32_t most) noexcept {
     const Step step = finished_ ? Step::ended : backend_.try_step();
     if (step == Step::standing) return step;
     if (step == Step::ended || !iterate()) stop();
+  }
+  return ended_ ? Step::ended : Step::run;
+}
+
+Step Loop::replay(Iteration last) noexcept {
+  while (!ended_ && backend_.iteration() <= last) {
+    if (backend_.step() == Step::ended || !iterate()) stop();
   }
   return ended_ ? Step::ended : Step::run;
 }

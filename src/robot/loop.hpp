@@ -26,7 +26,9 @@ class Loop final : public RequestServer {
  public:
   /// Describes the robot, takes the segment's name, publishes the segment as starting.
   /// Throws SegmentTaken, SegmentError, InvalidArgument, DriverError.
-  Loop(std::unique_ptr<DriverInstance> robot, const BackendOptions& options);
+  /// With `recorded`, the loop replays a run: see `replay`.
+  Loop(std::unique_ptr<DriverInstance> robot, const BackendOptions& options,
+       RecordedDecisions* recorded = nullptr);
   Loop(const Loop&) = delete;
   Loop& operator=(const Loop&) = delete;
   ~Loop();
@@ -40,6 +42,9 @@ class Loop final : public RequestServer {
   /// Bursting only: runs at most `most` granted iterations in this thread; `Step::run` if more are
   /// granted.
   Step run_granted(std::uint32_t most) noexcept;
+  /// Runs the iterations of a recorded run up to this one, without waiting; `Step::ended` if the
+  /// driver failed.
+  Step replay(Iteration last) noexcept;
   /// Cancels the rest of the current burst.
   void cut_burst() noexcept { backend_.cut_burst(); }
   /// Stops the robot and ends the backend. Called by run() and the destructor.

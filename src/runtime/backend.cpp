@@ -15,6 +15,7 @@
 #include "o80/base/version.hpp"
 #include "runtime/backend_body.hpp"
 #include "runtime/provenance_bytes.hpp"
+#include "runtime/recorded_decisions.hpp"
 #include "runtime/run_option_texts.hpp"
 
 namespace o80 {
@@ -162,7 +163,8 @@ std::size_t largest_request(const Schema& schema) {
 
 }  // namespace
 
-UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, RequestServer* server)
+UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, RequestServer* server,
+                           RecordedDecisions* recorded)
     : schema(prepared(std::move(given), options)),
       layout(row_layout(schema)),
       provenance(provenance_of(schema, options)),
@@ -181,6 +183,7 @@ UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, Reques
       running(schema, segment.view()),
       verbs(segment.view()),
       server_(server),
+      recorded_(recorded),
       lives_(lanes.size()),
       handled_deaths_(lanes.size()),
       row_(layout.size / 8),
@@ -202,6 +205,7 @@ UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, Reques
 
 /// In bursting mode waits at most `at_most` [ns] for a burst.
 Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
+  if (recorded_ != nullptr) return step_recorded();
   const std::int64_t give_up =
       at_most > 0 && at_most < kForEver ? monotonic_now() + at_most : at_most;
   const std::uint32_t most_looks = 2 + pool.size() / kWorkPerIteration;
@@ -246,14 +250,23 @@ Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
     share_ = {};
     take_due();
   }
-  under_way_ = true;
-  outbox_.begin_step();
   if (burst_.is_in_last_iteration()) history.expect(current);
-  controller.step(current, row() + layout.observed);
-  outbox_.end_step();
+  move();
   show_acts();
   O80_CRASH_POINT("backend.after_step");
   return Step::run;
+}
+
+/// Commands => desired.
+void UntypedBackend::Body::move() noexcept {
+  under_way_ = true;
+  outbox_.begin_step();
+  controller.step(current, row() + layout.observed);
+  outbox_.end_step();
+}
+
+std::int64_t UntypedBackend::Body::real_time() const noexcept {
+  return recorded_ == nullptr ? monotonic_now() : recorded_->time(current);
 }
 
 /// Finds NaN or infinity in the first reading or in a fresh start, which are refused because no
@@ -283,7 +296,11 @@ bool UntypedBackend::Body::publish_first() noexcept {
 void UntypedBackend::Body::publish(bool fresh) noexcept {
   if (!begun_) {
     controller.restart(row() + layout.observed, nullptr, 0);
-    watch_halt();
+    if (recorded_ == nullptr) {
+      watch_halt();
+    } else {
+      obey_recorded();
+    }
   }
 
   // observed and extended are in the row already: add head, desired and masks
@@ -341,8 +358,9 @@ void UntypedBackend::Body::end(BackendState state, std::string_view text) noexce
 
 // ------------------------------------------------------------------------------
 
-UntypedBackend::UntypedBackend(Schema schema, const BackendOptions& options, RequestServer* server)
-    : body_(std::make_unique<Body>(std::move(schema), options, server)) {}
+UntypedBackend::UntypedBackend(Schema schema, const BackendOptions& options, RequestServer* server,
+                               RecordedDecisions* recorded)
+    : body_(std::make_unique<Body>(std::move(schema), options, server, recorded)) {}
 
 UntypedBackend::~UntypedBackend() {
   body_->end(failure().empty() ? BackendState::stopped : BackendState::failed, failure());

@@ -187,13 +187,17 @@ void UntypedBackend::Body::accept(const StagedBatch& sent) noexcept {
 
 void UntypedBackend::Body::take(const StagedBatch& sent) noexcept {
   O80_COUNT(batch_taken);
-  taking_owner_ = sent.had_left ? 0 : sent.incarnation;
   // if the ticket counter was reset since the batch was staged, a purge with the old ticket would
   // end batches that are sent from now on
   StagedBatch taken = sent;
   taken.ticket = lanes.drawn_at_most(sent.ticket);
   pool.batch(sent.batch).ticket = taken.ticket;
-  deciding_ = &taken;
+  take_checked(taken);
+}
+
+void UntypedBackend::Body::take_checked(const StagedBatch& sent) noexcept {
+  taking_owner_ = sent.had_left ? 0 : sent.incarnation;
+  deciding_ = &sent;
   controller.take(sent.lane, sent.batch, *this);
   deciding_ = nullptr;
 }

@@ -22,6 +22,7 @@
 #include "memory/verb_word.hpp"
 #include "o80/base/time.hpp"
 #include "o80/runtime/backend.hpp"
+#include "o80/runtime/journal.hpp"
 #include "runtime/burst_grant.hpp"
 #include "runtime/control_holder.hpp"
 #include "runtime/decision_journal.hpp"
@@ -44,7 +45,8 @@ inline constexpr std::uint32_t kExpressWork = 512;
 /// controller.
 class UntypedBackend::Body final : public StatusSink, public BatchHandler {
  public:
-  Body(Schema&& given, const BackendOptions& options, RequestServer* server);
+  Body(Schema&& given, const BackendOptions& options, RequestServer* server,
+       RecordedDecisions* recorded);
   Body(const Body&) = delete;
   Body& operator=(const Body&) = delete;
   virtual ~Body() = default;
@@ -75,7 +77,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   bool acts() const noexcept { return shown_acts_ != 0 || controller.active() || running.moves(); }
   void set_timing(const Timing& now) noexcept;
   std::int64_t time() const noexcept {
-    return schema.head.bursting != 0 ? current * schema.head.period : monotonic_now();
+    return schema.head.bursting != 0 ? current * schema.head.period : real_time();
   }
 
   const Schema schema;
@@ -114,6 +116,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   bool admit(const StagedBatch& sent) noexcept;
   bool is_of_dead(const StagedBatch& sent) noexcept;
   void take(const StagedBatch& sent) noexcept;
+  void take_checked(const StagedBatch& sent) noexcept;
   bool reject(const StagedBatch& sent, Reason reason, std::uint32_t detail = 0) noexcept;
   void end_batch(const StagedBatch& sent, Reason reason, std::uint8_t detail,
                  Status status) noexcept;
@@ -123,8 +126,18 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   void count_burst() noexcept;
   void end_burst(Iteration row, BurstEnd end = BurstEnd::done) noexcept;
 
+  void move() noexcept;
+  std::int64_t real_time() const noexcept;
+
+  // replay
+  Step step_recorded() noexcept;
+  bool obey_recorded() noexcept;
+  void obey(const JournalEntry& entry) noexcept;
+  void take_recorded(const JournalEntry& entry) noexcept;
+
   // halts
   void watch_halt() noexcept;
+  void purge_to_stop() noexcept;
   void show_acts() noexcept;
   void watch_errors() noexcept;
   void begin_halt() noexcept;
@@ -157,6 +170,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
 
   ForkGuard guard_;
   RequestServer* server_;
+  RecordedDecisions* recorded_;  // a replay obeys them; else null
   std::vector<LaneLife> lives_;
   std::vector<std::uint64_t> handled_deaths_;  // of each lane: the last one handled
   std::vector<std::uint64_t> row_;             // 8-byte words: the current row

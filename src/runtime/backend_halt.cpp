@@ -5,6 +5,7 @@
 
 #include "base/short_text.hpp"
 #include "runtime/backend_body.hpp"
+#include "runtime/recorded_decisions.hpp"
 
 namespace o80 {
 
@@ -26,6 +27,7 @@ void UntypedBackend::Body::ask_to_halt(HaltCause cause, std::string_view text) n
   std::atomic<std::uint64_t>& last = own_halts_[static_cast<std::size_t>(cause)];
   const std::uint64_t print = fingerprint(text);
   if (last.exchange(print, std::memory_order_relaxed) == print) return;
+  if (recorded_ != nullptr) return recorded_->ask_to_halt(cause, text);
   ask_for_halt(segment.view(), cause, {}, text);
 }
 
@@ -70,17 +72,18 @@ Step UntypedBackend::Body::brake() noexcept {
     journal.stopping();
     if (unreadable) return Step::ended;  // the position is unknown, so the robot cannot brake
     const bool acted = acts();
-    controller.purge(kEveryActuator, current, Reason::stopped);
-    drop_running({Status::purged, Reason::stopped});
+    purge_to_stop();
     if (!acted) return Step::ended;
   } else if (!controller.braking()) {
     return Step::ended;
   }
-  under_way_ = true;
-  outbox_.begin_step();
-  controller.step(current, row() + layout.observed);
-  outbox_.end_step();
+  move();
   return Step::run;
+}
+
+void UntypedBackend::Body::purge_to_stop() noexcept {
+  controller.purge(kEveryActuator, current, Reason::stopped);
+  drop_running({Status::purged, Reason::stopped});
 }
 
 void UntypedBackend::Body::set_timing(const Timing& now) noexcept {
@@ -182,7 +185,8 @@ Outcome UntypedBackend::Body::resume(std::uint32_t lane, CommandId id,
     }
   }
   driver_halted_ = false;
-  if (!halts.clear()) {
+  const bool confirmed = recorded_ == nullptr || recorded_->confirms(JournalKind::resume);
+  if (!confirmed || !halts.clear()) {
     return refuse("another halt was requested meanwhile: read its reason, then resume that one");
   }
   for (auto& last : own_halts_) last.store(0, std::memory_order_relaxed);

@@ -3,10 +3,15 @@
 #include <cstring>
 
 #include "runtime/backend_body.hpp"
+#include "runtime/recorded_decisions.hpp"
 
 namespace o80 {
 
 void UntypedBackend::Body::interrupt(std::uint32_t actuator) noexcept {
+  if (recorded_ != nullptr) {
+    recorded_->interrupt(current, static_cast<std::uint16_t>(actuator),
+                         schema.actuators[actuator].name.view());
+  }
   journal.interrupted(actuator);
   controller.interrupt(actuator, current);
 }
@@ -62,6 +67,7 @@ Outcome UntypedBackend::Body::start_afresh(std::uint32_t lane, CommandId id) noe
     return reject_request(lane, id, failure.data());
   }
   controller.restart(reading.observed, reading.has_desired ? reading.desired : nullptr, current);
+  if (recorded_ != nullptr) recorded_->fresh_start(current);
   journal.fresh_start(lane);
   publish(true);
   return {};

@@ -98,6 +98,7 @@ std::uint32_t type_of(Schema& schema) {
       members.push_back(field_row<Field>(schema, field, offset, note.text));
       members.back().resting = note.rest ? 1 : 0;
       if (note.rest) members.back().rest = note.rest->value;
+      members.back().origin = note.origin;
     });
   } else {
     members.push_back(field_row<T>(schema, "", 0, ""));

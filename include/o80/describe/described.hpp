@@ -15,7 +15,8 @@
 /// o80::rests_at(0))), at namespace scope.
 ///
 /// A text may hold a help and a unit in brackets. `rests_at(value)`: the field goes to that value
-/// when no command drives its actuator. Every field must be named; a missing one does not compile.
+/// when no command drives its actuator. `of_the_clock()`, `of_the_world()`: a replay does not
+/// compare the field. Every field must be named; a missing one does not compile.
 #define O80_DESCRIBE(Type, ...)                                                                  \
   static_assert(std::is_aggregate_v<Type>, #Type " must be a plain struct to be described");     \
   static_assert(::o80::field_count<Type>() == (0 O80_FOR_EACH(O80_PLUS_ONE, ~, __VA_ARGS__)),    \
@@ -71,15 +72,18 @@ namespace o80 {
 template <class T>
 struct Tag {};
 
-/// What O80_DESCRIBE gives for a field: a text, and the value at which it rests.
+/// What O80_DESCRIBE gives for a field: a text, the value at which it rests, and its origin.
 struct FieldNote {
   std::string_view text;
   std::optional<RestsAt> rest;
+  Origin origin = Origin::robot;
 
   constexpr FieldNote(std::string_view said) : text(said) {}  // NOLINT(google-explicit-constructor)
   constexpr FieldNote(const char* said) : text(said) {}       // NOLINT(google-explicit-constructor)
   constexpr FieldNote(std::string_view said, RestsAt where) : text(said), rest(where) {}
   constexpr FieldNote(RestsAt where) : rest(where) {}  // NOLINT(google-explicit-constructor)
+  constexpr FieldNote(std::string_view said, Origin from) : text(said), origin(from) {}
+  constexpr FieldNote(Origin from) : origin(from) {}  // NOLINT(google-explicit-constructor)
   // NOLINTNEXTLINE(google-explicit-constructor)
   constexpr operator std::string_view() const { return text; }
 };

@@ -58,6 +58,15 @@ using NameText = FixedText<48>;
 using UnitText = FixedText<24>;
 using HelpText = FixedText<120>;
 
+/// Where the value of a field comes from. A replay compares only what the robot itself computes.
+enum class Origin : std::uint8_t {
+  robot,  // its commands, its options and its former states
+  clock,  // the time or the load of the machine, which differ from run to run
+  world   // a sensor: what no replay can repeat
+};
+constexpr Origin of_the_clock() { return Origin::clock; }
+constexpr Origin of_the_world() { return Origin::world; }
+
 inline constexpr std::uint32_t kNoType = 0xFFFFFFFF;
 
 /// One field of a described struct.
@@ -77,6 +86,8 @@ struct FieldRow {
   std::uint8_t resting = 0;      // 1: goes to `rest` when no command drives it
   std::uint8_t has_default = 0;  // 1: a request may leave it out
   double rest = 0.0;             // in the field's unit
+  Origin origin = Origin::robot;
+  std::array<std::uint8_t, 7> reserved{};
 
   std::uint32_t count() const { return (rows == 0 ? 1 : rows) * (columns == 0 ? 1 : columns); }
   bool operator==(const FieldRow&) const = default;
@@ -179,7 +190,8 @@ struct SchemaHead {
   Clock clock = Clock::monotonic;
   std::uint8_t bursting = 0;
   Stale stale = Stale::hold;
-  std::array<std::uint8_t, 5> reserved{};
+  std::uint8_t of_the_world = 0;  // 1: all that the robot observes comes from the world
+  std::array<std::uint8_t, 4> reserved{};
   std::int64_t silence = 0;  // iterations without a sign of life until `stale`; 0: no watchdog
   bool operator==(const SchemaHead&) const = default;
 };

@@ -89,6 +89,10 @@ class Schema {
   std::int64_t asked_period() const { return head.period; }
   /// Sets the period of this robot [ns]. Without this call the user chooses it.
   void period(std::int64_t own) { head.period = own; }
+  /// Says that what the driver reads comes from the world (hardware, other processes): a replay
+  /// does not start the driver, and reads the recorded values instead. Single fields are marked in
+  /// O80_DESCRIBE: `o80::of_the_world()`, `o80::of_the_clock()`.
+  void of_the_world() { head.of_the_world = 1; }
   ActuatorDescription actuator(std::uint32_t index);
   ActuatorDescription actuator(std::string_view name);
 

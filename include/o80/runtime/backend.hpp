@@ -21,6 +21,7 @@ namespace o80 {
 
 class OwnedSegment;
 enum class Verb : std::uint8_t;
+class RecordedDecisions;
 
 /// Options of a backend that do not depend on the robot.
 struct BackendOptions {
@@ -75,7 +76,10 @@ class UntypedBackend {
  public:
   /// Takes the name and publishes the segment as starting. Sets period and clock of the schema from
   /// the options. Throws SegmentTaken, SegmentError, InvalidArgument.
-  UntypedBackend(Schema schema, const BackendOptions& options, RequestServer* server = nullptr);
+  /// With `recorded`, the backend replays a run: it obeys these decisions instead of frontends, and
+  /// never waits.
+  UntypedBackend(Schema schema, const BackendOptions& options, RequestServer* server = nullptr,
+                 RecordedDecisions* recorded = nullptr);
   UntypedBackend(const UntypedBackend&) = delete;
   UntypedBackend& operator=(const UntypedBackend&) = delete;
   /// Ends as stopped, or as failed if failure() is set, unless it has ended.

@@ -16,6 +16,7 @@ from o80.cli.info import info
 from o80.cli.list_segments import list_segments
 from o80.cli.plot import plot
 from o80.cli.record import record
+from o80.cli.replay import replay
 from o80.cli.run import run
 from o80.cli.save import repair, save
 from o80.cli.stop import stop
@@ -49,6 +50,7 @@ app.command("plot")(plot)
 app.command("view")(view)
 app.command("export")(export)
 app.command("diff")(diff)
+app.command("replay")(replay)
 app.command("halt")(halt)
 app.command("resume")(resume)
 app.command("stop")(stop)

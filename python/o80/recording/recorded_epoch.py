@@ -179,18 +179,29 @@ class RecordedEpoch:
         Raises RecordingError if the file is damaged there.
         """
         layout = self._decoder.layout
-        plan = MessagePlan(row_type(layout), layout.size)
-        parts = [
-            plan.decode(messages)
-            for part in self._parts
-            for messages in self._messages(part, plan.size, from_time, to_time)
-        ]
-        raw = np.concatenate(parts) if parts else np.empty((0, layout.size), np.uint8)
-        rows = np.ascontiguousarray(raw).view(layout.row).reshape(len(raw))
+        parts = [*self._rows(from_time, to_time)]
+        rows = np.concatenate(parts) if parts else np.empty(0, layout.row)
         history = History(self._decoder, rows)
         return history.select(
             n, since=since, until=until, seconds=seconds, from_time=from_time, to_time=to_time
         )
+
+    def blocks(self) -> Iterator[History]:
+        """All rows in their order, some at a time: for recordings larger than the memory.
+
+        Raises RecordingError if the file is damaged there.
+        """
+        for rows in self._rows():
+            yield History(self._decoder, rows)
+
+    def _rows(self, from_time: int | None = None, to_time: int | None = None) -> Iterator[Any]:
+        """The rows of each chunk that may have rows of these times."""
+        layout = self._decoder.layout
+        plan = MessagePlan(row_type(layout), layout.size)
+        for part in self._parts:
+            for messages in self._messages(part, plan.size, from_time, to_time):
+                raw = np.ascontiguousarray(plan.decode(messages))
+                yield raw.view(layout.row).reshape(len(raw))
 
     def _messages(
         self, part: EpochPart, size: int, from_time: int | None, to_time: int | None
@@ -221,16 +232,22 @@ class RecordedEpoch:
 
         Raises RecordingError if the file is damaged there.
         """
-        native = _core.RecordedJournal(self.description, whole(since, "since", 0))
         decoder = EntryDecoder(self.schema)
+        return [decoder.entry(entry) for entry in self.native_journal(since)]
+
+    def native_journal(self, since: int = 0) -> Iterator[_core.JournalEntry]:
+        """The same before their conversion to Python, read as they are needed: for a replay."""
+        native = _core.RecordedJournal(self.description, whole(since, "since", 0))
         try:
-            return [
-                decoder.entry(entry)
-                for content in self.journal_parts()
-                for entry in native.decode(content)
-            ]
+            for content in self.journal_parts():
+                yield from native.decode(content)
         except (InvalidArgument, ValueError, LookupError) as error:
             raise RecordingError(f"{self._parts[0].path}: {error}") from error
+
+    @property
+    def has_journal(self) -> bool:
+        """Its backend had a journal, and its recorder wrote it."""
+        return any(part.journal is not None for part in self._parts)
 
     def journal_parts(self) -> Iterator[bytes]:
         """The entries of the journal as they were in the segment, for `_core.RecordedJournal`.

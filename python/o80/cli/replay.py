@@ -1,0 +1,90 @@
+"""``o80 replay``: starts recorded robots again and compares every row."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+import typer
+
+import o80
+from o80.cli.diff import _tolerances
+
+
+def replay(
+    recording: Annotated[str, typer.Argument(help="A recording (.mcap), or a segment.")],
+    segment: Annotated[
+        str | None, typer.Option(help="Replay only this segment of a recording.")
+    ] = None,
+    robot: Annotated[
+        str | None,
+        typer.Option(help="Name or library of another robot than the recorded one (.so)."),
+    ] = None,
+    option: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", help="NAME=VALUE: another option of the robot than the recorded one."
+        ),
+    ] = None,
+    ignore: Annotated[
+        str, typer.Option(help="Columns to leave out, for example extended,observed.elbow")
+    ] = "",
+    tolerance: Annotated[
+        list[str] | None,
+        typer.Option(help="FIELD=NUMBER: differences up to this number count as equal."),
+    ] = None,
+    exact: Annotated[
+        bool, typer.Option("--exact", help="Bit for bit, also if another build of o80 recorded it.")
+    ] = False,
+) -> None:
+    """Start recorded robots again, let them do what they did, and compare every row bit for bit.
+
+    Exit code 0: all rows are identical. 1: a row differs, and the first one is printed. 2: rows or
+    decisions are missing from the recording, and those before them are identical.
+    """
+    from o80.replaying.replay import replay as replay_all
+
+    report = replay_all(
+        recording if recording.endswith(".mcap") or "/" in recording else _attached(recording),
+        segment=segment,
+        robot=robot,
+        options=_options(option),
+        ignore=tuple(name for name in ignore.split(",") if name),
+        tolerances=_tolerances(tolerance) if tolerance or exact else None,
+        progress=_show if sys.stderr.isatty() else None,
+    )
+    if sys.stderr.isatty():
+        print("\r\033[K", end="", file=sys.stderr)
+    for run in report:
+        print(run)
+        for note in run.notes:
+            print(f"  note: {note}")
+        if run.rows and run.seconds > 0:
+            speed = run.recorded_seconds / run.seconds
+            print(f"  {run.rows / run.seconds:.0f} rows/s, {speed:.3g} times as fast as it ran")
+    if report.difference is not None:
+        raise typer.Exit(1)
+    if not report.identical:
+        raise typer.Exit(2)
+
+
+def _attached(name: str) -> o80.Frontend:
+    from o80.cli.attach import attach
+
+    return attach(name)
+
+
+def _options(texts: list[str] | None) -> dict[str, str]:
+    found = {}
+    for text in texts or []:
+        name, equals, value = text.partition("=")
+        if not equals:
+            raise typer.BadParameter(
+                f"write NAME=VALUE, for example gain=2, not '{text}'", param_hint="--set"
+            )
+        found[name] = value
+    return found
+
+
+def _show(segment: str, rows: int, of: int) -> None:
+    print(f"\r\033[K{segment}: {rows} of {of} rows", end="", file=sys.stderr, flush=True)

@@ -1,0 +1,1 @@
+"""Exact replay: recorded robots are started again, and every row is compared."""

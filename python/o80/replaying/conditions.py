@@ -1,0 +1,32 @@
+"""What differs between a recorded run and its replay."""
+
+from o80.provenance import Provenance
+
+TOLERANCE = 1e-9
+"""Largest difference that counts as equal where bits need not agree."""
+
+
+def changes(recorded: Provenance, now: Provenance) -> list[str]:
+    """What else than the run may be the cause of a difference, in words."""
+    found = []
+    if recorded.library_sha256 and recorded.library_sha256 != now.library_sha256:
+        found.append(f"the library of the robot has changed since: {now.library}")
+    before = {(file.option, file.path): file.sha256 for file in recorded.files}
+    found += [
+        f"the file of the option {file.option} has changed since: {file.path}"
+        for file in now.files
+        if before.get((file.option, file.path), file.sha256) != file.sha256
+    ]
+    return found
+
+
+def other_arithmetic(recorded: Provenance, now: Provenance) -> str:
+    """Why rows may differ in their last bits although nothing is wrong; empty if they may not."""
+    if recorded.version != now.version:
+        return f"o80 {recorded.version} recorded it, this is {now.version}"
+    if recorded.source_hash != now.source_hash:
+        return (
+            f"another build of o80 {now.version} recorded it (sources {recorded.source_hash[:12]}, "
+            f"these are {now.source_hash[:12]})"
+        )
+    return ""

@@ -1,0 +1,43 @@
+"""Gives the entries of a journal to a replay, just before the rows that they act in."""
+
+from collections.abc import Iterator
+
+from o80 import _core
+
+
+class EntryFeed:
+    """Reads a journal in step with the rows of its run."""
+
+    def __init__(self, entries: Iterator[_core.JournalEntry]) -> None:
+        self._entries = entries
+        self._pending: _core.JournalEntry | None = None
+        self._known = -1  # all decisions up to this iteration were read
+        self.gap = ""  #: why the decisions after `until` are not known
+        self.until = 2**62  #: the last iteration whose decisions are known
+
+    def read(self, last: int) -> list[_core.JournalEntry]:
+        """The entries that act up to iteration `last`, less those of earlier calls."""
+        found = []
+        while not self.gap and (entry := self._next()) is not None:
+            if entry.missed or entry.records_lost:
+                self._end_at(entry)
+            elif entry.kind == "ended" or entry.iteration > last:
+                self._pending = entry
+                break
+            else:
+                found.append(entry)
+                # a status is written after the row of its iteration, a decision before
+                self._known = max(self._known, entry.iteration - (entry.kind != "status"))
+        return found
+
+    def _next(self) -> _core.JournalEntry | None:
+        pending, self._pending = self._pending, None
+        return pending if pending is not None else next(self._entries, None)
+
+    def _end_at(self, entry: _core.JournalEntry) -> None:
+        self.until = self._known
+        if entry.missed:
+            first = entry.number - entry.missed
+            self.gap = f"the journal lacks entries {first} to {entry.number - 1}"
+        else:
+            self.gap = f"the journal lacks the commands of entry {entry.number}"

@@ -1,0 +1,135 @@
+"""What a replay needs of one run of a backend: its rows, its journal, how it was started."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+from o80 import _core
+from o80.errors import InvalidArgument
+
+if TYPE_CHECKING:
+    from o80.frontend import Frontend
+    from o80.history import History
+    from o80.provenance import Provenance
+    from o80.recording.reader import RecordingFile
+    from o80.recording.recorded_epoch import RecordedEpoch
+
+ROWS_AT_ONCE = 4096
+_BYTES_AT_ONCE = 1 << 20
+
+
+class RecordedRun(Protocol):
+    """One run of a backend."""
+
+    @property
+    def segment(self) -> str: ...
+
+    @property
+    def number(self) -> int:
+        """Of the run in a file, from 0."""
+
+    @property
+    def schema(self) -> dict[str, Any]: ...
+
+    @property
+    def provenance(self) -> Provenance | None: ...
+
+    @property
+    def rows(self) -> int:
+        """Number of rows, for a progress bar."""
+
+    def blocks(self) -> Iterator[History]:
+        """Rows in their order, a few thousand at a time."""
+
+    def entries(self) -> Iterator[_core.JournalEntry]:
+        """The journal in its order."""
+
+
+@dataclass(frozen=True)
+class LiveRun:
+    """What a segment in shared memory holds."""
+
+    frontend: Frontend
+    number: int = 0
+
+    @property
+    def segment(self) -> str:
+        return self.frontend.segment
+
+    @property
+    def schema(self) -> dict[str, Any]:
+        schema: dict[str, Any] = self.frontend._layout.schema
+        return schema
+
+    @property
+    def provenance(self) -> Provenance | None:
+        return self.frontend.provenance
+
+    @property
+    def rows(self) -> int:
+        return self.frontend.published + 1 - self.frontend.oldest
+
+    def blocks(self) -> Iterator[History]:
+        last = self.frontend.published
+        for since in range(self.frontend.oldest, last + 1, ROWS_AT_ONCE):
+            yield self.frontend.history(since=since, until=min(last, since + ROWS_AT_ONCE - 1))
+
+    def entries(self) -> Iterator[_core.JournalEntry]:
+        # as a recorder does: it tells which entries were overwritten before the first read
+        journal = _core.RawJournal(self.frontend, 0)
+        if not journal.exists:
+            raise InvalidArgument(
+                f"'{self.segment}' was started without a journal (journal=0): replay needs it"
+            )
+        native = _core.RecordedJournal(self.frontend._description, 0)
+        while content := journal.read(_BYTES_AT_ONCE)[0]:
+            yield from native.decode(content)
+
+
+@dataclass(frozen=True)
+class FileRun:
+    """An epoch of a recording."""
+
+    segment: str
+    number: int
+    epoch: RecordedEpoch
+
+    @property
+    def schema(self) -> dict[str, Any]:
+        return self.epoch.schema
+
+    @property
+    def provenance(self) -> Provenance | None:
+        return self.epoch.provenance
+
+    @property
+    def rows(self) -> int:
+        return self.epoch.rows
+
+    def blocks(self) -> Iterator[History]:
+        for block in self.epoch.blocks():
+            for begin in range(0, len(block), ROWS_AT_ONCE):
+                yield block[begin : begin + ROWS_AT_ONCE]
+
+    def entries(self) -> Iterator[_core.JournalEntry]:
+        if not self.epoch.has_journal:
+            raise InvalidArgument(
+                f"the recording has no journal of '{self.segment}', which a replay needs: its "
+                f"robot was started without one, or an older o80 recorded it"
+            )
+        return self.epoch.native_journal()
+
+
+def runs_in(recording: RecordingFile, segment: str | None = None) -> list[FileRun]:
+    """The runs of all segments of a recording, or of one. Raises InvalidArgument."""
+    if segment is not None and segment not in recording.segments:
+        there = ", ".join(recording) or "none"
+        raise InvalidArgument(f"no segment '{segment}' in {recording.path}; there are: {there}")
+    names = [segment] if segment is not None else list(recording)
+    return [
+        FileRun(name, number, epoch)
+        for name in names
+        for number, epoch in enumerate(recording[name].epochs)
+    ]

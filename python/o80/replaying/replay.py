@@ -1,0 +1,288 @@
+"""Starts recorded robots again and compares every row.
+
+report = o80.replay("run.mcap")
+assert report.identical, report
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from o80 import _core, robots
+from o80.columns import columns_of
+from o80.difference import Difference, first_difference
+from o80.errors import DriverError, InvalidArgument
+from o80.frontend import Frontend
+from o80.loop_options import text_of
+from o80.replaying.conditions import TOLERANCE, changes, other_arithmetic
+from o80.replaying.entry_feed import EntryFeed
+from o80.replaying.recorded_run import LiveRun, RecordedRun, runs_in
+from o80.replaying.report import ReplayReport, RunReport
+from o80.replaying.same_bytes import same_bytes
+
+if TYPE_CHECKING:
+    from o80.history import History
+    from o80.recording.reader import RecordingFile
+
+Progress = Callable[[str, int, int], None]
+
+# of the run options, those that decide what a backend does; the others are of its process
+_OF_BACKEND = ("lanes", "lane_blocks")
+_HISTORY = 1 << 14  # rows that the replay keeps: those of a block, and fresh starts
+
+
+def replay(
+    source: str | os.PathLike[str] | RecordingFile | Frontend,
+    *,
+    segment: str | None = None,
+    robot: str | os.PathLike[str] | None = None,
+    options: Mapping[str, Any] | None = None,
+    tolerances: Mapping[str, float] | None = None,
+    ignore: tuple[str, ...] = (),
+    progress: Progress | None = None,
+) -> ReplayReport:
+    """Repeats recorded runs with the same robots and options, and compares every row bit for bit.
+
+    source: a recording, or a frontend whose segment holds all rows and decisions of its run.
+    segment: replay only this one of a recording.
+    robot: name or library of another robot than the recorded one, for example after a change.
+    options: options of the robot that differ from the recorded ones.
+    tolerances, ignore: by column, as for `o80 diff`. None: bit for bit, but with a tolerance if
+        another build of o80 recorded the run; a note in the report says so. {}: bit for bit.
+    progress: called with the name of a run, its rows compared, and all its rows.
+
+    No hardware is touched: the driver of a robot that reads the world is not started.
+
+    Raises InvalidArgument, RecordingError, DriverError.
+    """
+    return replay_runs(
+        _runs_of(source, segment),
+        robot=robot,
+        options=options,
+        tolerances=tolerances,
+        ignore=ignore,
+        progress=progress,
+    )
+
+
+def replay_runs(
+    runs: Iterable[RecordedRun],
+    *,
+    robot: str | os.PathLike[str] | None = None,
+    options: Mapping[str, Any] | None = None,
+    tolerances: Mapping[str, float] | None = None,
+    ignore: tuple[str, ...] = (),
+    progress: Progress | None = None,
+) -> ReplayReport:
+    """As `replay`, for runs from anywhere."""
+    return ReplayReport(
+        tuple(
+            _RunReplay(run, robot, options or {}, tolerances, ignore, progress).report()
+            for run in runs
+        )
+    )
+
+
+def _runs_of(
+    source: str | os.PathLike[str] | RecordingFile | Frontend, segment: str | None
+) -> list[RecordedRun]:
+    if isinstance(source, Frontend):
+        return [LiveRun(source)]
+    from o80.recording.reader import RecordingFile
+
+    recording = source if isinstance(source, RecordingFile) else RecordingFile(source)
+    runs: list[RecordedRun] = [*runs_in(recording, segment)]
+    if not runs:
+        raise InvalidArgument(f"{recording.path} holds no segment")
+    return runs
+
+
+class _RunReplay:
+    """The replay of one run."""
+
+    def __init__(
+        self,
+        run: RecordedRun,
+        robot: str | os.PathLike[str] | None,
+        options: Mapping[str, Any],
+        tolerances: Mapping[str, float] | None,
+        ignore: tuple[str, ...],
+        progress: Progress | None,
+    ) -> None:
+        self._run, self._robot, self._options = run, robot, options
+        self._tolerances, self._ignore, self._progress = tolerances, ignore, progress
+        self._rows = 0
+        self._times = [0, 0]  # of the first and the last row compared [ns]
+        self._gap = ""
+        self._notes: list[str] = []
+
+    def report(self) -> RunReport:
+        begin = time.monotonic()
+        difference = self._compare()
+        return RunReport(
+            segment=self._run.segment,
+            number=self._run.number,
+            rows=self._rows,
+            difference=difference,
+            gap="" if difference else self._gap,
+            notes=tuple(self._notes),
+            seconds=time.monotonic() - begin,
+            recorded_seconds=(self._times[1] - self._times[0]) * 1e-9,
+        )
+
+    def _compare(self) -> Difference | None:
+        feed = EntryFeed(self._run.entries())
+        blocks = self._whole(self._run.blocks())
+        first = next(blocks, None)
+        if first is None:
+            return None
+        with self._started() as native:
+            for block in self._chain(first, blocks):
+                native.add(feed.read(int(block.iteration[-1])))
+                if int(block.iteration[-1]) > feed.until:
+                    block = block.select(until=feed.until)
+                    self._gap = feed.gap
+                if not len(block) or int(block.iteration[0]) > feed.until:
+                    return None
+                difference = self._compare_block(native, block)
+                if difference is not None or self._gap:
+                    return difference
+        return None
+
+    @staticmethod
+    def _chain(first: History, others: Iterator[History]) -> Iterator[History]:
+        yield first
+        yield from others
+
+    def _whole(self, blocks: Iterator[History]) -> Iterator[History]:
+        """Rows from row 0 to the first gap. No block ends with the row of a fresh start, because
+        the decisions after it are of the same step."""
+        held: History | None = None
+        expected = 0
+        for block in blocks:
+            if not len(block):
+                continue
+            found = int(block.iteration[0])
+            if found != expected:
+                self._gap = (
+                    f"the first recorded row is row {found}: a replay begins at row 0. Record "
+                    f"from the start of the robot, or with --whole"
+                    if expected == 0
+                    else f"rows {expected} to {found - 1} are missing"
+                )
+                break
+            expected = int(block.iteration[-1]) + 1
+            whole = block if held is None else _joined(held, block)
+            held = None
+            settled = np.flatnonzero(whole.rows["fresh"] == 0)
+            cut = int(settled[-1]) + 1 if len(settled) else 0
+            if cut < len(whole):
+                held = whole[cut:]
+            if cut:
+                yield whole[:cut]
+        if held is not None:
+            yield held
+
+    # ------------------------------------------------------------------ the robot
+
+    @contextmanager
+    def _started(self) -> Iterator[_core.Replay]:
+        provenance = self._run.provenance
+        library = _loaded(self._robot or _recorded_robot(self._run))
+        own = dict(provenance.options) if provenance else {}
+        own |= {name: text_of(value) for name, value in self._options.items()}
+        recorded = provenance.run_options if provenance else {}
+        loop = {name: recorded[name] for name in _OF_BACKEND if name in recorded}
+        schema = self._run.schema
+        loop |= {"bursting": text_of(schema["bursting"]), "stale": schema["stale"]}
+        loop |= {"silence": text_of(schema["silence"])} if schema["silence"] else {}
+        loop["history"] = str(_HISTORY)
+        name = _core.unused_segment_name(library.name)
+        native = _core.Replay(library, name, [*loop.items()], [*own.items()], schema["period"])
+        try:
+            yield native
+        finally:
+            native.close()
+            _core.clean(name)
+
+    def _compare_block(self, native: _core.Replay, block: History) -> Difference | None:
+        first, last = int(block.iteration[0]), int(block.iteration[-1])
+        times = np.ascontiguousarray(block.time)
+        try:
+            runs = native.run(times)
+        except DriverError as error:
+            return Difference(first, "driver", ("started", str(error)))
+        with Frontend(native.segment, read_only=True, dead=True, timeout=5) as frontend:
+            replayed = frontend.history(since=first, until=last)
+            if first == 0:
+                self._note_changes(frontend)
+        found = self._first_difference(block[: len(replayed)], replayed)
+        decided = native.mismatch
+        if decided is not None and (found is None or decided[0] < found.iteration):
+            found = Difference(decided[0], decided[1], (decided[2], decided[3]))
+        if found is None and not runs:
+            found = Difference(native.next, "driver", ("went on", native.fault or "ended"))
+        self._count(block if found is None else block.select(until=found.iteration - 1))
+        return found
+
+    def _note_changes(self, frontend: Frontend) -> None:
+        """Says what has changed since the run, and adds a tolerance where bits need not agree."""
+        recorded, now = self._run.provenance, frontend.provenance
+        if recorded is None:
+            return
+        self._notes += changes(recorded, now)
+        why = other_arithmetic(recorded, now)
+        if not why:
+            return
+        if self._tolerances is None:
+            self._tolerances = dict.fromkeys(self._numbers(frontend), TOLERANCE)
+            why += f": numbers are compared with a tolerance of {TOLERANCE:g}"
+        self._notes.append(why)
+
+    @staticmethod
+    def _numbers(frontend: Frontend) -> list[str]:
+        parts = ["desired", "observed"] if frontend.actuators else []
+        return [*parts, "extended"] if "extended" in frontend._layout.schema else parts
+
+    def _first_difference(self, recorded: History, replayed: History) -> Difference | None:
+        if same_bytes(recorded, replayed):
+            return None
+        world = [each.name for each in columns_of(recorded.schema) if each.origin == "world"]
+        return first_difference(
+            recorded, replayed, ignore=[*self._ignore, *world], tolerances=self._tolerances
+        )
+
+    def _count(self, compared: History) -> None:
+        if not len(compared):
+            return
+        if self._rows == 0:
+            self._times[0] = int(compared.time[0])
+        self._rows += len(compared)
+        self._times[1] = int(compared.time[-1])
+        if self._progress is not None:
+            self._progress(self._run.segment, self._rows, self._run.rows)
+
+
+def _recorded_robot(run: RecordedRun) -> str:
+    provenance = run.provenance
+    if provenance is not None and provenance.library and Path(provenance.library).exists():
+        return provenance.library
+    name: str = run.schema["robot"]
+    return name
+
+
+def _loaded(name_or_path: str | os.PathLike[str]) -> _core.RobotLibrary:
+    return _core.load_robot(str(robots.path_of(name_or_path)))
+
+
+def _joined(one: History, other: History) -> History:
+    from o80.history import History
+
+    return History(one._decoder, np.concatenate([one.rows, other.rows]))

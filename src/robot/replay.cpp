@@ -1,0 +1,65 @@
+#include "robot/replay.hpp"
+
+#include <cstring>
+#include <utility>
+
+#include "control/record.hpp"
+#include "o80/base/error.hpp"
+
+namespace o80 {
+
+namespace {
+
+/// The options of the recorded run, for a backend that nobody halts or reads the journal of.
+BackendOptions replaying(BackendOptions options) {
+  options.resume = true;  // halts come from the recording
+  options.journal = 0;
+  return options;
+}
+
+[[noreturn]] void refuse(const JournalEntry& entry, const std::string& why) {
+  throw InvalidArgument("entry " + std::to_string(entry.number) + " of the journal " + why);
+}
+
+/// Throws if these are not the blocks of a whole batch.
+void check_blocks(const JournalEntry& entry) {
+  BatchRecord batch;
+  if (entry.blocks.size() < kBlockBytes) refuse(entry, "lacks the blocks of its batch");
+  std::memcpy(&batch, entry.blocks.data(), sizeof batch);
+  const bool is_whole = batch.kind == RecordKind::batch &&
+                        std::uint64_t{batch.blocks} * kBlockBytes == entry.blocks.size();
+  if (!is_whole) refuse(entry, "holds a damaged batch");
+}
+
+}  // namespace
+
+Replay::Replay(std::unique_ptr<DriverInstance> robot, BackendOptions options)
+    : lanes_(options.lanes), loop_(std::move(robot), replaying(std::move(options)), &recorded_) {}
+
+void Replay::add(const JournalEntry& entry) {
+  const bool is_batch = entry.kind == JournalKind::taken || entry.kind == JournalKind::rejected;
+  const bool is_of_lane =
+      is_batch || entry.kind == JournalKind::died || entry.kind == JournalKind::silent;
+  if (is_of_lane && entry.lane >= lanes_) {
+    refuse(entry, "is of lane " + std::to_string(entry.lane) + ", but the robot has " +
+                      std::to_string(lanes_) + " lanes: give the option lanes of the recorded run");
+  }
+  if (is_batch) check_blocks(entry);
+  const auto actuators = loop_.backend().schema().actuators.size();
+  if (entry.kind == JournalKind::interrupted && entry.actuator >= actuators) {
+    refuse(entry, "interrupts an actuator that the robot does not have");
+  }
+  recorded_.add(entry);
+}
+
+bool Replay::run(std::span<const std::int64_t> times) {
+  if (times.empty()) return true;
+  const auto last = next() + static_cast<Iteration>(times.size()) - 1;
+  recorded_.set_times(next(), times);
+  if (!std::exchange(started_, true)) loop_.start();
+  return loop_.replay(last) == Step::run;
+}
+
+std::string Replay::fault() const { return loop_.fault(); }
+
+}  // namespace o80

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "o80/base/time.hpp"
+#include "o80/memory/halt.hpp"
+#include "o80/runtime/journal.hpp"
+
+namespace o80 {
+
+/// A decision of the driver that the replay has not repeated.
+struct DecisionMismatch {
+  Iteration iteration = -1;
+  std::string decision;  // "halt", "interrupt of elbow", "fresh start"
+  std::string recorded;
+  std::string replayed;
+};
+
+/// The decisions and row times of a recorded run. A backend that replays it obeys them instead of
+/// its lanes, watchdog and clock. What the driver decides again (halts, interrupts, fresh starts)
+/// is compared with them. See ARCHITECTURE.md, Replay.
+///
+/// Writer: the thread of the replay.
+class RecordedDecisions {
+ public:
+  // the recording
+  /// Adds the next entry of the journal. Entries that follow from others are left out.
+  void add(const JournalEntry& entry);
+  /// The times of the rows from iteration `first` on [ns].
+  void set_times(Iteration first, std::span<const std::int64_t> times);
+
+  // the backend
+  std::int64_t time(Iteration iteration) const noexcept;
+  /// The next decision, if it acts in this iteration or before; else null.
+  const JournalEntry* next(Iteration iteration) const noexcept;
+  JournalEntry take();
+  /// True if the next decision is of this kind; takes it.
+  bool confirms(JournalKind kind);
+
+  // the driver of the replay
+  void fresh_start(Iteration iteration);
+  void interrupt(Iteration iteration, std::uint16_t actuator, std::string_view name);
+  /// The driver or an error limit asks for a halt.
+  void ask_to_halt(HaltCause cause, std::string_view text);
+  /// The recorded halt that is obeyed now.
+  void compare_halt(const JournalEntry& halt);
+  /// Call it when all decisions before a step were obeyed: no requested halt may be left.
+  void end_decisions(Iteration iteration);
+  /// A recorded decision that the driver should have caused and has not.
+  void not_repeated(const JournalEntry& entry);
+
+  /// The first one, if any.
+  const std::optional<DecisionMismatch>& mismatch() const noexcept { return mismatch_; }
+
+ private:
+  struct AskedHalt {
+    HaltCause cause;
+    std::string text;
+  };
+  void note(Iteration iteration, std::string decision, std::string recorded, std::string replayed);
+
+  std::deque<JournalEntry> entries_;
+  Iteration first_time_ = 0;
+  std::vector<std::int64_t> times_;
+  std::vector<AskedHalt> asked_;
+  std::optional<DecisionMismatch> mismatch_;
+};
+
+}  // namespace o80

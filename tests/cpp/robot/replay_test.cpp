@@ -1,0 +1,378 @@
+// A replay gives every row of a recorded run bit for bit, and finds the first one that differs.
+
+#include "robot/replay.hpp"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cstring>
+#include <random>
+#include <thread>
+
+#include "o80/robot/make_table.hpp"
+#include "robot/puppet.hpp"
+
+namespace o80::test {
+namespace {
+
+/// A request that runs until the joints are near 0.
+struct Home {
+  double speed = 0.05;
+};
+O80_DESCRIBE(Home, speed);
+
+/// Two joints that follow with a lag. The driver halts, interrupts, refuses to resume now and then,
+/// and serves requests of all kinds.
+class Rig {
+ public:
+  struct Config {
+    double bent = 0;  // a change of the driver that acts beyond 0.2
+  };
+  struct Sensors {
+    std::array<double, 2> effort{};
+    std::int64_t bends = 0;  // iterations in which the line with `bent` was executed
+  };
+  using Actuators = std::array<double, 2>;
+  using Extended = Sensors;
+  using Requests = o80::Requests<Reset, Snapshot, Restore, Home>;
+
+  explicit Rig(const Config& config) : config_(config) {}
+  void describe(Schema& schema) const {
+    schema.actuator(0)
+        .name("shoulder")
+        .limits({.minimum = -3, .maximum = 3, .speed = 500, .acceleration = 1e6});
+    schema.actuator(1).name("elbow").limits({.minimum = -3, .maximum = 3, .error = 2.5});
+  }
+  void start() {}
+  void write(const Desired<Rig>& desired) {
+    if (now_.homes) return;
+    for (std::size_t i = 0; i < 2; ++i) {
+      now_.effort[i] = desired[i] - now_.position[i];
+      now_.position[i] += 0.3 * now_.effort[i];
+    }
+    if (now_.position[0] > 0.2) {
+      now_.position[0] += config_.bent;
+      ++now_.bends;
+    }
+  }
+  void read(Reading<Rig>& reading) {
+    if (now_.homes) home(reading);
+    if (reading.fresh()) now_.homes = false;
+    const bool goes_below = reading.observed[1] > -1.4 && now_.position[1] <= -1.4;
+    if (goes_below && !reading.fresh()) reading.interrupt(1);
+    const bool goes_above = reading.observed[1] < 1.8 && now_.position[1] >= 1.8;
+    if (goes_above && !reading.fresh()) reading.halt("the elbow is too far");
+    reading.observed = now_.position;
+    reading.extended = {now_.effort, now_.bends};
+  }
+  Served on(const Reset& reset) {
+    now_ = {};
+    now_.position[0] = static_cast<double>(reset.seed) / 10;
+    return Served::start_afresh();
+  }
+  Served on(const Snapshot&) {
+    kept_ = now_;
+    return Served::done();
+  }
+  Served on(const Restore& restore) {
+    if (restore.slot > 1) return Served::rejected("there are slots 0 and 1");
+    now_ = kept_;
+    return Served::start_afresh();
+  }
+  Served on(const Home& home) {
+    now_.homes = true;
+    now_.speed = home.speed;
+    return Served::running();
+  }
+  Served resume() {
+    if (++resumes_ % 3 == 0) return Served::rejected("not ready");
+    return Served::done();
+  }
+  void stop() noexcept {}
+
+ private:
+  struct State {
+    std::array<double, 2> position{};
+    std::array<double, 2> effort{};
+    std::int64_t bends = 0;
+    double speed = 0;
+    bool homes = false;
+  };
+
+  void home(Reading<Rig>& reading) {
+    if (!reading.runs<Home>()) {  // a halt has ended it
+      now_.homes = false;
+      return;
+    }
+    double left = 0;
+    for (double& position : now_.position) {
+      position -= std::clamp(position, -now_.speed, now_.speed);
+      left = std::max(left, std::abs(position));
+    }
+    if (left < 0.2) reading.ended<Home>(Served::start_afresh());
+  }
+
+  Config config_;
+  State now_;
+  State kept_;
+  int resumes_ = 0;
+};
+O80_DESCRIBE(Rig::Config, bent);
+O80_DESCRIBE(Rig::Sensors, effort, bends);
+
+const RobotTable& rig_table() { return *robot_table<Rig>("rig"); }
+
+std::unique_ptr<DriverInstance> rig(double bent = 0) {
+  return std::make_unique<DriverInstance>(rig_table(),
+                                          OptionValues{{"bent", std::to_string(bent)}});
+}
+
+BackendOptions options_of(bool bursting) {
+  return {.segment = "rig",
+          .period = 50'000,
+          .bursting = bursting,
+          .history = 1U << 16,
+          .journal = 1 << 25,
+          .stale = Stale::purge,
+          .silence = 60};
+}
+
+/// What two frontends do at random.
+class RandomCommanders {
+ public:
+  explicit RandomCommanders(unsigned seed) : random_(seed) {}
+
+  unsigned below(unsigned n) { return static_cast<unsigned>(random_() % n); }
+
+  void act() {
+    UntypedFrontend& one = frontends_[below(2)];
+    try {
+      if (one.halted()) {
+        if (below(3) == 0) one.resume(one.halted()->number, kAtOnce);
+      } else if (below(80) == 0) {
+        one.halt("now and then");
+      } else if (below(12) == 0) {
+        control(one);
+      } else {
+        pulse(one);
+      }
+    } catch (const Error&) {
+      one.forget_added();  // halted, refused, full, or not at rest: all of them belong to the run
+    }
+  }
+  UntypedFrontend& first() { return frontends_[0]; }
+  UntypedFrontend& any() { return frontends_[below(2)]; }
+
+ private:
+  double target() { return static_cast<double>(below(2000)) / 500.0 - 2; }
+
+  void control(UntypedFrontend& one) {
+    if (below(3) == 0) {
+      one.add_take_control();
+    } else {
+      one.add_release_control();
+    }
+    one.pulse();
+  }
+  CommandOptions how() {
+    CommandOptions options;
+    switch (below(5)) {
+      case 0:
+        options.pace = duration(std::chrono::microseconds(10 + below(900)));
+        break;
+      case 1:
+        options.pace = speed(400);
+        break;
+      case 2:
+        options.pace = until(first().published() + 1 + below(20));
+        break;
+      case 3:
+        options.pace = iterations(1 + below(9));
+        break;
+      default:
+        options.on_limit = OnLimit::go_on;
+    }
+    options.mode = below(3) == 0 ? Mode::overwrite : Mode::queue;
+    options.start = below(6) == 0 ? Start::observed : Start::desired;
+    return options;
+  }
+  void pulse(UntypedFrontend& one) {
+    for (unsigned i = 0; i <= below(4); ++i) {
+      if (below(4) == 0) {
+        const std::array<std::uint32_t, 2> both{0, 1};
+        const std::array<double, 2> targets{target(), target()};
+        one.add_commands(both, std::as_bytes(std::span(targets)), how());
+      } else if (below(6) == 0) {
+        const std::array<double, 3> rows{target(), target(), target()};
+        one.add_trajectory(below(2), 3, std::as_bytes(std::span(rows)),
+                           {.pace = iterations(1 + below(4))});
+      } else {
+        add(one, below(2), target(), how());
+      }
+      if (below(12) == 0) one.add_purge(below(2));
+      if (below(12) == 0) one.add_purge_own();
+    }
+    if (below(30) == 0) add_request(one, Reset{.seed = below(3)});
+    if (below(20) == 0) add_request(one, Snapshot{.slot = 0});
+    if (below(20) == 0) add_request(one, Restore{.slot = below(3)});
+    if (below(20) == 0) add_request(one, Home{});
+    PulseOptions options;
+    if (below(4) == 0) options.at = one.published() + below(6);
+    one.pulse(options);
+  }
+
+  std::mt19937 random_;
+  std::array<UntypedFrontend, 2> frontends_{UntypedFrontend("rig"), UntypedFrontend("rig")};
+};
+
+/// Rows and journal of a run.
+struct Recorded {
+  Rows rows;
+  RowLayout layout;
+  std::vector<JournalEntry> entries;
+  bool bursting = false;
+
+  explicit Recorded(bool in_bursts) : bursting(in_bursts) {
+    const UntypedFrontend reader("rig", {.access = Access::read_only, .dead = true});
+    rows = reader.history(0, reader.published());
+    layout = reader.layout();
+    Journal journal(reader);
+    for (JournalEntry entry; journal.next(entry);) {
+      EXPECT_EQ(entry.missed, 0U);
+      entries.push_back(std::move(entry));
+    }
+  }
+  RowHead head(std::size_t i) const { return unpack<RowHead>(rows.row(i).data()); }
+  std::vector<std::int64_t> times() const {
+    std::vector<std::int64_t> times;
+    for (std::size_t i = 0; i < rows.count; ++i) times.push_back(head(i).time);
+    return times;
+  }
+  int count(JournalKind kind) const {
+    return static_cast<int>(std::ranges::count(entries, kind, &JournalEntry::kind));
+  }
+};
+
+Recorded record_bursts(unsigned seed, int bursts) {
+  Loop loop(rig(), options_of(true));
+  loop.start();
+  RandomCommanders commanders(seed);
+  for (int i = 0; i < bursts; ++i) {
+    for (unsigned k = commanders.below(3); k > 0; --k) commanders.act();
+    // it is not waited for: it may be rejected, halted or cut
+    commanders.any().start_burst(1 + commanders.below(8));
+    loop.run_granted(kAll);
+  }
+  EXPECT_EQ(loop.fault(), "");
+  Recorded recorded(true);
+  return recorded;
+}
+
+Recorded record_in_real_time(unsigned seed, Iteration iterations) {
+  Loop loop(rig(), options_of(false));
+  loop.start();
+  std::thread thread([&] { loop.run(); });
+  {
+    RandomCommanders commanders(seed);
+    Iteration last = 0;
+    while (commanders.first().published() < iterations) {
+      if (commanders.first().published() == last) {
+        std::this_thread::yield();
+        continue;
+      }
+      last = commanders.first().published();
+      if (commanders.below(3) == 0) commanders.act();
+      // a pause in which the watchdog may find them silent
+      if (commanders.below(200) == 0) {
+        const Iteration until = last + 100;
+        while (commanders.first().published() < until) std::this_thread::yield();
+      }
+    }
+  }
+  loop.ask_to_stop();
+  thread.join();
+  EXPECT_EQ(loop.fault(), "");
+  // the segment lives as long as the loop
+  Recorded recorded(false);
+  return recorded;
+}
+
+/// A row without what belongs to the clock.
+std::vector<std::byte> comparable(const Recorded& recorded, std::span<const std::byte> row) {
+  std::vector<std::byte> bytes(row.begin(), row.end());
+  RowHead head = unpack<RowHead>(row.data());
+  if (!recorded.bursting) head.lateness = head.overruns = head.skipped = 0;
+  std::memcpy(bytes.data(), &head, sizeof head);
+  return bytes;
+}
+
+/// The first row that a replay does not repeat, or -1; and what it says about the driver.
+struct Verdict {
+  Iteration row = -1;
+  std::optional<DecisionMismatch> mismatch;
+};
+
+Verdict replayed(const Recorded& recorded, double bent = 0) {
+  BackendOptions options = options_of(recorded.bursting);
+  options.segment = "replay";
+  Replay replay(rig(bent), options);
+  for (const JournalEntry& entry : recorded.entries) replay.add(entry);
+  EXPECT_TRUE(replay.run(recorded.times())) << replay.fault();
+  const UntypedFrontend reader("replay", {.access = Access::read_only, .dead = true});
+  const Rows rows = reader.history(0, reader.published());
+  Verdict verdict{-1, replay.mismatch()};
+  for (std::size_t i = 0; i < recorded.rows.count; ++i) {
+    if (i < rows.count &&
+        comparable(recorded, rows.row(i)) == comparable(recorded, recorded.rows.row(i))) {
+      continue;
+    }
+    verdict.row = static_cast<Iteration>(i);
+    break;
+  }
+  return verdict;
+}
+
+std::string text_of(const std::optional<DecisionMismatch>& mismatch) {
+  if (!mismatch) return "";
+  return std::to_string(mismatch->iteration) + " " + mismatch->decision + ": " +
+         mismatch->recorded + " / " + mismatch->replayed;
+}
+
+class ReplayTest : public StationTest, public ::testing::WithParamInterface<unsigned> {};
+
+TEST_P(ReplayTest, BurstsRepeatBitForBit) {
+  const Recorded recorded = record_bursts(GetParam(), 500);
+  const Verdict verdict = replayed(recorded);
+  EXPECT_EQ(verdict.row, -1);
+  EXPECT_EQ(text_of(verdict.mismatch), "");
+  EXPECT_GT(recorded.rows.count, 500U);
+  EXPECT_GT(recorded.count(JournalKind::taken), 100);
+  EXPECT_GT(recorded.count(JournalKind::fresh_start), 5);
+  EXPECT_GT(recorded.count(JournalKind::halt), 0);
+}
+
+TEST_P(ReplayTest, ARunInRealTimeRepeatsBitForBit) {
+  const Recorded recorded = record_in_real_time(GetParam(), 3000);
+  const Verdict verdict = replayed(recorded);
+  EXPECT_EQ(verdict.row, -1);
+  EXPECT_EQ(text_of(verdict.mismatch), "");
+  EXPECT_GT(recorded.count(JournalKind::taken), 20);
+}
+
+TEST_P(ReplayTest, AChangedDriverIsFoundInTheFirstIterationInWhichTheChangeActs) {
+  const Recorded recorded = record_bursts(GetParam(), 300);
+  Iteration first = -1;
+  for (std::size_t i = 0; i < recorded.rows.count && first < 0; ++i) {
+    const auto sensors =
+        unpack<Rig::Sensors>(recorded.rows.row(i).data() + recorded.layout.extended);
+    if (sensors.bends > 0) first = static_cast<Iteration>(i);
+  }
+  ASSERT_GT(first, 0) << "the changed line was executed";
+  EXPECT_EQ(replayed(recorded, 1e-6).row, first);
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, ReplayTest, ::testing::Range(1U, 9U));
+
+}  // namespace
+}  // namespace o80::test

@@ -1,0 +1,264 @@
+"""A replay repeats every row of a run bit for bit, and finds the first one that differs."""
+
+import random
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import o80
+from o80.replaying.recorded_run import FileRun, RecordedRun, runs_in
+from o80.replaying.replay import replay_runs
+
+NAMES = ("shoulder", "elbow")
+WAIT = 30.0  # [s] longer than any wait should take
+
+
+class Commander:
+    """Sends what random programs send."""
+
+    def __init__(self, arm: o80.Frontend, seed: int) -> None:
+        self.arm, self.random = arm, random.Random(seed)
+
+    def act(self) -> None:
+        for _ in range(self.random.randrange(3)):
+            self.command()
+        if self.random.random() < 0.05:
+            self.arm.add_request(*self.random.choice([("snapshot",), ("home",)]))
+        if self.random.random() < 0.05:
+            self.arm.add_purge(self.random.choice(["elbow", "shoulder"]))
+        later = self.random.random() < 0.1
+        self.arm.pulse(at=self.arm.published + self.random.randrange(8) if later else None)
+        if self.random.random() < 0.05:
+            self.arm.add_request(self.random.choice(["reset", "restore"]))
+            self.arm.pulse()
+
+    def command(self) -> None:
+        choose = self.random
+        how = {
+            "iterations": choose.randrange(1, 40),
+            "mode": choose.choice(["queue", "overwrite"]),
+            "start": choose.choice(["desired", "observed"]),
+        }
+        if choose.random() < 0.3:
+            self.arm.add_command(None, [self.target(), self.target()], **how)
+        else:
+            self.arm.add_command(choose.choice(["elbow", "shoulder"]), self.target(), **how)
+
+    def target(self) -> float:
+        return self.random.uniform(-2, 2)
+
+
+def run_bursts(arm: o80.Frontend, seed: int, bursts: int = 150) -> None:
+    commander = Commander(arm, seed)
+    for _ in range(bursts):
+        commander.act()
+        arm.burst(commander.random.randrange(1, 20))
+        if commander.random.random() < 0.04:
+            arm.halt("now and then")
+            arm.burst(3)
+            arm.resume()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_run_of_bursts_is_identical(arm: o80.Frontend, seed: int) -> None:
+    run_bursts(arm, seed)
+    report = o80.replay(arm)
+
+    assert report.identical, report
+    (run,) = report
+    assert run.rows == arm.published + 1
+    kinds = {entry.kind for entry in arm.journal()}
+    assert kinds >= {"taken", "scheduled", "fresh_start", "halt", "resume"}
+
+
+def test_the_options_of_the_run_are_used(segment: str) -> None:
+    with o80.robots.load("two_joints").inline(segment, gain=7.5) as arm:
+        arm.burst(5)
+        arm.add_command("elbow", 0.5)
+        arm.burst(5)
+        assert o80.replay(arm).identical
+
+
+def test_the_first_difference_of_another_option_is_told(segment: str) -> None:
+    with o80.robots.load("two_joints").inline(segment, gain=7.5) as arm:
+        arm.burst(5)
+        arm.add_command("elbow", 0.5)
+        arm.burst(5)
+        found = o80.replay(arm, options={"gain": 7.6}).difference
+
+        assert found is not None
+        assert (found.iteration, found.field) == (6, "observed.elbow")
+        assert found.values[0] == arm.wait_for(6).observed[1]
+        near = {"observed": 0.1, "extended": 0.1}
+        assert o80.replay(arm, options={"gain": 7.6}, tolerances=near).identical
+
+
+def test_a_run_in_real_time_with_a_killed_commander_is_identical(segment: str) -> None:
+    """The death is recorded, and with it the purge; nobody dies in the replay."""
+    moves = (
+        f"import o80; arm = o80.Frontend({segment!r}); arm.add_command('elbow', 2.0, duration=60)\n"
+        f"arm.pulse(); print('sent', flush=True); input()"
+    )
+    with o80.robots.load("two_joints").start(segment, frequency=2000, stale="purge") as process:
+        arm = process.frontend()
+        commander = Commander(arm, 7)
+        with subprocess.Popen(
+            [sys.executable, "-c", moves], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        ) as child:
+            assert child.stdout is not None
+            assert child.stdout.readline() == b"sent\n"
+            arm.wait_for(arm.published + 20, timeout=WAIT)
+            child.send_signal(signal.SIGKILL)
+        while not any(entry.kind == "died" for entry in arm.journal()):
+            arm.wait_for(arm.published + 1, timeout=WAIT)
+        for _ in range(100):
+            commander.act()
+            arm.wait_for(arm.published + commander.random.randrange(10), timeout=WAIT)
+        report = o80.replay(arm)
+        assert report.identical, report
+        assert sum(run.rows for run in report) > 100
+
+
+def test_a_run_whose_robot_has_stopped_is_identical(segment: str) -> None:
+    with o80.robots.load("two_joints").start(segment, frequency=2000) as process:
+        arm = process.frontend()
+        arm.add_command("elbow", 1.0, duration=0.05)
+        arm.pulse()
+        arm.wait_for(20, timeout=WAIT)
+    assert o80.replay(arm).identical
+    arm.close()
+
+
+def test_a_history_without_row_0_is_not_replayed(segment: str) -> None:
+    with o80.robots.load("two_joints").inline(segment, history=20) as arm:
+        arm.burst(50)
+        report = o80.replay(arm)
+    assert not report.identical
+    assert report.difference is None
+    assert "the first recorded row is row 31: a replay begins at row 0" in str(report)
+
+
+def test_a_replay_ends_at_a_gap_of_the_journal(segment: str) -> None:
+    with o80.robots.load("two_joints").inline(segment, journal=0.5) as arm:
+        for _ in range(300):  # 300 batches of 50 commands are more than 0.5 MiB
+            for _ in range(50):
+                arm.add_command("elbow", 0.1)
+            arm.burst(50)
+        report = o80.replay(arm)
+    assert not report.identical
+    assert report.difference is None
+    assert "the journal lacks entries 0 to" in str(report)
+
+
+def file_of(path: Path, arm: o80.Frontend, seed: int = 3) -> Path:
+    """A recording of a random run."""
+    with o80.Recording(path, arm) as recording:
+        for part in range(5):
+            run_bursts(arm, seed + part, 40)
+            recording.flush()
+    return path
+
+
+def test_a_recorded_run_is_identical(arm: o80.Frontend, tmp_path: Path) -> None:
+    path = file_of(tmp_path / "run.mcap", arm)
+    rows = arm.published + 1
+    arm.close()
+    report = o80.replay(path)
+
+    assert report.identical, report
+    (run,) = report
+    assert (run.segment, run.rows) == (arm.segment, rows)
+
+
+def test_each_run_of_each_segment_is_replayed(segment: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with o80.Recording(path, [segment, f"{segment}-b"]) as recording:
+        for number, gain in enumerate((5.0, 9.0)):
+            load = o80.robots.load("two_joints")
+            with load.inline(segment, gain=gain) as a, load.inline(f"{segment}-b") as b:
+                for arm in (a, b):
+                    arm.add_command("elbow", 0.5, iterations=20)
+                    arm.burst(30)
+                while recording.rows < (number + 1) * 2 * 31:  # until it has attached to both
+                    recording.flush()
+    o80.clean(f"{segment}-b")
+    report = o80.replay(path)
+
+    assert report.identical, report
+    assert [(run.name, run.rows) for run in report] == [
+        (segment, 31),
+        (f"{segment}/1", 31),
+        (f"{segment}-b", 31),
+        (f"{segment}-b/1", 31),
+    ]
+
+
+@dataclass(frozen=True)
+class Flipped:
+    """A recorded run in which one bit of a row is changed."""
+
+    run: FileRun
+    row: int
+    byte: int
+    bit: int
+    segment: str = "flipped"
+    number: int = 0
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.run, name)
+
+    def blocks(self) -> Iterator[o80.History]:
+        for block in self.run.blocks():
+            raw = bytearray(block.rows.tobytes())
+            place = self.row - int(block.iteration[0])
+            if 0 <= place < len(block):
+                raw[place * block.rows.itemsize + self.byte] ^= self.bit
+            yield o80.History(block._decoder, np.frombuffer(bytes(raw), block.rows.dtype))
+
+
+@pytest.fixture(scope="module")
+def run_in_file(tmp_path_factory: pytest.TempPathFactory) -> RecordedRun:
+    """A random run of two joints in a file."""
+    with o80.robots.load("two_joints").inline() as arm:
+        path = file_of(tmp_path_factory.mktemp("run") / "run.mcap", arm)
+    return runs_in(o80.open(path))[0]
+
+
+@given(data=st.data())
+@settings(max_examples=15, deadline=None)
+def test_a_flipped_bit_is_found_in_its_row_and_field(
+    run_in_file: FileRun, data: st.DataObject
+) -> None:
+    run = run_in_file
+    row = data.draw(st.integers(0, run.rows - 1))
+    part, actuator = data.draw(st.sampled_from([("desired", 0), ("observed", 1), ("extended", 1)]))
+    byte = run.schema["row"][part] + 8 * actuator + data.draw(st.integers(0, 7))
+    flipped = Flipped(run, row, byte, 1 << data.draw(st.integers(0, 7)))
+    (report,) = replay_runs([flipped])
+
+    assert report.difference is not None
+    name = f"extended.effort[{actuator}]" if part == "extended" else f"{part}.{NAMES[actuator]}"
+    assert (report.difference.iteration, report.difference.field) == (row, name)
+
+
+def test_a_run_without_a_journal_is_refused(segment: str) -> None:
+    with o80.Backend(segment, ["a"], bursting=True) as backend:
+        backend.publish()
+        with o80.Frontend(segment) as frontend, pytest.raises(o80.DriverError, match="no robot"):
+            o80.replay(frontend)
+
+
+def test_nothing_is_left_in_shared_memory(arm: o80.Frontend) -> None:
+    arm.burst(3)
+    before = {entry.name for entry in o80.segments()}
+    o80.replay(arm)
+    assert {entry.name for entry in o80.segments()} == before
