@@ -57,6 +57,7 @@ struct FixedText {
 using NameText = FixedText<48>;
 using UnitText = FixedText<24>;
 using HelpText = FixedText<120>;
+using FieldHelpText = FixedText<119>;
 
 /// Where the value of a field comes from. A replay compares only what the robot itself computes.
 enum class Origin : std::uint8_t {
@@ -73,7 +74,8 @@ inline constexpr std::uint32_t kNoType = 0xFFFFFFFF;
 struct FieldRow {
   NameText name;
   UnitText unit;
-  HelpText help;
+  FieldHelpText help;
+  Origin origin = Origin::robot;
   std::uint32_t type = kNoType;   // index of the type of a nested struct
   std::uint32_t offset = 0;       // from the start of the struct [bytes]
   std::uint32_t size = 0;         // size of one element [bytes]
@@ -86,8 +88,6 @@ struct FieldRow {
   std::uint8_t resting = 0;      // 1: goes to `rest` when no command drives it
   std::uint8_t has_default = 0;  // 1: a request may leave it out
   double rest = 0.0;             // in the field's unit
-  Origin origin = Origin::robot;
-  std::array<std::uint8_t, 7> reserved{};
 
   std::uint32_t count() const { return (rows == 0 ? 1 : rows) * (columns == 0 ? 1 : columns); }
   bool operator==(const FieldRow&) const = default;

@@ -167,13 +167,13 @@ inline void set_text(FieldRow& field, std::string_view text) {
   const auto open = text.rfind('[');
   const auto close = text.rfind(']');
   if (open == std::string_view::npos || close == std::string_view::npos || close < open) {
-    field.help = HelpText(text);
+    field.help = FieldHelpText(text);
     return;
   }
   field.unit = UnitText(text.substr(open + 1, close - open - 1));
   auto help = text.substr(0, open);
   while (!help.empty() && help.back() == ' ') help.remove_suffix(1);
-  field.help = HelpText(help);
+  field.help = FieldHelpText(help);
 }
 
 inline FieldRow scalar_field(std::string_view name, Kind kind, std::string_view text,
