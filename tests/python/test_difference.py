@@ -71,6 +71,15 @@ def number_bytes(history: o80.History) -> list[int]:
     return [each.offset - begin for each in columns if each.name.startswith("desired")]
 
 
+def test_a_field_of_the_clock_is_left_out(segment: str) -> None:
+    """The description is the only thing that says so: see docs/drivers.md."""
+    history = run_of(0.5, segment)
+    other = changed(history, 3, history.schema["row"]["extended"])
+    assert first_difference(history, other) is not None
+    history.schema["extended"]["fields"][0]["origin"] = "clock"
+    assert first_difference(history, other) is None
+
+
 def test_not_a_number_equals_itself(segment: str) -> None:
     with o80.Backend(segment, {"sensor": float}, bursting=True) as backend:
         backend.publish({"sensor": 1.0})

@@ -250,11 +250,43 @@ def test_a_flipped_bit_is_found_in_its_row_and_field(
     assert (report.difference.iteration, report.difference.field) == (row, name)
 
 
-def test_a_run_without_a_journal_is_refused(segment: str) -> None:
+def test_a_robot_that_may_be_hardware_is_not_started(segment: str) -> None:
     with o80.Backend(segment, ["a"], bursting=True) as backend:
         backend.publish()
-        with o80.Frontend(segment) as frontend, pytest.raises(o80.DriverError, match="no robot"):
-            o80.replay(frontend)
+        with o80.Frontend(segment) as frontend:
+            report = o80.replay(frontend)
+    assert not report.identical
+    assert report.difference is None
+    assert "the robot may be hardware" in str(report)
+
+
+def o80_replay(*words: str) -> subprocess.CompletedProcess[str]:
+    program = Path(sys.executable).parent / "o80"
+    return subprocess.run(
+        [program, "replay", *words], capture_output=True, text=True, timeout=2 * WAIT, check=False
+    )
+
+
+def test_the_command_says_whether_a_recording_repeats(arm: o80.Frontend, tmp_path: Path) -> None:
+    path = file_of(tmp_path / "run.mcap", arm)
+    done = o80_replay(str(path))
+    assert (done.returncode, done.stderr) == (0, "")
+    assert f"{arm.segment}: {arm.published + 1} rows, identical" in done.stdout
+
+    done = o80_replay(str(path), "--set", "gain=21")
+    assert done.returncode == 1
+    assert "observed." in done.stdout
+
+    assert o80_replay(str(path), "--set", "gain").returncode == 2
+    assert "'gian'" in o80_replay(str(path), "--set", "gian=2").stderr
+
+
+def test_the_command_says_when_rows_are_missing(segment: str) -> None:
+    with o80.robots.load("two_joints").inline(segment, history=20) as arm:
+        arm.burst(50)
+        done = o80_replay(segment)
+    assert done.returncode == 2
+    assert "a replay begins at row 0" in done.stdout
 
 
 def test_nothing_is_left_in_shared_memory(arm: o80.Frontend) -> None:

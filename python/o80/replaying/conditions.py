@@ -1,9 +1,24 @@
 """What differs between a recorded run and its replay."""
 
+from typing import Any
+
 from o80.provenance import Provenance
 
 TOLERANCE = 1e-9
 """Largest difference that counts as equal where bits need not agree."""
+
+
+def reads_the_world(schema: dict[str, Any]) -> str:
+    """Why a robot must not be started for a replay, because it may be hardware; else empty."""
+    if schema.get("of_the_world"):
+        return "the robot reads the world (its driver says so), which no replay can repeat"
+    served = {request["name"] for request in schema["requests"]}
+    if lacking := {"snapshot", "restore"} - served:
+        return (
+            f"the robot may be hardware: it does not serve the requests of a simulation "
+            f"({', '.join(sorted(lacking))})"
+        )
+    return ""
 
 
 def changes(recorded: Provenance, now: Provenance) -> list[str]:

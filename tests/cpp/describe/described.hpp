@@ -19,6 +19,14 @@ struct Joint {
 };
 O80_DESCRIBE(Joint, (position, "[rad]"), (velocity, "how fast [rad/s]"));
 
+/// Fields that a replay compares, and that it does not.
+struct Origins {
+  double force = 0;
+  std::int64_t stamp = 0;
+  float camera = 0;
+};
+O80_DESCRIBE(Origins, force, (stamp, "[ns]", o80::of_the_clock()), (camera, o80::of_the_world()));
+
 struct Gripper {
   float width = 0;
   bool closed = false;

@@ -231,6 +231,23 @@ void use(const Schema& schema) {
   for (const ActuatorRow& actuator : schema.actuators) schema.scalar_count(actuator.type);
 }
 
+TEST(Table, TheOriginOfAFieldIsKeptAndAnUnknownOneIsRefused) {
+  Schema schema;
+  schema.head.extended = describing::type_of<described::Origins>(schema);
+  const TypeRow& type = schema.types[schema.head.extended];
+  const auto origin = [&](std::uint32_t field) -> Origin& {
+    return schema.fields[type.first_field + field].origin;
+  };
+  EXPECT_EQ(origin(0), Origin::robot);
+  EXPECT_EQ(origin(1), Origin::clock);
+  EXPECT_EQ(origin(2), Origin::world);
+  EXPECT_EQ(schema_from_bytes(to_bytes(schema)), schema);
+  EXPECT_THAT(to_json(schema), ::testing::HasSubstr(R"("origin": "clock")"));
+
+  origin(0) = static_cast<Origin>(3);
+  EXPECT_THROW(schema_from_bytes(to_bytes(schema)), Error);
+}
+
 TEST(Table, GarbageIsRefusedAndNeverCrashes) {
   const std::vector<std::byte> good = to_bytes(schema_of<MixedRobot>());
   std::mt19937 random(7);  // NOLINT(bugprone-random-generator-seed)
