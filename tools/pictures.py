@@ -1,23 +1,27 @@
-"""Draws the pictures of README.md and of docs/recording.md anew: docs/pictures/*.png.
+"""Draws the pictures of README.md and of docs anew: docs/pictures/*.png. Needs chromium.
 
 python tools/pictures.py
 """
 
 from pathlib import Path
+from typing import Any
 
 import gymnasium
 import numpy as np
 from matplotlib.figure import Figure
 
 import o80
+from chromium import Chromium
 from o80.plot import plot
 from o80_table_tennis.players.policies import default_policy
 from o80_table_tennis.report.rendering import Scene, write_picture
 from o80_table_tennis.settings import TaskSettings
 from o80_table_tennis.task.observations import BALL_POSITION, JOINT_POSITIONS
+from o80_table_tennis.world.scene import MODEL
 
 FOLDER = Path(__file__).resolve().parent.parent / "docs" / "pictures"
 SIZE = (800, 450)
+VIEW_SIZE = (1180, 700)
 SHOWN = 4  # every n-th step of the episode shows the ball
 
 
@@ -82,7 +86,39 @@ def draw_recording(path: Path) -> None:
         plot({"two_joints": arm.history()}).savefig(path, dpi=80)
 
 
+def draw_view(path: Path) -> None:
+    """The page of o80 view: an arm that swings beside flying balls."""
+    options: dict[str, Any] = {
+        "model": str(MODEL),
+        "balls": "ball",
+        "extra_balls": 5,
+        "surfaces": "table",
+    }
+    balls = ["ball", *(f"ball_{i}" for i in range(1, 6))]
+    joints = ["joint_1", "joint_2", "joint_3", "joint_4"]
+    with (
+        o80.robots.load("mujoco").inline("twin", **options) as twin,
+        o80.View(twin) as view,
+        Chromium() as browser,
+    ):
+        for i, ball in enumerate(balls):
+            place = [0.1 + 0.12 * i, 2.6 - 0.3 * i, 1.25 - 0.03 * i]
+            twin.add_command(ball, {"position": place, "velocity": [0.0, -4.0, 1.0]})
+        for joint, target in zip(joints, (0.7, 1.0, 0.6, -0.4), strict=True):
+            twin.add_command(joint, target, iterations=250, profile="minimum_jerk")
+            twin.add_command(joint, -0.5 * target, iterations=400, profile="minimum_jerk")
+        twin.burst(450)
+        page = browser.page(view.url, *VIEW_SIZE)
+        page.wait_for("page.scene.frames > 0 && page.charts.length")
+        page.value("Object.assign(page.scene, {azimuth: -0.62, elevation: 0.3, distance: 4.1})")
+        page.value("page.scene.dirty = true")
+        looks = page.value("page.looks")
+        page.wait_for(f"page.looks > {looks} + 8 && page.charts[2].parts.observed")
+        path.write_bytes(page.picture())
+
+
 if __name__ == "__main__":
     draw_table_tennis(FOLDER / "table_tennis.png")
     draw_first_minute(FOLDER / "first_minute.png")
     draw_recording(FOLDER / "recording.png")
+    draw_view(FOLDER / "view.png")

@@ -41,6 +41,7 @@ SAYS = {
     "recording": ["151 rows", "episode 2: begins with the elbow at 0.037"],
     "several_frontends": ["both ended: COMPLETED, COMPLETED", "without control: REJECTED"],
     "snapshots": ["the same to the last bit: True", "refused: "],
+    "view": ["open http://127.0.0.1:", "/?token="],
     "waiting_or_not": ["asked for 0.30 rad", "is next"],
 }
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import select
 import signal
 import subprocess
@@ -114,3 +115,13 @@ def test_the_command_prints_the_address_that_is_bound(arm: o80.Frontend) -> None
         assert look(running.stdout.readline().strip())["source"] == arm.segment
         running.send_signal(signal.SIGINT)
         assert running.wait(TIMEOUT) == 0
+
+
+def test_the_program_of_the_page_runs(tmp_path: Path) -> None:
+    page = Path(__file__).resolve().parents[2] / "docs" / "view.md"
+    [program] = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=TIMEOUT
+    )
+    assert done.returncode == 0, done.stderr
+    assert "/?token=" in done.stdout

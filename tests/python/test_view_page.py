@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from chromium import Chromium, Page
 
 import o80
+from chromium import Chromium, Page
 from o80.view.serve import page_server
 
 pytestmark = pytest.mark.check
