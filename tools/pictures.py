@@ -102,15 +102,15 @@ def draw_view(path: Path) -> None:
         Chromium() as browser,
     ):
         for i, ball in enumerate(balls):
-            place = [0.1 + 0.12 * i, 2.6 - 0.3 * i, 1.25 - 0.03 * i]
-            twin.add_command(ball, {"position": place, "velocity": [0.0, -4.0, 1.0]})
+            place = [0.1 + 0.12 * i, 2.9 - 0.2 * i, 1.2]
+            twin.add_command(ball, {"position": place, "velocity": [0.0, -3.0, 1.5]})
         for joint, target in zip(joints, (0.7, 1.0, 0.6, -0.4), strict=True):
-            twin.add_command(joint, target, iterations=250, profile="minimum_jerk")
-            twin.add_command(joint, -0.5 * target, iterations=400, profile="minimum_jerk")
-        twin.burst(450)
+            twin.add_command(joint, target, iterations=110, profile="minimum_jerk")
+            twin.add_command(joint, -0.5 * target, iterations=200, profile="minimum_jerk")
+        twin.burst(200)
         page = browser.page(view.url, *VIEW_SIZE)
         page.wait_for("page.scene.frames > 0 && page.charts.length")
-        page.value("Object.assign(page.scene, {azimuth: -0.62, elevation: 0.3, distance: 4.1})")
+        page.value("Object.assign(page.scene, {azimuth: -0.75, elevation: 0.36, distance: 4.8})")
         page.value("page.scene.dirty = true")
         looks = page.value("page.looks")
         page.wait_for(f"page.looks > {looks} + 8 && page.charts[2].parts.observed")

@@ -66,7 +66,7 @@ class Answers:
         if asked.get("key") != source.key:
             answer["new"] = shown.introduction(source)
         if shown.scene is not None:
-            answer |= shown.scene.poses(_bytes_of(row))
+            answer |= shown.scene.poses(_bytes_of(row), row.active)
         panels = asked.get("panels")
         panels = shown.panels.first if not isinstance(panels, list) else [str(p) for p in panels]
         answer["values"] = shown.panels.values(_as_rows(row), panels)

@@ -1,6 +1,7 @@
 """The bodies of a MuJoCo model, and where they are in a row."""
 
 import threading
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,9 +27,10 @@ class Scene:
         self._data = self._mujoco.MjData(self._model)
         self._lock = threading.Lock()
         self._start: NDArray[np.float64] = np.array(self._data.qpos)
-        row = schema["row"]
         self._places = [
-            place for value in described["values"] if (place := self._place(value, row)) is not None
+            place
+            for value in described["values"]
+            if (place := self._place(value, schema)) is not None
         ]
         weld = self._model.body_weldid
         self._moving = [body for body in range(self._model.nbody) if weld[body] != 0]
@@ -46,7 +48,7 @@ class Scene:
         except ValueError as error:
             raise o80.Error(f"the model of the robot cannot be read: {error}") from error
 
-    def _place(self, value: dict[str, Any], row: dict[str, Any]) -> "_Place | None":
+    def _place(self, value: dict[str, Any], schema: dict[str, Any]) -> "_Place | None":
         """None if the model has no such joint or body."""
         kind = self._mujoco.mjtObj
         joint = value["what"] == "joint"
@@ -57,25 +59,32 @@ class Scene:
             found = int(self._model.body_jntadr[body]) if body >= 0 else -1
         if found < 0:
             return None
+        row = schema["row"]
         extended = value["from"] == "extended"
         observed = row["extended" if extended else "observed"] + value["offset"]
         desired = observed if extended else row["desired"] + value["offset"]
         address = int(self._model.jnt_qposadr[found])
-        return _Place(value["name"], address, 1 if joint else 3, observed, desired)
+        follows = None if extended else _following(schema, value["offset"])
+        return _Place(value["name"], address, 1 if joint else 3, observed, desired, follows)
 
-    def poses(self, row: bytes) -> dict[str, Any]:
-        """Positions and quaternions of the moving bodies (bodies, 7), observed and desired."""
+    def poses(self, row: bytes, active: NDArray[np.bool_]) -> dict[str, Any]:
+        """Positions and quaternions of the moving bodies (bodies, 7), observed and desired.
+
+        active: actuators that a command drives.
+        """
         found: dict[str, Any] = {"pose": None, "ghost": None, "not_finite": []}
         with self._lock:
-            found["pose"] = packed(self._pose(row, "observed", found["not_finite"]))
+            observed = [place.observed for place in self._places]
+            found["pose"] = packed(self._pose(row, observed, found["not_finite"]))
             if self._has_ghost:
-                found["ghost"] = packed(self._pose(row, "desired", []))
+                desired = [place.wanted(active) for place in self._places]
+                found["ghost"] = packed(self._pose(row, desired, []))
         return found
 
-    def _pose(self, row: bytes, part: str, not_finite: list[str]) -> NDArray[np.float32]:
+    def _pose(self, row: bytes, offsets: list[int], not_finite: list[str]) -> NDArray[np.float32]:
         self._data.qpos[:] = self._start
-        for place in self._places:
-            numbers = np.frombuffer(row, np.float64, place.count, getattr(place, part))
+        for place, offset in zip(self._places, offsets, strict=True):
+            numbers = np.frombuffer(row, np.float64, place.count, offset)
             if np.isfinite(numbers).all():
                 self._data.qpos[place.address : place.address + place.count] = numbers
             else:
@@ -143,12 +152,30 @@ class Scene:
         }
 
 
+@dataclass(frozen=True)
 class _Place:
     """Where a value lies in a row, and where it goes in qpos."""
 
-    def __init__(self, name: str, address: int, count: int, observed: int, desired: int) -> None:
-        self.name, self.address, self.count = name, address, count
-        self.observed, self.desired = observed, desired
+    name: str
+    address: int
+    count: int
+    observed: int
+    desired: int
+    follows: int | None  #: the actuator, if without a command it follows what is observed
+
+    def wanted(self, active: NDArray[np.bool_]) -> int:
+        """Where the desired value lies; what only follows has no desired value of its own."""
+        idle = self.follows is not None and not bool(active[self.follows])
+        return self.observed if idle else self.desired
+
+
+def _following(schema: dict[str, Any], offset: int) -> int | None:
+    """The actuator of a value in the states, if it follows."""
+    found = None
+    for index, actuator in enumerate(schema["actuators"]):
+        if actuator["offset"] <= offset:
+            found = index if actuator["when_idle"] == "follow" else None
+    return found
 
 
 def _mujoco() -> Any:
