@@ -5,7 +5,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import o80
+from o80.machine import this_machine
 from o80.replaying.recorded_run import FileRun, RecordedRun, runs_in
 from o80.replaying.replay import replay_runs
 
@@ -258,6 +259,42 @@ def test_a_robot_that_may_be_hardware_is_not_started(segment: str) -> None:
     assert not report.identical
     assert report.difference is None
     assert "the robot may be hardware" in str(report)
+
+
+@dataclass(frozen=True)
+class FromElsewhere(Flipped):
+    """A run with one flipped bit that another build of o80, or another machine, recorded."""
+
+    provenance: Any = None
+    machine: Any = None
+
+
+def test_what_another_build_recorded_is_compared_with_a_tolerance(run_in_file: FileRun) -> None:
+    other = replace(run_in_file.provenance, source_hash="0" * 64)
+    place = run_in_file.schema["row"]["observed"]
+    row = run_in_file.rows - 2
+    run = FromElsewhere(run_in_file, row, place, 1, provenance=other)
+
+    (report,) = replay_runs([run])
+    assert report.identical, report
+    assert any("another build of o80" in note and "1e-09" in note for note in report.notes)
+    (report,) = replay_runs([run], tolerances={})
+    assert report.difference is not None
+    assert report.difference.iteration == row
+
+
+def test_another_machine_is_noted(run_in_file: FileRun) -> None:
+    machine = run_in_file.machine
+    assert machine == this_machine()
+    assert machine is not None
+    older = replace(machine, libc="glibc 2.1")
+    assert "glibc 2.1 recorded it" in older.difference(machine)
+    lesser = replace(machine, features=machine.features[1:])
+    assert "the processors differ" in lesser.difference(machine)
+    run = FromElsewhere(run_in_file, 0, 0, 0, provenance=run_in_file.provenance, machine=older)
+    (report,) = replay_runs([run])
+    assert report.identical, report
+    assert any("glibc 2.1 recorded it" in note for note in report.notes)
 
 
 def o80_replay(*words: str) -> subprocess.CompletedProcess[str]:

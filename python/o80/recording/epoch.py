@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.machine import this_machine
 from o80.recording.blocks import Block
 from o80.recording.joint_states import JointWriter
 from o80.recording.message_plan import MessagePlan
@@ -127,7 +128,10 @@ class RowWriter:
         message = row_type(layout)
         schema = file.add_schema(f"{PACKAGE}/msg/{message.name}", message.definition)
         file.attach(note.attachment, DESCRIPTION, frontend._description.table(), time.time_ns())
-        file.add_metadata(note.provenance, {"json": frontend.provenance.as_json()})
+        file.add_metadata(
+            note.provenance,
+            {"json": frontend.provenance.as_json(), "machine": this_machine().as_json()},
+        )
         channel = file.add_channel(topic_of(note.segment), schema, note.texts())
         return cls(layout, note, channel, JointWriter.added_to(file, layout, note, None))
 

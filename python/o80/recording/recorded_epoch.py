@@ -1,12 +1,12 @@
 """One run of a backend in a recording: its rows and its journal, as from a live frontend."""
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, TypeVar
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from o80.errors import InvalidArgument, RecordingError, SegmentError
 from o80.history import History
 from o80.journal import EntryDecoder, JournalEntry
 from o80.layout import decoder_of
+from o80.machine import Machine
 from o80.provenance import Provenance
 from o80.recording.blocks import messages_in
 from o80.recording.epoch import GAP, EpochNote
@@ -24,6 +25,8 @@ from o80.recording.journal_channel import entries_in
 from o80.recording.message_plan import MessagePlan
 from o80.recording.message_types import row_type
 from o80.recording.scan import Scan, attachment_of, content_of, index_of
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -135,16 +138,31 @@ class RecordedEpoch:
     @cached_property
     def provenance(self) -> Provenance:
         """How the backend was started; as `Frontend.provenance`. Raises RecordingError."""
-        part = self._parts[0]
-        name = self._note.provenance
-        for each in part.found.metadata:
-            if each.name != name:
-                continue
-            try:
-                return Provenance.from_json(each.metadata["json"])
-            except (KeyError, TypeError, ValueError) as error:
-                raise RecordingError(f"{part.path}: the record {name} is damaged") from error
-        raise RecordingError(f"{part.path} does not say how '{self._note.segment}' was started")
+        return self._started("json", Provenance.from_json)
+
+    @property
+    def machine(self) -> Machine | None:
+        """The machine that recorded it; None: an older o80 recorded it. Raises RecordingError."""
+        known = "machine" in self._provenance_texts
+        return self._started("machine", Machine.from_json) if known else None
+
+    def _started(self, key: str, read: Callable[[str], T]) -> T:
+        try:
+            return read(self._provenance_texts[key])
+        except (KeyError, TypeError, ValueError) as error:
+            raise RecordingError(
+                f"{self._parts[0].path}: the record {self._note.provenance} is damaged"
+            ) from error
+
+    @cached_property
+    def _provenance_texts(self) -> dict[str, str]:
+        for each in self._parts[0].found.metadata:
+            if each.name == self._note.provenance:
+                texts: dict[str, str] = each.metadata
+                return texts
+        raise RecordingError(
+            f"{self._parts[0].path} does not say how '{self._note.segment}' was started"
+        )
 
     @cached_property
     def _decoder(self) -> Any:

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from o80.machine import Machine, this_machine
 from o80.provenance import Provenance
 
 TOLERANCE = 1e-9
@@ -35,8 +36,11 @@ def changes(recorded: Provenance, now: Provenance) -> list[str]:
     return found
 
 
-def other_arithmetic(recorded: Provenance, now: Provenance) -> str:
-    """Why rows may differ in their last bits although nothing is wrong; empty if they may not."""
+def other_arithmetic(recorded: Provenance, now: Provenance, machine: Machine | None) -> str:
+    """Why rows may differ in their last bits although nothing is wrong; empty if they may not.
+
+    machine: that the run was recorded on.
+    """
     if recorded.version != now.version:
         return f"o80 {recorded.version} recorded it, this is {now.version}"
     if recorded.source_hash != now.source_hash:
@@ -44,4 +48,4 @@ def other_arithmetic(recorded: Provenance, now: Provenance) -> str:
             f"another build of o80 {now.version} recorded it (sources {recorded.source_hash[:12]}, "
             f"these are {now.source_hash[:12]})"
         )
-    return ""
+    return machine.difference(this_machine()) if machine is not None else ""

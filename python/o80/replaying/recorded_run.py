@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from o80 import _core
 from o80.errors import InvalidArgument
+from o80.machine import Machine, this_machine
 
 if TYPE_CHECKING:
     from o80.frontend import Frontend
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from o80.recording.reader import RecordingFile
     from o80.recording.recorded_epoch import RecordedEpoch
 
-ROWS_AT_ONCE = 4096
+ROWS_AT_ONCE = 1024  # Ctrl-C waits for them
 _BYTES_AT_ONCE = 1 << 20
 
 
@@ -34,7 +35,11 @@ class RecordedRun(Protocol):
     def schema(self) -> dict[str, Any]: ...
 
     @property
-    def provenance(self) -> Provenance | None: ...
+    def provenance(self) -> Provenance: ...
+
+    @property
+    def machine(self) -> Machine | None:
+        """That it ran on; None: not known."""
 
     @property
     def rows(self) -> int:
@@ -64,8 +69,12 @@ class LiveRun:
         return schema
 
     @property
-    def provenance(self) -> Provenance | None:
+    def provenance(self) -> Provenance:
         return self.frontend.provenance
+
+    @property
+    def machine(self) -> Machine:
+        return this_machine()
 
     @property
     def rows(self) -> int:
@@ -101,8 +110,12 @@ class FileRun:
         return self.epoch.schema
 
     @property
-    def provenance(self) -> Provenance | None:
+    def provenance(self) -> Provenance:
         return self.epoch.provenance
+
+    @property
+    def machine(self) -> Machine | None:
+        return self.epoch.machine
 
     @property
     def rows(self) -> int:

@@ -23,7 +23,7 @@ from o80.frontend import Frontend
 from o80.loop_options import text_of
 from o80.replaying.conditions import TOLERANCE, changes, other_arithmetic, reads_the_world
 from o80.replaying.entry_feed import EntryFeed
-from o80.replaying.recorded_run import LiveRun, RecordedRun, runs_in
+from o80.replaying.recorded_run import ROWS_AT_ONCE, LiveRun, RecordedRun, runs_in
 from o80.replaying.report import ReplayReport, RunReport
 from o80.replaying.same_bytes import same_bytes
 
@@ -35,7 +35,7 @@ Progress = Callable[[str, int, int], None]
 
 # of the run options, those that decide what a backend does; the others are of its process
 _OF_BACKEND = ("lanes", "lane_blocks")
-_HISTORY = 1 << 14  # rows that the replay keeps: those of a block, and fresh starts
+_HISTORY = 4 * ROWS_AT_ONCE  # rows that the replay keeps: those of a block, and fresh starts
 
 
 def replay(
@@ -55,7 +55,8 @@ def replay(
     robot: name or library of another robot than the recorded one, for example after a change.
     options: options of the robot that differ from the recorded ones.
     tolerances, ignore: by column, as for `o80 diff`. None: bit for bit, but with a tolerance if
-        another build of o80 recorded the run; a note in the report says so. {}: bit for bit.
+        another build of o80, C library or processor recorded the run; a note in the report says so.
+        {}: bit for bit.
     progress: called with the name of a run, its rows compared, and all its rows.
 
     Only simulations are started: robots that serve the requests snapshot and restore and do not say
@@ -200,9 +201,9 @@ class _RunReplay:
     def _started(self) -> Iterator[_core.Replay]:
         provenance = self._run.provenance
         library = _loaded(self._robot or _recorded_robot(self._run))
-        own = dict(provenance.options) if provenance else {}
+        own = dict(provenance.options)
         own |= {name: text_of(value) for name, value in self._options.items()}
-        recorded = provenance.run_options if provenance else {}
+        recorded = provenance.run_options
         loop = {name: recorded[name] for name in _OF_BACKEND if name in recorded}
         schema = self._run.schema
         loop |= {"bursting": text_of(schema["bursting"]), "stale": schema["stale"]}
@@ -239,10 +240,8 @@ class _RunReplay:
     def _note_changes(self, frontend: Frontend) -> None:
         """Says what has changed since the run, and adds a tolerance where bits need not agree."""
         recorded, now = self._run.provenance, frontend.provenance
-        if recorded is None:
-            return
         self._notes += changes(recorded, now)
-        why = other_arithmetic(recorded, now)
+        why = other_arithmetic(recorded, now, self._run.machine)
         if not why:
             return
         if self._tolerances is None:
@@ -276,7 +275,7 @@ class _RunReplay:
 
 def _recorded_robot(run: RecordedRun) -> str:
     provenance = run.provenance
-    if provenance is not None and provenance.library and Path(provenance.library).exists():
+    if provenance.library and Path(provenance.library).exists():
         return provenance.library
     name: str = run.schema["robot"]
     return name

@@ -1,0 +1,63 @@
+"""What of a machine decides the last bits of a computation: its C library and its processor."""
+
+import json
+import os
+import platform
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Self
+
+
+@dataclass(frozen=True)
+class Machine:
+    """The C library and the processor of a machine. Mathematical functions differ between them."""
+
+    libc: str  #: "glibc 2.36"
+    architecture: str  #: "x86_64"
+    features: tuple[str, ...]  #: of the processor, sorted
+
+    def as_json(self) -> str:
+        """As one line of JSON, which `from_json` reads."""
+        return json.dumps(asdict(self), sort_keys=True)
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """Raises ValueError, KeyError, TypeError if it is damaged."""
+        found = json.loads(text)
+        return cls(str(found["libc"]), str(found["architecture"]), tuple(found["features"]))
+
+    def difference(self, other: "Machine") -> str:
+        """What of another machine differs, in words; empty if nothing does."""
+        if self.libc != other.libc:
+            return f"{self.libc} recorded it, this machine has {other.libc}"
+        if self.architecture != other.architecture:
+            return f"a machine of {self.architecture} recorded it, this one is {other.architecture}"
+        differ = sorted(set(self.features) ^ set(other.features))
+        if differ:
+            more = f" and {len(differ) - 3} more" if len(differ) > 3 else ""
+            return f"the processors differ in their features: {', '.join(differ[:3])}{more}"
+        return ""
+
+
+@lru_cache
+def this_machine() -> Machine:
+    """The machine of this process."""
+    try:
+        libc = os.confstr("CS_GNU_LIBC_VERSION") or ""
+    except (ValueError, OSError):
+        libc = ""
+    return Machine(libc or " ".join(platform.libc_ver()), platform.machine(), _features())
+
+
+def _features() -> tuple[str, ...]:
+    """Of the first processor, as Linux lists them."""
+    try:
+        text = Path("/proc/cpuinfo").read_text()
+    except OSError:
+        return ()
+    for line in text.splitlines():
+        name, _, value = line.partition(":")
+        if name.strip() in ("flags", "Features"):
+            return tuple(sorted(value.split()))
+    return ()
