@@ -200,6 +200,7 @@ def _say_where(settings: DemoSettings, console: Console) -> None:
         f"report, plots and film: {settings.output}",
         f"recording of every row: {recording}",
         f"  o80 view {recording}      # arm, table and balls in the browser, back in time too",
+        f"  o80 replay {recording}    # repeats all of it and compares bit for bit",
         f"  o80 plot {recording} --segment {arm} --fields agonist_1,extended.joint_positions",
     )
     for line in lines:

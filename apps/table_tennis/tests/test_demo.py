@@ -128,12 +128,12 @@ def test_what_it_says_about_the_recording_works(played: tuple[Path, str]) -> Non
     printed = [line.split("#")[0].split() for line in text.splitlines() if "o80 " in line]
     commands = {words[1]: words[2:] for words in printed if words[:1] == ["o80"]}
     assert all(words[0] == recording for words in commands.values())
-    assert sorted(commands) == ["plot", "view"]
+    assert sorted(commands) == ["plot", "replay", "view"]
 
     o80_program = str(Path(sys.executable).with_name("o80"))
-    words = [o80_program, "plot", *commands["plot"], "-o", str(folder / "p.png")]
-    done = subprocess.run(words, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
+    for words in (["plot", *commands["plot"], "-o", str(folder / "p.png")], ["replay", recording]):
+        done = subprocess.run([o80_program, *words], capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
 
 
 @pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])

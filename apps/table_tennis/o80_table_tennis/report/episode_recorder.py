@@ -18,11 +18,9 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import asdict, fields
 from enum import Enum
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -43,7 +41,7 @@ MARGIN = 2 * ITERATIONS
 """A step flushes when fewer rows than this are left before unread ones are overwritten."""
 
 
-class EpisodeRecorder(AbstractContextManager["EpisodeRecorder"]):
+class EpisodeRecorder:
     """Writes a recording beside an environment; see the module.
 
     A file that exists is continued. Every row is recorded, from the oldest that the segments still
@@ -113,14 +111,6 @@ class EpisodeRecorder(AbstractContextManager["EpisodeRecorder"]):
     def close(self) -> None:
         """Finishes the file; may be called twice."""
         self._recording.close()
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
 
 def packed(rows: Sequence[Float32Array]) -> dict[str, Any]:
