@@ -1,6 +1,8 @@
 """Recordings that earlier versions of o80 wrote are read as they were then."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -34,3 +36,12 @@ def test_a_recording_of_an_earlier_version_is_read(name: str) -> None:
             [entry.number, entry.kind, entry.iteration, len(entry.commands), entry.text]
             for entry in epoch.journal()
         ] == there["journal"]
+
+
+@pytest.mark.parametrize("name", [path.stem for path in sorted(RECORDINGS.glob("*.mcap"))])
+def test_a_recording_of_an_earlier_version_is_replayed(name: str) -> None:
+    command = [Path(sys.executable).parent / "o80", "replay", RECORDINGS / f"{name}.mcap"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout.count("116 rows, identical") == 2
