@@ -40,8 +40,8 @@ def test_a_recording_of_an_earlier_version_is_read(name: str) -> None:
 
 @pytest.mark.parametrize("name", [path.stem for path in sorted(RECORDINGS.glob("*.mcap"))])
 def test_a_recording_of_an_earlier_version_is_replayed(name: str) -> None:
-    command = [Path(sys.executable).parent / "o80", "replay", RECORDINGS / f"{name}.mcap"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    command = [str(Path(sys.executable).parent / "o80"), "replay", f"{name}.mcap"]
+    done = subprocess.run(command, cwd=RECORDINGS, capture_output=True, text=True, timeout=60)
 
     assert done.returncode == 0, done.stdout + done.stderr
     assert done.stdout.count("116 rows, identical") == 2
