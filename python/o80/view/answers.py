@@ -144,7 +144,7 @@ class _Shown:
             first, last = source.extent()
             length = round(window * 1e9)
             end = last if at is None else max(first, min(at + length // 2, last))
-            begin = end - length
+            begin = max(first, end - length)  # a run that has just begun fills its chart
             rows = source.rows(begin, end)
             return {
                 "begin": source.seconds(begin),
