@@ -19,6 +19,7 @@ from o80.machine import this_machine
 from o80.replaying.recorded_run import FileRun, RecordedRun, runs_in
 from o80.replaying.replay import replay_runs
 
+RECORDINGS = Path(__file__).resolve().parents[1] / "data" / "recordings"
 NAMES = ("shoulder", "elbow")
 WAIT = 30.0  # [s] longer than any wait should take
 
@@ -316,6 +317,25 @@ def test_the_command_says_whether_a_recording_repeats(arm: o80.Frontend, tmp_pat
 
     assert o80_replay(str(path), "--set", "gain").returncode == 2
     assert "'gian'" in o80_replay(str(path), "--set", "gian=2").stderr
+
+
+def test_a_recording_of_an_older_version_repeats() -> None:
+    report = o80.replay(RECORDINGS / "format_1.mcap")
+    assert report.identical, report
+    assert [run.rows for run in report] == [116, 116]
+
+
+def test_a_recording_in_several_files_repeats(segment: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with o80.robots.load("two_joints").inline(segment) as arm:
+        with o80.Recording(path, arm, split="20k") as recording:
+            for part in range(5):
+                run_bursts(arm, part, 20)
+                recording.flush()
+        rows = arm.published + 1
+    assert len(list(path.glob("*.mcap"))) > 1
+    done = o80_replay(str(path))
+    assert f"{segment}: {rows} rows, identical" in done.stdout, done.stdout + done.stderr
 
 
 def test_the_command_says_when_rows_are_missing(segment: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -10,9 +11,13 @@ import typer
 import o80
 from o80.cli.diff import _tolerances
 
+_ENOUGH = 1000  # rows for a speed that is not that of the start
+
 
 def replay(
-    recording: Annotated[str, typer.Argument(help="A recording (.mcap), or a segment.")],
+    recording: Annotated[
+        str, typer.Argument(help="A recording (.mcap, or a folder), or a segment.")
+    ],
     segment: Annotated[
         str | None, typer.Option(help="Replay only this segment of a recording.")
     ] = None,
@@ -44,8 +49,9 @@ def replay(
     """
     from o80.replaying.replay import replay as replay_all
 
+    is_file = recording.endswith(".mcap") or Path(recording).exists()
     report = replay_all(
-        recording if recording.endswith(".mcap") or "/" in recording else _attached(recording),
+        recording if is_file else _attached(recording),
         segment=segment,
         robot=robot,
         options=_options(option),
@@ -59,7 +65,7 @@ def replay(
         print(run)
         for note in run.notes:
             print(f"  note: {note}")
-        if run.rows and run.seconds > 0:
+        if run.rows >= _ENOUGH and run.seconds > 0:
             speed = run.recorded_seconds / run.seconds
             print(f"  {run.rows / run.seconds:.0f} rows/s, {speed:.3g} times as fast as it ran")
     if report.difference is not None:
