@@ -184,7 +184,7 @@ void bind_inline_group(nb::module_& m) {
            "targets"_a, "rows"_a);
 
   nb::class_<Group> group(m, "InlineGroup", "The compiled half of o80.InlineGroup.");
-  refuse_to_pickle(group, "an inline group", "its copies");
+  refuse_to_pickle(group, "an inline group", "its rows");
   group.def_prop_ro("copies", [](const Group& self) { return self.inner().copies(); })
       .def_prop_ro("threads", [](const Group& self) { return self.inner().threads(); })
       .def_prop_ro(

@@ -9,6 +9,8 @@ with o80.robots.load("two_joints").inline(copies=64) as group:
 
 from __future__ import annotations
 
+import contextlib
+import warnings
 from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -18,7 +20,7 @@ from numpy.typing import NDArray
 
 from o80 import _core, at_exit
 from o80.checked import whole
-from o80.errors import InvalidArgument
+from o80.errors import InvalidArgument, UsedAfterFork
 from o80.frontend import Frontend
 from o80.gather import Comparison, Gather, Gathered, flags_from, numbers_from
 from o80.group_burst import GroupBurst, chosen_copies
@@ -187,6 +189,18 @@ class InlineGroup:
         self._group.close()
 
     def _close_at_exit(self) -> None:
+        self.close()
+
+    def __del__(self) -> None:
+        if self.__dict__.get("_closed", True):
+            return
+        with contextlib.suppress(UsedAfterFork):
+            self._group.check_usable()
+            warnings.warn(
+                f"the inline group of '{self.robot}' was never closed",
+                ResourceWarning,
+                stacklevel=2,
+            )
         self.close()
 
     def _number(self, copy: int) -> int:

@@ -1,5 +1,6 @@
 """Inline groups: copies of one robot in this process (o80.InlineGroup)."""
 
+import gc
 import os
 import pickle
 import resource
@@ -180,8 +181,18 @@ def test_refuses_wrong_arguments(group: o80.InlineGroup) -> None:
         group.request("rest")
     with pytest.raises(IndexError, match="copies 0 to 4"):
         group[5]
-    with pytest.raises(TypeError, match="cannot be pickled"):
-        pickle.dumps(burst)
+    for thing in (burst, group):
+        with pytest.raises(TypeError, match="cannot be pickled, it belongs to this process"):
+            pickle.dumps(thing)
+
+
+def test_a_group_that_is_never_closed_is_warned_about_and_stopped() -> None:
+    group = o80.robots.load("two_joints").inline(copies=2)
+    group.publish(0, "forgotten")
+    with pytest.warns(ResourceWarning, match="the inline group of 'two_joints' was never closed"):
+        del group
+        gc.collect()
+    assert files() == []
 
 
 def test_serves_requests_that_take_time(group: o80.InlineGroup) -> None:
