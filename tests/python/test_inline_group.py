@@ -1,6 +1,5 @@
 """Inline groups: copies of one robot in this process (o80.InlineGroup)."""
 
-import gc
 import os
 import pickle
 import resource
@@ -187,11 +186,10 @@ def test_refuses_wrong_arguments(group: o80.InlineGroup) -> None:
 
 
 def test_a_group_that_is_never_closed_is_warned_about_and_stopped() -> None:
-    group = o80.robots.load("two_joints").inline(copies=2)
-    group.publish(0, "forgotten")
+    held = [o80.robots.load("two_joints").inline(copies=2)]
+    held[0].publish(0, "forgotten")
     with pytest.warns(ResourceWarning, match="the inline group of 'two_joints' was never closed"):
-        del group
-        gc.collect()
+        held.clear()
     assert files() == []
 
 
