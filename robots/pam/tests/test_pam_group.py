@@ -1,5 +1,7 @@
 """Copies of the arm in an inline group do what single arms do, bit for bit."""
 
+from contextlib import ExitStack
+
 import numpy as np
 import pytest
 
@@ -12,9 +14,9 @@ COPIES = 3
 def test_a_group_of_arms_gives_the_rows_of_single_arms(threads: int) -> None:
     random = np.random.default_rng(4)
     robot = o80.robots.load("pam")
-    options = {"start_noise": 0.01}
-    singles = [robot.inline(**options) for _ in range(COPIES)]
-    with robot.inline(copies=COPIES, threads=threads, **options) as group:
+    with ExitStack() as stack:
+        singles = [stack.enter_context(robot.inline(start_noise=0.01)) for _ in range(COPIES)]
+        group = stack.enter_context(robot.inline(copies=COPIES, threads=threads, start_noise=0.01))
         burst = group.prepared_burst(10, steps=2, each=5)
         bursts = [single.prepared_burst(10, steps=2, each=5) for single in singles]
         middle = group.latest()["desired"].mean(axis=0)
@@ -34,5 +36,3 @@ def test_a_group_of_arms_gives_the_rows_of_single_arms(threads: int) -> None:
             if turn % 3 == 2:
                 group.request("restore", copies=[0], slot=1)
                 singles[0].request("restore", slot=1)
-    for single in singles:
-        single.close()

@@ -1,5 +1,6 @@
 """Copies of a MuJoCo model in an inline group do what single ones do, bit for bit."""
 
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -15,12 +16,14 @@ COPIES = 3
 def test_a_group_of_simulations_gives_the_rows_of_single_ones(threads: int) -> None:
     random = np.random.default_rng(5)
     robot = o80.robots.load("mujoco")
-    singles = [robot.inline(model=MODEL) for _ in range(COPIES)]
-    with robot.inline(copies=COPIES, threads=threads, model=MODEL) as group:
+    with ExitStack() as stack:
+        singles = [stack.enter_context(robot.inline(model=MODEL)) for _ in range(COPIES)]
+        group = stack.enter_context(robot.inline(copies=COPIES, threads=threads, model=MODEL))
         burst = group.prepared_burst(8)
         bursts = [single.prepared_burst(8) for single in singles]
         for turn in range(12):
-            burst.targets = random.uniform(-0.5, 0.5, burst.targets.shape)
+            burst.targets["position"][...] = random.uniform(-0.5, 0.5, burst.targets.shape)
+            burst.targets["velocity"][...] = random.uniform(-1, 1, burst.targets.shape)
             burst.run()
             for i, one in enumerate(bursts):
                 one.targets = burst.targets[i]
@@ -35,5 +38,3 @@ def test_a_group_of_simulations_gives_the_rows_of_single_ones(threads: int) -> N
                 singles[1].request("restore", slot=1)
                 group.request("reset", copies=[2], seed=turn)
                 singles[2].request("reset", seed=turn)
-    for single in singles:
-        single.close()
