@@ -23,6 +23,7 @@ WorkerPool::WorkerPool(std::size_t workers) {
 WorkerPool::~WorkerPool() {
   if (guard_.forked()) {
     // the threads exist in the parent only: neither join nor end their handles
+    // NOLINTNEXTLINE(bugprone-unhandled-exception-at-new)
     static_cast<void>(new std::vector<std::thread>(std::move(threads_)));
     return;
   }

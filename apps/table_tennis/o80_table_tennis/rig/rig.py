@@ -176,7 +176,8 @@ class Rig:
             "history": settings.history,
         }
         if settings.pacing is Pacing.INLINE:
-            return self._stack.enter_context(library.inline(**common, **options))
+            frontend: o80.Frontend = library.inline(**common, **options)
+            return self._stack.enter_context(frontend)
         process = self._stack.enter_context(
             library.start(bursting=not real_time, **common, **options)
         )
