@@ -4,6 +4,7 @@ import base64
 import json
 import os
 import shutil
+import signal
 import subprocess
 import tempfile
 import time
@@ -82,7 +83,7 @@ class Chromium:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._popen.kill()
+        os.killpg(self._popen.pid, signal.SIGKILL)  # with its helpers
         self._popen.wait()
         shutil.rmtree(self._folder, ignore_errors=True)
 
