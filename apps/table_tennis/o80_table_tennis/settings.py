@@ -49,10 +49,13 @@ class RigSettings:
     """Simulations that mirror the arm; the first one holds the ball that is played."""
     extra_balls: int = 0
     """Balls beside it, spread over the twins."""
-    muscle: str = "linear"
-    """Model of the muscles of the simulated arm: linear or hill."""
-    ranges: str = "simulated"
-    """Pressure ranges of the arm: simulated or real."""
+    preset: str = "standard"
+    """Numbers of the simulated arm: standard, identified (as the real arm) or published_simulation.
+    The default policy is made for the standard ones."""
+    muscle: str = "of_preset"
+    """Model of the muscles of the simulated arm, instead of the preset's: linear or hill."""
+    ranges: str = "of_preset"
+    """Pressure ranges of the arm, instead of the preset's: simulated or real."""
     start_noise: float = 0.0
     """On each joint of the simulated arm at a reset, uniform in plus or minus this [rad]."""
     frequency: float = 1.0 / PERIOD

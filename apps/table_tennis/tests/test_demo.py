@@ -173,7 +173,7 @@ def test_wrong_recordings_are_refused_in_words(tmp_path: Path) -> None:
     ("output", "options", "said"),
     [
         ("taken", [], "--output"),
-        ("new", ["--muscle", "steel", "--real-time-episodes", "0"], "one of: linear, hill"),
+        ("new", ["--muscle", "steel", "--real-time-episodes", "0"], "linear, hill"),
     ],
 )
 def test_what_the_demo_cannot_do_is_said_in_a_line(

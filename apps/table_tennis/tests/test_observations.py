@@ -1,10 +1,13 @@
 """The 22 numbers of an observation, and their box."""
 
+import ast
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from recorded_rows import DATA
 
 from o80_table_tennis.task import observations
 from o80_table_tennis.task.ball_play import ReturnTask
@@ -55,4 +58,17 @@ def test_the_box_has_room_for_the_robot_and_its_balls() -> None:
     )
 
     assert np.all((row > bounds.low) & (row < bounds.high))
-    assert bounds.high[0] == pytest.approx(np.radians(89.8))
+    assert bounds.high[0] > np.radians(89.8)
+
+
+@pytest.mark.recordings("robot_and_ball_2022")
+def test_the_logs_of_the_real_arm_lie_inside_the_bounds() -> None:
+    bounds = ObservationBounds()
+    for file in (DATA / "robot_and_ball_2022").iterdir():
+        joints = [ast.literal_eval(line)[1][1:] for line in file.read_text().splitlines()]
+        q, dq = (np.abs(np.array(values)) for values in zip(*joints, strict=True))
+        assert q.max() < bounds.joint_position
+        assert dq.max() < bounds.joint_velocity
+    # of 50 other public logs, and of simulated muscles that are switched fully
+    assert bounds.joint_position > 1.73
+    assert bounds.joint_velocity > 39

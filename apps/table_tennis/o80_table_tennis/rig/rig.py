@@ -128,6 +128,7 @@ class Rig:
         if settings.attach:
             return self._attach()
         options = {
+            "preset": settings.preset,
             "muscle": settings.muscle,
             "ranges": settings.ranges,
             "start_noise": settings.start_noise,

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..world.arm import JOINT_LIMIT
 from ..world.scene import Vector
 from .state import State
 
@@ -25,18 +24,21 @@ BALL_POSITION = slice(16, 19)
 BALL_VELOCITY = slice(19, 22)
 """World frame [m/s]."""
 SIZE = 22
-JOINT_VELOCITY_BOUND = 20.0
-"""[rad/s]"""
+JOINT_POSITION_BOUND = 1.75
+"""[rad]: the real arm passes its stops a little, to 1.73 rad in public logs."""
+JOINT_VELOCITY_BOUND = 40.0
+"""[rad/s]: joints of the simulated arm reach 39 when its muscles are switched fully, those of the
+real one 8."""
 
 
 @dataclass(frozen=True)
 class ObservationBounds:
     """The box of observations; values outside are clipped into it."""
 
-    joint_position: float = JOINT_LIMIT
-    """Either way [rad]: the limit of the joints."""
+    joint_position: float = JOINT_POSITION_BOUND
+    """Either way [rad]."""
     joint_velocity: float = JOINT_VELOCITY_BOUND
-    """Either way [rad/s]: the fastest joints recorded reach 3.8."""
+    """Either way [rad/s]."""
     ball_low: Vector = (-3.0, -3.0, -1.0)
     """[m]"""
     ball_high: Vector = (3.0, 5.0, 4.0)

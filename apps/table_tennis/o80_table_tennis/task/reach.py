@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..world.arm import JOINT_LIMIT, JOINTS, PLAYING_POSTURE, racket_pose
 from .end import MOST_STEPS, End
-from .observations import JOINT_VELOCITY_BOUND
+from .observations import JOINT_POSITION_BOUND, JOINT_VELOCITY_BOUND
 from .state import State
 
 Float32Array = NDArray[np.float32]
@@ -41,13 +41,20 @@ class ReachTask:
     @property
     def low(self) -> Float32Array:
         """(22,)"""
-        bounds = [-JOINT_LIMIT] * 4 + [-self.joint_velocity] * 4 + [0.0] * 8 + [-2.0, -2.0, 0.0] * 2
+        bounds = (
+            [-JOINT_POSITION_BOUND] * 4
+            + [-self.joint_velocity] * 4
+            + [0.0] * 8
+            + [-2.0, -2.0, 0.0] * 2
+        )
         return np.array(bounds, dtype=np.float32)
 
     @property
     def high(self) -> Float32Array:
         """(22,)"""
-        bounds = [JOINT_LIMIT] * 4 + [self.joint_velocity] * 4 + [1.0] * 8 + [2.0, 2.0, 3.0] * 2
+        bounds = (
+            [JOINT_POSITION_BOUND] * 4 + [self.joint_velocity] * 4 + [1.0] * 8 + [2.0, 2.0, 3.0] * 2
+        )
         return np.array(bounds, dtype=np.float32)
 
     def begin(self, rng: np.random.Generator) -> FloatArray:

@@ -102,6 +102,38 @@ Joints solve(const JointMatrix& lower, Joints b) {
   return b;
 }
 
+// Effect of a unit impulse on each joint.
+JointMatrix responses(const JointMatrix& lower) {
+  JointMatrix response;
+  for (std::size_t j = 0; j < kJoints; ++j) {
+    Joints unit{};
+    unit[j] = 1.0;
+    response[j] = solve(lower, unit);
+  }
+  return response;
+}
+
+// The impulses with which dry friction of at most `friction` [Nm] brings the joints nearest to
+// rest.
+void rub(const Joints& friction, const JointMatrix& lower, double duration, Joints& dq) {
+  bool any = false;
+  for (std::size_t j = 0; j < kJoints; ++j) any = any || friction[j] > 0.0;
+  if (!any) return;
+
+  // projected Gauss-Seidel on the impulses
+  const JointMatrix response = responses(lower);
+  Joints impulse{};
+  for (int sweep = 0; sweep < 20; ++sweep) {
+    for (std::size_t j = 0; j < kJoints; ++j) {
+      const double most = duration * friction[j];
+      const double next = std::clamp(impulse[j] - dq[j] / response[j][j], -most, most);
+      const double change = next - impulse[j];
+      impulse[j] = next;
+      for (std::size_t i = 0; i < kJoints; ++i) dq[i] += response[j][i] * change;
+    }
+  }
+}
+
 // The smallest impulses that keep every joint within its stops for `duration`.
 void stop_at_limits(const Joints& q, const JointMatrix& lower, double duration, Joints& dq) {
   const auto passes = [&](std::size_t j) {
@@ -112,12 +144,7 @@ void stop_at_limits(const Joints& q, const JointMatrix& lower, double duration, 
   if (!any) return;
 
   // projected Gauss-Seidel on the impulses; at most one of the two stops of a joint is near
-  JointMatrix response;
-  for (std::size_t j = 0; j < kJoints; ++j) {
-    Joints unit{};
-    unit[j] = 1.0;
-    response[j] = solve(lower, unit);
-  }
+  const JointMatrix response = responses(lower);
   Joints impulse{};
   for (int sweep = 0; sweep < 20; ++sweep) {
     for (std::size_t j = 0; j < kJoints; ++j) {
@@ -270,6 +297,7 @@ void Arm::advance(Motion& motion, const Joints& torque, double duration) const n
   const JointMatrix lower = factor(m);
   motion.dq = solve(lower, momentum);
 
+  rub(config_.friction, lower, duration, motion.dq);
   stop_at_limits(motion.q, lower, duration, motion.dq);
   for (std::size_t i = 0; i < kJoints; ++i) {
     motion.q[i] = std::clamp(motion.q[i] + duration * motion.dq[i], -kJointLimit, kJointLimit);

@@ -70,6 +70,7 @@ class Arm {
     Vector base{0.0, 0.0, 1.21};                  ///< [m], in the world
     double gravity = 9.81;                        ///< [m/s^2]
     Joints damping{2.0, 2.0, 1.2, 1.5};           ///< [Nm s/rad], of bearings and tendons
+    Joints friction{};                            ///< [Nm], dry, of bearings and tendons
     Joints armature{0.003, 0.003, 0.003, 0.003};  ///< [kg m^2], of pulleys, tendons and muscles
   };
 
@@ -85,8 +86,8 @@ class Arm {
                       const Joints& torque) const noexcept;  ///< without stops
   double energy(const Motion& motion) const noexcept;        ///< [J], kinetic and potential
 
-  /// Integrates by `duration` [s]: semi-implicit Euler with implicit damping. The stops at
-  /// ±kJointLimit are inelastic and never passed.
+  /// Integrates by `duration` [s]: semi-implicit Euler with implicit damping and friction. The
+  /// stops at ±kJointLimit are inelastic and never passed.
   void advance(Motion& motion, const Joints& torque, double duration) const noexcept;
 
   RacketMotion racket(const Motion& motion) const noexcept;

@@ -9,10 +9,37 @@
 namespace o80::pam {
 namespace {
 
+/// Takes the numbers that are given. Each joint may be left to the preset.
+void take(const Joints& given, Joints& numbers) {
+  for (std::size_t j = 0; j < kJoints; ++j) {
+    if (given[j] != kOfPreset[j]) numbers[j] = given[j];
+  }
+}
+
+PressureRanges ranges_of(const PamDriver::Config& config, const PressureRanges& of_preset) {
+  const bool preset_in_bar = of_preset[0].idle != of_preset[0].minimum;
+  const bool bars = config.activated_by == ActivatedBy::bar ||
+                    (config.activated_by == ActivatedBy::of_preset && preset_in_bar);
+  PressureRanges ranges{};
+  for (std::size_t m = 0; m < kMuscles; ++m) {
+    ranges[m] = {of_preset[m].minimum, of_preset[m].maximum};
+  }
+  if (config.ranges == Ranges::real) ranges = kRealRanges;
+  if (config.ranges == Ranges::simulated) ranges = kSimulatedRanges;
+  return bars ? in_bar(ranges, config.full_bar) : ranges;
+}
+
 Plant::Config plant_config(const PamDriver::Config& config) {
-  Plant::Config plant;
-  plant.muscle = config.muscle;
-  plant.ranges = config.ranges == Ranges::real ? kRealRanges : kSimulatedRanges;
+  Plant::Config plant = preset(config.preset);
+  if (config.muscle == Law::linear) plant.muscle = MuscleModel::linear;
+  if (config.muscle == Law::hill) plant.muscle = MuscleModel::hill;
+  plant.ranges = ranges_of(config, plant.ranges);
+  take(config.dead_time, plant.dead_time);
+  take(config.lag, plant.lag);
+  take(config.damping, plant.arm.damping);
+  take(config.friction, plant.arm.friction);
+  take(config.maximum_force, plant.maximum_force);
+  take(config.stroke, plant.stroke);
   plant.period = config.period;
   plant.substeps = config.substeps;
   plant.start_posture = config.start_posture;
@@ -45,11 +72,12 @@ void PamDriver::describe(Schema& schema) const {
   }
   schema.period(period_);
   for (std::uint32_t m = 0; m < kMuscles; ++m) {
-    const auto [minimum, maximum] = plant_.config().ranges[m];
+    const PressureRange& range = plant_.config().ranges[m];
     schema.actuator(m)
         .name((m % 2 == 0 ? "agonist_" : "antagonist_") + std::to_string(m / 2 + 1))
         .when_idle(WhenIdle::hold)
-        .limits({.minimum = static_cast<double>(minimum), .maximum = static_cast<double>(maximum)});
+        .limits({.minimum = static_cast<double>(range.minimum),
+                 .maximum = static_cast<double>(range.maximum)});
   }
 }
 

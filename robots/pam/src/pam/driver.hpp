@@ -6,14 +6,26 @@
 
 #include "o80/robot.hpp"
 #include "pam/plant.hpp"
+#include "pam/presets.hpp"
 
 namespace o80::pam {
 
-O80_DESCRIBE_ENUM(MuscleModel, linear, hill);
+O80_DESCRIBE_ENUM(Preset, standard, identified, published_simulation);
+
+/// The law of the muscles.
+enum class Law : std::uint8_t { of_preset, linear, hill };
+O80_DESCRIBE_ENUM(Law, of_preset, linear, hill);
 
 /// The pressure ranges of the muscles.
-enum class Ranges : std::uint8_t { simulated, real };
-O80_DESCRIBE_ENUM(Ranges, simulated, real);
+enum class Ranges : std::uint8_t { of_preset, simulated, real };
+O80_DESCRIBE_ENUM(Ranges, of_preset, simulated, real);
+
+/// What determines the activation of a muscle: where the pressure lies in its range, or the bar.
+enum class ActivatedBy : std::uint8_t { of_preset, range, bar };
+O80_DESCRIBE_ENUM(ActivatedBy, of_preset, range, bar);
+
+/// An option that is left to the preset.
+inline constexpr Joints kOfPreset{-1.0, -1.0, -1.0, -1.0};
 
 /// Sensor values beside the pressures.
 struct ArmSensors {
@@ -42,8 +54,17 @@ O80_DESCRIBE(ArmSensors, (joint_positions, "[rad]"), (joint_velocities, "[rad/s]
 class PamDriver {
  public:
   struct Config {
-    MuscleModel muscle = MuscleModel::linear;
-    Ranges ranges = Ranges::simulated;
+    Preset preset = Preset::standard;
+    Law muscle = Law::of_preset;
+    Ranges ranges = Ranges::of_preset;
+    ActivatedBy activated_by = ActivatedBy::of_preset;
+    double full_bar = kFullBar;
+    Joints dead_time = kOfPreset;
+    Joints lag = kOfPreset;
+    Joints damping = kOfPreset;
+    Joints friction = kOfPreset;
+    Joints maximum_force = kOfPreset;
+    Joints stroke = kOfPreset;
     double period = 0.002;
     std::int32_t substeps = 4;
     Joints start_posture = kPlayingPosture;
@@ -88,8 +109,17 @@ class PamDriver {
   std::int64_t period_;  // [ns]
 };
 O80_DESCRIBE(PamDriver::Config,
+             (preset, "numbers of the arm, unless they are given: as before, as identified, ..."),
              (muscle, "law of the muscles: linear, or of Hill type after Haeufle et al. (2014)"),
              (ranges, "pressure ranges: those of the published simulation, or of the real arm"),
+             (activated_by, "what activates a muscle: the share of its range, or bars from 0 on"),
+             (full_bar, "pressure of full activation, if it is bars that activate [bar]"),
+             (dead_time, "of each joint until pressures begin to act; -1: of the preset [s]"),
+             (lag, "of first order, of each joint's muscles; -1: of the preset [s]"),
+             (damping, "of each joint; -1: of the preset [Nm s/rad]"),
+             (friction, "dry, of each joint; -1: of the preset [Nm]"),
+             (maximum_force, "of each joint's muscles; -1: of the preset [N]"),
+             (stroke, "without force, of linear muscles; -1: of the preset [m]"),
              (period, "of an iteration, which sets the frequency [s]"),
              (substeps, "integration steps in a period"),
              (start_posture, "posture at the start, unless start_pressures are given [rad]"),

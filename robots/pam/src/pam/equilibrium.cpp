@@ -9,21 +9,29 @@
 namespace o80::pam {
 namespace {
 
-double pair_torque(const Muscle& muscle, std::size_t joint, double angle, double pull,
-                   double counter_pull) {
+/// `pull` is the activation of the muscle that turns the joint towards larger angles.
+double pair_torque(const Muscle& muscle, double angle, double pull, double counter_pull) {
   return std::visit(
       [&](const auto& law) {
-        return kPulleyRadius *
-               (law.resting_force(muscle_length(agonist(joint), angle), pull) -
-                law.resting_force(muscle_length(antagonist(joint), angle), counter_pull));
+        return kPulleyRadius * (law.resting_force(muscle_length(1.0, angle), pull) -
+                                law.resting_force(muscle_length(-1.0, angle), counter_pull));
       },
       muscle);
 }
 
 /// The activations of two antagonists with this mean and difference.
-std::pair<double, double> around(double mean, double difference) {
-  return {std::clamp(mean + 0.5 * difference, 0.0, 1.0),
-          std::clamp(mean - 0.5 * difference, 0.0, 1.0)};
+std::pair<double, double> around(double mean, double difference, const PressureRange& range,
+                                 const PressureRange& counter_range) {
+  return {std::clamp(mean + 0.5 * difference, range.least(), range.most()),
+          std::clamp(mean - 0.5 * difference, counter_range.least(), counter_range.most())};
+}
+
+/// The muscles that turn a joint towards larger angles, and towards smaller ones.
+std::size_t towards_larger(std::size_t joint, const Joints& directions) {
+  return directions[joint] > 0 ? agonist(joint) : antagonist(joint);
+}
+std::size_t towards_smaller(std::size_t joint, const Joints& directions) {
+  return directions[joint] > 0 ? antagonist(joint) : agonist(joint);
 }
 
 }  // namespace
@@ -31,8 +39,11 @@ std::pair<double, double> around(double mean, double difference) {
 Joints Equilibrium::muscle_torque(const Joints& q, const Pressures& pressures) const noexcept {
   Joints torque{};
   for (std::size_t j = 0; j < kJoints; ++j) {
-    torque[j] = pair_torque(muscle, j, q[j], ranges[agonist(j)].activation(pressures[agonist(j)]),
-                            ranges[antagonist(j)].activation(pressures[antagonist(j)]));
+    const std::size_t larger = towards_larger(j, directions);
+    const std::size_t smaller = towards_smaller(j, directions);
+    torque[j] =
+        pair_torque(muscles[j], q[j] - neutral[j], ranges[larger].activation(pressures[larger]),
+                    ranges[smaller].activation(pressures[smaller]));
   }
   return torque;
 }
@@ -41,20 +52,25 @@ Pressures Equilibrium::pressures_holding(const Joints& q, double activation) con
   const Joints needed = arm.gravity(q);
   Pressures pressures{};
   for (std::size_t j = 0; j < kJoints; ++j) {
+    const std::size_t larger = towards_larger(j, directions);
+    const std::size_t smaller = towards_smaller(j, directions);
+    const auto shared = [&](double difference) {
+      return around(activation, difference, ranges[larger], ranges[smaller]);
+    };
     // the torque grows with the difference of the activations: bisect
     double low = -2.0, high = 2.0;
     for (int i = 0; i < 50; ++i) {
       const double middle = 0.5 * (low + high);
-      const auto [pull, counter_pull] = around(activation, middle);
-      const bool weak = pair_torque(muscle, j, q[j], pull, counter_pull) < needed[j];
+      const auto [pull, counter_pull] = shared(middle);
+      const bool weak = pair_torque(muscles[j], q[j] - neutral[j], pull, counter_pull) < needed[j];
       (weak ? low : high) = middle;
     }
-    const auto [pull, counter_pull] = around(activation, 0.5 * (low + high));
+    const auto [pull, counter_pull] = shared(0.5 * (low + high));
     const auto raw = [&](std::size_t m, double share) {
       return static_cast<std::int32_t>(std::lround(ranges[m].pressure(share)));
     };
-    pressures[agonist(j)] = raw(agonist(j), pull);
-    pressures[antagonist(j)] = raw(antagonist(j), counter_pull);
+    pressures[larger] = raw(larger, pull);
+    pressures[smaller] = raw(smaller, counter_pull);
   }
   return pressures;
 }

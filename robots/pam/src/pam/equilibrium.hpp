@@ -9,8 +9,10 @@ namespace o80::pam {
 /// An arm and its muscles at rest: from a posture to its pressures, and back.
 struct Equilibrium {
   const Arm& arm;
-  const Muscle& muscle;
+  const Muscles& muscles;
   const PressureRanges& ranges;
+  const Joints& directions;  // see Plant::Config
+  const Joints& neutral;
 
   /// Torque of the muscles on the joints [Nm].
   Joints muscle_torque(const Joints& q, const Pressures& pressures) const noexcept;

@@ -133,8 +133,15 @@ double HillMuscle::resting_force(double length, double activation) const noexcep
   return series_force(length - resting_fibre_length(length, activation));
 }
 
-Muscle make_muscle(MuscleModel model) noexcept {
-  return model == MuscleModel::hill ? Muscle(HillMuscle()) : Muscle(LinearMuscle());
+Muscle make_muscle(MuscleModel model, double maximum_force, double stroke) noexcept {
+  if (model == MuscleModel::linear) {
+    return LinearMuscle{.maximum_force = maximum_force, .stroke = stroke};
+  }
+  // all forces in the same proportion
+  HillMuscle::Parameters parameters;
+  parameters.series_force *= maximum_force / parameters.maximum_force;
+  parameters.maximum_force = maximum_force;
+  return HillMuscle(parameters);
 }
 
 }  // namespace o80::pam

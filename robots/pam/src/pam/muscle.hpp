@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <concepts>
 #include <cstdint>
 #include <variant>
@@ -109,9 +110,14 @@ static_assert(MuscleLaw<LinearMuscle> && MuscleLaw<HillMuscle>);
 /// The law of the muscles of a plant.
 enum class MuscleModel : std::uint8_t { linear, hill };
 
-/// A law chosen at run time; visited once for all eight muscles.
+/// A law chosen at run time.
 using Muscle = std::variant<LinearMuscle, HillMuscle>;
 
-Muscle make_muscle(MuscleModel model) noexcept;
+/// The muscles of each joint, whose two are alike. All joints have the same law with numbers of
+/// their own, so that the law is chosen once for all of them.
+using Muscles = std::array<Muscle, 4>;
+
+/// `stroke` is that of the linear law; the Hill law has none.
+Muscle make_muscle(MuscleModel model, double maximum_force = 1500.0, double stroke = 0.10) noexcept;
 
 }  // namespace o80::pam

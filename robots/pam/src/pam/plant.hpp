@@ -11,6 +11,8 @@
 
 namespace o80::pam {
 
+struct Equilibrium;
+
 /// Radius of the pulleys through which the muscles turn the joints [m].
 inline constexpr double kPulleyRadius = 0.037;
 
@@ -19,6 +21,9 @@ inline constexpr Joints kActivationLag{0.016, 0.044, 0.044, 0.044};
 
 /// Near the median posture of the real arm in recorded play [rad].
 inline constexpr Joints kPlayingPosture{0.17, 1.1, 1.04, 0.5};
+
+/// Periods that a dead time may last.
+inline constexpr std::size_t kLongestDeadTime = 127;
 
 /// The simulated arm: `advance` takes eight pressures and integrates one period.
 ///
@@ -32,6 +37,15 @@ class Plant {
     double period = 0.002;  ///< [s]
     int substeps = 4;       ///< integration steps in a period
     Arm::Config arm{};
+    Joints maximum_force{1500.0, 1500.0, 1500.0, 1500.0};  ///< [N], of each muscle of a joint
+    Joints stroke{0.10, 0.10, 0.10, 0.10};                 ///< [m], of linear muscles
+    Joints lag = kActivationLag;                           ///< [s]
+    /// [s], from a pressure that is asked for to the first change in the muscle; rounded to whole
+    /// periods.
+    Joints dead_time{};
+    /// 1: the agonist of the joint turns it towards larger angles; -1: towards smaller ones.
+    Joints directions{1.0, 1.0, 1.0, 1.0};
+    Joints neutral{};  ///< [rad], angles at which the two muscles of a joint are equally long
     /// The arm starts at rest in the posture that these pressures hold; unset: the pressures that
     /// hold `start_posture`.
     std::optional<Pressures> start_pressures{};
@@ -47,7 +61,9 @@ class Plant {
     std::array<double, kMuscles> activation{};
     std::array<double, kMuscles> fibre_length{};  ///< [m], Hill model
     Pressures commanded{};                        ///< raw, within the ranges
-    std::int64_t clipped = 0;                     ///< iterations with a pressure out of range
+    /// The last commanded pressures, a ring: the newest lies at iteration % its size.
+    std::array<Pressures, kLongestDeadTime + 1> asked{};
+    std::int64_t clipped = 0;  ///< iterations with a pressure out of range
   };
   static_assert(std::is_trivially_copyable_v<State>);
 
@@ -62,7 +78,10 @@ class Plant {
 
   const Config& config() const noexcept { return config_; }
   const Arm& arm() const noexcept { return arm_; }
-  const Muscle& muscle() const noexcept { return muscle_; }
+  /// Of each joint.
+  const Muscles& muscles() const noexcept { return muscles_; }
+  /// The laws of this plant without its motion.
+  Equilibrium equilibrium() const noexcept;
 
   /// The pressures that hold the arm in its start posture.
   const Pressures& start_pressures() const noexcept { return start_pressures_; }
@@ -85,23 +104,28 @@ class Plant {
 
  private:
   template <MuscleLaw Law>
-  void integrate(const Law& law, const std::array<double, kMuscles>& target,
-                 const Joints& external) noexcept;
+  void integrate(const std::array<double, kMuscles>& target, const Joints& external) noexcept;
   void settle_muscles() noexcept;
+  /// 1 if a muscle turns its joint towards larger angles, else -1.
+  double side(std::size_t muscle) const noexcept {
+    return muscle % 2 == 0 ? config_.directions[muscle / 2] : -config_.directions[muscle / 2];
+  }
 
   Config config_;
   Arm arm_;
-  Muscle muscle_;
-  double substep_;   // [s]
+  Muscles muscles_;
+  std::array<std::int64_t, kJoints> delay_{};  // iterations of dead time
+  double substep_;                             // [s]
   Joints lag_gain_;  // share of its difference that an activation covers in a substep
   Pressures start_pressures_{};
   Joints start_equilibrium_{};
   State state_{};
 };
 
-/// Length of a muscle [m] with its joint at `angle`: agonists shorten as the angle grows.
-constexpr double muscle_length(std::size_t muscle, double angle) noexcept {
-  return kRestLength + (muscle % 2 == 0 ? -kPulleyRadius : kPulleyRadius) * angle;
+/// Length of a muscle [m] with its joint at `angle`. `side` is 1 for a muscle that turns the joint
+/// towards larger angles and shortens then, else -1.
+constexpr double muscle_length(double side, double angle) noexcept {
+  return kRestLength + (side > 0 ? -kPulleyRadius : kPulleyRadius) * angle;
 }
 
 }  // namespace o80::pam

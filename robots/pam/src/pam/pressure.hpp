@@ -28,17 +28,26 @@ constexpr Pressures equal_pressures(std::int32_t raw) noexcept {
 /// Pressure above the atmosphere [bar]; 18000 is 1.81 bar.
 constexpr double to_bar(double raw) noexcept { return 0.0002 * raw - 1.7888; }
 
-/// Raw pressures that a muscle accepts: from no activation to full activation.
+/// The raw pressure of a number of bar above the atmosphere.
+constexpr double from_bar(double bar) noexcept { return (bar + 1.7888) / 0.0002; }
+
+/// Raw pressures that a muscle accepts, and the pressures of no and of full activation: the ends of
+/// the range unless they are given.
 struct PressureRange {
   std::int32_t minimum = 6000;
   std::int32_t maximum = 24000;
+  double idle = minimum;
+  double full = maximum;
 
   constexpr double activation(std::int32_t raw) const noexcept {
-    return static_cast<double>(raw - minimum) / (maximum - minimum);
+    return (raw - idle) / (full - idle);
   }
   constexpr double pressure(double activation) const noexcept {
-    return minimum + activation * (maximum - minimum);
+    return idle + activation * (full - idle);
   }
+  /// Of the least and the most pressure.
+  constexpr double least() const noexcept { return activation(minimum); }
+  constexpr double most() const noexcept { return activation(maximum); }
 };
 
 using PressureRanges = std::array<PressureRange, kMuscles>;

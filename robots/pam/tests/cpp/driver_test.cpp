@@ -134,6 +134,40 @@ TEST_F(PamDriverTest, TellsHowManySlotsThereAre) {
   EXPECT_THAT(batch.handle(1).text, HasSubstr("snapshot it first"));
 }
 
+TEST_F(PamDriverTest, TakesAPresetAndSingleNumbersInsteadOfItsOwn) {
+  // nothing moves during the dead time of joint 1
+  InlineArm identified(OptionValues{{"preset", "identified"}});
+  const auto start = identified.latest();
+  identified.ask("agonist_1", start.desired()[0] + 1000);
+  EXPECT_EQ(identified.burst(20).observed()[0], start.observed()[0]);
+  EXPECT_GT(identified.burst(1).observed()[0], start.observed()[0]);
+  EXPECT_LT(identified.burst(60).extended().joint_positions[0],
+            start.extended().joint_positions[0] - 0.01);
+  EXPECT_THAT([&] { identified.ask("antagonist_4", 22000); },
+              ThrowsMessage<Error>(HasSubstr("21900")));
+
+  InlineArm prompt(OptionValues{{"preset", "identified"}, {"dead_time", "0,-1,-1,-1"}});
+  prompt.ask("agonist_1", start.desired()[0] + 1000);
+  EXPECT_GT(prompt.burst(1).observed()[0], start.observed()[0]);
+
+  EXPECT_THAT([] { InlineArm(OptionValues{{"friction", "0,0,-2,0"}}); },
+              ThrowsMessage<std::exception>(HasSubstr("friction of joint 3")));
+}
+
+TEST_F(PamDriverTest, RestoresPressuresThatHaveNotActedYet) {
+  InlineArm arm(OptionValues{{"preset", "identified"}});
+  arm.ask("agonist_1", arm.latest().desired()[0] + 2000);
+  arm.burst(5);
+  arm.request(Snapshot{.slot = 1});
+  arm.burst(80);
+  arm.request(Restore{.slot = 1});
+  arm.burst(79);
+  const auto first = arm.rows(79);
+  arm.request(Restore{.slot = 1});
+  arm.burst(79);
+  EXPECT_TRUE(arm.rows(79) == first);
+}
+
 class EveryMuscleModel : public PamDriverTest, public testing::WithParamInterface<std::string> {
  protected:
   OptionValues options() const { return {{"muscle", GetParam()}, {"start_noise", "0.01"}}; }

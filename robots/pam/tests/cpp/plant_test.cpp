@@ -15,6 +15,7 @@
 
 #include "count_allocations.hpp"
 #include "pam/equilibrium.hpp"
+#include "pam/presets.hpp"
 
 namespace o80::pam {
 namespace {
@@ -35,8 +36,9 @@ void advance(Plant& plant, const Pressures& pressures, int iterations,
 Pressures varied(const Plant& plant, std::mt19937& random) {
   Pressures pressures{};
   for (std::size_t m = 0; m < kMuscles; ++m) {
-    const auto [minimum, maximum] = plant.config().ranges[m];
-    pressures[m] = std::uniform_int_distribution<std::int32_t>(minimum, maximum)(random);
+    const PressureRange& range = plant.config().ranges[m];
+    pressures[m] =
+        std::uniform_int_distribution<std::int32_t>(range.minimum, range.maximum)(random);
   }
   return pressures;
 }
@@ -53,7 +55,7 @@ bool same_bits(const Plant& a, const Plant& b) {
          first.commanded == second.commanded && same_bits(first.motion.q, second.motion.q) &&
          same_bits(first.motion.dq, second.motion.dq) &&
          same_bits(first.activation, second.activation) &&
-         same_bits(first.fibre_length, second.fibre_length);
+         same_bits(first.fibre_length, second.fibre_length) && first.asked == second.asked;
 }
 
 class PlantWithAnyMuscle : public testing::TestWithParam<MuscleModel> {
@@ -231,9 +233,20 @@ TEST_P(PlantWithAnyMuscle, AllocatesNothingInMotion) {
   EXPECT_EQ(allocations, before);
 }
 
+TEST(IdentifiedPlant, AllocatesNothingInMotion) {
+  Plant plant(preset(Preset::identified));
+  Pressures pressures = plant.start_pressures();
+  pressures[2] += 700;
+  const std::size_t before = allocations;
+  advance(plant, pressures, 200);
+  plant.reset(1);
+  plant.restore(plant.state());
+  EXPECT_EQ(allocations, before);
+}
+
 TEST_P(PlantWithAnyMuscle, BringsTheRacketToWhereBallsPass) {
   const Plant start(config());
-  const Equilibrium rest{start.arm(), start.muscle(), start.config().ranges};
+  const Equilibrium rest = start.equilibrium();
   for (const Vector& point :
        {Vector{0.50, 0.20, 1.00}, Vector{0.55, 0.20, 1.15}, Vector{0.60, 0.10, 1.10},
         Vector{0.58, 0.25, 1.20}, Vector{0.62, 0.25, 1.32}, Vector{0.68, 0.00, 1.32}}) {
@@ -328,7 +341,7 @@ TEST(Plant, RefusesValuesOutOfTheirRange) {
 TEST(Equilibrium, PressuresForAPostureHoldThatPosture) {
   for (MuscleModel model : {MuscleModel::linear, MuscleModel::hill}) {
     const Plant plant({.muscle = model});
-    const Equilibrium rest{plant.arm(), plant.muscle(), plant.config().ranges};
+    const Equilibrium rest = plant.equilibrium();
     for (const Joints& posture :
          {Joints{0.6, 0.9, 0.8, -0.3}, Joints{-0.6, 1.2, 0.2, 0.9}, Joints{0.0, 0.7, 1.3, 0.0}}) {
       const Pressures pressures = rest.pressures_holding(posture, 0.5);
@@ -340,7 +353,7 @@ TEST(Equilibrium, PressuresForAPostureHoldThatPosture) {
 
 TEST(Equilibrium, TorquesBalanceGravityThere) {
   const Plant plant;
-  const Equilibrium rest{plant.arm(), plant.muscle(), plant.config().ranges};
+  const Equilibrium rest = plant.equilibrium();
   EXPECT_THAT(rest.muscle_torque(plant.q(), plant.start_pressures()),
               Pointwise(DoubleNear(1e-9), plant.arm().gravity(plant.q())));
 }
