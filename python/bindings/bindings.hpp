@@ -17,5 +17,6 @@ void bind_robots(nanobind::module_& module);
 void bind_loop_state(nanobind::module_& module);
 void bind_journal(nanobind::module_& module);
 void bind_provenance(nanobind::module_& module);
+void bind_played_segment(nanobind::module_& module);
 void bind_nearest_name(nanobind::module_& module);
 void bind_replay(nanobind::module_& module);

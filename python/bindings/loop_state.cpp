@@ -64,6 +64,7 @@ void bind_loop_state(nb::module_& m) {
   nb::class_<LoopState>(m, "LoopState", "State of a backend's loop.")
       .def_prop_ro("life", [](const LoopState& self) { return std::string(name_of(self.life)); })
       .def_ro("bursting", &LoopState::bursting)
+      .def_ro("played", &LoopState::played)
       .def_prop_ro("frequency",
                    [](const LoopState& self) { return 1e9 / static_cast<double>(self.period); })
       .def_ro("last", &LoopState::last)

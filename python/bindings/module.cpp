@@ -30,6 +30,7 @@ NB_MODULE(_core, m) {
   bind_loop_state(m);
   bind_journal(m);
   bind_provenance(m);
+  bind_played_segment(m);
   bind_nearest_name(m);
   bind_replay(m);
 }

@@ -24,6 +24,7 @@ void bind_segment_list(nb::module_& m) {
       .def_ro("program", &SegmentEntry::program)
       .def_ro("epoch", &SegmentEntry::epoch)
       .def_ro("size", &SegmentEntry::bytes)
+      .def_ro("played", &SegmentEntry::played)
       .def_ro("problem", &SegmentEntry::problem, "Reason why it is not readable.");
   m.def("list_segments", [] {
     const Waiting waiting;

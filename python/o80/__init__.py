@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from o80.installation import prefix
     from o80.journal import Journal, JournalCommand, JournalEntry
     from o80.limits import Limits
+    from o80.playing.playback import Playback, play
     from o80.prepared_burst import PreparedBurst
     from o80.provenance import Provenance, ProvenanceFile
     from o80.record import Record
@@ -89,6 +90,8 @@ _LAZY = {
     "JournalCommand": "o80.journal",
     "JournalEntry": "o80.journal",
     "Limits": "o80.limits",
+    "Playback": "o80.playing.playback",
+    "play": "o80.playing.playback",
     "PreparedBurst": "o80.prepared_burst",
     "Provenance": "o80.provenance",
     "ProvenanceFile": "o80.provenance",
@@ -169,6 +172,7 @@ __all__ = [
     "NotBursting",
     "Number",
     "Observation",
+    "Playback",
     "PreparedBurst",
     "Profile",
     "Provenance",
@@ -201,6 +205,7 @@ __all__ = [
     "burst",
     "clean",
     "halt",
+    "play",
     "prefix",
     "register_frontend",
     "replay",

@@ -19,6 +19,7 @@ class Segment:
     started_at: int  #: [s] since 1970
     bytes: int
     epoch: int  #: identifies this run of the backend
+    played: bool = False  #: a recording is played into it: it takes no commands
     problem: str = ""  #: reason why it is not readable
 
     @property
@@ -41,6 +42,7 @@ def segments() -> list[Segment]:
             started_at=entry.started_at,
             bytes=entry.size,
             epoch=entry.epoch,
+            played=entry.played,
             problem=entry.problem,
         )
         for entry in _core.list_segments()

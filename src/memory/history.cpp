@@ -44,6 +44,13 @@ void HistoryWriter::publish(Iteration k, const std::byte* row) noexcept {
   O80_CRASH_POINT("history.after_published");
 }
 
+void HistoryWriter::skip_to(Iteration k) noexcept {
+  O80_CRASH_POINT("history.before_first");
+  // before `begun`: a row ahead of `published` by more than one is damage, unless it is `first`
+  counters_->first.store(k, std::memory_order_relaxed);
+  O80_CRASH_POINT("history.after_first");
+}
+
 void HistoryWriter::expect(Iteration k) const noexcept {
   constexpr std::size_t kMost = 512;  // further lines are prefetched by the processor
   prefetch_to_write(&counters_->begun);
@@ -75,13 +82,20 @@ bool HistoryReader::is_damaged() const noexcept {
     std::atomic_thread_fence(std::memory_order_seq_cst);
     const Iteration under_way = begun();
     std::atomic_thread_fence(std::memory_order_seq_cst);
-    if (under_way <= before + 1 || published() != before) return false;
+    if (under_way <= before + 1 || under_way == first_there() || published() != before)
+      return false;
   }
   return true;
 }
 
+Iteration HistoryReader::first_there() const noexcept {
+  return std::clamp<Iteration>(counters_->first.load(std::memory_order_relaxed), 0, kFarthest);
+}
+
 Iteration HistoryReader::oldest() const noexcept {
-  return std::max<Iteration>(0, published() - static_cast<Iteration>(rows()) + 1);
+  // `published` before `first`: who sees a row after a gap sees the gap
+  const Iteration newest = published();
+  return std::max(first_there(), newest - static_cast<Iteration>(rows()) + 1);
 }
 
 const std::byte* HistoryReader::slot(Iteration k) const noexcept {
@@ -96,7 +110,7 @@ Iteration HistoryReader::first_true() const noexcept {
 bool HistoryReader::read(Iteration k, std::byte* to) const noexcept {
   if (k < oldest() || k > published()) return false;
   load_words(to, slot(k), row_bytes_);
-  return k >= first_true();
+  return k >= first_true() && k >= first_there();
 }
 
 Iteration HistoryReader::latest(std::byte* to) const noexcept {
@@ -133,7 +147,7 @@ HistoryReader::Range HistoryReader::read_range(Iteration first, std::size_t coun
   load_words(to + before_end * row_bytes_, slots_begin_, (rows - before_end) * row_bytes_);
 
   // drop rows that the writer may have overwritten during the copy
-  const Iteration kept = std::max(begin, first_true());
+  const Iteration kept = std::max({begin, first_true(), first_there()});
   const auto lost = static_cast<std::uint64_t>(kept - begin);
   if (lost >= rows) return {kept, 0};
   if (lost > 0) std::memmove(to, to + lost * row_bytes_, (rows - lost) * row_bytes_);

@@ -20,6 +20,10 @@ class HistoryWriter {
   std::size_t row_bytes() const noexcept { return row_bytes_; }
   /// Publishes row k, which must be one more than the last; `row` is private memory of row_bytes().
   void publish(Iteration k, const std::byte* row) noexcept;
+  /// The next row is k, later than the last one plus one: the rows between are missing, and the
+  /// rows before them are no longer read. Until row k is published readers find no row but the
+  /// latest.
+  void skip_to(Iteration k) noexcept;
   /// Prefetches the cache lines that publish(k) will write.
   void expect(Iteration k) const noexcept;
 
@@ -49,7 +53,7 @@ class HistoryReader {
   std::uint64_t rows() const noexcept { return slots_ - 1; }
   /// The newest row; -1 before row 0.
   Iteration published() const noexcept;
-  /// The oldest row that the history still holds; 0 before row 0.
+  /// The oldest row that the history still holds; before the first row, that one.
   Iteration oldest() const noexcept;
   /// Copies row k; false if not published yet or overwritten.
   bool read(Iteration k, std::byte* to) const noexcept;
@@ -65,6 +69,8 @@ class HistoryReader {
   const std::byte* slot(Iteration k) const noexcept;
   /// The row that is being written; else the newest.
   Iteration begun() const noexcept;
+  /// Rows before this one are missing.
+  Iteration first_there() const noexcept;
   /// The first intact row: rows from here on that were copied before this call were not overwritten
   /// during the copy.
   Iteration first_true() const noexcept;

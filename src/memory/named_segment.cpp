@@ -116,10 +116,9 @@ std::string NamedSegment::in_use_text() const {
          " that lives. Stop it first with `o80 stop " + name_ + "`";
 }
 
-std::string NamedSegment::taken_text() const {
+std::string NamedSegment::taken_text(std::string_view otherwise) const {
   return "segment '" + name_ + "' already has " + backend_text() +
-         ".\nStop it first with `o80 stop " + name_ +
-         "`, or give this one another name with --segment.";
+         ".\nStop it first with `o80 stop " + name_ + "`, or " + std::string(otherwise) + ".";
 }
 
 bool NamedSegment::remove() noexcept {

@@ -36,8 +36,9 @@ class NamedSegment {
   /// lock for a moment, so this waits for it up to 20 ms (1 s if the process of the header is
   /// gone). Call it only if try_lock() has failed.
   bool is_alive() const;
-  /// The text of the error for a second backend.
-  std::string taken_text() const;
+  /// The text of the error for a second backend, and what to do instead of stopping the first.
+  std::string taken_text(
+      std::string_view otherwise = "give this one another name with --segment") const;
   /// What refuses to remove it while its backend lives.
   std::string in_use_text() const;
   /// Unlinks both files, the segment file first, so that a name never leads to a segment without

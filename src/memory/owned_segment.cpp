@@ -57,6 +57,7 @@ void fill(const SegmentView& view, const SegmentSpec& spec, std::uint64_t epoch)
   header.epoch = epoch;
   header.started_at = time(nullptr);
   header.pid = getpid();
+  header.flags = spec.played ? kPlayed : 0;
   header.process_start = process_start(header.pid);
   copy_text(header.user, sizeof header.user, own_user());
   copy_text(header.program, sizeof header.program, own_program());

@@ -32,6 +32,7 @@ struct SegmentSpec {
   bool inherits_halt = false;
   /// The files get no name until OwnedSegment::publish(); `name` is for messages only.
   bool anonymous = false;
+  bool played = false;  // a recording is played into it: its frontends send no command
 };
 
 /// Move-only: the segment of a living backend.

@@ -83,6 +83,8 @@ Predecessor supersede(const NamedSegment& former) {
   }
   const BackendState state = state_of(view);
   end_segment(view, BackendState::superseded);
+  // a halt in a recording was one of another robot, at another time
+  if ((header.flags & kPlayed) != 0) return {};
   return judge_predecessor(view, state);
 }
 

@@ -57,6 +57,9 @@ struct SegmentShape {
 };
 inline constexpr std::uint64_t kLeastJournal = 4096;  // [bytes]
 
+/// Flag of a segment: its rows come from a recording (runtime/played_segment.hpp).
+inline constexpr std::uint32_t kPlayed = 1;
+
 struct SegmentHeader {
   std::uint64_t magic;
   std::uint32_t version;
@@ -67,7 +70,7 @@ struct SegmentHeader {
   std::int64_t started_at;      // [s] since 1970
   std::uint64_t process_start;  // with `pid`: identifies the process, for `o80 stop`
   std::int32_t pid;
-  std::uint32_t reserved;
+  std::uint32_t flags;
   char user[32];
   char program[64];
 };
@@ -105,6 +108,8 @@ static_assert(sizeof(JournalCounters) == kLineBytes + kJournalSectors * 8);
 struct Counters {
   alignas(kLineBytes) std::atomic<std::int64_t> begun;  // newest row that was begun
   std::atomic<std::int64_t> published;                  // newest row, -1 before the first
+  /// Rows before this one are missing: 0, unless a recording is played. See HistoryWriter::skip_to.
+  std::atomic<std::int64_t> first;
   alignas(kLineBytes) std::atomic<std::uint32_t> state;
   alignas(kLineBytes) std::atomic<std::uint64_t> fault[128];  // text
   alignas(kLineBytes) std::atomic<std::uint64_t> halted;      // number of the halt in force, or 0

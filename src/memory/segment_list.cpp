@@ -48,6 +48,7 @@ SegmentEntry describe(const std::string& name) {
   entry.user = printable({header.user, strnlen(header.user, sizeof header.user)});
   entry.program = printable({header.program, strnlen(header.program, sizeof header.program)});
   entry.epoch = header.epoch;
+  entry.played = (header.flags & kPlayed) != 0;
   entry.bytes = offsets.file_bytes + offsets.commands_bytes;
   return entry;
 }

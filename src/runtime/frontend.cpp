@@ -163,17 +163,18 @@ std::int64_t UntypedFrontend::wait_for_next(Iteration& position, std::byte* row,
                                             const KeepWaiting& keep_waiting) const {
   link_->check_usable();
   const Iteration wanted = position;
-  if (wanted > link_->history.published()) {
-    const Deadline deadline(timeout);
-    if (link_->rows.wait_for_row(wanted, deadline, link_->guarded(keep_waiting)) ==
-        Waited::timed_out) {
-      throw TimeoutError("row " + std::to_string(wanted) + " of '" + segment() +
+  const Deadline deadline(timeout);
+  Iteration next = wanted;
+  while (true) {
+    // the oldest row may be still to come, after a gap in a recording that is played
+    if (next > link_->history.published() &&
+        link_->rows.wait_for_row(next, deadline, link_->guarded(keep_waiting)) ==
+            Waited::timed_out) {
+      throw TimeoutError("row " + std::to_string(next) + " of '" + segment() +
                          "' was not published in time");
     }
-  }
-  Iteration next = wanted;
-  while (!link_->history.read(next, row)) {
-    if (next > link_->history.published() || link_->history.is_damaged()) throw damaged();
+    if (link_->history.read(next, row)) break;
+    if (link_->history.is_damaged()) throw damaged();
     next = std::max(next, link_->history.oldest());
   }
   position = next + 1;

@@ -62,7 +62,9 @@ void UntypedFrontend::refuse_burst(std::int64_t iterations) const {
   link_->check_usable();
   if (!bursting()) {
     throw NotBursting("'" + segment() +
-                      "' runs in real time and cannot be burst: start it with bursting");
+                      (is_played(link_->segment)
+                           ? "' is played by time: play the recording with --bursts"
+                           : "' runs in real time and cannot be burst: start it with bursting"));
   }
   if (iterations < 1) {
     throw InvalidArgument("the iterations of a burst of '" + segment() +

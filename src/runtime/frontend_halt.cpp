@@ -21,6 +21,7 @@ std::uint64_t UntypedFrontend::halt(std::string_view reason) {
   if (link_->segment.access() != Access::read_write) {
     throw ReadOnly("'" + segment() + "' was attached with read_only: attach without it to halt");
   }
+  refuse_if_played(link_->segment);
   link_->segment.throw_if_gone();
   const std::uint64_t number =
       ask_for_halt(link_->segment.view(), HaltCause::frontend, own_process(), reason);
@@ -44,6 +45,7 @@ std::optional<Halt> UntypedFrontend::halted() const {
 
 void UntypedFrontend::resume(std::uint64_t number, Timeout timeout,
                              const KeepWaiting& keep_waiting) {
+  refuse_if_played(link_->segment);
   const Deadline deadline(timeout);
   while (true) {
     wait_for_rest(number, deadline, keep_waiting);
@@ -116,6 +118,7 @@ std::uint64_t halt(const std::string& segment, std::string_view reason, Timeout 
   while (true) {
     const AttachedSegment attached =
         AttachedSegment::attach(segment, Access::read_write, deadline, options);
+    refuse_if_played(attached);
     const std::uint64_t number =
         ask_for_halt(attached.view(), HaltCause::frontend, own_process(), reason);
     // a successor is taking the name: halt that one

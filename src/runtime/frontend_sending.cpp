@@ -104,7 +104,7 @@ std::uint32_t UntypedFrontend::add_command(std::uint32_t actuator, std::span<con
                                            const CommandOptions& options,
                                            std::span<const std::uint64_t> mask) {
   const RecordHead head = checked_command(actuator, state, options, mask);
-  const auto lock = link_->lock_to_send();
+  const auto lock = link_->lock_to_add();
   return link_->builder.command(head, mask, {}, 1, state);
 }
 
@@ -142,7 +142,7 @@ std::uint32_t UntypedFrontend::add_commands(std::span<const std::uint32_t> actua
   refuse_size("states", states.size(), bytes, "bytes");
   if (!masks.empty()) refuse_size("masks", masks.size(), words, "words");
 
-  const auto lock = link_->lock_to_send();
+  const auto lock = link_->lock_to_add();
   link_->members.clear();
   Profile profile = Profile::linear;
   for (const std::uint32_t actuator : actuators) {
@@ -205,7 +205,7 @@ std::uint32_t UntypedFrontend::add_trajectories(std::span<const std::uint32_t> a
   }
   refuse_twice(actuators);
   const std::span<const std::int64_t> ends = rows > 1 ? times : std::span<const std::int64_t>{};
-  const auto lock = link_->lock_to_send();
+  const auto lock = link_->lock_to_add();
   if (actuators.size() == 1) {
     return link_->builder.command(head_of(actuators[0], paced, Profile::linear), {}, ends, rows,
                                   states);
@@ -220,29 +220,29 @@ std::uint32_t UntypedFrontend::add_trajectories(std::span<const std::uint32_t> a
 
 std::uint32_t UntypedFrontend::add_purge(std::uint32_t actuator) {
   if (actuator != kEveryActuator) link_->command_check.actuator(std::int64_t{actuator});
-  const auto lock = link_->lock_to_send();
+  const auto lock = link_->lock_to_add();
   return link_->builder.purge(static_cast<std::uint16_t>(actuator));
 }
 
 std::uint32_t UntypedFrontend::add_purge_own() {
-  const auto lock = link_->lock_to_send();
+  const auto lock = link_->lock_to_add();
   return link_->builder.purge_own(kEveryActuator);
 }
 
 std::uint32_t UntypedFrontend::add_request(std::uint32_t request,
                                            std::span<const std::byte> payload) {
   link_->command_check.request(request, payload);
-  const auto lock = link_->lock_to_send();
+  const auto lock = link_->lock_to_add();
   return link_->builder.request(static_cast<std::uint16_t>(request), payload);
 }
 
 std::uint32_t UntypedFrontend::add_take_control() {
-  const auto lock = link_->lock_to_send();
+  const auto lock = link_->lock_to_add();
   return link_->builder.take_control();
 }
 
 std::uint32_t UntypedFrontend::add_release_control() {
-  const auto lock = link_->lock_to_send();
+  const auto lock = link_->lock_to_add();
   return link_->builder.release_control();
 }
 
@@ -367,6 +367,7 @@ Sent UntypedFrontend::send(BatchBuilder& builder, const BatchRecord& wanted) {
     const auto lock = link_->lock_to_send();
     runner = link_->runner;
     if (runner) runner->refuse_nested();
+    if (builder.records() > 0) refuse_if_played(link_->segment);
     sent.lane = link_->lane();
     LaneSender* const lane = sent.lane.get();
     link_->segment.throw_if_known_gone();

@@ -22,6 +22,13 @@ std::shared_ptr<const Description> describe(const AttachedSegment& segment) {
 }
 }  // namespace
 
+void refuse_if_played(const AttachedSegment& segment) {
+  if (!is_played(segment)) return;
+  throw ReadOnly("'" + segment.name() + "' is a recording that is being played (pid " +
+                 std::to_string(segment.header().pid) +
+                 "): it can be read, but takes no commands, requests or halts");
+}
+
 Link::Link(AttachedSegment attached, std::shared_ptr<InlineRunner> inline_runner)
     : segment(std::move(attached)),
       description(describe(segment)),
@@ -64,6 +71,11 @@ std::unique_lock<std::mutex> Link::lock_to_send() const {
   std::unique_lock lock(sending);
   check_usable();
   return lock;
+}
+
+std::unique_lock<std::mutex> Link::lock_to_add() const {
+  refuse_if_played(segment);
+  return lock_to_send();
 }
 
 std::optional<Halt> Link::halt() const {

@@ -28,6 +28,13 @@ constexpr std::uint32_t kept_free(std::uint32_t blocks) noexcept {
   return blocks < 8 ? 0 : std::clamp(blocks / 16, 2U, 16U);
 }
 
+/// True if the rows of a segment come from a recording (runtime/played_segment.hpp).
+inline bool is_played(const AttachedSegment& segment) noexcept {
+  return (segment.header().flags & kPlayed) != 0;
+}
+/// Throws ReadOnly if they do: nobody takes commands there.
+void refuse_if_played(const AttachedSegment& segment);
+
 /// State shared by a frontend, its batches and its bursts: the attached segment and the lane.
 ///
 /// Writer / Readers: any threads; `sending` guards what is sent.
@@ -43,6 +50,8 @@ struct Link {
   /// Locks `sending` to add or send something. Throws Closed, or UsedAfterFork: the mutex of a
   /// forked child may be held by a thread that exists in the parent only.
   std::unique_lock<std::mutex> lock_to_send() const;
+  /// The same, to add a record. Throws ReadOnly if the segment is played from a recording.
+  std::unique_lock<std::mutex> lock_to_add() const;
   /// The halt in force. A frontend with write access also sees a halt that was requested and is not
   /// yet in force.
   std::optional<Halt> halt() const;

@@ -77,6 +77,7 @@ bool LoopState::stalled() const noexcept {
 }
 
 std::string LoopState::hang() const {
+  if (played) return "";  // a recording may end, or have gaps
   const std::string process = "its process (pid " + std::to_string(pid) + ")";
   std::string text;
   // a verb begins after the row before it, and the helper thread notes it somewhat later
@@ -115,6 +116,7 @@ LoopState loop_state(const UntypedFrontend& frontend, std::int64_t now) {
   state.life = frontend.life();
   state.pid = segment.header().pid;
   state.bursting = frontend.bursting();
+  state.played = is_played(segment);
   state.period = frontend.period();
   state.last = frontend.published();
   if (!is_over(state.life)) {
@@ -129,7 +131,7 @@ LoopState loop_state(const UntypedFrontend& frontend, std::int64_t now) {
   if (state.last < 0 || !heads.read(state.last, last)) return state;
   state.overruns = last.overruns;
   state.skipped = last.skipped;
-  if (state.bursting) return state;
+  if (frontend.schema().head.clock == Clock::simulated) return state;
   state.row_age = now - last.time;
   RowHead first;
   if (!heads.read_second_before(last, first) || first.time >= last.time) return state;

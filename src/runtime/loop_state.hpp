@@ -18,6 +18,7 @@ struct LoopState {
   int pid = 0;
   bool process_stopped = false;  // by SIGSTOP or a debugger
   bool bursting = false;
+  bool played = false;         // its rows come from a recording
   std::int64_t period = 0;     // [ns]
   Iteration last = -1;         // the newest row; -1: none yet
   std::uint32_t overruns = 0;  // so far

@@ -20,6 +20,7 @@ struct SegmentEntry {
   std::string program{};
   std::uint64_t epoch = 0;
   std::uint64_t bytes = 0;  // of both files
+  bool played = false;      // a recording is played into it
   std::string problem{};    // why it is not readable
 };
 

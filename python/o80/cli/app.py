@@ -14,6 +14,7 @@ from o80.cli.export import export
 from o80.cli.halt import halt, resume
 from o80.cli.info import info
 from o80.cli.list_segments import list_segments
+from o80.cli.play import play
 from o80.cli.plot import plot
 from o80.cli.record import record
 from o80.cli.replay import replay
@@ -46,6 +47,7 @@ app.command("echo")(echo)
 app.command("record")(record)
 app.command("save")(save)
 app.command("repair")(repair)
+app.command("play")(play)
 app.command("plot")(plot)
 app.command("view")(view)
 app.command("export")(export)

@@ -7,14 +7,21 @@ from typing import Any
 from o80 import _core
 
 
-def halt_text(segment: str, halt: tuple[int, str, int, str, str] | None) -> str:
-    """The reason of a halt and the command that resumes; empty if there is no halt."""
+def halt_text(
+    segment: str, halt: tuple[int, str, int, str, str] | None, *, played: bool = False
+) -> str:
+    """The reason of a halt and the command that resumes; empty if there is no halt.
+
+    played: the halt is one of a recording.
+    """
     if halt is None:
         return ""
     number, cause, iteration, who, text = halt
     since = "" if iteration < 0 else f" since iteration {iteration}"
     by = f", requested by {who}" if who else ""
     reason = f": {text}" if text else ""
+    if played:
+        return f"was halted{since} when it was recorded{reason}"
     return (
         f"halted{since} (halt {number}, cause {cause}{by}){reason}. "
         f"Go on with: o80 resume {segment} {number}"
@@ -43,6 +50,8 @@ def pace_text(loop: _core.LoopState) -> str:
     """Rate, overruns and age of the last row, in one line."""
     if loop.bursting:
         return f"bursting: runs when a frontend requests iterations; at row {loop.last}"
+    if loop.played and loop.row_age is None:
+        return f"a recording of {loop.frequency:g} Hz is played; at row {loop.last}"
     age = "no row yet" if loop.row_age is None else f"last row {age_text(loop.row_age)} ago"
     rate = rate_text(loop.rate, loop.frequency)
     return f"{rate} reached, {loop.overruns} overruns, {loop.skipped} missed ticks, {age}"

@@ -136,7 +136,9 @@ class _Remarks:
         halt = self._frontend._halted
         number = halt[0] if halt else 0
         if number != self._halt:
-            complain(halt_text(self._frontend.segment, halt) if halt else "resumed")
+            frontend = self._frontend
+            said = halt_text(frontend.segment, halt, played=frontend.played)
+            complain(said or "resumed")
             self._halt = number
         if time.monotonic() - self._said_at < _BETWEEN_REMARKS:
             return

@@ -34,7 +34,7 @@ def info(
         )
         if frontend.alive:
             print(pace_text(loop))
-        halt = halt_text(segment, frontend._halted)
+        halt = halt_text(segment, frontend._halted, played=frontend.played)
         trouble = loop.trouble if frontend.alive else ""
         running = running_texts(frontend._running_requests) if frontend.alive else []
         for said in (halt, trouble, watchdog_text(schema), *running):

@@ -27,6 +27,7 @@ _STYLES = {
     "running": "green",
     "starting": "yellow",
     "halted": "yellow",
+    "played": "green",
     "hangs": "red",
     "killed": "red",
     "failed": "red",
@@ -59,6 +60,7 @@ def _row(entry: o80.Segment) -> dict[str, Any]:
         "segment": entry.name,
         "state": entry.life if entry.readable else "unreadable",
         "problem": entry.problem,
+        "played": entry.played,
         "pid": entry.pid,
         "user": entry.user,
         "program": entry.program,
@@ -95,9 +97,11 @@ def _row(entry: o80.Segment) -> dict[str, Any]:
         "row_age": loop.row_age,
         "hangs": entry.alive and bool(loop.hang),
         "state_of_loop": loop.trouble if entry.alive else "",
-        "halted": halt_text(entry.name, state.halt) if entry.alive else "",
+        "halted": "",
         "running": running_texts(state.running) if entry.alive else [],
     }
+    if entry.alive:
+        row["halted"] = halt_text(entry.name, state.halt, played=entry.played)
     return row
 
 
@@ -108,6 +112,8 @@ def _cells(row: dict[str, Any]) -> list[str]:
         state = "hangs"
     elif alive and row["halted"]:
         state = "halted"
+    elif row["state"] == "running" and row["played"]:
+        state = "played"
     return [
         row["segment"],
         row["robot"] or "?",

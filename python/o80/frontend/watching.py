@@ -43,6 +43,11 @@ class Watching(Describing):
         return _core.loop_state(self).row_age
 
     @property
+    def played(self) -> bool:
+        """True if the rows come from a recording (`o80 play`): commands are refused."""
+        return _core.loop_state(self).played
+
+    @property
     def slow_verb(self) -> tuple[str, float] | None:
         """The function of the driver that has not returned, and for how long [s]; or None.
 

@@ -118,6 +118,25 @@ TEST_F(HistoryTest, OutlivesItsBackend) {
   EXPECT_THAT(row, Each(5));
 }
 
+TEST_F(HistoryTest, RowsBeforeAGapAreNotRead) {
+  publish(0, 14);
+  writer_.skip_to(18);
+  Row row;
+  EXPECT_FALSE(reader_.is_damaged()) << "also if the writer is killed here";
+  EXPECT_EQ(reader_.latest(bytes(row)), 14);
+  publish(18, 20);
+
+  EXPECT_EQ(reader_.oldest(), 18);
+  for (Iteration k = 0; k < 18; ++k) EXPECT_FALSE(reader_.read(k, bytes(row))) << k;
+  std::array<Row, 12> rows;
+  const auto range = reader_.read_range(10, 12, bytes(rows[0]));
+  EXPECT_EQ(range.first, 18);
+  ASSERT_EQ(range.count, 3U);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(rows[i], row_of(18 + static_cast<Iteration>(i)));
+  publish(21, 40);
+  EXPECT_EQ(reader_.oldest(), 31) << "the gap is behind";
+}
+
 TEST_F(HistoryTest, IsNeverTornWhenReadersAreOvertaken) {
   constexpr Iteration kLast = 30'000;
   std::atomic<bool> torn{false};

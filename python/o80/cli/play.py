@@ -1,0 +1,120 @@
+"""``o80 play``: puts a recording back into shared memory."""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+import o80
+from o80.cli.stop_request import StopRequest
+
+if TYPE_CHECKING:
+    from o80.playing.playback import Playback
+
+_BETWEEN_REPORTS = 0.5  # [s]
+
+
+def _speed(value: float) -> float:
+    if not value > 0:
+        raise typer.BadParameter(f"speed must be positive, got {value:g}", param_hint="--speed")
+    return value
+
+
+def play(
+    path: Annotated[Path, typer.Argument(help="A recording, NAME.mcap.")],
+    segment: Annotated[
+        list[str] | None, typer.Option(help="Only this segment; may be given several times.")
+    ] = None,
+    speed: Annotated[
+        float, typer.Option(callback=_speed, help="0.5: half as fast as recorded.")
+    ] = 1.0,
+    fast: Annotated[
+        bool, typer.Option("--fast", help="All rows at once; they stay until Ctrl-C.")
+    ] = False,
+    bursts: Annotated[
+        bool,
+        typer.Option("--bursts", help="Rows when frontends request iterations, as in bursting."),
+    ] = False,
+    loop: Annotated[
+        bool, typer.Option("--loop", help="Begin again after the last row, as after a restart.")
+    ] = False,
+    begin: Annotated[
+        float, typer.Option("--from", help="Begin so many seconds after the first row.")
+    ] = 0.0,
+    end: Annotated[
+        float | None, typer.Option("--to", help="End so many seconds after the first row.")
+    ] = None,
+    prefix: Annotated[
+        str, typer.Option(help="Put before the names of the segments, for example old-")
+    ] = "",
+    name: Annotated[
+        str | None, typer.Option(help="Another name, if one segment is played.")
+    ] = None,
+    history: Annotated[
+        int | None,
+        typer.Option(help="Rows that a segment keeps (default: all, 64 MiB at most)."),
+    ] = None,
+    hold: Annotated[
+        bool, typer.Option("--hold", help="Keep the segments after the last row, until Ctrl-C.")
+    ] = False,
+) -> None:
+    """Play a recording: its segments appear again, for every tool and script that reads robots.
+
+    Commands to them are refused. A segment whose name a living robot has is refused: choose another
+    with --prefix or --name.
+    """
+    stop = StopRequest()
+    with o80.play(
+        path,
+        segment,
+        speed=math.inf if fast else speed,
+        bursts=bursts,
+        loop=loop,
+        begin=begin,
+        end=end,
+        prefix=prefix,
+        names=_names(path, segment, name),
+        history=history,
+        hold=True if hold else None,
+    ) as playback:
+        print(_head(playback, bursts), file=sys.stderr, flush=True)
+        _follow(playback, stop)
+        holds = playback.done and (hold or fast) and not bursts
+        if holds and not stop.requested:
+            print("played; Ctrl-C ends", file=sys.stderr, flush=True)
+        while holds and not stop.requested:
+            stop.wait(_BETWEEN_REPORTS)
+
+
+def _names(path: Path, segments: list[str] | None, name: str | None) -> dict[str, str]:
+    if name is None:
+        return {}
+    found = segments or list(o80.open(path))
+    if len(found) != 1:
+        raise o80.InvalidArgument(
+            f"--name is for one segment, and {len(found)} are played ({', '.join(found)}): choose "
+            f"one with --segment, or rename all with --prefix"
+        )
+    return {found[0]: name}
+
+
+def _head(playback: Playback, bursts: bool) -> str:
+    names = ", ".join(playback.names)
+    how = "; rows come when a frontend requests iterations" if bursts else ""
+    return f"playing {playback.duration:.1f} s of {names}{how}"
+
+
+def _follow(playback: Playback, stop: StopRequest) -> None:
+    """Shows how far it is, again and again on a terminal."""
+    terminal = sys.stderr.isatty()
+    while not stop.requested and not playback.wait(0.05):
+        if terminal:
+            line = f"{playback.position:.1f} of {playback.duration:.1f} s, {playback.rows} rows"
+            print(f"\r\033[K{line}", end="", file=sys.stderr, flush=True)
+            stop.wait(_BETWEEN_REPORTS)
+    begin = "\r\033[K" if terminal else ""
+    print(f"{begin}{playback.rows} rows", file=sys.stderr, flush=True)

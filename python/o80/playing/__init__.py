@@ -1,0 +1,1 @@
+"""Puts the rows of recordings back into shared memory, as if their robots ran again."""

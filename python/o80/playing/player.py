@@ -1,0 +1,113 @@
+"""One segment that is played: the segment in shared memory that shows the rows of a track."""
+
+import threading
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o80 import _core
+from o80.playing.track import Part, Track
+
+KEPT = 64 << 20  # most bytes of the rows that a segment keeps by default
+NO_TIME = np.empty(0, np.int64)
+
+
+class Player:
+    """Publishes the parts of a track; each run of its robot is a run of the segment.
+
+    Used by one thread; `stop` may come from any.
+    """
+
+    def __init__(
+        self,
+        track: Track,
+        name: str,
+        *,
+        bursting: bool,
+        real_time: bool,
+        history: int | None,
+        permission: int,
+    ) -> None:
+        """real_time: rows of robots in real time get the times at which they are published.
+
+        Raises SegmentTaken, SegmentError, InvalidArgument.
+        """
+        self.track = track
+        self.name = name
+        self.rows = 0  #: published so far
+        self._bursting, self._real_time = bursting, real_time
+        self._history, self._permission = history, permission
+        self._lock = threading.Lock()
+        self._stopped = False
+        self._run = 0
+        self._segment: _core.PlayedSegment | None = None
+        self.begin(0)
+
+    def begin(self, run: int) -> None:
+        """Ends the run before, and takes the name for this one."""
+        self.end()
+        with self._lock:
+            if self._stopped:
+                return
+            epoch = self.track.epochs[run]
+            self._run = run
+            self._segment = _core.PlayedSegment(
+                self.name,
+                epoch.description.table(),
+                self._bursting,
+                not self._has_clock(run),
+                self._history or max(1, min(epoch.rows, KEPT // epoch.schema["row"]["size"])),
+                self._permission,
+            )
+
+    def publish(self, part: Part, due: NDArray[np.int64] | None) -> bool:
+        """Publishes rows when they are due [ns] (None: at once). False after `stop`."""
+        rows = part.rows
+        if due is not None and self._has_clock(part.run):
+            rows = rows.copy()
+            rows["time"] += due[0] - rows["time"][0]
+        segment = self._of(part)
+        if segment is None:
+            return False
+        done = segment.publish(_bytes(rows), NO_TIME if due is None else due)
+        self.rows += done
+        return done == len(rows)
+
+    def serve(self, part: Part) -> bool:
+        """Publishes rows as frontends request them. False after `stop`."""
+        segment = self._of(part)
+        if segment is None:
+            return False
+        done = segment.serve(_bytes(part.rows))
+        self.rows += done
+        return done == len(part.rows)
+
+    def end(self) -> None:
+        """Ends the run: frontends learn that no row follows."""
+        with self._lock:
+            if self._segment is not None:
+                self._segment.end(False, "")
+                self._segment = None
+
+    def stop(self) -> None:
+        """Makes `publish` and `serve` return within 50 ms."""
+        with self._lock:
+            self._stopped = True
+            if self._segment is not None:
+                self._segment.ask_to_stop()
+
+    def _of(self, part: Part) -> _core.PlayedSegment | None:
+        """The segment of the part's run."""
+        if self._segment is None or part.run != self._run:
+            self.begin(part.run)
+        return self._segment
+
+    def _has_clock(self, run: int) -> bool:
+        """Whether times of rows are those of the clock of this computer."""
+        clock: str = self.track.epochs[run].schema["clock"]
+        return self._real_time and clock == "monotonic"
+
+
+def _bytes(rows: NDArray[Any]) -> NDArray[np.uint8]:
+    return np.ascontiguousarray(rows).view(np.uint8)

@@ -1,0 +1,71 @@
+"""The rows of one recorded segment, in time: what is played, and when."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from o80.recording.reader import RecordedEpoch
+
+MOST_ROWS = 256  # of a part: what is published by one call
+SAME_CLOCK = 500_000_000  # clocks whose offsets differ by less are one clock [ns]
+
+
+@dataclass(frozen=True)
+class Part:
+    """Consecutive rows of one run of a robot."""
+
+    run: int  #: number of the run among those that are played, from 0
+    rows: NDArray[Any]  #: structured array (n,), as in the segment
+    wall: NDArray[np.int64]  #: when they were published, on the wall clock [ns]
+
+    def split(self, count: int) -> tuple["Part", "Part | None"]:
+        """The first rows, and the rest if there is one."""
+        if count >= len(self.rows):
+            return self, None
+        head = replace(self, rows=self.rows[:count], wall=self.wall[:count])
+        return head, replace(self, rows=self.rows[count:], wall=self.wall[count:])
+
+
+class Track:
+    """The runs of one segment."""
+
+    def __init__(self, name: str, epochs: Sequence["RecordedEpoch"], offsets: list[int]) -> None:
+        """offsets: of the monotonic clocks met so far, to wall-clock time [ns].
+
+        Robots on one monotonic clock keep the differences of their times exactly, although each
+        offset was measured at another moment.
+        """
+        self.name = name
+        self.epochs = [epoch for epoch in epochs if epoch.rows]
+        self.offsets = [_offset(epoch, offsets) for epoch in self.epochs]
+
+    @property
+    def time_range(self) -> tuple[int, int]:
+        """Wall-clock times of the first and the last row [ns]."""
+        ranges = [epoch.time_range for epoch in self.epochs]
+        begins = [first + offset for (first, _), offset in zip(ranges, self.offsets, strict=True)]
+        ends = [last + offset for (_, last), offset in zip(ranges, self.offsets, strict=True)]
+        return min(begins), max(ends)
+
+    def parts(self, begin: int, end: int) -> Iterator[Part]:
+        """The rows from `begin` to `end` [ns], on the wall clock, in small parts."""
+        for run, (epoch, offset) in enumerate(zip(self.epochs, self.offsets, strict=True)):
+            for history in epoch.parts(from_time=begin - offset, to_time=end - offset):
+                for first in range(0, len(history), MOST_ROWS):
+                    rows = history.rows[first : first + MOST_ROWS]
+                    yield Part(run, rows, rows["time"] + offset)
+
+
+def _offset(epoch: "RecordedEpoch", offsets: list[int]) -> int:
+    """Wall-clock time less row time of an epoch [ns]."""
+    if epoch.schema["clock"] != "monotonic":
+        return epoch.wall_offset
+    for known in offsets:
+        if abs(known - epoch.wall_offset) < SAME_CLOCK:
+            return known
+    offsets.append(epoch.wall_offset)
+    return epoch.wall_offset

@@ -1,0 +1,250 @@
+"""Recordings that are played: what readers see, in time and by bursts, and what is refused."""
+
+import math
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+import o80
+from o80.difference import first_difference
+
+WAIT = 30.0  # [s] longer than any wait should take
+
+
+@pytest.fixture
+def recorded(segment: str, tmp_path: Path) -> Path:
+    """201 rows of a moving arm, named as the test's segment."""
+    path = tmp_path / "run.mcap"
+    with (
+        o80.robots.load("two_joints").inline(segment) as arm,
+        o80.Recording(path, arm) as recording,
+    ):
+        arm.add_command("elbow", 0.5, iterations=100)
+        arm.burst(150)
+        recording.flush()
+        arm.burst(50)
+    return path
+
+
+@pytest.fixture
+def real_time(segment: str, tmp_path: Path) -> Path:
+    """Rows of an arm in real time, 1000 a second."""
+    path = tmp_path / "real.mcap"
+    with o80.robots.load("two_joints").start(segment) as process:
+        arm = process.frontend()
+        with o80.Recording(path, arm):
+            arm.add_command("elbow", 0.5, duration=0.1)
+            arm.pulse()
+            arm.wait_for(arm.published + 300)
+    return path
+
+
+def rows_of(path: Path, segment: str, epoch: int = 0) -> o80.History:
+    return o80.open(path)[segment].epochs[epoch].history()
+
+
+def read_to_the_end(segment: str) -> list[int]:
+    """A user's script: it does not know whether a robot runs or a recording is played."""
+    iterations = []
+    with o80.Frontend(segment, WAIT) as arm:
+        try:
+            for observation in arm.stream(since=0):
+                iterations.append(observation.iteration)
+        except o80.BackendStopped:
+            return iterations
+
+
+def test_rows_appear_again_bit_for_bit(recorded: Path, segment: str) -> None:
+    with o80.play(recorded, speed=math.inf) as playback:
+        assert playback.wait(WAIT)
+        with o80.Frontend(segment) as arm:
+            assert arm.played
+            assert arm.robot == "two_joints"
+            assert arm.history().rows.tobytes() == rows_of(recorded, segment).rows.tobytes()
+        assert playback.rows == 201
+    assert segment not in [each.name for each in o80.segments()]
+
+
+def test_a_recording_of_a_played_recording_is_the_same(
+    recorded: Path, segment: str, tmp_path: Path
+) -> None:
+    copy = tmp_path / "copy.mcap"
+    with (
+        o80.play(recorded, bursts=True),
+        o80.Frontend(segment, WAIT) as arm,
+        o80.Recording(copy, arm, whole=True),
+    ):
+        for count in (1, 5, 94, 100):
+            arm.burst(count)
+    assert rows_of(copy, segment).rows.tobytes() == rows_of(recorded, segment).rows.tobytes()
+
+
+def test_bursts_end_with_the_recording(recorded: Path, segment: str) -> None:
+    with o80.play(recorded, bursts=True), o80.Frontend(segment, WAIT) as arm:
+        assert arm.bursting
+        assert arm.burst(100).iteration == 100
+        with pytest.raises(o80.BackendStopped):
+            arm.burst(200, timeout=WAIT)
+        assert arm.published == 200
+
+
+def test_a_script_reads_a_robot_and_its_recording_alike(real_time: Path, segment: str) -> None:
+    expected = rows_of(real_time, segment).iteration.tolist()
+    found: list[list[int]] = []
+    reader = threading.Thread(target=lambda: found.append(read_to_the_end(segment)))
+    with o80.play(real_time, history=1000) as playback:
+        reader.start()
+        assert playback.wait(WAIT)
+        reader.join(WAIT)
+    assert found == [expected]
+
+
+def test_at_recorded_speed_times_are_those_of_now(real_time: Path, segment: str) -> None:
+    recorded = rows_of(real_time, segment)
+    begin = time.monotonic_ns()
+    with o80.play(real_time, hold=True) as playback, o80.Frontend(segment, WAIT) as arm:
+        assert playback.wait(WAIT)
+        end = time.monotonic_ns()
+        played = arm.history()
+        assert arm.schema["clock"] == "monotonic"
+        assert arm.rate_reached == pytest.approx(1000, rel=0.5)
+        assert not arm.trouble
+    shift = played.time - recorded.time
+    assert (shift == shift[0]).all()
+    assert begin <= played.time[0]
+    assert played.time[-1] <= end
+    assert first_difference(played, recorded) is None
+
+
+@pytest.mark.parametrize("speed", [10.0, math.inf])
+def test_at_another_speed_rows_are_exactly_as_recorded(
+    real_time: Path, segment: str, speed: float
+) -> None:
+    recorded = rows_of(real_time, segment)
+    begin = time.monotonic()
+    with o80.play(real_time, speed=speed, hold=True) as playback:
+        assert playback.wait(WAIT)
+        taken = time.monotonic() - begin
+        with o80.Frontend(segment) as arm:
+            assert arm.history().rows.tobytes() == recorded.rows.tobytes()
+            assert arm.schema["clock"] == "simulated"
+            assert arm.row_age is None
+    seconds = float(recorded.time[-1] - recorded.time[0]) * 1e-9
+    assert taken >= (0 if math.isinf(speed) else seconds / speed)
+
+
+def test_a_part_is_played(recorded: Path, segment: str) -> None:
+    with o80.play(recorded, speed=math.inf, begin=0.05, end=0.1) as playback:
+        assert playback.wait(WAIT)
+        with o80.Frontend(segment) as arm:
+            assert arm.history().iteration.tolist() == list(range(50, 101))
+            with pytest.raises(o80.RowOverwritten):
+                arm.wait_for(49)
+    with pytest.raises(o80.InvalidArgument, match="no row in the part"):
+        o80.play(recorded, begin=1000.0)
+
+
+def test_commands_are_refused(recorded: Path, segment: str) -> None:
+    with o80.play(recorded, speed=math.inf), o80.Frontend(segment, WAIT) as arm:
+        for verb in (
+            lambda: arm.add_command("elbow", 0.1),
+            lambda: arm.request("reset", seed=1),
+            lambda: arm.halt("why"),
+            lambda: o80.halt(segment),
+            lambda: arm.purge(),
+        ):
+            with pytest.raises(o80.ReadOnly, match="a recording that is being played"):
+                verb()
+        with pytest.raises(o80.NotBursting, match="--bursts"):
+            arm.burst(1)
+
+
+def test_restarts_are_played_as_restarts(segment: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with o80.Recording(path, segment) as recording:
+        for count in (30, 20):
+            with o80.robots.load("two_joints").inline(segment) as arm:
+                arm.burst(count)
+                while recording.rows < (31 if count == 30 else 52):
+                    recording.flush()
+    copy = tmp_path / "copy.mcap"
+    with o80.Recording(copy, segment) as recording, o80.play(path, bursts=True, history=100):
+        for count in (30, 20):
+            with o80.Frontend(segment, WAIT) as arm:
+                assert arm.burst(count).iteration == count
+                while recording.rows < (31 if count == 30 else 52):
+                    recording.flush()
+                with pytest.raises(o80.BackendStopped):
+                    arm.burst(1, timeout=WAIT)
+    for epoch in (0, 1):
+        one, other = rows_of(path, segment, epoch), rows_of(copy, segment, epoch)
+        assert one.rows.tobytes() == other.rows.tobytes()
+
+
+def test_loop_begins_again_as_a_restart(recorded: Path, segment: str) -> None:
+    with o80.play(recorded, bursts=True, loop=True):
+        epochs = set()
+        for _ in range(3):
+            with o80.Frontend(segment, WAIT) as arm:
+                epochs.add(arm.epoch)
+                assert arm.burst(200).iteration == 200
+                with pytest.raises(o80.BackendGone):
+                    arm.burst(1, timeout=WAIT)
+        assert len(epochs) == 3
+
+
+def test_gaps_are_played_as_gaps(segment: str, tmp_path: Path) -> None:
+    path, copy = tmp_path / "run.mcap", tmp_path / "copy.mcap"
+    with o80.robots.load("two_joints").inline(segment, history=20) as arm:
+        with o80.Recording(path, arm) as recording:
+            recording.flush()
+            with recording._lock:  # the recorder is late
+                arm.burst(100)
+    gaps = o80.open(path)[segment].epochs[0].gaps
+    assert gaps
+    with o80.play(path, speed=math.inf, history=20), o80.Recording(copy, segment, whole=True):
+        pass
+    again = rows_of(copy, segment)
+    assert again.iteration[0] == gaps[-1][1] + 1
+    assert (
+        again.rows.tobytes() == rows_of(path, segment).select(since=gaps[-1][1] + 1).rows.tobytes()
+    )
+
+
+def test_a_living_robot_keeps_its_name(recorded: Path, segment: str) -> None:
+    with o80.robots.load("two_joints").inline(segment):
+        with pytest.raises(o80.SegmentTaken, match="--prefix"):
+            o80.play(recorded)
+        with o80.play(recorded, speed=math.inf, prefix="old-") as playback:
+            assert playback.names == [f"old-{segment}"]
+            assert playback.wait(WAIT)
+        with o80.play(recorded, names={segment: f"{segment}-b"}) as playback:
+            assert playback.names == [f"{segment}-b"]
+
+
+def test_a_robot_cannot_start_where_a_recording_is_played(recorded: Path, segment: str) -> None:
+    with o80.play(recorded, speed=math.inf), pytest.raises(o80.SegmentTaken):
+        o80.robots.load("two_joints").inline(segment)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"speed": 0.0}, "speed must be positive"),
+        ({"speed": math.nan}, "speed must be positive"),
+        ({"begin": -1.0}, "begin must be a number of seconds from 0"),
+        ({"begin": 2.0, "end": 1.0}, "end must be later than begin"),
+        ({"history": 0}, "history"),
+        ({"segments": "aram"}, "no segment 'aram'"),
+    ],
+)
+def test_mistakes_are_named(recorded: Path, arguments: dict[str, object], message: str) -> None:
+    with pytest.raises(o80.InvalidArgument, match=message):
+        o80.play(recorded, **arguments)
+
+
+def test_a_file_that_is_no_recording_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(o80.RecordingError):
+        o80.play(tmp_path / "none.mcap")
