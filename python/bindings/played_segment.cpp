@@ -19,7 +19,8 @@ using o80::PlayedSegment;
 namespace {
 
 PlayedSegment* make_played(const std::string& segment, nb::bytes description, bool bursting,
-                           bool simulated, std::uint64_t history, std::uint32_t permission) {
+                           bool simulated, std::uint64_t history, bool journal,
+                           std::uint32_t permission) {
   o80::PlayedOptions options;
   options.segment = segment;
   options.description = {reinterpret_cast<const std::byte*>(description.c_str()),
@@ -27,6 +28,7 @@ PlayedSegment* make_played(const std::string& segment, nb::bytes description, bo
   options.bursting = bursting;
   options.clock = simulated ? o80::Clock::simulated : o80::Clock::monotonic;
   options.history = history;
+  options.journal = journal;
   options.permission = permission;
   return new PlayedSegment(options);
 }
@@ -53,17 +55,26 @@ void bind_played_segment(nb::module_& m) {
   refuse_to_pickle(bound, "a played segment", "the path of the recording");
   bound
       .def(nb::new_(&make_played), "segment"_a, "description"_a, "bursting"_a, "simulated"_a,
-           "history"_a, "permission"_a)
+           "history"_a, "journal"_a, "permission"_a)
       .def_prop_ro("row_bytes", &PlayedSegment::row_bytes)
       .def("publish", &publish, "rows"_a, "due"_a,
            "Rows as bytes, and the due time of each as int64 [ns] (empty: at once). Returns how "
            "many were published before ask_to_stop().")
+      .def(
+          "wait_for_burst",
+          [](PlayedSegment& self) {
+            const Waiting waiting;
+            return self.wait_for_burst(Waiting::keep_waiting);
+          },
+          "After the last row: waits for another request. False after ask_to_stop().")
       .def("serve", &serve, "rows"_a, "The same, as frontends request iterations.")
       .def(
-          "end",
-          [](PlayedSegment& self, bool failed, const std::string& text) {
-            self.end(failed ? o80::BackendState::failed : o80::BackendState::stopped, text);
+          "add_journal",
+          [](PlayedSegment& self, nb::bytes entries) {
+            return self.add_journal(
+                {reinterpret_cast<const std::byte*>(entries.c_str()), entries.size()});
           },
-          "failed"_a, "text"_a)
+          "entries"_a, "Returns the iteration of the last entry.")
+      .def("end", &PlayedSegment::end)
       .def("ask_to_stop", &PlayedSegment::ask_to_stop);
 }

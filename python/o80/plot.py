@@ -1,6 +1,6 @@
-"""Curves of histories: desired and observed together, sensor values, halts and late iterations."""
+"""Curves of histories: desired and observed together, sensor values, halts, ends of commands."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -8,9 +8,11 @@ from numpy.typing import NDArray
 
 from o80 import _core
 from o80.columns import Column, columns_of, values_of
+from o80.command_ends import CommandEnd
 from o80.errors import InvalidArgument
 from o80.extras import needed
 from o80.history import History
+from o80.words import Status
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
 MOST_PANELS = 24
 PANEL = (9.0, 1.9)  # width and height [inch]
 PARTS = ("desired", "observed", "extended")
+END_STYLES = {"COMPLETED": ("|", "tab:green"), "OVERWRITTEN": ("|", "tab:purple")}
 STYLES = {"desired": "--", "observed": "-", "extended": "-"}
 
 
@@ -32,13 +35,23 @@ class Curve(NamedTuple):
 
 
 def plot(
-    histories: dict[str, History], fields: Sequence[str] = (), *, window: bool = False
+    histories: Mapping[str, History],
+    fields: Sequence[str] = (),
+    *,
+    ends: Mapping[str, Sequence[CommandEnd]] | None = None,
+    origins: Mapping[str, int] | None = None,
+    label: str = "time [s]",
+    window: bool = False,
 ) -> "Figure":
     """A figure with a panel for each number; desired and observed share one.
 
-    histories: by name of robot; their times begin at 0 together with the earliest row.
+    histories: by name of robot.
     fields: such as "observed.elbow", "elbow" (desired and observed), "extended.force", "extended";
         empty: all states.
+    ends: ends of commands to mark, by name of robot: o80.command_ends.command_ends(arm.journal()).
+    origins: the time of a row [ns] that is 0 on the axis, by name of robot (None: the earliest row
+        of all). Give those of `o80.timelines.origins` if the clocks of the robots differ.
+    label: of the time axis.
     window: a figure that `matplotlib.pyplot.show` shows.
     Raises InvalidArgument for an unknown field, MissingExtra without matplotlib.
     """
@@ -61,8 +74,13 @@ def plot(
     start = min(int(history.time[0]) for history in histories.values() if len(history))
     for ax, panel in zip(axes, panels, strict=True):
         curves = [curve for curve in chosen if (curve.robot, curve.panel) == panel]
-        _draw(ax, curves, histories[panel[0]], start, several=len(histories) > 1)
-    axes[-1].set_xlabel("time [s]")
+        history = histories[panel[0]]
+        zero = start if origins is None else origins[panel[0]]
+        times = np.asarray((history.time - zero) * 1e-9, np.float64)
+        _draw(ax, curves, history, times, several=len(histories) > 1)
+        _mark_ends(ax, panel[1], history, times, (ends or {}).get(panel[0], ()))
+        ax.legend(fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    axes[-1].set_xlabel(label)
     return figure
 
 
@@ -120,9 +138,13 @@ def _units(schema: dict[str, Any]) -> dict[str, str]:
 
 
 def _draw(
-    ax: "Axes", curves: Sequence[Curve], history: History, start: int, *, several: bool
+    ax: "Axes",
+    curves: Sequence[Curve],
+    history: History,
+    times: NDArray[np.float64],
+    *,
+    several: bool,
 ) -> None:
-    times = np.asarray((history.time - start) * 1e-9, np.float64)
     for curve in curves:
         part = _part(curve.column.name)
         color = {"desired": "tab:gray", "observed": "tab:blue"}.get(part, "tab:green")
@@ -139,11 +161,41 @@ def _draw(
     if len(late):
         at = np.full(len(late), 0.02)
         label = "late iteration"
-        ax.plot(times[late], at, "|", color="tab:orange", transform=_bottom(ax), label=label)
-    ax.legend(fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5))
+        ax.plot(times[late], at, "|", color="tab:orange", transform=_shares(ax), label=label)
 
 
-def _bottom(ax: "Axes") -> Any:
+def _mark_ends(
+    ax: "Axes",
+    panel: str,
+    history: History,
+    times: NDArray[np.float64],
+    ends: Sequence[CommandEnd],
+) -> None:
+    """Marks at the upper edge where commands of this actuator ended."""
+    if not len(history):
+        return
+    iterations = history.iteration
+    for status in Status:
+        places = {
+            int(np.searchsorted(iterations, end.iteration))
+            for end in ends
+            if end.status is status
+            and iterations[0] <= end.iteration <= iterations[-1]
+            and any(_is_of(panel, name) for name in end.actuators)
+        }
+        if places:
+            marker, color = END_STYLES.get(status.name, ("x", "tab:red"))
+            at = np.full(len(places), 0.95)
+            label = f"command {status.name.lower()}"
+            where = times[sorted(places)]
+            ax.plot(where, at, marker, color=color, transform=_shares(ax), label=label, ms=5)
+
+
+def _is_of(panel: str, actuator: str) -> bool:
+    return panel == actuator or panel.startswith((actuator + ".", actuator + "["))
+
+
+def _shares(ax: "Axes") -> Any:
     """Data along x, shares of the panel along y."""
     return ax.get_xaxis_transform()
 

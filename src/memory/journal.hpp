@@ -67,6 +67,9 @@ class JournalWriter {
   /// larger than kMostJournalPayload or a quarter of the ring is left out.
   void write(JournalHead head, const void* payload = nullptr, std::size_t bytes = 0) noexcept;
 
+  /// The next entry has this number: entries before it are missing. A smaller one has no effect.
+  void skip_to(std::uint64_t number) noexcept { number_ = number > number_ ? number : number_; }
+
   // an entry whose payload comes in pieces: begin, add any number of times, end
   /// `most`: upper bound of the payload.
   void begin(std::size_t most) noexcept;

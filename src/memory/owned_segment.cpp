@@ -185,10 +185,20 @@ OwnedSegment& OwnedSegment::operator=(OwnedSegment&& other) noexcept {
 
 OwnedSegment::~OwnedSegment() { release(); }
 
+void OwnedSegment::end_and_remove() noexcept {
+  if (!lock_.is_open() || guard_.forked()) return;
+  end_if_alive();
+  remove();
+}
+
+void OwnedSegment::end_if_alive() noexcept {
+  if (state() == BackendState::starting || state() == BackendState::running)
+    end(BackendState::stopped);
+}
+
 void OwnedSegment::release() noexcept {
   if (lock_.is_open() && !guard_.forked()) {
-    if (state() == BackendState::starting || state() == BackendState::running)
-      end(BackendState::stopped);
+    end_if_alive();
     if (state() != BackendState::failed) remove();
   }
   mapping_ = Mapping();

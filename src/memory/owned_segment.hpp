@@ -71,6 +71,8 @@ class OwnedSegment {
   void set_state(BackendState state) noexcept;
   /// Stores the end and its reason, and wakes all threads that wait for a row or on a lane.
   void end(BackendState stopped_or_failed, std::string_view text = {}) noexcept;
+  /// Ends as stopped unless it has ended, and removes the files, also those of a failed backend.
+  void end_and_remove() noexcept;
   /// Unlinks both files; the segment file only if the name still leads to it.
   void remove() noexcept;
   /// Throws UsedAfterFork.
@@ -79,6 +81,7 @@ class OwnedSegment {
  private:
   OwnedSegment() = default;
 
+  void end_if_alive() noexcept;
   void release() noexcept;
 
   std::string name_;

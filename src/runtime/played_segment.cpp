@@ -9,10 +9,14 @@
 #include "memory/named_segment.hpp"
 #include "memory/segment_file.hpp"
 #include "o80/base/error.hpp"
+#include "runtime/provenance_bytes.hpp"
 
 namespace o80 {
 
 namespace {
+
+/// A quarter of it holds the largest entry.
+constexpr std::uint64_t kJournalBytes = 4 << 20;
 
 Schema schema_of(const PlayedOptions& options) {
   Schema schema = schema_from_bytes(options.description);
@@ -45,9 +49,13 @@ OwnedSegment segment_of(const PlayedOptions& options, const RowLayout& layout) {
   SegmentSpec spec;
   spec.name = options.segment;
   spec.schema = description;
+  const std::vector<std::byte> provenance =
+      to_bytes(Provenance{.robot = schema_of(options).head.robot.str()});
+  spec.provenance = provenance;
   spec.row_bytes = layout.size;
   spec.rows = options.history;
   spec.lane_blocks = 64;  // only bursts are sent
+  spec.journal_bytes = options.journal ? kJournalBytes : 0;
   spec.permission = options.permission;
   spec.played = true;
   return OwnedSegment::create(spec);
@@ -67,10 +75,18 @@ PlayedSegment::PlayedSegment(const PlayedOptions& options)
       history_(segment_.view()),
       signal_(segment_.view()),
       halts_(segment_.view()),
+      journal_(segment_.view()),
       bursts_(options.bursting ? std::make_unique<BurstServer>(segment_) : nullptr),
       row_(layout_.size / 8) {}
 
-PlayedSegment::~PlayedSegment() = default;
+PlayedSegment::~PlayedSegment() {
+  // also the files of one that ended as failed: the recording holds its rows
+  segment_.end_and_remove();
+}
+
+Iteration PlayedSegment::add_journal(std::span<const std::byte> entries) {
+  return journal_.add(entries);
+}
 
 std::size_t PlayedSegment::count(std::span<const std::byte> rows) const {
   if (rows.size() % layout_.size == 0) return rows.size() / layout_.size;
@@ -100,24 +116,27 @@ std::size_t PlayedSegment::publish(std::span<const std::byte> rows,
 
 std::size_t PlayedSegment::serve(std::span<const std::byte> rows, const KeepWaiting& keep_waiting) {
   segment_.check_process();
-  if (!bursts_) throw InvalidArgument("'" + segment_.name() + "' is not played by bursts");
   const std::size_t all = count(rows);
   std::size_t served = 0;
   if (last_ < 0 && all > 0) {  // row 0 needs no burst
     publish(rows.first(layout_.size), {});
     served = 1;
   }
-  while (served < all) {
-    if (stop_.load(std::memory_order_relaxed)) return served;
-    if (!bursts_->may_begin(kSlice)) {
-      if (keep_waiting && !keep_waiting()) return served;
-      continue;
-    }
+  while (served < all && wait_for_burst(keep_waiting)) {
     const bool wakes = publish_one(row(rows, served));
     bursts_->count(last_, wakes);
     ++served;
   }
   return served;
+}
+
+bool PlayedSegment::wait_for_burst(const KeepWaiting& keep_waiting) {
+  if (!bursts_) throw InvalidArgument("'" + segment_.name() + "' is not played by bursts");
+  while (!stop_.load(std::memory_order_relaxed)) {
+    if (bursts_->may_begin(kSlice)) return true;
+    if (keep_waiting && !keep_waiting()) return false;
+  }
+  return false;
 }
 
 /// False if the player must stop.
@@ -140,6 +159,7 @@ bool PlayedSegment::publish_one(const std::byte* row) {
                           std::to_string(head.iteration) + " follows row " + std::to_string(last_));
   // a copy, because the words of a row are read with their alignment
   std::memcpy(row_.data(), row, layout_.size);
+  journal_.write_until(head.iteration);
   show_halt(head.iteration, head.halted != 0);
   if (head.iteration != last_ + 1) history_.skip_to(head.iteration);
   const bool is_first = last_ < 0;
@@ -149,22 +169,32 @@ bool PlayedSegment::publish_one(const std::byte* row) {
   return signal_.announce(last_);
 }
 
-/// Shows a halt from its first row to its last. Rows do not say why it was requested.
-void PlayedSegment::show_halt(Iteration k, bool halted) noexcept {
-  if (halted == halts_.acts()) return;
-  if (halted) {
-    ask_for_halt(segment_.view(), HaltCause::none, {}, {});
-    halts_.look();
-    halts_.show(k);
-  } else {
+/// Shows a halt from its first row to its last, with the number and the reason that the journal
+/// has.
+void PlayedSegment::show_halt(Iteration k, bool halted) {
+  const Halt& recorded = journal_.halt();
+  const bool is_new = halted && recorded.number > halts_.halt().number;
+  if (halts_.acts() && (!halted || is_new)) {
     while (!halts_.clear()) halts_.look();
   }
+  if (!halted || halts_.acts()) return;
+  if (recorded.number > 0) {
+    segment_.view().bell().halts.store(recorded.number - 1, std::memory_order_seq_cst);
+    ask_for_halt(segment_.view(), recorded.cause, recorded.who_text(), recorded.reason());
+  } else {
+    ask_for_halt(segment_.view(), HaltCause::none, {}, {});
+  }
+  halts_.look();
+  halts_.show(recorded.number > 0 ? recorded.iteration : k);
 }
 
-void PlayedSegment::end(BackendState stopped_or_failed, std::string_view text) noexcept {
+void PlayedSegment::end() {
   if (segment_.state() != BackendState::starting && segment_.state() != BackendState::running)
     return;
-  segment_.end(stopped_or_failed, text);
+  journal_.write_until(last_ + 1);
+  const auto& recorded = journal_.end();
+  if (recorded) return segment_.end(recorded->state, recorded->text);
+  segment_.end(BackendState::stopped);
 }
 
 void PlayedSegment::ask_to_stop() noexcept {

@@ -19,6 +19,7 @@
 #include "o80/describe/layout.hpp"
 #include "o80/describe/schema.hpp"
 #include "runtime/burst_server.hpp"
+#include "runtime/journal_player.hpp"
 
 namespace o80 {
 
@@ -28,6 +29,7 @@ struct PlayedOptions {
   bool bursting = false;                   // rows are published when frontends request iterations
   Clock clock = Clock::simulated;          // that of the times in the rows
   std::uint64_t history = 1;               // rows kept
+  bool journal = false;                    // add_journal() will be called
   mode_t permission = 0600;                // read: may observe; write: may request bursts
 };
 
@@ -50,6 +52,9 @@ class PlayedSegment {
   ~PlayedSegment();
 
   std::size_t row_bytes() const noexcept { return layout_.size; }
+  /// Adds entries of the recorded journal, which are written before the rows of their iterations;
+  /// returns the iteration of the last one. Throws InvalidArgument if they are damaged.
+  Iteration add_journal(std::span<const std::byte> entries);
   /// Publishes rows, each when the monotonic clock reaches its `due` [ns] (late ones at once; no
   /// `due`: all at once), and returns their number: fewer after ask_to_stop() or if `keep_waiting`
   /// returned false. Iterations must grow; those between are shown as missing.
@@ -58,8 +63,11 @@ class PlayedSegment {
                       const KeepWaiting& keep_waiting = {});
   /// The same as frontends request iterations. The first row of all is published at once.
   std::size_t serve(std::span<const std::byte> rows, const KeepWaiting& keep_waiting = {});
-  /// Ends it; the text is the fault of a failed robot.
-  void end(BackendState stopped_or_failed, std::string_view text = {}) noexcept;
+  /// After the last row: waits until a frontend requests another iteration. False after
+  /// ask_to_stop() or if `keep_waiting` returned false.
+  bool wait_for_burst(const KeepWaiting& keep_waiting = {});
+  /// Ends it as the journal says that the recorded robot ended, else as stopped.
+  void end();
   /// Makes publish() and serve() return within 50 ms.
   void ask_to_stop() noexcept;
 
@@ -69,13 +77,14 @@ class PlayedSegment {
   bool wait_until(std::int64_t due, const KeepWaiting& keep_waiting);
   /// True if a reader must be woken.
   bool publish_one(const std::byte* row);
-  void show_halt(Iteration k, bool halted) noexcept;
+  void show_halt(Iteration k, bool halted);
 
   RowLayout layout_;
   OwnedSegment segment_;
   HistoryWriter history_;
   RowSignal signal_;
   HaltLatch halts_;
+  JournalPlayer journal_;
   std::unique_ptr<BurstServer> bursts_;  // null unless bursting
   std::vector<std::uint64_t> row_;       // the row being published
   Iteration last_ = -1;

@@ -1,5 +1,6 @@
 """Recordings that are played: what readers see, in time and by bursts, and what is refused."""
 
+import contextlib
 import math
 import threading
 import time
@@ -47,13 +48,10 @@ def rows_of(path: Path, segment: str, epoch: int = 0) -> o80.History:
 
 def read_to_the_end(segment: str) -> list[int]:
     """A user's script: it does not know whether a robot runs or a recording is played."""
-    iterations = []
-    with o80.Frontend(segment, WAIT) as arm:
-        try:
-            for observation in arm.stream(since=0):
-                iterations.append(observation.iteration)
-        except o80.BackendStopped:
-            return iterations
+    iterations: list[int] = []
+    with o80.Frontend(segment, WAIT) as arm, contextlib.suppress(o80.BackendStopped):
+        iterations.extend(each.iteration for each in arm.stream(since=0))
+    return iterations
 
 
 def test_rows_appear_again_bit_for_bit(recorded: Path, segment: str) -> None:
@@ -109,8 +107,9 @@ def test_at_recorded_speed_times_are_those_of_now(real_time: Path, segment: str)
         end = time.monotonic_ns()
         played = arm.history()
         assert arm.schema["clock"] == "monotonic"
-        assert arm.rate_reached == pytest.approx(1000, rel=0.5)
-        assert not arm.trouble
+        age = arm.row_age
+        assert age is not None
+        assert age * 1e9 < time.monotonic_ns() - begin
     shift = played.time - recorded.time
     assert (shift == shift[0]).all()
     assert begin <= played.time[0]
@@ -197,15 +196,19 @@ def test_loop_begins_again_as_a_restart(recorded: Path, segment: str) -> None:
 
 def test_gaps_are_played_as_gaps(segment: str, tmp_path: Path) -> None:
     path, copy = tmp_path / "run.mcap", tmp_path / "copy.mcap"
-    with o80.robots.load("two_joints").inline(segment, history=20) as arm:
-        with o80.Recording(path, arm) as recording:
-            recording.flush()
-            with recording._lock:  # the recorder is late
-                arm.burst(100)
+    with (
+        o80.robots.load("two_joints").inline(segment, history=20) as arm,
+        o80.Recording(path, arm) as recording,
+    ):
+        recording.flush()
+        with recording._lock:  # the recorder is late
+            arm.burst(100)
     gaps = o80.open(path)[segment].epochs[0].gaps
     assert gaps
-    with o80.play(path, speed=math.inf, history=20), o80.Recording(copy, segment, whole=True):
-        pass
+    with o80.play(path, speed=math.inf, history=20) as playback:
+        assert playback.wait(WAIT)
+        with o80.Recording(copy, segment, whole=True):
+            pass
     again = rows_of(copy, segment)
     assert again.iteration[0] == gaps[-1][1] + 1
     assert (

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import o80
 from o80.cli.attach import attach
+from o80.journal import JournalEntry
 
 
 @dataclass(frozen=True)
@@ -18,6 +20,7 @@ class Named:
     number: int  #: of the run, from 0; runs of a segment in one file
     history: o80.History
     wall_offset: int | None  #: wall clock less row time [ns]; None: not known
+    journal: Callable[[], list[JournalEntry]]  #: what its backend decided, as far as known
 
 
 def histories(source: str, only: str | None, *, seconds: float | None = None) -> Iterator[Named]:
@@ -29,7 +32,11 @@ def histories(source: str, only: str | None, *, seconds: float | None = None) ->
         with attach(source) as frontend:
             if frontend.published < 0:
                 raise o80.BackendGone(f"segment '{source}' has no row")
-            yield Named(source, 0, frontend.history(seconds=seconds), None)
+            history = frontend.history(seconds=seconds)
+            real_time = frontend.schema["clock"] == "monotonic"
+            offset = time.time_ns() - time.monotonic_ns() if real_time else None
+            entries = frontend.journal()
+            yield Named(source, 0, history, offset, lambda: entries)
         return
     recording = o80.open(Path(source))
     if only is not None and only not in recording.segments:
@@ -37,4 +44,5 @@ def histories(source: str, only: str | None, *, seconds: float | None = None) ->
         raise o80.InvalidArgument(f"no segment '{only}' in {source}; there are: {there}")
     for name in [only] if only is not None else list(recording):
         for number, epoch in enumerate(recording[name].epochs):
-            yield Named(name, number, epoch.history(seconds=seconds), epoch.wall_offset)
+            history = epoch.history(seconds=seconds)
+            yield Named(name, number, history, epoch.wall_offset, epoch.journal)

@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 import o80
-from o80.cli.histories import histories
+from o80.cli.histories import Named, histories
+from o80.cli.screen import complain
 from o80.unwritable import writing
 
 
@@ -23,22 +24,37 @@ def plot(
     seconds: Annotated[float | None, typer.Option(help="Only the last seconds of each.")] = None,
     segment: Annotated[str | None, typer.Option(help="Only this segment of a recording.")] = None,
 ) -> None:
-    """Plot rows: desired and observed together, sensor values, halts, late iterations.
+    """Plot rows: desired and observed together, sensor values, halts, late iterations, ends of
+    commands.
 
-    Each run of a robot that was restarted has panels of its own.
+    Each run of a robot that was restarted has panels of its own. Runs of different times begin at 0
+    each.
     """
     from o80 import plot as plots
+    from o80.command_ends import command_ends
+    from o80.timelines import Placed, origins
 
-    found = {}
+    found: dict[str, Named] = {}
     for source in dict.fromkeys(sources):
         for each in histories(source, segment, seconds=seconds):
             name = f"{each.name}/{each.number}" if each.number else each.name
             if len(each.history):
-                found[f"{source}: {name}" if name in found else name] = each.history
+                found[f"{source}: {name}" if name in found else name] = each
     if not found:
         raise o80.InvalidArgument(f"{', '.join(sources)}: no rows to plot")
-    chosen = [field for field in fields.split(",") if field]
-    figure = plots.plot(found, chosen, window=output is None)
+    zeros, axes = origins(
+        {name: Placed(each.history, each.wall_offset) for name, each in found.items()}
+    )
+    figure = plots.plot(
+        {name: each.history for name, each in found.items()},
+        [field for field in fields.split(",") if field],
+        ends={name: command_ends(each.journal()) for name, each in found.items()},
+        origins=zeros,
+        label="time [s]" if axes == 1 else f"time since each of {axes} beginnings [s]",
+        window=output is None,
+    )
+    if axes > 1:
+        complain(f"the runs are of {axes} different times: each begins at 0")
     if output is not None:
         known = figure.canvas.get_supported_filetypes()
         if output.suffix[1:].lower() not in known:
@@ -47,7 +63,8 @@ def plot(
             )
         with writing(output):
             figure.savefig(output, dpi=110)
-        print(f"{sum(map(len, found.values()))} rows of {', '.join(found)} in {output}")
+        rows = sum(len(each.history) for each in found.values())
+        print(f"{rows} rows of {', '.join(found)} in {output}")
         return
     from matplotlib import pyplot
 

@@ -60,6 +60,8 @@ class Playback:
         self._tracks_in_range(tracks, path)
         self._now = self._begin
         self._over = threading.Event()
+        self._lock = threading.Lock()
+        self._served = 0  # tracks whose last row was published
         self._stopping = False
         self._failure: BaseException | None = None
         self._players: list[Player] = []
@@ -203,17 +205,28 @@ class Playback:
 
     def _serve(self, player: Player) -> None:
         try:
-            for part in player.track.parts(self._begin, self._end):
-                if not player.serve(part):
-                    return
+            stream = player.track.parts(self._begin, self._end)
+            part = next(stream, None)
+            while part is not None and player.serve(part):
                 self._now = max(self._now, int(part.wall[-1]))
-            if not self._hold:
-                player.end()
+                following = next(stream, None)
+                if following is None:
+                    self._note_served()
+                if following is None or following.run != part.run:
+                    player.end_at_burst()
+                part = following
         except BaseException as error:
             self._failure = error
             self._stopping = True
             for each in self._players:
                 each.stop()
+
+    def _note_served(self) -> None:
+        """One track has published its last row."""
+        with self._lock:
+            self._served += 1
+            if self._served == len(self._players) and not self._loop:
+                self._over.set()
 
     def _end_all(self) -> None:
         for player in self._players:
@@ -286,7 +299,8 @@ def play(
     names: a mapping from recorded names to others.
     history: rows that each segment keeps (None: all of a run, 64 MiB at most).
     permission: as for `o80.robots.Robot.start`; commands are refused in any case.
-    hold: keep the segments after the last row until `close` (None: if speed is math.inf).
+    hold: keep the segments after the last row until `close` (None: if speed is math.inf). By bursts
+        a run ends when a frontend requests more iterations than it has.
 
     At speed 1 the rows of robots in real time get new times, by one constant, so that each row
     has the time at which it is published; their ages and rates are right. In all other

@@ -1,6 +1,7 @@
 """One segment that is played: the segment in shared memory that shows the rows of a track."""
 
 import threading
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from o80 import _core
 from o80.playing.track import Part, Track
 
 KEPT = 64 << 20  # most bytes of the rows that a segment keeps by default
+END = 2**62  # an iteration later than any
 NO_TIME = np.empty(0, np.int64)
 
 
@@ -42,6 +44,8 @@ class Player:
         self._stopped = False
         self._run = 0
         self._segment: _core.PlayedSegment | None = None
+        self._journal: Iterator[bytes] = iter(())
+        self._journal_until = END  # iteration of the last entry that was added
         self.begin(0)
 
     def begin(self, run: int) -> None:
@@ -58,8 +62,11 @@ class Player:
                 self._bursting,
                 not self._has_clock(run),
                 self._history or max(1, min(epoch.rows, KEPT // epoch.schema["row"]["size"])),
+                epoch.has_journal,
                 self._permission,
             )
+            self._journal = epoch.journal_parts()
+            self._journal_until = -1
 
     def publish(self, part: Part, due: NDArray[np.int64] | None) -> bool:
         """Publishes rows when they are due [ns] (None: at once). False after `stop`."""
@@ -83,11 +90,17 @@ class Player:
         self.rows += done
         return done == len(part.rows)
 
+    def end_at_burst(self) -> None:
+        """After the last row of a run by bursts: ends it when a frontend requests another one."""
+        if self._segment is not None:
+            self._segment.wait_for_burst()
+        self.end()
+
     def end(self) -> None:
         """Ends the run: frontends learn that no row follows."""
         with self._lock:
             if self._segment is not None:
-                self._segment.end(False, "")
+                self._segment.end()
                 self._segment = None
 
     def stop(self) -> None:
@@ -98,9 +111,14 @@ class Player:
                 self._segment.ask_to_stop()
 
     def _of(self, part: Part) -> _core.PlayedSegment | None:
-        """The segment of the part's run."""
+        """The segment of the part's run, with the journal of the part."""
         if self._segment is None or part.run != self._run:
             self.begin(part.run)
+        # one iteration more, because the end of a backend belongs to the one after its last row
+        last = int(part.rows["iteration"][-1]) + 1
+        while self._segment is not None and self._journal_until <= last:
+            entries = next(self._journal, None)
+            self._journal_until = END if entries is None else self._segment.add_journal(entries)
         return self._segment
 
     def _has_clock(self, run: int) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from o80.recording.reader import RecordedEpoch
+    from o80.recording.recorded_epoch import RecordedEpoch
 
 MOST_ROWS = 256  # of a part: what is published by one call
 SAME_CLOCK = 500_000_000  # clocks whose offsets differ by less are one clock [ns]
@@ -54,7 +54,7 @@ class Track:
     def parts(self, begin: int, end: int) -> Iterator[Part]:
         """The rows from `begin` to `end` [ns], on the wall clock, in small parts."""
         for run, (epoch, offset) in enumerate(zip(self.epochs, self.offsets, strict=True)):
-            for history in epoch.parts(from_time=begin - offset, to_time=end - offset):
+            for history in epoch.blocks(from_time=begin - offset, to_time=end - offset):
                 for first in range(0, len(history), MOST_ROWS):
                     rows = history.rows[first : first + MOST_ROWS]
                     yield Part(run, rows, rows["time"] + offset)

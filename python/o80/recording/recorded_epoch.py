@@ -56,6 +56,23 @@ class EpochPart:
             except (KeyError, ValueError) as error:
                 raise RecordingError(f"{self.path}: a record {name} is damaged") from error
 
+    @property
+    def log_times(self) -> tuple[int, int]:
+        """Log times of the first and the last row [ns]. There must be rows."""
+        chunks = [each for each in self.found.chunks if self.channel in each.message_index_offsets]
+        with self.reading() as file:
+            first = index_of(file, chunks[0], self.channel)[0, 0]
+            last = index_of(file, chunks[-1], self.channel)[-1, 0]
+        return int(first), int(last)
+
+    @property
+    def began_at(self) -> int:
+        """When its recording began, on the wall clock [ns since 1970]."""
+        for place in self.found.attachments:
+            if place.name == self.note.attachment:
+                return place.create_time
+        return 0
+
     def table(self) -> bytes:
         """The description of the robot. Raises RecordingError."""
         for place in self.found.attachments:
@@ -204,13 +221,31 @@ class RecordedEpoch:
             n, since=since, until=until, seconds=seconds, from_time=from_time, to_time=to_time
         )
 
-    def blocks(self) -> Iterator[History]:
-        """All rows in their order, some at a time: for recordings larger than the memory.
+    def blocks(
+        self, *, from_time: int | None = None, to_time: int | None = None
+    ) -> Iterator[History]:
+        """The rows between two times [ns] in their order, some at a time.
 
-        Raises RecordingError if the file is damaged there.
+        For recordings larger than the memory. Raises RecordingError if the file is damaged there.
         """
-        for rows in self._rows():
-            yield History(self._decoder, rows)
+        for rows in self._rows(from_time, to_time):
+            history = History(self._decoder, rows).select(from_time=from_time, to_time=to_time)
+            if len(history):
+                yield history
+
+    @property
+    def time_range(self) -> tuple[int, int]:
+        """Times of the first and the last row [ns]. Raises RecordingError if there is none."""
+        with_rows = [part for part in self._parts if part.rows]
+        if not with_rows:
+            raise RecordingError(f"{self._parts[0].path}: '{self._note.segment}' has no row")
+        first, last = with_rows[0].log_times[0], with_rows[-1].log_times[1]
+        return first - self.wall_offset, last - self.wall_offset
+
+    @property
+    def recorded_at(self) -> int:
+        """When its recording began, on the wall clock [ns since 1970]."""
+        return self._parts[0].began_at
 
     def _rows(self, from_time: int | None = None, to_time: int | None = None) -> Iterator[Any]:
         """The rows of each chunk that may have rows of these times."""

@@ -159,7 +159,7 @@ TEST_F(PlayedSegmentTest, ABurstBeyondTheLastRowEndsWithTheRecording) {
   UntypedFrontend frontend("pair", {.timeout = kAtOnce, .starting = true});
   std::thread player([&] {
     played.serve(all());
-    played.end(BackendState::stopped);
+    played.end();
   });
   EXPECT_THROW(frontend.burst(kRows + 10, kPatience), BackendStopped);
   player.join();

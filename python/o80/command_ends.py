@@ -1,0 +1,46 @@
+"""When commands ended, and how, by actuator: from the journal of a backend."""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from o80.journal import JournalEntry
+from o80.words import Status
+
+ENDS = frozenset(
+    {
+        Status.COMPLETED,
+        Status.LIMITED,
+        Status.OVERWRITTEN,
+        Status.PURGED,
+        Status.INTERRUPTED,
+        Status.REJECTED,
+        Status.HALTED,
+    }
+)
+
+
+class CommandEnd(NamedTuple):
+    """The end of a command."""
+
+    iteration: int
+    status: Status
+    actuators: tuple[str, ...]
+
+
+def command_ends(entries: Iterable[JournalEntry]) -> list[CommandEnd]:
+    """The ends of all commands whose batch is among the entries, in their order."""
+    actuators: dict[tuple[int | None, int], tuple[str, ...]] = {}
+    ends = []
+    for entry in entries:
+        commands = [each for each in entry.commands if each.kind == "command"]
+        if entry.kind == "rejected":
+            ends += [
+                CommandEnd(entry.iteration, Status.REJECTED, each.actuators) for each in commands
+            ]
+            continue
+        actuators.update({(entry.lane, each.id): each.actuators for each in commands})
+        if entry.kind == "status" and entry.status in ENDS and entry.id is not None:
+            named = actuators.pop((entry.lane, entry.id), None)
+            if named is not None:
+                ends.append(CommandEnd(entry.iteration, entry.status, named))
+    return ends

@@ -1,0 +1,227 @@
+"""The episodes of a recording, from the marks of the program that recorded it.
+
+The rules are in docs/recording.md, Export for learning.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o80.checked import whole
+from o80.columns import columns_of, values_of
+from o80.errors import InvalidArgument
+from o80.history import History
+
+if TYPE_CHECKING:
+    from o80.recording.marks import Mark
+    from o80.recording.reader import RecordingFile
+    from o80.recording.recorded_epoch import RecordedEpoch
+
+BEGIN, END = "episode", "episode_end"
+"""Names of the marks before and after an episode."""
+
+
+@dataclass(frozen=True)
+class Episode:
+    """An episode of T steps."""
+
+    rows: History  #: T + 1 rows: what was there before each step, and after the last one
+    rewards: NDArray[np.float64]  #: (T,)
+    terminated: bool  #: it ended by itself; else it was cut off
+    task: str
+    values: Mapping[str, Any]  #: of the mark before it
+
+    def __len__(self) -> int:
+        return len(self.rewards)
+
+    @cached_property
+    def observed(self) -> NDArray[np.float64]:
+        """The observed states: (T + 1, numbers)."""
+        return self._numbers("observed")
+
+    @cached_property
+    def extended(self) -> NDArray[np.float64]:
+        """Further sensor values: (T + 1, numbers)."""
+        return self._numbers("extended")
+
+    @cached_property
+    def actions(self) -> NDArray[np.float64]:
+        """What was asked in each step, the desired states: (T, numbers)."""
+        return self._numbers("desired")[1:]
+
+    def _numbers(self, part: str) -> NDArray[np.float64]:
+        columns = [each for each in columns_of(self.rows.schema) if _part(each.name) == part]
+        numbers = np.empty((len(self.rows), len(columns)))
+        for i, column in enumerate(columns):
+            numbers[:, i] = values_of(self.rows.rows, column)
+        return numbers
+
+
+@dataclass(frozen=True)
+class Episodes:
+    """The episodes of one robot, and those that could not be used."""
+
+    segment: str
+    robot: str
+    frequency: float  #: steps a second [1/s]
+    names: Mapping[str, Sequence[str]]  #: of the numbers in desired, observed and extended
+    all: Sequence[Episode]
+    left_out: Sequence[str]  #: why an episode is missing, a sentence for each
+
+
+def episodes_of(
+    recording: "RecordingFile",
+    segment: str | None = None,
+    *,
+    every: int = 1,
+    begin: str = BEGIN,
+    end: str = END,
+) -> Episodes:
+    """The episodes of one segment of a recording.
+
+    segment: may be left out if there is only one with actuators.
+    every: a step is so many iterations.
+    begin, end: names of the marks before and after an episode.
+    Raises InvalidArgument.
+    """
+    every = whole(every, "every", 1)
+    chosen = recording[_segment(recording, segment)]
+    epochs = [epoch for epoch in chosen.epochs if epoch.rows]
+    left_out: list[str] = []
+    found = []
+    for span in _spans(recording.marks, chosen.name, begin, end):
+        try:
+            found.append(_episode(span, epochs, chosen.name, every))
+        except InvalidArgument as error:
+            left_out.append(str(error))
+    if not found:
+        why = f": {left_out[0]}" if left_out else f": it has no mark '{begin}'"
+        raise InvalidArgument(
+            f"{recording.path} holds no episode of '{chosen.name}'{why}. A program marks the "
+            f'beginning of each with recording.mark("{begin}")'
+        )
+    schema = found[0].rows.schema
+    return Episodes(
+        segment=chosen.name,
+        robot=schema["robot"],
+        frequency=1e9 / (schema["period"] * every),
+        names=_names(schema),
+        all=found,
+        left_out=left_out,
+    )
+
+
+# ---------------------------------------------------------------------------- marks
+
+
+@dataclass(frozen=True)
+class _Span:
+    number: int
+    marks: Sequence["Mark"]  #: the one before it, and those in it
+    until: "Mark | None"  #: the mark that ends it
+
+
+def _spans(marks: Sequence["Mark"], segment: str, begin: str, end: str) -> Iterator[_Span]:
+    """Where the marks say that episodes begin and end."""
+    open_at: list[Mark] = []
+    number = 0
+    for mark in marks:
+        if segment not in mark.rows:
+            continue
+        if open_at and mark.name in (begin, end):
+            yield _Span(number, open_at, mark)
+            number += 1
+            open_at = []
+        if mark.name == begin:
+            open_at = [mark]
+        elif open_at:
+            open_at.append(mark)
+    if open_at:
+        yield _Span(number, open_at, None)
+
+
+def _episode(span: _Span, epochs: Sequence["RecordedEpoch"], segment: str, every: int) -> Episode:
+    """Raises InvalidArgument if its rows are not all there."""
+    mark = span.marks[0]
+    where = f"episode {span.number} (mark at row {mark.rows[segment]})"
+    epoch = _epoch_at(mark, epochs)
+    first = mark.rows[segment]
+    last = None
+    if span.until is not None and _epoch_at(span.until, epochs) is epoch:
+        last = span.until.rows[segment]
+    rows = epoch.history(since=first, until=last)
+    if not len(rows) or rows.iteration[0] != first:
+        raise InvalidArgument(f"{where}: its first row is not in the recording")
+    fresh = np.flatnonzero(rows.fresh[1:])
+    if len(fresh):
+        rows = rows[: 1 + int(fresh[0])]
+    if len(rows) != rows.iteration[-1] - first + 1:
+        raise InvalidArgument(f"{where}: it has a gap")
+    steps = (len(rows) - 1) // every
+    if steps < 1:
+        raise InvalidArgument(f"{where}: it has no step")
+    rows = rows[: steps * every + 1 : every]
+    ending = None if span.until is None or span.until.name == mark.name else span.until
+    return Episode(
+        rows=rows,
+        rewards=_rewards(span, ending, segment, every, steps),
+        terminated=ending is not None and not ending.values.get("truncated", False),
+        task=str(mark.values.get("task", "")) or epoch.schema["robot"],
+        values=mark.values,
+    )
+
+
+def _epoch_at(mark: "Mark", epochs: Sequence["RecordedEpoch"]) -> "RecordedEpoch":
+    """The run of the robot that was recorded when a mark was made."""
+    begun = [epoch for epoch in epochs if epoch.recorded_at <= mark.time]
+    return begun[-1] if begun else epochs[0]
+
+
+def _rewards(
+    span: _Span, ending: "Mark | None", segment: str, every: int, steps: int
+) -> NDArray[np.float64]:
+    """The reward of each step: `rewards` of the last mark, or the sum of `reward` of all marks."""
+    rewards = np.zeros(steps)
+    given = ending.values.get("rewards") if ending is not None else None
+    if isinstance(given, list) and given:
+        places = np.arange(len(given)) * steps // len(given)
+        np.add.at(rewards, places, np.asarray(given, np.float64))
+        return rewards
+    first = span.marks[0].rows[segment]
+    for mark in [*span.marks[1:], *([] if ending is None else [ending])]:
+        if isinstance(mark.values.get("reward"), (int, float)):
+            step = (mark.rows[segment] - first - 1) // every
+            rewards[min(max(step, 0), steps - 1)] += mark.values["reward"]
+    return rewards
+
+
+# ---------------------------------------------------------------------------- robots
+
+
+def _segment(recording: "RecordingFile", segment: str | None) -> str:
+    if segment is not None:
+        if segment not in recording.segments:
+            raise InvalidArgument(f"no segment '{segment}' in {recording.path}")
+        return segment
+    moving = [name for name in recording if recording[name].schema["actuators"]]
+    if len(moving) != 1:
+        raise InvalidArgument(
+            f"{recording.path} holds {len(moving)} robots ({', '.join(moving)}): choose one with "
+            f"segment"
+        )
+    return moving[0]
+
+
+def _part(column: str) -> str:
+    return column.partition(".")[0]
+
+
+def _names(schema: dict[str, Any]) -> dict[str, list[str]]:
+    names: dict[str, list[str]] = {"desired": [], "observed": [], "extended": []}
+    for column in columns_of(schema):
+        names[_part(column.name)].append(column.name.partition(".")[2])
+    return names

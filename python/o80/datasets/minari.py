@@ -1,0 +1,61 @@
+"""Episodes as a Minari data set, written by Minari itself."""
+
+from pathlib import Path
+
+import numpy as np
+
+from o80.datasets.episodes import Episode, Episodes
+from o80.errors import InvalidArgument
+from o80.extras import needed
+
+
+def write(path: Path, episodes: Episodes) -> None:
+    """Writes a folder, which must not exist: `minari.MinariDataset(path / "data")` reads it.
+
+    An observation is the observed numbers, then the sensor values; an action the desired numbers.
+    Raises InvalidArgument, MissingExtra, OSError.
+    """
+    minari = needed("minari", "minari", "a Minari data set")
+    needed("h5py", "minari", "a Minari data set")
+    from gymnasium.spaces import Box
+    from minari.data_collector import EpisodeBuffer
+    from minari.dataset.minari_storage import MinariStorage
+
+    if path.exists():
+        raise InvalidArgument(f"{path} exists: a data set is written to a new folder")
+    size = len(episodes.names["observed"]) + len(episodes.names["extended"])
+    actions = len(episodes.names["desired"])
+    (path / "data").mkdir(parents=True)
+    storage = MinariStorage.new(
+        path / "data",
+        observation_space=Box(-np.inf, np.inf, (size,), np.float64),
+        action_space=Box(-np.inf, np.inf, (actions,), np.float64),
+        data_format="hdf5",
+    )
+    names = episodes.names
+    storage.update_metadata(
+        {
+            "dataset_id": f"o80/{episodes.robot}/{path.name}-v0",
+            "minari_version": minari.__version__,
+            "description": f"Recorded by o80 from '{episodes.segment}', {episodes.frequency:g} "
+            f"steps a second. Observations: {', '.join([*names['observed'], *names['extended']])}. "
+            f"Actions: {', '.join(names['desired'])}.",
+        }
+    )
+    storage.update_episodes(
+        [_buffer(each, number, EpisodeBuffer) for number, each in enumerate(episodes.all)]
+    )
+
+
+def _buffer(episode: Episode, number: int, kind: type) -> object:
+    steps = len(episode)
+    last = np.arange(steps) == steps - 1
+    return kind(
+        id=number,
+        observations=np.concatenate([episode.observed, episode.extended], axis=1),
+        actions=episode.actions,
+        rewards=episode.rewards,
+        terminations=last & episode.terminated,
+        truncations=last & (not episode.terminated),
+        infos={},
+    )

@@ -1,0 +1,109 @@
+"""o80 play: what it says, how it ends, and what other commands see meanwhile."""
+
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+import o80
+
+WAIT = 60.0  # [s] longer than any command should take
+
+
+def o80_command(*words: str | Path) -> list[str]:
+    return [str(Path(sys.executable).parent / "o80"), *map(str, words)]
+
+
+def run(*words: str | Path, code: int = 0) -> str:
+    done = subprocess.run(o80_command(*words), capture_output=True, text=True, timeout=WAIT)
+    assert done.returncode == code, done.stdout + done.stderr
+    return done.stdout + done.stderr
+
+
+@contextmanager
+def playing(*words: str | Path) -> Iterator[subprocess.Popen[str]]:
+    """o80 play, which Ctrl-C ends in order."""
+    with subprocess.Popen(
+        o80_command("play", *words), stderr=subprocess.PIPE, text=True
+    ) as player:
+        try:
+            yield player
+            player.send_signal(signal.SIGINT)
+            _, said = player.communicate(timeout=WAIT)
+            assert player.returncode == 0, said
+        finally:
+            player.kill()
+
+
+@pytest.fixture
+def recorded(segment: str, tmp_path: Path) -> Path:
+    path = tmp_path / "run.mcap"
+    with o80.robots.load("two_joints").inline(segment) as arm, o80.Recording(path, arm):
+        arm.add_command("elbow", 0.5, iterations=100)
+        arm.burst(150)
+    return path
+
+
+def test_other_commands_see_the_rows(recorded: Path, segment: str, tmp_path: Path) -> None:
+    copy = tmp_path / "copy.mcap"
+    with playing(recorded, "--fast"):
+        with o80.Frontend(segment, WAIT) as arm:
+            arm.wait_for(150, timeout=WAIT)
+        assert "played" in run("list")
+        assert " 150 " in run("echo", segment, "--count", "1")
+        assert "a recording of 1000 Hz is played" in run("info", segment)
+        assert "is a recording that is being played" in run("halt", segment, code=1)
+        run("save", segment, "-o", copy)
+        run("plot", segment, "-o", tmp_path / "run.png")
+    run("diff", recorded, copy)
+    assert segment not in run("list")
+
+
+def test_it_ends_with_the_last_row(recorded: Path) -> None:
+    said = run("play", recorded, "--speed", "2")
+    assert "playing 0.1 s" in said or "playing 0.2 s" in said
+    assert "151 rows" in said
+
+
+def test_bursts_are_served(recorded: Path, segment: str) -> None:
+    with playing(recorded, "--bursts"), o80.Frontend(segment, WAIT) as arm:
+        assert arm.burst(20).iteration == 20
+
+
+def test_a_name_that_is_taken_is_refused(recorded: Path, segment: str) -> None:
+    with o80.robots.load("two_joints").inline(segment):
+        assert "--prefix" in run("play", recorded, code=1)
+        run("play", recorded, "--speed", "100", "--name", f"{segment}-b")
+
+
+def test_a_killed_player_leaves_a_dead_segment_that_the_next_one_replaces(
+    recorded: Path, segment: str
+) -> None:
+    with subprocess.Popen(o80_command("play", recorded, "--fast"), text=True) as player:
+        with o80.Frontend(segment, WAIT) as arm:
+            arm.wait_for(150, timeout=WAIT)
+            player.kill()
+            with pytest.raises(o80.BackendKilled):
+                arm.wait_for(151, timeout=WAIT)
+            assert arm.published == 150
+    run("play", recorded, "--speed", "100")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--speed", "0"], "speed must be positive"),
+        (["--from", "-1"], "begin must be a number of seconds"),
+        (["--segment", "aram"], "no segment 'aram'"),
+    ],
+)
+def test_wrong_options_are_named(recorded: Path, words: list[str], said: str) -> None:
+    done = subprocess.run(
+        o80_command("play", recorded, *words), capture_output=True, text=True, timeout=WAIT
+    )
+    assert done.returncode != 0
+    assert said in " ".join(done.stderr.split())
