@@ -58,6 +58,7 @@ def values_of(rows: NDArray[Any], column: Column) -> NDArray[Any]:
     """The numbers of a column as a contiguous copy: (T,)."""
     if not len(rows):
         return np.empty(0, column.dtype)
+    rows = np.ascontiguousarray(rows)  # those of a slice with a step have gaps
     part: NDArray[Any] = np.ndarray(
         (len(rows),), column.dtype, rows, column.offset, (rows.strides[0],)
     )

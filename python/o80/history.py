@@ -21,8 +21,8 @@ class History:
     """Consecutive observations, oldest first: arrays with a first dimension (T,).
 
     Its arrays are views of one copy, `rows`, which does not change. It may hold fewer rows than
-    requested, but every row is complete. It can be pickled; for `numpy.save` and h5py use `rows`,
-    for pandas `to_frame()`.
+    requested, but every row is complete. It can be pickled, and given to `numpy.save`,
+    `numpy.savez` and h5py, which store `rows`; for pandas there is `to_frame()`.
     """
 
     __slots__ = ("_decoder", "_layout", "rows")
@@ -221,6 +221,10 @@ class History:
         """All observed numbers, then all extended ones: (T, numbers), float32 by default."""
         numbers: NDArray[Any] = self._layout.many_flat(self.rows, dtype)
         return numbers
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        """The rows, for NumPy and h5py."""
+        return np.array(self.rows, dtype=dtype, copy=copy)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return History, (self._decoder, self.rows)

@@ -297,6 +297,7 @@ class Layout:
         kind = np.dtype(np.float32 if dtype is None else dtype)
         columns = sum(count for _, _, count in self.runs)
         result = np.empty((len(rows), columns), kind)
+        rows = np.ascontiguousarray(rows)  # those of a slice with a step have gaps
         column = 0
         for own, offset, count in self.runs:
             strides = (rows.strides[0], own.itemsize)

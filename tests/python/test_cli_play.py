@@ -27,9 +27,7 @@ def run(*words: str | Path, code: int = 0) -> str:
 @contextmanager
 def playing(*words: str | Path) -> Iterator[subprocess.Popen[str]]:
     """o80 play, which Ctrl-C ends in order."""
-    with subprocess.Popen(
-        o80_command("play", *words), stderr=subprocess.PIPE, text=True
-    ) as player:
+    with subprocess.Popen(o80_command("play", *words), stderr=subprocess.PIPE, text=True) as player:
         try:
             yield player
             player.send_signal(signal.SIGINT)
@@ -83,13 +81,15 @@ def test_a_name_that_is_taken_is_refused(recorded: Path, segment: str) -> None:
 def test_a_killed_player_leaves_a_dead_segment_that_the_next_one_replaces(
     recorded: Path, segment: str
 ) -> None:
-    with subprocess.Popen(o80_command("play", recorded, "--fast"), text=True) as player:
-        with o80.Frontend(segment, WAIT) as arm:
-            arm.wait_for(150, timeout=WAIT)
-            player.kill()
-            with pytest.raises(o80.BackendKilled):
-                arm.wait_for(151, timeout=WAIT)
-            assert arm.published == 150
+    with (
+        subprocess.Popen(o80_command("play", recorded, "--fast"), text=True) as player,
+        o80.Frontend(segment, WAIT) as arm,
+    ):
+        arm.wait_for(150, timeout=WAIT)
+        player.kill()
+        with pytest.raises(o80.BackendKilled):
+            arm.wait_for(151, timeout=WAIT)
+        assert arm.published == 150
     run("play", recorded, "--speed", "100")
 
 

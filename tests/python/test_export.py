@@ -15,8 +15,10 @@ from mixed_robots import GROUPS, ROBOTS, SENSORS, Mode, recorded
 
 import o80
 from o80.columns import columns_of
+from o80.command_ends import command_ends
 from o80.export import columns_in, write
 from o80.plot import plot
+from o80.timelines import Placed, origins
 
 
 def read(path: Path, name: str) -> dict[str, Any]:
@@ -140,3 +142,92 @@ def test_the_commands_write_files(arm: o80.Frontend, tmp_path: Path) -> None:
     assert (tmp_path / "run.png").read_bytes().startswith(b"\x89PNG")
     assert (tmp_path / "live.png").stat().st_size > 1000
     assert len(np.load(tmp_path / "run.npz")[f"{arm.segment}/time"]) == 21
+
+
+def ends_in(figure: Any, panel: int) -> set[str]:
+    """Labels of the marks for ends of commands in a panel."""
+    labels = (str(line.get_label()) for line in figure.axes[panel].get_lines())
+    return {label for label in labels if label.startswith("command ")}
+
+
+def test_ends_of_commands_are_marked_in_the_panels_of_their_actuators(arm: o80.Frontend) -> None:
+    arm.add_command("shoulder", 0.2, iterations=10)
+    arm.burst(5)
+    arm.add_command("shoulder", 0.1, iterations=10, mode="overwrite")
+    arm.add_command("elbow", 0.3, iterations=20)
+    arm.burst(15)
+    history = arm.history()
+    figure = plot({"arm": history}, ends={"arm": command_ends(arm.journal())})
+
+    assert ends_in(figure, 0) == {"command overwritten", "command completed"}
+    assert ends_in(figure, 1) == set()
+    arm.burst(10)
+    ends = command_ends(arm.journal())
+    figure = plot({"arm": arm.history()}, ends={"arm": ends})
+    assert ends_in(figure, 1) == {"command completed"}
+    (line,) = [
+        each for each in figure.axes[1].get_lines() if each.get_label() in ends_in(figure, 1)
+    ]
+    (end,) = [each for each in ends if each.actuators == ("elbow",)]
+    assert line.get_xdata()[0] == pytest.approx(
+        arm.history().at_iteration(end.iteration).time * 1e-9
+    )
+    # ends outside the rows are not drawn
+    assert ends_in(plot({"arm": arm.history(3)}, ends={"arm": ends}), 0) == set()
+
+
+def test_ends_come_from_a_recording_too(arm: o80.Frontend, tmp_path: Path) -> None:
+    with o80.Recording(tmp_path / "run.mcap", arm):
+        arm.add_command("elbow", 0.3, iterations=10)
+        arm.burst(20)
+    epoch = o80.open(tmp_path / "run.mcap")[arm.segment].epochs[0]
+    assert command_ends(epoch.journal()) == command_ends(arm.journal())
+    assert [end.status for end in command_ends(epoch.journal())] == [o80.Status.COMPLETED]
+
+
+def test_a_rejected_batch_ends_its_commands(arm: o80.Frontend) -> None:
+    arm.burst(10)
+    arm.add_command("elbow", 0.3)
+    arm.pulse(at=3)
+    arm.burst(1)
+    assert [end.status for end in command_ends(arm.journal())] == [o80.Status.REJECTED]
+
+
+DAY = 86_400_000_000_000  # [ns]
+
+
+def test_runs_of_different_days_begin_at_zero_each() -> None:
+    history = recorded({"joints": ({"position": "f8"}, 1)}, {}, 5)
+    first = int(history.time[0])
+    runs = {
+        "arm": Placed(history, 1000),
+        "ball": Placed(history, 1000 + 5_000_000),
+        "arm/1": Placed(history, 1000 + DAY),
+        "live": Placed(history, None),
+    }
+    zeros, axes = origins(runs)
+
+    assert axes == 3
+    assert zeros["arm"] == first
+    assert zeros["ball"] == first - 5_000_000  # the same axis, 5 ms later
+    assert zeros["arm/1"] == first
+    assert zeros["live"] == first
+    figure = plot({name: run.history for name, run in runs.items()}, origins=zeros)
+    begins = [ax.get_lines()[0].get_xdata()[0] for ax in figure.axes]
+    assert begins == pytest.approx([0, 0.005, 0, 0])
+
+
+def test_recordings_made_one_after_the_other_share_an_axis(segment: str, tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        with (
+            o80.robots.load("two_joints").inline(segment) as arm,
+            o80.Recording(tmp_path / f"{name}.mcap", arm),
+        ):
+            arm.burst(20)
+    o80_plot = [str(Path(sys.executable).parent / "o80"), "plot"]
+    files = [str(tmp_path / "a.mcap"), str(tmp_path / "b.mcap"), "-o", str(tmp_path / "run.png")]
+    done = subprocess.run([*o80_plot, *files], capture_output=True, text=True, timeout=60)
+
+    assert done.returncode == 0, done.stderr
+    assert "different times" not in done.stderr  # recorded within ten seconds
+    assert "42 rows" in done.stdout

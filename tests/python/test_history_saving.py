@@ -94,6 +94,32 @@ def test_hdf5_takes_the_rows(arm: o80.Frontend, tmp_path: Path) -> None:
         assert np.array_equal(file["rows"]["observed"], history.observed)
 
 
+def test_a_history_itself_is_saved(arm: o80.Frontend, tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    arm.add_command("elbow", 0.3, iterations=20)
+    arm.burst(20)
+    history = arm.history()
+    np.save(tmp_path / "run.npy", history)
+    np.savez(tmp_path / "run.npz", run=history, rest=history[10:])
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        file["rows"] = history
+    with h5py.File(tmp_path / "run.h5") as file:
+        stored = file["rows"][:]
+    loaded = np.load(tmp_path / "run.npz")
+    for rows in (np.load(tmp_path / "run.npy"), loaded["run"], stored):
+        assert np.array_equal(rows["desired"], history.desired)
+        assert np.array_equal(rows["iteration"], history.iteration)
+    assert len(loaded["rest"]) == 11
+
+
+def test_every_second_row_has_all_numbers(arm: o80.Frontend) -> None:
+    arm.add_command("elbow", 0.3, iterations=20)
+    arm.burst(20)
+    history = arm.history()
+    assert np.array_equal(history[::2].flat(), history.flat()[::2])
+    assert history[::2].to_frame().equals(history.to_frame()[::2])
+
+
 def test_without_pandas_the_error_names_the_extra(
     arm: o80.Frontend, monkeypatch: pytest.MonkeyPatch
 ) -> None:

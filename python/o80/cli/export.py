@@ -1,7 +1,9 @@
-"""``o80 export``: rows in formats that data tools read."""
+"""``o80 export``: rows in formats that data tools and learners read."""
 
 from __future__ import annotations
 
+import sys
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -9,17 +11,43 @@ import typer
 
 import o80
 from o80.cli.histories import histories
+from o80.cli.screen import complain
 from o80.unwritable import writing
+
+
+class Format(StrEnum):
+    """Formats of data sets for learning."""
+
+    LEROBOT = "lerobot"
+    MINARI = "minari"
 
 
 def export(
     source: Annotated[str, typer.Argument(help="A recording (.mcap), or the name of a segment.")],
     output: Annotated[
-        Path, typer.Option("--output", "-o", help="File to write: .npz, .h5 or .parquet.")
+        Path,
+        typer.Option(
+            "--output", "-o", help="File to write: .npz, .h5 or .parquet; with --format a folder."
+        ),
     ],
     segment: Annotated[str | None, typer.Option(help="Only this segment of a recording.")] = None,
+    form: Annotated[
+        Format | None,
+        typer.Option("--format", help="A data set for learning, of the marked episodes."),
+    ] = None,
+    every: Annotated[
+        int, typer.Option(min=1, help="With --format: iterations in a step of the data set.")
+    ] = 1,
 ) -> None:
-    """Export rows: one column for each number, named as in observed.elbow or extended.force[2]."""
+    """Export rows: one column for each number, named as in observed.elbow or extended.force[2].
+
+    With --format, the episodes of a recording as a data set for learning: see docs/recording.md.
+    """
+    if form is not None:
+        _export_episodes(source, output, segment, form, every)
+        return
+    if every != 1:
+        raise o80.InvalidArgument("--every is for data sets: give --format lerobot or minari too")
     from o80.export import write
 
     found = list(histories(source, segment))
@@ -34,3 +62,24 @@ def export(
         write(output, named)
     for name, history in named.items():
         print(f"{name}: {len(history)} rows in {output}")
+
+
+def _export_episodes(
+    source: str, output: Path, segment: str | None, form: Format, every: int
+) -> None:
+    from o80.datasets import lerobot, minari
+    from o80.datasets.episodes import episodes_of
+
+    episodes = episodes_of(o80.open(source), segment, every=every)
+    write = {Format.LEROBOT: lerobot.write, Format.MINARI: minari.write}[form]
+    with writing(output):
+        write(output, episodes)
+    for why in episodes.left_out:
+        complain(f"left out: {why}")
+    steps = sum(len(episode) for episode in episodes.all)
+    print(
+        f"{episodes.segment}: {len(episodes.all)} episodes, {steps} steps at "
+        f"{episodes.frequency:g} a second in {output}"
+    )
+    if form is Format.MINARI:
+        print(f"read it with minari.MinariDataset('{output}/data')", file=sys.stderr)

@@ -1,0 +1,249 @@
+"""Episodes of recordings as data sets for learning, read by what reads them."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas
+import pyarrow.parquet
+import pytest
+
+import o80
+from o80.datasets import lerobot, minari
+from o80.datasets.episodes import Episodes, episodes_of
+
+
+@pytest.fixture
+def recorded(segment: str, tmp_path: Path) -> Path:
+    """Three episodes of 30, 20 and 20 steps; the second ends by itself, the last is cut."""
+    path = tmp_path / "run.mcap"
+    with (
+        o80.robots.load("two_joints").inline(segment) as arm,
+        o80.Recording(path, arm) as recording,
+    ):
+        arm.burst(5)
+        recording.mark("episode", task="swing", ball=3)
+        arm.add_command("elbow", 0.3, iterations=30)
+        arm.burst(10)
+        recording.mark("touched", reward=0.25)
+        arm.burst(20)
+        recording.mark("episode")
+        arm.burst(20)
+        recording.mark("episode_end", reward=1.0)
+        arm.request("reset", seed=1)
+        arm.burst(1)
+        recording.mark("episode")
+        arm.burst(20)
+    return path
+
+
+def episodes(path: Path, **options: Any) -> Episodes:
+    return episodes_of(o80.open(path), **options)
+
+
+def test_marks_delimit_episodes(recorded: Path) -> None:
+    first, second, third = episodes(recorded).all
+
+    assert (first.rows.iteration[0], first.rows.iteration[-1]) == (5, 35)
+    assert [len(each) for each in (first, second, third)] == [30, 20, 20]
+    assert [each.terminated for each in (first, second, third)] == [False, True, False]
+    assert [each.task for each in (first, second, third)] == ["swing", "two_joints", "two_joints"]
+    assert first.values["ball"] == 3
+
+
+def test_an_action_is_what_was_asked_in_its_step(recorded: Path, segment: str) -> None:
+    first = episodes(recorded).all[0]
+    history = o80.open(recorded)[segment].history(since=5, until=35)
+
+    assert np.array_equal(first.observed, history.observed)
+    assert np.array_equal(first.actions, history.desired[1:])
+    assert np.array_equal(first.extended[:, 0], history.extended.effort[:, 0])
+
+
+def test_rewards_belong_to_the_step_in_which_they_were_marked(recorded: Path) -> None:
+    first, second, _ = episodes(recorded).all
+    assert first.rewards.nonzero()[0].tolist() == [9]  # after ten steps
+    assert first.rewards[9] == 0.25
+    assert second.rewards[-1] == 1.0
+    assert second.rewards.sum() == 1.0
+
+
+def test_steps_may_be_several_iterations(recorded: Path, segment: str) -> None:
+    found = episodes(recorded, every=10)
+    history = o80.open(recorded)[segment].history()
+
+    assert found.frequency == 100
+    assert [len(each) for each in found.all] == [3, 2, 2]
+    assert found.all[0].rows.iteration.tolist() == [5, 15, 25, 35]
+    assert np.array_equal(found.all[0].actions[0], history.at_iteration(15).desired)
+    assert found.all[0].rewards.tolist() == [0.25, 0, 0]
+
+
+def test_a_fresh_start_ends_an_episode(segment: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with (
+        o80.robots.load("two_joints").inline(segment) as arm,
+        o80.Recording(path, arm) as recording,
+    ):
+        for _ in range(2):
+            recording.mark("episode")
+            arm.burst(10)
+            arm.request("reset", seed=1)
+            arm.burst(1)
+    first, second = episodes(path).all
+    assert not first.rows.fresh[1:].any()
+    assert first.rows.iteration[-1] < second.rows.iteration[0]
+
+
+def test_rewards_of_all_steps_may_come_with_the_last_mark(segment: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    rewards = [0.0, 0.5, 1.0]
+    with (
+        o80.robots.load("two_joints").inline(segment) as arm,
+        o80.Recording(path, arm) as recording,
+    ):
+        recording.mark("episode")
+        arm.burst(30)
+        recording.mark("episode_end", rewards=rewards, truncated=True)
+    (only,) = episodes(path, every=10).all
+    assert only.rewards.tolist() == rewards
+    assert not only.terminated
+    assert episodes(path).all[0].rewards.sum() == sum(rewards)
+
+
+def test_an_episode_with_a_gap_is_left_out_and_said(segment: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with (
+        o80.robots.load("two_joints").inline(segment, history=20) as arm,
+        o80.Recording(path, arm) as recording,
+    ):
+        recording.mark("episode")
+        recording.flush()
+        with recording._lock:  # the recorder is late
+            arm.burst(100)
+        recording.flush()
+        recording.mark("episode")
+        arm.burst(10)
+    found = episodes(path)
+    assert [len(each) for each in found.all] == [10]
+    assert len(found.left_out) == 1
+    assert "gap" in found.left_out[0]
+
+
+def test_episodes_of_restarted_robots_are_those_of_their_run(segment: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with o80.Recording(path, segment) as recording:
+        rows = 0
+        for run, count in enumerate((10, 20)):
+            with o80.robots.load("two_joints").inline(segment) as arm:
+                rows += count + 1
+                while recording._recorder.newest[segment] != 0 or not recording.rows:
+                    recording.flush()
+                recording.mark("episode", run=run)
+                arm.burst(count)
+                while recording.rows < rows:
+                    recording.flush()
+    found = episodes(path)
+    assert [(each.values["run"], len(each)) for each in found.all] == [(0, 10), (1, 20)]
+
+
+def test_a_recording_without_episodes_is_refused(arm: o80.Frontend, tmp_path: Path) -> None:
+    with o80.Recording(tmp_path / "run.mcap", arm):
+        arm.burst(5)
+    with pytest.raises(o80.InvalidArgument, match=r'recording.mark\("episode"\)'):
+        episodes(tmp_path / "run.mcap")
+    with pytest.raises(o80.InvalidArgument, match="no segment 'leg'"):
+        episodes(tmp_path / "run.mcap", segment="leg")
+
+
+# ---------------------------------------------------------------------------- LeRobot
+
+
+def test_a_lerobot_data_set_has_the_documented_files(recorded: Path, tmp_path: Path) -> None:
+    """Checked against the loader of LeRobot: datasets/io_utils.py and dataset_metadata.py."""
+    root = tmp_path / "set"
+    found = episodes(recorded, every=10)
+    lerobot.write(root, found)
+
+    info = json.loads((root / "meta/info.json").read_text())
+    assert info["codebase_version"] == "v3.0"
+    assert (info["fps"], info["total_episodes"], info["total_frames"]) == (100, 3, 7)
+    assert info["robot_type"] == "two_joints"
+    tasks = pandas.read_parquet(root / "meta/tasks.parquet")
+    assert tasks.loc["swing", "task_index"] == 0
+    assert list(tasks.columns) == ["task_index"]
+
+    frames = pandas.read_parquet(root / info["data_path"].format(chunk_index=0, file_index=0))
+    assert set(frames.columns) == set(info["features"])
+    assert frames["index"].tolist() == list(range(7))
+    assert frames["frame_index"].tolist() == [0, 1, 2, 0, 1, 0, 1]
+    assert frames["next.done"].tolist() == [False, False, True, False, True, False, True]
+    assert frames["timestamp"].tolist()[:3] == pytest.approx([0, 0.01, 0.02])
+    for number, episode in enumerate(found.all):
+        own = frames[frames.episode_index == number]
+        assert np.array_equal(np.stack(own["action"]), episode.actions.astype(np.float32))
+        state = np.stack(own["observation.state"])
+        assert np.array_equal(state, episode.observed[:-1].astype(np.float32))
+        assert own["next.reward"].to_numpy() == pytest.approx(episode.rewards)
+    assert info["features"]["action"]["names"] == ["shoulder", "elbow"]
+    assert info["features"]["observation.environment_state"]["names"][0] == "effort[0]"
+
+    table = pyarrow.parquet.read_table(root / "meta/episodes/chunk-000/file-000.parquet")
+    rows = table.to_pylist()
+    assert [row["length"] for row in rows] == [3, 2, 2]
+    assert [(row["dataset_from_index"], row["dataset_to_index"]) for row in rows] == [
+        (0, 3),
+        (3, 5),
+        (5, 7),
+    ]
+    assert rows[0]["tasks"] == ["swing"]
+    stats = json.loads((root / "meta/stats.json").read_text())
+    assert stats["action"]["max"] == pytest.approx(
+        frames["action"].map(list).agg(lambda each: np.max(list(each), axis=0).tolist())
+    )
+    parquet = pyarrow.parquet.ParquetFile(root / "data/chunk-000/file-000.parquet")
+    assert parquet.num_row_groups == 3
+
+
+def test_a_folder_that_exists_is_not_overwritten(recorded: Path, tmp_path: Path) -> None:
+    for module in (lerobot, minari):
+        with pytest.raises(o80.InvalidArgument, match="exists"):
+            module.write(tmp_path, episodes(recorded))
+
+
+# ---------------------------------------------------------------------------- Minari
+
+
+def test_minari_reads_its_data_set(recorded: Path, tmp_path: Path) -> None:
+    from minari import MinariDataset
+
+    found = episodes(recorded)
+    minari.write(tmp_path / "set", found)
+    read = MinariDataset(tmp_path / "set/data")
+
+    assert read.total_episodes == 3
+    assert read.total_steps == 70
+    for one, other in zip(found.all, read.iterate_episodes(), strict=True):
+        observed = np.concatenate([one.observed, one.extended], axis=1)
+        assert np.array_equal(other.observations, observed)
+        assert np.array_equal(other.actions, one.actions)
+        assert np.array_equal(other.rewards, one.rewards)
+        assert other.terminations[-1] == one.terminated
+        assert other.truncations[-1] == (not one.terminated)
+        assert not other.terminations[:-1].any()
+
+
+# ---------------------------------------------------------------------------- command
+
+
+@pytest.mark.parametrize("form", ["lerobot", "minari"])
+def test_the_command_writes_a_data_set(form: str, recorded: Path, tmp_path: Path) -> None:
+    command = [str(Path(sys.executable).parent / "o80"), "export", str(recorded)]
+    command += ["-o", str(tmp_path / "set"), "--format", form, "--every", "10"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+
+    assert done.returncode == 0, done.stderr
+    assert "3 episodes, 7 steps at 100 a second" in done.stdout
