@@ -49,8 +49,7 @@ OwnedSegment segment_of(const PlayedOptions& options, const RowLayout& layout) {
   SegmentSpec spec;
   spec.name = options.segment;
   spec.schema = description;
-  const std::vector<std::byte> provenance =
-      to_bytes(Provenance{.robot = schema_of(options).head.robot.str()});
+  const std::vector<std::byte> provenance = to_bytes(options.provenance);
   spec.provenance = provenance;
   spec.row_bytes = layout.size;
   spec.rows = options.history;

@@ -18,6 +18,7 @@
 #include "o80/base/keep_waiting.hpp"
 #include "o80/describe/layout.hpp"
 #include "o80/describe/schema.hpp"
+#include "o80/runtime/provenance.hpp"
 #include "runtime/burst_server.hpp"
 #include "runtime/journal_player.hpp"
 
@@ -26,6 +27,7 @@ namespace o80 {
 struct PlayedOptions {
   std::string segment;
   std::span<const std::byte> description;  // of the recorded robot, as its segment had it
+  Provenance provenance{};                 // of the recorded robot; its clock is that of the rows
   bool bursting = false;                   // rows are published when frontends request iterations
   Clock clock = Clock::simulated;          // that of the times in the rows
   std::uint64_t history = 1;               // rows kept

@@ -60,6 +60,7 @@ def test_rows_appear_again_bit_for_bit(recorded: Path, segment: str) -> None:
         with o80.Frontend(segment) as arm:
             assert arm.played
             assert arm.robot == "two_joints"
+            assert arm.provenance == o80.open(recorded)[segment].epochs[0].provenance
             assert arm.history().rows.tobytes() == rows_of(recorded, segment).rows.tobytes()
         assert playback.rows == 201
     assert segment not in [each.name for each in o80.segments()]

@@ -1,14 +1,18 @@
 """One segment that is played: the segment in shared memory that shows the rows of a track."""
 
 import threading
+import time
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from o80 import _core
+from o80.errors import RecordingError
 from o80.playing.track import Part, Track
+from o80.provenance import Provenance
 
 KEPT = 64 << 20  # most bytes of the rows that a segment keeps by default
 END = 2**62  # an iteration later than any
@@ -59,6 +63,7 @@ class Player:
             self._segment = _core.PlayedSegment(
                 self.name,
                 epoch.description.table(),
+                self._provenance(run),
                 self._bursting,
                 not self._has_clock(run),
                 self._history or max(1, min(epoch.rows, KEPT // epoch.schema["row"]["size"])),
@@ -120,6 +125,24 @@ class Player:
             entries = next(self._journal, None)
             self._journal_until = END if entries is None else self._segment.add_journal(entries)
         return self._segment
+
+    def _provenance(self, run: int) -> Provenance:
+        """That of the recorded robot, with the clock of the rows as they are played."""
+        epoch = self.track.epochs[run]
+        offset = epoch.wall_offset
+        if self._has_clock(run):
+            offset = time.time_ns() - time.monotonic_ns()
+        try:
+            return replace(epoch.provenance, wall_clock_offset=offset)
+        except RecordingError:  # a file of the first recorders, which does not say it
+            return Provenance(
+                robot=epoch.schema["robot"],
+                options={},
+                run_options={},
+                version="",
+                source_hash="",
+                wall_clock_offset=offset,
+            )
 
     def _has_clock(self, run: int) -> bool:
         """Whether times of rows are those of the clock of this computer."""
