@@ -252,3 +252,57 @@ def test_mistakes_are_named(recorded: Path, arguments: dict[str, object], messag
 def test_a_file_that_is_no_recording_is_refused(tmp_path: Path) -> None:
     with pytest.raises(o80.RecordingError):
         o80.play(tmp_path / "none.mcap")
+
+
+def decisions(journal: list[o80.JournalEntry]) -> list[str]:
+    return [str(entry) for entry in journal]
+
+
+def test_the_journal_is_played(recorded: Path, segment: str) -> None:
+    expected = o80.open(recorded)[segment].epochs[0].journal()
+    with o80.play(recorded, bursts=True), o80.Frontend(segment, WAIT) as arm:
+        arm.burst(10)
+        so_far = arm.journal()
+        assert decisions(so_far) == decisions(expected)[: len(so_far)]
+        assert all(entry.iteration <= 10 for entry in so_far)
+        assert any(entry.commands for entry in so_far)
+        arm.burst(190)
+        assert decisions(arm.journal()) == decisions(expected)[: len(arm.journal())]
+        assert any(entry.status is o80.Status.COMPLETED for entry in arm.journal())
+
+
+def test_halts_are_those_of_the_recording(segment: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with o80.robots.load("two_joints").inline(segment) as arm, o80.Recording(path, arm):
+        arm.burst(5)
+        arm.halt("the belt slipped")
+        arm.burst(5)
+        recorded = arm.halted
+    with o80.play(path, bursts=True), o80.Frontend(segment, WAIT) as arm:
+        arm.burst(5)
+        assert arm.halted is None
+        arm.burst(1)
+        assert arm.halted == recorded
+
+
+def test_a_fault_of_the_recorded_robot_is_raised_again(segment: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with o80.Recording(path, segment) as recording:
+
+        def break_down() -> None:
+            with o80.Backend(segment, ["joint"]) as backend:
+                backend.publish([0.0])
+                while not recording.rows:
+                    recording.flush()
+                raise RuntimeError("the belt broke")
+
+        with pytest.raises(RuntimeError):
+            break_down()
+    o80.clean(segment)
+    with (
+        o80.play(path, bursts=True),
+        o80.Frontend(segment, WAIT) as arm,
+        pytest.raises(o80.BackendFailed, match="the belt broke"),
+    ):
+        arm.burst(1, timeout=WAIT)
+    assert segment not in [each.name for each in o80.segments()]
