@@ -45,7 +45,7 @@ class Commander:
 
     def command(self) -> None:
         choose = self.random
-        how = {
+        how: dict[str, Any] = {
             "iterations": choose.randrange(1, 40),
             "mode": choose.choice(["queue", "overwrite"]),
             "start": choose.choice(["desired", "observed"]),

@@ -1,6 +1,7 @@
 """Runs of the simulated arm repeat bit for bit, and a changed plant is found where it acts."""
 
 import random
+from typing import Any
 
 import pytest
 
@@ -15,7 +16,10 @@ def act(arm: o80.Frontend, choose: random.Random) -> None:
     for _ in range(choose.randrange(4)):
         muscle = choose.randrange(8)
         target = float(start[muscle]) + choose.uniform(0, 3000)
-        how = {"mode": choose.choice(["queue", "overwrite"]), "iterations": choose.randrange(1, 30)}
+        how: dict[str, Any] = {
+            "mode": choose.choice(["queue", "overwrite"]),
+            "iterations": choose.randrange(1, 30),
+        }
         arm.add_command(muscle, target, **how)
     arm.pulse(at=arm.published + choose.randrange(5) if choose.random() < 0.2 else None)
     if choose.random() < 0.1:
