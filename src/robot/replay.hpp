@@ -29,8 +29,6 @@ class Replay {
   /// Runs one iteration for each time, the first of them row 0 [ns]. False if the driver failed or
   /// has ended: see fault(). The last row must not be followed by a decision of the same iteration.
   bool run(std::span<const std::int64_t> times);
-  /// Stops the driver.
-  void stop() noexcept { loop_.stop(); }
 
   const std::optional<DecisionMismatch>& mismatch() const noexcept { return recorded_.mismatch(); }
   /// The failure of the driver, or empty.

@@ -1,8 +1,6 @@
 // How a backend obeys the decisions of a recorded run instead of its lanes, its watchdog and its
 // clock. See ARCHITECTURE.md, Replay.
 
-#include <cstring>
-
 #include "runtime/backend_body.hpp"
 #include "runtime/recorded_decisions.hpp"
 
