@@ -3,6 +3,7 @@
 import shutil
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -73,9 +74,10 @@ def test_twenty_accelerated_episodes_replay_bit_for_bit(pacing: Pacing, tmp_path
     assert len(report.runs) == 3
 
 
-def test_the_hill_muscle_replays_bit_for_bit(tmp_path: Path) -> None:
+@pytest.mark.parametrize("arm", [{"muscle": "hill"}, {"preset": "identified"}])
+def test_other_arms_replay_bit_for_bit(arm: dict[str, Any], tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
-    with opened(record=path, muscle="hill", start_noise=0.02) as environment:
+    with opened(record=path, start_noise=0.02, **arm) as environment:
         for episode in range(2):
             environment.reset(seed=episode)
             for _ in range(STEPS):
