@@ -37,6 +37,8 @@ SAYS = {
         "at 10 rad/s:          100",
         "smoothly at 10 rad/s: 188",
     ],
+    "exporting": ["episode 4: 5 steps", "swings/meta/info.json"],
+    "playing": ["the elbow was at 0.353", "201 rows of two_joints, played: True"],
     "queue_and_overwrite": ["the slow command was overwritten", "the last one was purged"],
     "recording": ["151 rows", "episode 2: begins with the elbow at 0.037"],
     "several_frontends": ["both ended: COMPLETED, COMPLETED", "without control: REJECTED"],
