@@ -41,6 +41,7 @@ SAYS = {
     "playing": ["the elbow was at 0.353", "201 rows of two_joints, played: True"],
     "queue_and_overwrite": ["the slow command was overwritten", "the last one was purged"],
     "recording": ["151 rows", "episode 2: begins with the elbow at 0.037"],
+    "replay": ["the first difference is in iteration "],
     "several_frontends": ["both ended: COMPLETED, COMPLETED", "without control: REJECTED"],
     "snapshots": ["the same to the last bit: True", "refused: "],
     "view": ["open http://127.0.0.1:", "/?token="],
