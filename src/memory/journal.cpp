@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <bit>
 #include <cstring>
 
 #include "base/crash_point.hpp"
@@ -28,7 +29,7 @@ JournalWriter::JournalWriter(const SegmentView& view) noexcept
     : counters_(&view.counters().journal),
       ring_(view.journal()),
       bytes_(view.shape.journal_bytes),
-      sector_bytes_(bytes_ / kJournalSectors),
+      sector_shift_(bytes_ == 0 ? 0 : std::countr_zero(bytes_ / kJournalSectors)),
       most_(bytes_ == 0 ? 0 : std::min<std::uint64_t>(kMostJournalPayload, bytes_ / 4)) {}
 
 void JournalWriter::write(JournalHead head, const void* payload, std::size_t bytes) noexcept {
@@ -67,7 +68,7 @@ void JournalWriter::publish(JournalHead& head, std::size_t payload) noexcept {
   number_ += head.numbers();
   head.words = static_cast<std::uint16_t>(bytes / 8);
   store(position_, reinterpret_cast<const std::byte*>(&head), sizeof head);
-  const std::uint64_t sector = position_ / sector_bytes_;
+  const std::uint64_t sector = position_ >> sector_shift_;
   if (sector != marked_) {
     marked_ = sector;
     counters_->marks[sector % kJournalSectors].store(position_, std::memory_order_relaxed);

@@ -23,7 +23,7 @@ struct JournalHead {
   std::uint16_t words = 0;  // length of the entry with this head [8 bytes]
   JournalKind kind = JournalKind::none;
   std::uint8_t lane = 0;
-  /// records: index of the first block; status: number of statuses; else as `how` packs it.
+  /// records: index of the first block; statuses: their number; else as `how` packs it.
   std::uint32_t what = 0;
   std::uint64_t number = 0;  // of the entry, from 0; an entry of n statuses has n numbers
   Iteration iteration = 0;
@@ -31,7 +31,8 @@ struct JournalHead {
 
   /// The numbers that the entry takes.
   constexpr std::uint64_t numbers() const noexcept {
-    return kind == JournalKind::status && what > 0 ? what : 1;
+    const bool is_many = kind == JournalKind::statuses || kind == JournalKind::status;
+    return is_many && what > 0 ? what : 1;
   }
   /// Packs a status, a reason and its detail into `what`.
   static constexpr std::uint32_t how(std::uint8_t status, std::uint8_t reason = 0,
@@ -96,7 +97,7 @@ class JournalWriter {
   JournalCounters* counters_;
   std::byte* ring_;
   std::uint64_t bytes_;
-  std::uint64_t sector_bytes_;
+  int sector_shift_;  // a sector has 1 << sector_shift_ bytes
   std::size_t most_;  // largest payload
   std::uint64_t position_ = 0;
   std::uint64_t marked_ = ~std::uint64_t{0};  // last sector with a mark, counted over all laps

@@ -27,7 +27,8 @@ std::string_view to_text(JournalKind kind) noexcept {
                                                                          "fresh_start",
                                                                          "order_lost",
                                                                          "stopping",
-                                                                         "ended"};
+                                                                         "ended",
+                                                                         "statuses"};
   const auto i = static_cast<std::size_t>(kind);
   return i < kTexts.size() ? kTexts[i] : "unknown";
 }

@@ -9,7 +9,8 @@ void UntypedBackend::Body::grant(const StagedBatch& sent, const BatchRecord& bat
   const bool until_ended = (batch.flags & kBurstUntilEnded) != 0;
   burst_.begin(sent.lane, sent.incarnation, batch.id,
                until_ended ? BurstGrant::kUntilEnded : batch.burst);
-  journal.burst(sent.lane, batch.id, until_ended ? -1 : batch.burst);
+  journal.burst(sent.lane, batch.id,
+                {until_ended ? -1 : batch.burst, sent.had_left ? 0 : sent.incarnation});
   if (sent.had_left || is_called_off()) stop_burst();
 }
 
@@ -25,7 +26,7 @@ void UntypedBackend::Body::count_burst() noexcept {
 
 void UntypedBackend::Body::end_burst(Iteration row, BurstEnd end) noexcept {
   lanes[burst_.lane()].set_burst_done(burst_.batch(), row, end);
-  journal.burst_ended(burst_.lane(), burst_.batch(), row, end);
+  journal.burst_ended(burst_.lane(), burst_.incarnation(), burst_.batch(), row, end);
   burst_.end();
 }
 

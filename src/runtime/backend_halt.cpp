@@ -191,7 +191,7 @@ Outcome UntypedBackend::Body::resume(std::uint32_t lane, CommandId id,
   }
   for (auto& last : own_halts_) last.store(0, std::memory_order_relaxed);
   reason_missing_ = false;
-  journal.resume(lane, number);
+  journal.resume(lane, taking_owner_, number);
   if (server_ != nullptr) return start_afresh(lane, id);
   controller.restart(row() + layout.observed, nullptr, current);
   journal.fresh_start(lane);

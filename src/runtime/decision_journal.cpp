@@ -13,10 +13,8 @@ DecisionJournal::DecisionJournal(const SegmentView& view)
 void DecisionJournal::begin_blocks(std::uint32_t lane, std::uint64_t sender,
                                    std::uint32_t most) noexcept {
   if (!writer_.is_on()) return;
-  const Named& named = named_[lane];
-  // once in each half of the ring, so that whoever reads from the middle finds the name
-  const bool is_far = writer_.position() - named.position > writer_.bytes() / 2;
-  if (sender != 0 && (named.incarnation != sender || is_far)) name_owner(lane, sender);
+  if (sender != 0 && named_[lane].incarnation != sender) name_owner(lane, sender);
+  name_again(lane, sender);
   flush();
   writer_.begin(std::size_t{most} * kBlockBytes);
 }
@@ -27,11 +25,22 @@ void DecisionJournal::end_blocks(std::uint32_t lane, CommandId batch,
 }
 
 void DecisionJournal::name_owner(std::uint32_t lane, std::uint64_t incarnation) noexcept {
-  named_[lane] = {incarnation, writer_.position()};
-  JournalOwner name{};
+  Named& named = named_[lane];
+  named.incarnation = incarnation;
+  named.position = writer_.position();
   const auto& owner = view_.lane(lane).owner;
-  load_text(owner, std::size(owner), reinterpret_cast<char*>(name.data()));
-  write(head(JournalKind::owner, lane, incarnation), name.data(), sizeof name);
+  load_text(owner, std::size(owner), reinterpret_cast<char*>(named.name.data()));
+  write(head(JournalKind::owner, lane, incarnation), named.name.data(), sizeof named.name);
+}
+
+/// Repeats the name once in each half of the ring, so that a reader that comes late finds it, also
+/// when the owner has left the lane.
+void DecisionJournal::name_again(std::uint32_t lane, std::uint64_t incarnation) noexcept {
+  if (!writer_.is_on()) return;
+  Named& named = named_[lane];
+  if (incarnation == 0 || named.incarnation != incarnation || !is_far(named)) return;
+  named.position = writer_.position();
+  write(head(JournalKind::owner, lane, incarnation), named.name.data(), sizeof named.name);
 }
 
 void DecisionJournal::dropped(std::uint32_t lane, CommandId batch) noexcept {
@@ -60,8 +69,9 @@ void DecisionJournal::decided(const StagedBatch& sent, const StatusChange& chang
 
 void DecisionJournal::flush() noexcept {
   if (statuses_ == 0) return;
-  writer_.end(head(JournalKind::status, status_lane_, 0, statuses_));
-  statuses_ = 0;
+  writer_.write(head(JournalKind::statuses, status_lane_, 0, statuses_), runs_.data(),
+                runs_used_ * sizeof(JournalStatusRun));
+  statuses_ = runs_used_ = 0;
 }
 
 void DecisionJournal::halt(JournalKind halt_or_reason, const Halt& halt) noexcept {
@@ -69,23 +79,36 @@ void DecisionJournal::halt(JournalKind halt_or_reason, const Halt& halt) noexcep
   write(head(halt_or_reason, 0, halt.number), &payload, sizeof payload);
 }
 
+void DecisionJournal::resume(std::uint32_t lane, std::uint64_t sender,
+                             std::uint64_t halt) noexcept {
+  name_again(lane, sender);
+  const JournalSender payload{sender};
+  write(head(JournalKind::resume, lane, halt), &payload, sizeof payload);
+}
+
 void DecisionJournal::died(std::uint32_t lane, std::uint64_t owner, Stale stale) noexcept {
+  name_again(lane, owner);
   note(JournalKind::died, lane, owner, static_cast<std::uint32_t>(stale));
 }
 
 void DecisionJournal::silent(std::uint32_t lane, std::uint64_t owner, Stale stale) noexcept {
+  name_again(lane, owner);
   note(JournalKind::silent, lane, owner, static_cast<std::uint32_t>(stale));
 }
 
-void DecisionJournal::burst(std::uint32_t lane, CommandId batch, std::int64_t iterations) noexcept {
-  write(head(JournalKind::burst, lane, batch), &iterations, sizeof iterations);
+void DecisionJournal::burst(std::uint32_t lane, CommandId batch,
+                            const JournalBurst& burst) noexcept {
+  name_again(lane, burst.sender);
+  write(head(JournalKind::burst, lane, batch), &burst, sizeof burst);
 }
 
-void DecisionJournal::burst_ended(std::uint32_t lane, CommandId batch, Iteration row,
-                                  BurstEnd how) noexcept {
+void DecisionJournal::burst_ended(std::uint32_t lane, std::uint64_t sender, CommandId batch,
+                                  Iteration row, BurstEnd how) noexcept {
+  name_again(lane, sender);
   JournalHead entry = head(JournalKind::burst_ended, lane, batch, static_cast<std::uint32_t>(how));
   entry.iteration = row;
-  write(entry);
+  const JournalSender payload{sender};
+  write(entry, &payload, sizeof payload);
 }
 
 void DecisionJournal::ended(BackendState state, std::string_view text) noexcept {

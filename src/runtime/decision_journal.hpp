@@ -34,12 +34,33 @@ static_assert(sizeof(JournalHalt) == 320);
 
 /// Payload of `owner`: its process, as text.
 using JournalOwner = std::array<std::uint64_t, 8>;
-/// One of the statuses of an entry `status`, which are all of one lane.
+/// Payload of `status`, which recordings of the first format have: statuses of one lane.
 struct JournalStatus {
   std::uint64_t id = 0;
   std::uint64_t word = 0;  // a StatusWord
 };
 static_assert(sizeof(JournalStatus) == 16);
+/// Payload of `statuses`: runs of consecutive ids of one lane with the same status.
+struct JournalStatusRun {
+  std::uint64_t first_id = 0;
+  std::uint64_t count = 0;
+  std::uint64_t word = 0;  // a StatusWord
+};
+static_assert(sizeof(JournalStatusRun) == 24);
+/// Most statuses of an entry.
+inline constexpr std::uint32_t kMostStatuses = 64;
+
+/// Payload of `burst`.
+struct JournalBurst {
+  std::int64_t iterations = 0;  // -1 until the batch has ended
+  std::uint64_t sender = 0;     // incarnation
+};
+static_assert(sizeof(JournalBurst) == 16);
+/// Payload of `burst_ended` and `resume`.
+struct JournalSender {
+  std::uint64_t sender = 0;  // incarnation; 0: it had left
+};
+static_assert(sizeof(JournalSender) == 8);
 
 /// Payload of `ended`: the reason, as text.
 using JournalText = std::array<char, 248>;
@@ -77,14 +98,13 @@ class DecisionJournal {
 
   // halts
   void halt(JournalKind halt_or_reason, const Halt& halt) noexcept;
-  void resume(std::uint32_t lane, std::uint64_t halt) noexcept {
-    note(JournalKind::resume, lane, halt);
-  }
+  void resume(std::uint32_t lane, std::uint64_t sender, std::uint64_t halt) noexcept;
   void fresh_start(std::uint32_t lane) noexcept { note(JournalKind::fresh_start, lane, 0); }
   void interrupted(std::uint32_t actuator) noexcept { note(JournalKind::interrupted, 0, actuator); }
 
   // commanders; `owner`: their incarnation
   void control(JournalKind kind, std::uint32_t lane, std::uint64_t owner) noexcept {
+    name_again(lane, owner);
     note(kind, lane, owner);
   }
   /// `stale`: the policy that applies now.
@@ -92,9 +112,9 @@ class DecisionJournal {
   void silent(std::uint32_t lane, std::uint64_t owner, Stale stale) noexcept;
 
   // bursts
-  /// `iterations`: -1 until the batch has ended.
-  void burst(std::uint32_t lane, CommandId batch, std::int64_t iterations) noexcept;
-  void burst_ended(std::uint32_t lane, CommandId batch, Iteration row, BurstEnd how) noexcept;
+  void burst(std::uint32_t lane, CommandId batch, const JournalBurst& burst) noexcept;
+  void burst_ended(std::uint32_t lane, std::uint64_t sender, CommandId batch, Iteration row,
+                   BurstEnd how) noexcept;
 
   // ends
   void stopping() noexcept { note(JournalKind::stopping, 0, 0); }
@@ -104,12 +124,11 @@ class DecisionJournal {
   void set_iteration(Iteration iteration) noexcept { iteration_ = iteration; }
 
  private:
-  static constexpr std::uint32_t kMostStatuses = 64;  // of an entry
-
   /// The newest entry with the name of a lane's owner.
   struct Named {
     std::uint64_t incarnation = 0;
     std::uint64_t position = 0;
+    JournalOwner name{};
   };
 
   JournalHead head(JournalKind kind, std::uint32_t lane, std::uint64_t id,
@@ -132,11 +151,17 @@ class DecisionJournal {
     writer_.write(head, payload, bytes);
   }
   void name_owner(std::uint32_t lane, std::uint64_t incarnation) noexcept;
+  void name_again(std::uint32_t lane, std::uint64_t incarnation) noexcept;
+  bool is_far(const Named& named) const noexcept {
+    return writer_.position() - named.position > writer_.bytes() / 2;
+  }
 
   JournalWriter writer_;
   SegmentView view_;
   std::vector<Named> named_;  // one for each lane
-  // the entry of statuses that is being written
+  // the next entry of statuses
+  std::array<JournalStatusRun, kMostStatuses> runs_;
+  std::uint32_t runs_used_ = 0;
   std::uint32_t statuses_ = 0;
   std::uint32_t status_lane_ = 0;
   Iteration iteration_ = 0;
@@ -146,13 +171,17 @@ inline void DecisionJournal::status(const StatusChange& change) noexcept {
   // the entries of the batch tell the others
   if (!writer_.is_on() || change.of != StatusChange::Of::record) return;
   if (statuses_ == kMostStatuses || status_lane_ != change.lane) flush();
-  if (statuses_ == 0) writer_.begin(kMostStatuses * sizeof(JournalStatus));
-  status_lane_ = change.lane;
-  ++statuses_;
   const StatusWord word{static_cast<std::uint8_t>(change.status),
                         static_cast<std::uint8_t>(change.reason), change.detail, change.iteration};
-  const JournalStatus status{change.id, word.packed()};
-  writer_.add(reinterpret_cast<const std::byte*>(&status), sizeof status);
+  const std::uint64_t packed = word.packed();
+  JournalStatusRun* const last = statuses_ > 0 ? &runs_[runs_used_ - 1] : nullptr;
+  if (last != nullptr && change.id == last->first_id + last->count && packed == last->word) {
+    ++last->count;
+  } else {
+    runs_[runs_used_++] = {change.id, 1, packed};
+  }
+  status_lane_ = change.lane;
+  ++statuses_;
 }
 
 }  // namespace o80

@@ -21,7 +21,13 @@ class Journal::Body {
   explicit Body(std::shared_ptr<Link> link)
       : link_(std::move(link)),
         reader_(link_->segment.view()),
-        decoder_(link_->description, bytes_of_lanes(link_->segment.view().shape)) {}
+        decoder_(link_->description, bytes_of_lanes(link_->segment.view().shape)) {
+    // the name of an owner may stand behind an entry that it caused, because names are repeated
+    JournalReader names = reader_;
+    // bounded: a fast writer adds entries meanwhile
+    const std::uint64_t most = link_->segment.view().shape.journal_bytes / sizeof(JournalHead);
+    for (std::uint64_t i = 0; i < most && names.next(decoder_.item()); ++i) decoder_.note_name();
+  }
 
   bool exists() const { return reader_.has_journal(); }
   bool next(JournalEntry& entry) {

@@ -34,6 +34,15 @@ Enum enum_of(std::uint64_t value, std::size_t count) {
   return static_cast<Enum>(value < count ? value : 0);
 }
 
+/// A word of the payload of an entry; 0 if the payload is shorter, as in recordings of the first
+/// format.
+std::uint64_t word_of(const JournalItem& item, std::size_t index) {
+  std::uint64_t word = 0;
+  if (item.payload.size() >= (index + 1) * sizeof word)
+    std::memcpy(&word, item.payload.data() + index * sizeof word, sizeof word);
+  return word;
+}
+
 /// The burst that a batch asks for; -1 until it has ended, 0: none.
 std::int64_t burst_of(const std::vector<std::byte>& blocks) {
   BatchRecord batch;
@@ -72,8 +81,9 @@ void JournalDecoder::take() {
       keep_name();
       break;
     case JournalKind::status:
-      entries_ =
-          std::min<std::size_t>(item_.head.what, item_.payload.size() / sizeof(JournalStatus));
+    case JournalKind::statuses:
+      keep_statuses();
+      entries_ = statuses_.size();
       returned_ = number < first_ ? std::min<std::uint64_t>(first_ - number, entries_) : 0;
       break;
     default:
@@ -85,7 +95,7 @@ void JournalDecoder::take() {
 bool JournalDecoder::next(JournalEntry& entry) {
   if (returned_ == entries_) return false;
   entry = {};
-  if (item_.head.kind == JournalKind::status) {
+  if (item_.head.kind == JournalKind::status || item_.head.kind == JournalKind::statuses) {
     fill_status(entry);
   } else {
     ++returned_;
@@ -96,10 +106,30 @@ bool JournalDecoder::next(JournalEntry& entry) {
   return true;
 }
 
+/// The statuses in item_. The number in its head is not trusted.
+void JournalDecoder::keep_statuses() {
+  statuses_.clear();
+  const std::size_t most = std::min(item_.head.what, kMostStatuses);
+  const auto each = [&]<class Payload>(Payload payload, auto&& add) {
+    for (std::size_t at = 0; at + sizeof payload <= item_.payload.size(); at += sizeof payload) {
+      std::memcpy(&payload, item_.payload.data() + at, sizeof payload);
+      add(payload);
+    }
+  };
+  const auto keep = [&](const JournalStatus& status) {
+    if (statuses_.size() < most) statuses_.push_back(status);
+    return statuses_.size() < most;
+  };
+  if (item_.head.kind == JournalKind::status) return each(JournalStatus{}, keep);
+  each(JournalStatusRun{}, [&](const JournalStatusRun& run) {
+    for (std::uint64_t i = 0; i < run.count; ++i)
+      if (!keep({run.first_id + i, run.word})) return;
+  });
+}
+
 /// The next status in item_.
 void JournalDecoder::fill_status(JournalEntry& entry) {
-  JournalStatus status;
-  std::memcpy(&status, item_.payload.data() + returned_ * sizeof status, sizeof status);
+  const JournalStatus& status = statuses_[returned_];
   const StatusWord word = StatusWord::unpack(status.word);
   entry.kind = JournalKind::status;
   entry.number = item_.head.number + returned_++;
@@ -169,11 +199,14 @@ void JournalDecoder::fill(JournalEntry& entry) {
     }
     case JournalKind::resume:
       entry.halt = head.id;
+      name(entry, word_of(item_, 0));
       break;
     case JournalKind::burst:
-      entry.burst = unpacked<std::int64_t>(item_);
+      entry.burst = static_cast<std::int64_t>(word_of(item_, 0));
+      name(entry, word_of(item_, 1));
       break;
     case JournalKind::burst_ended:
+      name(entry, word_of(item_, 0));
       entry.cut = head.what == static_cast<std::uint32_t>(BurstEnd::cut);
       break;
     case JournalKind::control_taken:
@@ -181,8 +214,7 @@ void JournalDecoder::fill(JournalEntry& entry) {
     case JournalKind::control_lost:
     case JournalKind::died:
     case JournalKind::silent:
-      entry.owner = head.id;
-      name(entry);
+      name(entry, head.id);
       break;
     case JournalKind::interrupted:
       entry.actuator = static_cast<std::uint16_t>(head.id);
@@ -208,8 +240,7 @@ void JournalDecoder::fill_batch(JournalEntry& entry) {
   const auto batch = unpacked<JournalBatch>(item_);
   entry.ticket = batch.ticket;
   entry.at = batch.at;
-  entry.owner = batch.sender;
-  name(entry);
+  name(entry, batch.sender);
   const auto found = batches_.find({entry.lane, entry.id});
   entry.records_lost = found == batches_.end();
   if (entry.records_lost) return;
@@ -222,7 +253,8 @@ void JournalDecoder::fill_batch(JournalEntry& entry) {
   kept.scheduled = true;
 }
 
-void JournalDecoder::name(JournalEntry& entry) const {
+void JournalDecoder::name(JournalEntry& entry, std::uint64_t owner) const {
+  entry.owner = owner;
   const auto found = names_.find({entry.lane, entry.owner});
   if (found != names_.end()) entry.who = found->second;
 }

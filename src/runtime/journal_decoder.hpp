@@ -11,6 +11,7 @@
 #include "memory/journal.hpp"
 #include "o80/runtime/journal.hpp"
 #include "o80/runtime/observation.hpp"
+#include "runtime/decision_journal.hpp"
 
 namespace o80 {
 
@@ -26,6 +27,10 @@ class JournalDecoder {
   /// Entries before this number are not returned. Forgets all batches.
   void start_at(std::uint64_t number);
 
+  /// Keeps the name in item() if it is one; for a pass over a ring before it is read.
+  void note_name() {
+    if (item_.head.kind == JournalKind::owner) keep_name();
+  }
   // read into item(), call take(), then next() until it returns false
   JournalItem& item() noexcept { return item_; }
   void take();
@@ -43,15 +48,17 @@ class JournalDecoder {
   void keep_blocks();
   void drop(Batches::iterator batch);
   void keep_name();
+  void keep_statuses();
   void fill_status(JournalEntry& entry);
   void fill(JournalEntry& entry);
   void fill_batch(JournalEntry& entry);
-  void name(JournalEntry& entry) const;
+  void name(JournalEntry& entry, std::uint64_t owner) const;
 
   std::shared_ptr<const Description> description_;
   std::uint64_t most_kept_;
   JournalItem item_;
-  std::size_t entries_ = 0;   // in item_: one, or its statuses
+  std::size_t entries_ = 0;  // in item_: one, or its statuses
+  std::vector<JournalStatus> statuses_;
   std::size_t returned_ = 0;  // of them
   std::uint64_t first_ = 0;   // number of the first entry to return
   std::uint64_t missed_ = 0;  // entries missed since the last one returned

@@ -7,11 +7,29 @@ namespace o80 {
 void StatusOutbox::put(const StatusChange& change) noexcept {
   const bool waits = stepping_ && is_end(change.status) && waiting_.size() < waiting_.capacity();
   if (waits) {
+    const bool began_now = begun_.id == change.id && begun_.lane == change.lane;
+    if (began_now) {
+      begun_.id = 0;
+    } else {
+      note_begin();
+    }
     waiting_.push_back(change);
+    return;
+  }
+  note_begin();
+  const bool begins =
+      stepping_ && change.status == Status::active && change.of == StatusChange::Of::record;
+  if (begins) {
+    begun_ = change;
   } else {
     journal_.status(change);
-    report(change);
   }
+  report(change);
+}
+
+void StatusOutbox::note_begin() noexcept {
+  if (begun_.id != 0) journal_.status(begun_);
+  begun_.id = 0;
 }
 
 void StatusOutbox::report_row() noexcept {

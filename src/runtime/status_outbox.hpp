@@ -9,9 +9,10 @@
 
 namespace o80 {
 
-/// Reports statuses to their lanes and to the journal. An end that comes during a step is reported
-/// after its row is published, so that no command is reported as completed by a backend that dies
-/// before.
+/// Reports statuses to their lanes and to the journal. The journal gets no begin of a command that
+/// ends in the same iteration, unless the changes of others come between the two. An end that comes
+/// during a step is reported after its row is published, so that no command is reported as
+/// completed by a backend that dies before.
 ///
 /// Writer:   the backend's thread.
 /// Realtime: everything but construction.
@@ -24,7 +25,10 @@ class StatusOutbox {
   }
 
   void begin_step() noexcept { stepping_ = true; }
-  void end_step() noexcept { stepping_ = false; }
+  void end_step() noexcept {
+    note_begin();
+    stepping_ = false;
+  }
   void put(const StatusChange& change) noexcept;
   /// Reports the ends of the last step. Call it after the row is published.
   void report_row() noexcept;
@@ -32,11 +36,15 @@ class StatusOutbox {
   void report_no_row() noexcept;
 
  private:
+  void note_begin() noexcept;
   void report(const StatusChange& change) noexcept;
 
   LaneReceivers& lanes_;
   DecisionJournal& journal_;
   std::vector<StatusChange> waiting_;
+  /// The last command that began in this step, until it is known whether its end follows at once:
+  /// then the journal gets only the end. Unused if `id` is 0, which no command has.
+  StatusChange begun_;
   bool stepping_ = false;
 };
 

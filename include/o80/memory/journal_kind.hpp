@@ -15,7 +15,7 @@ enum class JournalKind : std::uint8_t {
   taken,             // a batch was taken
   scheduled,         // a batch waits for the iteration it was sent for
   rejected,          // a batch was rejected
-  status,            // a command or request has begun or ended
+  status,            // a command or request has begun or ended; in memory, see `statuses`
   halt,              // a halt is in force
   halt_reason,       // the reason of that halt, written after it began
   resume,            // the halt was cleared
@@ -30,9 +30,10 @@ enum class JournalKind : std::uint8_t {
   fresh_start,  // the queues were dropped and the robot was read anew
   order_lost,   // the ticket counter was damaged: the order between lanes begins anew
   stopping,     // all commands were purged; the robot brakes before it stops
-  ended         // the backend has ended
+  ended,        // the backend has ended
+  statuses      // many of `status` in one entry; readers get each of them
 };
-inline constexpr std::size_t kJournalKinds = static_cast<std::size_t>(JournalKind::ended) + 1;
+inline constexpr std::size_t kJournalKinds = static_cast<std::size_t>(JournalKind::statuses) + 1;
 
 std::string_view to_text(JournalKind kind) noexcept;
 

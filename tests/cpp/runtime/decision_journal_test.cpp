@@ -131,10 +131,13 @@ TEST_F(DecisionJournalTest, ShowsAHaltAndItsResume) {
   std::thread helper([&] { other.resume(number, kPatience); });
   station.run_until([&] { return !commander->halted(); });
   helper.join();
-  const auto kinds = kinds_of(news());
-  EXPECT_THAT(kinds, ElementsAre(JournalKind::taken, JournalKind::status, JournalKind::halt,
-                                 JournalKind::status, JournalKind::taken, JournalKind::resume,
-                                 JournalKind::fresh_start, JournalKind::status));
+  const auto entries = news();
+  ASSERT_THAT(kinds_of(entries),
+              ElementsAre(JournalKind::taken, JournalKind::status, JournalKind::halt,
+                          JournalKind::status, JournalKind::taken, JournalKind::resume,
+                          JournalKind::fresh_start, JournalKind::status));
+  EXPECT_EQ(entries[5].owner, 1U);
+  EXPECT_THAT(entries[5].who, HasSubstr(this_process()));
 }
 
 TEST_F(DecisionJournalTest, ABatchForLaterIsScheduledAndThenTaken) {
@@ -142,8 +145,8 @@ TEST_F(DecisionJournalTest, ABatchForLaterIsScheduledAndThenTaken) {
   commander->pulse({.at = 6});
   station.run(8);
   const auto entries = news();
-  ASSERT_THAT(kinds_of(entries), ElementsAre(JournalKind::scheduled, JournalKind::taken,
-                                             JournalKind::status, JournalKind::status));
+  ASSERT_THAT(kinds_of(entries),
+              ElementsAre(JournalKind::scheduled, JournalKind::taken, JournalKind::status));
   EXPECT_EQ(entries[0].iteration, 1);
   EXPECT_EQ(entries[0].at, 6);
   EXPECT_EQ(entries[0].records.size(), 1U);
@@ -364,13 +367,85 @@ TEST_F(StationTest, TheJournalShowsBursts) {
   frontend.start_burst(4);
   station.drive();
   const auto entries = all_of(journal);
-  ASSERT_THAT(kinds_of(entries),
-              ElementsAre(JournalKind::burst, JournalKind::taken, JournalKind::status,
-                          JournalKind::status, JournalKind::burst_ended));
+  ASSERT_THAT(kinds_of(entries), ElementsAre(JournalKind::burst, JournalKind::taken,
+                                             JournalKind::status, JournalKind::burst_ended));
   EXPECT_EQ(entries[0].burst, 4);
   EXPECT_EQ(entries[1].burst, 4);
-  EXPECT_EQ(entries[4].iteration, 4);
-  EXPECT_FALSE(entries[4].cut);
+  EXPECT_EQ(entries[3].iteration, 4);
+  EXPECT_FALSE(entries[3].cut);
+  for (const std::size_t i : {0, 1, 3}) EXPECT_THAT(entries[i].who, HasSubstr(this_process()));
+}
+
+TEST_F(DecisionJournalTest, ACommandThatEndsInItsFirstIterationHasOneEntry) {
+  add(*commander, 0, 0.5);
+  add(*commander, 1, 0.25);
+  add(*commander, 1, 0.75, {.pace = iterations(2), .profile = Profile::linear});
+  commander->pulse();
+  station.run(4);
+  std::vector<std::tuple<CommandId, Status, Iteration>> found;
+  std::vector<std::uint64_t> numbers;
+  CommandId first = 0;
+  for (const JournalEntry& entry : news()) {
+    if (entry.kind == JournalKind::taken) first = entry.records[0].id;
+    if (entry.kind != JournalKind::status) continue;
+    found.emplace_back(entry.id - first, entry.status, entry.iteration);
+    numbers.push_back(entry.number);
+  }
+  EXPECT_THAT(found,
+              ElementsAre(std::tuple(0, Status::completed, 1), std::tuple(1, Status::completed, 1),
+                          std::tuple(2, Status::active, 2), std::tuple(2, Status::completed, 3)));
+  EXPECT_EQ(numbers[1], numbers[0] + 1);
+}
+
+/// The lane of the commander, when a reader comes after the ring was filled since its last batch.
+class LateReaderTest : public DecisionJournalTest {
+ protected:
+  LateReaderTest() : DecisionJournalTest({.segment = "pair", .journal = 1 << 19}) {}
+  /// Another frontend's batches until the ring has none of the entries before.
+  void flood() {
+    UntypedFrontend other("pair");
+    for (int i = 0; i < 2000; ++i) {
+      for (int k = 0; k < 8; ++k) add(other, 1, 0.5);
+      other.pulse();
+      station.run(1);
+    }
+  }
+  std::vector<JournalEntry> of_late_reader(JournalKind kind) {
+    Journal late(*observer);
+    std::vector<JournalEntry> found;
+    for (const JournalEntry& entry : all_of(late))
+      if (entry.kind == kind) found.push_back(entry);
+    return found;
+  }
+};
+
+TEST_F(LateReaderTest, FindsTheNameOfAHolderThatLostControl) {
+  commander->add_take_control();
+  commander->pulse();
+  station.run(1);
+  flood();
+  EXPECT_THAT(of_late_reader(JournalKind::control_taken), ::testing::IsEmpty());
+  // in a lane of its own: the next owner of the holder's lane would take the place of its name
+  UntypedFrontend other("pair");
+  send(other, 0, 1.0);
+  station.run(1);
+  commander->close();
+  // the next batch finds that the holder has gone
+  send(other, 0, 2.0);
+  station.run(1);
+  const auto lost = of_late_reader(JournalKind::control_lost);
+  ASSERT_EQ(lost.size(), 1U);
+  EXPECT_EQ(lost[0].owner, 1U);
+  EXPECT_THAT(lost[0].who, HasSubstr(this_process()));
+}
+
+TEST_F(LateReaderTest, FindsTheNamesOfAllBatchesInTheRing) {
+  send(*commander, 0, 5.0);
+  station.run(1);
+  flood();
+  const auto taken = of_late_reader(JournalKind::taken);
+  ASSERT_FALSE(taken.empty());
+  for (const JournalEntry& entry : taken) ASSERT_THAT(entry.who, HasSubstr(this_process()));
 }
 
 }  // namespace
