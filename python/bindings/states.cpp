@@ -1,5 +1,7 @@
 #include "states.hpp"
 
+#include <nanobind/stl/string.h>
+
 #include <cmath>
 #include <cstring>
 #include <limits>
