@@ -1,6 +1,6 @@
 """Files that a recorder writes: new ones, or those of a predecessor that are continued."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from o80.recording.journal_channel import CONTENT as JOURNAL
 from o80.recording.journal_channel import last_entry_in
 from o80.recording.message_plan import ENCAPSULATION
 from o80.recording.reader import RecordingFile, files_of
-from o80.recording.scan import MAGIC, NotARecordingError, Scan, content_of, index_of, scan
+from o80.recording.scan import MAGIC, NotARecordingError, Scan, content_of, has_end, index_of, scan
 from o80.unwritable import reason
 
 FILES = "*.mcap"
@@ -29,6 +29,7 @@ class Written:
     last: int = -1  #: iteration; -1: no row
     last_log_time: int = 0  #: [ns]
     journal_next: int = 0  #: number after the last entry of the journal
+    has_journal: bool = False  #: in any file
     channel: int | None = None  #: of the rows in the file that is written now
     journal: int | None = None  #: the channel of the journal there
     joints: int | None = None  #: the channel of joint states there
@@ -75,8 +76,8 @@ def opened_in(folder: Path, *, proceed: bool, compression: str = "zstd") -> File
         raise RecordingError(f"{folder} cannot be written: {reason(folder, error)}") from error
     files = sorted(folder.glob(FILES)) or [folder / "0000.mcap"]
     last = opened(files[-1], proceed=True, compression=compression)  # locks the folder
-    for file in unfinished_in(folder):
-        if file != last.path:
+    for file in files:
+        if file != last.path and not has_end(file):
             opened(file, proceed=True).finish()
     return last
 
@@ -98,35 +99,58 @@ def next_file(file: FileWriter) -> FileWriter:
     return FileWriter(file.path.with_name(name), compression=file.compression)
 
 
-def written_in(file: FileWriter, before: Sequence[Path]) -> dict[str, dict[int, Written]]:
-    """What a file and those before it hold, by segment and epoch. Raises RecordingError."""
-    result: dict[str, dict[int, Written]] = {}
-    for path in before:
-        _add(result, path, scan(path), is_last=False)
-    _add(result, file.path, file.found, is_last=True)
-    return result
+class Predecessor:
+    """What the files of a recording hold that is continued.
+
+    Looks into them from the newest back, into each once at most, and no further than it must: the
+    newest epoch of a segment is the only one that can go on.
+    """
+
+    def __init__(self, file: FileWriter, before: Sequence[Path]) -> None:
+        """file: the last one, which is continued. before: complete files, in their order."""
+        self._last = file.path
+        self._found = [(file.path, file.found)]  # newest first
+        self._unread = list(before)
+
+    def written(self, segment: str) -> dict[int, Written]:
+        """What is to be known of a segment, by epoch; empty: no row. Raises RecordingError."""
+        epochs: dict[int, Written] = {}
+        for path, found in self._files():
+            self._add(epochs, path, found, segment)
+            if epochs and _is_known(max(epochs.values(), key=lambda each: each.note.number)):
+                break
+        return epochs
+
+    def _files(self) -> Iterator[tuple[Path, Scan]]:
+        yield from list(self._found)
+        while self._unread:
+            path = self._unread.pop()
+            self._found.append((path, scan(path)))
+            yield self._found[-1]
+
+    def _add(self, epochs: dict[int, Written], path: Path, found: Scan, segment: str) -> None:
+        """Adds what a file before those that were added holds."""
+        journals = channels_of(found, JOURNAL)
+        joints = channels_of(found, joint_states.CONTENT)
+        for channel in found.channels.values():
+            note = EpochNote.of(channel.metadata)
+            if note is None or note.segment != segment:
+                continue
+            run = (segment, note.number)
+            journal = journals.get(run)
+            own = Written(note, channel=channel.id, journal=journal, joints=joints.get(run))
+            known = epochs.get(note.epoch, own if path == self._last else Written(note))
+            known = replace(known, has_journal=known.has_journal or journal is not None)
+            if known.last < 0 and (last := _last_row(path, found, channel.id)) is not None:
+                known = replace(known, last=last[0], last_log_time=last[1])
+            if known.journal_next == 0 and journal is not None:
+                known = replace(known, journal_next=_last_entry(path, found, journal))
+            epochs[note.epoch] = known
 
 
-def _add(result: dict[str, dict[int, Written]], path: Path, found: Scan, *, is_last: bool) -> None:
-    journals = channels_of(found, JOURNAL)
-    joints = channels_of(found, joint_states.CONTENT)
-    for channel in found.channels.values():
-        note = EpochNote.of(channel.metadata)
-        if note is None:
-            continue
-        epochs = result.setdefault(note.segment, {})
-        written = epochs.setdefault(note.epoch, Written(note))
-        journal = journals.get((note.segment, note.number))
-        last = _last_row(path, found, channel.id)
-        if last is not None:
-            written = replace(written, last=last[0], last_log_time=last[1])
-        if journal is not None:
-            entry = _last_entry(path, found, journal)
-            written = replace(written, journal_next=max(entry, written.journal_next))
-        if is_last:
-            own = joints.get((note.segment, note.number))
-            written = replace(written, channel=channel.id, journal=journal, joints=own)
-        epochs[note.epoch] = written
+def _is_known(epoch: Written) -> bool:
+    """Whether older files cannot tell more of an epoch."""
+    return epoch.last >= 0 and (epoch.journal_next > 0 or not epoch.has_journal)
 
 
 def _last_row(path: Path, found: Scan, channel: int) -> tuple[int, int] | None:

@@ -10,7 +10,7 @@ from typing import Any
 
 from o80.errors import Error, InvalidArgument, RecordingError
 from o80.recording.marks import Mark, add_mark
-from o80.recording.output import next_file, opened, opened_in, written_in
+from o80.recording.output import Predecessor, next_file, opened, opened_in
 from o80.recording.reader import files_of
 from o80.recording.source import Source
 from o80.recording.split import Split
@@ -59,7 +59,7 @@ class Recorder:
         self.sources: dict[str, Source] = {}
         self._search_at = 0.0
         try:
-            self._written = written_in(self.file, before) if proceed else {}
+            self._before = Predecessor(self.file, before) if proceed else None
             with self.writing():
                 for name in names:
                     if name not in self._patterns:
@@ -161,7 +161,8 @@ class Recorder:
             self._bytes_before += full.size
 
     def _add(self, name: str, whole: bool) -> None:
-        self.sources[name] = Source(name, self.file, self._written.get(name, {}), whole=whole)
+        written = self._before.written(name) if self._before else {}
+        self.sources[name] = Source(name, self.file, written, whole=whole)
 
     def _search(self, whole: bool) -> None:
         """Adds segments that match a pattern and are not recorded yet."""

@@ -73,6 +73,21 @@ def scan(path: str | os.PathLike[str]) -> Scan:
         return _Scanner(file, size, path).run()
 
 
+def has_end(path: str | os.PathLike[str]) -> bool:
+    """Whether a file ends with a summary and a footer. Raises OSError."""
+    with Path(path).open("rb") as file:
+        return _has_footer(file, os.fstat(file.fileno()).st_size)
+
+
+def _has_footer(file: IO[bytes], size: int) -> bool:
+    file.seek(max(0, size - FOOTER_LENGTH))
+    data = file.read()
+    if len(data) != FOOTER_LENGTH or not data.endswith(MAGIC):
+        return False
+    footer: Footer = Footer.read(ReadDataStream(BytesIO(data[HEAD.size :])))
+    return footer.summary_start > 0
+
+
 def content_of(file: IO[bytes], chunk: ChunkIndex) -> bytes:
     """The decompressed content of a chunk. Raises ValueError if it is damaged."""
     file.seek(chunk.chunk_start_offset + HEAD.size)
@@ -124,7 +139,7 @@ class _Scanner:
             if after > self._size:
                 break
             if opcode == Opcode.DATA_END:
-                self._scan.finished = self._has_footer()
+                self._scan.finished = _has_footer(self._file, self._size)
                 break
             try:
                 belongs = self._take(opcode, at, length)
@@ -227,11 +242,3 @@ class _Scanner:
             return False
         channels = {record.channel_id for record in records if hasattr(record, "channel_id")}
         return channels == set(chunk.message_index_offsets)
-
-    def _has_footer(self) -> bool:
-        self._file.seek(max(0, self._size - FOOTER_LENGTH))
-        data = self._file.read()
-        if len(data) != FOOTER_LENGTH or not data.endswith(MAGIC):
-            return False
-        footer: Footer = Footer.read(ReadDataStream(BytesIO(data[HEAD.size :])))
-        return footer.summary_start > 0

@@ -24,7 +24,7 @@ class Source:
     def __init__(
         self, name: str, file: FileWriter, written: Mapping[int, Written], *, whole: bool
     ) -> None:
-        """written: by epoch. whole: begin with the oldest row that the segment holds."""
+        """written: by epoch, at least the newest. whole: begin with the oldest row there is."""
         self.name = name
         self.rows = 0  #: recorded so far
         self.missed = 0  #: overwritten before they were read
@@ -114,8 +114,8 @@ class Source:
         if known is None:
             known = self._first_time(frontend)
             self._written[frontend.epoch] = known
-        note = known.note
-        self._next = max(known.last + 1, note.begin)
+        self._next = max(known.last + 1, known.note.begin)
+        note = replace(known.note, begin=self._next)
         if known.channel is None:
             self._writer = RowWriter.added_to(self._file, frontend, note)
         else:
@@ -140,7 +140,8 @@ class Source:
     def _first_time(self, frontend: Frontend) -> Written:
         """Of an epoch that is not in the recording yet."""
         first = frontend.oldest if self._whole or self._written else frontend.published
-        note = note_of(frontend, len(self._written), first)
+        number = 1 + max((each.note.number for each in self._written.values()), default=-1)
+        note = note_of(frontend, number, first)
         if self._written:
             first_time = frontend.history(since=first, until=first).time
             if len(first_time):
