@@ -14,6 +14,7 @@ import o80
 from o80.recording import source
 from o80.recording.output import opened
 from o80.recording.recorder import Recorder
+from o80.recording.scan import HEAD, scan
 
 O80 = Path(sys.executable).parent / "o80"
 
@@ -223,6 +224,19 @@ def test_a_damaged_file_is_a_recording_error_that_names_it(
             errors.append(str(error))
     assert len(errors) > 100
     assert all(str(path) in error for error in errors)
+
+
+def test_a_length_beyond_all_memory_is_a_recording_error(arm: o80.Frontend, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with o80.Recording(path, arm):
+        arm.burst(20)
+    attachment = scan(path).attachments[0]
+    texts = 8 + len(attachment.name) + len(attachment.media_type)
+    damaged = bytearray(path.read_bytes())
+    damaged[attachment.offset + HEAD.size + 16 + texts + 7] = 255  # of the size of its data
+    path.write_bytes(damaged)
+    with pytest.raises(o80.RecordingError, match=f"{path}: the record at byte .* is damaged"):
+        o80.open(path)
 
 
 # ---------------------------------------------------------------------- commands

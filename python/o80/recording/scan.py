@@ -143,7 +143,7 @@ class _Scanner:
                 break
             try:
                 belongs = self._take(opcode, at, length)
-            except (EndOfFile, ValueError, struct.error) as error:
+            except (EndOfFile, ValueError, OverflowError, struct.error) as error:
                 raise RecordingError(f"{self._path}: the record at byte {at} is damaged") from error
             if not belongs:
                 break
