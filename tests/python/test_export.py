@@ -169,7 +169,7 @@ def test_ends_of_commands_are_marked_in_the_panels_of_their_actuators(arm: o80.F
         each for each in figure.axes[1].get_lines() if each.get_label() in ends_in(figure, 1)
     ]
     (end,) = [each for each in ends if each.actuators == ("elbow",)]
-    assert line.get_xdata()[0] == pytest.approx(
+    assert np.asarray(line.get_xdata())[0] == pytest.approx(
         arm.history().at_iteration(end.iteration).time * 1e-9
     )
     # ends outside the rows are not drawn
@@ -213,7 +213,7 @@ def test_runs_of_different_days_begin_at_zero_each() -> None:
     assert zeros["arm/1"] == first
     assert zeros["live"] == first
     figure = plot({name: run.history for name, run in runs.items()}, origins=zeros)
-    begins = [ax.get_lines()[0].get_xdata()[0] for ax in figure.axes]
+    begins = [np.asarray(ax.get_lines()[0].get_xdata())[0] for ax in figure.axes]
     assert begins == pytest.approx([0, 0.005, 0, 0])
 
 

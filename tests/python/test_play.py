@@ -5,6 +5,7 @@ import math
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -244,7 +245,7 @@ def test_a_robot_cannot_start_where_a_recording_is_played(recorded: Path, segmen
         ({"segments": "aram"}, "no segment 'aram'"),
     ],
 )
-def test_mistakes_are_named(recorded: Path, arguments: dict[str, object], message: str) -> None:
+def test_mistakes_are_named(recorded: Path, arguments: dict[str, Any], message: str) -> None:
     with pytest.raises(o80.InvalidArgument, match=message):
         o80.play(recorded, **arguments)
 
