@@ -39,8 +39,8 @@ void WorkerPool::begin(std::uint32_t count, Call call, const void* object) noexc
   count_.store(count, std::memory_order_relaxed);
   done_.store(0, std::memory_order_relaxed);
   const std::uint32_t round = round_.load(std::memory_order_relaxed) + 1;
-  next_.store(std::uint64_t{round} << 32, std::memory_order_release);  // sync next
-  round_.store(round, std::memory_order_release);                      // sync round
+  left_.store(std::uint64_t{round} << 32 | count, std::memory_order_release);  // sync left
+  round_.store(round, std::memory_order_release);                              // sync round
   // one task is for the caller
   if (count > 1 && !threads_.empty()) {
     const auto most = std::min<std::size_t>(count - 1, threads_.size());
@@ -48,14 +48,15 @@ void WorkerPool::begin(std::uint32_t count, Call call, const void* object) noexc
   }
 }
 
-/// Takes the next task of this round; false if there is none. A worker that comes late finds
-/// another round in `next_`, and so cannot take a task of a later call.
+/// Takes a task of this round; false if there is none. A worker that comes late finds 0 tasks left,
+/// or another round, and so cannot take a task of a later call: round and number of tasks change in
+/// one store.
 bool WorkerPool::take(std::uint32_t round, std::uint32_t& i) noexcept {
-  std::uint64_t next = next_.load(std::memory_order_acquire);  // sync next
+  std::uint64_t left = left_.load(std::memory_order_acquire);  // sync left
   do {
-    i = static_cast<std::uint32_t>(next);
-    if (next >> 32 != round || i >= count_.load(std::memory_order_relaxed)) return false;
-  } while (!next_.compare_exchange_weak(next, next + 1, std::memory_order_acq_rel,
+    i = static_cast<std::uint32_t>(left) - 1;
+    if (left >> 32 != round || static_cast<std::uint32_t>(left) == 0) return false;
+  } while (!left_.compare_exchange_weak(left, left - 1, std::memory_order_acq_rel,
                                         std::memory_order_acquire));
   return true;
 }

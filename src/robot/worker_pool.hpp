@@ -58,14 +58,14 @@ class WorkerPool {
   bool wait_for_workers(std::uint32_t count) noexcept;
   void work() noexcept;
 
-  // written by the caller before `next_` changes; a worker reads call_ and object_ only after it
+  // written by the caller before `left_` changes; a worker reads call_ and object_ only after it
   // has taken a task, and the call cannot end before that task
   Call call_ = nullptr;
   const void* object_ = nullptr;
   std::atomic<std::uint32_t> count_{0};
   alignas(64) std::atomic<std::uint32_t> round_{0};  // futex of the workers; number of the call
   std::atomic<bool> stop_{false};
-  alignas(64) std::atomic<std::uint64_t> next_{0};  // the round << 32 | the next task
+  alignas(64) std::atomic<std::uint64_t> left_{0};  // the round << 32 | tasks that nobody has taken
   alignas(64) std::atomic<std::uint32_t> done_{0};  // futex of the caller; tasks that have returned
   std::atomic<bool> waiting_{false};                // the caller sleeps on done_
   Spinner caller_spin_;
