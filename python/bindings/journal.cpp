@@ -159,7 +159,9 @@ void bind_journal(nb::module_& m) {
       .def_prop_ro("cause", word(&JournalEntry::cause))
       .def_ro("cut", &JournalEntry::cut)
       .def_ro("text", &JournalEntry::text)
-      .def_ro("actuator", &JournalEntry::actuator);
+      .def_ro("actuator", &JournalEntry::actuator)
+      .def_ro("slot", &JournalEntry::slot)
+      .def_prop_ro("kept", [](const JournalEntry& self) { return bytes_of(self.kept); });
   nb::class_<Journal>(m, "Journal")
       .def(
           "__init__",

@@ -53,6 +53,10 @@ class OpenReplay {
     const Waiting waiting;
     return replay.run(rows);
   }
+  void begin_at(std::int64_t first) { open().begin_at(first); }
+  void load_snapshot(std::uint32_t slot, const nb::bytes& bytes) {
+    open().load_snapshot(slot, {reinterpret_cast<const std::byte*>(bytes.c_str()), bytes.size()});
+  }
   void close() { replay_.reset(); }
 
   std::optional<MismatchFields> mismatch() {
@@ -83,6 +87,8 @@ void bind_replay(nb::module_& m) {
       .def("add", &OpenReplay::add, "entries"_a)
       .def("run", &OpenReplay::run, "times"_a,
            nb::sig("def run(self, times: numpy.typing.NDArray[numpy.int64]) -> bool"))
+      .def("begin_at", &OpenReplay::begin_at, "first"_a)
+      .def("load_snapshot", &OpenReplay::load_snapshot, "slot"_a, "state"_a)
       .def("close", &OpenReplay::close)
       .def_prop_ro("mismatch", &OpenReplay::mismatch)
       .def_prop_ro("fault", &OpenReplay::fault)

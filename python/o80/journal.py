@@ -47,7 +47,7 @@ class JournalEntry:
     number: int
     #: taken, scheduled, rejected, status, halt, halt_reason, resume, control_taken,
     #: control_released, control_lost, burst, burst_ended, died, silent, interrupted, fresh_start,
-    #: order_lost, stopping or ended
+    #: order_lost, stopping, ended or snapshot
     kind: str
     iteration: int
     missed: int = 0  #: entries before this one that were overwritten before they were read
@@ -66,6 +66,7 @@ class JournalEntry:
     cause: str = ""  #: of a halt
     text: str = ""  #: the reason of a halt, or of the end of the backend
     actuator: str = ""  #: that the driver interrupted
+    slot: int | None = None  #: in which the driver keeps a snapshot
 
 
 class Journal:
@@ -137,6 +138,7 @@ class EntryDecoder:
             cause=native.cause if kind in ("halt", "halt_reason") else "",
             text=native.text,
             actuator=self._name(native.actuator) if kind == "interrupted" else "",
+            slot=native.slot if kind == "snapshot" else None,
         )
 
     def _name(self, index: int) -> str:

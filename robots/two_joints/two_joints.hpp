@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -80,6 +82,17 @@ class TwoJoints {
     if (restore.slot >= kept_.size()) return o80::Served::rejected("there are slots 0 to 7");
     now_ = kept_[restore.slot];
     return o80::Served::start_afresh();
+  }
+
+  // for a replay that begins with a snapshot
+  std::span<const std::byte> snapshot_bytes(std::uint32_t slot) const {
+    if (slot >= kept_.size()) return {};
+    return std::as_bytes(std::span(&kept_[slot], 1));
+  }
+  bool load_snapshot(std::uint32_t slot, std::span<const std::byte> bytes) {
+    if (slot >= kept_.size() || bytes.size() != sizeof(State)) return false;
+    kept_[slot] = o80::unpack<State>(bytes.data());
+    return true;
   }
 
   o80::Served on(const Home& home) {

@@ -64,6 +64,8 @@ class JournalWriter {
   /// Position of the next entry.
   std::uint64_t position() const noexcept { return position_; }
   std::uint64_t bytes() const noexcept { return bytes_; }
+  /// True if an entry may have so large a payload.
+  bool fits(std::size_t payload) const noexcept { return payload <= most_; }
   /// Appends an entry; sets `number` and `words` of its head. `bytes`: a multiple of 8. A payload
   /// larger than kMostJournalPayload or a quarter of the ring is left out.
   void write(JournalHead head, const void* payload = nullptr, std::size_t bytes = 0) noexcept;

@@ -28,7 +28,8 @@ std::string_view to_text(JournalKind kind) noexcept {
                                                                          "order_lost",
                                                                          "stopping",
                                                                          "ended",
-                                                                         "statuses"};
+                                                                         "statuses",
+                                                                         "snapshot"};
   const auto i = static_cast<std::size_t>(kind);
   return i < kTexts.size() ? kTexts[i] : "unknown";
 }

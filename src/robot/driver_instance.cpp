@@ -171,6 +171,18 @@ Served DriverInstance::resume() noexcept {
   return served(table_.resume(driver_, &text), text);
 }
 
+std::span<const std::byte> DriverInstance::snapshot_bytes(std::uint32_t slot) noexcept {
+  if (table_.snapshot_bytes == nullptr) return {};
+  std::uint64_t size = 0;
+  const std::byte* bytes = table_.snapshot_bytes(driver_, slot, &size);
+  return bytes == nullptr ? std::span<const std::byte>() : std::span(bytes, size);
+}
+
+bool DriverInstance::load_snapshot(std::uint32_t slot, std::span<const std::byte> bytes) noexcept {
+  return table_.load_snapshot != nullptr &&
+         table_.load_snapshot(driver_, slot, bytes.data(), bytes.size(), &fault_) == 0;
+}
+
 void DriverInstance::stop() noexcept {
   if (!started_) return;
   started_ = false;

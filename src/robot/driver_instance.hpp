@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -53,6 +54,10 @@ class DriverInstance {
   Served request(std::uint32_t index, const std::byte* payload) noexcept;
   bool halt() noexcept;
   Served resume() noexcept;
+  /// The snapshot in a slot; empty if there is none, or if the driver does not give it.
+  std::span<const std::byte> snapshot_bytes(std::uint32_t slot) noexcept;
+  /// Fills a slot; false if the driver refuses.
+  bool load_snapshot(std::uint32_t slot, std::span<const std::byte> bytes) noexcept;
   /// Calls the driver's stop() once, and only after a call of start().
   void stop() noexcept;
   /// The result that a driver reported for a request in its reading.

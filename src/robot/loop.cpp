@@ -8,12 +8,23 @@
 #include "memory/verb_word.hpp"
 #include "o80/base/error.hpp"
 #include "o80/base/time.hpp"
+#include "o80/robot/plant_requests.hpp"
 #include "robot/robot_provenance.hpp"
 
 namespace o80 {
 
 namespace {
 constexpr std::int64_t kLongestBraking = 1'000'000'000;  // [ns]
+
+/// Index of the request `snapshot` whose first field is the slot; the number of requests if there
+/// is none.
+std::uint32_t snapshot_of(const Schema& schema) {
+  const auto found = std::ranges::find_if(schema.requests, [&](const RequestRow& request) {
+    const TypeRow& type = schema.types[request.type];
+    return request.name.view() == "snapshot" && type.size == sizeof(Snapshot);
+  });
+  return static_cast<std::uint32_t>(found - schema.requests.begin());
+}
 
 BackendOptions with_provenance(BackendOptions options, const DriverInstance& robot) {
   Provenance provenance = provenance_of(robot.table(), robot.options());
@@ -30,7 +41,8 @@ Loop::Loop(std::unique_ptr<DriverInstance> robot, const BackendOptions& options,
       pacer_(backend_.schema().head.period),
       paced_(!options.bursting && recorded == nullptr),
       interrupted_(backend_.layout().mask_words + 1),
-      reports_(backend_.schema().requests.size()) {
+      reports_(backend_.schema().requests.size()),
+      snapshot_(snapshot_of(backend_.schema())) {
   fault_.reserve(1024);
 }
 
@@ -210,6 +222,14 @@ Served Loop::serve(std::uint32_t request, std::span<const std::byte> payload) no
     failed(backend_.schema().requests[request].name.chars.data());
   }
   return served;
+}
+
+KeptState Loop::kept_state(std::uint32_t request, std::span<const std::byte> payload) noexcept {
+  if (request != snapshot_ || payload.size() < sizeof(std::uint32_t)) return {};
+  KeptState kept;
+  std::memcpy(&kept.slot, payload.data(), sizeof kept.slot);
+  kept.bytes = robot_->snapshot_bytes(kept.slot);
+  return kept;
 }
 
 bool Loop::read_fresh(FreshReading& reading) noexcept {

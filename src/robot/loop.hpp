@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -45,6 +46,12 @@ class Loop final : public RequestServer {
   /// Runs the iterations of a recorded run up to this one, without waiting; `Step::ended` if the
   /// driver failed.
   Step replay(Iteration last) noexcept;
+  /// Replay only: makes this the first iteration, instead of 0. Call it before `start`.
+  void begin_at(Iteration first) noexcept { backend_.begin_at(first); }
+  /// Fills a slot of the driver for snapshots; false if it refuses.
+  bool load_snapshot(std::uint32_t slot, std::span<const std::byte> bytes) noexcept {
+    return robot_->load_snapshot(slot, bytes);
+  }
   /// Cancels the rest of the current burst.
   void cut_burst() noexcept { backend_.cut_burst(); }
   /// Stops the robot and ends the backend. Called by run() and the destructor.
@@ -58,6 +65,7 @@ class Loop final : public RequestServer {
 
  private:
   Served serve(std::uint32_t request, std::span<const std::byte> payload) noexcept override;
+  KeptState kept_state(std::uint32_t request, std::span<const std::byte> payload) noexcept override;
   bool read_fresh(FreshReading& reading) noexcept override;
   bool halt() noexcept override;
   Served resume() noexcept override;
@@ -95,6 +103,7 @@ class Loop final : public RequestServer {
   std::string fault_;  // capacity reserved, so that run() does not allocate
   std::vector<std::uint64_t> interrupted_;
   std::vector<RequestReport> reports_;  // of each request
+  std::uint32_t snapshot_;              // index of that request
 };
 
 }  // namespace o80

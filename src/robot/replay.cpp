@@ -36,6 +36,14 @@ void check_blocks(const JournalEntry& entry) {
 Replay::Replay(std::unique_ptr<DriverInstance> robot, BackendOptions options)
     : lanes_(options.lanes), loop_(std::move(robot), replaying(std::move(options)), &recorded_) {}
 
+void Replay::begin_at(Iteration first) noexcept { loop_.begin_at(first - 1); }
+
+void Replay::load_snapshot(std::uint32_t slot, std::span<const std::byte> bytes) {
+  if (loop_.load_snapshot(slot, bytes)) return;
+  throw DriverError("the robot cannot take the recorded snapshot of slot " + std::to_string(slot) +
+                    ": replay the recording with the driver that it was made with");
+}
+
 void Replay::add(const JournalEntry& entry) {
   const bool is_batch = entry.kind == JournalKind::taken || entry.kind == JournalKind::rejected;
   const bool is_of_lane =

@@ -23,11 +23,18 @@ class Replay {
   /// `options`: those of the recorded run, with another segment name. Throws as Loop.
   Replay(std::unique_ptr<DriverInstance> robot, BackendOptions options);
 
+  /// Begins at this iteration instead of row 0: `run` first publishes the row before it, which
+  /// shows the start state, and obeys the decisions of this iteration and later ones. Call it
+  /// before `add` and `run`.
+  void begin_at(Iteration first) noexcept;
+  /// Fills a slot of the driver with a recorded snapshot. Throws DriverError if it refuses.
+  void load_snapshot(std::uint32_t slot, std::span<const std::byte> bytes);
   /// Adds the next entry of the recorded journal. Add all of an iteration before it runs. Throws
   /// InvalidArgument for an entry that no backend writes.
   void add(const JournalEntry& entry);
-  /// Runs one iteration for each time, the first of them row 0 [ns]. False if the driver failed or
-  /// has ended: see fault(). The last row must not be followed by a decision of the same iteration.
+  /// Runs one iteration for each time, the first of them the first row [ns]. False if the driver
+  /// failed or has ended: see fault(). The last row must not be followed by a decision of the same
+  /// iteration.
   bool run(std::span<const std::int64_t> times);
 
   const std::optional<DecisionMismatch>& mismatch() const noexcept { return recorded_.mismatch(); }

@@ -295,7 +295,7 @@ bool UntypedBackend::Body::publish_first() noexcept {
 
 void UntypedBackend::Body::publish(bool fresh) noexcept {
   if (!begun_) {
-    controller.restart(row() + layout.observed, nullptr, 0);
+    controller.restart(row() + layout.observed, nullptr, current);
     if (recorded_ == nullptr) {
       watch_halt();
     } else {
@@ -380,6 +380,8 @@ bool UntypedBackend::publish() noexcept {
   body_->publish(false);
   return true;
 }
+
+void UntypedBackend::begin_at(Iteration first) noexcept { body_->current = first; }
 
 Step UntypedBackend::step() noexcept { return body_->step(kForEver); }
 Step UntypedBackend::try_step() noexcept { return body_->step(0); }

@@ -30,6 +30,10 @@ Outcome UntypedBackend::Body::request(std::uint32_t lane, CommandId id, BlockInd
   const Served served = server_->serve(index, {payload_.data(), size});
   switch (served.kind) {
     case Served::Kind::done:
+      if (journal.is_on()) {
+        const KeptState kept = server_->kept_state(index, {payload_.data(), size});
+        if (!kept.bytes.empty()) journal.kept(kept);
+      }
       return {};
     case Served::Kind::rejected:
       return reject_request(lane, id, served.why());

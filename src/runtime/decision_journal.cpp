@@ -1,6 +1,8 @@
 #include "runtime/decision_journal.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cstring>
 #include <iterator>
 
 #include "memory/atomic_words.hpp"
@@ -84,6 +86,23 @@ void DecisionJournal::resume(std::uint32_t lane, std::uint64_t sender,
   name_again(lane, sender);
   const JournalSender payload{sender};
   write(head(JournalKind::resume, lane, halt), &payload, sizeof payload);
+}
+
+void DecisionJournal::kept(const KeptState& state) noexcept {
+  constexpr std::array<std::byte, 8> kPadding{};
+  const std::size_t rest = state.bytes.size() % kPadding.size();
+  const std::size_t padding = rest == 0 ? 0 : kPadding.size() - rest;
+  flush();
+  if (!writer_.fits(state.bytes.size() + padding)) return;
+  writer_.begin(state.bytes.size() + padding);
+  const std::size_t whole = state.bytes.size() - rest;
+  writer_.add(state.bytes.data(), whole);
+  if (rest != 0) {
+    std::array<std::byte, 8> last = kPadding;
+    std::memcpy(last.data(), state.bytes.data() + whole, rest);
+    writer_.add(last.data(), last.size());
+  }
+  writer_.end(head(JournalKind::snapshot, 0, state.bytes.size(), state.slot));
 }
 
 void DecisionJournal::died(std::uint32_t lane, std::uint64_t owner, Stale stale) noexcept {

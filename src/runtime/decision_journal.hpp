@@ -12,6 +12,7 @@
 #include "o80/describe/rows.hpp"
 #include "o80/memory/halt.hpp"
 #include "o80/memory/life.hpp"
+#include "o80/runtime/request_server.hpp"
 #include "runtime/schedule.hpp"
 
 namespace o80 {
@@ -100,6 +101,9 @@ class DecisionJournal {
   void halt(JournalKind halt_or_reason, const Halt& halt) noexcept;
   void resume(std::uint32_t lane, std::uint64_t sender, std::uint64_t halt) noexcept;
   void fresh_start(std::uint32_t lane) noexcept { note(JournalKind::fresh_start, lane, 0); }
+  /// A snapshot of the driver; left out if it is larger than an entry may be.
+  void kept(const KeptState& state) noexcept;
+  bool is_on() const noexcept { return writer_.is_on(); }
   void interrupted(std::uint32_t actuator) noexcept { note(JournalKind::interrupted, 0, actuator); }
 
   // commanders; `owner`: their incarnation

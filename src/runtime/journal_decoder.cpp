@@ -227,6 +227,15 @@ void JournalDecoder::fill(JournalEntry& entry) {
       entry.lane = JournalEntry::kNoLane;
       break;
     }
+    case JournalKind::snapshot:
+      entry.lane = JournalEntry::kNoLane;
+      entry.id = 0;
+      entry.slot = head.what;
+      if (head.id <= item_.payload.size() && item_.payload.size() - head.id < 8) {
+        entry.kept.assign(item_.payload.begin(),
+                          item_.payload.begin() + static_cast<std::ptrdiff_t>(head.id));
+      }
+      break;
     case JournalKind::order_lost:
     case JournalKind::stopping:
       entry.lane = JournalEntry::kNoLane;

@@ -15,6 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import o80
+from o80 import _core
 from o80.machine import this_machine
 from o80.replaying.recorded_run import FileRun, RecordedRun, runs_in
 from o80.replaying.replay import replay_runs
@@ -147,6 +148,68 @@ def test_a_history_without_row_0_is_not_replayed(segment: str) -> None:
     assert not report.identical
     assert report.difference is None
     assert "the first recorded row is row 31: a replay begins at row 0" in str(report)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_history_without_row_0_begins_at_a_reset_or_a_snapshot(segment: str, seed: int) -> None:
+    with o80.robots.load("two_joints").inline(segment, history=600) as arm:
+        arm.request("snapshot", slot=0)
+        arm.request("snapshot", slot=2)
+        arm.burst(700)
+        run_bursts(arm, seed, 20)
+        for request, fields in (("reset", {}), ("restore", {"slot": 2}), ("snapshot", {"slot": 1})):
+            arm.request(request, **fields)
+            run_bursts(arm, seed + 10, 10)
+        arm.request("restore", slot=1)
+        run_bursts(arm, seed + 20, 10)
+
+        (run,) = o80.replay(arm)
+        assert run.identical, run
+        assert any("the replay begins with the" in note for note in run.notes)
+        fresh = arm.history().iteration[arm.history().rows["fresh"] != 0]
+        began = set()
+        for row in fresh:
+            (run,) = o80.replay(arm, since=int(row))
+            assert run.difference is None, (row, run)
+            began |= {note.rpartition(" ")[2] for note in run.notes if "begins with" in note}
+        assert len(began) > 1
+
+
+def test_a_replay_begins_with_a_restored_snapshot(segment: str) -> None:
+    with o80.robots.load("two_joints").inline(segment, history=60) as arm:
+        arm.request("snapshot", slot=2)
+        arm.burst(100)
+        arm.request("restore", slot=2)
+        arm.burst(5)
+        (run,) = o80.replay(arm)
+        assert run.identical, run
+        assert run.rows == 6
+
+
+def test_a_snapshot_of_another_robot_is_refused() -> None:
+    library = _core.load_robot(str(o80.robots.path_of("two_joints")))
+    name = _core.unused_segment_name("replay")
+    replay = _core.Replay(library, name, [], [], 1_000_000)
+    with pytest.raises(o80.DriverError, match="cannot take the recorded snapshot of slot 1"):
+        replay.load_snapshot(1, b"another")
+    replay.close()
+    o80.clean(name)
+
+
+def test_a_restore_whose_snapshot_is_not_recorded_ends_the_replay(segment: str) -> None:
+    with o80.robots.load("two_joints").inline(segment, history=60, journal=0.5) as arm:
+        arm.request("snapshot", slot=2)
+        for _ in range(300):  # more than 0.5 MiB
+            for _ in range(50):
+                arm.add_command("elbow", 0.1)
+            arm.burst(50)
+        arm.request("reset")
+        arm.burst(5)
+        arm.request("restore", slot=2)
+        arm.burst(5)
+        (run,) = o80.replay(arm)
+    assert (run.difference, run.rows) == (None, 6)
+    assert "the snapshot in slot 2, which row" in str(run)
 
 
 def test_a_replay_ends_at_a_gap_of_the_journal(segment: str) -> None:

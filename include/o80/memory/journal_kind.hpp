@@ -31,9 +31,10 @@ enum class JournalKind : std::uint8_t {
   order_lost,   // the ticket counter was damaged: the order between lanes begins anew
   stopping,     // all commands were purged; the robot brakes before it stops
   ended,        // the backend has ended
-  statuses      // many of `status` in one entry; readers get each of them
+  statuses,     // many of `status` in one entry; readers get each of them
+  snapshot      // the driver keeps its state in a slot: the state
 };
-inline constexpr std::size_t kJournalKinds = static_cast<std::size_t>(JournalKind::statuses) + 1;
+inline constexpr std::size_t kJournalKinds = static_cast<std::size_t>(JournalKind::snapshot) + 1;
 
 std::string_view to_text(JournalKind kind) noexcept;
 

@@ -216,6 +216,32 @@ const RobotTable* robot_table(const char* name, const char* versions = "") {
         });
       };
     }
+    if constexpr (requires(D& driver, std::uint32_t slot, std::span<const std::byte> bytes) {
+                    { driver.snapshot_bytes(slot) } -> std::same_as<std::span<const std::byte>>;
+                    { driver.load_snapshot(slot, bytes) } -> std::same_as<bool>;
+                  }) {
+      t.snapshot_bytes = [](void* robot, std::uint32_t slot,
+                            std::uint64_t* size) -> const std::byte* {
+        std::span<const std::byte> bytes;
+        FaultText fault;
+        static_cast<void>(driving::guarded<int>(&fault, 1, [&] {
+          bytes = static_cast<D*>(robot)->snapshot_bytes(slot);
+          return 0;
+        }));
+        *size = bytes.size();
+        return bytes.data();
+      };
+      t.load_snapshot = [](void* robot, std::uint32_t slot, const std::byte* bytes,
+                           std::uint64_t size, FaultText* fault) {
+        return driving::guarded<int>(fault, 1, [&] {
+          if (static_cast<D*>(robot)->load_snapshot(slot, {bytes, size})) return 0;
+          driving::set_fault(fault,
+                             "the recorded snapshot is of another robot, or of another "
+                             "version of its driver");
+          return 1;
+        });
+      };
+    }
     t.stop = [](void* robot) { static_cast<D*>(robot)->stop(); };
     t.destroy = [](void* robot) { delete static_cast<D*>(robot); };
     return t;

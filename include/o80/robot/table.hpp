@@ -12,7 +12,7 @@
 
 namespace o80 {
 
-inline constexpr std::uint32_t kRobotTableVersion = 4;
+inline constexpr std::uint32_t kRobotTableVersion = 5;
 
 /// Reason for the failure of a call.
 struct FaultText {
@@ -122,6 +122,12 @@ struct RobotTable {
   /// Called before a halt is cleared: done, rejected (with a text) or failed; null if the driver
   /// has no `resume`.
   RequestAnswer (*resume)(void* robot, FaultText* text);
+  /// The snapshot in a slot, valid until the next call of any function; null and 0 if the slot
+  /// holds none. Null if the driver has no `snapshot_bytes`.
+  const std::byte* (*snapshot_bytes)(void* robot, std::uint32_t slot, std::uint64_t* size);
+  /// Fills a slot with bytes from `snapshot_bytes`; null if the driver has no `load_snapshot`.
+  int (*load_snapshot)(void* robot, std::uint32_t slot, const std::byte* bytes, std::uint64_t size,
+                       FaultText* fault);
   void (*stop)(void* robot);
   void (*destroy)(void* robot);
 };

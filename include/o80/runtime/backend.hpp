@@ -102,6 +102,8 @@ class UntypedBackend {
   /// of row 0 is NaN or infinite, publishes nothing and returns false; `failure` names the number.
   bool publish() noexcept;
 
+  /// Of a replay: makes this the first iteration, instead of 0. Call it before `publish`.
+  void begin_at(Iteration first) noexcept;
   /// Begins an iteration: commands => desired. In bursting mode `step` waits for a burst,
   /// `try_step` does not.
   Step step() noexcept;

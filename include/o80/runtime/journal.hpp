@@ -78,6 +78,9 @@ struct JournalEntry {
   std::string text;                            // of a halt, and of the end of a failed backend
   std::uint16_t actuator = 0;                  // interrupted
   BackendState state = BackendState::running;  // ended
+  // snapshot: what the driver keeps in a slot
+  std::uint32_t slot = 0;
+  std::vector<std::byte> kept;
 };
 
 /// Reads the decisions of a backend from the journal in its segment, in their order: batches that

@@ -43,6 +43,12 @@ struct Served {
   }
 };
 
+/// A snapshot of a robot.
+struct KeptState {
+  std::uint32_t slot = 0;
+  std::span<const std::byte> bytes{};
+};
+
 /// Memory for the reading of a fresh start, laid out as in the schema.
 struct FreshReading {
   std::byte* observed;
@@ -55,6 +61,12 @@ struct FreshReading {
 class RequestServer {
  public:
   virtual Served serve(std::uint32_t request, std::span<const std::byte> payload) noexcept = 0;
+  /// The state that this request has kept, for the journal, so that a replay can begin with it;
+  /// empty if the request keeps none. Called after `serve` has answered `done`.
+  virtual KeptState kept_state(std::uint32_t /*request*/,
+                               std::span<const std::byte> /*payload*/) noexcept {
+    return {};
+  }
   /// Reads the robot for a fresh start; false if that failed.
   virtual bool read_fresh(FreshReading& reading) noexcept = 0;
   /// Called when a halt begins: commands have ended, the actuators brake. False if the robot

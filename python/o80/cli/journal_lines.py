@@ -107,6 +107,8 @@ class _Lines:
             return f"{who}burst ended{' early' if entry.cut else ''}"
         if entry.kind == "interrupted":
             return f"the robot interrupted {entry.actuator}"
+        if entry.kind == "snapshot":
+            return f"the robot keeps its state in slot {entry.slot}"
         if entry.kind == "ended":
             return "the backend ended" + (f": {entry.text}" if entry.text else "")
         said = {

@@ -31,6 +31,12 @@ def replay(
             "--set", help="NAME=VALUE: another option of the robot than the recorded one."
         ),
     ] = None,
+    since: Annotated[
+        int | None,
+        typer.Option(
+            help="Begin at the first reset or restored snapshot in this iteration or later."
+        ),
+    ] = None,
     ignore: Annotated[
         str, typer.Option(help="Columns to leave out, for example extended,observed.elbow")
     ] = "",
@@ -55,6 +61,7 @@ def replay(
         segment=segment,
         robot=robot,
         options=_options(option),
+        since=since,
         ignore=tuple(name for name in ignore.split(",") if name),
         tolerances=_tolerances(tolerance) if tolerance or exact else None,
         progress=_show if sys.stderr.isatty() else None,

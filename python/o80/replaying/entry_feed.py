@@ -3,13 +3,18 @@
 from collections.abc import Iterator
 
 from o80 import _core
+from o80.replaying.start import SlotsKept, Start
 
 
 class EntryFeed:
     """Reads a journal in step with the rows of its run."""
 
-    def __init__(self, entries: Iterator[_core.JournalEntry]) -> None:
-        self._entries = entries
+    def __init__(
+        self, entries: Iterator[_core.JournalEntry], start: Start, slots: SlotsKept
+    ) -> None:
+        self._entries = (entry for entry in entries if entry.number >= start.entry)
+        self._begins = start.entry
+        self._slots = slots
         self._pending: _core.JournalEntry | None = None
         self._known = -1  # all decisions up to this iteration were read
         self.gap = ""  #: why the decisions after `until` are not known
@@ -19,7 +24,14 @@ class EntryFeed:
         """The entries that act up to iteration `last`, less those of earlier calls."""
         found = []
         while not self.gap and (entry := self._next()) is not None:
-            if entry.missed or entry.records_lost:
+            slot = self._slots.unknown(entry)
+            if slot is not None:
+                self.until = entry.iteration - 1
+                self.gap = (
+                    f"the snapshot in slot {slot}, which row {entry.iteration} restores, is not "
+                    f"recorded"
+                )
+            elif self._lacks(entry) or entry.records_lost:
                 self._end_at(entry)
             elif entry.kind == "ended" or entry.iteration > last:
                 self._pending = entry
@@ -29,6 +41,10 @@ class EntryFeed:
                 # a status is written after the row of its iteration, a decision before
                 self._known = max(self._known, entry.iteration - (entry.kind != "status"))
         return found
+
+    def _lacks(self, entry: _core.JournalEntry) -> bool:
+        """True if entries before this one are missing, other than those before the start."""
+        return entry.missed > 0 and (entry.number > self._begins or self._begins == 0)
 
     def _next(self) -> _core.JournalEntry | None:
         pending, self._pending = self._pending, None

@@ -26,6 +26,7 @@ from o80.replaying.entry_feed import EntryFeed
 from o80.replaying.recorded_run import ROWS_AT_ONCE, LiveRun, RecordedRun, runs_in
 from o80.replaying.report import ReplayReport, RunReport
 from o80.replaying.same_bytes import same_bytes
+from o80.replaying.start import Requests, SlotsKept, Start, find_start, times_from
 
 if TYPE_CHECKING:
     from o80.history import History
@@ -46,6 +47,7 @@ def replay(
     options: Mapping[str, Any] | None = None,
     tolerances: Mapping[str, float] | None = None,
     ignore: tuple[str, ...] = (),
+    since: int | None = None,
     progress: Progress | None = None,
 ) -> ReplayReport:
     """Repeats recorded runs with the same robots and options, and compares every row bit for bit.
@@ -57,6 +59,8 @@ def replay(
     tolerances, ignore: by column, as for `o80 diff`. None: bit for bit, but with a tolerance if
         another build of o80, C library or processor recorded the run; a note in the report says so.
         {}: bit for bit.
+    since: begin at the first reset or restored snapshot in this iteration or later. None: at row 0,
+        or at the first of these that the recording holds.
     progress: called with the name of a run, its rows compared, and all its rows.
 
     Only simulations are started: robots that serve the requests snapshot and restore and do not say
@@ -70,6 +74,7 @@ def replay(
         options=options,
         tolerances=tolerances,
         ignore=ignore,
+        since=since,
         progress=progress,
     )
 
@@ -81,12 +86,13 @@ def replay_runs(
     options: Mapping[str, Any] | None = None,
     tolerances: Mapping[str, float] | None = None,
     ignore: tuple[str, ...] = (),
+    since: int | None = None,
     progress: Progress | None = None,
 ) -> ReplayReport:
     """As `replay`, for runs from anywhere."""
     return ReplayReport(
         tuple(
-            _RunReplay(run, robot, options or {}, tolerances, ignore, progress).report()
+            _RunReplay(run, robot, options or {}, tolerances, ignore, since, progress).report()
             for run in runs
         )
     )
@@ -116,10 +122,13 @@ class _RunReplay:
         options: Mapping[str, Any],
         tolerances: Mapping[str, float] | None,
         ignore: tuple[str, ...],
+        since: int | None,
         progress: Progress | None,
     ) -> None:
         self._run, self._robot, self._options = run, robot, options
         self._tolerances, self._ignore, self._progress = tolerances, ignore, progress
+        self._since = since
+        self._start = Start()
         self._rows = 0
         self._times = [0, 0]  # of the first and the last row compared [ns]
         self._gap = ""
@@ -143,12 +152,23 @@ class _RunReplay:
         self._gap = reads_the_world(self._run.schema)
         if self._gap:
             return None
-        feed = EntryFeed(self._run.entries())
+        start = self._found_start()
+        if start is None:
+            return None
+        self._start = start
+        if start.row > 0:
+            self._notes.append(f"the replay begins with the {start.request} of row {start.row}")
+        slots = SlotsKept(Requests(self._run.schema), start)
+        feed = EntryFeed(self._run.entries(), start, slots)
         blocks = self._whole(self._run.blocks())
         first = next(blocks, None)
         if first is None:
             return None
         with self._started() as native:
+            if start.row > 0:
+                native.begin_at(start.row)
+                for slot, state in start.snapshots.items():
+                    native.load_snapshot(slot, state)
             for block in self._chain(first, blocks):
                 native.add(feed.read(int(block.iteration[-1])))
                 if int(block.iteration[-1]) > feed.until:
@@ -161,27 +181,48 @@ class _RunReplay:
                     return difference
         return None
 
+    def _found_start(self) -> Start | None:
+        """Where to begin; None if nowhere: `_gap` says why."""
+        rows = (int(block.iteration[0]) for block in self._run.blocks() if len(block))
+        first = next(rows, None)
+        if first is None:
+            return Start()
+        if self._since is None and first == 0:
+            entry = next(iter(self._run.entries()), None)
+            if entry is None or not entry.missed:
+                return Start()
+        found = find_start(self._run, max(first, self._since or 0))
+        if found is None and first == 0 and self._since is None:
+            return Start()  # says what the journal lacks
+        if found is None and self._since is not None:
+            self._gap = f"no reset and no restored snapshot is recorded from row {self._since} on"
+        elif found is None:
+            self._gap = (
+                f"the first recorded row is row {first}: a replay begins at row 0, at a reset, or "
+                f"at a restored snapshot, and none is recorded. Record from the start of the "
+                f"robot, or with --whole"
+            )
+        return found
+
     @staticmethod
     def _chain(first: History, others: Iterator[History]) -> Iterator[History]:
         yield first
         yield from others
 
     def _whole(self, blocks: Iterator[History]) -> Iterator[History]:
-        """Rows from row 0 to the first gap. No block ends with the row of a fresh start, because
-        the decisions after it are of the same step."""
+        """Rows from the start to the first gap.
+
+        No block ends with the row of a fresh start: the decisions after it are of the same step.
+        """
         held: History | None = None
-        expected = 0
-        for block in blocks:
+        expected = self._start.row
+        for each in blocks:
+            block = each.select(since=self._start.row) if len(each) else each
             if not len(block):
                 continue
             found = int(block.iteration[0])
             if found != expected:
-                self._gap = (
-                    f"the first recorded row is row {found}: a replay begins at row 0. Record "
-                    f"from the start of the robot, or with --whole"
-                    if expected == 0
-                    else f"rows {expected} to {found - 1} are missing"
-                )
+                self._gap = f"rows {expected} to {found - 1} are missing"
                 break
             expected = int(block.iteration[-1]) + 1
             whole = block if held is None else _joined(held, block)
@@ -219,14 +260,14 @@ class _RunReplay:
 
     def _compare_block(self, native: _core.Replay, block: History) -> Difference | None:
         first, last = int(block.iteration[0]), int(block.iteration[-1])
-        times = np.ascontiguousarray(block.time)
+        times = times_from(block.time, self._start, first, self._run.schema["period"])
         try:
             runs = native.run(times)
         except DriverError as error:
             return Difference(first, "driver", ("started", str(error)))
         with Frontend(native.segment, read_only=True, dead=True, timeout=5) as frontend:
             replayed = frontend.history(since=first, until=last)
-            if first == 0:
+            if first == self._start.row:
                 self._note_changes(frontend)
         found = self._first_difference(block[: len(replayed)], replayed)
         decided = native.mismatch

@@ -65,3 +65,26 @@ def test_another_model_of_the_muscles_differs_in_the_first_iteration() -> None:
         found = o80.replay(arm, options={"muscle": "hill"}).difference
         assert found is not None
         assert found.iteration <= 1
+
+
+def test_a_replay_begins_with_a_reset_or_a_snapshot(muscle: str) -> None:
+    choose = random.Random(4)
+    with o80.robots.load("pam").inline(
+        muscle=muscle, dead_time=[0.02] * 4, friction=[0.5] * 4, start_noise=0.1, history=500
+    ) as arm:
+        _act_and_burst(arm, choose)
+        arm.request("snapshot", slot=2)
+        _act_and_burst(arm, choose)
+        for request, fields in (("restore", {"slot": 2}), ("reset", {"seed": 5})):
+            arm.request(request, **fields)
+            row = arm.published
+            _act_and_burst(arm, choose)
+            (run,) = o80.replay(arm, since=row)
+            assert run.identical, run
+            assert run.notes[0] == f"the replay begins with the {request} of row {row}"
+
+
+def _act_and_burst(arm: o80.Frontend, choose: random.Random) -> None:
+    for _ in range(15):
+        act(arm, choose)
+        arm.burst(choose.randrange(1, 12))

@@ -8,6 +8,7 @@
 #include <atomic>
 #include <cstring>
 #include <random>
+#include <set>
 #include <thread>
 
 #include "o80/robot/make_table.hpp"
@@ -80,13 +81,20 @@ class Rig {
     now_ = kept_;
     return Served::start_afresh();
   }
+  std::span<const std::byte> snapshot_bytes(std::uint32_t) const {
+    return std::as_bytes(std::span(&kept_, 1));
+  }
+  bool load_snapshot(std::uint32_t, std::span<const std::byte> bytes) {
+    kept_ = unpack<State>(bytes.data());
+    return bytes.size() == sizeof(State);
+  }
   Served on(const Home& home) {
     now_.homes = true;
     now_.speed = home.speed;
     return Served::running();
   }
   Served resume() {
-    if (++resumes_ % 3 == 0) return Served::rejected("not ready");
+    if (++now_.resumes % 3 == 0) return Served::rejected("not ready");
     return Served::done();
   }
   void stop() noexcept {}
@@ -97,6 +105,7 @@ class Rig {
     std::array<double, 2> effort{};
     std::int64_t bends = 0;
     double speed = 0;
+    int resumes = 0;
     bool homes = false;
   };
 
@@ -116,7 +125,6 @@ class Rig {
   Config config_;
   State now_;
   State kept_;
-  int resumes_ = 0;
 };
 O80_DESCRIBE(Rig::Config, bent);
 O80_DESCRIBE(Rig::Sensors, effort, bends);
@@ -370,6 +378,76 @@ TEST_P(ReplayTest, AChangedDriverIsFoundInTheFirstIterationInWhichTheChangeActs)
   }
   ASSERT_GT(first, 0) << "the changed line was executed";
   EXPECT_EQ(replayed(recorded, 1e-6).row, first);
+}
+
+/// Number of requests that run when this entry is written.
+int running_at(const Recorded& recorded, const JournalEntry& until) {
+  std::set<std::pair<std::uint32_t, CommandId>> requests;
+  std::set<std::pair<std::uint32_t, CommandId>> run;
+  for (const JournalEntry& entry : recorded.entries) {
+    if (entry.number >= until.number) break;
+    for (const JournalRecord& record : entry.records) {
+      if (record.kind == JournalRecord::Kind::request) requests.emplace(entry.lane, record.id);
+    }
+    const std::pair id(entry.lane, entry.id);
+    if (entry.kind != JournalKind::status || !requests.contains(id)) continue;
+    if (entry.status == Status::active) run.insert(id);
+    if (entry.status != Status::active) run.erase(id);
+  }
+  return static_cast<int>(run.size());
+}
+
+/// The entry with the request that caused this fresh start, if a replay can begin with it.
+const JournalEntry* start_of(const Recorded& recorded, std::size_t fresh_start) {
+  const JournalEntry& fresh = recorded.entries[fresh_start];
+  for (std::size_t i = fresh_start; i-- > 0;) {
+    const JournalEntry& entry = recorded.entries[i];
+    if (entry.kind != JournalKind::taken || entry.lane != fresh.lane) continue;
+    const auto serves = [](const JournalRecord& record) {
+      return record.kind == JournalRecord::Kind::request;
+    };
+    const auto first = std::ranges::find_if(entry.records, serves);
+    const bool begins = entry.iteration == fresh.iteration && first != entry.records.end() &&
+                        (first->request == 0 || first->request == 2);  // reset, restore
+    return begins && running_at(recorded, entry) == 0 ? &entry : nullptr;
+  }
+  return nullptr;
+}
+
+TEST_P(ReplayTest, ItBeginsAtAnyResetOrRestoredSnapshot) {
+  const Recorded recorded = record_bursts(GetParam(), 500);
+  int begun = 0;
+  std::vector<std::byte> kept;
+  for (std::size_t i = 0; i < recorded.entries.size(); ++i) {
+    const JournalEntry& entry = recorded.entries[i];
+    if (entry.kind == JournalKind::snapshot) kept = entry.kept;
+    if (entry.kind != JournalKind::fresh_start) continue;
+    const JournalEntry* start = start_of(recorded, i);
+    if (start == nullptr) continue;
+    const auto row = static_cast<std::size_t>(start->iteration);
+    if (recorded.head(row).halted != 0) continue;
+
+    BackendOptions options = options_of(true);
+    options.segment = "replay";
+    Replay replay(rig(), options);
+    replay.begin_at(start->iteration);
+    if (!kept.empty()) replay.load_snapshot(0, kept);
+    for (const JournalEntry& each : recorded.entries) {
+      if (each.number >= start->number) replay.add(each);
+    }
+    const std::vector<std::int64_t> times = recorded.times();
+    ASSERT_TRUE(replay.run(std::span(times).subspan(row - 1))) << replay.fault();
+    EXPECT_EQ(text_of(replay.mismatch()), "") << "from " << row;
+    const UntypedFrontend reader("replay", {.access = Access::read_only, .dead = true});
+    const Rows rows = reader.history(start->iteration, reader.published());
+    ASSERT_EQ(rows.count, recorded.rows.count - row);
+    for (std::size_t k = 0; k < rows.count; ++k) {
+      ASSERT_EQ(comparable(recorded, rows.row(k)), comparable(recorded, recorded.rows.row(row + k)))
+          << "row " << row + k << " of a replay from " << row;
+    }
+    ++begun;
+  }
+  EXPECT_GT(begun, 3);
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, ReplayTest, ::testing::Range(1U, 9U));

@@ -51,6 +51,35 @@ TEST_F(DecisionJournalTest, AnIterationWithoutCommandsWritesNothing) {
   EXPECT_TRUE(news().empty());
 }
 
+TEST_F(DecisionJournalTest, HoldsTheStateThatASnapshotKeeps) {
+  for (std::size_t size = 0; size <= 20; ++size) {
+    station.kept.clear();
+    for (std::size_t i = 0; i < size; ++i) station.kept.push_back(static_cast<std::byte>(i + 1));
+    station.kept_slot = static_cast<std::uint32_t>(size);
+    add_request<Snapshot>(*commander);
+    commander->pulse();
+    station.run(1);
+    const std::vector<JournalEntry> entries = news();
+    if (size == 0) {
+      EXPECT_THAT(kinds_of(entries), ElementsAre(JournalKind::taken, JournalKind::status));
+      continue;
+    }
+    ASSERT_THAT(kinds_of(entries),
+                ElementsAre(JournalKind::taken, JournalKind::snapshot, JournalKind::status));
+    EXPECT_EQ(entries[1].kept, station.kept);
+    EXPECT_EQ(entries[1].slot, size);
+    EXPECT_EQ(entries[1].iteration, entries[0].iteration);
+  }
+}
+
+TEST_F(DecisionJournalTest, LeavesOutAStateThatIsLargerThanAnEntry) {
+  station.kept.resize(std::size_t{1} << 20);
+  add_request<Snapshot>(*commander);
+  commander->pulse();
+  station.run(1);
+  EXPECT_THAT(kinds_of(news()), ElementsAre(JournalKind::taken, JournalKind::status));
+}
+
 TEST_F(DecisionJournalTest, ShowsWhoSentWhatAndWhenItWasTakenStartedAndEnded) {
   station.run(2);
   add(*commander, 1, 0.5, {.pace = iterations(3), .profile = Profile::linear});

@@ -86,6 +86,9 @@ class Station final : private RequestServer {
   double total = 0;
   std::function<void()> before_publish;
   UntypedBackend backend;
+  // what a request `snapshot` gives to the journal
+  std::uint32_t kept_slot = 0;
+  std::vector<std::byte> kept;
 
  private:
   struct State {
@@ -113,6 +116,10 @@ class Station final : private RequestServer {
     pack(now, backend.observed());
     pack(total, backend.extended());
     backend.publish();
+  }
+  KeptState kept_state(std::uint32_t request,
+                       std::span<const std::byte> /*payload*/) noexcept override {
+    return request == 1 ? KeptState{kept_slot, kept} : KeptState{};  // Snapshot
   }
   Served serve(std::uint32_t request, std::span<const std::byte> payload) noexcept override {
     switch (request) {

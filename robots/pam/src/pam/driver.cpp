@@ -142,6 +142,17 @@ Served PamDriver::on(const Restore& restore) noexcept {
   return Served::start_afresh();
 }
 
+std::span<const std::byte> PamDriver::snapshot_bytes(std::uint32_t slot) const noexcept {
+  if (slot >= slots_.size() || slots_[slot].filled == 0) return {};
+  return std::as_bytes(std::span(&slots_[slot], 1));
+}
+
+bool PamDriver::load_snapshot(std::uint32_t slot, std::span<const std::byte> bytes) noexcept {
+  if (slot >= slots_.size() || bytes.size() != sizeof(State)) return false;
+  slots_[slot] = unpack<State>(bytes.data());
+  return true;
+}
+
 Served PamDriver::no_such_slot() const noexcept {
   std::array<char, 160> text{};
   std::snprintf(text.data(), text.size(),

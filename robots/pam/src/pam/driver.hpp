@@ -89,6 +89,9 @@ class PamDriver {
   Served on(const Reset& reset) noexcept;
   Served on(const Snapshot& snapshot) noexcept;
   Served on(const Restore& restore) noexcept;
+  // for a replay that begins with a snapshot
+  std::span<const std::byte> snapshot_bytes(std::uint32_t slot) const noexcept;
+  bool load_snapshot(std::uint32_t slot, std::span<const std::byte> bytes) noexcept;
 
   const Plant& plant() const noexcept { return plant_; }
 

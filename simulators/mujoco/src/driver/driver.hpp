@@ -29,6 +29,13 @@ class MujocoDriver {
   Served on(const Reset& reset) noexcept;
   Served on(const Snapshot& snapshot) noexcept;
   Served on(const Restore& restore) noexcept;
+  // for a replay that begins with a snapshot
+  std::span<const std::byte> snapshot_bytes(std::uint32_t slot) noexcept {
+    return simulation_.snapshot_bytes(slot);
+  }
+  bool load_snapshot(std::uint32_t slot, std::span<const std::byte> bytes) noexcept {
+    return simulation_.load_snapshot(slot, bytes);
+  }
   Served on(const ClearContacts& which) noexcept;
 
  private:

@@ -25,6 +25,7 @@ Simulation::Simulation(const Config& config)
   integrates_ = moved != static_cast<std::size_t>(model_.model->nv) || model_.model->na != 0;
   data_ = make_data("the model");
   add_slots(config.slots);
+  make_room_for_bytes();
   reset();
 }
 
@@ -54,6 +55,7 @@ void Simulation::reset() noexcept {
     now_.targets.controls[i] = control(i);
   }
   if (balls_) balls_->reset(*data_);
+  now_.engine_contacts = static_cast<std::uint32_t>(data_->ncon);
 }
 
 bool Simulation::snapshot(std::size_t slot) noexcept {
@@ -83,6 +85,7 @@ void Simulation::advance() noexcept {
   for (std::uint32_t number = 0; number < steps_; ++number) step(number);
   now_.joints = now_.targets.joints;
   update_sensors();
+  now_.engine_contacts = static_cast<std::uint32_t>(data_->ncon);
 }
 
 void Simulation::step(std::uint32_t number) noexcept {

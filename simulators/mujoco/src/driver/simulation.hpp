@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -55,6 +56,10 @@ class Simulation {
   /// False if the slot holds no snapshot.
   bool restore(std::size_t slot) noexcept;
   std::size_t slots() const noexcept { return slots_.size(); }
+  /// The snapshot in a slot, valid until the next call; empty if the slot holds none.
+  std::span<const std::byte> snapshot_bytes(std::size_t slot) noexcept;
+  /// Fills a slot; false if there is no such slot, or if the bytes are those of another model.
+  bool load_snapshot(std::size_t slot, std::span<const std::byte> bytes) noexcept;
 
   JointState joint(std::size_t i) const noexcept;
   double control(std::size_t i) const noexcept;
@@ -63,8 +68,8 @@ class Simulation {
   std::int64_t clock() const noexcept { return now_.clock; }
   /// True if the engine integrates anything: a body that is neither imposed nor a ball.
   bool integrates() const noexcept { return integrates_; }
-  /// Contacts between bodies in the engine.
-  std::uint32_t engine_contacts() const noexcept { return static_cast<std::uint32_t>(data_->ncon); }
+  /// Contacts between bodies in the engine, in the last step.
+  std::uint32_t engine_contacts() const noexcept { return now_.engine_contacts; }
   /// A position, velocity or acceleration is not finite, or too large.
   bool diverged() const noexcept;
 
@@ -72,6 +77,7 @@ class Simulation {
   /// Everything that changes, but for the engine's data and the balls.
   struct State {
     std::int64_t clock = 0;  // [iterations]
+    std::uint32_t engine_contacts = 0;
     Targets targets;
     std::vector<JointState> joints;  // imposed ones, at the end of the last iteration
   };
@@ -84,6 +90,9 @@ class Simulation {
 
   DataPointer make_data(const char* purpose) const;
   void add_slots(std::uint32_t count);
+  void make_room_for_bytes();
+  template <class Bytes>
+  void each_part(Slot& slot, Bytes& bytes) noexcept;
   void step(std::uint32_t number) noexcept;
   void impose_joints(std::uint32_t number) noexcept;
   void update_sensors() noexcept;
@@ -95,6 +104,9 @@ class Simulation {
   DataPointer data_;
   State now_;
   std::vector<Slot> slots_;
+  // of a snapshot as bytes
+  std::vector<mjtNum> engine_state_;
+  std::vector<std::byte> bytes_;
 };
 
 }  // namespace o80::mujoco

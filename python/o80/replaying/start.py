@@ -1,0 +1,112 @@
+"""Where a replay can begin: at row 0, at a reset, or at a restored snapshot that is recorded."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from o80 import _core
+    from o80.replaying.recorded_run import RecordedRun
+
+
+@dataclass(frozen=True)
+class Start:
+    """The first row of a replay, and what the robot then needs to know."""
+
+    row: int = 0
+    entry: int = 0  #: number of the first entry of the journal to obey
+    request: str = ""  #: that began it: "reset" or "restore"; empty at row 0
+    snapshots: dict[int, bytes] = field(default_factory=dict)  #: by slot
+
+
+class Requests:
+    """Names and slots of the requests in entries of a journal."""
+
+    def __init__(self, schema: dict[str, Any]) -> None:
+        self._names = [request["name"] for request in schema["requests"]]
+
+    def of(self, entry: _core.JournalEntry) -> Iterator[tuple[str, int, int]]:
+        """Name, slot and id of each request of a batch; slot -1: the request has none."""
+        for record in entry.records:
+            if record.kind != "request":
+                continue
+            name = self._names[record.request] if record.request < len(self._names) else ""
+            has_slot = name in ("snapshot", "restore") and len(record.payload) >= 4
+            yield name, struct.unpack_from("<I", record.payload)[0] if has_slot else -1, record.id
+
+
+class SlotsKept:
+    """Which slots hold a snapshot that a replay knows."""
+
+    def __init__(self, requests: Requests, start: Start) -> None:
+        self._requests, self._start = requests, start
+        self._known = set(start.snapshots)
+
+    def unknown(self, entry: _core.JournalEntry) -> int | None:
+        """The slot that this batch restores although its snapshot is not known, or None."""
+        if entry.kind != "taken" or self._start.row == 0:
+            return None
+        for name, slot, _ in self._requests.of(entry):
+            if name == "snapshot":
+                self._known.add(slot)
+            elif name == "restore" and slot not in self._known:
+                return slot
+        return None
+
+
+def find_start(run: RecordedRun, since: int) -> Start | None:
+    """The first one at row `since` or later, or None.
+
+    A reset determines the whole state of a simulation, and so does a restored snapshot that the
+    journal holds. Nothing else may act on: no halt, no request that takes time.
+    """
+    begun = {
+        int(row)
+        for block in run.blocks()
+        for row in block.iteration[(block.rows["fresh"] != 0) & (block.rows["halted"] == 0)]
+    }
+    requests = Requests(run.schema)
+    snapshots: dict[int, bytes] = {}
+    sent: set[tuple[int, int]] = set()  # lane and id of requests
+    running: set[tuple[int, int]] = set()
+    for entry in run.entries():
+        if entry.kind == "snapshot":
+            snapshots[entry.slot] = entry.kept
+        elif entry.kind == "status":
+            _note(entry, sent, running)
+        elif entry.kind == "taken":
+            named = list(requests.of(entry))
+            first = named[0] if named else ("", -1, 0)
+            is_start = entry.iteration >= since and entry.iteration in begun and not running
+            if is_start and (first[0] == "reset" or first[:2] in _restores(snapshots)):
+                return Start(entry.iteration, entry.number, first[0], snapshots)
+            sent.update((entry.lane, number) for _, _, number in named)
+    return None
+
+
+def _restores(snapshots: dict[int, bytes]) -> list[tuple[str, int]]:
+    return [("restore", slot) for slot in snapshots]
+
+
+def _note(
+    entry: _core.JournalEntry, sent: set[tuple[int, int]], running: set[tuple[int, int]]
+) -> None:
+    key = (entry.lane, entry.id)
+    if entry.status == "active" and key in sent:
+        running.add(key)
+    elif entry.status != "active":
+        running.discard(key)
+        sent.discard(key)
+
+
+def times_from(times: np.ndarray[Any, Any], start: Start, first: int, period: int) -> Any:
+    """The times of a block of rows, and before the first row of a later start one more: that of the
+    row that shows the robot before it."""
+    if first != start.row or start.row == 0:
+        return np.ascontiguousarray(times)
+    return np.concatenate([times[:1] - period, times])
