@@ -2,6 +2,7 @@
 
 import random
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -94,7 +95,7 @@ HEAP = """
     ],
 )
 def test_a_replay_begins_with_a_reset_or_a_snapshot(
-    model: str, options: dict[str, str], tmp_path: Path
+    model: str, options: dict[str, Any], tmp_path: Path
 ) -> None:
     choose = random.Random(6)
     path = MODELS / model if model.endswith(".xml") else tmp_path / "heap.xml"
