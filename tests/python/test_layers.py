@@ -9,6 +9,9 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 LAYERS = ("base", "describe", "memory", "control", "runtime", "robot")
 INCLUDE = re.compile(r'^#include "(?:o80/)?(\w+)/', re.MULTILINE)
+CAST = re.compile(r"\bcast<(.*?)>\(")
+CASTER = re.compile(r"std::(string|string_view|vector|optional|pair|tuple|shared_ptr|array)\b")
+INCLUDED_CASTER = re.compile(r"#include <nanobind/stl/(\w+)\.h>")
 PUBLIC = re.compile(r'^#include "(o80/.*)"', re.MULTILINE)
 
 
@@ -68,3 +71,15 @@ def test_every_public_header_is_reached_from_the_umbrella() -> None:
     public = {str(file.relative_to(ROOT / "include")) for file in (ROOT / "include").rglob("*.hpp")}
 
     assert public == reached_from("o80/o80.hpp")
+
+
+@pytest.mark.parametrize(
+    "file", sorted((ROOT / "python" / "bindings").glob("*.cpp")), ids=lambda file: file.name
+)
+def test_a_binding_includes_the_casters_that_it_uses(file: Path) -> None:
+    # without its caster, a cast compiles to a throw of std::bad_cast, and the linker may take that
+    # copy of the function for all other files
+    text = file.read_text()
+    used = {word for cast in CAST.findall(text) for word in CASTER.findall(cast)}
+
+    assert used <= set(INCLUDED_CASTER.findall(text))
