@@ -76,6 +76,8 @@ Iteration HistoryReader::begun() const noexcept {
 }
 
 bool HistoryReader::is_damaged() const noexcept {
+  // a row beyond all that a backend can write would be waited for without end
+  if (counters_->published.load(std::memory_order_relaxed) > kFarthest) return true;
   // `begun` is at most one row ahead of `published`; compare them only while `published` is stable
   for (int i = 0; i < kReadings; ++i) {
     const Iteration before = published();

@@ -5,12 +5,17 @@
 
 #include <atomic>
 #include <cmath>
+#include <cstddef>
+#include <fstream>
+#include <limits>
 #include <random>
 #include <thread>
+#include <vector>
 
 #include "control/batch_builder.hpp"
 #include "memory/child_process.hpp"
 #include "memory/lane.hpp"
+#include "memory/segment_name.hpp"
 #include "runtime/liar.hpp"
 #include "runtime/shared_scene.hpp"
 #include "runtime/station.hpp"
@@ -53,6 +58,40 @@ void scribble_until_over(const SharedScene& scene, std::uint64_t seed,
     const Iteration now = published;
     if (random() % 2 == 0) continue;
     while (published == now && !scene->over) std::this_thread::yield();
+  }
+}
+
+TEST_F(HostileTest, EveryReadOfDamagedCountersEnds) {
+  Station station;
+  station.start();
+  station.run(20);
+  UntypedFrontend reader("pair", {.access = Access::read_only});
+  std::fstream file(segment_path("pair"), std::ios::binary | std::ios::in | std::ios::out);
+  const auto put = [&](std::size_t counter, Iteration value) {
+    file.seekp(
+        static_cast<std::streamoff>(reader.link()->segment.view().offsets.counters + counter));
+    file.write(reinterpret_cast<const char*>(&value), sizeof value).flush();
+  };
+  constexpr Iteration kFar = Iteration{1} << 60;
+  constexpr Iteration kValues[] = {
+      std::numeric_limits<Iteration>::min(), -1, 0, 7, kFar - 1, kFar, kFar + 1,
+      std::numeric_limits<Iteration>::max()};
+  std::vector<std::byte> row(reader.layout().size);
+  for (const Iteration begun : kValues) {
+    for (const Iteration published : kValues) {
+      for (const Iteration first : kValues) {
+        put(offsetof(Counters, begun), begun);
+        put(offsetof(Counters, published), published);
+        put(offsetof(Counters, first), first);
+        Iteration position = 0;
+        for (int i = 0; i < 4; ++i) {
+          try {
+            reader.wait_for_next(position, row.data(), kAtOnce);
+          } catch (const Error&) {
+          }
+        }
+      }
+    }
   }
 }
 
