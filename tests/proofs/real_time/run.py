@@ -29,6 +29,8 @@ LEFT_OUT = (
     "InlineRobotTest.LetsOthersWatchAndCommand",
     "InlineRobotTest.LeavesTheRestOfABurstThatItsCallerCuts",
     "InlineRobotTest.WaitsForNothingOfItsOwn",
+    "GroupEqualityTest.HoldsForTheBundledRobot",
+    "RobotProvenanceTest.OfARobotSaysHowToStartItAgain",
     # a compiler, and Python
     "Describe.Refuses*WhenItIsCompiled",
     "Json.*",
