@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from o80 import _core
 from o80.errors import InvalidArgument
-from o80.trajectory import states_from
+from o80.prepared_burst import fill_targets
 
 #: Numbers of copies, each once, or a mask with a bool for each copy; None: all of them.
 Copies = ArrayLike | None
@@ -52,16 +52,7 @@ class GroupBurst:
 
     @targets.setter
     def targets(self, values: ArrayLike) -> None:
-        wanted = self._targets.dtype
-        given = np.asarray(values) if wanted.names is None else states_from(values, wanted)
-        if given.shape != self._targets.shape:
-            raise InvalidArgument(
-                f"targets must have the shape (copies, steps, actuators) = {self._targets.shape}, "
-                f"got {given.shape}"
-            )
-        if wanted.names is None and not np.can_cast(given.dtype, wanted, "same_kind"):
-            raise InvalidArgument(f"targets must have dtype {wanted}, got {given.dtype}")
-        self._targets[...] = given
+        fill_targets(self._targets, values, "(copies, steps, actuators)")
 
     @property
     def rows(self) -> NDArray[Any]:

@@ -12,14 +12,14 @@ from __future__ import annotations
 import contextlib
 import warnings
 from collections.abc import Mapping, Sequence
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from o80 import _core, at_exit
 from o80.checked import whole
+from o80.closeable import Closeable
 from o80.errors import InvalidArgument, UsedAfterFork
 from o80.frontend import Frontend
 from o80.gather import Comparison, Gather, Gathered, flags_from, numbers_from
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 __all__ = ["Gather", "Gathered", "GroupBurst", "InlineGroup"]
 
 
-class InlineGroup:
+class InlineGroup(Closeable):
     """Copies of one robot in this process; made by `Robot.inline(copies=...)`.
 
     Each copy does what a single inline robot does, bit for bit, with any number of threads. A call
@@ -188,9 +188,6 @@ class InlineGroup:
             frontend.close()
         self._group.close()
 
-    def _close_at_exit(self) -> None:
-        self.close()
-
     def __del__(self) -> None:
         if self.__dict__.get("_closed", True):
             return
@@ -226,17 +223,6 @@ class InlineGroup:
                     if known["name"] == field:
                         return len(known["shape"])
         return 0  # C++ says what is unknown
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def __repr__(self) -> str:
         state = "closed" if self._closed else f"{self.threads} threads"

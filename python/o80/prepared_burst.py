@@ -51,16 +51,7 @@ class PreparedBurst:
 
     @targets.setter
     def targets(self, values: ArrayLike) -> None:
-        wanted = self._targets.dtype
-        given = np.asarray(values) if wanted.names is None else states_from(values, wanted)
-        if given.shape != self._targets.shape:
-            raise InvalidArgument(
-                f"targets must have the shape (steps, actuators) = {self._targets.shape}, "
-                f"got {given.shape}"
-            )
-        if wanted.names is None and not np.can_cast(given.dtype, wanted, "same_kind"):
-            raise InvalidArgument(f"targets must have dtype {wanted}, got {given.dtype}")
-        self._targets[...] = given
+        fill_targets(self._targets, values, "(steps, actuators)")
 
     @property
     def rows(self) -> NDArray[Any]:
@@ -84,3 +75,19 @@ class PreparedBurst:
 def checked_count(count: int, name: str) -> int:
     """At least 1. Raises InvalidArgument."""
     return whole(count, f"{name} of a burst", 1)
+
+
+def fill_targets(targets: NDArray[Any], values: ArrayLike, axes: str) -> None:
+    """Copies values into the targets of a prepared burst. axes: for an error, as "(steps, ...)".
+
+    Raises InvalidArgument.
+    """
+    wanted = targets.dtype
+    given = np.asarray(values) if wanted.names is None else states_from(values, wanted)
+    if given.shape != targets.shape:
+        raise InvalidArgument(
+            f"targets must have the shape {axes} = {targets.shape}, got {given.shape}"
+        )
+    if wanted.names is None and not np.can_cast(given.dtype, wanted, "same_kind"):
+        raise InvalidArgument(f"targets must have dtype {wanted}, got {given.dtype}")
+    targets[...] = given

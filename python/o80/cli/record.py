@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-import signal
 import sys
 import time
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from o80.cli.screen import complain
+from o80.cli.stop_request import StopRequest
 
 if TYPE_CHECKING:
     from o80.recording.recorder import Recorder
@@ -81,7 +80,7 @@ def record(
     from o80.recording.recorder import Recorder
 
     most = _size(size)
-    end = _Stop()
+    end = StopRequest()
     recorder = Recorder(output, names, proceed=proceed, whole=whole, split=split)
     report = _Report(recorder)
     begin = time.monotonic()
@@ -101,23 +100,6 @@ def record(
     finally:
         recorder.finish()
     report.show(last=True)
-
-
-class _Stop:
-    """Ctrl-C and SIGTERM end a recording in order."""
-
-    def __init__(self) -> None:
-        self.requested = False
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            signal.signal(number, self._request)
-
-    def _request(self, _number: int, _frame: FrameType | None) -> None:
-        self.requested = True
-
-    def wait(self, seconds: float) -> None:
-        end = time.monotonic() + seconds
-        while not self.requested and (left := end - time.monotonic()) > 0:
-            time.sleep(min(left, 0.05))
 
 
 class _Report:

@@ -6,12 +6,12 @@ import threading
 import time
 from collections.abc import Mapping, Sequence
 from types import TracebackType
-from typing import Self
 
 import numpy as np
 
 from o80 import _core, at_exit
 from o80.checked import whole
+from o80.closeable import Closeable
 from o80.errors import InvalidArgument
 from o80.extras import needed
 from o80.playing.player import Player
@@ -20,14 +20,33 @@ from o80.playing.track import Part, Track
 NEVER = 2**62  # later than any time [ns]
 
 
-class Playback:
+class Playback(Closeable):
     """Segments of a recording that are played until the end of its `with` block.
 
     with o80.play("run.mcap", prefix="old-"):
         arm = o80.Frontend("old-arm")
 
     Readers see what they saw when it was recorded; commands, requests and halts are refused.
-    See o80.play for the arguments.
+    `o80.play` is another name of this class.
+
+    segments: names of the segments to play (None: all).
+    speed: 0.5 is half as fast as recorded; math.inf is as fast as it can be.
+    bursts: rows are published when a frontend requests iterations, as by a bursting robot.
+    loop: begin again after the last row, as a robot that is restarted.
+    begin, end: play only this part, in seconds since the first row of the recording.
+    prefix: put before the names of the segments, for example if the robots run.
+    names: a mapping from recorded names to others.
+    history: rows that each segment keeps (None: all of a run, 64 MiB at most).
+    permission: as for `o80.robots.Robot.start`; commands are refused in any case.
+    hold: keep the segments after the last row until `close` (None: if speed is math.inf). By bursts
+        a run ends when a frontend requests more iterations than it has.
+
+    At speed 1 the rows of robots in real time get new times, by one constant, so that each row
+    has the time at which it is published; their ages and rates are right. In all other
+    cases rows are exactly as recorded, and their clock counts as simulated.
+
+    It runs in a thread. Raises RecordingError, InvalidArgument, SegmentTaken if a living robot has
+    the name, or if it leads to the last rows of one that was killed.
     """
 
     def __init__(
@@ -127,21 +146,15 @@ class Playback:
             self._thread.join()
         self._end_all()
 
-    def __enter__(self) -> Self:
-        return self
-
     def __exit__(
         self,
         kind: type[BaseException] | None,
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self.close()
+        super().__exit__(kind, error, trace)
         if error is None and self._failure is not None:
             raise self._failure
-
-    def _close_at_exit(self) -> None:
-        self.close()
 
     # ------------------------------------------------------------------ the thread
 
@@ -273,53 +286,4 @@ def _check(speed: float, begin: float, end: float | None, history: int | None) -
         whole(history, "history", 1)
 
 
-def play(
-    path: str | os.PathLike[str],
-    segments: str | Sequence[str] | None = None,
-    *,
-    speed: float = 1.0,
-    bursts: bool = False,
-    loop: bool = False,
-    begin: float = 0.0,
-    end: float | None = None,
-    prefix: str = "",
-    names: Mapping[str, str] | None = None,
-    history: int | None = None,
-    permission: int = 0o600,
-    hold: bool | None = None,
-) -> Playback:
-    """Plays a recording: puts its segments back into shared memory, as if the robots ran again.
-
-    segments: names of the segments to play (None: all).
-    speed: 0.5 is half as fast as recorded; math.inf is as fast as it can be.
-    bursts: rows are published when a frontend requests iterations, as by a bursting robot.
-    loop: begin again after the last row, as a robot that is restarted.
-    begin, end: play only this part, in seconds since the first row of the recording.
-    prefix: put before the names of the segments, for example if the robots run.
-    names: a mapping from recorded names to others.
-    history: rows that each segment keeps (None: all of a run, 64 MiB at most).
-    permission: as for `o80.robots.Robot.start`; commands are refused in any case.
-    hold: keep the segments after the last row until `close` (None: if speed is math.inf). By bursts
-        a run ends when a frontend requests more iterations than it has.
-
-    At speed 1 the rows of robots in real time get new times, by one constant, so that each row
-    has the time at which it is published; their ages and rates are right. In all other
-    cases rows are exactly as recorded, and their clock counts as simulated.
-
-    Runs in a thread. Raises RecordingError, InvalidArgument, SegmentTaken if a living robot has
-    the name, or if it leads to the last rows of one that was killed.
-    """
-    return Playback(
-        path,
-        segments,
-        speed=speed,
-        bursts=bursts,
-        loop=loop,
-        begin=begin,
-        end=end,
-        prefix=prefix,
-        names=names,
-        history=history,
-        permission=permission,
-        hold=hold,
-    )
+play = Playback

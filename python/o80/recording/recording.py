@@ -3,10 +3,10 @@
 import os
 import threading
 from collections.abc import Sequence
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from o80.at_exit import close_later
+from o80.closeable import Closeable
 from o80.errors import Closed
 from o80.frontend import Frontend
 from o80.recording.recorder import Recorder
@@ -14,7 +14,7 @@ from o80.recording.recorder import Recorder
 BETWEEN_POLLS = 0.05  # [s]
 
 
-class Recording:
+class Recording(Closeable):
     """Records rows and journals of segments in a thread while its `with` block runs.
 
     with o80.Recording("run.mcap", [arm, "ball"]) as recording:
@@ -96,20 +96,6 @@ class Recording:
             self._recorder.finish()
         if self._failure is not None:
             raise self._failure
-
-    def _close_at_exit(self) -> None:
-        self.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _check(self) -> None:
         if self._closed:

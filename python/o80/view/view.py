@@ -8,11 +8,11 @@ import sys
 import time
 from collections.abc import Iterable
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 from weakref import WeakSet
 
 from o80 import at_exit
+from o80.closeable import Closeable
 from o80.errors import Error, InvalidArgument, TimeoutError
 from o80.frontend import Frontend
 from o80.recording.reader import RecordingFile
@@ -24,7 +24,7 @@ STARTS_WITHIN = 30.0  # [s]
 What = str | Path | Frontend | RecordingFile
 
 
-class View:
+class View(Closeable):
     """A page in the browser that shows robots and recordings: `o80 view` for programs.
 
     what: names of segments, patterns such as "arm*", paths of recordings (.mcap), frontends, or
@@ -106,20 +106,6 @@ class View:
             if pipe is not None:
                 pipe.close()
         self._popen.returncode = 0
-
-    def _close_at_exit(self) -> None:
-        self.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def __repr__(self) -> str:
         return f"<o80.View on port {self.port}, {'open' if self.alive else 'closed'}>"
