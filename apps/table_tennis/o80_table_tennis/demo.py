@@ -2,7 +2,7 @@
 
 Starts the arm in real time (500 Hz, a process of its own), its simulated twin (bursting, another
 one) and an environment between them, plays episodes, then plays accelerated, as processes and
-inline. Prints rates, lateness and hits; writes a recording, plots, a film and a report.
+inline. Prints rates, lateness and returns; writes a recording, plots, a film and a report.
 """
 
 from __future__ import annotations
@@ -80,10 +80,10 @@ def run_demo(settings: DemoSettings, console: Console) -> Report:
             episodes = settings.episodes_of(pacing)
             if episodes == 0:
                 continue
-            bar = progress.add_task(pacing.value, total=episodes, hits="0 hits")
+            bar = progress.add_task(pacing.value, total=episodes, returns="0 returned")
             modes[pacing] = _play_mode(settings, pacing, available, _advance(progress, bar))
 
-        bar = progress.add_task("plots and film", total=1, hits="")
+        bar = progress.add_task("plots and film", total=1, returns="")
         report = write_report(
             settings.output,
             modes,
@@ -126,7 +126,7 @@ def _progress(console: Console) -> Progress:
         TextColumn("{task.description:>16}"),
         BarColumn(bar_width=30),
         MofNCompleteColumn(),
-        TextColumn("{task.fields[hits]}"),
+        TextColumn("{task.fields[returns]}"),
         TimeElapsedColumn(),
         console=console,
     )
@@ -134,12 +134,12 @@ def _progress(console: Console) -> Progress:
 
 def _advance(progress: Progress, bar: Any) -> Callable[[EpisodeSummary], None]:
     """Moves a bar on by an episode."""
-    hits = 0
+    returns = 0
 
     def advance(summary: EpisodeSummary) -> None:
-        nonlocal hits
-        hits += summary.returned
-        progress.update(bar, advance=1, hits=f"{hits} hits")
+        nonlocal returns
+        returns += summary.returned
+        progress.update(bar, advance=1, returns=f"{returns} returned")
 
     return advance
 
@@ -158,10 +158,10 @@ def main(
     seed: Annotated[int, typer.Option(min=0, help="Of the environments.")] = 1,
     extra_balls: Annotated[int, typer.Option(min=0, help="Balls beside the one played.")] = 0,
     muscle: Annotated[str, typer.Option(help="Model of the muscles: linear or hill.")] = "linear",
-    film: Annotated[bool, typer.Option(help="Draw a film of a hit.")] = True,
+    film: Annotated[bool, typer.Option(help="Draw a film of a return.")] = True,
     output: Annotated[Path, typer.Option(help="Folder that is written.")] = Path("build/demo"),
 ) -> None:
-    """Plays table tennis in real time, then accelerated, and reports rates, lateness and hits."""
+    """Plays table tennis in real time, then accelerated; reports rates, lateness and returns."""
     signal.signal(signal.SIGTERM, _end_in_order)
     console = Console()
     settings = DemoSettings(

@@ -46,7 +46,6 @@ Info = dict[str, Any]
 Outcome = tuple[Float32Array, float, bool, bool, Info]
 
 SEEDS = 2**32
-STALLED = "stalled"
 
 
 class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
@@ -56,11 +55,11 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
     defines observation and reward. By default observations are a Box of 22 numbers (see
     `task.observations`), clipped into named bounds, and the reward is paid in the last step.
 
-    `info` holds the entries of the task (with a ball `hit`: the racket has touched the ball, and
-    `smallest_distance` of the surfaces of ball and racket so far [m]), `stalled` (real time: the
-    caller paused for so long that the episode was given up), `end` (why the episode ended,
-    "running" before), and with extra balls `virtual`: `observations` (N, M), `rewards` (N,),
-    `hits` (N,), `ended` (N,), and `balls` (N,), their numbers.
+    `info` holds the entries of the task (with a ball `touched`, `returned`, `landing`, `distance`,
+    see `task.outcome`, and `smallest_distance` of the surfaces of ball and racket so far [m]),
+    `stalled` (real time: the caller paused for so long that the episode was given up), `end` (why
+    the episode ended, a number of `End`) and its `end_text`, and with extra balls `virtual`, see
+    `rig.virtual_balls`.
 
     `options` of `reset`: `ball`, the number of the ball to be played (else drawn from the seed), or
     `flight`, a SampledFlight of the caller's own. `statistics()` tells rates and lateness.
@@ -211,31 +210,29 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
             self._display.after_step()
         if end is End.RUNNING:
             return observation, reward, False, False, info
-        self._finish(end.text, terminated=end.terminated)
+        self._finish(end)
         return observation, reward, end.terminated, end.truncated, info
 
     def _stall(self) -> Outcome:
         """The arm has moved on too far for the twin to follow: the episode is given up."""
         self._counts.stalled_episodes += 1
-        self._finish(STALLED, terminated=False)
+        self._finish(End.STALLED)
         observation = self._box.clip(self._task.observe(self._state))
-        info = self._task.info(self._state) | {"stalled": True, "end": STALLED}
-        return observation, 0.0, False, True, info
+        return observation, 0.0, False, True, self._info(self._state, End.STALLED)
 
-    def _finish(self, end: str, *, terminated: bool) -> None:
+    def _finish(self, end: End) -> None:
         """The episode is over: its summary, its mark in the recording."""
         self._over = True
         self._counts.episodes += 1
         self._counts.seconds += time.monotonic() - self._first_step_at
-        self._summary = EpisodeSummary(
+        self._summary = EpisodeSummary.of(
+            self._state.record,
             number=self._episode,
             ball=self._drawn.numbers[0],
             steps=self._steps,
             reward=self._paid,
-            hit=bool(self._state.record.touched),
-            returned=bool(self._state.record.flew_back),
-            terminated=terminated,
-            end=end,
+            terminated=end.terminated,
+            end=end.text,
             arm_first=self._arm_first,
             arm_last=self._rig.row,
             twin_first=self._twin_first,
@@ -256,8 +253,8 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
 
     def _info(self, state: State, end: End) -> Info:
         info = self._task.info(state)
-        info["stalled"] = False
-        info["end"] = end.text
+        info["stalled"] = end is End.STALLED
+        info["end"], info["end_text"] = int(end), end.text
         if self._rig_settings.extra_balls:
             info["virtual"] = self._virtual.look(state, over=end is not End.RUNNING)
         return info

@@ -43,7 +43,7 @@ class Score:
     """How well some parameters played."""
 
     mean_reward: float
-    hits: int
+    returns: int
     episodes: int
 
 
@@ -96,7 +96,7 @@ def scoring(environment: TableTennisEnvironment, balls: Sequence[int], seed: int
         policy = HittingPolicy(with_parameters(HittingSettings(), parameters))
         played = play(environment, policy, balls, seed=seed)
         mean = float(np.mean([episode.reward for episode in played.episodes]))
-        return Score(mean_reward=mean, hits=played.hits, episodes=len(balls))
+        return Score(mean_reward=mean, returns=played.returns, episodes=len(balls))
 
     return score
 
@@ -115,15 +115,16 @@ def main(
 
     def tell(number: int, child: Score, best: Score) -> None:
         print(
-            f"{number + 1:4d}: reward {child.mean_reward:.4f}, {child.hits} hits; "
-            f"best {best.mean_reward:.4f}, {best.hits} of {best.episodes} hits",
+            f"{number + 1:4d}: reward {child.mean_reward:.4f}, {child.returns} returned; "
+            f"best {best.mean_reward:.4f}, {best.returns} of {best.episodes} returned",
             flush=True,
         )
 
     path = None if balls is None else str(balls)
     available = len(balls_from(path))
     numbers = [available * number // episodes for number in range(episodes)]
-    task = TaskSettings(balls=path, factor=HittingSettings().factor)
+    # by the published reward, with which the numbers of the file were found
+    task = TaskSettings(balls=path, factor=HittingSettings().factor, reward="published")
     with TableTennisEnvironment(task=task) as environment:
         score = scoring(environment, numbers, seed)
         parameters, best = search(score, candidates=candidates, seed=seed, after_each=tell)
@@ -133,7 +134,7 @@ def main(
         command=command,
         parameters=parameters,
         mean_reward=best.mean_reward,
-        hits=best.hits,
+        returns=best.returns,
         episodes=best.episodes,
     ).save(output)
     print(f"written: {output}")

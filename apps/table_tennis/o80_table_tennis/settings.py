@@ -15,7 +15,7 @@ from .task.ball_play import HitTask, ReturnTask, SmashTask
 from .task.end import EndRule
 from .task.observations import ObservationBounds
 from .task.reach import ReachTask
-from .task.rewards import RewardRule
+from .task.rewards import RewardRule, reward_rule
 from .task.task import Task, missing_members
 from .world.timing import ITERATIONS, PERIOD
 
@@ -118,8 +118,8 @@ class TaskSettings:
     """Of the observation of the named tasks with a ball."""
     end: EndRule = field(default_factory=EndRule)
     """Of an episode of the named tasks."""
-    reward: RewardRule = field(default_factory=RewardRule)
-    """Of the named tasks with a ball."""
+    reward: str | RewardRule = "ordered"
+    """Of the named tasks with a ball: ordered, published, or a rule of `task.rewards`."""
     most_late: int = 20
     """Rows of lateness above which an episode is given up as stalled, real time."""
 
@@ -134,6 +134,7 @@ class TaskSettings:
                 f"delay must lie between 0 and {ITERATIONS - 1} iterations, so that an action acts "
                 f"within its step, got {self.delay}"
             )
+        reward_rule(self.reward)
         task: object = self.task
         if isinstance(self.task, str):
             if self.task not in TASKS:
@@ -152,9 +153,9 @@ class TaskSettings:
 
 
 TASKS: Mapping[str, Callable[[TaskSettings], Task]] = {
-    "return": lambda s: ReturnTask(s.bounds, s.end, s.reward),
-    "smash": lambda s: SmashTask(s.bounds, s.end, s.reward),
-    "hit": lambda s: HitTask(s.bounds, s.end, s.reward),
+    "return": lambda s: ReturnTask(s.bounds, s.end, reward_rule(s.reward)),
+    "smash": lambda s: SmashTask(s.bounds, s.end, reward_rule(s.reward)),
+    "hit": lambda s: HitTask(s.bounds, s.end, reward_rule(s.reward)),
     "reach": lambda s: ReachTask(most_steps=s.end.most_steps),
 }
 """The tasks with a name."""

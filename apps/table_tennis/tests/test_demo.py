@@ -72,7 +72,7 @@ def test_accelerated_is_faster_than_real_time(report: dict[str, Any]) -> None:
 
 
 def test_processes_and_inline_played_the_same(report: dict[str, Any]) -> None:
-    told = ("hits", "touches", "mean_reward", "best_reward", "steps")
+    told = ("returned", "touched", "mean_reward", "best_reward", "steps")
     processes, inline = report["modes"]["processes"], report["modes"]["inline"]
     assert [processes[key] for key in told] == [inline[key] for key in told]
 

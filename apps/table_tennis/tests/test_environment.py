@@ -12,7 +12,7 @@ from o80_table_tennis.balls.sources import balls_from
 from o80_table_tennis.environment import TableTennisEnvironment
 from o80_table_tennis.settings import Pacing, TaskSettings
 from o80_table_tennis.task.actions import COARSE, changed_pressures
-from o80_table_tennis.task.end import EndRule
+from o80_table_tennis.task.end import End, EndRule
 from o80_table_tennis.world.arm import MUSCLES
 from o80_table_tennis.world.timing import ITERATIONS
 
@@ -97,14 +97,15 @@ def test_a_missed_ball_costs_how_far_it_was_missed(inline: TableTennisEnvironmen
 
     assert [reward for _, reward, *_ in steps[:-1]] == [0.0] * (len(steps) - 1)
     _, reward, terminated, truncated, info = steps[-1]
-    assert (terminated, truncated, info["hit"]) == (True, False, False)
+    assert (terminated, truncated, info["touched"]) == (True, False, False)
     assert reward == -info["smallest_distance"] < 0
-    assert info["end"] in ("passed", "floor")
+    assert info["end"] in (End.PASSED, End.FLOOR)
+    assert info["end_text"] in ("passed", "floor")
     distances = [info["smallest_distance"] for *_, info in steps]
     assert distances == sorted(distances, reverse=True)
 
 
-def test_an_episode_out_of_steps_is_truncated_and_paid() -> None:
+def test_an_episode_out_of_steps_is_truncated_and_paid_nothing() -> None:
     task = TaskSettings(end=EndRule(most_steps=12))
     with closing(opened(task=task)) as environment:
         environment.reset(seed=1)
@@ -112,8 +113,8 @@ def test_an_episode_out_of_steps_is_truncated_and_paid() -> None:
 
         _, reward, terminated, truncated, info = steps[-1]
         assert (len(steps), terminated, truncated) == (12, False, True)
-        assert info["end"] == "out of steps"
-        assert reward == -info["smallest_distance"]
+        assert (info["end"], info["end_text"]) == (End.OUT_OF_STEPS, "out of steps")
+        assert reward == 0.0 < info["smallest_distance"]
 
 
 def test_the_seed_chooses_the_ball_and_so_do_the_options(inline: TableTennisEnvironment) -> None:
@@ -153,7 +154,8 @@ def test_extra_balls_are_judged_as_if_each_were_played_alone() -> None:
                 _, reward, terminated, _, info = alone.step(actions[step])
             assert terminated
             assert reward == pytest.approx(paid[ball], abs=1e-6)
-            assert info["hit"] == virtual["hits"][ball]
+            assert info["touched"] == virtual["touched"][ball]
+            assert info["returned"] == virtual["returned"][ball]
 
 
 @pytest.mark.parametrize("pacing", ALL_MODES)

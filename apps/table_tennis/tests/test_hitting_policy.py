@@ -81,4 +81,4 @@ def test_most_balls_are_hit_and_fly_back() -> None:
     finally:
         environment.close()
     assert len(played.episodes) == count
-    assert played.hits >= count / 2
+    assert played.returns >= count / 2

@@ -105,7 +105,7 @@ def test_a_ball_leaves_the_racket_alike() -> None:
     policy, task = default_policy(), TaskSettings(factor=COARSE)
     with TableTennisEnvironment(task=task) as environment:
         observation, info = environment.reset(seed=1)
-        while not info["hit"]:
+        while not info["touched"]:
             observation, *_, info = environment.step(policy.act(observation))
         record: Any = environment.rig.twins[0].all_records[0]["racket"]
         # the spin before the touch is the one that was imposed in that iteration

@@ -1,88 +1,149 @@
-"""The reward of an episode of ball play, of one or of many."""
+"""The reward of an episode of ball play, of one or of many, and the order of what it pays."""
 
 import math
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
+from ball_records import landing_at, stacked, state_of, states
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from o80_table_tennis.settings import TaskSettings
+from o80_table_tennis.task.ball_play import ReturnTask, SmashTask
 from o80_table_tennis.task.ball_record import BallRecord
-from o80_table_tennis.task.rewards import RewardRule
+from o80_table_tennis.task.end import End, terminated
+from o80_table_tennis.task.outcome import returned
+from o80_table_tennis.task.rewards import REWARDS, OrderedReward, PublishedReward
+from o80_table_tennis.task.state import State
+from o80_table_tennis.world.table import NET_Y, TABLE
 
-RULE = RewardRule()
-TARGET = np.array(RULE.target)
-MISSED = BallRecord(0.35)
-TOUCHED = BallRecord(0.0, touched=True, largest_speed=9.0)
-
-
-def landing_at(x: float, y: float, largest_speed: float = 5.0) -> BallRecord:
-    return BallRecord(
-        0.0, touched=True, landed=True, landing=(x, y, 0.795), largest_speed=largest_speed
-    )
+ORDERED, PUBLISHED = OrderedReward(), PublishedReward()
+TARGET = np.array(ORDERED.target)
+MISSED = state_of(BallRecord(0.35))
+TOUCHED = state_of(BallRecord(0.0, touched=True, largest_speed=9.0, touched_floor=True))
 
 
-def stacked(records: list[BallRecord]) -> BallRecord:
-    """Many records as one."""
-    names = BallRecord.__slots__
-    return BallRecord(*(np.array([getattr(one, name) for one in records]) for name in names))
+def kind(state: State) -> int:
+    """0: a miss, 1: a touch without a return, 2: a return."""
+    return int(bool(state.record.touched)) + int(bool(returned(state.record)))
 
 
-def test_without_a_touch_the_reward_is_minus_the_smallest_distance() -> None:
-    assert RULE.returned(MISSED, TARGET) == -0.35
-    assert RULE.smashed(MISSED, TARGET) == -0.35
-    assert RULE.touched(MISSED) == -0.35
+@settings(deadline=None)
+@given(
+    many=st.lists(states(), min_size=10, max_size=20),
+    task=st.sampled_from([ReturnTask(), SmashTask()]),
+)
+def test_any_miss_earns_less_than_any_touch_and_any_touch_less_than_any_return(
+    many: list[State], task: ReturnTask
+) -> None:
+    ended = [state for state in many if terminated(task.end(state))]
+    paid = [[task.reward(state) for state in ended if kind(state) == each] for each in range(3)]
+    for worse, better in ((0, 1), (1, 2), (0, 2)):
+        assert max(paid[worse], default=-math.inf) < min(paid[better], default=math.inf)
 
 
-def test_a_touch_alone_is_worth_one_where_only_touches_count() -> None:
-    assert RULE.touched(TOUCHED) == 1.0
+@settings(deadline=None)
+@given(state=states())
+def test_each_kind_has_its_own_range(state: State) -> None:
+    low, high = [(-1.5, 0.0), (0.0, 0.5), (1.0, 2.0)][kind(state)]
+    assert low <= ORDERED.returned(state) <= high
+    assert (ORDERED.returned(state) == 0.0) <= (state.record.smallest_distance == 0.0)
 
 
-def test_a_landing_on_the_target_is_worth_one() -> None:
-    assert RULE.returned(landing_at(0.0, 2.5), TARGET) == 1.0
+@settings(deadline=None)
+@given(many=st.lists(states(), min_size=1, max_size=20), rule=st.sampled_from(list(REWARDS)))
+def test_many_episodes_are_judged_and_paid_as_each_alone_bit_for_bit(
+    many: list[State], rule: str
+) -> None:
+    for name in ("return", "smash", "hit"):
+        task, together = TaskSettings(task=name, reward=rule).made(), stacked(many)
+        for method in (task.end, task.reward):
+            np.testing.assert_array_equal(method(together), [method(one) for one in many])
+        assert method(together).dtype == np.float64
+        infos = task.info(together)
+        for key in infos:
+            alone = [task.info(one)[key] for one in many]
+            np.testing.assert_array_equal(infos[key], alone)
+            assert np.asarray(infos[key]).dtype == np.array(alone).dtype
+
+
+@settings(deadline=None)
+@given(state=states())
+def test_info_has_the_same_keys_and_types_in_every_state(state: State) -> None:
+    info = ReturnTask().info(state)
+    assert {key: type(value) for key, value in info.items()} == {
+        "touched": bool,
+        "returned": bool,
+        "landing": np.ndarray,
+        "distance": float,
+        "smallest_distance": float,
+    }
+    assert (info["landing"].shape, info["landing"].dtype) == ((3,), np.float64)
+    assert math.isfinite(info["distance"]) == bool(state.record.landed)
+    assert info["returned"] <= info["touched"]
+    assert info["returned"] == (ReturnTask().end(state) == End.RETURNED)
+
+
+def test_a_ball_that_is_missed_costs_how_far_and_no_more_than_a_metre_and_a_half() -> None:
+    far = state_of(BallRecord(4.0))
+    assert [ORDERED.returned(each) for each in (MISSED, far)] == [-0.35, -1.5]
+    assert [ORDERED.touched(each) for each in (MISSED, far)] == [-0.35, -1.5]
+    assert [PUBLISHED.returned(each) for each in (MISSED, far)] == [-0.35, -4.0]
+
+
+def test_a_touch_earns_more_the_nearer_to_the_target_the_ball_ended_whatever_it_met() -> None:
+    def touched(**ends: Any) -> BallRecord:
+        return BallRecord(0.0, touched=True, **ends)
+
+    behind = state_of(touched(), ball=(0.0, -0.9, 1.0, 0.0, -1.0, 0.0))
+    own_half = state_of(touched(landed=True, landing=(0.0, 0.5, TABLE.top)))
+    net = state_of(touched(touched_net=True, net_position=(0.0, NET_Y - 0.03, 0.8)))
+    far_floor = state_of(touched(touched_floor=True, floor_position=(0.0, 3.2, 0.0)))
+    paid = [float(ORDERED.returned(each)) for each in (behind, own_half, net, far_floor)]
+    assert paid == sorted(paid)
+    assert paid == pytest.approx([0.5 / (1 + (d / 1.5) ** 2) for d in (3.4, 2.0, 0.96, 0.7)])
+    smashed = [float(ORDERED.smashed(each)) for each in (behind, own_half, net, far_floor)]
+    assert smashed == paid
+
+
+def test_a_return_earns_one_and_the_accuracy_of_its_landing() -> None:
+    paid = [float(ORDERED.returned(state_of(landing_at(0.0, y)))) for y in (2.5, 2.7, 2.0, 1.6)]
+    assert paid == pytest.approx([2.0, *(2 - (d / 3) ** 0.75 for d in (0.2, 0.5, 0.9))])
+    assert ORDERED.smashed(state_of(landing_at(0.0, 2.5, largest_speed=7.0))) == 8.0
+
+
+@pytest.mark.parametrize("seconds", [0, 1])
+def test_no_episode_is_paid_that_goes_on_or_is_truncated(seconds: int) -> None:
+    going_on = state_of(BallRecord(0.3), steps=299 + seconds)
+    assert ReturnTask().reward(going_on) == 0.0
+    assert ReturnTask().eventful(going_on) == bool(seconds)
+
+
+def test_the_published_rule_pays_a_ball_dropped_on_ones_own_half() -> None:
+    """The trap of the published rule, and why it is not the default."""
+    own_half, near_miss = state_of(landing_at(0.0, 1.5)), state_of(BallRecord(0.05))
+    assert PUBLISHED.returned(own_half) == pytest.approx(0.5613, abs=1e-4)
+    assert PUBLISHED.returned(TOUCHED) == -0.2 < PUBLISHED.returned(near_miss)
+    assert ORDERED.returned(near_miss) < ORDERED.returned(own_half) < 0.5
 
 
 @pytest.mark.parametrize(
     ("distance", "reward"), [(3.0, 0.0), (1.0, 0.561309), (0.1875, 0.875), (30.0, -0.2)]
 )
-def test_a_landing_is_worth_less_the_farther_it_is(distance: float, reward: float) -> None:
-    assert RULE.returned(landing_at(distance, 2.5), TARGET) == pytest.approx(reward, abs=1e-6)
+def test_the_published_rule_pays_a_landing_by_its_distance(distance: float, reward: float) -> None:
+    landed = state_of(landing_at(distance, 2.5))
+    assert PUBLISHED.returned(landed) == pytest.approx(reward, abs=1e-6)
+    smashed = max(7.0 * reward, -0.2)
+    fast = replace(landed, record=landing_at(distance, 2.5, largest_speed=7.0))
+    assert PUBLISHED.smashed(fast) == pytest.approx(smashed, abs=1e-5)
 
 
-def test_the_distance_is_measured_in_the_plane_of_the_table() -> None:
-    assert RULE.distance((0.3, 2.1, 9.0), TARGET) == pytest.approx(0.5)
-
-
-def test_a_touch_without_a_landing_is_worth_the_floor() -> None:
-    assert RULE.returned(TOUCHED, TARGET) == -0.2
-    assert RULE.smashed(TOUCHED, TARGET) == -0.2
-
-
-def test_a_smash_multiplies_by_the_largest_speed_and_keeps_the_floor() -> None:
-    assert RULE.smashed(landing_at(0.0, 2.5, largest_speed=7.0), TARGET) == 7.0
-    assert RULE.smashed(landing_at(3.5, 2.5, largest_speed=7.0), TARGET) == -0.2
-
-
-@settings(deadline=None)
-@given(x=st.floats(-5, 5), y=st.floats(-5, 8), speed=st.floats(0, 30))
-def test_a_touch_is_never_worth_less_than_the_floor(x: float, y: float, speed: float) -> None:
-    record = landing_at(x, y, largest_speed=speed)
-
-    assert -0.2 <= RULE.returned(record, TARGET) <= 1.0
-    assert -0.2 <= RULE.smashed(record, TARGET) <= max(speed, 1.0)
-
-
-def test_many_episodes_are_paid_as_each_alone_and_as_the_formula_says_bit_for_bit() -> None:
-    rng = np.random.default_rng(1)
-    records = [
-        landing_at(rng.uniform(-2, 4), rng.uniform(-2, 4), rng.uniform(0, 9)) for _ in range(200)
-    ]
-    records += [MISSED, TOUCHED]
-    for rule in (RULE.returned, RULE.smashed):
-        together = rule(stacked(records), np.tile(TARGET, (len(records), 1)))
-        np.testing.assert_array_equal(together, [rule(one, TARGET) for one in records])
-
-    distances = [math.dist(one.landing[:2], TARGET[:2]) for one in records[:200]]
-    terms = [max(1.0 - math.pow(d / 3.0, 0.75), -0.2) for d in distances]
-    together = RULE.returned(stacked(records[:200]), np.tile(TARGET, (200, 1)))
-    np.testing.assert_array_equal(together, terms)
+def test_an_unknown_rule_is_refused() -> None:
+    with pytest.raises(ValueError, match="unknown reward 'publshed'; there are: ordered, publish"):
+        TaskSettings(reward="publshed")
+    with pytest.raises(TypeError, match=r"or an object like .*OrderedReward\(\), got 3"):
+        TaskSettings(reward=3)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="or an object like"):
+        TaskSettings(reward=OrderedReward)  # type: ignore[arg-type]

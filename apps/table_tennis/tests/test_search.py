@@ -17,7 +17,7 @@ def score_of(parameters: Parameters) -> Score:
     """Best at the start, but for the flight, which should be longer."""
     start = start_parameters() | {"interception.flight": 0.6}
     miss = sum(((parameters[name] - start[name]) / SCALES[name]) ** 2 for name in SCALES)
-    return Score(mean_reward=-miss, hits=0, episodes=1)
+    return Score(mean_reward=-miss, returns=0, episodes=1)
 
 
 def test_it_finds_better_numbers() -> None:

@@ -8,6 +8,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+from ball_records import stacked
 from gymnasium.utils.env_checker import check_env
 
 import o80_table_tennis
@@ -16,7 +17,6 @@ from o80_table_tennis.players.policies import default_policy
 from o80_table_tennis.settings import TASKS, RigSettings, TaskSettings
 from o80_table_tennis.task.actions import COARSE
 from o80_table_tennis.task.ball_play import ReturnTask
-from o80_table_tennis.task.ball_record import BallRecord
 from o80_table_tennis.task.end import End, EndRule
 from o80_table_tennis.task.reach import ReachTask
 from o80_table_tennis.task.state import State
@@ -78,15 +78,15 @@ def test_a_smash_is_the_return_times_the_speed_of_the_ball() -> None:
     returned, _ = played("return")
     smashed, _ = played("smash")
     assert len(returned) == len(smashed)
-    assert 0.5 < returned[-1] <= 1.0
-    assert smashed[-1] > 3.0 * returned[-1]
+    assert 1.5 < returned[-1] <= 2.0
+    assert smashed[-1] - 1.0 > 3.0 * (returned[-1] - 1.0)
 
 
 def test_a_hit_ends_with_the_touch_and_is_worth_one() -> None:
     rewards, info = played("hit")
     returned, _ = played("return")
     assert rewards[-1] == 1.0
-    assert (info["hit"], info["end"]) == (True, "goal")
+    assert (info["touched"], info["end"], info["end_text"]) == (True, End.GOAL, "goal")
     assert len(rewards) < len(returned)
     rewards, info = played("hit", scripted=False, seed=2)
     assert rewards[-1] == -info["smallest_distance"]
@@ -102,33 +102,26 @@ def test_extra_balls_are_judged_by_the_task_too() -> None:
             observation, _, terminated, truncated, info = env.step(policy.act(observation))
             paid += info["virtual"]["rewards"]
             over = terminated or truncated
-    hits = info["virtual"]["hits"]
-    assert hits.any()
-    np.testing.assert_array_equal(paid[hits], 1.0)
-    assert np.all(paid[~hits] < 0)
+    touched, truncated = info["virtual"]["touched"], info["virtual"]["truncated"]
+    assert touched.any()
+    np.testing.assert_array_equal(paid[touched], 1.0)
+    assert info["virtual"]["ended"].all()
+    assert (truncated & ~touched).any()
+    np.testing.assert_array_equal(paid[truncated], 0.0)
+    assert np.all(paid[~touched & ~truncated] < 0)
 
 
 def test_a_users_own_task_is_paid_in_every_step() -> None:
     rewards, info = played(KeepStillTask())
     assert sum(reward < 0 for reward in rewards) > len(rewards) / 2
     assert "speed" in info
-    assert "hit" not in info
+    assert "touched" not in info
 
 
 def snapshot(state: State) -> State:
     """A copy that the next step leaves alone."""
     copied = {name: np.array(getattr(state, name)) for name in ARRAYS}
     return State(steps=state.steps, record=state.record, **copied)
-
-
-def stacked(states: list[State]) -> State:
-    """Many states as one."""
-    columns = {name: np.array([getattr(one, name) for one in states]) for name in ARRAYS}
-    records = BallRecord(
-        *(np.array([getattr(one.record, name) for one in states]) for name in BallRecord.__slots__)
-    )
-    steps = np.array([one.steps for one in states])
-    return State(steps=steps, record=records, **columns)
 
 
 @pytest.mark.parametrize("name", TASKS)

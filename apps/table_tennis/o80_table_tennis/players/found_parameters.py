@@ -21,7 +21,7 @@ class FoundParameters:
     parameters: Mapping[str, float]
     """By their dotted names in `HittingSettings`, like "control.damping"."""
     mean_reward: float
-    hits: int
+    returns: int
     episodes: int
 
     def save(self, path: Path = FILE) -> None:

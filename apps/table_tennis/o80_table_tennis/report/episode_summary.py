@@ -3,6 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..task.ball_record import BallRecord
+from ..task.outcome import returned
 
 
 @dataclass(frozen=True)
@@ -16,10 +22,12 @@ class EpisodeSummary:
     steps: int
     reward: float
     """Sum over the episode."""
-    hit: bool
+    touched: bool
     """The racket has touched the ball."""
     returned: bool
-    """It has, and the ball flew back: v_y > 0 after the touch."""
+    """The ball then landed on the opponent's half, see `task.outcome`."""
+    landing: list[float] | None
+    """Where it first touched the table after the touch, on whichever half [m]; None: nowhere."""
     terminated: bool
     """Ended by the rule of the task; else truncated: by the number of steps, or as stalled."""
     end: str
@@ -30,3 +38,13 @@ class EpisodeSummary:
     twin_first: int
     """Iteration of the twin before the first step."""
     twin_last: int
+
+    @classmethod
+    def of(cls, record: BallRecord, **others: Any) -> EpisodeSummary:
+        """Of what happened to the ball of one episode, and the `others` as they are."""
+        return cls(
+            touched=bool(record.touched),
+            returned=bool(returned(record)),
+            landing=np.asarray(record.landing).tolist() if record.landed else None,
+            **others,
+        )

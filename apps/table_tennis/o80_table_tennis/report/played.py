@@ -19,11 +19,11 @@ class Played:
     """From the first reset to the last step."""
 
     @property
-    def hits(self) -> int:
-        """Episodes in which the racket met the ball and the ball flew back."""
+    def returns(self) -> int:
+        """Episodes in which the ball was returned, see `task.outcome`."""
         return sum(episode.returned for episode in self.episodes)
 
     @property
     def touches(self) -> int:
         """Episodes in which the racket met the ball."""
-        return sum(episode.hit for episode in self.episodes)
+        return sum(episode.touched for episode in self.episodes)

@@ -20,7 +20,7 @@ FloatArray = NDArray[np.float64]
 
 RESOLUTION = 110
 """[dots per inch]"""
-BALL, RACKET, HIT = "tab:orange", "tab:red", "tab:green"
+BALL, RACKET, TOUCH = "tab:orange", "tab:red", "tab:green"
 
 
 def plot_motion(path: Path, episode: RecordedEpisode) -> None:
@@ -50,7 +50,7 @@ def plot_motion(path: Path, episode: RecordedEpisode) -> None:
     for axes in (angles, velocities, pressures):
         axes.grid(alpha=0.3)
         if touch is not None:
-            axes.axvline(touch, color=HIT, linewidth=1, label="hit")
+            axes.axvline(touch, color=TOUCH, linewidth=1, label="touch")
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
     figure.savefig(path, dpi=RESOLUTION)
 
@@ -104,19 +104,19 @@ def plot_jitter(path: Path, lateness: FloatArray, periods: FloatArray, *, period
 def plot_overview(
     path: Path, episodes: Mapping[str, Sequence[EpisodeSummary]], rates: Mapping[str, float]
 ) -> None:
-    """Rewards and hits of the episodes of each mode, and how many steps a second it reached."""
+    """Rewards and returns of the episodes of each mode, and how many steps a second it reached."""
     figure = Figure(figsize=(10, 4.5), layout="constrained")
     rewards, speed = figure.subplots(1, 2, width_ratios=(3, 2))
     figure.suptitle("episodes of each mode")
     for row, (mode, played) in enumerate(episodes.items()):
         returned = sum(episode.returned for episode in played)
         values = np.array([episode.reward for episode in played])
-        hit = np.array([episode.returned for episode in played], dtype=bool)
+        back = np.array([episode.returned for episode in played], dtype=bool)
         numbers = np.arange(len(played)) + 0.2 * row
-        label = f"{mode}: {returned} of {len(played)} hit"
-        rewards.plot(numbers[~hit], values[~hit], "x", color=f"C{row}")
-        rewards.plot(numbers[hit], values[hit], "o", markersize=5, color=f"C{row}", label=label)
-    rewards.set_xlabel("episode (o: the ball flew back, x: it did not)")
+        label = f"{mode}: {returned} of {len(played)} returned"
+        rewards.plot(numbers[~back], values[~back], "x", color=f"C{row}")
+        rewards.plot(numbers[back], values[back], "o", markersize=5, color=f"C{row}", label=label)
+    rewards.set_xlabel("episode (o: returned, x: not)")
     rewards.set_ylabel("reward")
     rewards.xaxis.set_major_locator(MaxNLocator(integer=True))
     rewards.grid(alpha=0.3)
@@ -138,12 +138,13 @@ def _draw_paths(axes: Axes, episode: RecordedEpisode, *, vertical: int) -> None:
     axes.plot(racket[:, 1], racket[:, vertical], color=RACKET, label="racket centre")
     touch = _touch_row(episode)
     if touch is not None:
-        axes.plot(ball[touch, 1], ball[touch, vertical], "*", markersize=12, color=HIT, label="hit")
+        place = ball[touch, 1], ball[touch, vertical]
+        axes.plot(*place, "*", markersize=12, color=TOUCH, label="touch")
 
 
 def _touch_row(episode: RecordedEpisode) -> int | None:
     """The row in which the racket met the ball: the largest change of its velocity to the front."""
-    if not episode.summary.hit:
+    if not episode.summary.touched:
         return None
     velocities = episode.twin.observed.balls["velocity"]
     return int(np.argmax(np.diff(velocities[:, 0, 1]))) + 1
@@ -173,5 +174,4 @@ def _edges(axis: int) -> tuple[float, float]:
 
 def _title(episode: RecordedEpisode, what: str) -> str:
     summary = episode.summary
-    touched = "hit" if summary.hit else "no hit"
-    return f"{what}: episode {summary.number}, {touched}, reward {summary.reward:.2f}"
+    return f"{what}: episode {summary.number}, {summary.end}, reward {summary.reward:.2f}"

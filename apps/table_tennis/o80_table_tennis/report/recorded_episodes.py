@@ -91,7 +91,7 @@ class _Reader:
         if self._arm is None or self._twin is None:
             self._arm = self._rows_of(self._environment["arm"])
             self._twin = self._rows_of(self._environment["twins"][0])
-        summary = EpisodeSummary(**{each.name: ended[each.name] for each in fields(EpisodeSummary)})
+        summary = EpisodeSummary(**{name: ended[name] for name in self._summarised(ended)})
         return RecordedEpisode(
             summary=summary,
             environment=self._environment,
@@ -102,6 +102,16 @@ class _Reader:
             rewards=np.array(ended["rewards"], np.float64),
             observations=unpacked(ended["observations"]),
         )
+
+    def _summarised(self, ended: Mapping[str, Any]) -> list[str]:
+        """Names of what a summary holds."""
+        names = [each.name for each in fields(EpisodeSummary)]
+        if missing := [name for name in names if name not in ended]:
+            raise o80.RecordingError(
+                f"{self._recording.path} was recorded by another version of this package: its "
+                f"marks lack {', '.join(missing)}. Read its rows with o80.open"
+            )
+        return names
 
     def _rows_of(self, place: Mapping[str, Any]) -> o80.History:
         """All rows of one run of a robot."""

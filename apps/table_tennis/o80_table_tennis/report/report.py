@@ -24,8 +24,8 @@ PERCENTILES = (50, 90, 99, 99.9, 100)
 
 LABELS = {
     "episodes": "episodes",
-    "hits": "hits (the ball flew back)",
-    "touches": "touches of the racket",
+    "returned": "returned to the opponent's half",
+    "touched": "touched by the racket",
     "mean_reward": "mean reward",
     "best_reward": "best reward",
     "steps": "steps of the environment",
@@ -100,8 +100,8 @@ def mode_numbers(
     rewards = [episode.reward for episode in played.episodes]
     numbers: dict[str, Value] = {
         "episodes": len(played.episodes),
-        "hits": played.hits,
-        "touches": played.touches,
+        "returned": played.returns,
+        "touched": played.touches,
         "mean_reward": round(float(np.mean(rewards)), 4),
         "best_reward": round(float(np.max(rewards)), 4),
         "steps": statistics.steps,
@@ -156,7 +156,7 @@ def _draw(
         plot_motion(output / "motion.png", shown)
         plot_paths(output / "paths.png", shown)
         files["shown_episode"] = shown.summary.number
-        files["shown_episode_hit"] = shown.summary.returned
+        files["shown_episode_returned"] = shown.summary.returned
         files["shown_episode_reward"] = round(shown.summary.reward, 4)
         if film:
             files |= _film(output, shown)
@@ -164,7 +164,7 @@ def _draw(
 
 
 def best_of(recorded: Sequence[RecordedEpisode]) -> RecordedEpisode | None:
-    """The best paid in which the ball flew back, else the best paid of all that came to an end."""
+    """The best paid return, else the best paid of all that came to an end."""
     return max(
         recorded,
         key=lambda episode: (

@@ -29,15 +29,20 @@ NET_TOUCHES = ("net", "count")
 FLOOR_TOUCHES = ("floor", "count")
 """Paths inside a record,"""
 LANDED_AT = ("table", "iteration")
-"""when the ball touched the table after the racket, or -1,"""
+NET_AT = ("net", "iteration")
+"""when the ball touched table and net after the racket, or -1,"""
 LANDING = ("table", "position")
+NET_POSITION = ("net", "position")
+FLOOR_POSITION = ("floor", "position")
+"""where it did,"""
 VELOCITY_AFTER = ("racket", "velocity_after")
 """of the first contact with the racket,"""
 LARGEST_SPEED = ("racket", "largest_speed")
 SMALLEST_DISTANCE = ("racket", "smallest_distance")
 
 READ = {
-    *(TOUCHES, NET_TOUCHES, FLOOR_TOUCHES, LANDED_AT, LANDING),
+    *(TOUCHES, NET_TOUCHES, FLOOR_TOUCHES, LANDED_AT, NET_AT),
+    *(LANDING, NET_POSITION, FLOOR_POSITION),
     *(VELOCITY_AFTER, LARGEST_SPEED, SMALLEST_DISTANCE),
 }
 CODES = {"i8": "q", "f8": "d"}
@@ -91,36 +96,46 @@ class BallReader:
         self._touches, self._net, self._floor = (
             places[path] for path in (TOUCHES, NET_TOUCHES, FLOOR_TOUCHES)
         )
-        self._landed, self._landing = places[LANDED_AT], _vector_at(places[LANDING])
+        self._landed, self._net_at = places[LANDED_AT], places[NET_AT]
+        self._landing, self._net_position, self._floor_position = (
+            _vector_at(places[path]) for path in (LANDING, NET_POSITION, FLOOR_POSITION)
+        )
         self._after = _vector_at(places[VELOCITY_AFTER])
         self._speed, self._distance = places[LARGEST_SPEED], places[SMALLEST_DISTANCE]
 
     def read(self, row: Any) -> BallRecord:
         """What has happened to the ball; `row` is any buffer."""
         seen = self._struct.unpack_from(row, self._offset)
+        landed, net_at = seen[self._landed], seen[self._net_at]
         return BallRecord(
             seen[self._distance],
             seen[self._touches] > 0,
             seen[self._after],
             seen[self._speed],
-            seen[self._landed] >= 0,
+            landed >= 0,
             seen[self._landing],
-            seen[self._net] > 0,
+            seen[self._net] > 0 and not 0 <= landed < net_at,
             seen[self._floor] > 0,
+            seen[self._net_position],
+            seen[self._floor_position],
         )
 
 
 def ball_records(records: NDArray[Any]) -> BallRecord:
     """What has happened to N balls, of their records (N,)."""
+    landed, net_at = _values(records, LANDED_AT), _values(records, NET_AT)
+    landed_first = (landed >= 0) & (landed < net_at)
     return BallRecord(
         _values(records, SMALLEST_DISTANCE),
         _values(records, TOUCHES) > 0,
         _values(records, VELOCITY_AFTER),
         _values(records, LARGEST_SPEED),
-        _values(records, LANDED_AT) >= 0,
+        landed >= 0,
         _values(records, LANDING),
-        _values(records, NET_TOUCHES) > 0,
+        (_values(records, NET_TOUCHES) > 0) & ~landed_first,
         _values(records, FLOOR_TOUCHES) > 0,
+        _values(records, NET_POSITION),
+        _values(records, FLOOR_POSITION),
     )
 
 

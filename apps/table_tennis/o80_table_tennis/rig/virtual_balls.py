@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from ..balls.sampled_flight import SampledFlight
 from ..settings import RigSettings
 from ..task.box import ObservationBox
-from ..task.end import End
+from ..task.end import End, terminated
+from ..task.outcome import returned
 from ..task.state import State
 from ..task.task import Task
 from .ball_records import ball_records
@@ -38,7 +39,9 @@ class VirtualBalls:
         """A new episode with these balls."""
         self._numbers = np.array(numbers, dtype=np.int64)
         self._ended = np.zeros(self._count, np.bool_)
-        self._hits = np.zeros(self._count, np.bool_)
+        self._truncated = np.zeros(self._count, np.bool_)
+        self._touched = np.zeros(self._count, np.bool_)
+        self._returned = np.zeros(self._count, np.bool_)
 
     def share(self, flights: Sequence[SampledFlight]) -> list[list[SampledFlight]]:
         """The flights of each twin's balls, of all flights, the played one first."""
@@ -56,15 +59,19 @@ class VirtualBalls:
         """`info["virtual"]` of the twins' newest rows; `played` is the state of the played ball.
 
         Each ball is paid for once: when its own episode ends, or when that of the played ball is
-        `over`. From then on its entries are invalid, and `ended` is true.
+        `over`. From then on its entries are invalid, and `ended` is true; `truncated` is true where
+        no event ended it, which a named task pays nothing for.
         """
         state = self._state(played)
-        self._hits |= ~self._ended & state.record.touched
+        self._touched |= ~self._ended & state.record.touched
+        self._returned |= ~self._ended & returned(state.record)
         return {
             "observations": self._box.clip(self._task.observe(state)),
             "rewards": self._judge(state, over=over),
-            "hits": self._hits.copy(),
+            "touched": self._touched.copy(),
+            "returned": self._returned.copy(),
             "ended": self._ended.copy(),
+            "truncated": self._truncated.copy(),
             "balls": self._numbers.copy(),
         }
 
@@ -101,5 +108,7 @@ class VirtualBalls:
         if judged.any():
             some = state.at(judged)
             rewards[judged] = self._task.reward(some)
-            self._ended[judged] = over | (self._task.end(some) != End.RUNNING)
+            ends = self._task.end(some)
+            self._ended[judged] = over | (ends != End.RUNNING)
+            self._truncated[judged] = self._ended[judged] & ~terminated(ends)
         return rewards

@@ -1,7 +1,8 @@
 """The tasks with a ball: hit it, return it to the target, smash it.
 
 They share the observation of 22 numbers and the end of an episode, and differ in the reward, which
-is paid in the last step. The goal of an episode is the target on the table.
+is paid in the last step. An episode that is truncated is paid nothing: its value is for the learner
+to estimate. The goal of an episode is the target on the table.
 """
 
 from __future__ import annotations
@@ -12,9 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .end import End, EndRule
+from .end import End, EndRule, terminated
 from .observations import ObservationBounds, observe_ball
-from .rewards import RewardRule
+from .outcome import outcome
+from .rewards import OrderedReward, RewardRule
 from .state import State
 
 Float32Array = NDArray[np.float32]
@@ -23,11 +25,11 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ReturnTask:
-    """The ball should land on the target: the published table-tennis reward."""
+    """The ball should land on the target."""
 
     bounds: ObservationBounds = field(default_factory=ObservationBounds)
     rule: EndRule = field(default_factory=EndRule)
-    pay: RewardRule = field(default_factory=RewardRule)
+    pay: RewardRule = field(default_factory=OrderedReward)
 
     plays_ball = True
 
@@ -58,21 +60,29 @@ class ReturnTask:
         return self.rule.judge(state.record, state.ball_y, state.steps)
 
     def reward(self, state: State) -> FloatArray:
-        """(...) reward of an episode that ends in this state."""
-        return self.pay.returned(state.record, state.goal)
+        """(...) reward of an episode that ends in this state; 0 if it is truncated or goes on."""
+        return np.where(terminated(self.end(state)), self.worth(state), 0.0)
+
+    def worth(self, state: State) -> FloatArray:
+        """(...) of an episode that an event ends in this state."""
+        return self.pay.returned(state)
 
     def info(self, state: State) -> dict[str, Any]:
-        """`hit`: the racket has touched the ball; `smallest_distance` of their surfaces [m]."""
-        return {"hit": state.record.touched, "smallest_distance": state.record.smallest_distance}
+        """`touched`, `returned`, `landing` and `distance`: see `outcome`; `smallest_distance` of
+        the surfaces of ball and racket so far [m].
+        """
+        info = outcome(state.record, state.goal)
+        info["smallest_distance"] = state.record.smallest_distance
+        return info
 
 
 @dataclass(frozen=True)
 class SmashTask(ReturnTask):
-    """The ball should land on the target, and be fast: published as well."""
+    """The ball should land on the target, and be fast."""
 
-    def reward(self, state: State) -> FloatArray:
-        """(...) reward of an episode that ends in this state."""
-        return self.pay.smashed(state.record, state.goal)
+    def worth(self, state: State) -> FloatArray:
+        """(...) of an episode that an event ends in this state."""
+        return self.pay.smashed(state)
 
 
 @dataclass(frozen=True)
@@ -87,6 +97,6 @@ class HitTask(ReturnTask):
         """(...) why it has."""
         return np.where(state.record.touched, int(End.GOAL), super().end(state))
 
-    def reward(self, state: State) -> FloatArray:
+    def worth(self, state: State) -> FloatArray:
         """(...) 1 for a touch, else minus the smallest distance [m]."""
-        return self.pay.touched(state.record)
+        return self.pay.touched(state)

@@ -13,6 +13,8 @@ Numbers = float | NDArray[np.float64]
 Flags = bool | NDArray[np.bool_]
 Vectors = Sequence[float] | NDArray[np.float64]
 
+NOWHERE = (0.0, 0.0, 0.0)
+
 
 @dataclass(slots=True)
 class BallRecord:
@@ -22,21 +24,21 @@ class BallRecord:
     """Of the surfaces of ball and racket so far [m]."""
     touched: Flags = False
     """The racket has touched the ball."""
-    velocity_after: Vectors = (0.0, 0.0, 0.0)
+    velocity_after: Vectors = NOWHERE
     """(..., 3) of the ball after that touch [m/s]."""
     largest_speed: Numbers = 0.0
     """Of the ball since that touch [m/s]."""
     landed: Flags = False
     """The ball has touched the table after the touch; bounces before it do not count."""
-    landing: Vectors = (0.0, 0.0, 0.0)
+    landing: Vectors = NOWHERE
     """(..., 3) where it did, if it did [m]."""
     touched_net: Flags = False
+    """The ball has touched the net, and not the table between racket and net."""
     touched_floor: Flags = False
-
-    @property
-    def flew_back(self) -> Any:
-        """(...) whether the racket has touched the ball, and the ball left towards the opponent."""
-        return np.logical_and(self.touched, np.asarray(self.velocity_after)[..., 1] > 0)
+    net_position: Vectors = NOWHERE
+    """(..., 3) where it touched the net after the touch of the racket, if it did [m]."""
+    floor_position: Vectors = NOWHERE
+    """(..., 3) of the floor alike [m]."""
 
     def at(self, index: Any) -> BallRecord:
         """The records of some of many balls, by an index or a mask."""

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .ball_record import BallRecord, Numbers
+from .outcome import beyond_net, on_top
 
 IntArray = NDArray[np.int64]
 
@@ -21,28 +22,42 @@ class End(IntEnum):
     """Why an episode ended. Arrays hold these numbers."""
 
     RUNNING = 0
-    LANDED = 1
+    RETURNED = 1
+    """The ball landed on the opponent's half, see `outcome`."""
     NET = 2
+    """The ball touched the net before it landed."""
     FLOOR = 3
     PASSED = 4
     """The ball has passed the arm."""
     OUT_OF_STEPS = 5
     GOAL = 6
     """The goal of the task is reached."""
+    OWN_HALF = 7
+    """The ball landed first on the player's own half after the touch."""
+    TABLE_SIDE = 8
+    """The ball met a side of the table after the touch, not its top."""
+    STALLED = 9
+    """Real time: the caller paused for so long that the episode was given up."""
 
     def __init__(self, number: int) -> None:
         self.text = self.name.lower().replace("_", " ")
-        """As in `info["end"]`: "out of steps"."""
+        """As in `info["end_text"]`: "out of steps"."""
 
     @property
     def terminated(self) -> bool:
         """Ended by an event."""
-        return self not in (End.RUNNING, End.OUT_OF_STEPS)
+        return self is not End.RUNNING and not self.truncated
 
     @property
     def truncated(self) -> bool:
-        """Ended by the number of steps."""
-        return self is End.OUT_OF_STEPS
+        """Ended by the number of steps, or stalled."""
+        return self in (End.OUT_OF_STEPS, End.STALLED)
+
+
+def terminated(ends: Any) -> Any:
+    """(...) whether numbers of `End` are ends by an event: only these are paid by a named task."""
+    ends = np.asarray(ends)
+    return (ends != End.RUNNING) & (ends != End.OUT_OF_STEPS) & (ends != End.STALLED)
 
 
 @dataclass(frozen=True)
@@ -69,12 +84,15 @@ class EndRule:
 
     def judge(self, record: BallRecord, y: Numbers, steps: int | IntArray) -> IntArray:
         """(...) the first reason that holds, as numbers of `End`."""
+        on_half = np.where(beyond_net(record), int(End.RETURNED), int(End.OWN_HALF))
+        landed_at = np.where(on_top(record), on_half, int(End.TABLE_SIDE))
         reasons = [
-            (record.landed, End.LANDED),
             (record.touched_net, End.NET),
+            (record.landed, landed_at),
             (record.touched_floor, End.FLOOR),
             (y < self.passed_y, End.PASSED),
             (steps >= self.most_steps, End.OUT_OF_STEPS),
         ]
         holds = np.broadcast_arrays(*(reason for reason, _ in reasons))
-        return np.select(holds, [int(end) for _, end in reasons], int(End.RUNNING))
+        ends = np.broadcast_arrays(holds[0], *(np.asarray(end, np.int64) for _, end in reasons))
+        return np.select(holds, ends[1:], int(End.RUNNING))

@@ -1,33 +1,119 @@
-"""Rewards of the tasks with a ball.
+"""Rewards of the tasks with a ball, paid when an episode has ended by an event.
 
-The published rule pays at the end: without a hit, minus the smallest distance of ball and racket;
-after a hit, by how near to the target the ball landed. Landing is the first touch of the table
-after the hit.
+`ORDERED` pays any miss less than any touch, and any touch less than any return. `PUBLISHED` is the
+rule of the published configuration. It does not ask on which half the ball landed, so a policy may
+learn to drop the ball on its own half; and a touch that does not reach the table costs more than a
+near miss.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..world.scene import Vector
 from ..world.table import TARGET
-from .ball_record import BallRecord, Numbers
+from .ball_record import Numbers
+from .outcome import distance, ended_at, returned
+from .state import State
 
 FloatArray = NDArray[np.float64]
 
 # of math, not of NumPy, which differ in the last bit: one episode and many get the same rewards
 _power = np.frompyfunc(math.pow, 2, 1)
-_hypot = np.frompyfunc(math.hypot, 2, 1)
+
+
+class RewardRule(Protocol):
+    """What an episode is worth that has ended in a state, or N in theirs."""
+
+    @property
+    def target(self) -> Vector:
+        """Where the ball should land [m]."""
+        ...
+
+    def returned(self, state: State) -> FloatArray:
+        """(...) of balls that should land on the target."""
+        ...
+
+    def smashed(self, state: State) -> FloatArray:
+        """(...) of balls that should land there and be fast."""
+        ...
+
+    def touched(self, state: State) -> FloatArray:
+        """(...) of balls that should be touched."""
+        ...
+
+
+def falling(distance: Numbers, reach: float, exponent: float) -> FloatArray:
+    """1 - (distance / reach)^exponent, for distances (...)."""
+    share = np.asarray(_power(np.asarray(distance) / reach, exponent), np.float64)
+    result: FloatArray = 1.0 - share
+    return result
 
 
 @dataclass(frozen=True)
-class RewardRule:
-    """The numbers of the published configuration."""
+class OrderedReward:
+    """Miss: -min(smallest distance, 1.5), at most 0. Touch: between 0 and 0.5, the more the nearer
+    to the target the flight ended. Return: 1 plus the accuracy of the landing, from 0 to 1.
+    """
+
+    target: Vector = TARGET
+    """Where the ball should land [m]."""
+    farthest_miss: float = 1.5
+    """A ball that was missed by more costs this [m]."""
+    touch: float = 0.5
+    """Least upper bound of a touch without a return, for a flight that ended at the target."""
+    touch_scale: float = 1.5
+    """A touch is worth half of that where the flight ended this far from the target [m]."""
+    reach: float = 3.0
+    """A landing this far from the target has accuracy 0 [m]: accuracy is 1 - (d / 3)^0.75."""
+    exponent: float = 0.75
+
+    def accuracy(self, distance: Numbers) -> FloatArray:
+        """(...) of landings at distances (...) from the target, in [0, 1]."""
+        return np.maximum(falling(distance, self.reach, self.exponent), 0.0)
+
+    def returned(self, state: State) -> FloatArray:
+        """(...) see the class."""
+        return self._ordered(state, smashed=False)
+
+    def smashed(self, state: State) -> FloatArray:
+        """(...) the same, accuracy times the largest speed of the ball after the touch [m/s]."""
+        return self._ordered(state, smashed=True)
+
+    def touched(self, state: State) -> FloatArray:
+        """(...) 1 for a touch, else the miss."""
+        return np.where(state.record.touched, 1.0, self._missed(state))
+
+    def _missed(self, state: State) -> FloatArray:
+        missed: FloatArray = -np.minimum(state.record.smallest_distance, self.farthest_miss)
+        return missed
+
+    def _ordered(self, state: State, *, smashed: bool) -> FloatArray:
+        record = state.record
+        apart = distance(ended_at(state), state.goal)
+        accuracy = self.accuracy(apart)
+        if smashed:
+            accuracy = accuracy * record.largest_speed
+        relative = apart / self.touch_scale
+        touch = self.touch / (1.0 + relative * relative)
+        paid = np.where(returned(record), 1.0 + accuracy, touch)
+        return np.where(record.touched, paid, self._missed(state))
+
+
+@dataclass(frozen=True)
+class PublishedReward:
+    """Miss: minus the smallest distance. Touch: max(1 - (d / 3)^0.75, -0.2), d the distance of the
+    first landing on either half from the target; -0.2 without a landing.
+
+    In the published system d is the smallest distance of the whole flight after the touch, and no
+    table stops the ball; here the episode ends at the table.
+    """
 
     target: Vector = TARGET
     """Where the ball should land [m]."""
@@ -37,30 +123,50 @@ class RewardRule:
     floor: float = -0.2
     """The least a touched ball is worth."""
 
-    def distance(self, landing: Any, target: Any) -> FloatArray:
-        """(...) of landings (..., 2+) from targets (..., 2+), in the plane of the table [m]."""
-        apart = np.asarray(landing)[..., :2] - np.asarray(target)[..., :2]
-        return np.asarray(_hypot(apart[..., 0], apart[..., 1]), dtype=np.float64)
-
     def landing_term(self, distance: Numbers) -> FloatArray:
         """max(1 - (d / reach)^exponent, floor), for distances d (...) from the target [m]."""
-        share = np.asarray(_power(np.asarray(distance) / self.reach, self.exponent), np.float64)
-        return np.maximum(1.0 - share, self.floor)
+        return np.maximum(falling(distance, self.reach, self.exponent), self.floor)
 
-    def returned(self, record: BallRecord, target: Any) -> FloatArray:
-        """(...) rewards of balls that should land on the target."""
-        term = self.landing_term(self.distance(record.landing, target))
-        return self._paid(record, term)
+    def returned(self, state: State) -> FloatArray:
+        """(...) see the class."""
+        return self._paid(state, self._term(state))
 
-    def smashed(self, record: BallRecord, target: Any) -> FloatArray:
+    def smashed(self, state: State) -> FloatArray:
         """(...) the same times the largest speed of the ball after the touch [m/s]."""
-        term = self.landing_term(self.distance(record.landing, target))
-        return self._paid(record, np.maximum(term * record.largest_speed, self.floor))
+        term = self._term(state) * state.record.largest_speed
+        return self._paid(state, np.maximum(term, self.floor))
 
-    def touched(self, record: BallRecord) -> FloatArray:
+    def touched(self, state: State) -> FloatArray:
         """(...) 1 for a touched ball, else minus the smallest distance [m]."""
-        return np.where(record.touched, 1.0, -np.asarray(record.smallest_distance))
+        return np.where(state.record.touched, 1.0, -np.asarray(state.record.smallest_distance))
 
-    def _paid(self, record: BallRecord, landing: FloatArray) -> FloatArray:
+    def _term(self, state: State) -> FloatArray:
+        return self.landing_term(distance(state.record.landing, state.goal))
+
+    def _paid(self, state: State, landing: FloatArray) -> FloatArray:
+        record = state.record
         touched = np.where(record.landed, landing, self.floor)
         return np.where(record.touched, touched, -np.asarray(record.smallest_distance))
+
+
+REWARDS: Mapping[str, RewardRule] = {"ordered": OrderedReward(), "published": PublishedReward()}
+"""The rules with a name."""
+
+
+def reward_rule(reward: str | RewardRule) -> RewardRule:
+    """A rule by its name, or the rule itself. Raises ValueError or TypeError."""
+    named: Any = reward
+    if isinstance(named, str):
+        if named not in REWARDS:
+            raise ValueError(f"unknown reward '{named}'; there are: {', '.join(REWARDS)}")
+        return REWARDS[named]
+    missing = [
+        name for name in ("target", "returned", "smashed", "touched") if not hasattr(named, name)
+    ]
+    if missing or isinstance(named, type):
+        raise TypeError(
+            f"reward must be one of {', '.join(REWARDS)}, or an object like "
+            f"o80_table_tennis.task.rewards.OrderedReward(), got {named!r}"
+        )
+    rule: RewardRule = named
+    return rule

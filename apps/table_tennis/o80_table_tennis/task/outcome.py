@@ -1,0 +1,95 @@
+"""What came of a touched ball: whether it was returned, and where its flight ended.
+
+A ball is **returned** if, after the racket touched it, it met nothing before it landed on top of
+the table beyond the net. A ball that touched the net on the way, landed first on the player's own
+half, or met a side of the table is not returned, wherever it went then. Neither the number of
+touches of the racket nor the bounces before the first one matter: a ball may be volleyed.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..world.table import NET_Y, TABLE
+from .ball_record import BallRecord, Flags
+from .state import State
+
+FloatArray = NDArray[np.float64]
+
+SMALL = 1e-6
+"""A landing this far below the top of the table is still on top of it [m]."""
+
+# of math, not of NumPy, which differ in the last bit: one episode and many get the same rewards
+_hypot = np.frompyfunc(math.hypot, 2, 1)
+
+
+def on_top(record: BallRecord) -> Any:
+    """(...) whether a ball that has landed did so on top of the table, not at its side."""
+    return np.asarray(record.landing)[..., 2] > TABLE.top - SMALL
+
+
+def beyond_net(record: BallRecord) -> Any:
+    """(...) whether a ball that has landed did so on the opponent's side of the net."""
+    return np.asarray(record.landing)[..., 1] > NET_Y
+
+
+def returned(record: BallRecord) -> Any:
+    """(...) whether the ball was returned, see the module."""
+    legal = np.logical_not(record.touched_net) & on_top(record) & beyond_net(record)
+    return record.touched & record.landed & legal
+
+
+def ended_at(state: State) -> FloatArray:
+    """(..., 3) where the flight of a touched ball ended: where it first met net, table or floor
+    after the touch, or where the ball is now [m].
+    """
+    record = state.record
+    place = np.asarray(state.ball)[..., :3]
+    for met, there in (
+        (record.touched_floor, record.floor_position),
+        (record.landed, record.landing),
+        (record.touched_net, record.net_position),
+    ):
+        place = np.where(np.asarray(met)[..., np.newaxis], there, place)
+    return place
+
+
+def distance(place: Any, target: Any) -> FloatArray:
+    """(...) of places (..., 2+) from targets (..., 2+), in the plane of the table [m]."""
+    apart = np.asarray(place)[..., :2] - np.asarray(target)[..., :2]
+    return np.asarray(_hypot(apart[..., 0], apart[..., 1]), dtype=np.float64)
+
+
+def outcome(record: BallRecord, target: Any) -> dict[str, Any]:
+    """`touched`, `returned`, `landing` (..., 3) and its `distance` from the target, as infos.
+
+    `landing` is where the ball touched the table after the touch, on whichever half; before that,
+    landing and distance are infinite. Not NaN: Gymnasium's checks want equal infos to compare
+    equal. Of one ball: Python numbers; arrays are fresh.
+    """
+    landed = record.landed
+    if none(landed):
+        shape = np.shape(landed)
+        nowhere = np.full((*shape, 3), np.inf)
+        is_returned: Any = np.zeros(shape, np.bool_) if shape else False
+        apart: Any = np.full(shape, np.inf) if shape else math.inf
+    else:
+        nowhere = np.where(np.asarray(landed)[..., np.newaxis], record.landing, np.inf)
+        is_returned, apart = returned(record), distance(nowhere, target)
+        if np.ndim(landed) == 0:
+            is_returned, apart = bool(is_returned), float(apart)
+    return {
+        "touched": record.touched,
+        "returned": is_returned,
+        "landing": nowhere,
+        "distance": apart,
+    }
+
+
+def none(flags: Flags) -> bool:
+    """Whether no flag is set; cheap, also for one."""
+    return not flags.any() if isinstance(flags, np.ndarray) else not flags
