@@ -77,5 +77,9 @@ void bind_schema_builder(nb::module_& m) {
       .def("set_follow", &SchemaBuilder::set_follow, "actuator"_a)
       .def("set_limits", &SchemaBuilder::set_limits, "actuator"_a, "field"_a, "limits"_a)
       .def("rests_at", &SchemaBuilder::rests_at, "actuator"_a, "field"_a, "value"_a)
+      .def("set_model", &SchemaBuilder::set_model, "mjcf"_a, "file"_a)
+      .def("moves_joint", &SchemaBuilder::moves_joint, "actuator"_a, "joint"_a)
+      .def("sensor_moves_joint", &SchemaBuilder::sensor_moves_joint, "field"_a, "index"_a,
+           "joint"_a)
       .def_prop_ro("actuators", &SchemaBuilder::actuators);
 }

@@ -59,6 +59,20 @@ struct SchemaBuilder {
     schema.actuator(actuator).rests_at(field, value);
   }
 
+  /// Sets the model that viewers draw.
+  void set_model(const std::string& mjcf, const std::string& file) {
+    schema.shown.mjcf = mjcf;
+    schema.shown.file = file;
+  }
+
+  void moves_joint(std::uint32_t actuator, const std::string& joint) {
+    schema.actuator(actuator).moves_joint(joint);
+  }
+
+  void sensor_moves_joint(const std::string& field, std::uint32_t index, const std::string& joint) {
+    schema.sensor_moves_joint(field, index, joint);
+  }
+
  private:
   o80::FieldRow member(const nanobind::tuple& row);
   void add_labels(o80::FieldRow& field, const nanobind::dict& labels);

@@ -1,5 +1,6 @@
 """The side that iterates, inside a Python program."""
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import TracebackType
@@ -75,6 +76,9 @@ class Backend:
     while_halted: requests that are served during a halt too, because they move nothing.
     lanes, lane_blocks, journal, permission, stale, silence, resume: as for
         `o80.robots.Robot.start`.
+    model: what `o80 view` draws: the path of an MJCF file, or its text.
+    joints: of the model, each with what moves it: an actuator, whose state must begin with a
+        float64, or (field, index) of an extended field of float64.
     max_overruns: halt when so many rows within a second come half a period late, or later.
 
     Leaving a `with` block by an exception ends it as failed: frontends raise its text.
@@ -107,6 +111,8 @@ class Backend:
         max_overruns: int | None = None,
         resume: bool = False,
         while_halted: Sequence[str] = (),
+        model: str | os.PathLike[str] | None = None,
+        joints: Mapping[str, int | str | tuple[str, int]] | None = None,
     ) -> None:
         loop = loop_texts(
             {
@@ -134,6 +140,7 @@ class Backend:
         writer.set_limits(limits)
         writer.set_rests(rests_at)
         writer.set_idle(when_idle)
+        writer.set_model(model, mapping(joints, "joints", "joints to what moves them"))
         self._native: _core.Backend | None = None
         native = _core.Backend(writer.builder, segment, loop)
         self._layout = Layout(native.description)

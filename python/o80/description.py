@@ -1,7 +1,9 @@
 """Makes the schema of a segment from NumPy dtypes, for backends in Python."""
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from enum import IntEnum
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -104,6 +106,27 @@ class SchemaWriter:
             if word == "follow":
                 self.builder.set_follow(self._index(named))
 
+    def set_model(
+        self,
+        model: str | os.PathLike[str] | None,
+        joints: Mapping[str, int | str | tuple[str, int]],
+    ) -> None:
+        """Sets the model that viewers draw, and what moves its joints."""
+        if model is None:
+            if joints:
+                raise InvalidArgument("joints were given without a model: give model too")
+            return
+        if isinstance(model, str) and model.lstrip().startswith("<"):
+            self.builder.set_model(model, "")
+        else:
+            self.builder.set_model(_text_of(Path(model)), str(Path(model).absolute()))
+        for joint, moved_by in joints.items():
+            if isinstance(moved_by, tuple):
+                field, index = moved_by
+                self.builder.sensor_moves_joint(field, index, joint)
+            else:
+                self.builder.moves_joint(self._index(moved_by), joint)
+
     def _index(self, named: int | str) -> int:
         names = self.builder.actuators
         if isinstance(named, str):
@@ -151,6 +174,16 @@ class SchemaWriter:
                 f"got dtype {element}"
             )
         return name, element.name, list(shape), text, None, 0
+
+
+def _text_of(model: Path) -> str:
+    """The text of an MJCF file."""
+    try:
+        return model.read_text()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InvalidArgument(
+            f"model must be the path of an MJCF file, or its text, which begins with '<': {error}"
+        ) from error
 
 
 def _is_enum(described: Described) -> bool:

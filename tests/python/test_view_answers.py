@@ -223,3 +223,39 @@ def test_a_file_that_is_no_recording_is_refused(tmp_path: Path) -> None:
     (tmp_path / "no.mcap").write_bytes(b"nothing")
     with pytest.raises(o80.RecordingError, match=r"no\.mcap"):
         looks_at(str(tmp_path / "no.mcap"))
+
+
+def test_a_backend_in_python_names_a_model_and_what_moves_it(segment: str, tmp_path: Path) -> None:
+    body = "<body name='{0}'><joint name='{0}' axis='0 1 0'/><geom size='0.1'/></body>"
+    model = tmp_path / "arm.xml"
+    bodies = "".join(body.format(name) for name in ("shoulder", "wrist"))
+    model.write_text(f"<mujoco><worldbody>{bodies}</worldbody></mujoco>")
+    for given in (model, str(model), model.read_text()):
+        with o80.Backend(
+            segment,
+            ["turn"],
+            extended={"angles": (np.float64, 3)},
+            model=given,
+            joints={"shoulder": "turn", "wrist": ("angles", 2)},
+        ) as backend:
+            backend.publish([0.5], {"angles": [0, 0, -0.25]})
+            pose = pose_of(looks_at(segment)())
+        assert pose[0, 3:] == pytest.approx(turn_about_y(0.5), abs=1e-6)
+        assert pose[1, 3:] == pytest.approx(turn_about_y(-0.25), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"model": "nowhere.xml"}, "path of an MJCF file"),
+        ({"joints": {"a": "turn"}}, "without a model"),
+        ({"model": "<mujoco/>", "joints": {"a": "trun"}}, "Did you mean"),
+        ({"model": "<mujoco/>", "joints": {"a": ("angle", 0)}}, "no extended field 'angle'"),
+        ({"model": "<mujoco/>", "joints": {"a": ("angles", 3)}}, "no double with index 3"),
+    ],
+)
+def test_a_model_that_cannot_be_drawn_is_refused(
+    options: dict[str, Any], text: str, segment: str
+) -> None:
+    with pytest.raises(o80.InvalidArgument, match=text):
+        o80.Backend(segment, ["turn"], extended={"angles": (np.float64, 3)}, **options)

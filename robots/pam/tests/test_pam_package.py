@@ -1,5 +1,6 @@
 """The package o80-pam: its robot is found by name, its README runs."""
 
+import base64
 import re
 import subprocess
 import sys
@@ -9,6 +10,8 @@ import numpy as np
 
 import o80
 import o80_pam
+from o80.view.answers import Answers
+from o80.view.source_list import SourceList
 
 PACKAGE = Path(__file__).resolve().parents[1]
 
@@ -39,3 +42,18 @@ def test_the_identified_arm_moves_after_its_dead_time_and_against_the_sign_of_jo
         moved = arm.burst(100).extended["joint_positions"]
     np.testing.assert_allclose(waited, start.extended["joint_positions"], atol=1e-6)
     assert moved[0] < start.extended["joint_positions"][0] - 0.05
+
+
+def test_the_view_draws_the_racket_where_the_arm_says_it_is() -> None:
+    with o80.robots.load("pam").inline(segment="pam-drawn") as arm:
+        arm.add_command([0, 2, 5, 6], [19000.0, 17000.0, 20000.0, 15000.0], iterations=50)
+        arm.burst(200)
+        answer = Answers(SourceList([arm.segment]), control=False).look({})
+        sensors = arm.latest().extended
+    shapes = [geom["shape"] for geom in answer["new"]["scene"]["geoms"]]
+    assert shapes.count("ellipsoid") == 1
+    *_, forearm = np.frombuffer(base64.b64decode(answer["pose"]), np.float32).reshape(-1, 7)
+    w, x, y, z = forearm[3:]
+    along = np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
+    assert np.abs(sensors["joint_positions"]).min() > 0.01  # each joint has been moved
+    np.testing.assert_allclose(forearm[:3] + 0.37 * along, sensors["racket_position"], atol=1e-5)

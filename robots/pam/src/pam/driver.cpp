@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <string>
 
+#include "pam/shown_model.hpp"
+
 namespace o80::pam {
 namespace {
 
@@ -78,6 +80,10 @@ void PamDriver::describe(Schema& schema) const {
         .when_idle(WhenIdle::hold)
         .limits({.minimum = static_cast<double>(range.minimum),
                  .maximum = static_cast<double>(range.maximum)});
+  }
+  schema.shown.mjcf = shown_model();
+  for (std::uint32_t j = 0; j < kJoints; ++j) {
+    schema.sensor_moves_joint("joint_positions", j, kShownJoints[j]);
   }
 }
 

@@ -1,0 +1,62 @@
+#include "pam/shown_model.hpp"
+
+#include <array>
+#include <cstdio>
+#include <stdexcept>
+
+#include "pam/arm.hpp"
+
+namespace o80::pam {
+namespace {
+
+// The frame stands below the base; each link lies along z from its joint.
+constexpr const char* kModel = R"(<mujoco model="pam">
+  <compiler angle="radian"/>
+  <statistic center="0 0 %g" extent="1.4"/>
+  <default>
+    <geom rgba="0.93 0.93 0.91 1"/>
+    <default class="pulley"><geom type="cylinder" size="0.037 0.014" zaxis="0 1 0" rgba="0.24 0.25 0.28 1"/></default>
+    <joint range="%g %g"/>
+  </default>
+  <worldbody>
+    <geom name="floor" type="plane" size="3 3 0.1" rgba="0.60 0.62 0.63 1"/>
+    <geom name="frame" type="box" pos="0 0 %g" size="0.12 0.12 %g" rgba="0.36 0.38 0.42 1"/>
+    <body name="shoulder" pos="%g %g %g">
+      <joint name="joint_1" axis="0 0 1"/>
+      <geom type="cylinder" pos="0 0 0.02" size="0.037 0.02" rgba="0.24 0.25 0.28 1"/>
+      <body name="upper_arm" pos="0 0 %g">
+        <joint name="joint_2" axis="0 1 0"/>
+        <geom class="pulley"/>
+        <geom type="capsule" fromto="0 0 0 0 0 %g" size="0.013"/>
+        <body name="elbow" pos="0 0 %g">
+          <joint name="joint_3" axis="0 1 0"/>
+          <geom class="pulley"/>
+          <body name="forearm">
+            <joint name="joint_4" axis="0 0 1"/>
+            <geom type="capsule" fromto="0 0 0 0 0 %g" size="0.013"/>
+            <geom name="racket" type="ellipsoid" pos="0 0 %g" size="%g %g %g" rgba="0.78 0.10 0.10 1"/>
+          </body>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>
+)";
+
+}  // namespace
+
+std::string shown_model() {
+  const Vector base = Arm::Config{}.base;
+  const double handle = kForearmLength - kBladeHalfLength;
+  std::array<char, 4096> text{};
+  const int length = std::snprintf(
+      text.data(), text.size(), kModel, base[2], -kJointLimit, kJointLimit, 0.5 * base[2],
+      0.5 * base[2], base[0], base[1], base[2], kShoulderHeight, kUpperArmLength, kUpperArmLength,
+      handle, kForearmLength, kBladeHalfWidth, 0.5 * kBladeThickness, kBladeHalfLength);
+  if (length <= 0 || static_cast<std::size_t>(length) >= text.size()) {
+    throw std::length_error("the text of the arm's model is longer than its buffer");
+  }
+  return {text.data(), static_cast<std::size_t>(length)};
+}
+
+}  // namespace o80::pam
