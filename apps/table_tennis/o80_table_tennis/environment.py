@@ -86,8 +86,9 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         self._settings, self._rig_settings = task or TaskSettings(), rig or RigSettings()
         self._task = self._settings.made()
         refuse_extra_balls_without_ball(self._rig_settings, plays_ball=self._task.plays_ball)
+        settings = self._settings
         self._balls = balls_from(
-            self._settings.balls, self._settings.ball_seed, self._rig_settings.period
+            settings.balls, settings.ball_seed, self._rig_settings.period, settings.ball_count
         )
         self._box = ObservationBox(self._task)
         self.observation_space = self._box.space

@@ -107,9 +107,12 @@ class TaskSettings:
     task: str | Task = "return"
     """return, smash, hit or reach; or an object of your own, see `task.task.Task`."""
     balls: str | None = None
-    """A recording or a folder of them; None: simulated shots."""
+    """Simulated shots, "narrow" (like those of the recorded ball gun) or "wide"; or the path of a
+    recording, or of a folder of them. None: narrow."""
     ball_seed: int = 0
-    """Of the simulated shots."""
+    """Of the simulated shots: each seed has its own."""
+    ball_count: int | None = None
+    """How many simulated shots there are; None: no end of them, each episode draws a new one."""
     factor: float = FINE
     """Of the actions: 0.05 fine, 1 coarse."""
     delay: int = 1
@@ -126,6 +129,8 @@ class TaskSettings:
     def __post_init__(self) -> None:
         for name in ("delay", "ball_seed", "most_late"):
             whole(getattr(self, name), name, 0)
+        if self.ball_count is not None:
+            whole(self.ball_count, "ball_count", 1)
         factor: object = self.factor
         if not isinstance(factor, Real) or not 0 < float(factor) < math.inf:
             raise ValueError(f"factor must be a positive number, got {factor!r}")

@@ -75,8 +75,9 @@ def test_without_a_renderer_the_error_names_the_extra(monkeypatch: pytest.Monkey
 def test_wrong_options_are_refused_with_what_there_is(inline: TableTennisEnvironment) -> None:
     with pytest.raises(ValueError, match="unknown options: bal; reset knows ball, flight"):
         inline.reset(options={"bal": 3})
-    with pytest.raises(IndexError, match="there are 0 to 79"):
-        inline.reset(options={"ball": 80})
+    counted = opened(task=TaskSettings(ball_count=80))
+    with closing(counted), pytest.raises(IndexError, match="there are 0 to 79"):
+        counted.reset(options={"ball": 80})
     with pytest.raises(ValueError, match="simulated, real"):
         opened(ranges="imagined")
     with pytest.raises(ValueError, match="within its step"):

@@ -13,6 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from o80_table_tennis.balls.sampled_flight import SampledFlight
+from o80_table_tennis.balls.simulated_shots import SimulatedShots
 from o80_table_tennis.environment import TableTennisEnvironment
 from o80_table_tennis.physics.aerodynamics import AERODYNAMICS, runge_kutta_step
 from o80_table_tennis.physics.impact import bounced, leaving
@@ -104,7 +105,8 @@ def test_a_ball_leaves_the_table_alike(flown: Numbers) -> None:
 def test_a_ball_leaves_the_racket_alike() -> None:
     policy, task = default_policy(), TaskSettings(factor=COARSE)
     with TableTennisEnvironment(task=task) as environment:
-        observation, info = environment.reset(seed=1)
+        flight = SimulatedShots().launch(1).seen().resample()
+        observation, info = environment.reset(seed=1, options={"flight": flight})
         while not info["touched"]:
             observation, *_, info = environment.step(policy.act(observation))
         record: Any = environment.rig.twins[0].all_records[0]["racket"]

@@ -1,9 +1,23 @@
 """Shots of a ball gun without any file."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from o80_table_tennis.balls.simulated_shots import ShotVariation, simulated_shot
+from o80_table_tennis.balls.launches import NARROW, WIDE, Launch, LaunchDistribution, NormalLaunches
+from o80_table_tennis.balls.playable import REACH, Verdict, verdict
+from o80_table_tennis.balls.simulated_shots import SimulatedShots, drawn_launch, simulated_shot
+from o80_table_tennis.physics.prediction import predict
+from o80_table_tennis.rig.rig import Rig
+from o80_table_tennis.settings import RigSettings
+from o80_table_tennis.world.arm import SHOULDER
+from o80_table_tennis.world.ball import BALL_RADIUS
+from o80_table_tennis.world.table import NET_HEIGHT, TABLE
+from o80_table_tennis.world.timing import PERIOD
+
+TINY = (0.0, -0.001, 0.001)  # [m]
+BOTH = pytest.mark.parametrize("distribution", [NARROW, WIDE])
 
 
 def test_the_same_generator_gives_the_same_shot() -> None:
@@ -27,6 +41,82 @@ def test_simulated_shots_bounce_once_and_come_into_reach_like_the_recorded_ones(
         assert shot.duration == pytest.approx(1.28, abs=0.01)
 
 
-def test_a_shot_that_cannot_bounce_once_is_refused() -> None:
-    with pytest.raises(ValueError, match="bounces exactly once"):
-        simulated_shot(np.random.default_rng(0), variation=ShotVariation(velocity=(0.0, 5.0, 0.0)))
+def test_a_distribution_without_playable_shots_is_refused() -> None:
+    away = NormalLaunches(velocity=(0.0, 5.0, 0.0))
+    with pytest.raises(ValueError, match=r"misses the player's half.*choose other means"):
+        drawn_launch(np.random.default_rng(0), away)
+
+
+def found_by_prediction(launch: Launch) -> Verdict:
+    """The verdict by a finely predicted flight, row by row."""
+    flight = predict(launch.position, launch.velocity, 2.0, spin=launch.spin, period=0.0005)
+    after = flight.stamps >= (flight.bounce_times[0] if len(flight.bounce_times) else np.inf)
+    at_net = int(np.argmax(flight.positions[:, 1] < TABLE.centre[1]))
+    over_net = flight.positions[at_net, 2] > TABLE.top + NET_HEIGHT + BALL_RADIUS
+    if not over_net:
+        return Verdict.NET
+    if not after.any() or flight.positions[np.argmax(after), 1] > TABLE.centre[1]:
+        return Verdict.NO_BOUNCE
+    near = np.linalg.norm(flight.positions - [0.0, 0.0, SHOULDER], axis=1) < REACH
+    first = flight.stamps[np.argmax(after & near)] if (after & near).any() else np.inf
+    if (flight.bounce_times[1:] < first).any():
+        return Verdict.TWO_BOUNCES
+    return Verdict.PLAYABLE if first < np.inf else Verdict.OUT_OF_REACH
+
+
+def test_the_verdict_is_that_of_the_predicted_flight() -> None:
+    spread = NormalLaunches(velocity_deviation=(0.5, 0.9, 0.7), spin_deviation=(60.0, 20.0, 20.0))
+    rng, seen = np.random.default_rng(3), set()
+    for _ in range(150):
+        launch = spread.draw(rng)
+        found = verdict(launch)
+        seen.add(found)
+        # either may be right where a millimetre decides
+        near = [replace(launch, position=launch.position + np.array([0, y, 0])) for y in TINY]
+        assert found in map(found_by_prediction, near), launch
+    assert seen == set(Verdict)
+
+
+@BOTH
+def test_few_draws_are_refused(distribution: LaunchDistribution) -> None:
+    rng = np.random.default_rng(1)
+    verdicts = [verdict(distribution.draw(rng)) for _ in range(1000)]
+    assert verdicts.count(Verdict.PLAYABLE) > 880
+
+
+def test_wide_shots_fill_their_ranges() -> None:
+    shots = SimulatedShots(WIDE)
+    launches = [shots.launch(number) for number in range(300)]
+    for name, middle, spread in (
+        ("position", WIDE.position, WIDE.position_spread),
+        ("velocity", WIDE.velocity, WIDE.velocity_spread),
+    ):
+        away = np.array([getattr(launch, name) for launch in launches]) - middle
+        assert np.abs(away).max() <= spread
+        assert (np.abs(away).max(axis=0) > 0.9 * spread).all()
+    spins = np.array([launch.spin for launch in launches])
+    assert spins[:, 0].min() < -55
+    assert spins[:, 0].max() > 85
+    assert not spins[:, 1:].any()
+
+
+def test_a_number_brings_a_shot_back_and_each_seed_has_its_own() -> None:
+    shots = SimulatedShots(WIDE, seed=5)
+    first = shots.launch(2**30)
+    shots.launch(3)
+    np.testing.assert_array_equal(shots.launch(2**30).velocity, first.velocity)
+    for other in (SimulatedShots(WIDE, seed=6), SimulatedShots(NARROW, seed=5)):
+        assert not np.array_equal(other.launch(2**30).velocity, first.velocity)
+    with pytest.raises(IndexError, match="0 to 3"):
+        SimulatedShots(count=4).launch(4)
+
+
+def test_the_twin_flies_a_shot_as_predicted() -> None:
+    launch = SimulatedShots(WIDE).launch(11)
+    seen = launch.seen(duration=0.8, period=PERIOD)
+    with Rig(RigSettings()) as rig:
+        rig.reset(arm_seed=1, twin_seed=1, flights=[[launch.flight(PERIOD)]])
+        rig.twins[0].frontend.burst(len(seen.positions) - 1)
+        flown = rig.twins[0].frontend.history(len(seen.positions)).observed.balls
+    np.testing.assert_allclose(flown["position"][:, 0], seen.positions, atol=1e-4)
+    np.testing.assert_allclose(flown["spin"][-1, 0], seen.spins[-1], atol=0.05)  # type: ignore[index]

@@ -55,8 +55,8 @@ def recording_files(path: Path) -> list[Path]:
         return [path]
     if not path.is_dir():
         raise FileNotFoundError(
-            f"{path}: no such file or folder; give a recording ({', '.join(FORMATS)}) "
-            "or a folder of them"
+            f"{path}: no such file or folder; give a recording ({', '.join(FORMATS)}), "
+            "a folder of them, or the name of simulated shots: narrow, wide"
         )
     files = sorted(file for file in path.iterdir() if file.suffix in FORMATS)
     if not files:

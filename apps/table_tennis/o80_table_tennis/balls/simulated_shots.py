@@ -1,4 +1,4 @@
-"""Shots of a ball gun without any file: drawn, with drag, top spin and one bounce on the table."""
+"""Shots without any file: as many as one likes, each with a number that brings it back."""
 
 from __future__ import annotations
 
@@ -6,63 +6,61 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..physics.aerodynamics import AERODYNAMICS, Aerodynamics
-from ..physics.prediction import predict
-from ..world.ball import BALL_GUN_SPIN
-from ..world.scene import Vector
-from ..world.table import TABLE, Table
-from .frame_stamps import FRAME_PERIOD
+from ..world.timing import PERIOD
+from .launches import NARROW, WIDE, Launch, LaunchDistribution
+from .playable import Verdict, verdict
+from .sampled_flight import SampledFlight
 from .trajectories import BallTrajectory
 
+DISTRIBUTIONS: dict[str, LaunchDistribution] = {"narrow": NARROW, "wide": WIDE}
+"""By the names that `TaskSettings.balls` takes."""
+NUMBERS = 2**31
+"""How many shots there are of a distribution and a seed."""
+MOST_DRAWS = 1000
 
-@dataclass(frozen=True)
-class ShotVariation:
-    """How simulated shots start: means and standard deviations of flights fitted to recordings."""
 
-    position: Vector = (0.46, 2.95, 1.37)
-    """[m]"""
-    position_deviation: Vector = (0.01, 0.013, 0.016)
-    """[m]"""
-    velocity: Vector = (0.24, -4.14, 2.28)
-    """[m/s]"""
-    velocity_deviation: Vector = (0.09, 0.07, 0.17)
-    """[m/s]"""
-    spin: Vector = BALL_GUN_SPIN
-    """[rad/s]"""
-    spin_deviation: Vector = (2.0, 3.0, 2.0)
-    """[rad/s]"""
-    duration: float = 1.28
-    """[s]"""
-    period: float = FRAME_PERIOD
-    """Between two rows, as the cameras give them [s]."""
+def drawn_launch(rng: np.random.Generator, distribution: LaunchDistribution = NARROW) -> Launch:
+    """The first launch drawn from `rng` that can be played; the same `rng`, the same launch.
+
+    Raises ValueError if the distribution hardly has any.
+    """
+    for _ in range(MOST_DRAWS):
+        launch = distribution.draw(rng)
+        if (why_not := verdict(launch)) is Verdict.PLAYABLE:
+            return launch
+    raise ValueError(
+        f"none of {MOST_DRAWS} shots of {distribution} can be played (the last one: "
+        f"{why_not.value}); choose other means"
+    )
 
 
 def simulated_shot(
-    rng: np.random.Generator,
-    *,
-    variation: ShotVariation | None = None,
-    aerodynamics: Aerodynamics = AERODYNAMICS,
-    table: Table = TABLE,
+    rng: np.random.Generator, *, distribution: LaunchDistribution = NARROW
 ) -> BallTrajectory:
-    """A shot towards the arm that bounces once on the table; the same `rng` gives the same shot."""
-    variation = variation or ShotVariation()
-    for _ in range(1000):
-        position = rng.normal(variation.position, variation.position_deviation)
-        velocity = rng.normal(variation.velocity, variation.velocity_deviation)
-        spin = rng.normal(variation.spin, variation.spin_deviation)
-        flight = predict(
-            position,
-            velocity,
-            variation.duration,
-            spin=spin,
-            period=variation.period,
-            aerodynamics=aerodynamics,
-            table=table,
-        )
-        if len(flight.bounce_times) == 1:
-            return BallTrajectory(
-                "simulated shot", flight.stamps, flight.positions, flight.velocities, flight.spins
-            )
-    raise ValueError(
-        f"no shot of {variation} bounces exactly once on the table; choose other means"
-    )
+    """A drawn shot, as cameras would see it."""
+    return drawn_launch(rng, distribution).seen()
+
+
+@dataclass(frozen=True)
+class SimulatedShots:
+    """The shots of a distribution and a seed, by their numbers; nothing is kept."""
+
+    distribution: LaunchDistribution = NARROW
+    seed: int = 0
+    count: int = NUMBERS
+    """How many there are."""
+    period: float = PERIOD
+    """[s]"""
+
+    def __len__(self) -> int:
+        return self.count
+
+    def launch(self, index: int) -> Launch:
+        """Launch `index`, from 0. Raises IndexError beyond the last."""
+        if not 0 <= index < self.count:
+            raise IndexError(f"there is no ball {index}: there are 0 to {self.count - 1}")
+        return drawn_launch(np.random.default_rng((self.seed, index)), self.distribution)
+
+    def flight(self, index: int) -> SampledFlight:
+        """The launch `index`, from which a simulator lets the ball fly."""
+        return self.launch(index).flight(self.period)

@@ -5,17 +5,28 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache, partial
 from pathlib import Path
-
-import numpy as np
+from typing import Protocol
 
 from ..world.timing import PERIOD
 from .recordings import load_trajectories, recording_files
 from .sampled_flight import SampledFlight
-from .simulated_shots import simulated_shot
+from .simulated_shots import DISTRIBUTIONS, NUMBERS, SimulatedShots
 from .trajectories import BallTrajectory
 
-SIMULATED_SHOTS = 80
-"""How many different shots there are without any file."""
+DEFAULT_BALLS = "narrow"
+"""What is played where no balls are named."""
+
+
+class Flights(Protocol):
+    """Balls by their numbers, from 0."""
+
+    def __len__(self) -> int:
+        """How many there are."""
+        ...
+
+    def flight(self, index: int) -> SampledFlight:
+        """Flight `index`. Raises IndexError beyond the last."""
+        ...
 
 
 class CachedFlights:
@@ -57,25 +68,21 @@ def recorded_balls(path: str | Path, *, period: float = PERIOD) -> CachedFlights
     return CachedFlights(shots, period=period)
 
 
-def simulated_balls(
-    *, count: int = SIMULATED_SHOTS, seed: int = 0, period: float = PERIOD
-) -> CachedFlights:
-    """Shots of a ball gun with drag, top spin and one bounce; the same `seed`, the same shots."""
-    return CachedFlights(
-        [
-            partial(lambda rng_seed: simulated_shot(np.random.default_rng(rng_seed)), (seed, i))
-            for i in range(count)
-        ],
-        period=period,
-    )
-
-
 @cache
-def balls_from(path: str | None, seed: int = 0, period: float = PERIOD) -> CachedFlights:
-    """Recorded balls of `path`, or simulated ones if there is none; shared in this process."""
-    if path is None:
-        return simulated_balls(seed=seed, period=period)
-    return recorded_balls(path, period=period)
+def balls_from(
+    balls: str | None, seed: int = 0, period: float = PERIOD, count: int | None = None
+) -> Flights:
+    """Simulated shots, "narrow" or "wide", or the recorded ones of a path; None: narrow ones.
+
+    `seed` is that of simulated shots, of which there are `count`; None: no end of them. Shared in
+    this process. Raises FileNotFoundError or ValueError.
+    """
+    name = balls or DEFAULT_BALLS
+    if name in DISTRIBUTIONS:
+        return SimulatedShots(DISTRIBUTIONS[name], seed, count or NUMBERS, period)
+    if count is not None:
+        raise ValueError(f"ball_count={count} is for simulated shots; {balls} is a recording")
+    return recorded_balls(name, period=period)
 
 
 def _only_shot(file: Path) -> BallTrajectory:

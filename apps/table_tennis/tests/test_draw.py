@@ -1,0 +1,86 @@
+"""Which balls the episodes play."""
+
+from contextlib import closing
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+from opened_environment import opened
+from recorded_rows import write_shots
+
+from o80_table_tennis.balls.draw import USERS_OWN, draw_balls
+from o80_table_tennis.balls.simulated_shots import SimulatedShots, simulated_shot
+from o80_table_tennis.balls.sources import balls_from
+from o80_table_tennis.environment import TableTennisEnvironment
+from o80_table_tennis.settings import TaskSettings
+
+
+def test_every_episode_draws_another_shot_and_the_seed_repeats_them() -> None:
+    def begun(task: TaskSettings) -> list[list[float]]:
+        with closing(TableTennisEnvironment(task=task)) as environment:
+            seeds = [4, None, None, None, None, None]
+            return [environment.reset(seed=seed)[0][16:].tolist() for seed in seeds]
+
+    wide = begun(TaskSettings(balls="wide"))
+    assert len({tuple(ball) for ball in wide}) == 6
+    assert begun(TaskSettings(balls="wide")) == wide
+    assert begun(TaskSettings(balls="wide", ball_seed=1)) != wide
+    counted = begun(TaskSettings(balls="wide", ball_count=2))
+    assert len({tuple(ball) for ball in counted}) == 2
+
+
+def test_a_shot_is_played_again_by_its_number() -> None:
+    shots = SimulatedShots()
+    drawn = draw_balls(shots, np.random.default_rng(1), extra=3)
+    assert len(set(drawn.numbers)) == 4
+    for number, flight in zip(drawn.numbers, drawn.flights, strict=True):
+        np.testing.assert_array_equal(shots.flight(number).states, flight.states)
+
+
+@pytest.mark.parametrize("ball", range(6))
+def test_no_ball_is_drawn_twice_where_there_are_enough(ball: int) -> None:
+    shots = SimulatedShots(count=6)
+    for seed in range(20):
+        for played in (None, ball):
+            drawn = draw_balls(shots, np.random.default_rng(seed), extra=5, ball=played)
+            assert sorted(drawn.numbers) == list(range(6))
+            assert played in (None, drawn.numbers[0])
+    assert len(draw_balls(shots, np.random.default_rng(0), extra=9).flights) == 10
+
+
+def test_what_the_caller_chooses_changes_no_other_draw() -> None:
+    shots, flight = SimulatedShots(), SimulatedShots(seed=9).flight(0)
+    states = []
+    for chosen in ({}, {"ball": 3}, {"flight": flight}):
+        rng = np.random.default_rng(2)
+        drawn = draw_balls(shots, rng, extra=2, **chosen)
+        states.append((drawn.numbers[1:], rng.integers(2**62)))
+    assert states[0] == states[1] == states[2]
+    assert drawn.numbers[0] == USERS_OWN
+
+
+def test_balls_are_named_or_read_from_a_path(tmp_path: Path) -> None:
+    assert len(balls_from("wide", count=400)) == 400
+    assert len(balls_from(None)) == len(balls_from("narrow")) > 10**9
+    with pytest.raises(FileNotFoundError, match="or the name of simulated shots: narrow, wide"):
+        balls_from("wid")
+    shots = {"0": simulated_shot(np.random.default_rng(0))}
+    file = str(write_shots(tmp_path / "shots.hdf5", shots))
+    assert len(balls_from(file)) == 1
+    with pytest.raises(ValueError, match="ball_count=3 is for simulated shots"):
+        balls_from(file, count=3)
+    with pytest.raises(ValueError, match="ball_count must be at least 1, got 0"):
+        TaskSettings(ball_count=0)
+
+
+def test_extra_balls_are_other_shots() -> None:
+    with opened(extra_balls=8) as environment:
+        _, info = environment.reset(seed=3)
+        assert len(set(info["virtual"]["balls"].tolist())) == 8
+
+
+def test_gymnasium_makes_the_environment_with_wide_shots() -> None:
+    with gymnasium.make("o80/TableTennis-v0", task=TaskSettings(balls="wide")) as environment:
+        environment.reset(seed=1)
+        environment.step(environment.action_space.sample())
