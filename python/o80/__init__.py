@@ -36,6 +36,7 @@ from o80.errors import (
 )
 
 if TYPE_CHECKING:
+    from o80 import learning as learning
     from o80 import robots
     from o80.actuator import Actuator, Number
     from o80.backend import Backend, Running, StartAfresh
@@ -119,8 +120,8 @@ _LAZY = {
 if not TYPE_CHECKING:  # otherwise a type checker would accept every name
 
     def __getattr__(name: str) -> Any:
-        if name == "robots":
-            return importlib.import_module("o80.robots")
+        if name in ("learning", "robots"):
+            return importlib.import_module(f"o80.{name}")
         if name not in _LAZY:
             raise AttributeError(f"module 'o80' has no attribute {name!r}")
         value = getattr(importlib.import_module(_LAZY[name]), name)
@@ -133,7 +134,7 @@ if not TYPE_CHECKING:  # otherwise a type checker would accept every name
 
 __version__ = version()
 
-# `open` is left out: `from o80 import *` must not replace the builtin
+# `open` is left out: `from o80 import *` must not replace the builtin. `learning` needs an extra.
 __all__ = [
     "Actuator",
     "Backend",

@@ -11,8 +11,8 @@ from o80 import _core
 from o80.errors import InvalidArgument
 from o80.prepared_burst import fill_targets
 
-#: Numbers of copies, each once, or a mask with a bool for each copy; None: all of them.
-Copies = ArrayLike | None
+#: Numbers of copies, each once, a slice, or a mask with a bool for each copy; None: all of them.
+Copies = ArrayLike | slice | None
 
 
 class GroupBurst:
@@ -62,7 +62,7 @@ class GroupBurst:
     def run(self, copies: Copies = None, *, timeout: float | None = None) -> None:
         """Sends the targets, with all else that was added, and bursts; fills `rows`.
 
-        copies: numbers of the copies that run, or a mask (None: all).
+        copies: numbers of the copies that run, a slice, or a mask (None: all).
         timeout: for all of them together [s].
 
         Raises CopyFailed with the exception of each copy that failed (for example targets that the
@@ -79,6 +79,8 @@ def chosen_copies(copies: Copies, everybody: NDArray[np.uint32]) -> NDArray[np.u
     """Numbers of copies. Raises InvalidArgument."""
     if copies is None:
         return everybody
+    if isinstance(copies, slice):
+        return everybody if copies == slice(None) else np.ascontiguousarray(everybody[copies])
     given = np.asarray(copies)
     if given.dtype == np.bool_:
         if given.shape != everybody.shape:

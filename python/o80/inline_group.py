@@ -129,7 +129,7 @@ class InlineGroup(Closeable):
         """Sends a request to copies and runs each until its request has ended.
 
         name: name of the request.
-        copies: numbers of the copies, or a mask (None: all).
+        copies: numbers of the copies, a slice, or a mask (None: all).
         timeout: for all of them together [s].
         fields: fields of the request. A value with one dimension more than the field has one entry
             for each of these copies: `seed=[3, 4]`.

@@ -19,6 +19,7 @@ SAYS = {
     "embedded_backend": ["closed to [ 0.02 -0.02]"],
     "embedded_simulation": ["iteration 300"],
     "history": ["1000 rows, observed is an array of shape (1000, 2)"],
+    "learning": ["mean reward of a step: -0."],
     "mirroring": ["asked for exactly what was seen: True"],
     "mujoco_control": [
         "500 Hz, as the model says; actuators: push",
@@ -31,6 +32,7 @@ SAYS = {
         "first on the floor at x = ",
     ],
     "mujoco_imposed": ["met the paddle at iteration", "rose again at"],
+    "mujoco_learning": ["generation 7: stood 2.00 s"],
     "mujoco_pictures": ["6 pictures of shape (240, 320, 3)", "they differ: True"],
     "paces": [
         "in 0.25 s:            250",

@@ -330,3 +330,11 @@ def test_many_copies_fit_into_the_files_of_a_process() -> None:
     now, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     assert now >= soft
     resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+
+
+def test_a_slice_names_copies(group: o80.InlineGroup) -> None:
+    burst = group.prepared_burst(3)
+    burst.targets = np.zeros((COPIES, 1, 2))
+    burst.run(slice(None))
+    burst.run(slice(None, None, 2))
+    assert [row["iteration"] for row in group.latest()] == [6, 3, 6, 3, 6]

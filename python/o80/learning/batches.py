@@ -1,0 +1,81 @@
+"""Observations and actions of several copies: arrays, or dicts and tuples of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium import Space, spaces
+
+from o80.errors import InvalidArgument
+from o80.learning.task import Index
+
+
+def rows(batch: Any, copies: Any) -> Any:
+    """Those of some copies; a number gives that of one copy. Arrays are fresh."""
+    if isinstance(batch, dict):
+        return {name: rows(each, copies) for name, each in batch.items()}
+    if isinstance(batch, tuple):
+        return tuple(rows(each, copies) for each in batch)
+    chosen = batch[copies]
+    return chosen.copy() if isinstance(chosen, np.ndarray) else chosen
+
+
+def put(batch: Any, copies: Index, values: Any) -> None:
+    """Replaces those of some copies."""
+    if isinstance(batch, dict):
+        for name, each in batch.items():
+            put(each, copies, values[name])
+    elif isinstance(batch, tuple):
+        for each, value in zip(batch, values, strict=True):
+            put(each, copies, value)
+    else:
+        batch[copies] = values
+
+
+def fresh(space: Space[Any], values: Any) -> Any:
+    """A copy of values in `space`, with its types. Raises InvalidArgument for other shapes."""
+    if isinstance(space, spaces.Dict):
+        return {name: fresh(each, values[name]) for name, each in space.items()}
+    if isinstance(space, spaces.Tuple):
+        return tuple(fresh(each, value) for each, value in zip(space, values, strict=True))
+    made = np.array(values, space.dtype)
+    if made.shape[1:] != space.shape:
+        raise InvalidArgument(
+            f"observations must have the shape (copies, {_numbers(space)}) of the observation "
+            f"space, got {made.shape}"
+        )
+    return made
+
+
+def checked_actions(space: Space[Any], actions: Any, copies: int) -> Any:
+    """Actions of all copies, as arrays. Raises InvalidArgument for a wrong shape."""
+    if isinstance(space, spaces.Dict):
+        return {name: checked_actions(each, actions[name], copies) for name, each in space.items()}
+    if isinstance(space, spaces.Tuple):
+        return tuple(
+            checked_actions(each, action, copies)
+            for each, action in zip(space, actions, strict=True)
+        )
+    given = np.asarray(actions)
+    if given.shape != (copies, *(space.shape or ())):
+        raise InvalidArgument(
+            f"actions must have the shape {(copies, *(space.shape or ()))}, got {given.shape}"
+        )
+    return given
+
+
+def batch_of_one(space: Space[Any], action: Any) -> Any:
+    """The action of one copy as a batch. Raises InvalidArgument for a wrong shape."""
+    if isinstance(space, spaces.Dict):
+        return {name: batch_of_one(each, action[name]) for name, each in space.items()}
+    if isinstance(space, spaces.Tuple):
+        return tuple(batch_of_one(each, value) for each, value in zip(space, action, strict=True))
+    given = np.asarray(action)
+    if given.shape != space.shape:
+        raise InvalidArgument(f"an action must have the shape {space.shape}, got {given.shape}")
+    return given[np.newaxis]
+
+
+def _numbers(space: Space[Any]) -> str:
+    return ", ".join(map(str, space.shape or ()))

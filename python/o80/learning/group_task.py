@@ -1,0 +1,83 @@
+"""A task on one inline group."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium import Space, spaces
+from numpy.typing import NDArray
+
+from o80.errors import InvalidArgument
+from o80.gather import Gather
+from o80.group_burst import GroupBurst
+from o80.inline_group import InlineGroup
+from o80.learning.task import Index, Task
+
+
+class GroupTask(Task):
+    """A task on one inline group: a step sends targets and runs a burst.
+
+    `begin` and `judge` are yours; `targets` turns actions into targets. Observations are the
+    numbers that `seen` gathers, unless you override `observe`. The copies to be judged are those
+    with a flag of `seen` raised, or all if it has no flags.
+
+    The task closes the group.
+    """
+
+    def __init__(
+        self,
+        group: InlineGroup,
+        *,
+        burst: GroupBurst,
+        seen: Gather,
+        observation_space: Space[Any],
+        action_space: Space[Any],
+        most_steps: int | None = None,
+    ) -> None:
+        """burst: of a step, from `group.prepared_burst`.
+
+        seen: observations and flags, from `group.gather`.
+        most_steps: steps after which an episode is truncated (None: no limit).
+        """
+        super().__init__(
+            group.copies,
+            observation_space=observation_space,
+            action_space=action_space,
+            most_steps=most_steps,
+        )
+        self.group, self.burst, self.seen = group, burst, seen
+        self._has_flags = seen.flags.shape[1] > 0
+
+    def targets(self, actions: Any) -> Any:
+        """The targets (n, steps, actuators) of a burst, of the actions (n, ...) of n copies.
+
+        By default the actions themselves, clipped into the action space.
+        """
+        space = self.action_space
+        if not isinstance(space, spaces.Box):
+            raise InvalidArgument(
+                f"{type(self).__name__} has actions of {space}: define targets(actions)"
+            )
+        clipped = np.clip(actions, space.low, space.high)
+        return clipped.reshape(len(clipped), *self.burst.targets.shape[1:])
+
+    def step(self, actions: Any, copies: Index) -> None:
+        """Sends the targets of these copies, and runs a burst of them."""
+        self.burst.targets[copies] = self.targets(actions)
+        self.burst.run(copies)
+
+    def observe(self, copies: Index) -> Any:
+        """(n, numbers) as they are gathered."""
+        return self.seen.observations[copies]
+
+    def flagged(self) -> NDArray[np.bool_]:
+        """(copies,) with a flag raised; all of them if there are no flags."""
+        if not self._has_flags:
+            return super().flagged()
+        raised: NDArray[np.bool_] = np.logical_or.reduce(self.seen.flags, axis=1)
+        return raised
+
+    def close(self) -> None:
+        """Closes the group."""
+        self.group.close()

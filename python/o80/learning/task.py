@@ -1,0 +1,118 @@
+"""A task: what copies of a robot do in episodes, and what it is worth."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+from gymnasium import Space
+from numpy.typing import ArrayLike, NDArray
+
+from o80.checked import whole
+from o80.errors import InvalidArgument
+
+Index = slice | NDArray[np.intp]
+"""Some copies, as an index of arrays over all copies: an array of numbers, or `EVERY`."""
+EVERY = slice(None)
+"""All copies, as an index."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a step was worth to the n copies that were judged: an entry for each, or one for all."""
+
+    reward: ArrayLike = 0.0
+    terminated: ArrayLike = False
+    """Ended by what happened."""
+    truncated: ArrayLike = False
+    """Ended by something that is not part of the task, such as a time limit."""
+    info: Mapping[str, Any] = field(default_factory=dict)
+    """Further entries of Gymnasium's info, for these copies only."""
+
+
+class Task(ABC):
+    """What `copies` copies of a robot do in episodes: for one copy and for many, written once.
+
+    `Environment` makes a Gymnasium environment of a task with one copy, `VectorEnvironment` one of
+    a task with any number. Both call, in each step: `step`, `flagged`, `judge` for the flagged
+    copies, `info` and `observe`; and `begin` for the copies that begin an episode.
+
+    Copies are independent: what a copy gets may depend only on its own actions, and on random
+    numbers of its own generator. Then a vector environment equals single ones, bit for bit.
+
+    An argument `copies` of a method is an index of arrays over all copies.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
+    """Of the environments: modes of rendering, among others."""
+
+    def __init__(
+        self,
+        copies: int,
+        *,
+        observation_space: Space[Any],
+        action_space: Space[Any],
+        most_steps: int | None = None,
+    ) -> None:
+        """observation_space, action_space: of one copy.
+
+        most_steps: steps after which an episode is truncated (None: no limit).
+        """
+        self.copies = whole(copies, "copies", 1)
+        for name, space in (
+            ("observation_space", observation_space),
+            ("action_space", action_space),
+        ):
+            if not isinstance(space, Space):
+                raise InvalidArgument(f"{name} must be a space of Gymnasium, got {space!r}")
+        self.observation_space = observation_space
+        self.action_space = action_space
+        self.most_steps = None if most_steps is None else whole(most_steps, "most_steps", 1)
+        self.steps: NDArray[np.int64] = np.zeros(self.copies, np.int64)
+        """(copies,) steps of each episode so far; counted by the environment."""
+
+    @abstractmethod
+    def begin(
+        self,
+        copies: NDArray[np.intp],
+        generators: Sequence[np.random.Generator],
+        options: dict[str, Any],
+    ) -> None:
+        """Begins an episode of these copies.
+
+        generators: one for each of them: draw the random numbers of a copy from its own.
+        options: of the call of `reset`, empty in an automatic reset.
+        """
+
+    @abstractmethod
+    def step(self, actions: Any, copies: Index) -> None:
+        """Carries out the actions (n, ...) of these n copies."""
+
+    @abstractmethod
+    def observe(self, copies: Index) -> Any:
+        """Observations (n, ...) of these n copies; the environment copies them."""
+
+    def flagged(self) -> NDArray[np.bool_]:
+        """(copies,) the copies that `judge` looks at after a step; by default all of them.
+
+        A step of the others is worth 0, and their episodes go on. Called after every step: cheap.
+        """
+        return np.ones(self.copies, np.bool_)
+
+    @abstractmethod
+    def judge(self, copies: NDArray[np.intp]) -> Outcome:
+        """What the step was worth to these copies: flagged, or at the end of `most_steps`."""
+
+    def info(self, copies: Index) -> Mapping[str, Any]:
+        """Entries of Gymnasium's info in every step and reset: arrays (n, ...), or mappings."""
+        return {}
+
+    def render(self, copy: int) -> Any:
+        """A picture of one copy."""
+        raise NotImplementedError(f"{type(self).__name__} has no pictures: define render(copy)")
+
+    def close(self) -> None:  # noqa: B027
+        """Ends what the task has started; may be called twice."""

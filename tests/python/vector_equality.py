@@ -1,0 +1,106 @@
+"""Runs a vector environment beside Gymnasium's SyncVectorEnv of single ones and compares all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from operator import methodcaller
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
+
+MODES = list(AutoresetMode)
+Policy = Callable[[Any, int], Any]
+"""Actions of all copies, from their observations and the number of the step."""
+
+
+def beside(
+    vector: VectorEnv[Any, Any, Any],
+    make: Callable[[], gymnasium.Env[Any, Any]],
+    policy: Policy,
+    *,
+    steps: int,
+    seed: Any,
+) -> int:
+    """Steps both, resets ended copies in DISABLED mode, and returns how many episodes ended."""
+    mode = vector.metadata["autoreset_mode"]
+    singles: Any = SyncVectorEnv([make] * vector.num_envs, autoreset_mode=mode)
+    try:
+        assert_same_spaces(vector, singles)
+        seen = both(vector, singles, lambda each: each.reset(seed=seed))[0]
+        ends = 0
+        for number in range(steps):
+            actions = policy(seen, number)
+            results = both(vector, singles, methodcaller("step", actions))
+            seen, over = results[0], results[2] | results[3]
+            ends += int(over.sum())
+            assert_final_observations(vector, results, mode)
+            if mode is AutoresetMode.DISABLED and over.any():
+                again = {"reset_mask": over}
+                seen = both(vector, singles, lambda each: each.reset(options=dict(again)))[0]  # noqa: B023
+        assert vector.np_random_seed == singles.np_random_seed
+        generators: Any = vector.np_random
+        for mine, other in zip(generators, singles.np_random, strict=True):
+            assert mine.bit_generator.state == other.bit_generator.state
+        return ends
+    finally:
+        singles.close()
+
+
+def both(vector: Any, singles: Any, call: Callable[[Any], Any]) -> Any:
+    """The results of a call of both, which are the same."""
+    results, others = call(vector), call(singles)
+    assert_same(results, others, "results")
+    return results
+
+
+def assert_same_spaces(vector: Any, singles: Any) -> None:
+    for name in (
+        "observation_space",
+        "action_space",
+        "single_observation_space",
+        "single_action_space",
+        "num_envs",
+        "metadata",
+        "render_mode",
+    ):
+        assert getattr(vector, name) == getattr(singles, name), name
+
+
+def assert_final_observations(vector: Any, results: Any, mode: AutoresetMode) -> None:
+    """The dense final observations are those of Gymnasium, or of the result itself."""
+    dense, infos = vector.final_observations, results[4]
+    if mode is not AutoresetMode.SAME_STEP:
+        assert_same(dense, results[0], "final observations")
+        return
+    for copy in np.flatnonzero(infos.get("_final_obs", [])).tolist():
+        assert_same(row(dense, copy), infos["final_obs"][copy], "final observation")
+
+
+def row(batch: Any, copy: int) -> Any:
+    if isinstance(batch, dict):
+        return {name: row(each, copy) for name, each in batch.items()}
+    return batch[copy]
+
+
+def assert_same(one: Any, other: Any, where: str) -> None:
+    """Same types, keys, shapes, dtypes and bits."""
+    assert type(one) is type(other), f"{where}: {type(one)}, {type(other)}"
+    if isinstance(one, dict):
+        assert one.keys() == other.keys(), where
+        for name in one:
+            assert_same(one[name], other[name], f"{where}.{name}")
+    elif isinstance(one, tuple | list):
+        assert len(one) == len(other), where
+        for number, (mine, theirs) in enumerate(zip(one, other, strict=True)):
+            assert_same(mine, theirs, f"{where}[{number}]")
+    elif isinstance(one, np.ndarray):
+        assert one.dtype == other.dtype, f"{where}: {one.dtype}, {other.dtype}"
+        assert one.shape == other.shape, f"{where}: {one.shape}, {other.shape}"
+        if one.dtype == object:
+            assert_same(list(one), list(other), where)
+        else:
+            assert one.tobytes() == other.tobytes(), f"{where}:\n{one}\n{other}"
+    else:
+        assert one == other, f"{where}: {one}, {other}"
