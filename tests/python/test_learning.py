@@ -82,8 +82,9 @@ def test_resets_copies_by_mask_seeds_and_options() -> None:
     singles.close()
 
 
-def test_every_array_is_fresh() -> None:
-    with VectorEnvironment(Reach(2), autoreset_mode=AutoresetMode.SAME_STEP) as vector:
+@pytest.mark.parametrize("mode", [AutoresetMode.SAME_STEP, AutoresetMode.NEXT_STEP])
+def test_every_array_is_fresh(mode: AutoresetMode) -> None:
+    with VectorEnvironment(Reach(2), autoreset_mode=mode) as vector:
         kept: list[Any] = [vector.reset(seed=1)]
         actions = np.full((2, 4), 0.2, np.float32)
         for _ in range(12):
