@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 import o80
 from chromium import Chromium
+from o80.command_ends import command_ends
 from o80.plot import plot
 from o80_table_tennis.players.policies import default_policy
 from o80_table_tennis.report.rendering import Scene, write_picture
@@ -38,7 +39,7 @@ def draw_table_tennis(path: Path) -> None:
         over = terminated or truncated
         seen.append(observation[BALL_POSITION].astype(float))
         if not hit:
-            arm, hit = observation[JOINT_POSITIONS].astype(float), info["hit"]
+            arm, hit = observation[JOINT_POSITIONS].astype(float), info["touched"]
     environment.close()
     balls = np.array(seen[::SHOWN])
     with Scene(balls=len(balls), size=SIZE) as scene:
@@ -83,7 +84,9 @@ def draw_recording(path: Path) -> None:
         arm.resume()
         arm.add_command("elbow", -0.2, duration=0.2)
         arm.burst(300)
-        plot({"two_joints": arm.history()}).savefig(path, dpi=80)
+        name = arm.segment
+        ends = {name: command_ends(arm.journal())}
+        plot({name: arm.history()}, ends=ends).savefig(path, dpi=80)
 
 
 def draw_view(path: Path) -> None:
