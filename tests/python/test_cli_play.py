@@ -97,7 +97,7 @@ def test_a_killed_player_leaves_a_dead_segment_that_the_next_one_replaces(
     ("words", "said"),
     [
         (["--speed", "0"], "speed must be positive"),
-        (["--from", "-1"], "begin must be a number of seconds"),
+        (["--from", "-1"], "--from: give a number of seconds from 0"),
         (["--segment", "aram"], "no segment 'aram'"),
     ],
 )
@@ -107,3 +107,27 @@ def test_wrong_options_are_named(recorded: Path, words: list[str], said: str) ->
     )
     assert done.returncode != 0
     assert said in " ".join(done.stderr.split())
+
+
+def test_contradictory_options_are_refused_by_their_names(recorded: Path) -> None:
+    assert "--fast" in (said := run("play", recorded, "--fast", "--speed", "2", code=2))
+    assert "--speed 2" in said
+    said = " ".join(run("play", recorded, "--from", "5", "--to", "2", code=2).split())
+    assert "--to" in said
+    assert "--from (5 s)" in said
+    assert "--from" in run("play", recorded, "--from", "-1", code=2)
+
+
+def test_info_says_that_a_segment_is_played(recorded: Path, segment: str) -> None:
+    with playing(recorded, "--fast"):
+        with o80.Frontend(segment, WAIT) as arm:
+            arm.wait_for(150, timeout=WAIT)
+        assert "robot two_joints, played, rows" in run("info", segment)
+
+
+def test_a_name_that_is_no_file_is_told_how_to_become_one(tmp_path: Path) -> None:
+    said = run("play", "arm", code=1)
+    assert "there is no file arm" in said
+    assert "o80 record arm -o arm.mcap" in said
+    said = run("export", "arm", "--format", "lerobot", "-o", tmp_path / "set", code=1)
+    assert "o80 record arm -o arm.mcap" in said

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import o80
 from o80 import _core
 from o80.cli.attach import attach
 from o80.cli.condition import halt_text, pace_text, running_texts, watchdog_text
@@ -28,7 +29,7 @@ def info(
             return
         loop = _core.loop_state(frontend)
         print(
-            f"{style(segment, 'bold')}: robot {schema['robot']}, {frontend.life}, "
+            f"{style(segment, 'bold')}: robot {schema['robot']}, {_life(frontend)}, "
             f"rows {frontend.oldest} to {frontend.published}, "
             f"{schema['row']['size']} bytes a row"
         )
@@ -57,6 +58,11 @@ def info(
         print(style("\nstarted with", "bold"))
         for line in _started_with(frontend.provenance):
             print(f"  {line}")
+
+
+def _life(frontend: o80.Frontend) -> str:
+    """As `o80 list` says it."""
+    return "played" if frontend.played and frontend.alive else frontend.life
 
 
 def _started_with(provenance: Provenance) -> list[str]:

@@ -18,9 +18,17 @@ if TYPE_CHECKING:
 _BETWEEN_REPORTS = 0.5  # [s]
 
 
-def _speed(value: float) -> float:
-    if not value > 0:
+def _speed(value: float | None) -> float | None:
+    if value is not None and not value > 0:
         raise typer.BadParameter(f"speed must be positive, got {value:g}", param_hint="--speed")
+    return value
+
+
+def _begin(value: float) -> float:
+    if not (value >= 0 and math.isfinite(value)):
+        raise typer.BadParameter(
+            f"give a number of seconds from 0, got {value:g}", param_hint="--from"
+        )
     return value
 
 
@@ -30,8 +38,8 @@ def play(
         list[str] | None, typer.Option(help="Only this segment; may be given several times.")
     ] = None,
     speed: Annotated[
-        float, typer.Option(callback=_speed, help="0.5: half as fast as recorded.")
-    ] = 1.0,
+        float | None, typer.Option(callback=_speed, help="0.5: half as fast as recorded.")
+    ] = None,
     fast: Annotated[
         bool, typer.Option("--fast", help="All rows at once; they stay until Ctrl-C.")
     ] = False,
@@ -43,7 +51,7 @@ def play(
         bool, typer.Option("--loop", help="Begin again after the last row, as after a restart.")
     ] = False,
     begin: Annotated[
-        float, typer.Option("--from", help="Begin so many seconds after the first row.")
+        float, typer.Option("--from", callback=_begin, help="Begin so many seconds after the first row.")
     ] = 0.0,
     end: Annotated[
         float | None, typer.Option("--to", help="End so many seconds after the first row.")
@@ -67,11 +75,20 @@ def play(
     Commands to them are refused. A segment whose name a living robot has is refused: choose another
     with --prefix or --name.
     """
+    if fast and speed is not None:
+        raise typer.BadParameter(
+            f"--fast plays all rows at once, so it cannot be given with --speed {speed:g}",
+            param_hint="--fast",
+        )
+    if end is not None and not end > begin:
+        raise typer.BadParameter(
+            f"must be later than --from ({begin:g} s), got {end:g} s", param_hint="--to"
+        )
     stop = StopRequest()
     with o80.play(
         path,
         segment,
-        speed=math.inf if fast else speed,
+        speed=math.inf if fast else 1.0 if speed is None else speed,
         bursts=bursts,
         loop=loop,
         begin=begin,

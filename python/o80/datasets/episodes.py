@@ -211,7 +211,7 @@ def _segment(recording: "RecordingFile", segment: str | None) -> str:
     if len(moving) != 1:
         raise InvalidArgument(
             f"{recording.path} holds {len(moving)} robots ({', '.join(moving)}): choose one with "
-            f"segment"
+            f"--segment, in Python with segment="
         )
     return moving[0]
 

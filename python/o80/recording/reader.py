@@ -95,8 +95,19 @@ def _scanned(path: Path) -> Scan:
         return scan(path)
     except NotARecordingError as error:
         raise RecordingError(f"{error}: o80.open reads files of o80 record") from None
+    except FileNotFoundError:
+        raise RecordingError(_no_such_file(path)) from None
     except OSError as error:
         raise RecordingError(f"{path} cannot be read: {error.strerror}") from error
+
+
+def _no_such_file(path: Path) -> str:
+    name, file = (path.name, path) if path.suffix == ".mcap" else (str(path), f"{path}.mcap")
+    segment = name.removesuffix(".mcap")
+    return (
+        f"there is no file {path}: give a recording. `o80 record {segment} -o {file}` records a "
+        f"segment '{segment}'"
+    )
 
 
 def _parts_of(path: Path, found: Scan) -> Iterator[EpochPart]:
