@@ -1,6 +1,8 @@
 #include "robot/replay.hpp"
 
+#include <algorithm>
 #include <cstring>
+#include <string_view>
 #include <utility>
 
 #include "control/record.hpp"
@@ -31,10 +33,25 @@ void check_blocks(const JournalEntry& entry) {
   if (!is_whole) refuse(entry, "holds a damaged batch");
 }
 
+/// Throws if this robot may be hardware. The recording may describe another robot than this one.
+void check_simulated(const Schema& schema) {
+  const auto serves = [&](std::string_view name) {
+    return std::ranges::any_of(schema.requests,
+                               [&](const RequestRow& row) { return row.name.view() == name; });
+  };
+  const bool simulated = schema.head.of_the_world == 0 && serves("snapshot") && serves("restore");
+  if (simulated) return;
+  throw DriverError("robot '" + schema.head.robot.str() +
+                    "' is not started for a replay: it may be hardware, because it reads the world "
+                    "or does not serve the requests snapshot and restore of a simulation");
+}
+
 }  // namespace
 
 Replay::Replay(std::unique_ptr<DriverInstance> robot, BackendOptions options)
-    : lanes_(options.lanes), loop_(std::move(robot), replaying(std::move(options)), &recorded_) {}
+    : lanes_(options.lanes), loop_(std::move(robot), replaying(std::move(options)), &recorded_) {
+  check_simulated(loop_.backend().schema());
+}
 
 void Replay::begin_at(Iteration first) noexcept { loop_.begin_at(first - 1); }
 

@@ -20,7 +20,8 @@ namespace o80 {
 /// Writer: one thread.
 class Replay {
  public:
-  /// `options`: those of the recorded run, with another segment name. Throws as Loop.
+  /// `options`: those of the recorded run, with another segment name. Throws as Loop, and
+  /// DriverError, before the robot is started, if it may be hardware.
   Replay(std::unique_ptr<DriverInstance> robot, BackendOptions options);
 
   /// Begins at this iteration instead of row 0: `run` first publishes the row before it, which

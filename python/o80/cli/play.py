@@ -51,7 +51,8 @@ def play(
         bool, typer.Option("--loop", help="Begin again after the last row, as after a restart.")
     ] = False,
     begin: Annotated[
-        float, typer.Option("--from", callback=_begin, help="Begin so many seconds after the first row.")
+        float,
+        typer.Option("--from", callback=_begin, help="Begin so many seconds after the first row."),
     ] = 0.0,
     end: Annotated[
         float | None, typer.Option("--to", help="End so many seconds after the first row.")

@@ -22,8 +22,11 @@ def replay(
         str | None, typer.Option(help="Replay only this segment of a recording.")
     ] = None,
     robot: Annotated[
-        str | None,
-        typer.Option(help="Name or library of another robot than the recorded one (.so)."),
+        list[str] | None,
+        typer.Option(
+            help="Name or library (.so) of another robot than the recorded one; NAME=LIBRARY: "
+            "instead of robot NAME."
+        ),
     ] = None,
     option: Annotated[
         list[str] | None,
@@ -59,7 +62,7 @@ def replay(
     report = replay_all(
         recording if is_file else _attached(recording),
         segment=segment,
-        robot=robot,
+        robot=_robot(robot),
         options=_options(option),
         since=since,
         ignore=tuple(name for name in ignore.split(",") if name),
@@ -85,6 +88,21 @@ def _attached(name: str) -> o80.Frontend:
     from o80.cli.attach import attach
 
     return attach(name)
+
+
+def _robot(texts: list[str] | None) -> str | dict[str, str] | None:
+    named = {}
+    for text in texts or []:
+        name, equals, library = text.partition("=")
+        if equals and "/" not in name:
+            named[name] = library
+        elif len(texts or []) == 1:
+            return text
+        else:
+            raise typer.BadParameter(
+                f"write NAME=LIBRARY to replace several robots, not '{text}'", param_hint="--robot"
+            )
+    return named or None
 
 
 def _options(texts: list[str] | None) -> dict[str, str]:

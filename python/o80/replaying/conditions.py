@@ -26,7 +26,8 @@ def changes(recorded: Provenance, now: Provenance) -> list[str]:
     """What else than the run may be the cause of a difference, in words."""
     found = []
     if recorded.library_sha256 and recorded.library_sha256 != now.library_sha256:
-        found.append(f"the library of the robot has changed since: {now.library}")
+        ran = "" if recorded.library == now.library else f" (it ran from {recorded.library!r})"
+        found.append(f"the library of the robot has changed since: {now.library}{ran}")
     before = {(file.option, file.path): file.sha256 for file in recorded.files}
     found += [
         f"the file of the option {file.option} has changed since: {file.path}"

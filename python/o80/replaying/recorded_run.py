@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from o80 import _core
 from o80.errors import InvalidArgument
 from o80.machine import Machine, this_machine
+from o80.replaying.trust import is_own
 
 if TYPE_CHECKING:
     from o80.frontend import Frontend
@@ -40,6 +41,10 @@ class RecordedRun(Protocol):
     @property
     def machine(self) -> Machine | None:
         """That it ran on; None: not known."""
+
+    @property
+    def is_own(self) -> bool:
+        """It is of a robot of this user, in shared memory; files may come from strangers."""
 
     @property
     def rows(self) -> int:
@@ -75,6 +80,10 @@ class LiveRun:
     @property
     def machine(self) -> Machine:
         return this_machine()
+
+    @property
+    def is_own(self) -> bool:
+        return is_own(self.frontend)
 
     @property
     def rows(self) -> int:
@@ -116,6 +125,10 @@ class FileRun:
     @property
     def machine(self) -> Machine | None:
         return self.epoch.machine
+
+    @property
+    def is_own(self) -> bool:
+        return False
 
     @property
     def rows(self) -> int:

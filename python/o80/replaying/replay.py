@@ -10,7 +10,6 @@ import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,12 +26,14 @@ from o80.replaying.recorded_run import ROWS_AT_ONCE, LiveRun, RecordedRun, runs_
 from o80.replaying.report import ReplayReport, RunReport
 from o80.replaying.same_bytes import same_bytes
 from o80.replaying.start import Requests, SlotsKept, Start, find_start, times_from
+from o80.replaying.trust import library_of, options_of
 
 if TYPE_CHECKING:
     from o80.history import History
     from o80.recording.reader import RecordingFile
 
 Progress = Callable[[str, int, int], None]
+OtherRobot = str | os.PathLike[str] | Mapping[str, str | os.PathLike[str]] | None
 
 # of the run options, those that decide what a backend does; the others are of its process
 _OF_BACKEND = ("lanes", "lane_blocks")
@@ -43,7 +44,7 @@ def replay(
     source: str | os.PathLike[str] | RecordingFile | Frontend,
     *,
     segment: str | None = None,
-    robot: str | os.PathLike[str] | None = None,
+    robot: OtherRobot = None,
     options: Mapping[str, Any] | None = None,
     tolerances: Mapping[str, float] | None = None,
     ignore: tuple[str, ...] = (),
@@ -54,8 +55,11 @@ def replay(
 
     source: a recording, or a frontend whose segment holds all rows and decisions of its run.
     segment: replay only this one of a recording.
-    robot: name or library of another robot than the recorded one, for example after a change.
-    options: options of the robot that differ from the recorded ones.
+    robot: name or library of another robot than the recorded one, for example after a change; or a
+        mapping from names of recorded robots to such. None: robots that are found here by the
+        recorded names. A library that only the recording names is not loaded.
+    options: options of the robot that differ from the recorded ones. A recorded option that names
+        a file must be given if the file has another content here.
     tolerances, ignore: by column, as for `o80 diff`. None: bit for bit, but with a tolerance if
         another build of o80, C library or processor recorded the run; a note in the report says so.
         {}: bit for bit.
@@ -82,7 +86,7 @@ def replay(
 def replay_runs(
     runs: Iterable[RecordedRun],
     *,
-    robot: str | os.PathLike[str] | None = None,
+    robot: OtherRobot = None,
     options: Mapping[str, Any] | None = None,
     tolerances: Mapping[str, float] | None = None,
     ignore: tuple[str, ...] = (),
@@ -118,7 +122,7 @@ class _RunReplay:
     def __init__(
         self,
         run: RecordedRun,
-        robot: str | os.PathLike[str] | None,
+        robot: OtherRobot,
         options: Mapping[str, Any],
         tolerances: Mapping[str, float] | None,
         ignore: tuple[str, ...],
@@ -241,9 +245,10 @@ class _RunReplay:
     @contextmanager
     def _started(self) -> Iterator[_core.Replay]:
         provenance = self._run.provenance
-        library = _loaded(self._robot or _recorded_robot(self._run))
-        own = dict(provenance.options)
-        own |= {name: text_of(value) for name, value in self._options.items()}
+        robot = robots.load(self._chosen_robot() or library_of(self._run))
+        library = robot._library
+        given = {name: text_of(value) for name, value in self._options.items()}
+        own = options_of(self._run, robot, given)
         recorded = provenance.run_options
         loop = {name: recorded[name] for name in _OF_BACKEND if name in recorded}
         schema = self._run.schema
@@ -251,12 +256,20 @@ class _RunReplay:
         loop |= {"silence": text_of(schema["silence"])} if schema["silence"] else {}
         loop["history"] = str(_HISTORY)
         name = _core.unused_segment_name(library.name)
-        native = _core.Replay(library, name, [*loop.items()], [*own.items()], schema["period"])
         try:
-            yield native
+            native = _core.Replay(library, name, [*loop.items()], [*own.items()], schema["period"])
+            try:
+                yield native
+            finally:
+                native.close()
         finally:
-            native.close()
             _core.clean(name)
+
+    def _chosen_robot(self) -> str | os.PathLike[str] | None:
+        """What the user gives instead of the recorded robot."""
+        if isinstance(self._robot, Mapping):
+            return self._robot.get(self._run.schema["robot"])
+        return self._robot
 
     def _compare_block(self, native: _core.Replay, block: History) -> Difference | None:
         first, last = int(block.iteration[0]), int(block.iteration[-1])
@@ -312,18 +325,6 @@ class _RunReplay:
         self._times[1] = int(compared.time[-1])
         if self._progress is not None:
             self._progress(self._run.segment, self._rows, self._run.rows)
-
-
-def _recorded_robot(run: RecordedRun) -> str:
-    provenance = run.provenance
-    if provenance.library and Path(provenance.library).exists():
-        return provenance.library
-    name: str = run.schema["robot"]
-    return name
-
-
-def _loaded(name_or_path: str | os.PathLike[str]) -> _core.RobotLibrary:
-    return _core.load_robot(str(robots.path_of(name_or_path)))
 
 
 def _joined(one: History, other: History) -> History:

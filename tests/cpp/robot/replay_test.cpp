@@ -450,6 +450,22 @@ TEST_P(ReplayTest, ItBeginsAtAnyResetOrRestoredSnapshot) {
   EXPECT_GT(begun, 3);
 }
 
+class HardwareReplayTest : public PuppetTest {};
+
+TEST_F(HardwareReplayTest, ARobotThatMayBeHardwareIsNotStarted) {
+  BackendOptions options;
+  options.segment = "replay";
+  options.bursting = true;
+  try {
+    Replay replay(std::make_unique<DriverInstance>(table(), OptionValues{}), options);
+    replay.run(std::array<std::int64_t, 2>{0, 1});
+    FAIL() << "it serves no snapshot";
+  } catch (const DriverError& error) {
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("robot 'puppet' is not started for a replay"));
+  }
+  EXPECT_EQ(Puppet::calls.started, 0);
+}
+
 INSTANTIATE_TEST_SUITE_P(Seeds, ReplayTest, ::testing::Range(1U, 9U));
 
 }  // namespace
