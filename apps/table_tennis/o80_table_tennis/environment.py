@@ -49,7 +49,7 @@ SEEDS = 2**32
 
 
 class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
-    """Real arm, simulated ball: 100 steps a second of eight pressure changes.
+    """Real arm, simulated ball: 100 steps a second of eight pressure changes, or fewer longer ones.
 
     Actions: Box(-1, 1, (8,)), changes of the normalised pressures. The task (`TaskSettings.task`)
     defines observation and reward. By default observations are a Box of 22 numbers (see
@@ -154,7 +154,7 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         return observation, self._info(state, End.RUNNING)
 
     def step(self, action: Action) -> Outcome:
-        """Five iterations of the arm and of every twin; see the module for their order."""
+        """`repeat` times five iterations of the arm and of every twin; for their order see above."""
         if self._over:
             state = "the episode is over" if self._episode >= 0 else "no episode has begun"
             raise gymnasium.error.ResetNeeded(f"{state}: call reset() before step()")
@@ -165,10 +165,13 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         if self._real_time and rig.lateness > self._settings.most_late:
             return self._stall()
 
-        # action => pressures => rows of the arm => rows of the twins => outcome
-        rig.ask(self._changed(action), delay=self._settings.delay)
-        rig.step_arm()
-        rig.step_twins()
+        for _ in range(self._settings.repeat):
+            # action => pressures => rows of the arm => rows of the twins => outcome
+            rig.ask(self._changed(action), delay=self._settings.delay)
+            rig.step_arm()
+            rig.step_twins()
+            lateness = rig.lateness if self._real_time else 0
+            self._counts.add_step(exact=rig.exact, lateness=lateness, late=self._arm.late)
         return self._outcome(called, action)
 
     def _begin(self) -> None:
@@ -195,8 +198,6 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
     def _outcome(self, called: float, action: Action) -> Outcome:
         """The result of a step that began at `called` on the clock [s]."""
         self._steps += 1
-        lateness = self._rig.lateness if self._real_time else 0
-        self._counts.add_step(exact=self._rig.exact, lateness=lateness, late=self._arm.late)
         state = self._look()
         observation = self._box.clip(self._task.observe(state))
         end, reward = End.RUNNING, 0.0

@@ -115,6 +115,8 @@ class TaskSettings:
     """How many simulated shots there are; None: no end of them, each episode draws a new one."""
     factor: float = FINE
     """Of the actions: 0.05 fine, 1 coarse."""
+    repeat: int = 1
+    """How often an action is carried out, for 10 ms each time, before the next observation."""
     delay: int = 1
     """Iterations the policy has to think, real time: an action acts from row k + 1 + delay."""
     bounds: ObservationBounds = field(default_factory=ObservationBounds)
@@ -129,6 +131,7 @@ class TaskSettings:
     def __post_init__(self) -> None:
         for name in ("delay", "ball_seed", "most_late"):
             whole(getattr(self, name), name, 0)
+        whole(self.repeat, "repeat", 1)
         if self.ball_count is not None:
             whole(self.ball_count, "ball_count", 1)
         factor: object = self.factor

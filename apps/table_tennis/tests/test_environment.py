@@ -55,6 +55,23 @@ def test_an_action_acts_from_the_iteration_it_is_meant_for(delay: int) -> None:
         np.testing.assert_array_equal(asked[delay:], np.tile(wanted, (ITERATIONS - delay, 1)))
 
 
+@pytest.mark.parametrize("pacing", [Pacing.INLINE, Pacing.PROCESSES])
+def test_a_step_that_repeats_its_action_is_several_steps_with_this_action(pacing: Pacing) -> None:
+    rows = []
+    for repeat, steps in ((1, 6), (3, 2)):
+        task = TaskSettings(factor=COARSE, repeat=repeat)
+        with closing(opened(pacing, task=task)) as environment:
+            environment.reset(seed=1)
+            for _ in range(steps):
+                observation, *_ = environment.step(0.1 * PUSH)
+            arm, twin = environment.rig.arm.frontend, environment.rig.twins[0].frontend
+            names = ("desired", "observed")
+            histories = [frontend.history().rows[name] for frontend in (arm, twin) for name in names]
+            rows.append(([each.tobytes() for each in histories], observation.tobytes()))
+            assert environment.statistics().exact_steps == repeat * steps
+    assert rows[0] == rows[1]
+
+
 @pytest.mark.parametrize("pacing", ALL_MODES)
 def test_every_twin_mirrors_every_row_of_the_arm_bit_for_bit(pacing: Pacing) -> None:
     with closing(opened(pacing, twins=2, extra_balls=1)) as environment:
