@@ -154,7 +154,7 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         return observation, self._info(state, End.RUNNING)
 
     def step(self, action: Action) -> Outcome:
-        """`repeat` times five iterations of the arm and of every twin; for their order see above."""
+        """`repeat` times five iterations of the arm and of every twin; order: see the module."""
         if self._over:
             state = "the episode is over" if self._episode >= 0 else "no episode has begun"
             raise gymnasium.error.ResetNeeded(f"{state}: call reset() before step()")

@@ -57,7 +57,7 @@ def test_an_action_acts_from_the_iteration_it_is_meant_for(delay: int) -> None:
 
 @pytest.mark.parametrize("pacing", [Pacing.INLINE, Pacing.PROCESSES])
 def test_a_step_that_repeats_its_action_is_several_steps_with_this_action(pacing: Pacing) -> None:
-    rows = []
+    seen = []
     for repeat, steps in ((1, 6), (3, 2)):
         task = TaskSettings(factor=COARSE, repeat=repeat)
         with closing(opened(pacing, task=task)) as environment:
@@ -65,11 +65,11 @@ def test_a_step_that_repeats_its_action_is_several_steps_with_this_action(pacing
             for _ in range(steps):
                 observation, *_ = environment.step(0.1 * PUSH)
             arm, twin = environment.rig.arm.frontend, environment.rig.twins[0].frontend
-            names = ("desired", "observed")
-            histories = [frontend.history().rows[name] for frontend in (arm, twin) for name in names]
-            rows.append(([each.tobytes() for each in histories], observation.tobytes()))
+            histories = [each.history() for each in (arm, twin)]
+            moved = [(rows.desired.tobytes(), rows.observed.tobytes()) for rows in histories]
+            seen.append((moved, observation.tobytes()))
             assert environment.statistics().exact_steps == repeat * steps
-    assert rows[0] == rows[1]
+    assert seen[0] == seen[1]
 
 
 @pytest.mark.parametrize("pacing", ALL_MODES)
