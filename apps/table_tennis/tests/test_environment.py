@@ -66,7 +66,9 @@ def test_a_step_that_repeats_its_action_is_several_steps_with_this_action(pacing
                 observation, *_ = environment.step(0.1 * PUSH)
             arm, twin = environment.rig.arm.frontend, environment.rig.twins[0].frontend
             histories = [each.history() for each in (arm, twin)]
-            moved = [(rows.desired.tobytes(), rows.observed.tobytes()) for rows in histories]
+            moved = [
+                each.rows[["iteration", "desired", "observed"]].tobytes() for each in histories
+            ]
             seen.append((moved, observation.tobytes()))
             assert environment.statistics().exact_steps == repeat * steps
     assert seen[0] == seen[1]
