@@ -42,8 +42,8 @@ std::span<T> writable_numbers_of(const Bytes& bytes) {
 /// A burst that is repeated: its options, and the caller's memory for targets and rows.
 struct GroupPlan {
   GroupPlan(std::vector<std::uint32_t> actuators, std::uint32_t steps, nb::handle each,
-            nb::handle mode, nb::handle profile, nb::handle start, std::int64_t iterations,
-            nb::handle given, nb::handle filled)
+            nb::handle mode, nb::handle profile, nb::handle start, std::int64_t delay,
+            std::int64_t iterations, nb::handle given, nb::handle filled)
       : targets(given), rows(filled, PyBUF_WRITABLE) {
     plan.actuators = std::move(actuators);
     plan.steps = steps;
@@ -52,6 +52,7 @@ struct GroupPlan {
                     .profile = profile_of(profile),
                     .start = start_of(start)};
     plan.iterations = iterations;
+    plan.delay = delay;
     plan.targets = targets.span();
     plan.rows = rows.writable();
   }
@@ -179,9 +180,9 @@ void bind_inline_group(nb::module_& m) {
   nb::class_<GroupPlan> plan(m, "GroupPlan", "The compiled half of o80.GroupBurst.");
   refuse_to_pickle(plan, "a burst of a group", "its targets and its rows");
   plan.def(nb::init<std::vector<std::uint32_t>, std::uint32_t, nb::handle, nb::handle, nb::handle,
-                    nb::handle, std::int64_t, nb::handle, nb::handle>(),
-           "actuators"_a, "steps"_a, "each"_a, "mode"_a, "profile"_a, "start"_a, "iterations"_a,
-           "targets"_a, "rows"_a);
+                    nb::handle, std::int64_t, std::int64_t, nb::handle, nb::handle>(),
+           "actuators"_a, "steps"_a, "each"_a, "mode"_a, "profile"_a, "start"_a, "delay"_a,
+           "iterations"_a, "targets"_a, "rows"_a);
 
   nb::class_<Group> group(m, "InlineGroup", "The compiled half of o80.InlineGroup.");
   refuse_to_pickle(group, "an inline group", "its rows");

@@ -32,7 +32,7 @@ class GroupBurst:
         states: NDArray[Any],
         rows: NDArray[Any],
         *,
-        pace: tuple[int, str, str, str],
+        pace: tuple[int, str, str, str, int],
         everybody: NDArray[np.uint32],
     ) -> None:
         states.view(np.uint8).fill(255)

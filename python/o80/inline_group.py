@@ -99,6 +99,7 @@ class InlineGroup(Closeable):
         mode: ModeWord = "queue",
         profile: ProfileWord = "linear",
         start: StartWord = "desired",
+        delay: int = 0,
     ) -> GroupBurst:
         """Prepares a burst of the copies that is repeated: it sends targets and returns all rows.
 
@@ -107,6 +108,7 @@ class InlineGroup(Closeable):
         steps: number of targets of each actuator in a burst.
         each: iterations to reach each target.
         mode, profile, start: as in `Frontend.add_command`.
+        delay: iterations of the burst before the targets are taken.
 
         Raises InvalidArgument, also if the history is too short for so many rows.
         """
@@ -119,7 +121,7 @@ class InlineGroup(Closeable):
             chosen,
             np.empty(shape, common_type(chosen, self._layout)),
             np.zeros((self.copies, count), self._layout.row),
-            pace=(checked_count(each, "each"), mode, profile, start),
+            pace=(checked_count(each, "each"), mode, profile, start, whole(delay, "delay", 0)),
             everybody=self._all,
         )
 

@@ -287,6 +287,11 @@ void InlineGroup::check(const BurstPlan& plan) const {
     throw InvalidArgument("the iterations of a burst must be at least 1, got " +
                           std::to_string(plan.iterations));
   }
+  if (plan.delay < 0 || plan.delay >= plan.iterations) {
+    throw InvalidArgument("the delay of a burst of " + std::to_string(plan.iterations) +
+                          " iterations must be at least 0 and less than these, got " +
+                          std::to_string(plan.delay));
+  }
   const auto iterations = static_cast<std::size_t>(plan.iterations);
   refuse_size("rows", plan.rows.size(), copies() * iterations * description().layout.size, "bytes");
   const std::uint64_t kept = copies_.front()->frontend.link()->history.rows();
@@ -308,8 +313,10 @@ void InlineGroup::burst(const BurstPlan& plan, std::span<const std::uint32_t> ch
       copy.frontend.add_trajectories(plan.actuators, plan.steps,
                                      plan.targets.subspan(i * targets, targets), plan.command);
     }
+    PulseOptions pulse;
+    if (plan.delay > 0) pulse.at = copy.frontend.published() + 1 + plan.delay;
     const std::span<std::byte> own = plan.rows.subspan(i * rows, rows);
-    copy.frontend.burst_rows(own, {}, go_on_);
+    copy.frontend.burst_rows(own, {}, go_on_, pulse);
     read_gathered(i, own.data() + rows - row);
   });
 }

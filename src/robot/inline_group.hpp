@@ -61,6 +61,7 @@ class InlineGroup {
     std::uint32_t steps = 1;               // targets of each actuator
     CommandOptions command = {.pace = o80::iterations(1)};
     std::int64_t iterations = 1;
+    std::int64_t delay = 0;  // iterations of a burst before its targets are taken
     /// For each copy the states of its first actuator, then those of its second, and so on.
     std::span<const std::byte> targets;
     std::span<std::byte> rows;  // for each copy `iterations` rows

@@ -338,3 +338,21 @@ def test_a_slice_names_copies(group: o80.InlineGroup) -> None:
     burst.run(slice(None))
     burst.run(slice(None, None, 2))
     assert [row["iteration"] for row in group.latest()] == [6, 3, 6, 3, 6]
+
+
+def test_delayed_targets_are_taken_within_the_burst() -> None:
+    random = np.random.default_rng(4)
+    robot = o80.robots.load("two_joints")
+    with robot.inline(copies=2) as group, robot.inline() as single:
+        burst = group.prepared_burst(5, mode="overwrite", delay=2)
+        one = single.prepared_burst(5, mode="overwrite")
+        for _ in range(4):
+            burst.targets = random.uniform(-2, 2, (2, 1, 2))
+            burst.run()
+            one.targets = burst.targets[1]
+            one.run(at=single.published + 3)
+            assert burst.rows[1].tobytes() == one.rows.tobytes()
+            assert not (burst.rows["desired"][:, 1] == burst.targets[:, 0]).any()
+            np.testing.assert_array_equal(burst.rows["desired"][:, 2], burst.targets[:, 0])
+        with pytest.raises(o80.InvalidArgument, match="delay of a burst of 5 iterations must be"):
+            group.prepared_burst(5, delay=5)

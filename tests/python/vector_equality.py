@@ -62,10 +62,10 @@ def assert_same_spaces(vector: Any, singles: Any) -> None:
         "single_observation_space",
         "single_action_space",
         "num_envs",
-        "metadata",
         "render_mode",
     ):
         assert getattr(vector, name) == getattr(singles, name), name
+    assert vector.metadata["autoreset_mode"] is singles.metadata["autoreset_mode"]
 
 
 def assert_final_observations(vector: Any, results: Any, mode: AutoresetMode) -> None:

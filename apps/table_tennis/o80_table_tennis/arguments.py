@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .settings import RigSettings, TaskSettings
+from .settings import Pacing, RigSettings, TaskSettings
 
 OPTIONS = ("ball", "flight")
 """Options that `reset` knows."""
@@ -34,6 +34,17 @@ def refuse_extra_balls_without_ball(rig: RigSettings, *, plays_ball: bool) -> No
     """Raises ValueError."""
     if rig.extra_balls and not plays_ball:
         raise ValueError(f"this task plays no ball: extra_balls must be 0, got {rig.extra_balls}")
+
+
+def refuse_unless_for_copies(rig: RigSettings) -> None:
+    """Raises ValueError for a rig that a vector environment cannot have."""
+    wanted = {"pacing": Pacing.INLINE, "twins": 1, "extra_balls": 0, "attach": False}
+    for name, value in wanted.items():
+        if getattr(rig, name) != value:
+            raise ValueError(
+                f"a vector environment needs {name}={value}, got {getattr(rig, name)}: make it of "
+                "single environments instead, with vectorization_mode='sync' or 'async'"
+            )
 
 
 def refuse_wrong_options(options: Mapping[str, Any], *, plays_ball: bool, period: float) -> None:

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+from gymnasium.vector import AutoresetMode
+
+from o80.learning import VectorEnvironment
+
 from .arguments import refuse_wrong_arguments
+from .copies import TableTennisCopies
 from .environment import TableTennisEnvironment
 from .settings import Pacing, RigSettings, TaskSettings
 
@@ -25,6 +30,22 @@ def accelerated_environment(
     """`o80/TableTennis-v0`: inline, or with arm and twins in processes of their own."""
     pacing = Pacing.PROCESSES if processes else Pacing.INLINE
     return TableTennisEnvironment(rig=_paced(rig, pacing), task=task, **rest)
+
+
+def vector_environment(
+    *,
+    num_envs: int,
+    rig: RigSettings | None = None,
+    task: TaskSettings | None = None,
+    threads: int | None = None,
+    autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+    render_mode: str | None = None,
+    camera: str = "side",
+) -> VectorEnvironment:
+    """Copies of `o80/TableTennis-v0` in this process, stepped together by threads of C++."""
+    refuse_wrong_arguments(rig, task, render_mode, TableTennisCopies.metadata["render_modes"])
+    copies = TableTennisCopies(num_envs, rig=rig, task=task, threads=threads, camera=camera)
+    return VectorEnvironment(copies, autoreset_mode=autoreset_mode, render_mode=render_mode)
 
 
 def real_time_environment(

@@ -24,8 +24,8 @@ from .arguments import (
     refuse_wrong_arguments,
     refuse_wrong_options,
 )
-from .balls.draw import NO_BALLS, draw_balls
 from .balls.sources import balls_from
+from .episode_draw import drawn_episode
 from .report.display import RENDER_MODES, Display, display_of
 from .report.episode_recorder import EpisodeRecorder
 from .report.episode_summary import EpisodeSummary
@@ -44,8 +44,6 @@ FloatArray = NDArray[np.float64]
 Action = NDArray[np.float32]
 Info = dict[str, Any]
 Outcome = tuple[Float32Array, float, bool, bool, Info]
-
-SEEDS = 2**32
 
 
 class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
@@ -125,20 +123,13 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         super().reset(seed=seed)
         options, task = options or {}, self._task
         refuse_wrong_options(options, plays_ball=task.plays_ball, period=self._rig_settings.period)
-        drawn = (
-            draw_balls(self._balls, self.np_random, extra=self._rig_settings.extra_balls, **options)
-            if task.plays_ball
-            else NO_BALLS
-        )
-        goal = self._task.begin(self.np_random)
-        arm_seed = int(self.np_random.integers(SEEDS))
-        twin_seed = int(self.np_random.integers(SEEDS))
-        self._rig.reset(
-            arm_seed=arm_seed, twin_seed=twin_seed, flights=self._virtual.share(drawn.flights)
-        )
+        extra = self._rig_settings.extra_balls
+        draw = drawn_episode(task, self._balls, self.np_random, extra=extra, options=options)
+        seeds = {"arm_seed": draw.arm_seed, "twin_seed": draw.twin_seed}
+        self._rig.reset(**seeds, flights=self._virtual.share(draw.balls.flights))
 
-        self._drawn = drawn
-        self._seeds = {"seed": self.np_random_seed, "arm_seed": arm_seed, "twin_seed": twin_seed}
+        self._drawn = drawn = draw.balls
+        self._seeds = {"seed": self.np_random_seed, **seeds}
         self._twin_first = self._rig.twin_row
         self._asked = self._arm.asked
         self._steps, self._paid = 0, 0.0
@@ -147,7 +138,7 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         self._virtual.begin(drawn.numbers[1:])
         arm, twin = self._arm, self._twin
         self._state = state = State(
-            0, arm.last_motion, arm.pressures, arm.last_racket, twin.ball, twin.record, goal
+            0, arm.last_motion, arm.pressures, arm.last_racket, twin.ball, twin.record, draw.goal
         )
         observation = self._box.clip(self._task.observe(state))
         self._first_observation = observation.copy()

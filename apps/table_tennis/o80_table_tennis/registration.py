@@ -20,13 +20,16 @@ def register_environments() -> None:
         needed(f"o80_{robot}", None, "table tennis", package=f"o80-{robot}")
     import gymnasium
 
-    for name, entry, nondeterministic in (
-        (ACCELERATED, "accelerated_environment", False),
-        (REAL_TIME, "real_time_environment", True),
-    ):
-        if name not in gymnasium.registry:
-            gymnasium.register(
-                id=name,
-                entry_point=f"o80_table_tennis.entry_points:{entry}",
-                nondeterministic=nondeterministic,
-            )
+    entries = "o80_table_tennis.entry_points"
+    if ACCELERATED not in gymnasium.registry:
+        gymnasium.register(
+            id=ACCELERATED,
+            entry_point=f"{entries}:accelerated_environment",
+            vector_entry_point=f"{entries}:vector_environment",
+        )
+    if REAL_TIME not in gymnasium.registry:
+        gymnasium.register(
+            id=REAL_TIME,
+            entry_point=f"{entries}:real_time_environment",
+            nondeterministic=True,
+        )

@@ -16,11 +16,10 @@ import o80
 
 from ..balls.sampled_flight import SampledFlight
 from ..settings import Pacing, RigSettings
-from ..world.arm import MUSCLES, PLAYING_POSTURE
-from ..world.scene import MODEL
+from ..world.arm import MUSCLES
 from ..world.timing import ITERATIONS
 from .arm import Arm
-from .ball_records import ball_options
+from .robot_options import arm_options, twin_options
 from .twin import TIMEOUT, Twin
 
 FloatArray = NDArray[np.float64]
@@ -127,14 +126,7 @@ class Rig:
         settings = self.settings
         if settings.attach:
             return self._attach()
-        options = {
-            "preset": settings.preset,
-            "muscle": settings.muscle,
-            "ranges": settings.ranges,
-            "start_noise": settings.start_noise,
-            "start_posture": PLAYING_POSTURE,
-            "period": settings.period,
-        }
+        options = arm_options(settings)
         return self._open("pam", settings.arm_segment, settings.pacing.real_time, options)
 
     def _attach(self) -> o80.Frontend:
@@ -158,12 +150,7 @@ class Rig:
         return frontend
 
     def _open_twin(self, twin: int) -> o80.Frontend:
-        options = {
-            "model": str(MODEL),
-            "timestep": self.settings.period,
-            **ball_options(self.settings.balls_of(twin)),
-        }
-        return self._open("mujoco", None, False, options)
+        return self._open("mujoco", None, False, twin_options(self.settings, twin))
 
     def _open(
         self, robot: str, segment: str | None, real_time: bool, options: dict[str, Any]

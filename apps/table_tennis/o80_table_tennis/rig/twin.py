@@ -25,6 +25,7 @@ BALL_NUMBERS = 9
 """Position, velocity and spin."""
 SEEN_NUMBERS = 6
 """Position and velocity: what is observed."""
+BALL_STATE = np.dtype([(name, np.float64, (3,)) for name in ("position", "velocity", "spin")])
 
 
 class Twin:
@@ -52,9 +53,6 @@ class Twin:
         """The words of the newest row; the next step overwrites them."""
         self.iteration = -1
         """Of that row."""
-        self._ball_state = np.dtype(
-            [(name, np.float64, (3,)) for name in ("position", "velocity", "spin")]
-        )
 
     def reset(self, seed: int) -> None:
         """All balls and contacts forgotten."""
@@ -68,7 +66,7 @@ class Twin:
         targets = {"position": q[None, :], "velocity": dq[None, :]}
         self.frontend.add_trajectory(targets, self._joint_names)
         for ball, flight in zip(self._ball_names, flights, strict=bool(flights)):
-            states = flight.states.view(self._ball_state)[:, 0]
+            states = flight.states.view(BALL_STATE)[:, 0]
             self.frontend.add_trajectory(states, ball)
 
     def step(self, motion: FloatArray) -> None:

@@ -1,0 +1,160 @@
+"""Table tennis in N copies, as a task of o80.learning; `environment` has the single one.
+
+One step, as that of an accelerated single environment, for all copies at once:
+1. actions => eight pressures of each arm; 2. all arms burst by 5; 3. the rows of the arms are
+replayed to the twins, which all burst by 5; 4. rows => observations, contacts, rewards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from o80.learning import Index, Outcome, Task
+
+from .arguments import refuse_unless_for_copies, refuse_wrong_options
+from .balls.sources import balls_from
+from .episode_draw import drawn_episode
+from .report.rendering import Scene
+from .rig.group_rig import GroupRig
+from .settings import RigSettings, TaskSettings
+from .task.actions import changed_pressures
+from .task.box import ObservationBox
+from .task.end import End, terminated
+from .task.state import State
+from .world.arm import MUSCLES
+
+FloatArray = NDArray[np.float64]
+Numbers = NDArray[np.intp]
+
+TEXTS = np.array([end.text for end in End], object)
+"""Of the ends, by their numbers."""
+
+
+class TableTennisCopies(Task):
+    """N arms with simulated balls, stepped together by threads of C++."""
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 100}  # noqa: RUF012
+
+    def __init__(
+        self,
+        copies: int,
+        *,
+        rig: RigSettings | None = None,
+        task: TaskSettings | None = None,
+        threads: int | None = None,
+        camera: str = "side",
+    ) -> None:
+        """threads: that step them, the calling one included (None: one for each processor)."""
+        settings, rig = task or TaskSettings(), rig or RigSettings()
+        refuse_unless_for_copies(rig)
+        self._task = settings.made()
+        self._box = ObservationBox(self._task)
+        super().__init__(
+            copies,
+            observation_space=self._box.space,
+            action_space=spaces.Box(-1.0, 1.0, (MUSCLES,), np.float32),
+        )
+        self._factor, self._period, self._camera = settings.factor, rig.period, camera
+        self._balls = balls_from(
+            settings.balls, settings.ball_seed, rig.period, settings.ball_count
+        )
+        self._rig = GroupRig(copies, rig, delay=settings.delay, threads=threads)
+        arms, twins = self._rig.arms, self._rig.twins
+        self._asked = arms.pressures
+        self._ends = np.zeros(copies, np.int64)
+        self._state = State(
+            self.steps,
+            arms.last_motion,
+            arms.pressures,
+            arms.last_racket,
+            twins.ball,
+            twins.records,
+            np.zeros((copies, *np.shape(self._task.begin(np.random.default_rng(0))))),
+        )
+        self._scene: Scene | None = None
+
+    def begin(
+        self,
+        copies: Numbers,
+        generators: Sequence[np.random.Generator],
+        options: Mapping[str, Any],
+    ) -> None:
+        """Arms and twins to the start, with a drawn ball, or that of `options`."""
+        plays = self._task.plays_ball
+        refuse_wrong_options(options, plays_ball=plays, period=self._period)
+        draws = [
+            drawn_episode(self._task, self._balls, generator, options=options)
+            for generator in generators
+        ]
+        self._rig.reset(
+            copies,
+            arm_seeds=[draw.arm_seed for draw in draws],
+            twin_seeds=[draw.twin_seed for draw in draws],
+            flights=[draw.balls.flights[0] if plays else None for draw in draws],
+        )
+        self._asked[copies] = self._rig.arms.asked(copies)
+        self._state.goal[copies] = [draw.goal for draw in draws]
+        self._ends[copies] = End.RUNNING
+        self._look()
+
+    def step(self, actions: Any, copies: Index) -> None:
+        """Five iterations of these arms and of their twins."""
+        asked = changed_pressures(self._asked[copies], actions, factor=self._factor)
+        self._asked[copies] = asked
+        self._rig.step(asked, copies)
+        self._ends[copies] = End.RUNNING
+        self._look()
+
+    def _look(self) -> None:
+        """What of the state is no view of the newest rows."""
+        self._state.pressures = self._rig.arms.pressures
+        self._state.record = self._rig.twins.records
+
+    def flagged(self) -> NDArray[np.bool_]:
+        """(copies,) whose episode may have ended, or whose step is paid."""
+        # the environment counts a step after it
+        flags: NDArray[np.bool_] = self._task.eventful(self._state)
+        return flags
+
+    def judge(self, copies: Numbers) -> Outcome:
+        """Ends and rewards of these."""
+        state = self._state.at(copies)
+        ends = self._task.end(state)
+        self._ends[copies] = ends
+        by_event = terminated(ends)
+        return Outcome(self._task.reward(state), by_event, ~by_event & (ends != End.RUNNING))
+
+    def observe(self, copies: Index) -> Any:
+        """(n, M)"""
+        return self._box.clip(self._task.observe(self._of(copies)))
+
+    def info(self, copies: Index) -> Mapping[str, Any]:
+        """As that of the single environment."""
+        state, ends = self._of(copies), self._ends[copies]
+        info = self._task.info(state)
+        info["stalled"] = ends == End.STALLED
+        info["end"], info["end_text"] = ends, TEXTS[ends]
+        return info
+
+    def _of(self, copies: Index) -> State:
+        return self._state if isinstance(copies, slice) else self._state.at(copies)
+
+    def render(self, copy: int) -> Any:
+        """A picture (480, 640, 3) of one copy."""
+        if self._scene is None:
+            self._scene = Scene()
+        twins = self._rig.twins
+        ball = twins.ball[copy, :3]
+        return self._scene.draw(twins.joint_positions[copy], ball[None], camera=self._camera)
+
+    def close(self) -> None:
+        """Ends arms and twins; may be called twice."""
+        self._rig.close()
+        if self._scene is not None:
+            self._scene.close()
+            self._scene = None

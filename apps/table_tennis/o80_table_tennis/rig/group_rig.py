@@ -1,0 +1,63 @@
+"""Arms and twins of a vector environment, in two inline groups."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import o80
+
+from ..balls.sampled_flight import SampledFlight
+from ..settings import RigSettings
+from .arms import Arms, Index
+from .robot_options import arm_options, twin_options
+from .twins import Twins
+
+FloatArray = NDArray[np.float64]
+
+LANE_BLOCKS = 2048
+"""Of 64 bytes in a lane of a twin: the states of a recorded flight are one batch."""
+
+
+class GroupRig:
+    """N arms, each with the twin that mirrors it; what an inline `Rig` is for one."""
+
+    def __init__(
+        self, copies: int, settings: RigSettings, *, delay: int, threads: int | None = None
+    ) -> None:
+        """delay: iterations from the beginning of a step until its pressures act."""
+        common: dict[str, Any] = {"threads": threads, "frequency": settings.frequency}
+        with ExitStack() as stack:
+            arms = o80.robots.load("pam").inline(copies=copies, **common, **arm_options(settings))
+            stack.enter_context(arms)
+            twins = o80.robots.load("mujoco").inline(
+                copies=copies, **common, lane_blocks=LANE_BLOCKS, **twin_options(settings)
+            )
+            stack.enter_context(twins)
+            self.arms, self.twins = Arms(arms, delay=delay), Twins(twins)
+            self._stack = stack.pop_all()
+
+    def reset(
+        self,
+        copies: NDArray[np.intp],
+        *,
+        arm_seeds: list[int],
+        twin_seeds: list[int],
+        flights: Sequence[SampledFlight | None],
+    ) -> None:
+        """These arms and twins to the start; the balls fly from the next step on."""
+        self.arms.reset(copies, arm_seeds)
+        self.twins.reset(copies, twin_seeds, self.arms.last_motion[copies], flights)
+
+    def step(self, pressures: FloatArray, copies: Index) -> None:
+        """These arms are asked for normalised pressures (n, 8); five rows of each."""
+        self.arms.step(pressures, copies)
+        self.twins.step(self.arms.motion, copies)
+
+    def close(self) -> None:
+        """Ends arms and twins; may be called twice."""
+        self._stack.close()

@@ -1,0 +1,78 @@
+"""The twins of a vector environment: each mirrors an arm, and holds one ball."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+import o80
+
+from ..balls.sampled_flight import SampledFlight
+from ..task.ball_record import BallRecord
+from ..world.arm import JOINT_NAMES, JOINTS
+from ..world.timing import ITERATIONS
+from .arms import TIMEOUT, Index
+from .ball_records import RECORDS, ball_records
+from .row_words import words
+from .twin import BALL_STATE, SEEN_NUMBERS
+
+FloatArray = NDArray[np.float64]
+
+
+class Twins:
+    """A group of N simulations of arm, table and a ball, and their last rows; N times `Twin`.
+
+    Views that each step fills: `ball` (N, 6) position and velocity, `joint_positions` (N, 4) [rad].
+    """
+
+    def __init__(self, group: o80.InlineGroup) -> None:
+        self.group = group
+        names = [actuator.name for actuator in group[0].actuators]
+        self._joint_names, self._ball_name = names[:JOINTS], names[JOINTS]
+        assert tuple(self._joint_names) == JOINT_NAMES, "the twin moves the joints of the scene"
+        self._burst = group.prepared_burst(ITERATIONS, self._joint_names, steps=ITERATIONS)
+        states = self._burst.targets.swapaxes(1, 2).view(np.float64)
+        self._motion = states.reshape(group.copies, JOINTS, ITERATIONS, 2)
+        assert np.shares_memory(self._motion, states)
+        self._first = group.prepared_burst(1, self._joint_names)
+        self._last = self._burst.rows[:, -1]
+        dtype = self._last.dtype
+        numbers = self._burst.rows.view(np.float64).reshape(group.copies, ITERATIONS, -1)[:, -1]
+        ball = words(dtype, "observed", "balls").start
+        self.ball: FloatArray = numbers[:, ball : ball + SEEN_NUMBERS]
+        self.joint_positions: FloatArray = numbers[:, words(dtype, "observed", "joints")][:, ::2]
+        self._records = self._last[RECORDS[0]][RECORDS[1]][:, 0]
+
+    @property
+    def records(self) -> BallRecord:
+        """What has happened to each ball (N,) until the last rows."""
+        return ball_records(self._records)
+
+    def step(self, motion: FloatArray, copies: Index) -> None:
+        """These mirror angle and velocity of each joint in their arm's last rows (N, 4, 5, 2)."""
+        self._motion[copies] = motion[copies]
+        self._burst.run(copies, timeout=TIMEOUT)
+
+    def reset(
+        self,
+        copies: NDArray[np.intp],
+        seeds: list[int],
+        motion: FloatArray,
+        flights: Sequence[SampledFlight | None],
+    ) -> None:
+        """These to the start, where their arms (n, 8) stand; their balls fly from the next step on.
+
+        Without a flight the ball falls from where the scene puts it.
+        """
+        self.group.request("reset", copies=copies, seed=seeds)
+        targets = self._first.targets[:, 0]
+        targets["position"][copies], targets["velocity"][copies] = np.hsplit(motion, 2)
+        for copy, flight in zip(copies.tolist(), flights, strict=True):
+            if flight is not None:
+                frontend = self.group[copy]
+                frontend.add_trajectory(flight.states.view(BALL_STATE)[:, 0], self._ball_name)
+                frontend.pulse()
+        self._first.run(copies, timeout=TIMEOUT)
+        self._last[copies] = self._first.rows[copies, 0]

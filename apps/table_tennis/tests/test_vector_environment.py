@@ -1,0 +1,167 @@
+"""Many copies of the accelerated environment in one call (o80_table_tennis.copies)."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode
+from vector_equality import MODES, beside, both
+
+import o80_table_tennis
+from o80.learning import VectorEnvironment
+from o80_table_tennis.balls.simulated_shots import simulated_shot
+from o80_table_tennis.balls.sources import balls_from
+from o80_table_tennis.players.policies import default_policy
+from o80_table_tennis.settings import Pacing, RigSettings, TaskSettings
+from o80_table_tennis.task.actions import COARSE
+from o80_table_tennis.task.end import EndRule
+from o80_table_tennis.task.observations import BALL_POSITION
+from o80_table_tennis.world.arm import MUSCLES
+
+COPIES = 4
+SHORT = EndRule(most_steps=40)
+RIGS = {
+    "standard": RigSettings(start_noise=0.02),
+    "identified": RigSettings(preset="identified"),
+    "another frequency": RigSettings(frequency=250.0),
+}
+TASKS = {
+    "return": TaskSettings(factor=COARSE),
+    "wide": TaskSettings(factor=0.3, balls="wide", ball_seed=4, reward="published"),
+    "hit": TaskSettings(task="hit", factor=COARSE, end=SHORT, delay=0),
+    "smash": TaskSettings(task="smash", delay=3, factor=COARSE),
+    "reach": TaskSettings(task="reach", factor=0.2, end=SHORT),
+}
+
+
+def made(
+    copies: int = COPIES, mode: Any = AutoresetMode.NEXT_STEP, **settings: Any
+) -> VectorEnvironment:
+    environment = gymnasium.make_vec(
+        o80_table_tennis.ACCELERATED, num_envs=copies, autoreset_mode=mode, **settings
+    )
+    assert isinstance(environment, VectorEnvironment)
+    return environment
+
+
+def assert_equals_single_ones(mode: Any, policy: Any, *, steps: int, **settings: Any) -> int:
+    single = partial(gymnasium.make, o80_table_tennis.ACCELERATED, **settings)
+    with made(mode=mode, threads=2, **settings) as vector:
+        vector.action_space.seed(7)
+        chosen = policy or (lambda seen, number: vector.action_space.sample())
+        return beside(vector, single, chosen, steps=steps, seed=5)
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("task", TASKS)
+def test_equals_single_environments_under_random_actions(mode: AutoresetMode, task: str) -> None:
+    settings = TASKS[task]
+    ends = assert_equals_single_ones(
+        mode, None, steps=190, task=settings, rig=RigSettings(start_noise=0.02)
+    )
+    assert ends >= COPIES
+
+
+@pytest.mark.parametrize("rig", RIGS)
+def test_equals_single_environments_of_every_rig(rig: str) -> None:
+    task = TaskSettings(factor=COARSE, end=SHORT)
+    mode = AutoresetMode.SAME_STEP
+    ends = assert_equals_single_ones(mode, None, steps=90, task=task, rig=RIGS[rig])
+    assert ends >= 2 * COPIES
+
+
+class Scripted:
+    """The scripted policy on each copy."""
+
+    def __init__(self) -> None:
+        self._policies = [default_policy() for _ in range(COPIES)]
+        self._ball_y = np.full(COPIES, -np.inf)
+
+    def __call__(self, seen: Any, number: int) -> Any:
+        ball_y = seen[:, BALL_POSITION][:, 1]
+        begun = ball_y - self._ball_y > 0.5  # [m]: no ball flies so far in a step
+        self._ball_y = ball_y
+        actions = np.zeros((COPIES, MUSCLES), np.float32)
+        for copy, policy in enumerate(self._policies):
+            if begun[copy]:
+                policy.reset()
+            actions[copy] = policy.act(seen[copy])
+        return actions
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_equals_single_environments_when_balls_are_returned(mode: AutoresetMode) -> None:
+    task = TaskSettings(factor=COARSE)
+    assert assert_equals_single_ones(mode, Scripted(), steps=200, task=task) >= COPIES
+    with made(mode=AutoresetMode.SAME_STEP, task=task) as vector:
+        seen, _ = vector.reset(seed=5)
+        policy, returned = Scripted(), 0
+        for number in range(200):
+            seen, _, _, _, infos = vector.step(policy(seen, number))
+            returned += int(infos.get("final_info", {}).get("returned", np.zeros(1)).sum())
+        assert returned >= COPIES
+
+
+def test_resets_some_copies_with_a_ball_of_the_callers() -> None:
+    mode = AutoresetMode.DISABLED
+    make = partial(gymnasium.make, o80_table_tennis.ACCELERATED)
+    singles: Any = gymnasium.vector.SyncVectorEnv([make] * COPIES, autoreset_mode=mode)
+    flight = balls_from(None).flight(3)
+    actions = np.full((COPIES, MUSCLES), 0.5, np.float32)
+    with made(mode=mode) as vector:
+        both(vector, singles, lambda each: each.reset(seed=[3, 1, 4, 1], options={"ball": 2}))
+        both(vector, singles, lambda each: each.step(actions))
+        mask = np.array([True, False, False, True])
+        options = {"reset_mask": mask, "flight": flight}
+        both(vector, singles, lambda each: each.reset(seed=9, options=dict(options)))
+        for _ in range(30):
+            both(vector, singles, lambda each: each.step(actions))
+        both(vector, singles, lambda each: each.reset())
+        with pytest.raises(ValueError, match="unknown options: bal"):
+            vector.reset(options={"bal": 2})
+    singles.close()
+
+
+def test_plays_long_recorded_flights() -> None:
+    with made(2, mode=AutoresetMode.DISABLED) as vector:
+        shot = simulated_shot(np.random.default_rng(1)).resample(0.002)
+        assert len(shot.positions) > 500
+        vector.reset(seed=1, options={"flight": shot})
+        for _ in range(60):
+            seen, *_ = vector.step(np.zeros((2, MUSCLES), np.float32))
+        np.testing.assert_allclose(seen[0, BALL_POSITION], shot.positions[300], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("rig", "text"),
+    [
+        (RigSettings(pacing=Pacing.PROCESSES), "needs pacing=Pacing.INLINE"),
+        (RigSettings(twins=2), "needs twins=1, got 2"),
+        (RigSettings(extra_balls=3), "needs extra_balls=0, got 3: make it of single"),
+    ],
+)
+def test_a_rig_that_copies_cannot_have_is_refused(rig: RigSettings, text: str) -> None:
+    with pytest.raises(ValueError, match=text):
+        made(2, rig=rig)
+
+
+def test_wrong_arguments_are_named() -> None:
+    wrong: Any = {"preset": "identified"}
+    with pytest.raises(TypeError, match=r"RigSettings\(preset='identified'\)"):
+        made(2, rig=wrong)
+    with pytest.raises(ValueError, match="unknown render mode 'human'; there are: rgb_array"):
+        made(2, render_mode="human")
+
+
+@pytest.mark.check
+def test_renders_all_copies() -> None:
+    with made(3, render_mode="rgb_array") as vector:
+        vector.reset(seed=1)
+        pictures = vector.render()
+        assert pictures is not None
+        assert [picture.shape for picture in pictures] == [(480, 640, 3)] * 3
+        assert (pictures[0] != pictures[1]).any()  # other balls
