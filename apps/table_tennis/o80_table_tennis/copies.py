@@ -59,7 +59,8 @@ class TableTennisCopies(Task):
             observation_space=self._box.space,
             action_space=spaces.Box(-1.0, 1.0, (MUSCLES,), np.float32),
         )
-        self._factor, self._period, self._camera = settings.factor, rig.period, camera
+        self._factor, self._repeat = settings.factor, settings.repeat
+        self._period, self._camera = rig.period, camera
         self._balls = balls_from(
             settings.balls, settings.ball_seed, rig.period, settings.ball_count
         )
@@ -103,10 +104,12 @@ class TableTennisCopies(Task):
         self._look()
 
     def step(self, actions: Any, copies: Index) -> None:
-        """Five iterations of these arms and of their twins."""
-        asked = changed_pressures(self._asked[copies], actions, factor=self._factor)
+        """`repeat` times five iterations of these arms and of their twins."""
+        asked = self._asked[copies]
+        for _ in range(self._repeat):
+            asked = changed_pressures(asked, actions, factor=self._factor)
+            self._rig.step(asked, copies)
         self._asked[copies] = asked
-        self._rig.step(asked, copies)
         self._ends[copies] = End.RUNNING
         self._look()
 

@@ -32,6 +32,7 @@ RIGS = {
 TASKS = {
     "return": TaskSettings(factor=COARSE),
     "wide": TaskSettings(factor=0.3, balls="wide", ball_seed=4, reward="published"),
+    "repeat": TaskSettings(factor=COARSE, repeat=3),
     "hit": TaskSettings(task="hit", factor=COARSE, end=SHORT, delay=0),
     "smash": TaskSettings(task="smash", delay=3, factor=COARSE),
     "reach": TaskSettings(task="reach", factor=0.2, end=SHORT),
