@@ -48,6 +48,8 @@ if TYPE_CHECKING:
     from o80.history import History
     from o80.inline_group import Gather, Gathered, GroupBurst, InlineGroup
     from o80.installation import prefix
+    from o80.joining.align import Aligned, AlignedHistory, align
+    from o80.joining.latency import Latency, latency
     from o80.journal import Journal, JournalCommand, JournalEntry
     from o80.limits import Limits
     from o80.playing.playback import Playback, play
@@ -87,6 +89,11 @@ _LAZY = {
     "GroupBurst": "o80.inline_group",
     "InlineGroup": "o80.inline_group",
     "prefix": "o80.installation",
+    "Aligned": "o80.joining.align",
+    "AlignedHistory": "o80.joining.align",
+    "align": "o80.joining.align",
+    "Latency": "o80.joining.latency",
+    "latency": "o80.joining.latency",
     "Journal": "o80.journal",
     "JournalCommand": "o80.journal",
     "JournalEntry": "o80.journal",
@@ -137,6 +144,8 @@ __version__ = version()
 # `open` is left out: `from o80 import *` must not replace the builtin. `learning` needs an extra.
 __all__ = [
     "Actuator",
+    "Aligned",
+    "AlignedHistory",
     "Backend",
     "BackendFailed",
     "BackendGone",
@@ -166,6 +175,7 @@ __all__ = [
     "JournalCommand",
     "JournalEntry",
     "LaneFull",
+    "Latency",
     "Limits",
     "MissingExtra",
     "Mode",
@@ -203,9 +213,11 @@ __all__ = [
     "UsedAfterFork",
     "View",
     "__version__",
+    "align",
     "burst",
     "clean",
     "halt",
+    "latency",
     "play",
     "prefix",
     "register_frontend",

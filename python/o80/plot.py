@@ -188,8 +188,8 @@ def _mark_ends(
             at = np.full(len(places), 0.95)
             label = f"command {status.name.lower()}"
             where = times[sorted(places)]
-            look = {"color": color, "markersize": 9 if marker == "|" else 6, "markeredgewidth": 2}
-            ax.plot(where, at, marker, transform=_shares(ax), label=label, **look)
+            line = ax.plot(where, at, marker, color=color, transform=_shares(ax), label=label)
+            line[0].set(markersize=9 if marker == "|" else 6, markeredgewidth=2)
 
 
 def _is_of(panel: str, actuator: str) -> bool:

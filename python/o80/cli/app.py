@@ -13,6 +13,7 @@ from o80.cli.echo import echo
 from o80.cli.export import export
 from o80.cli.halt import halt, resume
 from o80.cli.info import info
+from o80.cli.latency import latency
 from o80.cli.list_segments import list_segments
 from o80.cli.play import play
 from o80.cli.plot import plot
@@ -52,6 +53,7 @@ app.command("plot")(plot)
 app.command("view")(view)
 app.command("export")(export)
 app.command("diff")(diff)
+app.command("latency")(latency)
 app.command("replay")(replay)
 app.command("halt")(halt)
 app.command("resume")(resume)

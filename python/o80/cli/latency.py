@@ -1,0 +1,60 @@
+"""``o80 latency``: the delay between two segments that see the same motion."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from contextlib import ExitStack
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+import o80
+from o80.cli.attach import attach
+
+if TYPE_CHECKING:
+    from o80.history import History
+
+
+def latency(
+    first: Annotated[
+        str, typer.Argument(help="SEGMENT:FIELD, for example arm:observed.elbow", metavar="A")
+    ],
+    second: Annotated[
+        str,
+        typer.Argument(help="Another one; norm(FIELD) is a length of several numbers", metavar="B"),
+    ],
+    recording: Annotated[
+        str | None, typer.Option(help="A recording that holds both, instead of running robots.")
+    ] = None,
+    most: Annotated[float, typer.Option(help="Longest delay to look for, either way [s].")] = 0.5,
+    seconds: Annotated[float | None, typer.Option(help="Only the last seconds.")] = None,
+) -> None:
+    """Estimate how much later B shows a motion than A, by cross-correlation.
+
+    Move the robot to and fro, without a fixed rhythm, while both segments see it.
+    """
+    from o80.joining.latency import latency as estimate
+
+    file = None if recording is None else o80.open(recording)
+    with ExitStack() as opened:
+        signals = []
+        for text in (first, second):
+            name, colon, field = text.partition(":")
+            if not colon or not name or not field:
+                raise o80.InvalidArgument(
+                    f"write SEGMENT:FIELD, for example arm:observed.elbow, not '{text}'"
+                )
+            source: Any = file[name] if file is not None else opened.enter_context(attach(name))
+            signals.append((source, _signal(field)))
+        print(f"{second} behind {first}: {estimate(*signals, most=most, seconds=seconds)}")
+
+
+def _signal(text: str) -> str | Callable[[History], Any]:
+    """A field, or the length of several numbers."""
+    match = re.fullmatch(r"norm\((.+)\)", text)
+    if match is None:
+        return text
+    from o80.joining.norm import norm_of
+
+    return norm_of(match[1])

@@ -1,0 +1,1 @@
+"""Rows of several segments or recordings, joined by time."""

@@ -1,0 +1,171 @@
+"""Joins rows of several segments or recordings by time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from o80 import _core
+from o80.errors import InvalidArgument
+from o80.history import History
+from o80.joining.picked import NANOSECOND, NOWHERE, before, blanked, linear, nearest
+from o80.joining.sources import Timed, timed
+
+if TYPE_CHECKING:
+    from o80.joining.sources import Sources
+
+HOW = {"before": before, "nearest": nearest, "linear": linear}
+HowWord = Literal["before", "nearest", "linear"]
+
+
+class AlignedHistory(History):
+    """The rows of one source for T times; where there is none its numbers are NaN, or 0."""
+
+    __slots__ = ("age", "found")
+
+    def __init__(
+        self,
+        decoder: _core.Decoder,
+        rows: NDArray[Any],
+        age: NDArray[np.float64],
+        found: NDArray[np.bool_],
+    ) -> None:
+        super().__init__(decoder, rows)
+        self.age = age  #: (T,) time less that of the row's capture [s]; NaN without a row
+        self.found = found  #: (T,) False where there is no row that is young enough
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return AlignedHistory, (self._decoder, self.rows, self.age, self.found)
+
+
+class Aligned(Mapping[str, AlignedHistory]):
+    """Rows of several sources at the same T times: `aligned["ball"].observed`."""
+
+    def __init__(self, time: NDArray[np.int64], sources: Mapping[str, AlignedHistory]) -> None:
+        self.time = time  #: (T,) [ns], on the clock of the rows
+        self._sources = sources
+
+    def __getitem__(self, name: str) -> AlignedHistory:
+        try:
+            return self._sources[name]
+        except KeyError:
+            there = ", ".join(self._sources)
+            raise KeyError(f"there is no source {name!r}; there are: {there}") from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._sources)
+
+    def __len__(self) -> int:
+        return len(self._sources)
+
+    @property
+    def complete(self) -> NDArray[np.bool_]:
+        """(T,) True where every source has a row."""
+        every: NDArray[np.bool_] = np.all([each.found for each in self.values()], axis=0)
+        return every
+
+    def __repr__(self) -> str:
+        return f"<o80.Aligned of {', '.join(self)} at {len(self.time)} times>"
+
+
+def align(
+    sources: Sources,
+    *,
+    by: str | None = None,
+    period: float | None = None,
+    at: ArrayLike | None = None,
+    how: HowWord | Mapping[str, HowWord] = "before",
+    most_age: float | Mapping[str, float] | None = None,
+    seconds: float | None = None,
+    offsets: Mapping[str, int] | None = None,
+) -> Aligned:
+    """Joins rows of several segments or recordings by the time of their capture.
+
+    sources: frontends, segments of a recording, or a whole one; or a mapping from names to these,
+        to runs of a recording, or to histories.
+    by: name of a source; its rows give the times.
+    period: times every so many seconds, while all sources have rows [s].
+    at: times (T,) [ns], on the clock of the rows. Give one of by, period and at.
+    how: "before": the newest row at or before the time, which a program that ran then had;
+        "nearest"; or "linear": floats are interpolated between two rows (each number by itself:
+        not for quaternions), other numbers are those of the older one. May differ by source.
+    most_age: rows further away from the time than this count as missing [s].
+    seconds: only the last seconds of each source.
+    offsets: added to the times of sources, for clocks that have nothing in common [ns].
+
+    A row is captured at its time. For devices it is the extended field `capture_time` [ns]; rows
+    in which it is 0 hold nothing. Recordings of different computers, or of different starts of one,
+    are joined on the wall clock. A recording of one run and live segments can be mixed.
+
+    Raises InvalidArgument.
+    """
+    if sum(given is not None for given in (by, period, at)) != 1:
+        raise InvalidArgument("give one of by (a source), period [s] and at (times [ns])")
+    found = timed(sources, seconds=seconds, offsets=offsets)
+    if not found:
+        raise InvalidArgument("there is nothing to align: give at least one source")
+    times = _times(found, by, period, at)
+    ways = _each(found, how, "how")
+    ages = _each(found, most_age, "most_age")
+    return Aligned(
+        times,
+        {
+            name: _aligned(name, source, times, ways[name], ages[name])
+            for name, source in found.items()
+        },
+    )
+
+
+def _each(found: Mapping[str, Timed], given: Any, name: str) -> dict[str, Any]:
+    """An argument for each source."""
+    if not isinstance(given, Mapping):
+        return dict.fromkeys(found, given)
+    if unknown := sorted(set(given) - set(found)):
+        raise InvalidArgument(f"{name}: there is no {unknown[0]!r}; there are: {', '.join(found)}")
+    usual = "before" if name == "how" else None
+    return {each: given.get(each, usual) for each in found}
+
+
+def _times(
+    found: Mapping[str, Timed], by: str | None, period: float | None, at: ArrayLike | None
+) -> NDArray[np.int64]:
+    if by is not None:
+        if by not in found:
+            raise InvalidArgument(f"by: there is no {by!r}; there are: {', '.join(found)}")
+        return found[by].times
+    if at is not None:
+        given = np.asarray(at)
+        if given.ndim != 1 or given.dtype.kind not in "iu":
+            raise InvalidArgument(
+                f"at must be whole nanoseconds (T,), got {given.dtype} {given.shape}"
+            )
+        return given.astype(np.int64)
+    assert period is not None
+    step = round(period / NANOSECOND) if 0 < period < 1e9 else 0
+    if step < 1:
+        raise InvalidArgument(f"period must be at least 1e-9 s, got {period!r}")
+    if not all(len(source.times) for source in found.values()):
+        return np.empty(0, np.int64)
+    first = max(int(source.times[0]) for source in found.values())
+    last = min(int(source.times[-1]) for source in found.values())
+    return np.arange(first, last + 1, step, dtype=np.int64)
+
+
+def _aligned(
+    name: str, source: Timed, times: NDArray[np.int64], how: str, most_age: float | None
+) -> AlignedHistory:
+    if how not in HOW:
+        raise InvalidArgument(f"how must be one of {', '.join(HOW)}, got {how!r} for {name}")
+    if most_age is not None and not most_age >= 0:
+        raise InvalidArgument(f"most_age must be at least 0 s, got {most_age!r} for {name}")
+    picked = HOW[how](source, times)
+    found = picked.age != NOWHERE
+    age = np.where(found, picked.age * NANOSECOND, np.nan)
+    if most_age is not None:
+        found &= np.abs(age) <= most_age
+    rows = np.ascontiguousarray(picked.rows)
+    blanked(source.history, rows, ~found)
+    return AlignedHistory(source.history._decoder, rows, age, found)

@@ -1,0 +1,136 @@
+"""What can be joined by time: histories, each with the times of its rows on one common clock."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o80.checked import whole
+from o80.errors import InvalidArgument
+from o80.history import History
+
+if TYPE_CHECKING:
+    from o80.frontend import Frontend
+    from o80.recording.reader import RecordedSegment, RecordingFile
+    from o80.recording.recorded_epoch import RecordedEpoch
+
+    Source: TypeAlias = History | Frontend | RecordedEpoch | RecordedSegment
+    Sources: TypeAlias = Mapping[str, Source] | Iterable[Frontend | RecordedSegment] | RecordingFile
+
+CAPTURE_TIME = "capture_time"
+"""Extended field of a device: when it captured the row, on the clock of the rows [ns]; 0: never."""
+SAME_CLOCK = (
+    5_000_000  # clocks of one boot differ by less, although the wall clock is adjusted [ns]
+)
+
+
+@dataclass(frozen=True)
+class Timed:
+    """A history and the times of its rows."""
+
+    history: History
+    rows: NDArray[np.intp]
+    """(N,) the rows that were captured, in the order of their capture."""
+    times: NDArray[np.int64]
+    """(N,) of their capture, on the common clock [ns]."""
+
+
+def timed(
+    sources: Sources,
+    *,
+    seconds: float | None = None,
+    offsets: Mapping[str, int] | None = None,
+) -> dict[str, Timed]:
+    """The histories of sources on one clock.
+
+    seconds: only the last seconds of each. offsets: see `align`. Raises InvalidArgument.
+    """
+    found = {name: _opened(name, source, seconds) for name, source in _named(sources).items()}
+    if unknown := sorted(set(offsets or {}) - set(found)):
+        raise InvalidArgument(f"offsets: there is no {unknown[0]!r}; there are: {', '.join(found)}")
+    shifts = shifts_of(found)
+    if offsets is not None:
+        shifts = {name: whole(offsets.get(name, 0), f"offset of {name}") for name in found}
+    elif shifts is None:
+        clocks = ", ".join(
+            f"{name}: {history.schema['clock']}" for name, (history, _) in found.items()
+        )
+        raise InvalidArgument(
+            f"the rows have times of different clocks ({clocks}); say with offsets={{name: ns}} "
+            "what to add to the times of each"
+        )
+    return {name: _on_clock(history, shifts[name]) for name, (history, _) in found.items()}
+
+
+def _named(sources: Sources) -> Mapping[str, Source]:
+    if isinstance(sources, Mapping):
+        return sources
+    if hasattr(sources, "segments"):
+        file = cast("RecordingFile", sources)
+        return {name: file[name] for name in file}
+    named: dict[str, Source] = {}
+    for source in cast("Iterable[Source]", sources):
+        name = getattr(source, "segment", None) or getattr(source, "name", None)
+        if name is None:
+            raise InvalidArgument(
+                f"{source!r} has no name: give a mapping from names to sources instead of a list"
+            )
+        if name in named:
+            raise InvalidArgument(f"two sources are named '{name}': give a mapping from names")
+        named[name] = source
+    return named
+
+
+def _opened(name: str, source: Any, seconds: float | None) -> tuple[History, int | None]:
+    """The history of a source, and wall-clock time less row time [ns]; None: not known."""
+    if isinstance(source, History):
+        return source.select(seconds=seconds) if seconds is not None else source, None
+    epochs = getattr(source, "epochs", None)
+    if epochs is not None:
+        if len(epochs) != 1:
+            raise InvalidArgument(
+                f"'{name}' was recorded in {len(epochs)} runs: choose one, as "
+                f"{{'{name}': recording['{name}'].epochs[0]}}"
+            )
+        (source,) = epochs
+    if not hasattr(source, "history"):
+        raise InvalidArgument(
+            f"{name} must be a Frontend, a History, or a run of a recording, got {source!r}"
+        )
+    offset = getattr(source, "wall_offset", None)  # of a recorded run
+    if offset is None:
+        offset = source.provenance.wall_clock_offset
+    return source.history(seconds=seconds), int(offset)
+
+
+def shifts_of(found: Mapping[str, tuple[History, int | None]]) -> dict[str, int] | None:
+    """What to add to the row times of each [ns]; None: their clocks have nothing in common."""
+    clocks = {history.schema["clock"] for history, _ in found.values()}
+    if len(clocks) > 1:
+        return None
+    known = [offset for _, offset in found.values() if offset is not None]
+    apart = max(known) - min(known) if known else 0
+    if clocks != {"monotonic"} or apart < SAME_CLOCK:
+        return dict.fromkeys(found, 0)
+    if len(known) < len(found):
+        return None
+    return {name: offset or 0 for name, (_, offset) in found.items()}
+
+
+def _on_clock(history: History, shift: int) -> Timed:
+    """The rows that were captured, in the order of their capture; of equal ones the newest."""
+    times = history.time
+    if CAPTURE_TIME in (history.extended.keys() if len(history) else ()):
+        times = np.asarray(getattr(history.extended, CAPTURE_TIME)).astype(np.int64)
+        captured = np.flatnonzero(times > 0)
+        order = captured[np.argsort(times[captured], kind="stable")]
+        ordered = times[order]
+        newest = np.append(ordered[1:] != ordered[:-1], True)[: len(ordered)]
+        rows = order[newest]
+    else:
+        rows = np.arange(len(history))
+    return Timed(history, rows, times[rows] + shift)

@@ -1,0 +1,231 @@
+"""Rows of several sources are joined by the time of their capture."""
+
+import pickle
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import o80
+from o80.joining.align import HowWord
+from o80.joining.sources import shifts_of
+
+EXTENDED = {
+    "capture_time": np.int64,
+    "position": (np.float64, 3),
+    "speed": np.float32,
+    "count": np.int32,
+    "seen": np.bool_,
+}
+Captures = list[int]
+Search = Callable[[Captures, int], int | None]
+
+
+def device(name: str, captures: Captures) -> o80.History:
+    """Rows of a device that captured at these times [ns]; 0: it captured nothing."""
+    with o80.Backend(name, 0, extended=EXTENDED, history=64, lanes=1, lane_blocks=64) as backend:
+        for number, time in enumerate(captures):
+            if number:
+                backend.step()
+            values = {
+                "capture_time": time,
+                "position": [number, 2.0 * number, -1.0],
+                "speed": 0.5 * number,
+                "count": number,
+                "seen": True,
+            }
+            backend.publish(None, values)
+        with o80.Frontend(name) as reader:
+            return reader.history()
+
+
+def nearest_row(captures: Captures, time: int) -> int | None:
+    """The newest row of those captured nearest to a time; of two as near the older capture."""
+    known = [capture for capture in captures if capture > 0]
+    if not known:
+        return None
+    best = min(known, key=lambda capture: (abs(capture - time), capture))
+    return max(i for i, capture in enumerate(captures) if capture == best)
+
+
+def row_before(captures: Captures, time: int) -> int | None:
+    known = [capture for capture in captures if 0 < capture <= time]
+    return max(i for i, c in enumerate(captures) if c == max(known)) if known else None
+
+
+TIMES = st.lists(st.integers(0, 50), min_size=1, max_size=12)
+
+
+@given(captures=TIMES, at=st.lists(st.integers(-5, 60), max_size=12), most=st.integers(0, 20))
+def test_each_time_gets_the_row_that_a_plain_search_finds(
+    captures: Captures, at: list[int], most: int
+) -> None:
+    history = device("align-search", captures)
+    ways: list[tuple[HowWord, Search]] = [("before", row_before), ("nearest", nearest_row)]
+    for how, search in ways:
+        joined = o80.align(
+            {"device": history}, at=np.array(at, np.int64), how=how, most_age=most * 1e-9
+        )
+        got = joined["device"]
+        for place, time in enumerate(at):
+            row = search(captures, time)
+            found = row is not None and abs(time - captures[row]) <= most
+            assert bool(got.found[place]) == found
+            if row is None:
+                assert np.isnan(got.age[place])
+            else:
+                assert got.age[place] == pytest.approx((time - captures[row]) * 1e-9)
+            if found:
+                assert got.extended.count[place] == row
+                assert got.iteration[place] == row
+            else:
+                assert np.isnan(got.extended.position[place]).all()
+                assert np.isnan(got.extended.speed[place])
+                assert not got.extended.seen[place]
+
+
+@given(captures=TIMES, at=st.lists(st.integers(-5, 60), max_size=12))
+def test_floats_lie_on_the_line_between_the_rows_around_a_time(
+    captures: Captures, at: list[int]
+) -> None:
+    got = o80.align(
+        {"device": device("align-line", captures)}, at=np.array(at, np.int64), how="linear"
+    )["device"]
+    rows = {capture: i for i, capture in enumerate(captures) if capture > 0}
+    times = sorted(rows)
+    for place, time in enumerate(at):
+        inside = bool(times) and times[0] <= time <= times[-1]
+        assert bool(got.found[place]) == inside
+        if not inside:
+            assert np.isnan(got.extended.speed[place])
+            continue
+        numbers = [float(rows[each]) for each in times]
+        wanted = np.interp(time, times, numbers)
+        assert got.extended.position[place].tolist() == pytest.approx([wanted, 2 * wanted, -1.0])
+        assert got.extended.speed[place] == pytest.approx(0.5 * wanted)
+        older = row_before(captures, time)
+        assert got.extended.count[place] == older
+        around = [abs(time - each) for each in (times[0], times[-1])]
+        assert got.age[place] <= max(around) * 1e-9
+
+
+def test_rows_of_one_source_give_the_times_and_programs_see_only_the_past(segment: str) -> None:
+    slow, fast = device(segment, [10, 30, 50]), device(segment, [5, 15, 25, 35, 45])
+    joined = o80.align({"slow": slow, "fast": fast}, by="slow")
+    assert joined.time.tolist() == [10, 30, 50]
+    assert joined["slow"].age.tolist() == [0, 0, 0]
+    assert joined["fast"].extended.count.tolist() == [0, 2, 4]
+    assert joined.complete.all()
+    assert list(joined) == ["slow", "fast"]
+    with pytest.raises(KeyError, match="there are: slow, fast"):
+        joined["ball"]
+
+
+def test_a_period_covers_the_time_in_which_all_have_rows(segment: str) -> None:
+    one, other = device(segment, [10, 20, 43]), device(segment, [15, 60])
+    joined = o80.align({"one": one, "other": other}, period=10e-9)
+    assert joined.time.tolist() == [15, 25, 35]
+    assert len(o80.align({"one": one, "none": device(segment, [0])}, period=1e-9).time) == 0
+
+
+def test_an_offset_moves_the_times_of_a_source(segment: str) -> None:
+    one, other = device(segment, [10, 20]), device(segment, [1010, 1020])
+    joined = o80.align({"one": one, "other": other}, by="one", offsets={"other": -1000})
+    assert joined["other"].extended.count.tolist() == [0, 1]
+
+
+def test_running_robots_are_joined_by_the_times_of_their_rows(segment: str) -> None:
+    with (
+        o80.robots.load("two_joints").start(segment, frequency=500) as one,
+        o80.robots.load("two_joints").start(segment + "-other", frequency=200) as other,
+    ):
+        left, right = one.frontend(), other.frontend()
+        left.wait_for(200, timeout=60.0)
+        right.wait_for(80, timeout=60.0)
+        joined = o80.align([left, right], by=right.segment, seconds=0.2)
+        rows = joined[left.segment]
+        known = rows.found
+        assert known.any()
+        assert (rows.time[known] <= joined.time[known]).all()
+        assert (rows.age[known] >= 0).all()
+        np.testing.assert_allclose(
+            rows.age[known], (joined.time - rows.time)[known] * 1e-9, atol=1e-12
+        )
+
+
+def test_a_recording_is_joined_like_the_running_robots(segment: str, tmp_path: Path) -> None:
+    names = [segment, segment + "-other"]
+    with (
+        o80.robots.load("two_joints").inline(names[0], frequency=500) as one,
+        o80.robots.load("two_joints").inline(names[1], frequency=100) as other,
+        o80.Recording(tmp_path / "run.mcap", names),
+    ):
+        for _ in range(10):
+            o80.burst({one: 5, other: 1})
+        live = o80.align([one, other], by=names[1])
+    recorded = o80.align(o80.open(tmp_path / "run.mcap"), by=names[1])
+    np.testing.assert_array_equal(live.time, recorded.time)
+    np.testing.assert_array_equal(live[names[0]].rows, recorded[names[0]].rows)
+    assert live[names[0]].iteration.tolist() == list(range(0, 51, 5))
+
+
+def test_clocks_that_have_nothing_in_common_need_an_offset(segment: str) -> None:
+    with o80.robots.load("two_joints").inline(segment) as arm:
+        arm.burst(10)
+        sources: dict[str, Any] = {"arm": arm, "device": device(segment + "-d", [10])}
+        with pytest.raises(o80.InvalidArgument, match=r"different clocks.*offsets"):
+            o80.align(sources, by="arm")
+        joined = o80.align(sources, by="arm", offsets={"device": 5_000_000})
+        assert joined["device"].found.tolist() == [False] * 6 + [True] * 5
+
+
+def test_joined_rows_can_be_pickled_and_sliced(segment: str) -> None:
+    joined = o80.align({"device": device(segment, [10, 20, 30])}, by="device")["device"]
+    again = pickle.loads(pickle.dumps(joined))
+    np.testing.assert_array_equal(again.rows, joined.rows)
+    np.testing.assert_array_equal(again.age, joined.age)
+    assert joined[1:].extended.count.tolist() == [1, 2]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        ({}, "give one of by"),
+        ({"by": "a", "period": 0.1}, "give one of by"),
+        ({"by": "b"}, "by: there is no 'b'; there are: a"),
+        ({"period": 0.0}, "period must be at least"),
+        ({"period": float("nan")}, "period must be at least"),
+        ({"at": [0.5]}, "at must be whole nanoseconds"),
+        ({"by": "a", "how": "after"}, "how must be one of before, nearest, linear"),
+        ({"by": "a", "how": {"b": "before"}}, "how: there is no 'b'"),
+        ({"by": "a", "most_age": -1.0}, "most_age must be at least 0"),
+        ({"by": "a", "most_age": float("nan")}, "most_age must be at least 0"),
+        ({"by": "a", "offsets": {"b": 1}}, "offsets: there is no 'b'"),
+    ],
+)
+def test_wrong_arguments_are_named(arguments: dict[str, Any], text: str, segment: str) -> None:
+    with pytest.raises(o80.InvalidArgument, match=text):
+        o80.align({"a": device(segment, [10])}, **arguments)
+
+
+def test_what_is_no_source_is_named(segment: str) -> None:
+    history = device(segment, [10])
+    with pytest.raises(o80.InvalidArgument, match="give a mapping from names"):
+        o80.align([history], by="a")  # type: ignore[list-item]
+    with pytest.raises(o80.InvalidArgument, match="a must be a Frontend"):
+        o80.align({"a": 5}, by="a")  # type: ignore[arg-type]
+    with pytest.raises(o80.InvalidArgument, match="at least one source"):
+        o80.align({}, period=0.1)
+
+
+def test_runs_of_different_starts_of_a_computer_are_joined_on_the_wall_clock() -> None:
+    clock = {"monotonic": SimpleNamespace(schema={"clock": "monotonic"})}
+    runs = {"a": (clock["monotonic"], 10**18), "b": (clock["monotonic"], 10**18 + 10**9)}
+    assert shifts_of(runs) == {"a": 10**18, "b": 10**18 + 10**9}  # type: ignore[arg-type]
+    runs["b"] = (clock["monotonic"], 10**18 + 1000)  # one start: the wall clock was adjusted
+    assert shifts_of(runs) == {"a": 0, "b": 0}  # type: ignore[arg-type]
