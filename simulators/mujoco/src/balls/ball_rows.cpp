@@ -1,7 +1,5 @@
 #include "balls/ball_rows.hpp"
 
-#include <cstdio>
-
 namespace o80::mujoco {
 namespace {
 
@@ -66,22 +64,6 @@ void BallRows::go_on_from_targets(const Balls& balls, std::byte* desired) const 
   for (std::size_t i = 0; i < balls.size(); ++i) {
     pack(balls.targets()[i].state, desired + states_[i].offset);
   }
-}
-
-Served clear_contacts(Balls* balls, const ClearContacts& request) noexcept {
-  if (balls == nullptr) {
-    return Served::rejected("this simulation has no balls: name some with balls=... at its start");
-  }
-  if (request.ball > balls->size()) {
-    char text[160];
-    std::snprintf(text, sizeof text, "ball must be from 1 to %zu, or 0 for all balls, got %u",
-                  balls->size(), request.ball);
-    return Served::rejected(text);
-  }
-  for (std::size_t i = 0; i < balls->size(); ++i) {
-    if (request.ball == 0 || request.ball == i + 1) balls->clear(i);
-  }
-  return Served::done();
 }
 
 }  // namespace o80::mujoco

@@ -1,20 +1,12 @@
 #pragma once
 
 #include <cstdint>
-#include <string_view>
 #include <vector>
 
 #include "balls/balls.hpp"
 #include "o80/robot.hpp"
 
 namespace o80::mujoco {
-
-/// Clears the contacts of a ball, so that the next contact is the first again.
-struct ClearContacts {
-  static constexpr std::string_view kHelp = "clear the contact records of balls";
-  std::uint32_t ball = 0;
-};
-O80_DESCRIBE(ClearContacts, (ball, "which, counted from 1; 0: all of them"));
 
 /// Where the balls lie in a row: each is an actuator, and has an element of the sensor `contacts`
 /// with a field for each surface, named after its geom.
@@ -65,8 +57,5 @@ class BallRows {
   std::vector<std::uint32_t> others_;
   std::uint32_t contacts_size_ = 0;  // of each ball [bytes]
 };
-
-/// Serves the request; `balls` is null in a simulation without balls.
-Served clear_contacts(Balls* balls, const ClearContacts& request) noexcept;
 
 }  // namespace o80::mujoco

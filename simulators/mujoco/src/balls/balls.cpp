@@ -26,18 +26,25 @@ Balls::Balls(mjModel& model, const BallOptions& options)
   imposed_starts_.resize(places_.size());
 }
 
-/// Watched surfaces first: an imposed ball meets no others.
+/// Watched surfaces first: an imposed ball meets no others. Still ones last: a ball that flies out
+/// meets no others.
 void Balls::add_surfaces() {
-  for (const bool watched : {true, false}) {
-    std::size_t record = 0;
-    for (std::size_t i = 0; i < surface_places_.size(); ++i) {
-      const SurfacePlace& place = surface_places_[i];
-      if (place.watched != watched) continue;
-      surfaces_.push_back({place.shape, place.restitution, place.friction, watched, record++, {}});
+  const auto add_those = [this](auto&& belongs) {
+    std::size_t records[2] = {0,
+                              0};  // of watched and of other surfaces, in the order of the option
+    for (const SurfacePlace& place : surface_places_) {
+      const std::size_t record = records[place.watched ? 0 : 1]++;
+      if (!belongs(place)) continue;
+      surfaces_.push_back(
+          {place.shape, place.restitution, place.friction, place.watched, record, {}});
       followers_.push_back({place.geom, place.still});
     }
-    if (watched) watched_ = record;
-  }
+  };
+  add_those([](const SurfacePlace& place) { return place.watched; });
+  watched_ = surfaces_.size();
+  add_those([](const SurfacePlace& place) { return !place.watched && !place.still; });
+  moving_ = surfaces_.size();
+  add_those([](const SurfacePlace& place) { return !place.watched && place.still; });
 }
 
 void Balls::reset(const mjData& data) noexcept {
@@ -76,12 +83,16 @@ void Balls::begin_iteration(double period) noexcept {
 void Balls::step(mjData& data, const StepOfIteration& step) noexcept {
   move_surfaces(data, step.count);
   for (std::size_t i = 0; i < places_.size(); ++i) {
-    if (now_.targets[i].imposed && !now_.balls[i].released) {
+    BallNow& now = now_.balls[i];
+    if (imposed(i)) {
       impose(i, step);
+    } else if (now.flies_out) {
+      if (step.is_first()) fly_out(i, step);
     } else {
-      fly(i, now_.balls[i].ball, 0, step);
+      fly(i, now.ball, 0, step, surfaces_);
     }
-    records(i).add_velocity(now_.balls[i].ball.velocity);
+    if (step.is_last()) now.flies_out = false;
+    records(i).add_velocity(now.ball.velocity);
     store(data, i);
   }
 }
@@ -138,18 +149,36 @@ void Balls::impose(std::size_t i, const StepOfIteration& step) noexcept {
   const Ball after = bounced(before, *contact, places_[i].sphere);
   contacts.add(step, *contact, before, after);
   now.released = true;
-  fly(i, after, contact->share, step);
+  fly(i, after, contact->share, step, surfaces_);
 }
 
-void Balls::fly(std::size_t i, const Ball& from, double begin,
-                const StepOfIteration& step) noexcept {
+bool Balls::fly(std::size_t i, const Ball& from, double begin, const StepOfIteration& step,
+                std::span<const Surface> among) noexcept {
   const ContactRecords contacts = records(i);
+  bool bounced = false;
   now_.balls[i].ball = flown_among(
-      surfaces_, from, air_[i], places_[i].sphere, model_.opt.timestep, begin,
+      among, from, air_[i], places_[i].sphere, model_.opt.timestep, begin,
       [&](const Contact& contact, const Ball& before, const Ball& after) {
         contacts.add(step, contact, before, after);
+        bounced = true;
       },
       [&](const Surface& surface, double gap) { contacts.add_gap(surface, gap); });
+  return bounced;
+}
+
+/// The contacts bear the iterations in which an ordinary flight would meet them.
+void Balls::fly_out(std::size_t i, const StepOfIteration& step) noexcept {
+  const FlyOut& request = now_.balls[i].fly_out;
+  const Ball& ball = now_.balls[i].ball;
+  bool bounced = false;
+  for (std::uint32_t flown = 0; flown < request.most;) {
+    for (std::uint32_t number = 0; number < step.count; ++number) {
+      const StepOfIteration later{step.iteration + flown, number, step.count};
+      bounced |= fly(i, ball, 0, later, still_surfaces());
+      records(i).add_velocity(ball.velocity);
+    }
+    if (++flown % request.every == 0 && (bounced || outside(request, ball.position))) return;
+  }
 }
 
 void Balls::store(mjData& data, std::size_t i) const noexcept {

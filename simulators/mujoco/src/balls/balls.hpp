@@ -11,6 +11,7 @@
 #include "balls/ball_model.hpp"
 #include "balls/bouncing_flight.hpp"
 #include "balls/contact_record.hpp"
+#include "balls/fly_out.hpp"
 
 namespace o80::mujoco {
 
@@ -39,6 +40,8 @@ class Balls {
   struct BallNow {
     Ball ball;
     bool released = false;
+    bool flies_out = false;  // in the next iteration, as `fly_out` says
+    FlyOut fly_out{};
   };
   /// Everything that changes; a restored state repeats bit for bit.
   struct State {
@@ -72,6 +75,15 @@ class Balls {
   void reset(const mjData& data) noexcept;
   /// Clears the records of a ball.
   void clear(std::size_t i) noexcept { records(i).clear(); }
+  /// True if a command moved the ball to the end of the last iteration.
+  bool imposed(std::size_t i) const noexcept {
+    return now_.targets[i].imposed && !now_.balls[i].released;
+  }
+  /// The ball flies out in the next iteration, unless a command moves it then.
+  void fly_out(const FlyOut& request) noexcept {
+    now_.balls[request.ball - 1].flies_out = true;
+    now_.balls[request.ball - 1].fly_out = request;
+  }
   /// Begins an iteration of `period` [s] towards the targets.
   void begin_iteration(double period) noexcept;
   /// Moves all balls by a step, after the engine has moved the surfaces.
@@ -94,7 +106,15 @@ class Balls {
   Ball start_of_imposed(const Ball& now, const BallState& target) const noexcept;
   Path imposed_path(std::size_t i, const StepOfIteration& step) const noexcept;
   void impose(std::size_t i, const StepOfIteration& step) noexcept;
-  void fly(std::size_t i, const Ball& from, double begin, const StepOfIteration& step) noexcept;
+  std::span<const Surface> all_surfaces() const noexcept { return surfaces_; }
+  /// Those that are part of the world.
+  std::span<const Surface> still_surfaces() const noexcept {
+    return all_surfaces().subspan(moving_);
+  }
+  /// Returns true after a bounce.
+  bool fly(std::size_t i, const Ball& from, double begin, const StepOfIteration& step,
+           std::span<const Surface> among) noexcept;
+  void fly_out(std::size_t i, const StepOfIteration& step) noexcept;
   void store(mjData& data, std::size_t i) const noexcept;
 
   const mjModel& model_;
@@ -104,9 +124,10 @@ class Balls {
   std::vector<BallPlace> places_;
   std::vector<Air> air_;  // for each ball
   std::vector<SurfacePlace> surface_places_;
-  std::vector<Surface> surfaces_;  // watched ones first
+  std::vector<Surface> surfaces_;  // watched ones first, then the others that move
   std::vector<Follower> followers_;
-  std::size_t watched_ = 0;
+  std::size_t watched_ = 0;  // how many
+  std::size_t moving_ = 0;   // how many, watched ones included
   State now_;
   std::vector<Ball> imposed_starts_;  // of this iteration
 };

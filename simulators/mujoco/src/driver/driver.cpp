@@ -193,6 +193,10 @@ Served MujocoDriver::on(const ClearContacts& which) noexcept {
   return clear_contacts(simulation_.balls(), which);
 }
 
+Served MujocoDriver::on(const FlyOut& request) noexcept {
+  return fly_out(simulation_.balls(), request);
+}
+
 Served MujocoDriver::no_such_slot() const noexcept {
   char text[160];
   std::snprintf(text, sizeof text,

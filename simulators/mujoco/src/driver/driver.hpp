@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "balls/ball_requests.hpp"
 #include "balls/ball_rows.hpp"
 #include "driver/simulation.hpp"
 #include "o80/robot.hpp"
@@ -15,7 +16,7 @@ class MujocoDriver {
  public:
   using Config = mujoco::Config;
   using Actuators = RunTimeActuators;
-  using Requests = o80::Requests<Reset, Snapshot, Restore, ClearContacts>;
+  using Requests = o80::Requests<Reset, Snapshot, Restore, ClearContacts, FlyOut>;
 
   /// Throws DriverError.
   explicit MujocoDriver(const Config& config);
@@ -37,6 +38,7 @@ class MujocoDriver {
     return simulation_.load_snapshot(slot, bytes);
   }
   Served on(const ClearContacts& which) noexcept;
+  Served on(const FlyOut& request) noexcept;
 
  private:
   using Number = Place<double>;
