@@ -30,10 +30,17 @@ def refuse_wrong_arguments(
         raise ValueError(f"unknown render mode '{render_mode}'; there are: {', '.join(modes)}")
 
 
-def refuse_extra_balls_without_ball(rig: RigSettings, *, plays_ball: bool) -> None:
-    """Raises ValueError."""
+def refuse_wrong_balls(rig: RigSettings, task: TaskSettings, *, plays_ball: bool) -> None:
+    """Raises ValueError for extra balls, or a ball that flies out, where these cannot be."""
     if rig.extra_balls and not plays_ball:
         raise ValueError(f"this task plays no ball: extra_balls must be 0, got {rig.extra_balls}")
+    if task.fly_out and not plays_ball:
+        raise ValueError("this task plays no ball: fly_out must be False")
+    if task.fly_out and rig.extra_balls:
+        raise ValueError(
+            "fly_out ends an episode at the first touch of the played ball, while extra balls "
+            f"still come in: give fly_out=False, or extra_balls=0 instead of {rig.extra_balls}"
+        )
 
 
 def refuse_unless_for_copies(rig: RigSettings) -> None:

@@ -20,8 +20,8 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from .arguments import (
-    refuse_extra_balls_without_ball,
     refuse_wrong_arguments,
+    refuse_wrong_balls,
     refuse_wrong_options,
 )
 from .balls.sources import balls_from
@@ -35,9 +35,10 @@ from .rig.virtual_balls import VirtualBalls
 from .settings import RigSettings, TaskSettings
 from .task.actions import changed_pressures
 from .task.box import ObservationBox
-from .task.end import End
+from .task.end import End, undecided
 from .task.state import State
 from .world.arm import MUSCLES
+from .world.timing import ITERATIONS
 
 Float32Array = NDArray[np.float32]
 FloatArray = NDArray[np.float64]
@@ -83,7 +84,7 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         self.render_mode = render_mode
         self._settings, self._rig_settings = task or TaskSettings(), rig or RigSettings()
         self._task = self._settings.made()
-        refuse_extra_balls_without_ball(self._rig_settings, plays_ball=self._task.plays_ball)
+        refuse_wrong_balls(self._rig_settings, self._settings, plays_ball=self._task.plays_ball)
         settings = self._settings
         self._balls = balls_from(
             settings.balls, settings.ball_seed, self._rig_settings.period, settings.ball_count
@@ -190,6 +191,10 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         """The result of a step that began at `called` on the clock [s]."""
         self._steps += 1
         state = self._look()
+        settings, touched = self._settings, state.record.touched
+        if settings.fly_out and touched and undecided(self._task.end(state), touched):
+            self._twin.fly_out(ITERATIONS * settings.repeat, settings.end.passed_y)
+            state = self._look()
         observation = self._box.clip(self._task.observe(state))
         end, reward = End.RUNNING, 0.0
         if self._task.eventful(state):
@@ -239,8 +244,7 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
     def _look(self) -> State:
         """The newest rows of the arm and of the first twin, for the task."""
         state, twin = self._state, self._twin
-        state.steps = self._steps
-        state.pressures = self._arm.pressures
+        state.steps, state.pressures = self._steps, self._arm.pressures
         state.ball, state.record = twin.ball, twin.record
         return state
 
@@ -272,17 +276,16 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
 
     def render(self) -> Any:
         """`rgb_array`: a picture (480, 640, 3) of the newest rows; `human`: None, see `Page`."""
-        if self._display is None:
-            modes = " or ".join(f"render_mode='{mode}'" for mode in RENDER_MODES)
-            gymnasium.logger.warn(f"no render mode was chosen: make it with {modes}")
-            return None
-        return self._display.render()
+        if self._display is not None:
+            return self._display.render()
+        modes = " or ".join(f"render_mode='{mode}'" for mode in RENDER_MODES)
+        gymnasium.logger.warn(f"no render mode was chosen: make it with {modes}")
+        return None
 
     def close(self) -> None:
         """Ends everything that was started; may be called twice."""
         with ExitStack() as stack:  # each is closed even if another one fails
             stack.callback(self._rig.close)
-            if self._display is not None:
-                stack.callback(self._display.close)
-            if self._recorder is not None:
-                stack.callback(self._recorder.close)
+            for part in (self._display, self._recorder):
+                if part is not None:
+                    stack.callback(part.close)

@@ -125,6 +125,9 @@ class TaskSettings:
     """Of an episode of the named tasks."""
     reward: str | RewardRule = "ordered"
     """Of the named tasks with a ball: ordered, published, or a rule of `task.rewards`."""
+    fly_out: bool = False
+    """After the first touch nobody is asked any more: in the same step the ball flies to its end,
+    and the episode ends. A second touch of the racket then does not happen."""
     most_late: int = 20
     """Rows of lateness above which an episode is given up as stalled, real time."""
 

@@ -45,6 +45,8 @@ READ = {
     *(LANDING, NET_POSITION, FLOOR_POSITION),
     *(VELOCITY_AFTER, LARGEST_SPEED, SMALLEST_DISTANCE),
 }
+FAR = 1e9
+"""[m]"""
 CODES = {"i8": "q", "f8": "d"}
 """Of numbers, for `struct`."""
 
@@ -72,6 +74,13 @@ def ball_options(balls: int) -> dict[str, Any]:
         "spin_decay": AERODYNAMICS.spin_decay,
         "spin": BALL_GUN_SPIN,
     }
+
+
+def fly_out_fields(*, every: int, passed_y: float) -> dict[str, Any]:
+    """Fields of the request `fly_out` of a twin: its first ball flies until it has bounced off
+    table, net or floor, or has passed y [m], both looked at every `every` iterations.
+    """
+    return {"every": every, "low": (-FAR, passed_y, -FAR)}
 
 
 class BallReader:

@@ -14,7 +14,7 @@ from ..balls.sampled_flight import SampledFlight
 from ..task.ball_record import BallRecord
 from ..world.arm import JOINT_NAMES, JOINTS
 from ..world.timing import ITERATIONS
-from .ball_records import RECORDS, BallReader
+from .ball_records import RECORDS, BallReader, fly_out_fields
 from .row_words import WORD, words
 
 FloatArray = NDArray[np.float64]
@@ -79,6 +79,11 @@ class Twin:
         """Adds the same, to be burst together with other twins."""
         self._motion[...] = motion
         self.frontend.add_trajectory(self._burst.targets, self._joint_names)
+
+    def fly_out(self, every: int, passed_y: float) -> None:
+        """The first ball flies to the end of its flight, see `fly_out_fields`, in one iteration."""
+        self.frontend.request("fly_out", **fly_out_fields(every=every, passed_y=passed_y))
+        self.see(self.frontend.burst(1, timeout=TIMEOUT))
 
     def see(self, row: o80.Observation) -> None:
         """The newest row is this one."""

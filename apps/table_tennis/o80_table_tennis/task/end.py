@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .ball_record import BallRecord, Numbers
+from .ball_record import BallRecord, Flags, Numbers
 from .outcome import beyond_net, on_top
 
 IntArray = NDArray[np.int64]
@@ -52,6 +52,11 @@ class End(IntEnum):
     def truncated(self) -> bool:
         """Ended by the number of steps, or stalled."""
         return self in (End.OUT_OF_STEPS, End.STALLED)
+
+
+def undecided(ends: Any, touched: Flags) -> Any:
+    """(...) whether a ball was touched and no event has ended its episode yet."""
+    return touched & ~terminated(ends)
 
 
 def terminated(ends: Any) -> Any:

@@ -1,0 +1,128 @@
+"""After the first touch the ball flies to its end in the same step, as it would have by itself."""
+
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from opened_environment import ALL_MODES, opened
+
+import o80
+from o80_table_tennis.environment import TableTennisEnvironment
+from o80_table_tennis.players.policies import default_policy
+from o80_table_tennis.report.recorded_episodes import recorded_episodes
+from o80_table_tennis.settings import Pacing, RigSettings, TaskSettings
+from o80_table_tennis.task.actions import COARSE
+from o80_table_tennis.task.end import End
+from o80_table_tennis.world.arm import MUSCLES
+
+Step = tuple[Any, float, bool, bool, dict[str, Any]]
+PATIENT = 1_000_000
+
+
+def flying_out(**settings: Any) -> TaskSettings:
+    return TaskSettings(factor=COARSE, most_late=PATIENT, fly_out=True, **settings)
+
+
+def played(
+    environment: TableTennisEnvironment, ball: int, *, noise: float = 0.0
+) -> tuple[list[Step], int]:
+    """All steps of an episode of the scripted policy, and how often the racket met the ball."""
+    policy, rng = default_policy(), np.random.default_rng(ball)
+    observation, _ = environment.reset(seed=ball, options={"ball": ball})
+    steps: list[Step] = []
+    while not steps or not (steps[-1][2] or steps[-1][3]):
+        action = policy.act(observation) + noise * rng.normal(size=MUSCLES)
+        steps.append(environment.step(np.clip(action, -1, 1).astype(np.float32)))
+        observation = steps[-1][0]
+    return steps, int(environment.rig.twins[0].all_records[0]["racket"]["count"])
+
+
+def compared(balls: range, noise: float) -> list[str]:
+    """Ends of episodes in which the racket met the ball once, with and without flying out."""
+    ends, others = [], 0
+    with (
+        closing(opened(task=flying_out())) as short,
+        closing(opened(task=TaskSettings(factor=COARSE))) as full,
+    ):
+        for ball in balls:
+            once, _ = played(short, ball, noise=noise)
+            whole, touches = played(full, ball, noise=noise)
+            if touches > 1:  # flying out leaves the second touch out
+                others += 1
+                continue
+            *_, once_info = once[-1]
+            _, reward, terminated, truncated, info = whole[-1]
+            assert once[-1][1:4] == (reward, terminated, truncated)
+            np.testing.assert_equal(once_info, info)
+            np.testing.assert_array_equal(once[-1][0][16:], whole[-1][0][16:])  # the ball
+            ends.append(info["end_text"])
+            if info["touched"]:
+                assert len(once) < len(whole)
+                assert [step[4]["touched"] for step in once] == [False] * (len(once) - 1) + [True]
+                assert whole[len(once) - 1][4]["touched"]
+    assert others <= len(ends) / 10
+    return ends
+
+
+def test_reward_info_and_ball_are_those_of_the_whole_flight_bit_for_bit() -> None:
+    ends = compared(range(4), 0.0) + compared(range(40, 55), 0.2)
+    assert "returned" in ends
+    assert len(set(ends)) >= 3
+
+
+@pytest.mark.check
+def test_many_shots_end_as_their_whole_flights() -> None:
+    ends = compared(range(40, 90), 0.15)
+    assert {"returned", "net", "floor", "own half"} <= set(ends)
+
+
+@pytest.mark.parametrize("pacing", ALL_MODES)
+def test_it_works_in_every_way_of_pacing_and_replays(pacing: Pacing, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with opened(pacing, task=flying_out(), record=path) as environment:
+        steps, _ = played(environment, 3)
+        _, reward, terminated, _, info = steps[-1]
+        assert (terminated, info["end"]) == (True, End.RETURNED)
+        assert 1.0 < reward <= 2.0
+        assert np.isfinite(info["landing"]).all()
+        # the flight took one more iteration of the twin, and no step
+        summary = environment.summary
+        assert summary.landing == info["landing"].tolist()
+        assert summary.twin_last - summary.twin_first == 5 * len(steps)
+        assert environment.rig.twins[0].frontend.published == summary.twin_last + 1
+
+    (episode,) = recorded_episodes(path)
+    assert (episode.summary, episode.rewards[-1]) == (summary, reward)
+    results = o80.replay(path)
+    assert all(result.identical for result in results)
+
+
+def test_a_ball_that_is_never_touched_is_played_to_its_end() -> None:
+    still = np.zeros(MUSCLES, np.float32)
+    outcomes = []
+    for fly_out in (False, True):
+        task = TaskSettings(factor=COARSE, fly_out=fly_out)
+        with opened(task=task) as environment:
+            environment.reset(seed=1, options={"ball": 0})
+            steps: list[Step] = []
+            while not steps or not steps[-1][2]:
+                steps.append(environment.step(still))
+        outcomes.append((len(steps), steps[-1][1], steps[-1][4]["end"]))
+    assert outcomes[0] == outcomes[1]
+
+
+def test_it_saves_the_steps_after_the_touch() -> None:
+    with closing(opened(task=flying_out())) as environment:
+        flown = [len(played(environment, ball)[0]) for ball in range(5)]
+    with closing(opened(task=TaskSettings(factor=COARSE))) as environment:
+        whole = [len(played(environment, ball)[0]) for ball in range(5)]
+    assert sum(flown) < 0.75 * sum(whole)
+
+
+def test_it_is_refused_where_it_cannot_be() -> None:
+    with pytest.raises(ValueError, match="give fly_out=False, or extra_balls=0 instead of 3"):
+        TableTennisEnvironment(rig=RigSettings(extra_balls=3), task=TaskSettings(fly_out=True))
+    with pytest.raises(ValueError, match="plays no ball: fly_out must be False"):
+        TableTennisEnvironment(task=TaskSettings(task="reach", fly_out=True))
