@@ -1,5 +1,5 @@
 # Everything made lies in .venv and build/. Options go through ARGS="...".
-.PHONY: demo test check wheel scripts torture model fuzz rt systemd bench growth stress format clean distclean
+.PHONY: demo learn test check wheel scripts torture model fuzz rt systemd bench growth stress format clean distclean
 ARGS ?=
 export PYTHONDONTWRITEBYTECODE := 1
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
@@ -7,6 +7,11 @@ export PATH := $(CURDIR)/.venv/bin:$(PATH)
 demo:
 	@tools/setup.sh demo
 	@.venv/bin/python -m o80_table_tennis.demo $(ARGS)
+
+# one seed of table tennis from scratch, 30 minutes on one processor: build/learn/report.json
+learn:
+	@tools/setup.sh learn
+	@.venv/bin/python -m o80_table_tennis.train $(ARGS)
 
 # what a change can break; ARGS chooses tests: make test ARGS=control, ARGS=tests/python/test_bursts.py
 test:

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# Sets up what a make target needs: tools/setup.sh demo|tools|test|check|wheels|bench|systemd
+# Sets up what a make target needs: tools/setup.sh demo|learn|tools|test|check|wheels|bench|systemd
 # `tools` is `test` without the packages of this repository: C++ tests do not use them installed.
 # Nothing is done twice; stamps of what was done lie in .venv/stamps.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 PATH=$PATH:/usr/sbin:/sbin # ldconfig, for users whose path lacks them
-purpose=${1:?demo, tools, test, check, wheels, bench or systemd}
+purpose=${1:?demo, learn, tools, test, check, wheels, bench or systemd}
 
 mkdir -p build
 exec 9> build/setup.lock
@@ -63,7 +63,7 @@ install_tools() {
   say "installing what building, running ${1:+and testing }needs"
   pip install 'pip>=25.1'
   .venv/bin/python tools/build_requirements.py build > build/requirements.txt
-  .venv/bin/python tools/build_requirements.py run rendering record >> build/requirements.txt
+  .venv/bin/python tools/build_requirements.py run rendering record $extras >> build/requirements.txt
   pip install -r build/requirements.txt --group build ${1:+--group "$1"}
 }
 
@@ -86,7 +86,7 @@ install_packages() {
 }
 
 case $purpose in
-  demo) ;;
+  demo | learn) ;;
   tools | test) need_packages g++ libgtest-dev libgmock-dev ;;
   check) # compilers of the sanitizers and of another machine, model checkers, emulators, stress, browser
     need_packages g++ libgtest-dev libgmock-dev googletest clang-19 libclang-rt-19-dev \
@@ -112,5 +112,10 @@ case $purpose in
   check | wheels) group=$purpose ;;
   *) group= ;;
 esac
-once "tools-${group:-build}" "$(state_of pyproject.toml ./*/*/pyproject.toml)" install_tools "$group"
+# torch and the rest that learning needs, for those that learn or test it
+case $purpose in
+  demo | bench) extras= ;;
+  *) extras=learn ;;
+esac
+once "tools-${group:-build$extras}" "$(state_of pyproject.toml ./*/*/pyproject.toml)" install_tools "$group"
 [ "$purpose" = tools ] || install_packages

@@ -1,0 +1,66 @@
+"""The environments of a training, as Stable-Baselines3 wants them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn, VecEnvWrapper
+
+from ..environment import TableTennisEnvironment
+from ..players.conditions import Conditions
+from ..task.observations import BALL_NUMBERS
+
+Float32Array = NDArray[np.float32]
+
+HISTORY = 64
+"""Rows that arms and twins keep: few, as nobody looks back."""
+
+
+def visible_numbers(size: int, *, blind: bool) -> Float32Array:
+    """(M,) 1 for the numbers of an observation that a policy sees; a blind one sees no ball."""
+    visible = np.ones(size, np.float32)
+    if blind:
+        visible[list(BALL_NUMBERS)] = 0.0
+    return visible
+
+
+class Masked(VecEnvWrapper):
+    """Environments with some numbers of their observations set to 0."""
+
+    def __init__(self, environments: VecEnv, visible: Float32Array) -> None:
+        super().__init__(environments)
+        self._visible = visible
+
+    def reset(self) -> VecEnvObs:
+        """The first observations."""
+        return self._masked(self.venv.reset())
+
+    def step_wait(self) -> VecEnvStepReturn:
+        """The outcome of the step under way."""
+        observations, rewards, dones, infos = self.venv.step_wait()
+        for copy in np.flatnonzero(dones):
+            infos[copy]["terminal_observation"] = self._masked(infos[copy]["terminal_observation"])
+        return self._masked(observations), rewards, dones, infos
+
+    def _masked(self, observations: Any) -> Float32Array:
+        masked: Float32Array = observations * self._visible
+        return masked
+
+
+def opened(conditions: Conditions, *, count: int, seed: int, ball_seed: int) -> VecEnv:
+    """Environments that play the shots of `ball_seed`; copy i is seeded with seed + i."""
+    rig = replace(conditions.rig(), history=HISTORY)
+    make = partial(TableTennisEnvironment, rig=rig, task=conditions.task(ball_seed=ball_seed))
+    environments = DummyVecEnv([make] * count)
+    environments.seed(seed)
+    return environments
+
+
+def generators_of(environments: VecEnv) -> list[np.random.Generator]:
+    """The random generators of the environments, from which every episode draws."""
+    return list(environments.get_attr("np_random"))

@@ -1,0 +1,71 @@
+"""The picture of an evaluation: where the balls landed on the table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from ..world.table import TABLE, TARGET
+from .evaluation import Evaluation
+
+RESOLUTION = 110
+"""[dots per inch]"""
+
+
+def plot_landings(path: Path, evaluations: Sequence[Evaluation]) -> None:
+    """The table from above, one for each evaluation; the arm stands on the left."""
+    figure = Figure(figsize=(8.5, 4.2 * len(evaluations)), layout="constrained")
+    panels = figure.subplots(len(evaluations), 1, squeeze=False)[:, 0]
+    for axes, evaluation in zip(panels, evaluations, strict=True):
+        x, y, _ = TABLE.centre
+        width, length, _ = TABLE.size
+        near, left = y - length / 2, x - width / 2
+        axes.add_patch(Rectangle((near, left), length, width, facecolor="tab:blue", alpha=0.25))
+        axes.plot([y, y], [left, left + width], color="black", label="net")
+        for returned, colour, label in (
+            (True, "tab:green", "returned"),
+            (False, "tab:red", "landed elsewhere"),
+        ):
+            places = np.array(
+                [
+                    episode.landing
+                    for episode in evaluation.episodes
+                    if episode.landing is not None and episode.returned is returned
+                ]
+            ).reshape(-1, 3)
+            axes.plot(
+                places[:, 1],
+                places[:, 0],
+                "o",
+                markersize=3.5,
+                alpha=0.7,
+                color=colour,
+                label=f"{label}: {len(places)}",
+            )
+        axes.plot(
+            TARGET[1],
+            TARGET[0],
+            "*",
+            markersize=13,
+            color="gold",
+            markeredgecolor="black",
+            label="target",
+        )
+        count = len(evaluation.episodes)
+        axes.set_title(
+            f"{evaluation.name}: {100 * evaluation.returned:.1f} % of {count} balls returned, "
+            f"{100 * evaluation.touched:.1f} % touched",
+            fontsize=10,
+        )
+        axes.set_xlabel("y, towards the opponent [m]")
+        axes.set_ylabel("x, across [m]")
+        axes.set_aspect("equal")
+        axes.set_xlim(near - 0.4, near + length + 0.4)
+        axes.set_ylim(left - 0.3, left + width + 0.3)
+        axes.grid(alpha=0.3)
+        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
+    figure.savefig(path, dpi=RESOLUTION)

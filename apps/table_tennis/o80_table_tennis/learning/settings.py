@@ -1,0 +1,84 @@
+"""Settings of a training: frozen values, with those that the search found as defaults."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from o80.checked import whole
+
+from ..players.conditions import Conditions
+
+
+@dataclass(frozen=True)
+class PpoSettings:
+    """Of Stable-Baselines3's PPO. `python -m o80_table_tennis.learning.search` tries others."""
+
+    environments: int = 32
+    """That are stepped side by side."""
+    steps: int = 64
+    """Decisions of each environment between two updates."""
+    batch: int = 512
+    epochs: int = 5
+    """Times that an update sees each decision."""
+    learning_rate: float = 1e-3
+    """At the start; it falls linearly to `last_rate` of that."""
+    last_rate: float = 0.05
+    discount: float = 0.995
+    trace: float = 0.95
+    """Lambda of the generalised advantage estimate."""
+    clip: float = 0.2
+    entropy: float = 0.0
+    hidden: int = 64
+    """Units of each of two hidden layers, of the policy and of the value."""
+    log_exploration: float = -0.5
+    """Logarithm of the standard deviation of the actions at the start."""
+
+    def __post_init__(self) -> None:
+        for name in ("environments", "steps", "batch", "epochs", "hidden"):
+            whole(getattr(self, name), name, 1)
+        for name in ("learning_rate", "discount", "trace", "clip"):
+            value = getattr(self, name)
+            if not 0 < value < math.inf:
+                raise ValueError(f"{name} must be a positive number, got {value}")
+
+
+@dataclass(frozen=True)
+class LearningSettings:
+    """A whole training. Raises ValueError or TypeError."""
+
+    conditions: Conditions = field(default_factory=Conditions)
+    ppo: PpoSettings = field(default_factory=PpoSettings)
+    seed: int = 1
+    decisions: int = 3_000_000
+    """After which the training ends."""
+    minutes: float = math.inf
+    """After which it ends at the latest [min]."""
+    blind: bool = False
+    """The ball is masked; the policy sees the arm and the time."""
+    evaluate_every: int = 100_000
+    """Decisions between two evaluations of the deterministic policy."""
+    evaluated: int = 100
+    """Balls of such an evaluation."""
+
+    def __post_init__(self) -> None:
+        whole(self.seed, "seed", 0)
+        for name in ("decisions", "evaluate_every", "evaluated"):
+            whole(getattr(self, name), name, 1)
+        if not self.minutes > 0:
+            raise ValueError(f"minutes must be positive, got {self.minutes}")
+
+
+WAYS: Mapping[str, LearningSettings] = {
+    "ours": LearningSettings(),
+    "published": LearningSettings(
+        conditions=Conditions(
+            preset="published_simulation", factor=0.05, repeat=1, reward="published"
+        ),
+        ppo=PpoSettings(
+            discount=0.9999, trace=1.0, learning_rate=1.5e-4, clip=0.4, hidden=380, steps=160
+        ),
+    ),
+}
+"""Sets of settings by name; `published`: fine actions, the published simulation and reward."""

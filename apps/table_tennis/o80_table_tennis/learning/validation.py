@@ -1,0 +1,43 @@
+"""Evaluations during a training: the deterministic policy on balls that it is not trained with."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..players.network import Network
+from .environments import opened
+from .episodes import EpisodeCounter, EpisodeOutcome, Shares, shares
+from .settings import LearningSettings
+
+BALL_SEED = 900_001
+"""Of the shots of validation: no training and no verdict plays them."""
+ENVIRONMENTS = 20
+
+
+class Validation:
+    """Plays the same shots, in the same noise, whenever it is asked."""
+
+    def __init__(self, settings: LearningSettings) -> None:
+        count = min(ENVIRONMENTS, settings.evaluated)
+        self._environments = opened(
+            settings.conditions, count=count, seed=BALL_SEED, ball_seed=BALL_SEED
+        )
+        self._each = -(-settings.evaluated // count)
+
+    def play(self, network: Network) -> Shares:
+        """What the network makes of the balls; each environment plays as many."""
+        environments = self._environments
+        environments.seed(BALL_SEED)
+        counter = EpisodeCounter(environments.num_envs)
+        played: list[list[EpisodeOutcome]] = [[] for _ in range(environments.num_envs)]
+        observations: Any = environments.reset()
+        while any(len(each) < self._each for each in played):
+            actions = network.act(observations)
+            observations, rewards, dones, infos = environments.step(actions)
+            for copy, outcome in counter.step(rewards, dones, infos):
+                played[copy].append(outcome)
+        return shares([outcome for each in played for outcome in each[: self._each]])
+
+    def close(self) -> None:
+        """Ends the environments."""
+        self._environments.close()

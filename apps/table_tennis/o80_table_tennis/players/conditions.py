@@ -1,0 +1,59 @@
+"""What a policy plays with: arm, actions and observation. A learned policy holds its own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any
+
+from ..settings import Pacing, RigSettings, TaskSettings
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Arm, actions, observation and reward; the defaults are those of the training."""
+
+    preset: str = "identified"
+    """Of the simulated arm."""
+    start_noise: float = 0.02
+    """On each joint at the start of an episode, uniform in plus or minus this [rad]."""
+    factor: float = 0.6
+    """Of the actions."""
+    repeat: int = 2
+    """Steps of 10 ms that an action lasts."""
+    reward: str = "ordered"
+    balls: str = "wide"
+    """Simulated shots, wide or narrow; or a path of recordings."""
+
+    def rig(self, pacing: Pacing = Pacing.INLINE) -> RigSettings:
+        """The arm and its twin. A simulated arm in real time starts without noise as a real one."""
+        return RigSettings(pacing=pacing, preset=self.preset, start_noise=self.start_noise)
+
+    def task(self, *, ball_seed: int = 0) -> TaskSettings:
+        """The task; each `ball_seed` has simulated shots of its own."""
+        return TaskSettings(
+            balls=self.balls,
+            ball_seed=ball_seed,
+            factor=self.factor,
+            repeat=self.repeat,
+            reward=self.reward,
+        )
+
+    def playing(self, balls: str | None) -> Conditions:
+        """The same with other balls, if any are named."""
+        return self if balls is None else replace(self, balls=balls)
+
+    def as_json(self) -> dict[str, Any]:
+        """By name."""
+        return asdict(self)
+
+    @classmethod
+    def of_json(cls, values: Mapping[str, Any]) -> Conditions:
+        """Of the values of a file. Raises ValueError for names that this version does not know."""
+        known = [each.name for each in fields(cls)]
+        unknown = [name for name in values if name not in known]
+        if unknown:
+            raise ValueError(
+                f"unknown conditions: {', '.join(unknown)}; the file is of another version"
+            )
+        return cls(**values)

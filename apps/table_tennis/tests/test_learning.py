@@ -1,0 +1,215 @@
+"""A training runs, writes its files, and goes on from a checkpoint as if it had not stopped."""
+
+import json
+import math
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+import typer
+from typer.testing import CliRunner
+
+import o80
+from o80_table_tennis import train
+from o80_table_tennis.learning import checkpoint, curve
+from o80_table_tennis.learning.environments import generators_of
+from o80_table_tennis.learning.settings import WAYS, LearningSettings, PpoSettings
+from o80_table_tennis.learning.training import CURVE, POLICY, Training
+from o80_table_tennis.players.learned_policy import LearnedPolicy
+from o80_table_tennis.task.observations import BALL_NUMBERS
+
+SMALL = LearningSettings(
+    ppo=PpoSettings(environments=2, steps=32, batch=32, epochs=2, hidden=8),
+    decisions=128,
+    evaluate_every=64,
+    evaluated=2,
+)
+
+
+@pytest.fixture(autouse=True)
+def one_thread() -> None:
+    torch.set_num_threads(1)
+
+
+def test_a_training_writes_a_row_for_each_update_a_policy_and_a_checkpoint(tmp_path: Path) -> None:
+    told: list[curve.CurvePoint] = []
+    with Training(SMALL, tmp_path) as training:
+        policy = training.run(told.append)
+    points = curve.read(tmp_path / CURVE)
+    assert [point.decisions for point in points] == [64, 128]
+    assert [point.decisions for point in told] == [64, 128]
+    assert all(point.evaluated for point in points)
+    assert checkpoint.found(tmp_path) is not None
+    loaded = LearnedPolicy.load(tmp_path / POLICY)
+    assert loaded.conditions == SMALL.conditions
+    observation = np.ones(loaded.network.inputs, np.float32)
+    assert loaded.act(observation).tobytes() == policy.act(observation).tobytes()
+
+
+def test_the_policy_of_numpy_acts_as_the_one_that_was_trained(tmp_path: Path) -> None:
+    with Training(SMALL, tmp_path) as training:
+        policy = training.run()
+        environments = training.model.get_vec_normalize_env()
+        assert environments is not None
+        rng = np.random.default_rng(1)
+        space = training.model.observation_space
+        seen = rng.uniform(-2, 2, (500, *(space.shape or ()))).astype(np.float32)
+        expected, _ = training.model.predict(environments.normalize_obs(seen), deterministic=True)
+        np.testing.assert_allclose(policy.network.act(seen), expected, atol=2e-6)
+        assert np.ptp(expected) > 0
+
+
+def state_of(training: Training) -> list[bytes]:
+    """All that decides how a training goes on, except for the episodes under way."""
+    environments = training.model.get_vec_normalize_env()
+    assert environments is not None
+    statistics: Any = environments.obs_rms
+    policy = training.model.policy
+    optimiser = policy.optimizer.state_dict()["state"]
+    moments = [values for _, state in sorted(optimiser.items()) for values in state.values()]
+    return [
+        *(values.detach().numpy().tobytes() for values in policy.state_dict().values()),
+        *(values.numpy().tobytes() for values in moments),
+        *(values.tobytes() for values in (statistics.mean, statistics.var)),
+        torch.get_rng_state().numpy().tobytes(),
+        *(repr(each.bit_generator.state).encode() for each in generators_of(environments)),
+    ]
+
+
+def test_a_resumed_training_has_weights_optimiser_normalisation_and_generators(
+    tmp_path: Path,
+) -> None:
+    with Training(SMALL, tmp_path) as training:
+        training.run()
+        before, spent = state_of(training), training.progress
+    saved = json.loads((tmp_path / checkpoint.FOLDER / checkpoint.PROGRESS).read_text())
+    with Training(replace(SMALL, decisions=192), tmp_path, resume=True) as resumed:
+        assert state_of(resumed) == before
+        assert resumed.progress.decisions == spent.decisions
+        assert resumed.progress.episodes == spent.episodes
+        assert resumed.progress.minutes >= saved["minutes"] > 0
+        resumed.run()
+        assert state_of(resumed) != before
+    assert [point.decisions for point in curve.read(tmp_path / CURVE)] == [64, 128, 192]
+
+
+def test_rows_after_the_checkpoint_are_dropped_when_a_training_resumes(tmp_path: Path) -> None:
+    with Training(SMALL, tmp_path) as training:
+        training.run()
+        last = training.point(evaluate=False)
+    curve.append(tmp_path / CURVE, replace(last, decisions=500))  # killed before the checkpoint
+    with Training(SMALL, tmp_path, resume=True):
+        assert [point.decisions for point in curve.read(tmp_path / CURVE)] == [64, 128]
+
+
+def test_a_training_that_is_stopped_leaves_a_checkpoint(tmp_path: Path) -> None:
+    def stop(point: curve.CurvePoint) -> None:
+        raise KeyboardInterrupt
+
+    with Training(SMALL, tmp_path) as training, pytest.raises(KeyboardInterrupt):
+        training.run(stop)
+    with Training(SMALL, tmp_path, resume=True) as resumed:
+        assert resumed.progress.decisions == 64
+
+
+def test_a_checkpoint_is_replaced_as_a_whole(tmp_path: Path) -> None:
+    with Training(SMALL, tmp_path) as training:
+        training.run()
+    folder = checkpoint.found(tmp_path)
+    assert folder is not None
+    folder.rename(tmp_path / f"{checkpoint.FOLDER}.old")  # killed between the two renames
+    (tmp_path / f"{checkpoint.FOLDER}.new").mkdir()
+    with Training(SMALL, tmp_path, resume=True) as resumed:
+        assert resumed.progress.decisions == 128
+
+
+def test_a_folder_without_a_checkpoint_cannot_be_resumed(tmp_path: Path) -> None:
+    with pytest.raises(o80.InvalidArgument, match="no checkpoint to resume"):
+        Training(SMALL, tmp_path, resume=True)
+
+
+def test_a_blind_policy_does_not_see_the_ball(tmp_path: Path) -> None:
+    with Training(replace(SMALL, blind=True), tmp_path) as training:
+        network = training.run().network
+        environments = training.model.get_vec_normalize_env()
+        assert environments is not None
+        statistics: Any = environments.obs_rms
+        assert np.ptp(statistics.var[list(BALL_NUMBERS)]) == 0  # of numbers that are always 0
+    first = np.zeros(network.inputs, np.float32)
+    second = first.copy()
+    second[list(BALL_NUMBERS)] = 1.0
+    assert network.act(first).tobytes() == network.act(second).tobytes()
+
+
+def test_a_training_ends_when_its_time_is_spent(tmp_path: Path) -> None:
+    with Training(replace(SMALL, minutes=1e-9, decisions=10**6), tmp_path) as training:
+        training.run()
+        assert training.progress.decisions <= 64
+
+
+def test_curves_are_read_as_they_were_written(tmp_path: Path) -> None:
+    path = tmp_path / "curve.csv"
+    point = curve.CurvePoint(10, 2, 2, 0.5, 0.25, 0.5, 0.25, -0.125, 0.75)
+    seen = replace(
+        point, decisions=20, evaluated_touched=1, evaluated_returned=0.5, evaluated_reward=1.5
+    )
+    for each in (point, seen):
+        curve.append(path, each)
+    first, second = curve.read(path)
+    assert not first.evaluated
+    assert math.isnan(first.evaluated_reward)
+    assert second == seen
+    path.write_text("something,else\n")
+    with pytest.raises(ValueError, match="not a learning curve"):
+        curve.read(path)
+
+
+@pytest.mark.parametrize("name", WAYS)
+def test_every_way_can_be_trained(tmp_path: Path, name: str) -> None:
+    way = WAYS[name]
+    few = replace(way.ppo, environments=1, steps=4, batch=4)
+    settings = replace(way, ppo=few, decisions=4, evaluate_every=4, evaluated=1)
+    with Training(settings, tmp_path) as training:
+        training.run()
+
+
+def test_the_command_trains_and_tells_how_well(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(WAYS, "ours", SMALL)
+    arguments = ["--seed", "5", "--evaluated", "2", "--blind-share", "0.5"]
+    app = typer.Typer()
+    app.command()(train.main)
+    result = CliRunner().invoke(app, [*arguments, "--output", str(tmp_path)])
+    assert result.exit_code == 0, result.output
+    report = json.loads((tmp_path / "report.json").read_text())
+    assert report["seed"] == 5
+    assert report["decisions"] == 128
+    assert report["minutes"] > 0
+    for name in ("returned_simulated", "returned_blind"):
+        assert 0 <= report[name] <= 1
+    assert report["returned_recorded"] is None
+    for name in ("curve.png", "landings.png", "policy.npz", "policy.json", "curve.csv"):
+        assert (tmp_path / name).stat().st_size > 100
+    for words in ("learned", "blind", "still arm", "random actions"):
+        assert words in result.output
+
+
+def test_a_missing_library_is_named_with_its_extra(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "torch", None)
+    app = typer.Typer()
+    app.command()(train.main)
+    result = CliRunner().invoke(app, ["--output", str(tmp_path)])
+    assert result.exit_code == 1
+    assert 'pip install "o80-table-tennis[learn]"' in result.output
+
+
+def test_an_unknown_way_is_refused_with_those_there_are() -> None:
+    with pytest.raises(ValueError, match="unknown way 'hers'; there are: ours, published"):
+        train.chosen("hers", balls=None, minutes=None)
