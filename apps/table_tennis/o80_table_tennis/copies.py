@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from o80.learning import Index, Outcome, Task
 
-from .arguments import refuse_unless_for_copies, refuse_wrong_options
+from .arguments import refuse_unless_for_copies, refuse_wrong_balls, refuse_wrong_options
 from .balls.sources import balls_from
 from .episode_draw import drawn_episode
 from .report.rendering import Scene
@@ -24,9 +24,10 @@ from .rig.group_rig import GroupRig
 from .settings import RigSettings, TaskSettings
 from .task.actions import changed_pressures
 from .task.box import ObservationBox
-from .task.end import End, terminated
+from .task.end import End, terminated, undecided
 from .task.state import State
 from .world.arm import MUSCLES
+from .world.timing import ITERATIONS
 
 FloatArray = NDArray[np.float64]
 Numbers = NDArray[np.intp]
@@ -53,6 +54,8 @@ class TableTennisCopies(Task):
         settings, rig = task or TaskSettings(), rig or RigSettings()
         refuse_unless_for_copies(rig)
         self._task = settings.made()
+        refuse_wrong_balls(rig, settings, plays_ball=self._task.plays_ball)
+        self._fly_out, self._passed_y = settings.fly_out, settings.end.passed_y
         self._box = ObservationBox(self._task)
         super().__init__(
             copies,
@@ -112,6 +115,19 @@ class TableTennisCopies(Task):
         self._asked[copies] = asked
         self._ends[copies] = End.RUNNING
         self._look()
+        if self._fly_out:
+            touched = np.zeros(self.copies, np.bool_)
+            touched[copies] = np.asarray(self._state.record.touched)[copies]
+            if touched.any():
+                self._fly(np.flatnonzero(touched))
+
+    def _fly(self, touched: Numbers) -> None:
+        """The touched balls of these copies fly to their ends, unless they are there."""
+        state = self._state.at(touched)
+        flying = touched[undecided(self._task.end(state), state.record.touched)]
+        if flying.size:
+            self._rig.twins.fly_out(flying, ITERATIONS * self._repeat, self._passed_y)
+            self._look()
 
     def _look(self) -> None:
         """What of the state is no view of the newest rows."""

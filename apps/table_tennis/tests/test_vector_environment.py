@@ -33,6 +33,7 @@ TASKS = {
     "return": TaskSettings(factor=COARSE),
     "wide": TaskSettings(factor=0.3, balls="wide", ball_seed=4, reward="published"),
     "repeat": TaskSettings(factor=COARSE, repeat=3),
+    "fly out": TaskSettings(factor=0.05, fly_out=True, repeat=2),
     "hit": TaskSettings(task="hit", factor=COARSE, end=SHORT, delay=0),
     "smash": TaskSettings(task="smash", delay=3, factor=COARSE),
     "reach": TaskSettings(task="reach", factor=0.2, end=SHORT),
@@ -94,9 +95,12 @@ class Scripted:
         return actions
 
 
+@pytest.mark.parametrize("fly_out", [False, True])
 @pytest.mark.parametrize("mode", MODES)
-def test_equals_single_environments_when_balls_are_returned(mode: AutoresetMode) -> None:
-    task = TaskSettings(factor=COARSE)
+def test_equals_single_environments_when_balls_are_returned(
+    mode: AutoresetMode, fly_out: bool
+) -> None:
+    task = TaskSettings(factor=COARSE, fly_out=fly_out)
     assert assert_equals_single_ones(mode, Scripted(), steps=200, task=task) >= COPIES
     with made(mode=AutoresetMode.SAME_STEP, task=task) as vector:
         seen, _ = vector.reset(seed=5)

@@ -14,7 +14,7 @@ from ..task.ball_record import BallRecord
 from ..world.arm import JOINT_NAMES, JOINTS
 from ..world.timing import ITERATIONS
 from .arms import TIMEOUT, Index
-from .ball_records import RECORDS, ball_records
+from .ball_records import RECORDS, ball_records, fly_out_fields
 from .row_words import words
 from .twin import BALL_STATE, SEEN_NUMBERS
 
@@ -54,6 +54,15 @@ class Twins:
         """These mirror angle and velocity of each joint in their arm's last rows (N, 4, 5, 2)."""
         self._motion[copies] = motion[copies]
         self._burst.run(copies, timeout=TIMEOUT)
+
+    def fly_out(self, copies: NDArray[np.intp], every: int, passed_y: float) -> None:
+        """Their balls fly to the end of their flights, see `fly_out_fields`, in one iteration."""
+        fields = fly_out_fields(every=every, passed_y=passed_y)
+        self.group.request("fly_out", copies=copies, **fields)
+        targets, motion = self._first.targets[:, 0], self._motion[copies, :, -1]
+        targets["position"][copies], targets["velocity"][copies] = motion[..., 0], motion[..., 1]
+        self._first.run(copies, timeout=TIMEOUT)
+        self._last[copies] = self._first.rows[copies, 0]
 
     def reset(
         self,
