@@ -8,6 +8,8 @@ environments = o80.learning.VectorEnvironment(Reach(copies=16))
 Needs the extra `gym`. See docs/learning.md.
 """
 
+from typing import TYPE_CHECKING
+
 from o80.extras import needed
 
 needed("gymnasium", "gym", "o80.learning")
@@ -18,6 +20,25 @@ from o80.learning.registration import register  # noqa: E402
 from o80.learning.task import EVERY, Index, Outcome, Task  # noqa: E402
 from o80.learning.vector_environment import VectorEnvironment  # noqa: E402
 
+if TYPE_CHECKING:
+    from o80.learning.stable_baselines3_env import StableBaselines3Env, WhichInfos
+
+
+def stable_baselines3(
+    environments: VectorEnvironment, *, infos: "WhichInfos" = "all"
+) -> "StableBaselines3Env":
+    """A vector environment in SAME_STEP mode for the learners of Stable-Baselines3.
+
+    infos: "all" or "ends": the info of the task in every step, or only of ended episodes.
+
+    Needs the extra `stable-baselines3`.
+    """
+    needed("stable_baselines3", "stable-baselines3", "o80.learning.stable_baselines3")
+    from o80.learning.stable_baselines3_env import StableBaselines3Env
+
+    return StableBaselines3Env(environments, infos=infos)
+
+
 __all__ = [
     "EVERY",
     "Environment",
@@ -27,4 +48,5 @@ __all__ = [
     "Task",
     "VectorEnvironment",
     "register",
+    "stable_baselines3",
 ]
