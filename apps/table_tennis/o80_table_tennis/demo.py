@@ -10,9 +10,9 @@ from __future__ import annotations
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import FrameType
 from typing import Annotated, Any
@@ -25,6 +25,7 @@ import o80
 
 from .balls.sources import balls_from
 from .environment import TableTennisEnvironment
+from .players.baselines import BASELINES
 from .players.policies import DEFAULT_FACTOR, default_policy
 from .playing import play
 from .report.episode_summary import EpisodeSummary
@@ -83,10 +84,12 @@ def run_demo(settings: DemoSettings, console: Console) -> Report:
             bar = progress.add_task(pacing.value, total=episodes, returns="0 returned")
             modes[pacing] = _play_mode(settings, pacing, available, _advance(progress, bar))
 
+        policies = _compared(settings, modes, available, progress)
         bar = progress.add_task("plots and film", total=1, returns="")
         report = write_report(
             settings.output,
             modes,
+            policies,
             _recorded(settings, modes),
             film=settings.film,
             begin=begin,
@@ -108,6 +111,29 @@ def _play_mode(
     with closing(environment):
         balls = (number % available for number in range(settings.episodes_of(pacing)))
         return play(environment, default_policy(), balls, seed=settings.seed, after_each=after_each)
+
+
+def _compared(
+    settings: DemoSettings, modes: Mapping[Pacing, Played], available: int, progress: Progress
+) -> dict[str, Played]:
+    """The scripted policy and the baselines on the same balls, all as fast as they can."""
+    scripted = modes.get(Pacing.INLINE) or modes[Pacing.REAL_TIME]
+    compared = {"scripted": scripted}
+    episodes = len(scripted.episodes)
+    for name, baseline in BASELINES.items():
+        bar = progress.add_task(name, total=episodes, returns="0 returned")
+        task = replace(settings.task(), factor=baseline.factor)
+        environment = TableTennisEnvironment(rig=settings.rig(Pacing.INLINE), task=task)
+        with closing(environment):
+            balls = (number % available for number in range(episodes))
+            compared[name] = play(
+                environment,
+                baseline.made(),
+                balls,
+                seed=settings.seed,
+                after_each=_advance(progress, bar),
+            )
+    return compared
 
 
 def _recorded(

@@ -77,6 +77,19 @@ def test_processes_and_inline_played_the_same(report: dict[str, Any]) -> None:
     assert [processes[key] for key in told] == [inline[key] for key in told]
 
 
+def test_baselines_stand_beside_the_policy(report: dict[str, Any]) -> None:
+    policies = report["policies"]
+    assert list(policies) == ["scripted", "still arm", "random, fine", "random, coarse"]
+    inline = report["modes"]["inline"]
+    for key in ("episodes", "touched", "returned", "mean_reward"):
+        assert policies["scripted"][key] == inline[key]
+    for numbers in policies.values():
+        share = numbers["returned"] / numbers["episodes"]
+        assert numbers["returned_at_least"] <= share <= numbers["returned_at_most"]
+        assert numbers["returned"] <= numbers["touched"] <= numbers["episodes"] == EPISODES
+    assert policies["scripted"]["returned"] > policies["still arm"]["returned"]
+
+
 def test_it_tells_how_the_arm_kept_its_time(report: dict[str, Any]) -> None:
     numbers = report["modes"]["real time"]
     assert 0 < numbers["arm_rate"] < 501
@@ -90,7 +103,8 @@ def test_every_printed_number_is_in_the_report(
     played: tuple[Path, str], report: dict[str, Any]
 ) -> None:
     values = [value for numbers in report["modes"].values() for value in numbers.values()]
-    values += [value for key, value in report.items() if key != "modes"]
+    values += [value for numbers in report["policies"].values() for value in numbers.values()]
+    values += [value for key, value in report.items() if key not in ("modes", "policies")]
     texts = {f"{value:g}" if isinstance(value, float) else str(value) for value in values}
     columns = [
         cell.strip()

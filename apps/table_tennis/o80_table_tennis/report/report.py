@@ -16,6 +16,7 @@ from rich.table import Table as Grid
 
 from ..settings import Pacing
 from ..world.timing import ITERATIONS
+from .interval import wilson
 from .played import Played
 from .recorded_episodes import RecordedEpisode
 
@@ -41,6 +42,8 @@ LABELS = {
     "arm_rate": "iterations of the arm a second [1/s]",
     "arm_overruns": "overruns of the arm",
     "arm_skipped": "periods the arm left out",
+    "returned_at_least": "share returned, at least (95 % sure)",
+    "returned_at_most": "share returned, at most (95 % sure)",
     "recorded_episodes": "episodes in the recording",
     "seconds": "seconds played",
 }
@@ -48,33 +51,43 @@ LABELS = {
 
 @dataclass(frozen=True)
 class Report:
-    """The numbers of every mode, and of the whole."""
+    """The numbers of every mode, of every policy on the same balls, and of the whole."""
 
     modes: Mapping[str, Mapping[str, Value]]
+    policies: Mapping[str, Mapping[str, Value]]
     whole: Mapping[str, Value]
 
     def print(self, console: Console) -> None:
-        """A table with a column for each mode, then the numbers of the whole demo."""
-        grid = Grid(title="table tennis", title_justify="left")
-        grid.add_column("")
-        for mode in self.modes:
-            grid.add_column(mode, justify="right")
-        rows = dict.fromkeys(key for numbers in self.modes.values() for key in numbers)
-        for key in rows:
-            values = [_text(numbers.get(key)) for numbers in self.modes.values()]
-            grid.add_row(escape(LABELS.get(key, _percentile_label(key))), *values)
-        console.print(grid)
+        """A table with a column for each mode, one for each policy, then the whole demo."""
+        console.print(_grid("table tennis", self.modes))
+        console.print(_grid("the same balls with other policies", self.policies))
         for key, value in self.whole.items():
             console.print(f"{key.replace('_', ' ')}: {_text(value)}", highlight=False)
 
     def write(self, path: Path) -> None:
         """As JSON."""
-        path.write_text(json.dumps({"modes": self.modes, **self.whole}, indent=2) + "\n")
+        path.write_text(
+            json.dumps({"modes": self.modes, "policies": self.policies, **self.whole}, indent=2)
+            + "\n"
+        )
+
+
+def _grid(title: str, columns: Mapping[str, Mapping[str, Value]]) -> Grid:
+    grid = Grid(title=title, title_justify="left")
+    grid.add_column("")
+    for name in columns:
+        grid.add_column(escape(name), justify="right")
+    rows = dict.fromkeys(key for numbers in columns.values() for key in numbers)
+    for key in rows:
+        values = [_text(numbers.get(key)) for numbers in columns.values()]
+        grid.add_row(escape(LABELS.get(key, _percentile_label(key))), *values)
+    return grid
 
 
 def write_report(
     output: Path,
     modes: Mapping[Pacing, Played],
+    policies: Mapping[str, Played],
     recorded: Mapping[Pacing, Sequence[RecordedEpisode]],
     *,
     film: bool,
@@ -86,9 +99,25 @@ def write_report(
         pacing.value: mode_numbers(pacing, played, recorded[pacing])
         for pacing, played in modes.items()
     }
-    report = Report(modes=numbers, whole={**drawn, "seconds": round(time.monotonic() - begin, 1)})
+    others = {name: policy_numbers(played) for name, played in policies.items()}
+    seconds = round(time.monotonic() - begin, 1)
+    report = Report(modes=numbers, policies=others, whole={**drawn, "seconds": seconds})
     report.write(output / "report.json")
     return report
+
+
+def policy_numbers(played: Played) -> dict[str, Value]:
+    """How well a policy played."""
+    episodes = len(played.episodes)
+    least, most = wilson(played.returns, episodes)
+    return {
+        "episodes": episodes,
+        "touched": played.touches,
+        "returned": played.returns,
+        "returned_at_least": round(least, 3),
+        "returned_at_most": round(most, 3),
+        "mean_reward": round(float(np.mean([each.reward for each in played.episodes])), 4),
+    }
 
 
 def mode_numbers(
