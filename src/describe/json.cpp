@@ -133,6 +133,10 @@ void write_type(JsonWriter& json, const Schema& schema, std::uint32_t index) {
   json.value(type.name.view());
   json.key("size");
   json.value(std::int64_t{type.size});
+  if (type.blends != 0) {
+    json.key("blends");
+    json.value(true);
+  }
   json.key("fields");
   json.open('[');
   for (std::uint32_t i = 0; i < type.fields; ++i) {

@@ -1,12 +1,11 @@
 #include "robot/replay.hpp"
 
 #include <algorithm>
-#include <cstring>
 #include <string_view>
 #include <utility>
 
-#include "control/record.hpp"
 #include "o80/base/error.hpp"
+#include "runtime/recorded_entry_check.hpp"
 
 namespace o80 {
 
@@ -17,20 +16,6 @@ BackendOptions replaying(BackendOptions options) {
   options.resume = true;  // halts come from the recording
   options.journal = 0;
   return options;
-}
-
-[[noreturn]] void refuse(const JournalEntry& entry, const std::string& why) {
-  throw InvalidArgument("entry " + std::to_string(entry.number) + " of the journal " + why);
-}
-
-/// Throws if these are not the blocks of a whole batch.
-void check_blocks(const JournalEntry& entry) {
-  BatchRecord batch;
-  if (entry.blocks.size() < kBlockBytes) refuse(entry, "lacks the blocks of its batch");
-  std::memcpy(&batch, entry.blocks.data(), sizeof batch);
-  const bool is_whole = batch.kind == RecordKind::batch &&
-                        std::uint64_t{batch.blocks} * kBlockBytes == entry.blocks.size();
-  if (!is_whole) refuse(entry, "holds a damaged batch");
 }
 
 /// Throws if this robot may be hardware. The recording may describe another robot than this one.
@@ -62,18 +47,7 @@ void Replay::load_snapshot(std::uint32_t slot, std::span<const std::byte> bytes)
 }
 
 void Replay::add(const JournalEntry& entry) {
-  const bool is_batch = entry.kind == JournalKind::taken || entry.kind == JournalKind::rejected;
-  const bool is_of_lane =
-      is_batch || entry.kind == JournalKind::died || entry.kind == JournalKind::silent;
-  if (is_of_lane && entry.lane >= lanes_) {
-    refuse(entry, "is of lane " + std::to_string(entry.lane) + ", but the robot has " +
-                      std::to_string(lanes_) + " lanes: give the option lanes of the recorded run");
-  }
-  if (is_batch) check_blocks(entry);
-  const auto actuators = loop_.backend().schema().actuators.size();
-  if (entry.kind == JournalKind::interrupted && entry.actuator >= actuators) {
-    refuse(entry, "interrupts an actuator that the robot does not have");
-  }
+  check_recorded(entry, loop_.backend().schema(), lanes_);
   recorded_.add(entry);
 }
 

@@ -321,7 +321,7 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
   }
   history.publish(current, row());
   // before a fresh start the robot may be away from its desired states
-  if (begun_ && !fresh && running.wanting_fresh_start() == nullptr) watch_errors();
+  if (begun_ && !fresh && !will_start_afresh()) watch_errors();
   tell_ended_requests(fresh);
 
   // report statuses, then wake waiting processes

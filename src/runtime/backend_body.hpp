@@ -131,6 +131,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
 
   // replay
   Step step_recorded() noexcept;
+  bool will_start_afresh() const noexcept;
   bool obey_recorded() noexcept;
   void obey(const JournalEntry& entry) noexcept;
   void take_recorded(const JournalEntry& entry) noexcept;

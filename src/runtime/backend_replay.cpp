@@ -23,18 +23,30 @@ Step UntypedBackend::Body::step_recorded() noexcept {
 bool UntypedBackend::Body::obey_recorded() noexcept {
   bool granted = false;
   while (const JournalEntry* entry = recorded_->next(current)) {
-    // this reading follows the step
-    if (entry->kind == JournalKind::interrupted && entry->iteration == current) break;
+    if (entry->kind == JournalKind::interrupted && entry->iteration == current) {
+      if (!entry->before_step || recorded_->has_driver()) break;  // its reading follows the step
+      interrupt(entry->actuator);
+      continue;
+    }
     if (entry->kind == JournalKind::burst) granted = true;
-    if (entry->kind == JournalKind::fresh_start && entry->iteration == current &&
-        running.wanting_fresh_start() != nullptr) {
-      start_afresh_after_request();  // confirms the entry
+    const bool is_fresh = entry->kind == JournalKind::fresh_start && entry->iteration == current;
+    if (is_fresh && !recorded_->has_driver()) {
+      start_afresh(entry->lane, 0);  // confirms the entry
+    } else if (is_fresh && running.wanting_fresh_start() != nullptr) {
+      start_afresh_after_request();
     } else {
       obey(recorded_->take());
     }
     if (stop.load(std::memory_order_relaxed)) break;
   }
   return granted;
+}
+
+/// True if a request that ran has ended and the next step begins with a fresh start.
+bool UntypedBackend::Body::will_start_afresh() const noexcept {
+  if (running.wanting_fresh_start() != nullptr) return true;
+  return recorded_ != nullptr && !recorded_->has_driver() &&
+         recorded_->begins_with_fresh_start(current + 1);
 }
 
 void UntypedBackend::Body::obey(const JournalEntry& entry) noexcept {

@@ -12,12 +12,15 @@ void UntypedBackend::Body::interrupt(std::uint32_t actuator) noexcept {
     recorded_->interrupt(current, static_cast<std::uint16_t>(actuator),
                          schema.actuators[actuator].name.view());
   }
-  journal.interrupted(actuator);
+  journal.interrupted(actuator, !under_way_);
   controller.interrupt(actuator, current);
 }
 
 Outcome UntypedBackend::Body::request(std::uint32_t lane, CommandId id, BlockIndex record,
                                       std::uint32_t index, Cursor payload) noexcept {
+  if (recorded_ != nullptr && !recorded_->has_driver()) {
+    return recorded_->made_fresh_start(current, lane, id) ? start_afresh(lane, id) : Outcome{};
+  }
   const std::size_t size = schema.types[schema.requests[index].type].size;
   payload.read(payload_.data(), size);
   if (server_ == nullptr) {

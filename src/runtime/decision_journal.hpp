@@ -104,7 +104,10 @@ class DecisionJournal {
   /// A snapshot of the driver; left out if it is larger than an entry may be.
   void kept(const KeptState& state) noexcept;
   bool is_on() const noexcept { return writer_.is_on(); }
-  void interrupted(std::uint32_t actuator) noexcept { note(JournalKind::interrupted, 0, actuator); }
+  /// `before_step`: before the desired states of this iteration were computed.
+  void interrupted(std::uint32_t actuator, bool before_step) noexcept {
+    note(JournalKind::interrupted, 0, actuator, before_step ? 1 : 0);
+  }
 
   // commanders; `owner`: their incarnation
   void control(JournalKind kind, std::uint32_t lane, std::uint64_t owner) noexcept {

@@ -218,6 +218,7 @@ void JournalDecoder::fill(JournalEntry& entry) {
       break;
     case JournalKind::interrupted:
       entry.actuator = static_cast<std::uint16_t>(head.id);
+      entry.before_step = head.what != 0;
       entry.lane = JournalEntry::kNoLane;
       break;
     case JournalKind::ended: {

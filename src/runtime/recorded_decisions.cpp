@@ -39,7 +39,24 @@ bool is_repeated(HaltCause cause) {
 }  // namespace
 
 void RecordedDecisions::add(const JournalEntry& entry) {
+  if (!has_driver()) note_requests(entry);
   if (is_obeyed(entry.kind)) entries_.push_back(entry);
+}
+
+/// Keeps the iterations in which requests were served.
+void RecordedDecisions::note_requests(const JournalEntry& entry) {
+  if (entry.kind == JournalKind::status) {
+    const auto sent = requests_.find({entry.lane, entry.id});
+    if (sent != requests_.end() && sent->second.iteration < 0)
+      sent->second.iteration = entry.iteration;
+  } else if (entry.kind == JournalKind::taken) {
+    CommandId next = 0;
+    for (auto record = entry.records.rbegin(); record != entry.records.rend(); ++record) {
+      if (record->kind != JournalRecord::Kind::request) continue;
+      requests_[{entry.lane, record->id}] = {.next = next};
+      next = record->id;
+    }
+  }
 }
 
 void RecordedDecisions::set_times(Iteration first, std::span<const std::int64_t> times) {
@@ -70,6 +87,37 @@ bool RecordedDecisions::confirms(JournalKind kind) {
   return true;
 }
 
+bool RecordedDecisions::made_fresh_start(Iteration iteration, std::uint32_t lane,
+                                         CommandId request) noexcept {
+  const auto found = requests_.find({lane, request});
+  const CommandId following = found == requests_.end() ? 0 : found->second.next;
+  if (found != requests_.end()) requests_.erase(found);
+  const JournalEntry* entry = next(iteration);
+  const bool is_due = entry != nullptr && entry->kind == JournalKind::fresh_start &&
+                      entry->iteration == iteration && entry->lane == lane;
+  if (!is_due) return false;
+  // a fresh start increases the iteration: with several requests in the batch, it is of the last
+  // one that was served in this iteration
+  const auto after = requests_.find({lane, following});
+  return after == requests_.end() || after->second.iteration != iteration;
+}
+
+bool RecordedDecisions::begins_with_fresh_start(Iteration iteration) const noexcept {
+  for (const JournalEntry& entry : entries_) {
+    if (entry.iteration > iteration) return false;
+    if (entry.kind == JournalKind::fresh_start) return true;
+    if (entry.kind == JournalKind::taken || entry.kind == JournalKind::rejected) return false;
+  }
+  return false;
+}
+
+std::optional<std::uint16_t> RecordedDecisions::interrupt_due(Iteration iteration) const noexcept {
+  const JournalEntry* entry = next(iteration);
+  const bool is_due = entry != nullptr && entry->kind == JournalKind::interrupted &&
+                      entry->iteration == iteration;
+  return is_due ? std::optional(entry->actuator) : std::nullopt;
+}
+
 void RecordedDecisions::fresh_start(Iteration iteration) {
   if (!confirms(JournalKind::fresh_start)) note(iteration, "fresh start", "no", "yes");
 }
@@ -94,7 +142,8 @@ void RecordedDecisions::compare_halt(const JournalEntry& halt) {
   const auto same = [&](const AskedHalt& asked) {
     return asked.cause == halt.cause && asked.text == halt.text;
   };
-  if (is_repeated(halt.cause) && std::ranges::none_of(asked_, same)) {
+  const bool repeats = is_repeated(halt.cause) && (has_driver() || halt.cause != HaltCause::driver);
+  if (repeats && std::ranges::none_of(asked_, same)) {
     note(halt.iteration, "halt", halt_text(halt.cause, halt.text),
          asked_.empty() ? "none" : halt_text(asked_[0].cause, asked_[0].text));
   }

@@ -2,10 +2,12 @@
 
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "o80/base/time.hpp"
@@ -24,11 +26,19 @@ struct DecisionMismatch {
 
 /// The decisions and row times of a recorded run. A backend that replays it obeys them instead of
 /// its lanes, watchdog and clock. What the driver decides again (halts, interrupts, fresh starts)
-/// is compared with them. See ARCHITECTURE.md, Replay.
+/// is compared with them; without a driver it is obeyed too. See ARCHITECTURE.md, Replay.
 ///
 /// Writer: the thread of the replay.
 class RecordedDecisions {
  public:
+  /// Where the decisions of the driver come from.
+  enum class Driver : std::uint8_t {
+    runs,     // it runs, and decides again: compared with the recording
+    recorded  // there is none: the recorded decisions are obeyed
+  };
+  explicit RecordedDecisions(Driver driver = Driver::runs) : driver_(driver) {}
+  bool has_driver() const noexcept { return driver_ == Driver::runs; }
+
   // the recording
   /// Adds the next entry of the journal. Entries that follow from others are left out.
   void add(const JournalEntry& entry);
@@ -42,6 +52,17 @@ class RecordedDecisions {
   JournalEntry take();
   /// True if the next decision is of this kind; takes it.
   bool confirms(JournalKind kind);
+
+  // without a driver
+  /// The answer of the recorded driver to a request, as far as desired states depend on it: whether
+  /// it made a fresh start.
+  bool made_fresh_start(Iteration iteration, std::uint32_t lane, CommandId request) noexcept;
+  /// True if the robot makes a fresh start before the batches of this iteration: a request that ran
+  /// has ended.
+  bool begins_with_fresh_start(Iteration iteration) const noexcept;
+  /// The next actuator that was interrupted after the step of this iteration. `interrupt` removes
+  /// it.
+  std::optional<std::uint16_t> interrupt_due(Iteration iteration) const noexcept;
 
   // the driver of the replay
   void fresh_start(Iteration iteration);
@@ -63,8 +84,17 @@ class RecordedDecisions {
     HaltCause cause;
     std::string text;
   };
+  /// A request of a batch, and the next one of the same batch.
+  struct Sent {
+    Iteration iteration = -1;  // of its first status
+    CommandId next = 0;        // 0: none
+  };
+  using RequestKey = std::pair<std::uint32_t, CommandId>;  // lane, id
   void note(Iteration iteration, std::string decision, std::string recorded, std::string replayed);
+  void note_requests(const JournalEntry& entry);
 
+  Driver driver_;
+  std::map<RequestKey, Sent> requests_;  // without a driver: those that are not served yet
   std::deque<JournalEntry> entries_;
   Iteration first_time_ = 0;
   std::vector<std::int64_t> times_;

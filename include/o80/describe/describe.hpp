@@ -110,6 +110,7 @@ std::uint32_t type_of(Schema& schema) {
   row.alignment = alignof(T);
   row.first_field = static_cast<std::uint32_t>(schema.fields.size());
   row.fields = static_cast<std::uint32_t>(members.size());
+  row.blends = Blending<T> ? 1 : 0;
   if constexpr (DescribedStruct<T>) add_defaults<T>(schema, row, members);
   schema.fields.insert(schema.fields.end(), members.begin(), members.end());
   schema.types.push_back(row);

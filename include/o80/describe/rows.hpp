@@ -101,7 +101,7 @@ struct TypeRow {
   std::uint32_t first_field = 0;
   std::uint32_t fields = 0;
   std::uint32_t first_default = kNoType;  // offset of the default values in Schema::defaults
-  std::uint32_t reserved = 0;
+  std::uint32_t blends = 0;  // 1: interpolates in C++, by code that only the driver has
   bool operator==(const TypeRow&) const = default;
 };
 

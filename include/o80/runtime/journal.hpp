@@ -77,6 +77,7 @@ struct JournalEntry {
   bool cut = false;
   std::string text;                            // of a halt, and of the end of a failed backend
   std::uint16_t actuator = 0;                  // interrupted
+  bool before_step = false;                    // interrupted before the step of the iteration
   BackendState state = BackendState::running;  // ended
   // snapshot: what the driver keeps in a slot
   std::uint32_t slot = 0;

@@ -13,6 +13,7 @@
 
 #include "o80/robot/make_table.hpp"
 #include "robot/puppet.hpp"
+#include "runtime/driverless_replay.hpp"
 
 namespace o80::test {
 namespace {
@@ -238,6 +239,7 @@ class RandomCommanders {
 struct Recorded {
   Rows rows;
   RowLayout layout;
+  Schema schema;
   std::vector<JournalEntry> entries;
   bool bursting = false;
 
@@ -245,6 +247,7 @@ struct Recorded {
     const UntypedFrontend reader("rig", {.access = Access::read_only, .dead = true});
     rows = reader.history(0, reader.published());
     layout = reader.layout();
+    schema = reader.schema();
     Journal journal(reader);
     for (JournalEntry entry; journal.next(entry);) {
       EXPECT_EQ(entry.missed, 0U);
@@ -341,6 +344,36 @@ Verdict replayed(const Recorded& recorded, double bent = 0) {
   return verdict;
 }
 
+/// The first row whose desired states a backend without the driver does not repeat, or -1.
+Verdict replayed_without_driver(const Recorded& recorded, std::size_t part = 100) {
+  BackendOptions options = options_of(recorded.bursting);
+  options.segment = "replay";
+  DriverlessReplay replay(recorded.schema, options);
+  for (const JournalEntry& entry : recorded.entries) replay.add(entry);
+  Verdict verdict;
+  for (std::size_t begin = 0; begin < recorded.rows.count;) {
+    // no part ends with a fresh start
+    std::size_t end = std::min(begin + part, recorded.rows.count);
+    while (end < recorded.rows.count && recorded.head(end - 1).fresh != 0) ++end;
+    std::vector<std::byte> rows;
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto row = recorded.rows.row(i);
+      rows.insert(rows.end(), row.begin(), row.end());
+    }
+    EXPECT_TRUE(replay.run(rows)) << replay.fault();
+    const UntypedFrontend reader("replay", {.access = Access::read_only, .dead = true});
+    const Rows found = reader.history(static_cast<Iteration>(begin), reader.published());
+    for (std::size_t i = begin; i < end && verdict.row < 0; ++i) {
+      if (i - begin >= found.count ||
+          comparable(recorded, found.row(i - begin)) != comparable(recorded, recorded.rows.row(i)))
+        verdict.row = static_cast<Iteration>(i);
+    }
+    begin = end;
+  }
+  verdict.mismatch = replay.mismatch();
+  return verdict;
+}
+
 std::string text_of(const std::optional<DecisionMismatch>& mismatch) {
   if (!mismatch) return "";
   return std::to_string(mismatch->iteration) + " " + mismatch->decision + ": " +
@@ -366,6 +399,29 @@ TEST_P(ReplayTest, ARunInRealTimeRepeatsBitForBit) {
   EXPECT_EQ(verdict.row, -1);
   EXPECT_EQ(text_of(verdict.mismatch), "");
   EXPECT_GT(recorded.count(JournalKind::taken), 0);
+}
+
+TEST_P(ReplayTest, BurstsRepeatWithoutTheDriver) {
+  const Recorded recorded = record_bursts(GetParam(), 500);
+  const Verdict verdict = replayed_without_driver(recorded);
+  EXPECT_EQ(verdict.row, -1);
+  EXPECT_EQ(text_of(verdict.mismatch), "");
+  EXPECT_GT(recorded.count(JournalKind::interrupted), 0);
+}
+
+TEST_P(ReplayTest, ARunInRealTimeRepeatsWithoutTheDriver) {
+  const Recorded recorded = record_in_real_time(GetParam(), 3000);
+  const Verdict verdict = replayed_without_driver(recorded);
+  EXPECT_EQ(verdict.row, -1);
+  EXPECT_EQ(text_of(verdict.mismatch), "");
+}
+
+TEST_P(ReplayTest, AChangedDesiredStateIsFoundWithoutTheDriver) {
+  Recorded recorded = record_bursts(GetParam(), 100);
+  std::size_t row = recorded.rows.count / 2;
+  while (recorded.head(row).fresh != 0) ++row;
+  recorded.rows.bytes[row * recorded.rows.row(0).size() + recorded.layout.desired] ^= std::byte{1};
+  EXPECT_EQ(replayed_without_driver(recorded).row, static_cast<Iteration>(row));
 }
 
 TEST_P(ReplayTest, AChangedDriverIsFoundInTheFirstIterationInWhichTheChangeActs) {
