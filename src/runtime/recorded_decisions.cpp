@@ -113,8 +113,8 @@ bool RecordedDecisions::begins_with_fresh_start(Iteration iteration) const noexc
 
 std::optional<std::uint16_t> RecordedDecisions::interrupt_due(Iteration iteration) const noexcept {
   const JournalEntry* entry = next(iteration);
-  const bool is_due = entry != nullptr && entry->kind == JournalKind::interrupted &&
-                      entry->iteration == iteration;
+  const bool is_due =
+      entry != nullptr && entry->kind == JournalKind::interrupted && entry->iteration == iteration;
   return is_due ? std::optional(entry->actuator) : std::nullopt;
 }
 

@@ -40,6 +40,14 @@ def replay(
             help="Begin at the first reset or restored snapshot in this iteration or later."
         ),
     ] = None,
+    without_driver: Annotated[
+        bool,
+        typer.Option(
+            "--without-driver",
+            help="Start no robot: compare the desired states that follow from the recorded "
+            "readings, as for hardware.",
+        ),
+    ] = False,
     ignore: Annotated[
         str, typer.Option(help="Columns to leave out, for example extended,observed.elbow")
     ] = "",
@@ -65,6 +73,7 @@ def replay(
         robot=_robot(robot),
         options=_options(option),
         since=since,
+        driver=not without_driver,
         ignore=tuple(name for name in ignore.split(",") if name),
         tolerances=_tolerances(tolerance) if tolerance or exact else None,
         progress=_show if sys.stderr.isatty() else None,

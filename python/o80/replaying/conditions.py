@@ -22,6 +22,20 @@ def reads_the_world(schema: dict[str, Any]) -> str:
     return ""
 
 
+def blended_columns(schema: dict[str, Any]) -> list[str]:
+    """Desired states that code of the driver interpolates."""
+    return [
+        f"desired.{actuator['name']}"
+        for actuator in schema["actuators"]
+        if _blends(schema["groups"][actuator["group"]]["type"])
+    ]
+
+
+def _blends(described: dict[str, Any]) -> bool:
+    nested = (field["type"] for field in described["fields"] if field["kind"] == "struct")
+    return described.get("blends", False) or any(map(_blends, nested))
+
+
 def changes(recorded: Provenance, now: Provenance) -> list[str]:
     """What else than the run may be the cause of a difference, in words."""
     found = []

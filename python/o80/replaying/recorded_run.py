@@ -36,6 +36,10 @@ class RecordedRun(Protocol):
     def schema(self) -> dict[str, Any]: ...
 
     @property
+    def description(self) -> _core.Description:
+        """The same, as the compiled library reads it."""
+
+    @property
     def provenance(self) -> Provenance: ...
 
     @property
@@ -72,6 +76,10 @@ class LiveRun:
     def schema(self) -> dict[str, Any]:
         schema: dict[str, Any] = self.frontend._layout.schema
         return schema
+
+    @property
+    def description(self) -> _core.Description:
+        return self.frontend._description
 
     @property
     def provenance(self) -> Provenance:
@@ -117,6 +125,10 @@ class FileRun:
     @property
     def schema(self) -> dict[str, Any]:
         return self.epoch.schema
+
+    @property
+    def description(self) -> _core.Description:
+        return self.epoch.description
 
     @property
     def provenance(self) -> Provenance:

@@ -9,24 +9,28 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from o80 import _core, robots
 from o80.columns import columns_of
 from o80.difference import Difference, first_difference
 from o80.errors import DriverError, InvalidArgument
 from o80.frontend import Frontend
-from o80.loop_options import text_of
-from o80.replaying.conditions import TOLERANCE, changes, other_arithmetic, reads_the_world
+from o80.replaying.conditions import (
+    TOLERANCE,
+    blended_columns,
+    changes,
+    other_arithmetic,
+    reads_the_world,
+)
 from o80.replaying.entry_feed import EntryFeed
 from o80.replaying.recorded_run import ROWS_AT_ONCE, LiveRun, RecordedRun, runs_in
 from o80.replaying.report import ReplayReport, RunReport
+from o80.replaying.runner import Runner, with_driver, without_driver
 from o80.replaying.same_bytes import same_bytes
-from o80.replaying.start import Requests, SlotsKept, Start, find_start, times_from
-from o80.replaying.trust import library_of, options_of
+from o80.replaying.start import Requests, SlotsKept, Start, find_fresh_start, find_start
 
 if TYPE_CHECKING:
     from o80.history import History
@@ -35,8 +39,6 @@ if TYPE_CHECKING:
 Progress = Callable[[str, int, int], None]
 OtherRobot = str | os.PathLike[str] | Mapping[str, str | os.PathLike[str]] | None
 
-# of the run options, those that decide what a backend does; the others are of its process
-_OF_BACKEND = ("lanes", "lane_blocks")
 _HISTORY = 4 * ROWS_AT_ONCE  # rows that the replay keeps: those of a block, and fresh starts
 
 
@@ -49,6 +51,7 @@ def replay(
     tolerances: Mapping[str, float] | None = None,
     ignore: tuple[str, ...] = (),
     since: int | None = None,
+    driver: bool = True,
     progress: Progress | None = None,
 ) -> ReplayReport:
     """Repeats recorded runs with the same robots and options, and compares every row bit for bit.
@@ -65,10 +68,14 @@ def replay(
         {}: bit for bit.
     since: begin at the first reset or restored snapshot in this iteration or later. None: at row 0,
         or at the first of these that the recording holds.
+    driver: False starts no robot, as for hardware.
     progress: called with the name of a run, its rows compared, and all its rows.
 
     Only simulations are started: robots that serve the requests snapshot and restore and do not say
-    that they read the world. No hardware is touched.
+    that they read the world. Of all others, and with driver=False, only the backend runs: it reads
+    the recorded observed and extended values, obeys the recorded halts, interrupts and fresh starts
+    of the driver too, and its desired states are compared. No hardware is touched. Notes in the
+    report say so.
 
     Raises InvalidArgument, RecordingError, DriverError.
     """
@@ -79,6 +86,7 @@ def replay(
         tolerances=tolerances,
         ignore=ignore,
         since=since,
+        driver=driver,
         progress=progress,
     )
 
@@ -91,12 +99,15 @@ def replay_runs(
     tolerances: Mapping[str, float] | None = None,
     ignore: tuple[str, ...] = (),
     since: int | None = None,
+    driver: bool = True,
     progress: Progress | None = None,
 ) -> ReplayReport:
     """As `replay`, for runs from anywhere."""
     return ReplayReport(
         tuple(
-            _RunReplay(run, robot, options or {}, tolerances, ignore, since, progress).report()
+            _RunReplay(
+                run, robot, options or {}, tolerances, ignore, since, driver, progress
+            ).report()
             for run in runs
         )
     )
@@ -127,11 +138,13 @@ class _RunReplay:
         tolerances: Mapping[str, float] | None,
         ignore: tuple[str, ...],
         since: int | None,
+        driver: bool,
         progress: Progress | None,
     ) -> None:
         self._run, self._robot, self._options = run, robot, options
         self._tolerances, self._ignore, self._progress = tolerances, ignore, progress
         self._since = since
+        self._no_driver = reads_the_world(run.schema) if driver else "it was asked for"
         self._start = Start()
         self._rows = 0
         self._times = [0, 0]  # of the first and the last row compared [ns]
@@ -153,34 +166,29 @@ class _RunReplay:
         )
 
     def _compare(self) -> Difference | None:
-        self._gap = reads_the_world(self._run.schema)
-        if self._gap:
-            return None
         start = self._found_start()
         if start is None:
             return None
         self._start = start
         if start.row > 0:
             self._notes.append(f"the replay begins with the {start.request} of row {start.row}")
-        slots = SlotsKept(Requests(self._run.schema), start)
-        feed = EntryFeed(self._run.entries(), start, slots)
+        # without a driver, a restored snapshot is read as any other row
+        known = Start() if self._no_driver else start
+        feed = EntryFeed(self._run.entries(), start, SlotsKept(Requests(self._run.schema), known))
         blocks = self._whole(self._run.blocks())
         first = next(blocks, None)
         if first is None:
             return None
-        with self._started() as native:
-            if start.row > 0:
-                native.begin_at(start.row)
-                for slot, state in start.snapshots.items():
-                    native.load_snapshot(slot, state)
+        with self._started() as runner:
+            runner.begin_at(start)
             for block in self._chain(first, blocks):
-                native.add(feed.read(int(block.iteration[-1])))
+                runner.native.add(feed.read(int(block.iteration[-1])))
                 if int(block.iteration[-1]) > feed.until:
                     block = block.select(until=feed.until)
                     self._gap = feed.gap
                 if not len(block) or int(block.iteration[0]) > feed.until:
                     return None
-                difference = self._compare_block(native, block)
+                difference = self._compare_block(runner, block)
                 if difference is not None or self._gap:
                     return difference
         return None
@@ -195,18 +203,23 @@ class _RunReplay:
             entry = next(iter(self._run.entries()), None)
             if entry is None or not entry.missed:
                 return Start()
-        found = find_start(self._run, max(first, self._since or 0))
+        find = find_fresh_start if self._no_driver else find_start
+        found = find(self._run, max(first, self._since or 0))
         if found is None and first == 0 and self._since is None:
             return Start()  # says what the journal lacks
         if found is None and self._since is not None:
-            self._gap = f"no reset and no restored snapshot is recorded from row {self._since} on"
+            self._gap = f"no {self._beginnings(' and no ')} is recorded from row {self._since} on"
         elif found is None:
             self._gap = (
-                f"the first recorded row is row {first}: a replay begins at row 0, at a reset, or "
-                f"at a restored snapshot, and none is recorded. Record from the start of the "
-                f"robot, or with --whole"
+                f"the first recorded row is row {first}: a replay begins at row 0, at a "
+                f"{self._beginnings(', or at a ')}, and none is recorded. Record from the start of "
+                f"the robot, or with --whole"
             )
         return found
+
+    def _beginnings(self, between: str) -> str:
+        begins = ["reset", "resume"] if self._no_driver else ["reset", "restored snapshot"]
+        return between.join(begins)
 
     @staticmethod
     def _chain(first: History, others: Iterator[History]) -> Iterator[History]:
@@ -242,40 +255,27 @@ class _RunReplay:
 
     # ------------------------------------------------------------------ the robot
 
-    @contextmanager
-    def _started(self) -> Iterator[_core.Replay]:
-        provenance = self._run.provenance
-        robot = robots.load(self._chosen_robot() or library_of(self._run))
-        library = robot._library
-        given = {name: text_of(value) for name, value in self._options.items()}
-        own = options_of(self._run, robot, given)
-        recorded = provenance.run_options
-        loop = {name: recorded[name] for name in _OF_BACKEND if name in recorded}
-        schema = self._run.schema
-        loop |= {"bursting": text_of(schema["bursting"]), "stale": schema["stale"]}
-        loop |= {"silence": text_of(schema["silence"])} if schema["silence"] else {}
-        loop["history"] = str(_HISTORY)
-        name = _core.unused_segment_name(library.name)
-        try:
-            native = _core.Replay(library, name, [*loop.items()], [*own.items()], schema["period"])
-            try:
-                yield native
-            finally:
-                native.close()
-        finally:
-            _core.clean(name)
+    def _started(self) -> AbstractContextManager[Runner]:
+        if not self._no_driver:
+            return with_driver(self._run, self._robot, self._options, _HISTORY)
+        self._notes.append(
+            f"compared: desired states, from the recorded readings; not repeated: readings of the "
+            f"world. No driver was started: {self._no_driver}"
+        )
+        if self._robot or self._options:
+            self._notes.append("the robot and the options that were given are not used")
+        if blended := blended_columns(self._run.schema):
+            self._ignore = (*self._ignore, *blended)
+            self._notes.append(
+                f"not compared, because code of the driver interpolates them: {', '.join(blended)}"
+            )
+        return without_driver(self._run, _HISTORY)
 
-    def _chosen_robot(self) -> str | os.PathLike[str] | None:
-        """What the user gives instead of the recorded robot."""
-        if isinstance(self._robot, Mapping):
-            return self._robot.get(self._run.schema["robot"])
-        return self._robot
-
-    def _compare_block(self, native: _core.Replay, block: History) -> Difference | None:
+    def _compare_block(self, runner: Runner, block: History) -> Difference | None:
         first, last = int(block.iteration[0]), int(block.iteration[-1])
-        times = times_from(block.time, self._start, first, self._run.schema["period"])
+        native = runner.native
         try:
-            runs = native.run(times)
+            runs = runner.run(block, self._start)
         except DriverError as error:
             return Difference(first, "driver", ("started", str(error)))
         with Frontend(native.segment, read_only=True, dead=True, timeout=5) as frontend:
@@ -287,14 +287,15 @@ class _RunReplay:
         if decided is not None and (found is None or decided[0] < found.iteration):
             found = Difference(decided[0], decided[1], (decided[2], decided[3]))
         if found is None and not runs:
-            found = Difference(native.next, "driver", ("went on", native.fault or "ended"))
+            found = Difference(native.next, runner.who, ("went on", native.fault or "ended"))
         self._count(block if found is None else block.select(until=found.iteration - 1))
         return found
 
     def _note_changes(self, frontend: Frontend) -> None:
         """Says what has changed since the run, and adds a tolerance where bits need not agree."""
         recorded, now = self._run.provenance, frontend.provenance
-        self._notes += changes(recorded, now)
+        if not self._no_driver:
+            self._notes += changes(recorded, now)
         why = other_arithmetic(recorded, now, self._run.machine)
         if not why:
             return

@@ -89,6 +89,27 @@ def find_start(run: RecordedRun, since: int) -> Start | None:
     return None
 
 
+def find_fresh_start(run: RecordedRun, since: int) -> Start | None:
+    """For a replay without a driver: the first fresh start at row `since` or later, or None.
+
+    It drops all queues, and its row has the state of the robot. The batch that caused it must hold
+    nothing else, because what follows in the batch acts after the fresh start.
+    """
+    begun = {
+        int(row)
+        for block in run.blocks()
+        for row in block.iteration[(block.rows["fresh"] != 0) & (block.rows["halted"] == 0)]
+    }
+    taken = (-1, -1, 0)  # iteration, lane and length of the last batch
+    for entry in run.entries():
+        if entry.kind == "taken":
+            taken = (entry.iteration, entry.lane, len(entry.records))
+        elif entry.kind == "fresh_start" and entry.iteration in begun and entry.iteration >= since:
+            if taken[:2] != (entry.iteration, entry.lane) or taken[2] == 1:
+                return Start(entry.iteration, entry.number, "fresh start")
+    return None
+
+
 def _restores(snapshots: dict[int, bytes]) -> list[tuple[str, int]]:
     return [("restore", slot) for slot in snapshots]
 

@@ -51,7 +51,7 @@ def library_of(run: RecordedRun) -> Path:
     raise DriverError(
         f"segment '{run.segment}' is of robot {name!r}{ran}. No robot of this name is found here. "
         f"A recording may name any library, so it is not loaded: if you trust a library, give "
-        f"--robot FILE.so, in Python robot="
+        f"--robot FILE.so, in Python robot=. Or compare only desired states, with --without-driver"
     )
 
 

@@ -1,0 +1,99 @@
+"""What runs a replay: the recorded robot, or its backend alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from o80 import _core, robots
+from o80.loop_options import text_of
+from o80.replaying.start import Start, times_from
+from o80.replaying.trust import library_of, options_of
+
+if TYPE_CHECKING:
+    from o80.history import History
+    from o80.replaying.recorded_run import RecordedRun
+    from o80.replaying.replay import OtherRobot
+
+# of the run options, those that decide what a backend does; the others are of its process
+_OF_BACKEND = ("lanes", "lane_blocks")
+
+
+@dataclass(frozen=True)
+class Runner:
+    """A replay that was started. Its rows are in a segment of its own."""
+
+    native: _core.Replay | _core.DriverlessReplay
+    who: str  #: what may fail: "driver" or "backend"
+    period: int  #: [ns]
+
+    def begin_at(self, start: Start) -> None:
+        """Begins at this row."""
+        if start.row == 0:
+            return
+        self.native.begin_at(start.row)
+        if isinstance(self.native, _core.Replay):
+            for slot, state in start.snapshots.items():
+                self.native.load_snapshot(slot, state)
+
+    def run(self, block: History, start: Start) -> bool:
+        """Runs one iteration for each row; False if the robot or its backend has ended."""
+        if isinstance(self.native, _core.Replay):
+            first = int(block.iteration[0])
+            return self.native.run(times_from(block.time, start, first, self.period))
+        return self.native.run(np.ascontiguousarray(block.rows).tobytes())
+
+
+@contextmanager
+def with_driver(
+    run: RecordedRun, robot: OtherRobot, options: Mapping[str, Any], history: int
+) -> Iterator[Runner]:
+    """The recorded robot, or another one, with the recorded options.
+
+    history: rows that the replay keeps. Raises DriverError, InvalidArgument.
+    """
+    chosen = robot.get(run.schema["robot"]) if isinstance(robot, Mapping) else robot
+    loaded = robots.load(chosen or library_of(run))
+    own = options_of(run, loaded, {name: text_of(value) for name, value in options.items()})
+    name = _core.unused_segment_name(loaded.name)
+    period = run.schema["period"]
+    try:
+        native = _core.Replay(
+            loaded._library, name, _loop_options(run, history), [*own.items()], period
+        )
+        try:
+            yield Runner(native, "driver", period)
+        finally:
+            native.close()
+    finally:
+        _core.clean(name)
+
+
+@contextmanager
+def without_driver(run: RecordedRun, history: int) -> Iterator[Runner]:
+    """A backend of the recorded description, which reads what was recorded.
+
+    history: rows that the replay keeps. Raises InvalidArgument.
+    """
+    name = _core.unused_segment_name("replay")
+    period = run.schema["period"]
+    try:
+        native = _core.DriverlessReplay(run.description, name, _loop_options(run, history), period)
+        try:
+            yield Runner(native, "backend", period)
+        finally:
+            native.close()
+    finally:
+        _core.clean(name)
+
+
+def _loop_options(run: RecordedRun, history: int) -> list[tuple[str, str]]:
+    recorded, schema = run.provenance.run_options, run.schema
+    loop = {name: recorded[name] for name in _OF_BACKEND if name in recorded}
+    loop |= {"bursting": text_of(schema["bursting"]), "stale": schema["stale"]}
+    loop |= {"silence": text_of(schema["silence"])} if schema["silence"] else {}
+    return [*loop.items(), ("history", str(history))]

@@ -1,0 +1,238 @@
+"""A robot of the world is replayed without its driver: its desired states repeat bit for bit."""
+
+import os
+import random
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from test_replay import Flipped, o80_replay
+
+import o80
+from o80.replaying.recorded_run import runs_in
+from o80.replaying.replay import replay_runs
+
+WAIT = 30.0  # [s] longer than any wait should take
+JOINT = {"position": float, "velocity": float}
+NAMES = ("shoulder", "elbow", "wrist")
+
+
+class World:
+    """A program with an embedded backend, whose robot does what nobody can predict."""
+
+    def __init__(self, segment: str, seed: int) -> None:
+        self.random = random.Random(seed)
+        limit = o80.Limits(minimum=-3.0, maximum=3.0, speed=400.0, acceleration=50000.0)
+        self.backend = o80.Backend(
+            segment,
+            NAMES,
+            JOINT,
+            extended={"force": float},
+            requests={"home": None, "jump": None, "look": None, "wait": None},
+            limits={"shoulder": {"position": limit}, "elbow": {"position": o80.Limits(error=2.5)}},
+            rests_at={name: {"velocity": 0.0} for name in NAMES},
+            when_idle={"wrist": "follow"},
+            history=200_000,
+            journal=64,
+            stale="purge",
+        )
+        self.place = np.zeros((3, 2))
+        self.backend.on("home", lambda _: o80.Running("on the way"))
+        self.backend.on("jump", self.jump)
+        self.backend.on("look", self.look)
+        self.backend.on("wait", lambda _: None)
+
+    def jump(self, _: Any) -> o80.StartAfresh:
+        self.place[:, 0] = [self.random.uniform(-1, 1) for _ in NAMES]
+        desired = None
+        if self.random.random() < 0.3:  # it knows better than its sensors
+            desired = self.states(self.place + 0.125)
+        return o80.StartAfresh(self.states(self.place), desired=desired)
+
+    def look(self, _: Any) -> None:
+        if self.random.random() < 0.5:
+            raise o80.RequestRejected("it is dark")
+
+    def states(self, numbers: Any) -> Any:
+        states = np.zeros(3, [("position", float), ("velocity", float)])
+        states["position"], states["velocity"] = numbers[:, 0], numbers[:, 1]
+        return states
+
+    def publish(self) -> None:
+        force = {"force": self.random.gauss(0, 1)}
+        self.backend.publish(self.states(self.place), force)
+
+    def run(self) -> None:
+        self.publish()
+        chance = self.random.random
+        while (desired := self.backend.step()) is not None:
+            noise = [[self.random.gauss(0, 0.01), self.random.gauss(0, 1)] for _ in NAMES]
+            self.place[:, 0] += 0.5 * (np.asarray(desired["position"]) - self.place[:, 0])
+            self.place += noise
+            if chance() < 0.002:
+                self.backend.interrupt(self.random.choice(NAMES))
+            if chance() < 0.001:
+                self.backend.halt(f"slipped {self.random.randrange(3)}")
+            if chance() < 0.001:
+                self.place[1, 0] += 3.0  # a collision: beyond the error limit
+            if self.backend.running("home") and chance() < 0.05:
+                fresh = o80.StartAfresh(self.states(self.place)) if chance() < 0.5 else None
+                self.backend.end_request("home", fresh)
+            self.publish()
+            if chance() < 0.002:
+                self.backend.interrupt(self.random.choice(NAMES))  # before the next step
+
+    @contextmanager
+    def running(self) -> Iterator[None]:
+        thread = threading.Thread(target=self.run)
+        thread.start()
+        try:
+            yield
+        finally:
+            self.backend.stop()
+            thread.join()
+
+
+def act(arm: o80.Frontend, choose: random.Random) -> None:
+    """What random programs send."""
+    for _ in range(choose.randrange(3)):
+        actuators = choose.choice([["shoulder"], ["elbow"], ["wrist"], ["shoulder", "elbow"]])
+        arm.add_command(
+            actuators if len(actuators) > 1 else actuators[0],
+            [{"position": choose.uniform(-1.5, 1.5)} for _ in actuators]
+            if len(actuators) > 1
+            else {"position": choose.uniform(-1.5, 1.5)},
+            iterations=choose.randrange(2, 60),
+            mode=choose.choice(["queue", "overwrite"]),
+            start=choose.choice(["desired", "observed"]),
+            profile=choose.choice(["linear", "minimum_jerk"]),
+        )
+    if choose.random() < 0.3:
+        for request in choose.sample(["home", "jump", "look", "wait"], choose.randrange(1, 3)):
+            arm.add_request(request)
+    if choose.random() < 0.1:
+        arm.add_purge(choose.choice(NAMES))
+    later = choose.random() < 0.2
+    arm.pulse(at=arm.published + choose.randrange(30) if later else None)
+
+
+def drive(arm: o80.Frontend, seed: int, actions: int = 100) -> None:
+    choose = random.Random(seed)
+    for _ in range(actions):
+        if arm.halted:
+            with suppress(o80.BackendHalted):  # another halt came meanwhile
+                arm.resume(timeout=WAIT)
+        act(arm, choose)
+        if choose.random() < 0.03:
+            arm.halt("now and then")
+        arm.wait_for(arm.published + choose.randrange(1, 30), timeout=WAIT)
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run of a robot of the world."""
+    path = tmp_path_factory.mktemp("run") / "run.mcap"
+    segment = f"test-{os.getpid()}-world"
+    world = World(segment, 3)
+    with (
+        world.backend,
+        world.running(),
+        o80.Frontend(segment) as arm,
+        o80.Recording(path, arm, whole=True),
+    ):
+        drive(arm, 3)
+    o80.clean(segment)
+    return path
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_desired_states_of_a_robot_of_the_world_repeat(segment: str, seed: int) -> None:
+    world = World(segment, seed)
+    with world.backend:
+        with world.running(), o80.Frontend(segment) as arm:
+            drive(arm, seed)
+            kinds = {(entry.kind, entry.cause) for entry in arm.journal()}
+        with o80.Frontend(segment, read_only=True, dead=True) as arm:
+            (run,) = o80.replay(arm)
+    assert run.identical, run
+    assert run.rows > 200
+    assert {kind for kind, _ in kinds} >= {"taken", "fresh_start", "halt", "interrupted", "resume"}
+    (note,) = (note for note in run.notes if "compared" in note)
+    assert "compared: desired states" in note
+    assert "not repeated: readings of the world" in note
+
+
+def test_a_changed_desired_state_is_found_at_its_row_and_field(recorded: Path) -> None:
+    (run,) = runs_in(o80.open(recorded))
+    fresh = np.concatenate([block.rows["fresh"] for block in run.blocks()])
+    choose = random.Random(1)
+    size = 16  # of a state [bytes]
+    for _ in range(6):
+        row = choose.choice(np.flatnonzero(fresh == 0).tolist())
+        actuator = choose.randrange(2)
+        byte = run.schema["row"]["desired"] + size * actuator + choose.randrange(8)
+        flipped = Flipped(run, row, byte, 1 << choose.randrange(8))
+        (report,) = replay_runs([flipped])
+        assert report.difference is not None
+        found = (report.difference.iteration, report.difference.field)
+        assert found == (row, f"desired.{NAMES[actuator]}.position")
+
+
+def test_a_changed_decision_is_found(recorded: Path) -> None:
+    """A recording whose rows show motion that its journal does not explain."""
+    (run,) = runs_in(o80.open(recorded))
+
+    class Silent(Flipped):
+        def entries(self) -> Iterator[Any]:
+            return (entry for entry in self.run.entries() if entry.kind == "status")
+
+    (report,) = replay_runs([Silent(run, 0, 0, 0)])
+    assert report.difference is not None or "the journal lacks" in report.gap
+
+
+def test_it_begins_at_a_fresh_start(recorded: Path) -> None:
+    (run,) = runs_in(o80.open(recorded))
+    report = o80.replay(recorded, since=run.rows // 2)
+    (found,) = report
+    assert report.identical, report
+    assert 0 < found.rows < run.rows
+    assert any("begins with the fresh start" in note for note in found.notes)
+
+
+def test_the_command_says_what_was_compared(recorded: Path) -> None:
+    done = o80_replay(str(recorded))
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "compared: desired states" in done.stdout
+    assert "does not serve the requests of a simulation" in done.stdout
+
+
+def test_any_recording_can_be_replayed_without_its_robot(segment: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with o80.robots.load("two_joints").inline(segment) as arm, o80.Recording(path, arm):
+        arm.add_command("elbow", 0.5, iterations=20)
+        arm.burst(30)
+        arm.request("reset", seed=3)
+        arm.add_command("elbow", 0.5, iterations=20)
+        arm.burst(30)
+    done = o80_replay(str(path), "--without-driver")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "it was asked for" in done.stdout
+
+
+def test_rows_of_another_robot_are_refused(recorded: Path) -> None:
+    from o80 import _core
+
+    (run,) = runs_in(o80.open(recorded))
+    name = _core.unused_segment_name("replay")
+    replay = _core.DriverlessReplay(run.description, name, [], 1_000_000)
+    with pytest.raises(o80.InvalidArgument, match="another size"):
+        replay.run(b"short")
+    block = next(run.blocks())
+    with pytest.raises(o80.InvalidArgument, match="not consecutive"):
+        replay.run(block.rows[1:3].tobytes())
+    replay.close()
+    o80.clean(name)
