@@ -104,8 +104,9 @@ def find_fresh_start(run: RecordedRun, since: int) -> Start | None:
     for entry in run.entries():
         if entry.kind == "taken":
             taken = (entry.iteration, entry.lane, len(entry.records))
-        elif entry.kind == "fresh_start" and entry.iteration in begun and entry.iteration >= since:
-            if taken[:2] != (entry.iteration, entry.lane) or taken[2] == 1:
+        elif entry.kind == "fresh_start" and entry.iteration in begun:
+            is_alone = taken[:2] != (entry.iteration, entry.lane) or taken[2] == 1
+            if is_alone and entry.iteration >= since:
                 return Start(entry.iteration, entry.number, "fresh start")
     return None
 
