@@ -23,8 +23,8 @@ from .report.rendering import Scene
 from .rig.group_rig import GroupRig
 from .settings import RigSettings, TaskSettings
 from .task.actions import changed_pressures
-from .task.box import ObservationBox
 from .task.end import End, terminated, undecided
+from .task.observer import Observer
 from .task.state import State
 from .world.arm import MUSCLES
 from .world.timing import ITERATIONS
@@ -56,10 +56,11 @@ class TableTennisCopies(Task):
         self._task = settings.made()
         refuse_wrong_balls(rig, settings, plays_ball=self._task.plays_ball)
         self._fly_out, self._passed_y = settings.fly_out, settings.end.passed_y
-        self._box = ObservationBox(self._task)
+        rig = settings.start_of(rig)
+        self._observer = Observer(self._task, settings.observing(rig.step), copies)
         super().__init__(
             copies,
-            observation_space=self._box.space,
+            observation_space=self._observer.space,
             action_space=spaces.Box(-1.0, 1.0, (MUSCLES,), np.float32),
         )
         self._factor, self._repeat = settings.factor, settings.repeat
@@ -81,6 +82,8 @@ class TableTennisCopies(Task):
             np.zeros((copies, *np.shape(self._task.begin(np.random.default_rng(0))))),
         )
         self._scene: Scene | None = None
+        self._observations = np.zeros((copies, self._observer.size), np.float32)
+        self._unobserved = False
 
     def begin(
         self,
@@ -105,6 +108,9 @@ class TableTennisCopies(Task):
         self._state.goal[copies] = [draw.goal for draw in draws]
         self._ends[copies] = End.RUNNING
         self._look()
+        state, asked = self._state.at(copies), self._asked[copies]
+        self._observations[copies] = self._observer.begin(state, asked, generators, copies)
+        self._unobserved = False
 
     def step(self, actions: Any, copies: Index) -> None:
         """`repeat` times five iterations of these arms and of their twins."""
@@ -120,6 +126,7 @@ class TableTennisCopies(Task):
             touched[copies] = np.asarray(self._state.record.touched)[copies]
             if touched.any():
                 self._fly(np.flatnonzero(touched))
+        self._unobserved = True
 
     def _fly(self, touched: Numbers) -> None:
         """The touched balls of these copies fly to their ends, unless they are there."""
@@ -149,8 +156,12 @@ class TableTennisCopies(Task):
         return Outcome(self._task.reward(state), by_event, ~by_event & (ends != End.RUNNING))
 
     def observe(self, copies: Index) -> Any:
-        """(n, M)"""
-        return self._box.clip(self._task.observe(self._of(copies)))
+        """(n, M); those that have been stepped are observed once, when first asked for."""
+        if self._unobserved:
+            state, asked = self._of(copies), self._asked[copies]
+            self._observations[copies] = self._observer.observe(state, asked, copies)
+            self._unobserved = False
+        return self._observations[copies]
 
     def info(self, copies: Index) -> Mapping[str, Any]:
         """As that of the single environment."""

@@ -34,8 +34,8 @@ from .rig.rig import Rig
 from .rig.virtual_balls import VirtualBalls
 from .settings import RigSettings, TaskSettings
 from .task.actions import changed_pressures
-from .task.box import ObservationBox
 from .task.end import End, undecided
+from .task.observer import Observer
 from .task.state import State
 from .world.arm import MUSCLES
 from .world.timing import ITERATIONS
@@ -82,15 +82,17 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
     ) -> None:
         refuse_wrong_arguments(rig, task, render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode
-        self._settings, self._rig_settings = task or TaskSettings(), rig or RigSettings()
+        self._settings = task or TaskSettings()
+        self._rig_settings = self._settings.start_of(rig or RigSettings())
         self._task = self._settings.made()
         refuse_wrong_balls(self._rig_settings, self._settings, plays_ball=self._task.plays_ball)
         settings = self._settings
         self._balls = balls_from(
             settings.balls, settings.ball_seed, self._rig_settings.period, settings.ball_count
         )
-        self._box = ObservationBox(self._task)
-        self.observation_space = self._box.space
+        observing = settings.observing(self._rig_settings.step)
+        self._observer = Observer(self._task, observing)
+        self.observation_space: spaces.Space[Float32Array] = self._observer.space
         self.action_space = spaces.Box(-1.0, 1.0, (MUSCLES,), np.float32)
 
         self._real_time = self._rig_settings.pacing.real_time
@@ -104,7 +106,7 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         self._rig = Rig(self._rig_settings)
         try:
             self._arm, self._twin = self._rig.arm, self._rig.twins[0]
-            self._virtual = VirtualBalls(self._rig.twins, self._rig_settings, self._task)
+            self._virtual = VirtualBalls(self._rig, self._task, observing)
             if render_mode is not None:
                 self._display = display_of(
                     self._rig, self._virtual, render_mode=render_mode, camera=camera
@@ -136,12 +138,13 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         self._steps, self._paid = 0, 0.0
         self._begun, self._over, self._summary = False, False, None
         self._episode += 1
-        self._virtual.begin(drawn.numbers[1:])
         arm, twin = self._arm, self._twin
         self._state = state = State(
             0, arm.last_motion, arm.pressures, arm.last_racket, twin.ball, twin.record, draw.goal
         )
-        observation = self._box.clip(self._task.observe(state))
+        observation = self._observer.begin(state, self._asked, [self.np_random])
+        self._virtual.begin(drawn.numbers[1:], state, self._asked, self.np_random)
+        self._observation = observation
         self._first_observation = observation.copy()
         return observation, self._info(state, End.RUNNING)
 
@@ -195,7 +198,8 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         if settings.fly_out and touched and undecided(self._task.end(state), touched):
             self._twin.fly_out(ITERATIONS * settings.repeat, settings.end.passed_y)
             state = self._look()
-        observation = self._box.clip(self._task.observe(state))
+        observation = self._observation = self._observer.observe(state, self._asked)
+        self._virtual.observe(state, self._asked)
         end, reward = End.RUNNING, 0.0
         if self._task.eventful(state):
             end, reward = End(int(self._task.end(state))), float(self._task.reward(state))
@@ -215,8 +219,7 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         """The arm has moved on too far for the twin to follow: the episode is given up."""
         self._counts.stalled_episodes += 1
         self._finish(End.STALLED)
-        observation = self._box.clip(self._task.observe(self._state))
-        return observation, 0.0, False, True, self._info(self._state, End.STALLED)
+        return self._observation.copy(), 0.0, False, True, self._info(self._state, End.STALLED)
 
     def _finish(self, end: End) -> None:
         """The episode is over: its summary, its mark in the recording."""

@@ -10,10 +10,13 @@ from numbers import Real
 
 from o80.checked import whole
 
-from .task.actions import FINE
+from .task.actions import FINE, largest_change
 from .task.ball_play import HitTask, ReturnTask, SmashTask
 from .task.end import EndRule
+from .task.full_observation import FullObservation, full_observation
+from .task.noise import NO_NOISE, NoiseSettings
 from .task.observations import ObservationBounds
+from .task.observer import Observing
 from .task.reach import ReachTask
 from .task.rewards import RewardRule, reward_rule
 from .task.task import Task, missing_members
@@ -119,8 +122,13 @@ class TaskSettings:
     """How often an action is carried out, for 10 ms each time, before the next observation."""
     delay: int = 1
     """Iterations the policy has to think, real time: an action acts from row k + 1 + delay."""
+    observation: str | FullObservation = "published"
+    """published (22 numbers), or full: with what was asked lately and a filtered ball, see
+    `task.full_observation`; the latter of the named tasks with a ball."""
+    noise: NoiseSettings = NO_NOISE
+    """Of what is observed; `NoiseSettings.tracker()` is that of a real camera system."""
     bounds: ObservationBounds = field(default_factory=ObservationBounds)
-    """Of the observation of the named tasks with a ball."""
+    """Of the published observation of the named tasks with a ball."""
     end: EndRule = field(default_factory=EndRule)
     """Of an episode of the named tasks."""
     reward: str | RewardRule = "ordered"
@@ -146,6 +154,10 @@ class TaskSettings:
                 f"within its step, got {self.delay}"
             )
         reward_rule(self.reward)
+        full_observation(self.observation)
+        noise: object = self.noise
+        if not isinstance(noise, NoiseSettings):
+            raise TypeError(f"noise must be NoiseSettings, got {noise!r}")
         task: object = self.task
         if isinstance(self.task, str):
             if self.task not in TASKS:
@@ -157,6 +169,22 @@ class TaskSettings:
                 f"task must be one of {', '.join(TASKS)}, or an object with the members of "
                 f"o80_table_tennis.task.task.Task; {self.task!r} has no {', '.join(missing)}"
             )
+        if self.observation != "published" and not self.made().plays_ball:
+            raise ValueError("this task plays no ball: observation must be published")
+
+    def observing(self, step: float) -> Observing:
+        """How an environment observes whose steps without repetition take `step` [s]."""
+        return Observing(
+            noise=self.noise,
+            full=full_observation(self.observation),
+            interval=self.repeat * step,
+            largest_change=self.repeat * largest_change(self.factor),
+        )
+
+    def start_of(self, rig: RigSettings) -> RigSettings:
+        """The rig, whose arm starts as the noise of this task says."""
+        posture = self.noise.start_posture
+        return replace(rig, start_noise=posture) if posture > 0 else rig
 
     def made(self) -> Task:
         """The task itself."""

@@ -19,6 +19,7 @@ from o80_table_tennis.players.policies import default_policy
 from o80_table_tennis.settings import Pacing, RigSettings, TaskSettings
 from o80_table_tennis.task.actions import COARSE
 from o80_table_tennis.task.end import EndRule
+from o80_table_tennis.task.noise import NoiseSettings
 from o80_table_tennis.task.observations import BALL_POSITION
 from o80_table_tennis.world.arm import MUSCLES
 
@@ -29,11 +30,15 @@ RIGS = {
     "identified": RigSettings(preset="identified"),
     "another frequency": RigSettings(frequency=250.0),
 }
+NOISY = NoiseSettings(0.005, 0.1, 0.1, latency=0.013, pressure=0.01, start_posture=0.02)
 TASKS = {
     "return": TaskSettings(factor=COARSE),
     "wide": TaskSettings(factor=0.3, balls="wide", ball_seed=4, reward="published"),
     "repeat": TaskSettings(factor=COARSE, repeat=3),
     "fly out": TaskSettings(factor=0.05, fly_out=True, repeat=2),
+    "noise": TaskSettings(factor=COARSE, noise=NOISY),
+    "full": TaskSettings(factor=COARSE, balls="wide", observation="full", noise=NOISY),
+    "full, repeat": TaskSettings(factor=COARSE, observation="full", repeat=2),
     "hit": TaskSettings(task="hit", factor=COARSE, end=SHORT, delay=0),
     "smash": TaskSettings(task="smash", delay=3, factor=COARSE),
     "reach": TaskSettings(task="reach", factor=0.2, end=SHORT),

@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..balls.sampled_flight import SampledFlight
-from ..settings import RigSettings
-from ..task.box import ObservationBox
 from ..task.end import End, terminated
+from ..task.observer import Observer, Observing
 from ..task.outcome import returned
 from ..task.state import State
 from ..task.task import Task
 from .ball_records import ball_records
-from .twin import Twin
+from .rig import Rig
 
 FloatArray = NDArray[np.float64]
 
@@ -24,24 +23,42 @@ FloatArray = NDArray[np.float64]
 class VirtualBalls:
     """All extra balls, in the order of the twins that hold them."""
 
-    def __init__(self, twins: Sequence[Twin], rig: RigSettings, task: Task) -> None:
-        self._twins, self._rig, self._task = twins, rig, task
-        self._box = ObservationBox(task)
-        self._count = rig.extra_balls
+    def __init__(self, rig: Rig, task: Task, observing: Observing) -> None:
+        self._twins, self._rig, self._task = rig.twins, rig.settings, task
+        self._count = rig.settings.extra_balls
+        self._observer = Observer(task, observing, count=self._count) if self._count else None
         # the first twin holds the ball that is played; a twin without extra balls mirrors it
         self._extra = [
-            slice(twin.balls - rig.extra_balls_of(number), twin.balls)
-            for number, twin in enumerate(twins)
+            slice(twin.balls - self._rig.extra_balls_of(number), twin.balls)
+            for number, twin in enumerate(self._twins)
         ]
-        self.begin()
 
-    def begin(self, numbers: Sequence[int] = ()) -> None:
-        """A new episode with these balls."""
+    def begin(
+        self,
+        numbers: Sequence[int],
+        played: State,
+        asked: FloatArray,
+        generator: np.random.Generator,
+    ) -> None:
+        """A new episode with these balls; `played` is the state of the played one."""
+        if self._observer is None:
+            return
         self._numbers = np.array(numbers, dtype=np.int64)
         self._ended = np.zeros(self._count, np.bool_)
         self._truncated = np.zeros(self._count, np.bool_)
         self._touched = np.zeros(self._count, np.bool_)
         self._returned = np.zeros(self._count, np.bool_)
+        self._observations = self._observer.begin(
+            self._state(played),
+            self._shared(asked),
+            [generator] * self._count,
+            np.arange(self._count),
+        )
+
+    def observe(self, played: State, asked: FloatArray) -> None:
+        """Observes all extra balls, once after each step."""
+        if self._observer is not None:
+            self._observations = self._observer.observe(self._state(played), self._shared(asked))
 
     def share(self, flights: Sequence[SampledFlight]) -> list[list[SampledFlight]]:
         """The flights of each twin's balls, of all flights, the played one first."""
@@ -66,7 +83,7 @@ class VirtualBalls:
         self._touched |= ~self._ended & state.record.touched
         self._returned |= ~self._ended & returned(state.record)
         return {
-            "observations": self._box.clip(self._task.observe(state)),
+            "observations": self._observations.copy(),
             "rewards": self._judge(state, over=over),
             "touched": self._touched.copy(),
             "returned": self._returned.copy(),
@@ -88,18 +105,19 @@ class VirtualBalls:
         pairs = zip(self._twins, self._extra, strict=True)
         records = np.concatenate([twin.all_records[extra] for twin, extra in pairs])
 
-        def shared(array: FloatArray) -> FloatArray:
-            return np.broadcast_to(array, (self._count, *array.shape))
-
         return State(
             np.full(self._count, played.steps),
-            shared(played.motion),
-            shared(played.pressures),
-            shared(played.racket),
+            self._shared(played.motion),
+            self._shared(played.pressures),
+            self._shared(played.racket),
             np.concatenate(self._balls()),
             ball_records(records),
-            shared(played.goal),
+            self._shared(played.goal),
         )
+
+    def _shared(self, array: FloatArray) -> FloatArray:
+        """The same for every extra ball, (N, ...)."""
+        return np.broadcast_to(array, (self._count, *array.shape))
 
     def _judge(self, state: State, *, over: bool) -> FloatArray:
         """The rewards (N,) that are paid now."""

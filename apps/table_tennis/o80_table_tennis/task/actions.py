@@ -25,6 +25,11 @@ _ZEROS, _ONES = np.zeros(MUSCLES), np.ones(MUSCLES)
 _MINUS_ONES = -_ONES
 
 
+def largest_change(factor: float) -> float:
+    """Of a normalised pressure, by one action."""
+    return 0.5 * math.tanh(0.5 * factor)
+
+
 def changed_pressures(
     pressures: FloatArray, action: NDArray[np.floating[Any]], *, factor: float = FINE
 ) -> FloatArray:

@@ -2,11 +2,26 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from .task import Task
+
+class Bounded(Protocol):
+    """What has bounds: a task, or another observation."""
+
+    @property
+    def low(self) -> NDArray[np.float32]:
+        """(M,)"""
+        ...
+
+    @property
+    def high(self) -> NDArray[np.float32]:
+        """(M,)"""
+        ...
+
 
 Float32Array = NDArray[np.float32]
 FloatArray = NDArray[np.float64]
@@ -15,7 +30,7 @@ FloatArray = NDArray[np.float64]
 class ObservationBox:
     """Holds the observations of a task within their bounds."""
 
-    def __init__(self, task: Task) -> None:
+    def __init__(self, task: Bounded) -> None:
         self.space = spaces.Box(task.low, task.high, task.low.shape, np.float32)
         # compared as 64-bit floats, so that clipping converts only once
         self._low, self._high = task.low.astype(np.float64), task.high.astype(np.float64)

@@ -51,6 +51,10 @@ class State:
         """(...) how far the ball is from the arm, towards the opponent [m]."""
         return self.ball.item(1) if self.ball.ndim == 1 else self.ball[:, 1]
 
+    def perceived(self, ball: FloatArray, pressures: FloatArray) -> State:
+        """The same as it is observed: another ball (..., 6), other pressures (..., 8)."""
+        return State(self.steps, self.motion, pressures, self.racket, ball, self.record, self.goal)
+
     def at(self, index: Any) -> State:
         """Some of N episodes, by an index or a mask (N,)."""
         return State(

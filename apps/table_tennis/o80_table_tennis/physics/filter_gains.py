@@ -1,0 +1,113 @@
+"""The gains of the ball filter: how much each measurement changes the estimate.
+
+They are those of an extended Kalman filter along a typical shot. What a spin does to a flight
+depends on its velocity, and the velocities of all shots are alike, so that the gains do not depend
+on the shot: they are computed once, before the first ball flies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..world.table import TABLE
+from ..world.timing import STEP
+from .tracked_ball import NUMBERS, Ball, Maths, advanced, rebounded, rebounded_within
+
+FloatArray = NDArray[np.float64]
+
+TYPICAL: Ball = (0.46, 2.95, 1.37, 0.24, -4.14, 2.28, 30.0)
+"""Launch of the recorded ball gun, with less spin."""
+STEPS_AFTER = 40
+"""Measurements after the bounce for which there are gains of their own; then the last ones go on.
+"""
+
+_ALONG_X = ((0, 0), (0, 3), (3, 0), (3, 3))
+_ALONG_YZ = tuple((row, column) for row in (1, 2, 4, 5, 6) for column in (1, 2, 4, 5))
+PLACES = _ALONG_X + _ALONG_YZ
+"""Row in the estimate (7) and column in the measurement (6) of each gain; the others are 0: what is
+seen across the table says nothing about the flight along it."""
+
+
+@dataclass(frozen=True)
+class FilterSettings:
+    """What the filter expects of the measurements and of the ball: standard deviations."""
+
+    step: float = STEP
+    """From one measurement to the next [s]."""
+    position: float = 0.005
+    """Of a measured position [m]."""
+    velocity: float = 0.1
+    """Of a measured velocity [m/s]."""
+    spin: float = 45.0
+    """Of the spin of a shot before it is seen [rad/s]."""
+    mean_spin: float = 20.0
+    """[rad/s]"""
+    force: float = 0.3
+    """Of an acceleration that no law explains, in each step [m/s^2]."""
+    bounce_velocity: float = 0.1
+    """Of the law of the bounce [m/s]."""
+    bounce_spin: float = 10.0
+    """[rad/s]"""
+
+
+@dataclass(frozen=True, eq=False)
+class Gains:
+    """One row for each measurement since the ball was first seen, or since its bounce."""
+
+    before: FloatArray
+    """(steps, 24), in the order of `PLACES`"""
+    after: FloatArray
+    """(STEPS_AFTER, 24)"""
+
+
+@cache
+def gains(settings: FilterSettings) -> Gains:
+    """The gains for these settings."""
+    s = settings
+    measured = np.diag([s.position**2] * 3 + [s.velocity**2] * 3)
+    moved = np.zeros((7, 7))
+    for axis in range(3):
+        move = np.array([s.step**2 / 2, s.step])
+        moved[np.ix_([axis, axis + 3], [axis, axis + 3])] = s.force**2 * np.outer(move, move)
+    moved[6, 6] = 1.0
+    bounce = np.diag([1e-6] * 3 + [s.bounce_velocity**2] * 3 + [s.bounce_spin**2])
+
+    ball, covariance = TYPICAL, np.diag([*np.diag(measured), s.spin**2])
+    before, bounced = [_gain(covariance, measured)], False
+    after: list[FloatArray] = []
+    while len(after) < STEPS_AFTER:
+        slope = _slopes(lambda ball, maths: advanced(ball, s.step, maths), ball)
+        ball, covariance = advanced(ball, s.step, NUMBERS), slope @ covariance @ slope.T + moved
+        if not bounced and ball[2] < TABLE.bounce_height:
+            bounced = True
+            slope = _slopes(rebounded, ball)
+            ball = rebounded_within(s.step, ball, NUMBERS)
+            covariance = slope @ covariance @ slope.T + bounce
+        gain = _gain(covariance, measured)
+        covariance = (np.eye(7) - gain @ np.eye(6, 7)) @ covariance
+        (after if bounced else before).append(gain)
+    return Gains(_table(before), _table(after))
+
+
+def _gain(covariance: FloatArray, measured: FloatArray) -> FloatArray:
+    """(7, 6) of an estimate and a measurement with these covariances."""
+    gain: FloatArray = covariance[:, :6] @ np.linalg.inv(covariance[:6, :6] + measured)
+    return gain
+
+
+def _slopes(move: Callable[[Ball, Maths], Ball], ball: Ball) -> FloatArray:
+    """(7, 7) change of a moved ball with the ball."""
+    start, small = np.array(move(ball, NUMBERS)), 1e-5
+    changed = [move(tuple(ball + small * unit), NUMBERS) for unit in np.eye(7)]
+    slopes: FloatArray = (np.array(changed) - start).T / small
+    return slopes
+
+
+def _table(rows: Sequence[FloatArray]) -> FloatArray:
+    """(rows, 24), in the order of `PLACES`."""
+    return np.array([[row[place] for place in PLACES] for row in rows])

@@ -1,0 +1,113 @@
+"""The observation `full`: all that decides what happens next, also with dead time and noise.
+
+Beside the arm and the pressures it holds what was asked for lately, which has not acted yet, and an
+estimate of the ball with its spin and with where it will go through the plane of the racket. All
+numbers are scaled to about -1 to 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..world.arm import MUSCLES
+
+Float32Array = NDArray[np.float32]
+FloatArray = NDArray[np.float64]
+
+
+class Part(NamedTuple):
+    """Some numbers of the observation: (number - centre) / scale, within plus or minus `bound`."""
+
+    name: str
+    centres: tuple[float, ...]
+    scale: tuple[float, ...]
+    bound: float
+
+
+@dataclass(frozen=True)
+class FullObservation:
+    """What `full` holds, and how it is scaled: `parts` names everything in its order."""
+
+    changes: int = 4
+    """How many of the last changes of the asked pressures it holds: in steps of 10 ms they cover
+    the longest dead time of the real arm, 40 ms."""
+    plane: float = 0.3
+    """The ball's crossing of y = this is predicted [m]; the racket reaches 0.7 m."""
+    joint_position: float = 1.75
+    """[rad]"""
+    joint_velocity: float = 10.0
+    """[rad/s]"""
+    ball_velocity: float = 5.0
+    """[m/s]"""
+    spin: float = 100.0
+    """[rad/s]"""
+
+    def parts(self) -> Iterator[Part]:
+        """All numbers."""
+        velocity = (self.ball_velocity,) * 3
+        yield _alike("joint_positions", 4, self.joint_position, 1.0)
+        yield _alike("joint_velocities", 4, self.joint_velocity, 4.0)
+        yield Part("pressures", (0.5,) * MUSCLES, (0.5,) * MUSCLES, 1.5)
+        yield Part("asked", (0.5,) * MUSCLES, (0.5,) * MUSCLES, 1.0)
+        yield _alike("changes", self.changes * MUSCLES, 1.0, 1.0)
+        yield Part("racket", (0.3, 0.3, 1.1), (0.5,) * 3, 3.0)
+        yield Part("time", (0.5,), (0.5,), 20.0)
+        yield Part("ball_position", (0.4, 1.5, 1.0), (0.5, 1.5, 0.5), 6.0)
+        yield Part("ball_velocity", (0.0,) * 3, velocity, 4.0)
+        yield _alike("spin", 1, self.spin, 4.0)
+        yield Part("crossing_position", (0.4, 1.0), (0.4, 0.4), 5.0)
+        yield Part("crossing_velocity", (0.0,) * 3, velocity, 4.0)
+        yield Part("crossing_time", (0.4,), (0.4,), 4.0)
+
+    @property
+    def high(self) -> Float32Array:
+        """(M,) fresh; the least observation is minus this."""
+        bounds = [part.bound for part in self.parts() for _ in part.centres]
+        return np.array(bounds, dtype=np.float32)
+
+    @property
+    def centres(self) -> FloatArray:
+        """(M,) fresh"""
+        return np.array([centre for part in self.parts() for centre in part.centres])
+
+    @property
+    def scales(self) -> FloatArray:
+        """(M,) fresh"""
+        return np.array([scale for part in self.parts() for scale in part.scale])
+
+    def places(self) -> dict[str, slice]:
+        """Where in an observation each part lies, by its name."""
+        places, at = {}, 0
+        for part in self.parts():
+            places[part.name] = slice(at, at + len(part.centres))
+            at += len(part.centres)
+        return places
+
+
+OBSERVATIONS: Mapping[str, FullObservation | None] = {
+    "published": None,
+    "full": FullObservation(),
+}
+"""By the names that settings take; None: what the task itself observes."""
+
+
+def full_observation(observation: str | FullObservation) -> FullObservation | None:
+    """The observation of a name, or the object itself. Raises ValueError or TypeError."""
+    if isinstance(observation, FullObservation):
+        return observation
+    names = ", ".join(OBSERVATIONS)
+    unknown: object = observation
+    if not isinstance(unknown, str):
+        raise TypeError(f"observation must be one of {names}, or a FullObservation: {unknown!r}")
+    if observation not in OBSERVATIONS:
+        raise ValueError(f"unknown observation '{observation}'; there are: {names}")
+    return OBSERVATIONS[observation]
+
+
+def _alike(name: str, count: int, scale: float, bound: float) -> Part:
+    return Part(name, (0.0,) * count, (scale,) * count, bound)

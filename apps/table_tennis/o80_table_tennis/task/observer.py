@@ -1,0 +1,128 @@
+"""From the state of an episode, or of N, to what the learner observes: noise, then the numbers.
+
+An environment makes one `Observer` from its settings. Noise and filters have a memory: `begin` is
+called for each new episode, `observe` exactly once after each step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from .box import Bounded, ObservationBox
+from .full_observation import FullObservation
+from .full_observer import ManyFullObserver, OneFullObserver
+from .noise import NO_NOISE, NoiseSettings
+from .perception import Perceived, Perception
+from .state import State
+from .task import Task
+
+Float32Array = NDArray[np.float32]
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+EVERY = slice(None)
+ONLY = np.zeros(1, np.int64)
+
+
+@dataclass(frozen=True)
+class Observing:
+    """How an environment observes."""
+
+    noise: NoiseSettings = NO_NOISE
+    full: FullObservation | None = None
+    """None: what the task itself observes."""
+    interval: float = 0.01
+    """From one observation to the next [s]."""
+    largest_change: float = 1.0
+    """Of an asked pressure in that time, normalised."""
+
+
+class Observer:
+    """The observations of one episode (`count` None: no leading dimension), or of N."""
+
+    def __init__(self, task: Task, observing: Observing, count: int | None = None) -> None:
+        self._task, self._count = task, count
+        noise, full = observing.noise, observing.full
+        self._perception = (
+            Perception(noise, observing.interval, count) if noise.of_observations else None
+        )
+        observed: Bounded = task if full is None else _Bounds(full)
+        self._box = ObservationBox(observed)
+        self.space: spaces.Space[Float32Array] = self._box.space
+        """Of the observation of one episode."""
+        self.size = int(observed.high.size)
+        """M, the numbers of an observation."""
+        self._full: OneFullObserver | ManyFullObserver | None = None
+        if full is not None:
+            interval, change = observing.interval, observing.largest_change
+            self._full = (
+                OneFullObserver(full, noise, interval, change)
+                if count is None
+                else ManyFullObserver(full, noise, interval, change, count)
+            )
+
+    def begin(
+        self,
+        state: State,
+        asked: FloatArray,
+        generators: Sequence[np.random.Generator],
+        which: IntArray = ONLY,
+    ) -> Float32Array:
+        """The first observations of new episodes: of the only one, or of those `which` (n,).
+
+        `state` and the `asked` pressures (..., 8) are theirs alone, as are the `generators`, of
+        which each is drawn from once if there is any noise.
+        """
+        seen = (
+            exactly(state)
+            if self._perception is None
+            else self._perception.begin(state, generators, which)
+        )
+        if self._full is None:
+            return self._of_task(state, seen)
+        return self._box.clip(self._full.begin(state, asked, seen, which))
+
+    def observe(
+        self, state: State, asked: FloatArray, which: IntArray | slice = EVERY
+    ) -> Float32Array:
+        """The observations after a step: of the only episode, or of those `which` (n,).
+
+        `state` and `asked` are theirs alone.
+        """
+        if self._perception is None and self._full is None:
+            return self._box.clip(self._task.observe(state))
+        seen = (
+            exactly(state) if self._perception is None else self._perception.perceive(state, which)
+        )
+        if self._full is None:
+            return self._of_task(state, seen)
+        return self._box.clip(self._full.observe(state, asked, seen, which))
+
+    def _of_task(self, state: State, seen: Perceived) -> Float32Array:
+        return self._box.clip(self._task.observe(state.perceived(seen.ball, seen.pressures)))
+
+
+@dataclass(frozen=True)
+class _Bounds:
+    """The box of `full`."""
+
+    full: FullObservation
+
+    @property
+    def low(self) -> Float32Array:
+        return -self.full.high
+
+    @property
+    def high(self) -> Float32Array:
+        return self.full.high
+
+
+def exactly(state: State) -> Perceived:
+    """What is observed without noise."""
+    missed = False if state.ball.ndim == 1 else np.zeros(len(state.ball), np.bool_)
+    return Perceived(state.ball, missed, state.pressures)

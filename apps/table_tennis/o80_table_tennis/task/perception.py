@@ -1,0 +1,152 @@
+"""The ball and the pressures as they are observed: noisy, late, now and then not seen.
+
+Each episode has a generator of its own for its noise, so that one environment and a copy among many
+observe the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..world.arm import MUSCLES
+from ..world.ball import GRAVITY
+from .noise import NoiseSettings
+from .state import State
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+BLOCK = 128
+"""Observations whose noise is drawn at once."""
+BALL = 6
+"""Numbers of a ball: position, velocity."""
+SEEDS = 2**63
+EVERY = slice(None)
+
+
+@dataclass(slots=True)
+class Perceived:
+    """What is observed of one episode, or of N."""
+
+    ball: FloatArray
+    """(..., 6) position [m] and velocity [m/s]; where the ball was not seen, the last ones"""
+    missed: Any
+    """(...) whether the ball was not seen"""
+    pressures: FloatArray
+    """(..., 8) normalised"""
+
+
+class Perception:
+    """The noise of N episodes (`count`), or of one (None).
+
+    `interval` is the time from one observation to the next [s].
+    """
+
+    def __init__(self, noise: NoiseSettings, interval: float, count: int | None) -> None:
+        copies, self._one = count or 1, count is None
+        self._noise, self._interval = noise, interval
+        self._sigmas = np.array(
+            [noise.ball_position] * 3 + [noise.ball_velocity] * 3 + [noise.pressure] * MUSCLES
+        )
+        self._generators: list[np.random.Generator] = [np.random.default_rng(0)] * copies
+        self._normal = np.zeros((copies, BLOCK, BALL + MUSCLES))
+        self._missed = np.zeros((copies, BLOCK), np.bool_)
+        self._at = np.zeros(copies, np.int64)
+        self._every = np.arange(copies)
+        self._last = np.zeros((copies, BALL))
+        self._delay = Delay(noise.latency, interval, copies)
+
+    def begin(
+        self, state: State, generators: Sequence[np.random.Generator], which: IntArray
+    ) -> Perceived:
+        """New episodes `which` (n,) in this state; each generator gives the seed of its noise."""
+        for copy, generator in zip(which.tolist(), generators, strict=True):
+            self._generators[copy] = np.random.default_rng(int(generator.integers(SEEDS)))
+            self._draw(copy)
+            self._missed[copy, 0] = False  # an episode begins with a ball that is seen
+        self._at[which] = 0
+        balls = state.ball.reshape(-1, BALL)
+        self._delay.begin(balls, which)
+        if self._one:
+            return self._look_at_one(state)
+        return self._look(state, balls if not self._delay else self._delay.delayed(which), which)
+
+    def perceive(self, state: State, which: IntArray | slice = EVERY) -> Perceived:
+        """The next observation of the episode, or of some of the N, which `state` holds."""
+        if self._delay:
+            self._delay.add(state.ball, which)
+        if self._one:
+            self._at[0] = next_row = (int(self._at[0]) + 1) % BLOCK
+            if next_row == 0:
+                self._draw(0)
+            return self._look_at_one(state)
+        chosen = self._every[which]
+        at = (self._at[chosen] + 1) % BLOCK
+        self._at[chosen] = at
+        for copy in chosen[at == 0].tolist():
+            self._draw(copy)
+        ball = self._delay.delayed(chosen) if self._delay else state.ball
+        return self._look(state, ball, chosen)
+
+    def _look(self, state: State, ball: FloatArray, which: IntArray) -> Perceived:
+        at = self._at[which]
+        noise, missed = self._normal[which, at], self._missed[which, at]
+        ball = np.where(missed[:, None], self._last[which], ball + noise[:, :BALL])
+        self._last[which] = ball
+        return Perceived(ball, missed, state.pressures + noise[:, BALL:])
+
+    def _look_at_one(self, state: State) -> Perceived:
+        at = int(self._at[0])
+        noise, missed = self._normal[0, at], bool(self._missed[0, at])
+        if not missed:
+            ball = self._delay.delayed(self._every)[0] if self._delay else state.ball
+            self._last[0] = ball + noise[:BALL]
+        return Perceived(self._last[0], missed, state.pressures + noise[BALL:])
+
+    def _draw(self, copy: int) -> None:
+        """The noise of the next observations of an episode."""
+        generator = self._generators[copy]
+        self._normal[copy] = generator.standard_normal((BLOCK, BALL + MUSCLES)) * self._sigmas
+        self._missed[copy] = generator.random(BLOCK) < self._noise.missed_frames
+
+
+class Delay:
+    """The balls of N episodes as they were some time ago; false where there is no latency."""
+
+    def __init__(self, latency: float, interval: float, copies: int) -> None:
+        self._late, self._share = int(latency / interval), latency / interval % 1.0
+        self._used, self._interval = latency > 0, interval
+        self._past = np.zeros((copies, self._late + 2, BALL))
+        """Of the last observations, the newest first."""
+
+    def __bool__(self) -> bool:
+        return self._used
+
+    def begin(self, balls: FloatArray, which: IntArray) -> None:
+        """New episodes with these balls (n, 6): before, they were on the way to where they are."""
+        ago = self._interval * np.arange(self._late + 2)[:, None]
+        states = np.repeat(balls[:, None], self._late + 2, axis=1)
+        states[..., :3] -= ago * states[..., 3:]
+        states[..., 2:3] -= 0.5 * GRAVITY * ago**2
+        states[..., 5:6] += GRAVITY * ago
+        self._past[which] = states
+
+    def add(self, balls: FloatArray, which: IntArray | slice) -> None:
+        """The next balls, (6,) or (n, 6)."""
+        self._past[which, 1:] = self._past[which, :-1].copy()
+        self._past[which, 0] = balls
+
+    def delayed(self, which: IntArray) -> FloatArray:
+        """(n, 6) between two observations by a cubic through positions and velocities."""
+        new, old = self._past[which, self._late], self._past[which, self._late + 1]
+        back, forth = self._share, 1.0 - self._share
+        rise = (new[:, :3] - old[:, :3]) / self._interval
+        bend = new[:, 3:] + old[:, 3:] - 2 * rise
+        lean = rise - old[:, 3:] - bend
+        way = forth * self._interval * (old[:, 3:] + forth * (lean + forth * bend))
+        return np.hstack([old[:, :3] + way, back * old[:, 3:] + forth * new[:, 3:]])

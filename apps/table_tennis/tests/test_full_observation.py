@@ -1,0 +1,205 @@
+"""The observation `full`: what it holds, and that one episode and many observe the same."""
+
+from contextlib import closing
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from numpy.typing import NDArray
+from opened_environment import opened
+
+from o80_table_tennis.balls.simulated_shots import SimulatedShots
+from o80_table_tennis.environment import TableTennisEnvironment
+from o80_table_tennis.settings import TaskSettings
+from o80_table_tennis.task.actions import COARSE
+from o80_table_tennis.task.ball_record import BallRecord
+from o80_table_tennis.task.full_observation import FullObservation
+from o80_table_tennis.task.noise import NoiseSettings
+from o80_table_tennis.task.observer import Observer
+from o80_table_tennis.task.state import State
+
+FloatArray = NDArray[np.float64]
+FULL = FullObservation()
+PLACES = FULL.places()
+NOISY = NoiseSettings(0.005, 0.1, missed_frames=0.1, latency=0.012, pressure=0.01)
+
+
+def part(observation: Any, name: str) -> Any:
+    """A part in its own unit."""
+    numbers = np.asarray(observation, np.float64) * FULL.scales + FULL.centres
+    return numbers[..., PLACES[name]]
+
+
+def full_task(**more: Any) -> TaskSettings:
+    return TaskSettings(balls="wide", observation="full", factor=COARSE, **more)
+
+
+def random_actions(count: int) -> NDArray[np.float32]:
+    return np.random.default_rng(4).uniform(-1, 1, (count, 8)).astype(np.float32)
+
+
+def test_it_holds_the_arm_the_pressures_and_what_was_asked() -> None:
+    actions = random_actions(12)
+    with closing(opened(task=full_task())) as environment:
+        observation, _ = environment.reset(seed=2)
+        assert observation.shape == (73,)
+        assert not part(observation, "changes").any()
+        asked = [part(observation, "asked")]
+        for action in actions:
+            observation, *_ = environment.step(action)
+            asked.append(part(observation, "asked"))
+        row = environment.rig.arm.frontend.latest()
+        arm = environment.rig.arm
+    positions = row.extended.joint_positions
+    np.testing.assert_allclose(part(observation, "joint_positions"), positions, atol=1e-6)
+    normalised = arm.range.normalised(np.array(row.observed))
+    np.testing.assert_allclose(part(observation, "pressures"), normalised, atol=1e-6)
+    np.testing.assert_allclose(part(observation, "racket"), arm.last_racket, atol=1e-6)
+    assert part(observation, "time") == pytest.approx(0.12)
+    # the newest change first; tanh is nearly straight, but for pressures at their limits
+    changes = part(observation, "changes").reshape(4, 8)
+    inside = np.diff(asked, axis=0)[::-1][:4]
+    np.testing.assert_allclose(changes, inside / (0.5 * np.tanh(0.5)), atol=1e-5)
+    free = np.all([(each > 0.01) & (each < 0.99) for each in asked[-5:]], axis=0)
+    assert free.any()
+    np.testing.assert_allclose(changes[:, free], actions[::-1][:4][:, free], atol=0.05)
+
+
+def test_the_ball_and_its_crossing_are_those_of_the_flight() -> None:
+    crossings, rows = [], []
+    with closing(opened(task=full_task())) as environment:
+        observation, _ = environment.reset(seed=7)
+        for _ in range(60):
+            observation, *_ = environment.step(np.zeros(8, np.float32))
+            true = environment.rig.twins[0].ball
+            np.testing.assert_allclose(part(observation, "ball_position"), true[:3], atol=0.002)
+            np.testing.assert_allclose(part(observation, "ball_velocity"), true[3:], atol=0.05)
+            time = float(part(observation, "time")[0] + part(observation, "crossing_time")[0])
+            crossings.append([*part(observation, "crossing_position"), time])
+            rows.append([*true])
+        while true[1] > FULL.plane:
+            environment.step(np.zeros(8, np.float32))
+            before, true = rows[-1], environment.rig.twins[0].ball
+            rows.append([*true])
+    share = (before[1] - FULL.plane) / (before[1] - true[1])
+    there = np.array(before[:3]) + share * (true[:3] - before[:3])
+    time = 0.01 * (len(rows) - 1 + share)
+    off = np.array(crossings)[10:] - [there[0], there[2], time]
+    assert (np.abs(off).max(axis=0) < [0.01, 0.02, 0.01]).all()
+
+
+def test_everything_is_scaled_to_about_one() -> None:
+    rows = []
+    with closing(opened(task=full_task(noise=NoiseSettings.tracker()))) as environment:
+        space = environment.observation_space
+        for seed in range(5):
+            observation, _ = environment.reset(seed=seed)
+            over, actions = False, iter(random_actions(300) * 0.3)
+            while not over:
+                rows.append(observation)
+                assert space.contains(observation)
+                observation, _, terminated, truncated, _ = environment.step(next(actions))
+                over = terminated or truncated
+    spread = np.abs(rows)
+    assert np.percentile(spread, 99, axis=0).max() < 3.0
+    assert np.mean(spread) < 1.0
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Random states of some episodes, and what was asked: arrays (copies, steps, ...)."""
+
+    motion: FloatArray
+    pressures: FloatArray
+    balls: FloatArray
+    asked: FloatArray
+
+    def state(self, step: int, which: Any) -> State:
+        """Of one copy, or of some."""
+        racket = self.motion[which, step][..., :3]
+        return State(
+            step if np.ndim(which) == 0 else np.full(len(which), step),
+            self.motion[which, step],
+            self.pressures[which, step],
+            racket,
+            self.balls[which, step],
+            BallRecord(1.0),
+            racket,
+        )
+
+
+def random_rows(copies: int, steps: int) -> Rows:
+    rng = np.random.default_rng(0)
+    shots = [SimulatedShots().launch(number).seen(period=0.01) for number in range(copies)]
+    balls = np.array([np.hstack([s.positions, s.velocities])[:steps] for s in shots])
+    shape = (copies, steps, 8)
+    return Rows(rng.normal(size=shape), rng.random(shape), balls, rng.random(shape))
+
+
+@pytest.mark.parametrize("noise", [NoiseSettings(), NOISY])
+@pytest.mark.parametrize("observation", ["published", "full"])
+def test_one_episode_and_many_observe_the_same_bits(observation: str, noise: NoiseSettings) -> None:
+    copies, steps, again = 5, 90, 40
+    rows = random_rows(copies, steps)
+    settings = TaskSettings(observation=observation, noise=noise, factor=COARSE)
+    every, some = np.arange(copies), np.array([0, 3])
+    many = Observer(settings.made(), settings.observing(0.01), copies)
+    rngs = [np.random.default_rng(copy) for copy in range(copies)]
+    found = [many.begin(rows.state(0, every), rows.asked[:, 0], rngs, every)]
+    for step in range(1, steps):
+        seen = many.observe(rows.state(step, every), rows.asked[:, step])
+        if step == again:
+            chosen = [rngs[0], rngs[3]]
+            seen[some] = many.begin(rows.state(step, some), rows.asked[some, step], chosen, some)
+        found.append(seen)
+
+    for copy in range(copies):
+        one = Observer(settings.made(), settings.observing(0.01))
+        rng = np.random.default_rng(copy)
+        for step in range(steps):
+            state, asked = rows.state(step, copy), rows.asked[copy, step]
+            if step == 0 or (step == again and copy in some):
+                observation_of_one = one.begin(state, asked, [rng])
+            else:
+                observation_of_one = one.observe(state, asked)
+            np.testing.assert_array_equal(observation_of_one, found[step][copy])
+
+
+def test_extra_balls_have_estimates_of_their_own() -> None:
+    task = full_task(noise=NoiseSettings.tracker())
+    with closing(opened(task=task, extra_balls=3, twins=2)) as environment:
+        _, info = environment.reset(seed=2)
+        assert info["virtual"]["observations"].shape == (3, 73)
+        for _ in range(40):
+            _, _, _, _, info = environment.step(np.zeros(8, np.float32))
+        true = np.concatenate([twin.all_balls for twin in environment.rig.twins])
+    seen = part(info["virtual"]["observations"], "ball_position")
+    # the played ball first, then the extra ones; the second twin has no played ball
+    np.testing.assert_allclose(np.sort(seen[:, 0]), np.sort(true[1:, 0]), atol=0.01)
+
+
+@pytest.mark.parametrize("task", ["return", "hit"])
+def test_gymnasium_accepts_it(task: str) -> None:
+    settings = TaskSettings(task=task, observation="full", noise=NOISY)
+    with closing(gymnasium.make("o80/TableTennis-v0", task=settings)) as environment:
+        check_env(environment.unwrapped, skip_render_check=True)
+
+
+def test_what_it_cannot_observe_is_refused() -> None:
+    with pytest.raises(ValueError, match="unknown observation 'ful'; there are: published, full"):
+        TaskSettings(observation="ful")
+    with pytest.raises(ValueError, match="this task plays no ball: observation must be published"):
+        TaskSettings(task="reach", observation="full")
+    with pytest.raises(TypeError, match="observation must be one of published, full"):
+        TaskSettings(observation=22)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match=r"noise must be NoiseSettings, got 0\.005"):
+        TaskSettings(noise=0.005)  # type: ignore[arg-type]
+
+
+def test_more_changes_make_a_longer_observation() -> None:
+    task = TaskSettings(observation=FullObservation(changes=6, plane=0.2))
+    with closing(TableTennisEnvironment(task=task)) as environment:
+        assert environment.reset(seed=1)[0].shape == (73 + 16,)
