@@ -16,11 +16,11 @@ from typer.testing import CliRunner
 import o80
 from o80_table_tennis import train
 from o80_table_tennis.learning import checkpoint, curve
-from o80_table_tennis.learning.environments import generators_of
+from o80_table_tennis.learning.environments import BALL_PARTS, generators_of
 from o80_table_tennis.learning.settings import WAYS, LearningSettings, PpoSettings
 from o80_table_tennis.learning.training import CURVE, POLICY, Training
 from o80_table_tennis.players.learned_policy import LearnedPolicy
-from o80_table_tennis.task.observations import BALL_NUMBERS
+from o80_table_tennis.task.full_observation import FullObservation
 
 SMALL = LearningSettings(
     ppo=PpoSettings(environments=2, steps=32, batch=32, epochs=2, hidden=8),
@@ -138,10 +138,15 @@ def test_a_blind_policy_does_not_see_the_ball(tmp_path: Path) -> None:
         environments = training.model.get_vec_normalize_env()
         assert environments is not None
         statistics: Any = environments.obs_rms
-        assert np.ptp(statistics.var[list(BALL_NUMBERS)]) == 0  # of numbers that are always 0
+    places = FullObservation().places()
     first = np.zeros(network.inputs, np.float32)
     second = first.copy()
-    second[list(BALL_NUMBERS)] = 1.0
+    for part in BALL_PARTS:
+        assert not statistics.mean[places[part]].any()  # always 0
+        second[places[part]] = 1.0
+    assert set(places) - set(BALL_PARTS) == {
+        *("joint_positions", "joint_velocities", "pressures", "asked", "changes", "racket", "time")
+    }
     assert network.act(first).tobytes() == network.act(second).tobytes()
 
 

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
+from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
-from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
+from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn, VecEnvWrapper
 
-from ..environment import TableTennisEnvironment
+import o80
+
+from ..entry_points import vector_environment
 from ..players.conditions import Conditions
-from ..task.observations import BALL_NUMBERS
+from ..task.full_observation import full_observation
 
 Float32Array = NDArray[np.float32]
 
@@ -21,11 +23,28 @@ HISTORY = 64
 """Rows that arms and twins keep: few, as nobody looks back."""
 
 
-def visible_numbers(size: int, *, blind: bool) -> Float32Array:
-    """(M,) 1 for the numbers of an observation that a policy sees; a blind one sees no ball."""
+BALL_PARTS = (
+    *("ball_position", "ball_velocity", "spin"),
+    *("crossing_position", "crossing_velocity", "crossing_time"),
+)
+"""Parts of the full observation that tell of the ball; the others tell of the arm and the time."""
+
+
+def visible_numbers(conditions: Conditions, size: int, *, blind: bool) -> Float32Array:
+    """(M,) 1 for the numbers of an observation that a policy sees; a blind one sees no ball.
+
+    Raises ValueError for a blind policy without a clock.
+    """
     visible = np.ones(size, np.float32)
     if blind:
-        visible[list(BALL_NUMBERS)] = 0.0
+        full = full_observation(conditions.observation)
+        if full is None:
+            raise ValueError(
+                "a blind policy needs the time, which the published observation does not hold: "
+                "give observation='full'"
+            )
+        for part in BALL_PARTS:
+            visible[full.places()[part]] = 0.0
     return visible
 
 
@@ -54,13 +73,18 @@ class Masked(VecEnvWrapper):
 
 def opened(conditions: Conditions, *, count: int, seed: int, ball_seed: int) -> VecEnv:
     """Environments that play the shots of `ball_seed`; copy i is seeded with seed + i."""
-    rig = replace(conditions.rig(), history=HISTORY)
-    make = partial(TableTennisEnvironment, rig=rig, task=conditions.task(ball_seed=ball_seed))
-    environments = DummyVecEnv([make] * count)
+    vector = vector_environment(
+        num_envs=count,
+        rig=replace(conditions.rig(), history=HISTORY),
+        task=conditions.task(ball_seed=ball_seed),
+        threads=1,
+        autoreset_mode=AutoresetMode.SAME_STEP,
+    )
+    environments: VecEnv = o80.learning.stable_baselines3(vector, infos="ends")
     environments.seed(seed)
     return environments
 
 
 def generators_of(environments: VecEnv) -> list[np.random.Generator]:
     """The random generators of the environments, from which every episode draws."""
-    return list(environments.get_attr("np_random"))
+    return list(environments.get_attr("np_random", 0)[0])

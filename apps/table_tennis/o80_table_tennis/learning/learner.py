@@ -22,7 +22,8 @@ def training_environments(settings: LearningSettings) -> VecNormalize:
         seed=settings.seed,
         ball_seed=settings.seed,
     )
-    visible = visible_numbers(_size(inner.observation_space), blind=settings.blind)
+    size = _size(inner.observation_space)
+    visible = visible_numbers(settings.conditions, size, blind=settings.blind)
     masked = Masked(inner, visible) if settings.blind else inner
     return VecNormalize(
         masked, norm_obs=True, norm_reward=False, clip_obs=CLIP, gamma=settings.ppo.discount
@@ -59,7 +60,7 @@ def learning_rate(settings: LearningSettings) -> Any:
     return lambda left: first * (last + (1.0 - last) * max(float(left), 0.0))
 
 
-def network_of(model: PPO, normalisation: VecNormalize, *, blind: bool) -> Network:
+def network_of(model: PPO, normalisation: VecNormalize, settings: LearningSettings) -> Network:
     """The deterministic policy."""
     statistics: Any = normalisation.obs_rms
     layers = [
@@ -69,7 +70,7 @@ def network_of(model: PPO, normalisation: VecNormalize, *, blind: bool) -> Netwo
     ]
     layers.append(model.policy.action_net)  # type: ignore[arg-type]
     return Network(
-        visible_numbers(len(statistics.mean), blind=blind),
+        visible_numbers(settings.conditions, len(statistics.mean), blind=settings.blind),
         np.asarray(statistics.mean, np.float32),
         np.asarray(1.0 / np.sqrt(statistics.var + normalisation.epsilon), np.float32),
         tuple(_array(layer.weight) for layer in layers),

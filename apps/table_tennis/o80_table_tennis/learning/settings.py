@@ -74,7 +74,14 @@ WAYS: Mapping[str, LearningSettings] = {
     "ours": LearningSettings(),
     "published": LearningSettings(
         conditions=Conditions(
-            preset="published_simulation", factor=0.05, repeat=1, reward="published"
+            preset="published_simulation",
+            factor=0.05,
+            repeat=1,
+            reward="published",
+            observation="published",
+            balls="narrow",
+            ball_position_noise=0.0,
+            ball_velocity_noise=0.0,
         ),
         ppo=PpoSettings(
             discount=0.9999, trace=1.0, learning_rate=1.5e-4, clip=0.4, hidden=380, steps=160

@@ -74,7 +74,7 @@ class Training:
         """The deterministic policy, as it is now."""
         progress, settings = self.progress, self.settings
         return LearnedPolicy(
-            network_of(self.model, self._environments, blind=settings.blind),
+            network_of(self.model, self._environments, settings),
             settings.conditions,
             {
                 "seed": settings.seed,
@@ -111,7 +111,7 @@ class Training:
         policy: Any = self.model.policy
         evaluated = {}
         if evaluate:
-            network = network_of(self.model, self._environments, blind=self.settings.blind)
+            network = network_of(self.model, self._environments, self.settings)
             seen = self._validation.play(network)
             evaluated = {f"evaluated_{name}": value for name, value in seen._asdict().items()}
         return CurvePoint(

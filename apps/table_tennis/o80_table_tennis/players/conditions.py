@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
 from ..settings import Pacing, RigSettings, TaskSettings
+from ..task.noise import NoiseSettings
 
 
 @dataclass(frozen=True)
@@ -15,6 +16,12 @@ class Conditions:
 
     preset: str = "identified"
     """Of the simulated arm."""
+    observation: str = "full"
+    """published (22 numbers) or full, see `task.full_observation`."""
+    ball_position_noise: float = 0.005
+    """Of the observed ball, along each axis [m]: as a camera system leaves it."""
+    ball_velocity_noise: float = 0.1
+    """[m/s]"""
     start_noise: float = 0.02
     """On each joint at the start of an episode, uniform in plus or minus this [rad]."""
     factor: float = 0.6
@@ -26,8 +33,8 @@ class Conditions:
     """Simulated shots, wide or narrow; or a path of recordings."""
 
     def rig(self, pacing: Pacing = Pacing.INLINE) -> RigSettings:
-        """The arm and its twin. A simulated arm in real time starts without noise as a real one."""
-        return RigSettings(pacing=pacing, preset=self.preset, start_noise=self.start_noise)
+        """The arm and its twin."""
+        return RigSettings(pacing=pacing, preset=self.preset)
 
     def task(self, *, ball_seed: int = 0) -> TaskSettings:
         """The task; each `ball_seed` has simulated shots of its own."""
@@ -37,6 +44,13 @@ class Conditions:
             factor=self.factor,
             repeat=self.repeat,
             reward=self.reward,
+            observation=self.observation,
+            noise=NoiseSettings(
+                ball_position=self.ball_position_noise,
+                ball_velocity=self.ball_velocity_noise,
+                start_posture=self.start_noise,
+            ),
+            fly_out=True,
         )
 
     def playing(self, balls: str | None) -> Conditions:

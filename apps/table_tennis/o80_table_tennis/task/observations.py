@@ -24,8 +24,6 @@ BALL_POSITION = slice(16, 19)
 BALL_VELOCITY = slice(19, 22)
 """World frame [m/s]."""
 SIZE = 22
-BALL_NUMBERS = tuple(range(BALL_POSITION.start, BALL_VELOCITY.stop))
-"""All numbers that tell of the ball."""
 JOINT_POSITION_BOUND = 1.75
 """[rad]: the real arm passes its stops a little, to 1.73 rad in public logs."""
 JOINT_VELOCITY_BOUND = 40.0

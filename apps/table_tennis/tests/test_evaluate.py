@@ -1,0 +1,79 @@
+"""Policies are compared on the same balls, by one command."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from o80_table_tennis import evaluate as program
+from o80_table_tennis.learning.contestants import contestant
+from o80_table_tennis.learning.evaluation import evaluate
+from o80_table_tennis.players.conditions import Conditions
+from o80_table_tennis.players.policies import StillPolicy
+
+
+@pytest.fixture
+def runner() -> tuple[CliRunner, typer.Typer]:
+    app = typer.Typer()
+    app.command()(program.main)
+    return CliRunner(), app
+
+
+def test_an_evaluation_counts_what_came_of_each_ball_and_repeats() -> None:
+    first, again = (evaluate("still", StillPolicy(), Conditions(), balls=4) for _ in range(2))
+    assert [episode.ball for episode in first.episodes] == [0, 1, 2, 3]
+    assert first.episodes == again.episodes
+    assert first.touched == np.mean([episode.touched for episode in first.episodes])
+    other = evaluate("still", StillPolicy(), Conditions(), balls=4, seed=5)
+    assert [e.reward for e in other.episodes] != [e.reward for e in first.episodes]
+
+
+def test_every_named_policy_plays_in_its_own_conditions() -> None:
+    for name in ("still", "random", "scripted"):
+        policy, conditions = contestant(name, balls="narrow")
+        assert conditions.balls == "narrow"
+        assert len(evaluate(name, policy, conditions, balls=1).episodes) == 1
+    _, scripted = contestant("scripted", preset="standard")
+    assert scripted.preset == "standard"
+    assert scripted.observation == "published"
+
+
+def test_an_unknown_policy_is_refused_with_those_there_are() -> None:
+    with pytest.raises(FileNotFoundError, match="unknown policy 'magic': give still, random"):
+        contestant("magic")
+
+
+def test_the_command_compares_policies_and_draws_their_landings(
+    runner: tuple[CliRunner, typer.Typer], tmp_path: Path
+) -> None:
+    tester, app = runner
+    arguments = ["still", "random", "--count", "2", "--balls", "narrow", "--output", str(tmp_path)]
+    result = tester.invoke(app, arguments)
+    assert result.exit_code == 0, result.output
+    figures = json.loads((tmp_path / "evaluation.json").read_text())
+    assert list(figures) == ["still", "random"]
+    assert all(each["balls"] == 2 for each in figures.values())
+    assert (tmp_path / "landings.png").stat().st_size > 1000
+
+
+def test_a_wrong_name_is_one_line_that_says_what_to_give(
+    runner: tuple[CliRunner, typer.Typer], tmp_path: Path
+) -> None:
+    tester, app = runner
+    for arguments, words in (
+        (["magic"], "unknown policy 'magic'"),
+        (["still", "--balls", str(tmp_path / "none")], "no such file or folder"),
+    ):
+        result = tester.invoke(app, [*arguments, "--output", str(tmp_path)])
+        assert result.exit_code == 1
+        assert words in result.output
+
+
+def test_conditions_of_a_file_are_those_that_were_written() -> None:
+    conditions = Conditions(preset="standard", repeat=3)
+    assert Conditions.of_json(conditions.as_json()) == conditions
+    assert replace(conditions, repeat=2) != conditions
