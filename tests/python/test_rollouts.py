@@ -1,0 +1,248 @@
+"""Rollouts of workers in this process (o80.learning.rollouts)."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+from collections.abc import Sequence
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from gymnasium.spaces import Box, Discrete
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from learning_tasks import Goal, Reach
+from rollout_tasks import COPIES, INFOS, assert_same_rollouts, maker, policies
+
+import o80
+from o80.learning import Environment, VectorEnvironment
+from o80.learning.rollouts import GaussianPolicy, LocalWorkers, Rollout, Worker
+from o80.learning.rollouts.rollout import arrays_of
+from o80.learning.rollouts.worker import environment_seeds, policy_generator
+
+STEPS = 11
+
+
+def workers_of(folder: Path, count: int = 2, **options: Any) -> LocalWorkers:
+    return LocalWorkers(maker(folder), workers=count, seed=5, infos=INFOS, **options)
+
+
+def collected(workers: LocalWorkers, count: int) -> list[list[Rollout]]:
+    return [workers.collect(policy, steps=STEPS) for policy in policies(count)]
+
+
+def test_a_rollout_is_what_its_actions_make_of_the_environments(tmp_path: Path) -> None:
+    with workers_of(tmp_path) as workers:
+        rollouts = [each[1] for each in collected(workers, 3)]
+    singles: Any = SyncVectorEnv(
+        [lambda: Environment(Reach())] * COPIES, autoreset_mode=AutoresetMode.SAME_STEP
+    )
+    seen, _ = singles.reset(seed=environment_seeds(5, 1, 0, COPIES))
+    paid, lengths, ends = np.zeros(COPIES), np.zeros(COPIES, int), 0
+    for rollout in rollouts:
+        expected = []
+        for step in range(STEPS):
+            assert rollout.observations[step].tobytes() == seen.tobytes()
+            action = np.clip(rollout.actions[step], -1, 1)
+            seen, rewards, terminated, truncated, infos = singles.step(action)
+            assert rollout.rewards[step].tobytes() == rewards.tobytes()
+            assert rollout.terminated[step].tolist() == terminated.tolist()
+            assert rollout.truncated[step].tolist() == truncated.tolist()
+            paid += rewards
+            lengths += 1
+            for copy in np.flatnonzero(terminated | truncated):
+                at_end = (infos["final_info"][name][copy] for name in INFOS)
+                last = infos["final_obs"][copy].tobytes()
+                expected.append((step, copy, paid[copy], lengths[copy], *at_end, last))
+                paid[copy], lengths[copy] = 0, 0
+        assert rollout.observations[STEPS].tobytes() == seen.tobytes()
+        assert list(rows_of(rollout)) == expected
+        ends += len(expected)
+    singles.close()
+    assert ends > 3 * COPIES
+
+
+def rows_of(rollout: Rollout) -> Sequence[Any]:
+    ends = rollout.ends
+    last = [each.tobytes() for each in ends.observations]
+    columns = (ends.steps, ends.copies, ends.rewards, ends.lengths)
+    return list(zip(*columns, ends.infos["apart"], ends.infos["why"], last, strict=True))
+
+
+def test_actions_are_drawn_by_the_policy_from_the_generator_of_the_iteration(
+    tmp_path: Path,
+) -> None:
+    with workers_of(tmp_path) as workers:
+        rollouts = collected(workers, 2)
+    for iteration, policy in enumerate(policies(2)):
+        for worker in range(2):
+            rollout = rollouts[iteration][worker]
+            generator = policy_generator(5, worker, iteration)
+            for step in range(STEPS):
+                actions, logarithms = policy.sample(rollout.observations[step], generator)
+                assert actions.tobytes() == rollout.actions[step].tobytes()
+                assert logarithms.tobytes() == rollout.log_probabilities[step].tobytes()
+
+
+def test_log_probabilities_are_those_of_the_normal_distributions() -> None:
+    policy = policies(1)[0]
+    seen = np.random.default_rng(1).normal(0, 1, (7, 6)).astype(np.float32)
+    actions, logarithms = policy.sample(seen, np.random.default_rng(2))
+    deviation = np.exp(policy.log_std.astype(float))
+    away = (actions - policy.means(seen)) / deviation
+    densities = np.exp(-0.5 * away**2) / (deviation * math.sqrt(2 * math.pi))
+    assert logarithms == pytest.approx(np.log(densities.prod(axis=1)), abs=1e-4)
+
+
+def test_the_means_are_those_of_the_network() -> None:
+    policy = policies(1)[0]
+    seen = np.random.default_rng(1).normal(0, 30, (7, 6))
+    layer = np.clip((seen - policy.mean) * policy.scale, -10, 10)
+    assert np.abs(layer).max() == 10
+    for weight, bias in zip(policy.weights[:-1], policy.biases[:-1], strict=True):
+        layer = np.tanh(layer @ weight.T + bias)
+    expected = layer @ policy.weights[-1].T + policy.biases[-1]
+    assert policy.means(seen) == pytest.approx(expected, abs=1e-4)
+
+
+def test_workers_iterations_and_seeds_differ(tmp_path: Path) -> None:
+    with workers_of(tmp_path, 3) as workers:
+        rollouts = [workers.collect(policies(1)[0], steps=STEPS) for _ in range(2)]
+    noise = [each.log_probabilities.tobytes() for both in rollouts for each in both]
+    begins = [each.observations[0].tobytes() for each in rollouts[0]]
+    with LocalWorkers(maker(tmp_path), workers=1, seed=6) as workers:
+        other = workers.collect(policies(1)[0], steps=STEPS)[0]
+    assert len({*noise, other.log_probabilities.tobytes()}) == 7
+    assert len({*begins, other.observations[0].tobytes()}) == 4
+
+
+def test_a_replaced_worker_begins_anew_and_the_others_go_on(tmp_path: Path) -> None:
+    with workers_of(tmp_path) as workers:
+        expected = collected(workers, 3)
+    with workers_of(tmp_path) as workers:
+        first = workers.collect(policies(3)[0], steps=STEPS)
+        workers.replace(1)
+        workers.replace(1)  # as often as it dies in this iteration
+        rest = [workers.collect(policy, steps=STEPS) for policy in policies(3)[1:]]
+        assert workers.replacements == [(1, 1), (1, 1)]
+    assert_same_rollouts(first, expected[0])
+    for iteration in (1, 2):
+        assert_same_rollouts(rest[iteration - 1][:1], expected[iteration][:1])
+        assert rest[iteration - 1][1].begun == 1
+    with Worker(maker(tmp_path), worker=1, seed=5, iteration=1, infos=INFOS) as alone:
+        for iteration in (1, 2):
+            again = alone.collect(policies(3)[iteration], steps=STEPS, iteration=iteration)
+            assert_same_rollouts([again], rest[iteration - 1][1:])
+
+
+def test_workers_that_start_at_a_later_iteration_all_begin_there(tmp_path: Path) -> None:
+    with workers_of(tmp_path) as workers:
+        workers.collect(policies(2)[0], steps=STEPS)
+        for worker in range(2):
+            workers.replace(worker)
+        expected = workers.collect(policies(2)[1], steps=STEPS)
+    with workers_of(tmp_path, iteration=1) as resumed:
+        assert_same_rollouts(resumed.collect(policies(2)[1], steps=STEPS), expected)
+
+
+def test_after_an_exception_all_workers_begin_anew_and_repeat_the_iteration(
+    tmp_path: Path,
+) -> None:
+    with workers_of(tmp_path) as workers:
+        workers.collect(policies(2)[0], steps=STEPS)
+        (tmp_path / "raise").touch()
+        with pytest.raises(ArithmeticError, match="square") as raised:
+            workers.collect(policies(2)[1], steps=STEPS)
+        assert raised.value.__notes__ == ["raised in rollout worker 0"]
+        again = workers.collect(policies(2)[1], steps=STEPS)
+        assert workers.replacements == [(1, 0), (1, 1)]
+        assert workers.iteration == 2
+    with workers_of(tmp_path, iteration=1) as fresh:
+        assert_same_rollouts(again, fresh.collect(policies(2)[1], steps=STEPS))
+
+
+def test_arrays_are_read_only_and_shared_by_nobody(tmp_path: Path) -> None:
+    with workers_of(tmp_path) as workers:
+        rollouts = [each for both in collected(workers, 2) for each in both]
+    arrays = [array for each in rollouts for _, array in arrays_of(each)]
+    assert not any(array.flags.writeable for array in arrays)
+    assert not any(np.shares_memory(a, b) for a, b in combinations(arrays, 2) if a.size and b.size)
+
+
+def test_a_rollout_without_an_end_has_empty_ends(tmp_path: Path) -> None:
+    with workers_of(tmp_path, 1) as workers:
+        rollout = workers.collect(policies(1)[0], steps=1)[0]
+    ends = rollout.ends
+    assert ends.observations.shape == (0, 6)
+    assert {len(array) for _, array in arrays_of(ends)} == {0}
+    assert set(ends.infos) == set(INFOS)
+
+
+class Chance:
+    """A policy of discrete actions, of one's own."""
+
+    def sample(self, observations: Any, generator: Any) -> Any:
+        return generator.integers(0, 3, len(observations)), np.full(len(observations), -math.log(3))
+
+
+class Plain(Goal):
+    """Observations without names."""
+
+    def __init__(self, copies: int) -> None:
+        super().__init__(copies)
+        self.observation_space = Box(-9, 9, (6,), np.float32)
+
+    def observe(self, copies: Any) -> Any:
+        return Reach.observe(self, copies)
+
+
+def test_a_policy_may_be_of_ones_own_with_discrete_actions() -> None:
+    make = lambda: VectorEnvironment(Plain(3), autoreset_mode="SameStep")  # noqa: E731
+    with LocalWorkers(make, workers=1, seed=1) as workers:
+        rollout = workers.collect(Chance(), steps=20)[0]
+    assert set(rollout.actions.ravel().tolist()) == {0, 1, 2}
+    assert rollout.actions.dtype == Discrete(3).dtype
+
+
+def test_mistakes_are_named(tmp_path: Path) -> None:
+    make = maker(tmp_path)
+    policy = policies(1)[0]
+    with pytest.raises(o80.InvalidArgument, match=r"SameStep, these are in NextStep: make them"):
+        LocalWorkers(lambda: VectorEnvironment(Reach(2)), workers=1)
+    with pytest.raises(o80.InvalidArgument, match="observation_space of arrays"):
+        LocalWorkers(
+            lambda: VectorEnvironment(Goal(2), autoreset_mode="SameStep"),
+            workers=1,
+        )
+    with pytest.raises(o80.InvalidArgument, match="workers must be at least 1, got 0"):
+        LocalWorkers(make, workers=0)
+    with LocalWorkers(make, workers=1, infos=("distance",)) as workers:
+        with pytest.raises(o80.InvalidArgument, match=r"no array 'distance' .* it has apart, "):
+            workers.collect(policy, steps=20)
+        with pytest.raises(o80.InvalidArgument, match="steps must be at least 1, got 0"):
+            workers.collect(policy, steps=0)
+        with pytest.raises(IndexError, match="workers 0 to 0, not 3"):
+            workers.replace(3)
+    with pytest.raises(o80.Closed, match="make new ones"):
+        workers.collect(policy, steps=1)
+    with pytest.raises(o80.InvalidArgument, match=r"log_std must have shape \(4,\), got \(3,\)"):
+        GaussianPolicy(policy.mean, policy.scale, policy.weights, policy.biases, policy.log_std[:3])
+    with pytest.raises(o80.InvalidArgument, match=r"weights must have the shapes \[\(32, 6\)"):
+        GaussianPolicy(policy.mean, policy.scale, policy.weights[1:], policy.biases, policy.log_std)
+
+
+def test_without_ray_everything_but_its_workers_is_there() -> None:
+    program = (
+        "import sys; sys.modules['ray'] = None\n"
+        "import o80\n"
+        "from o80.learning.rollouts import LocalWorkers, RayWorkers\n"
+        "try: RayWorkers(None, workers=1)\n"
+        "except o80.MissingExtra as error: print(error)\n"
+    )
+    ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert ran.stdout.strip() == (
+        'rollouts on several machines needs ray, which is not installed: pip install "o80[ray]"'
+    )
