@@ -26,6 +26,13 @@ def view(
     browser: Annotated[
         bool | None, typer.Option(help="Open the page (default: if there is a screen).")
     ] = None,
+    model_files: Annotated[
+        bool,
+        typer.Option(
+            "--model-files",
+            help="Read the files (meshes) that models of recordings name; only if you trust them.",
+        ),
+    ] = False,
 ) -> None:
     """Show robots and recordings in the browser: in 3D, as curves, and back in time.
 
@@ -35,7 +42,9 @@ def view(
     from o80.view.guard import is_loopback
     from o80.view.serve import page_server, wait_for_end
 
-    with page_server(names or [], host=host, port=port, control=control) as server:
+    with page_server(
+        names or [], host=host, port=port, control=control, model_files=model_files
+    ) as server:
         print(server.url, flush=True)
         if not is_loopback(host):
             complain(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from o80 import _core
 from o80.errors import InvalidArgument
 from o80.machine import Machine, this_machine
-from o80.replaying.trust import is_own
+from o80.own_robots import is_own
 
 if TYPE_CHECKING:
     from o80.frontend import Frontend

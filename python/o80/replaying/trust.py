@@ -8,8 +8,6 @@ names them or the run is one of the user's own robots in shared memory.
 from __future__ import annotations
 
 import hashlib
-import os
-import pwd
 import stat
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,25 +15,12 @@ from typing import TYPE_CHECKING
 
 from o80 import robots
 from o80.errors import DriverError, InvalidArgument
-from o80.segment_list import segments
 
 if TYPE_CHECKING:
-    from o80.frontend import Frontend
     from o80.provenance import Provenance
     from o80.replaying.recorded_run import RecordedRun
 
 _LARGEST_HASHED = 64 << 20  # [bytes], as when it was recorded
-
-
-def is_own(frontend: Frontend) -> bool:
-    """True for a segment of a robot that this user runs, or ran; not for one that is played."""
-    if frontend.played:
-        return False
-    try:
-        user = pwd.getpwuid(os.geteuid()).pw_name
-    except KeyError:
-        user = str(os.geteuid())
-    return any(each.name == frontend.segment and each.user == user for each in segments())
 
 
 def library_of(run: RecordedRun) -> Path:

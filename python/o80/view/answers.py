@@ -119,7 +119,7 @@ class _Shown:
         self._kept = Kept()
         if "model" in schema:
             try:
-                self.scene = Scene(schema, source.model)
+                self.scene = Scene(schema, source.model, trusted=source.trusted)
             except o80.Error as error:
                 self.no_scene = str(error)
 

@@ -7,6 +7,7 @@ import o80
 from o80 import _core
 from o80.cli.condition import age_text, rate_text
 from o80.history import History
+from o80.own_robots import is_own
 from o80.view.source import NothingToShow, Source
 
 GUARD_ROWS = 16  # the oldest rows may be overwritten while they are read
@@ -17,7 +18,8 @@ class LiveSource(Source):
 
     live = True
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, *, model_files: bool = False) -> None:
+        self._model_files = model_files
         self.name = self.label = name
         self._frontend: o80.Frontend | None = None
         self._lock = threading.Lock()
@@ -37,6 +39,7 @@ class LiveSource(Source):
                 self._problem = "" if known is not None else "there is no row yet"
                 found.close()
                 return
+            self.trusted = self._model_files or is_own(found)
             self._frontend, self._problem = found, ""
             self.key = f"{self.name} {found.epoch}"
             self.zero = self.extent_of(found)[0]

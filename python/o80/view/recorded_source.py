@@ -18,7 +18,10 @@ class RecordedSource(Source):
 
     live = False
 
-    def __init__(self, name: str, number: int, epoch: RecordedEpoch) -> None:
+    def __init__(
+        self, name: str, number: int, epoch: RecordedEpoch, *, model_files: bool = False
+    ) -> None:
+        self.trusted = model_files
         self.name = name
         self.label = f"{name}, run {number + 1}" if number else name
         self.key = f"recorded {name} {number} {epoch.epoch}"

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import o80
+from o80.view.foreign_model import compiled
 from o80.view.packed import packed, packed_indices
 
 SHAPES = {0: "plane", 2: "sphere", 3: "capsule", 4: "ellipsoid", 5: "cylinder", 6: "box", 7: "mesh"}
@@ -19,11 +20,16 @@ USUAL_COLOUR = (0.5, 0.5, 0.5, 1.0)  # of a geom that has none
 class Scene:
     """Draws one model. May be used from several threads."""
 
-    def __init__(self, schema: dict[str, Any], mjcf: str) -> None:
-        """Raises o80.Error if the model cannot be read, MissingExtra without mujoco."""
+    def __init__(self, schema: dict[str, Any], mjcf: str, *, trusted: bool) -> None:
+        """trusted: the files that the model names may be read.
+
+        Raises o80.Error if the model cannot be read, MissingExtra without mujoco.
+        """
         described = schema["model"]
         self._mujoco = _mujoco()
-        self._model = self._compiled(mjcf, described["file"])
+        self._model = (
+            self._compiled(mjcf, described["file"]) if trusted else compiled(mjcf, self._mujoco)
+        )
         self._data = self._mujoco.MjData(self._model)
         self._lock = threading.Lock()
         self._start: NDArray[np.float64] = np.array(self._data.qpos)

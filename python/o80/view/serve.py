@@ -18,13 +18,18 @@ HOST = "127.0.0.1"
 
 @contextmanager
 def page_server(
-    names: Sequence[str], *, host: str = HOST, port: int = 0, control: bool = False
+    names: Sequence[str],
+    *,
+    host: str = HOST,
+    port: int = 0,
+    control: bool = False,
+    model_files: bool = False,
 ) -> Iterator[PageServer]:
     """A server that listens, and serves in threads of its own until the block ends.
 
     Raises o80.Error if the port is taken, RecordingError if a file cannot be read.
     """
-    sources = SourceList(names)
+    sources = SourceList(names, model_files=model_files)
     answers = Answers(sources, control=control)
     server = PageServer(
         host, port, {"/look": answers.look, "/halt": answers.halt, "/resume": answers.resume}

@@ -21,6 +21,8 @@ class Source(ABC):
     live: bool
     key: str = ""  #: changes when another run takes the name
     zero: int = 0  #: [ns]
+    #: False: it may come from a stranger, and files that its model names are not read
+    trusted: bool = False
 
     @property
     @abstractmethod

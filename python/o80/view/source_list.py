@@ -16,25 +16,29 @@ BETWEEN_LOOKS = 0.25  # for new segments and restarts [s]
 class SourceList:
     """Finds segments that come later too. May be used from several threads."""
 
-    def __init__(self, names: Sequence[str]) -> None:
+    def __init__(self, names: Sequence[str], *, model_files: bool = False) -> None:
         """names: segments, patterns such as "arm*", recordings (.mcap files, or folders of
             them); none: all segments.
+        model_files: read the files that models of recordings and of other users' robots name.
 
         Raises RecordingError.
         """
+        self._model_files = model_files
         self._recorded: list[Source] = []
         self._names: list[str] = []
         self._patterns: list[str] = []
         for name in dict.fromkeys(names):
             if name.endswith(".mcap") or Path(name).is_dir():
-                self._recorded += _runs_of(name)
+                self._recorded += _runs_of(name, model_files)
             elif any(character in name for character in "*?["):
                 self._patterns.append(name)
             else:
                 self._names.append(name)
         if not names:
             self._patterns.append("*")
-        self._live: dict[str, LiveSource] = {name: LiveSource(name) for name in self._names}
+        self._live: dict[str, LiveSource] = {
+            name: LiveSource(name, model_files=model_files) for name in self._names
+        }
         self._lock = threading.Lock()
         self._look_at = 0.0
 
@@ -59,18 +63,18 @@ class SourceList:
                 if entry.name not in self._live and any(
                     fnmatch.fnmatchcase(entry.name, pattern) for pattern in self._patterns
                 ):
-                    self._live[entry.name] = LiveSource(entry.name)
+                    self._live[entry.name] = LiveSource(entry.name, model_files=self._model_files)
         for source in self._live.values():
             source.refresh()
 
 
-def _runs_of(path: str) -> list[Source]:
+def _runs_of(path: str, model_files: bool) -> list[Source]:
     from o80.recording.reader import RecordingFile
     from o80.view.recorded_source import RecordedSource
 
     recording = RecordingFile(path)
     found: list[Source] = [
-        RecordedSource(name, number, epoch)
+        RecordedSource(name, number, epoch, model_files=model_files)
         for name, segment in recording.segments.items()
         for number, epoch in enumerate(segment.epochs)
     ]

@@ -33,6 +33,7 @@ class View(Closeable):
     port: 0 is any free one.
     control: pages may resume a halted robot. They may always halt.
     open_browser: also opens the page.
+    model_files: read the files (meshes) that models of recordings and of other users' robots name.
 
     The server is a process of its own, so that it takes no time of this one. It ends with `close`,
     with the `with` block, and with this process. Raises Error if the port is taken, RecordingError.
@@ -45,10 +46,17 @@ class View(Closeable):
         port: int = 0,
         control: bool = False,
         open_browser: bool = False,
+        model_files: bool = False,
     ) -> None:
         self._owner = os.getpid()
         names = [_name(each) for group in what for each in _several(group)]
-        options = {"names": names, "host": host, "port": port, "control": control}
+        options = {
+            "names": names,
+            "host": host,
+            "port": port,
+            "control": control,
+            "model_files": model_files,
+        }
         self._popen = subprocess.Popen(
             [sys.executable, "-m", "o80.view", json.dumps(options)],
             stdin=subprocess.PIPE,

@@ -1,0 +1,84 @@
+"""Compiles a model that may come from a stranger: in a recording, or of another user's robot.
+
+Such a model may name any file of this computer, and may be made so that its compilation takes all
+memory or never ends. So models that name files are refused, and a process of its own compiles them,
+with limits.
+"""
+
+import os
+import subprocess
+import sys
+from typing import Any
+from xml.etree import ElementTree
+
+import o80
+
+TIMEOUT = 20.0  # [s]
+LARGEST = 256 << 20  # of a compiled model [bytes]
+DEEPEST = 200  # bodies inside each other
+
+# stdin: a model; stdout: the same, compiled
+_PROGRAM = """
+import resource, sys
+resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
+resource.setrlimit(resource.RLIMIT_CPU, (15, 15))
+resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+import mujoco, numpy
+try:
+    model = mujoco.MjSpec.from_string(sys.stdin.buffer.read().decode()).compile()
+except (ValueError, MemoryError) as error:
+    sys.exit(str(error) or "it needs too much memory")
+content = numpy.empty(mujoco.mj_sizeModel(model), numpy.uint8)
+mujoco.mj_saveModel(model, None, content)
+sys.stdout.buffer.write(content.tobytes())
+"""
+
+
+def compiled(mjcf: str, mujoco: Any) -> Any:
+    """The model. Raises o80.Error."""
+    text = without_files(mjcf)
+    try:
+        done = subprocess.run(
+            [sys.executable, "-I", "-c", _PROGRAM],
+            input=text.encode(),
+            capture_output=True,
+            timeout=TIMEOUT,
+            check=False,
+            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+        )
+    except subprocess.TimeoutExpired:
+        raise _unreadable(f"it was not compiled within {TIMEOUT:g} s") from None
+    if done.returncode != 0:
+        said = done.stderr.decode(errors="replace").strip()
+        raise _unreadable(said.splitlines()[-1] if said else "it needs too much time or memory")
+    if len(done.stdout) > LARGEST:
+        raise _unreadable(f"compiled, it is larger than {LARGEST >> 20} MiB")
+    return mujoco.MjModel.from_binary_path("model.mjb", {"model.mjb": done.stdout})
+
+
+def without_files(mjcf: str) -> str:
+    """The same model, if it names no file. Raises o80.Error."""
+    if "<!" in mjcf.replace("<!--", "").replace("<![CDATA[", ""):
+        raise _unreadable("it has a document type")  # which may define entities
+    try:
+        root = ElementTree.fromstring(mjcf)
+    except (ElementTree.ParseError, ValueError) as error:
+        raise _unreadable(str(error)) from error
+    waiting = [(root, 0)]
+    while waiting:
+        element, depth = waiting.pop()
+        if depth > DEEPEST:
+            raise _unreadable(f"elements are nested more than {DEEPEST} deep")
+        for name, value in element.attrib.items():
+            if name.lower().startswith("file") and value:
+                raise o80.Error(
+                    f"The model names a file, {value[:200]!r}, which is not read: the recording "
+                    f"may come from a stranger. To read the files of models that you trust, start "
+                    f"the view with --model-files."
+                )
+        waiting += [(child, depth + 1) for child in element]
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _unreadable(why: str) -> o80.Error:
+    return o80.Error(f"the model of the robot cannot be read: {why}")
