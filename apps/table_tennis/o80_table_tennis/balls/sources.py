@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Protocol
 
 from ..world.timing import PERIOD
+from .flight_cache import cached_flight
 from .recordings import load_trajectories, recording_files
 from .sampled_flight import SampledFlight
 from .simulated_shots import DISTRIBUTIONS, NUMBERS, SimulatedShots
@@ -29,17 +30,13 @@ class Flights(Protocol):
         ...
 
 
-class CachedFlights:
-    """Flights that are read or computed when first asked for, and kept.
+class KeptFlights:
+    """Flights that are read or fitted when first asked for, and kept."""
 
-    `shots` computes the trajectory of each number.
-    """
-
-    def __init__(self, shots: list[Callable[[], BallTrajectory]], *, period: float = PERIOD):
+    def __init__(self, shots: list[Callable[[], SampledFlight]]):
         if not shots:
             raise ValueError("no balls: give a file or folder that holds at least one shot")
         self._shots = shots
-        self._period = period
         self._kept: dict[int, SampledFlight] = {}
 
     def __len__(self) -> int:
@@ -50,22 +47,38 @@ class CachedFlights:
         if not 0 <= index < len(self):
             raise IndexError(f"there is no ball {index}: there are 0 to {len(self) - 1}")
         if index not in self._kept:
-            self._kept[index] = self._shots[index]().resample(self._period)
+            self._kept[index] = self._shots[index]()
         return self._kept[index]
 
 
-def recorded_balls(path: str | Path, *, period: float = PERIOD) -> CachedFlights:
+def recorded_balls(path: str | Path, *, period: float = PERIOD) -> KeptFlights:
     """The shots of a file, or of all recordings of a folder in the order of their names.
 
-    A file of one shot (JSON) is read when the shot is asked for, one of many (HDF5) at once.
+    A file of one shot (JSON) is read when the shot is asked for, one of many (HDF5) at once. The
+    fitted flights are kept in files too, see `flight_cache`.
     """
-    shots: list[Callable[[], BallTrajectory]] = []
+    shots: list[Callable[[], SampledFlight]] = []
     for file in recording_files(Path(path)):
         if file.suffix == ".json":
-            shots.append(partial(_only_shot, file))
+            shots.append(partial(_of_file, file, period))
         else:
-            shots += [partial(_same, shot) for shot in load_trajectories(file)]
-    return CachedFlights(shots, period=period)
+            shots += [partial(_of_shot, shot, period) for shot in load_trajectories(file)]
+    return KeptFlights(shots)
+
+
+def _of_file(file: Path, period: float) -> SampledFlight:
+    """Of a file of one shot, whose time stamps take most of the time."""
+    return cached_flight(
+        file.read_bytes(),
+        file.stem,
+        period,
+        lambda: load_trajectories(file)[0].resample(period),
+    )
+
+
+def _of_shot(shot: BallTrajectory, period: float) -> SampledFlight:
+    content = shot.stamps.tobytes() + shot.positions.tobytes()
+    return cached_flight(content, shot.name, period, lambda: shot.resample(period))
 
 
 @cache
@@ -83,11 +96,3 @@ def balls_from(
     if count is not None:
         raise ValueError(f"ball_count={count} is for simulated shots; {balls} is a recording")
     return recorded_balls(name, period=period)
-
-
-def _only_shot(file: Path) -> BallTrajectory:
-    return load_trajectories(file)[0]
-
-
-def _same(shot: BallTrajectory) -> BallTrajectory:
-    return shot
