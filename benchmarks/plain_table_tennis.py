@@ -39,11 +39,11 @@ class PlainEnvironment(gymnasium.Env[Float32Array, Float32Array]):
     """
 
     def __init__(self, library: Path, record: np.dtype[Any], pressures: PressureRange) -> None:
-        self._library = ctypes.CDLL(str(library))
+        self.library = ctypes.CDLL(str(library))
         plain = self._create()
         if not plain:
             raise RuntimeError(f"{library.name} could not be set up")
-        self._plain = ctypes.c_void_p(plain)
+        self.handle = ctypes.c_void_p(plain)
         self._seen = np.zeros(22 * 8 + record.itemsize, np.uint8)
         self._numbers = self._seen[: 22 * 8].view(np.float64)
         self._seen_at = ctypes.c_void_p(self._seen.ctypes.data)
@@ -55,7 +55,7 @@ class PlainEnvironment(gymnasium.Env[Float32Array, Float32Array]):
         self._box = ObservationBox(self._task)
         self.action_space = spaces.Box(-1.0, 1.0, (MUSCLES,), np.float32)
         self.observation_space = self._box.space
-        self._range = pressures
+        self.pressures = pressures
         self._delay = ctypes.c_int(self._settings.delay)
         self._reader = BallReader(record, 22 * 8)
         self._goal = self._task.begin(self.np_random)
@@ -71,8 +71,8 @@ class PlainEnvironment(gymnasium.Env[Float32Array, Float32Array]):
             **ball_options(1),
         }
         texts = ctypes.c_char_p * len(options)
-        self._library.plain_create.restype = ctypes.c_void_p
-        plain: int | None = self._library.plain_create(
+        self.library.plain_create.restype = ctypes.c_void_p
+        plain: int | None = self.library.plain_create(
             texts(*(name.encode() for name in options)),
             texts(*(text_of(value).encode() for value in options.values())),
             ctypes.c_size_t(len(options)),
@@ -87,15 +87,15 @@ class PlainEnvironment(gymnasium.Env[Float32Array, Float32Array]):
         arm_seed = int(self.np_random.integers(2**32))
         flight: SampledFlight = (options or {})["flight"]
         self._flight = flight.states
-        self._library.plain_reset(
-            self._plain,
+        self.library.plain_reset(
+            self.handle,
             ctypes.c_uint64(arm_seed),
             ctypes.c_void_p(self._flight.ctypes.data),
             ctypes.c_size_t(len(self._flight)),
             self._seen_at,
         )
         self._steps, self._over = 0, False
-        self._asked = self._range.normalised(self._numbers[8:16])
+        self.asked = self.pressures.normalised(self._numbers[8:16])
         state = self._look()
         return self._box.clip(self._task.observe(state)), self._info(state, End.RUNNING)
 
@@ -103,11 +103,9 @@ class PlainEnvironment(gymnasium.Env[Float32Array, Float32Array]):
         if self._over:
             raise gymnasium.error.ResetNeeded("the episode is over: call reset() before step()")
         called = time.perf_counter()
-        self._asked = changed_pressures(
-            self._asked, np.asarray(action), factor=self._settings.factor
-        )
-        self._raw[...] = self._range.raw(self._asked)
-        self._library.plain_step(self._plain, self._raw_at, self._delay, self._seen_at)
+        self.asked = changed_pressures(self.asked, np.asarray(action), factor=self._settings.factor)
+        self._raw[...] = self.pressures.raw(self.asked)
+        self.library.plain_step(self.handle, self._raw_at, self._delay, self._seen_at)
         self._steps += 1
         state = self._look()
         observation = self._box.clip(self._task.observe(state))
@@ -127,7 +125,7 @@ class PlainEnvironment(gymnasium.Env[Float32Array, Float32Array]):
         return State(
             self._steps,
             numbers[0:8],
-            self._range.normalised(numbers[8:16]),
+            self.pressures.normalised(numbers[8:16]),
             self._racket,
             numbers[16:22],
             self._reader.read(self._seen),
@@ -141,4 +139,4 @@ class PlainEnvironment(gymnasium.Env[Float32Array, Float32Array]):
         return info
 
     def close(self) -> None:
-        self._library.plain_destroy(self._plain)
+        self.library.plain_destroy(self.handle)

@@ -121,6 +121,23 @@ __attribute__((visibility("default"))) void plain_step(Plain* plain, const doubl
   plain->step(pressures, delay, *seen);
 }
 
+/// Makes the steps from `first` to `last` of `count` of them, one after the other in each step.
+/// Each is reset every `episode` steps, not all in the same step. `pressures` are those of the
+/// steps of an episode, `flights` has a row for each copy.
+__attribute__((visibility("default"))) void plain_play(Plain* const* all, std::size_t count,
+                                                       std::size_t first, std::size_t last,
+                                                       std::size_t episode, const double* pressures,
+                                                       const o80::mujoco::BallState* flights) {
+  Seen seen;
+  for (std::size_t step = first; step < last; ++step) {
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t own = (step + i * episode / count) % episode;
+      if (own == 0) all[i]->reset(step, {flights + i, 1}, seen);
+      all[i]->step(pressures + 8 * own, 1, seen);
+    }
+  }
+}
+
 __attribute__((visibility("default"))) void plain_destroy(Plain* plain) { delete plain; }
 
 }  // extern "C"

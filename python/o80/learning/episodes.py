@@ -93,4 +93,4 @@ def _to_be_judged(task: Task, copies: Index) -> tuple[NDArray[np.intp], NDArray[
         stepped[copies] = True
         flagged = flagged & stepped
         late = None if late is None else late & stepped
-    return np.flatnonzero(flagged), late
+    return flagged.nonzero()[0], late

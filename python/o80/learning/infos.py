@@ -6,6 +6,7 @@ The same as Gymnasium's `VectorEnv._add_info` makes of the infos of single envir
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,13 @@ Info = dict[str, Any]
 
 def add(infos: Info, values: Mapping[str, Any], copies: Index, count: int) -> None:
     """Adds values (n, ...) of n of `count` copies to what is there of others."""
+    every = isinstance(copies, slice)
     for name, value in values.items():
         there = infos.get(name)
+        # the usual case first: it happens for each entry in every step
+        if every and there is None and _is_plain(value, count):
+            infos[name], infos[f"_{name}"] = value.copy(), _all(count).copy()
+            continue
         if isinstance(value, Mapping):
             there = {} if there is None else there
             add(there, value, copies, count)
@@ -53,6 +59,15 @@ def of_one(values: Mapping[str, Any]) -> Info:
         name: of_one(value) if isinstance(value, Mapping) else _first(_array(value))
         for name, value in values.items()
     }
+
+
+def _is_plain(value: Any, count: int) -> bool:
+    return type(value) is np.ndarray and value.dtype.kind != "U" and value.shape[:1] == (count,)
+
+
+@cache
+def _all(count: int) -> NDArray[np.bool_]:
+    return np.ones(count, np.bool_)
 
 
 def _array(value: Any) -> NDArray[Any]:

@@ -121,8 +121,11 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]]):
 
     def _after(self, stepped: episodes.Stepped, info: infos.Info) -> StepResult:
         """The result of a step of all copies; begins episodes where others ended, if told so."""
+        if not stepped.judged.size:
+            infos.add(info, stepped.info, EVERY, self.num_envs)
+            return self._result(stepped, info)
         over = stepped.terminated | stepped.truncated
-        self._ended = ended = np.flatnonzero(over)
+        self._ended = ended = over.nonzero()[0]
         if ended.size and self.autoreset_mode is AutoresetMode.SAME_STEP:
             self._add_finals(stepped, over, info)
             self._final, self._ended = stepped.observations, _NOBODY

@@ -130,22 +130,34 @@ class BallReader:
         )
 
 
+class BallRecords:
+    """Reads the records (N,) of N balls, an array that is filled anew for each reading."""
+
+    def __init__(self, records: NDArray[Any]) -> None:
+        self._at = {path: _values(records, path) for path in READ}
+
+    def read(self) -> BallRecord:
+        """What has happened to the balls; numbers and vectors are views of the array."""
+        at = self._at
+        landed_at, net_at = at[LANDED_AT], at[NET_AT]
+        landed, touched_net = landed_at >= 0, at[NET_TOUCHES] > 0
+        return BallRecord(
+            at[SMALLEST_DISTANCE],
+            at[TOUCHES] > 0,
+            at[VELOCITY_AFTER],
+            at[LARGEST_SPEED],
+            landed,
+            at[LANDING],
+            touched_net & ~(landed & (landed_at < net_at)),
+            at[FLOOR_TOUCHES] > 0,
+            at[NET_POSITION],
+            at[FLOOR_POSITION],
+        )
+
+
 def ball_records(records: NDArray[Any]) -> BallRecord:
     """What has happened to N balls, of their records (N,)."""
-    landed, net_at = _values(records, LANDED_AT), _values(records, NET_AT)
-    landed_first = (landed >= 0) & (landed < net_at)
-    return BallRecord(
-        _values(records, SMALLEST_DISTANCE),
-        _values(records, TOUCHES) > 0,
-        _values(records, VELOCITY_AFTER),
-        _values(records, LARGEST_SPEED),
-        landed >= 0,
-        _values(records, LANDING),
-        (_values(records, NET_TOUCHES) > 0) & ~landed_first,
-        _values(records, FLOOR_TOUCHES) > 0,
-        _values(records, NET_POSITION),
-        _values(records, FLOOR_POSITION),
-    )
+    return BallRecords(records).read()
 
 
 def _values(records: NDArray[Any], path: tuple[str, ...]) -> NDArray[Any]:

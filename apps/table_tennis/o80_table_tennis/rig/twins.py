@@ -14,7 +14,7 @@ from ..task.ball_record import BallRecord
 from ..world.arm import JOINT_NAMES, JOINTS
 from ..world.timing import ITERATIONS
 from .arms import TIMEOUT, Index
-from .ball_records import RECORDS, ball_records, fly_out_fields
+from .ball_records import RECORDS, BallRecords, fly_out_fields
 from .row_words import words
 from .twin import BALL_STATE, SEEN_NUMBERS
 
@@ -43,12 +43,12 @@ class Twins:
         ball = words(dtype, "observed", "balls").start
         self.ball: FloatArray = numbers[:, ball : ball + SEEN_NUMBERS]
         self.joint_positions: FloatArray = numbers[:, words(dtype, "observed", "joints")][:, ::2]
-        self._records = self._last[RECORDS[0]][RECORDS[1]][:, 0]
+        self._records = BallRecords(self._last[RECORDS[0]][RECORDS[1]][:, 0])
 
     @property
     def records(self) -> BallRecord:
         """What has happened to each ball (N,) until the last rows."""
-        return ball_records(self._records)
+        return self._records.read()
 
     def step(self, motion: FloatArray, copies: Index) -> None:
         """These mirror angle and velocity of each joint in their arm's last rows (N, 4, 5, 2)."""

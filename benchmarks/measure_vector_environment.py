@@ -1,0 +1,149 @@
+"""Steps a second of table tennis in many copies on two threads, resets included.
+
+Beside them, in the same run: the same plants and simulations stepped and reset by plain calls of
+C++ on two threads, and as many processes under Gymnasium's AsyncVectorEnv.
+"""
+
+import ctypes
+import threading
+from contextlib import ExitStack, closing
+from functools import partial
+from typing import Any
+
+import numpy as np
+from gymnasium.vector import AsyncVectorEnv, AutoresetMode, VectorEnv
+from numpy.typing import NDArray
+
+from o80_table_tennis.balls.sources import balls_from
+from o80_table_tennis.entry_points import accelerated_environment, vector_environment
+from o80_table_tennis.rig.ball_records import RECORDS
+from o80_table_tennis.settings import TaskSettings
+from o80_table_tennis.task.actions import COARSE, changed_pressures
+from o80_table_tennis.world.arm import MUSCLES
+from o80_table_tennis.world.timing import PERIOD
+from plain_table_tennis import PlainEnvironment
+from sampling import built, rounds, sample, seconds, take_priority
+
+THREADS = 2
+COPIES = (64, 16)
+PROCESSES = 16
+COPY_STEPS = 16_000  # of all copies together, in a round
+TASK = TaskSettings(factor=COARSE)
+
+
+class Plain:
+    """As many plants and simulations, stepped by plain calls on two threads."""
+
+    def __init__(self, environments: list[PlainEnvironment], episode: int) -> None:
+        self._library, pressures = environments[0].library, environments[0].pressures
+        self._all = [environment.handle.value for environment in environments]
+        self._episode, self._step = episode, 0
+        balls = balls_from(None, 0, PERIOD)
+        flights = [balls.flight(number) for number in range(len(self._all))]
+        for environment, flight in zip(environments, flights, strict=True):
+            environment.reset(seed=1, options={"flight": flight})
+        self._flights = np.vstack([flight.states[:1] for flight in flights])
+        # those of random actions
+        asked = environments[0].asked
+        raw = []
+        for action in random_actions(episode, MUSCLES):
+            asked = changed_pressures(asked, action, factor=TASK.factor)
+            raw.append(pressures.raw(asked))
+        self._raw = np.array(raw)
+
+    def play(self, steps: int) -> None:
+        share = len(self._all) // THREADS
+        workers = [
+            threading.Thread(target=self._play_some, args=(slice(begin, begin + share), steps))
+            for begin in range(0, len(self._all), share)
+        ]
+        for worker in workers:
+            worker.start()
+        for worker in workers:
+            worker.join()
+        self._step += steps
+
+    def _play_some(self, which: slice, steps: int) -> None:
+        """In a thread of its own; ctypes releases the interpreter meanwhile."""
+        chosen = self._all[which]
+        self._library.plain_play(
+            (ctypes.c_void_p * len(chosen))(*chosen),
+            ctypes.c_size_t(len(chosen)),
+            ctypes.c_size_t(self._step),
+            ctypes.c_size_t(self._step + steps),
+            ctypes.c_size_t(self._episode),
+            ctypes.c_void_p(self._raw.ctypes.data),
+            ctypes.c_void_p(self._flights[which].ctypes.data),
+        )
+
+
+class Played:
+    """A vector environment under random actions."""
+
+    def __init__(self, environment: VectorEnv[Any, Any, Any]) -> None:
+        self._environment = environment
+        self._actions = random_actions(64, environment.num_envs, MUSCLES)
+        self._steps = self._ends = 0
+        environment.reset(seed=1)
+
+    def play(self, steps: int) -> None:
+        for step in range(steps):
+            stepped = self._environment.step(self._actions[step % 64])
+            self._ends += int(np.count_nonzero(stepped[2] | stepped[3]))
+        self._steps += steps * self._environment.num_envs
+
+    @property
+    def episode(self) -> int:
+        """Steps of an episode, on average."""
+        return round(self._steps / self._ends)
+
+
+def random_actions(*shape: int) -> NDArray[np.float32]:
+    return np.random.default_rng(1).uniform(-1, 1, shape).astype(np.float32)
+
+
+def plain_environments(stack: ExitStack, count: int) -> list[PlainEnvironment]:
+    with closing(accelerated_environment()) as one:
+        rows = one.rig.twins[0].frontend.history(1).rows
+        record = rows.dtype[RECORDS[0]][RECORDS[1]].base
+        pressures = one.rig.arm.range
+    library = built() / "lib" / "plain_table_tennis.so"
+    return [
+        stack.enter_context(closing(PlainEnvironment(library, record, pressures)))
+        for _ in range(count)
+    ]
+
+
+def measure(copies: int) -> None:
+    with ExitStack() as stack:
+        vector = vector_environment(
+            num_envs=copies, threads=THREADS, task=TASK, autoreset_mode=AutoresetMode.SAME_STEP
+        )
+        played: dict[str, Played | Plain] = {"vector": Played(stack.enter_context(vector))}
+        if copies == PROCESSES:
+            processes = AsyncVectorEnv(
+                [partial(accelerated_environment, task=TASK)] * copies,
+                autoreset_mode=AutoresetMode.SAME_STEP,
+            )
+            played["async"] = Played(stack.enter_context(closing(processes)))
+        steps = COPY_STEPS // copies
+        first = played["vector"]
+        assert isinstance(first, Played)
+        first.play(steps)
+        played["plain"] = Plain(plain_environments(stack, copies), first.episode)
+        for each in played.values():
+            each.play(steps // 8)  # everybody warms up
+        for _ in range(rounds()):
+            for name, each in played.items():
+                taken = seconds(partial(each.play, steps))
+                sample(f"{name}_{copies}", "steps/s", copies * steps / taken)
+
+
+def main() -> None:
+    take_priority()
+    for copies in COPIES:
+        measure(copies)
+
+
+if __name__ == "__main__":
+    main()
