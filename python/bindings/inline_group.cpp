@@ -165,12 +165,15 @@ std::shared_ptr<o80::Description> description_of(const Group& self) {
 
 /// Starts copies of a robot in this process.
 Group start_group(const o80::RobotLibrary& library, std::size_t copies, std::size_t threads,
-                  const o80::OptionValues& loop, const o80::OptionValues& options) {
+                  const Group* sharing, const o80::OptionValues& loop,
+                  const o80::OptionValues& options) {
   const Waiting waiting;
   o80::LoopOptions defaults;
   defaults.backend = o80::InlineGroup::default_options();
-  const o80::InlineGroup::Options group{
-      .copies = copies, .threads = threads, .backend = loop_options_of(loop, defaults).backend};
+  const o80::InlineGroup::Options group{.copies = copies,
+                                        .threads = threads,
+                                        .sharing = sharing == nullptr ? nullptr : &sharing->inner(),
+                                        .backend = loop_options_of(loop, defaults).backend};
   return Group(std::make_shared<o80::InlineGroup>(*library.table, options, group, kKeepWaiting));
 }
 
@@ -202,5 +205,6 @@ void bind_inline_group(nb::module_& m) {
       .def("latest", &Group::latest, "copies"_a, "rows"_a)
       .def("gather", &Group::gather, "numbers"_a, "flags"_a, "observations"_a, "raised"_a)
       .def("close", &Group::close);
-  m.def("start_group", &start_group, "library"_a, "copies"_a, "threads"_a, "loop"_a, "options"_a);
+  m.def("start_group", &start_group, "library"_a, "copies"_a, "threads"_a, "sharing"_a.none(),
+        "loop"_a, "options"_a);
 }

@@ -246,7 +246,7 @@ class Robot:
         segment: None = None,
         *,
         copies: int,
-        threads: int | None = None,
+        threads: "int | InlineGroup | None" = None,
         frequency: float | None = None,
         history: int | None = None,
         lanes: int | None = None,
@@ -270,7 +270,7 @@ class Robot:
         stale: Literal["hold", "purge", "halt", "stop"] | None = None,
         silence: int | None = None,
         copies: int | None = None,
-        threads: int | None = None,
+        threads: "int | InlineGroup | None" = None,
         **config: Any,
     ) -> "Frontend | InlineGroup":
         """Starts the robot in this process. A burst runs in the thread that requests it.
@@ -281,7 +281,7 @@ class Robot:
             have no names. Copies keep 64 rows, two lanes of 256 blocks and no journal, unless these
             options say otherwise.
         threads: threads that step the copies, the calling one included (None: one for each
-            processor).
+            processor); or another group, whose threads are used: call the two in turn.
         config: the robot's own options, see `options`.
 
         Closing the frontend or the group stops the robot. Raises DriverError, SegmentTaken,
@@ -317,7 +317,7 @@ class Robot:
     def _group(
         self,
         copies: int,
-        threads: int | None,
+        threads: "int | InlineGroup | None",
         segment: str | None,
         texts: builtins.list[tuple[str, str]],
         own: builtins.list[tuple[str, str]],
@@ -330,8 +330,13 @@ class Robot:
                 "`group.publish(copy, name)`"
             )
         count = whole(copies, "copies", 1)
-        workers = 0 if threads is None else whole(threads, "threads", 1)
-        return InlineGroup(_core.start_group(self._library, count, workers, texts, own))
+        sharing, workers = None, 0
+        if isinstance(threads, InlineGroup):
+            sharing = threads._group
+            sharing.check_usable()
+        elif threads is not None:
+            workers = whole(threads, "threads", 1)
+        return InlineGroup(_core.start_group(self._library, count, workers, sharing, texts, own))
 
     def _config(
         self, config: Mapping[str, Any], loop: Sequence[str]

@@ -92,10 +92,18 @@ class InlineGroup::Call {
                   "' runs a call of another thread (or is this a signal handler?): call it from "
                   "one thread at a time");
     }
+    if (!group.pool_->try_claim()) {
+      group.running_.store(0, std::memory_order_release);
+      throw Error("the threads of the group of '" + group.name_ +
+                  "' run a call of the group that it shares them with: call one after the other");
+    }
   }
   Call(const Call&) = delete;
   Call& operator=(const Call&) = delete;
-  ~Call() { group_.running_.store(0, std::memory_order_release); }
+  ~Call() {
+    group_.pool_->release();
+    group_.running_.store(0, std::memory_order_release);
+  }
 
  private:
   InlineGroup& group_;
@@ -115,7 +123,8 @@ InlineGroup::InlineGroup(const RobotTable& table, const OptionValues& options, c
     : name_(table.name),
       otherwise_(keep_waiting),
       go_on_([this] { return go_on(); }),
-      pool_(threads_of(group) - 1) {
+      pool_(group.sharing != nullptr ? group.sharing->pool_
+                                     : std::make_shared<WorkerPool>(threads_of(group) - 1)) {
   if (group.copies == 0) throw InvalidArgument("a group needs at least one copy, got 0");
   allow_descriptors(group.copies * kDescriptorsPerCopy,
                     std::to_string(group.copies) + " copies of '" + name_ + "'");
@@ -230,7 +239,7 @@ void InlineGroup::for_each(std::span<const std::uint32_t> chosen, Timeout timeou
     working_for = before;
   };
   const auto look = [this]() noexcept { look_around(); };
-  pool_.run(static_cast<std::uint32_t>(chosen.size()), task, look);
+  pool_->run(static_cast<std::uint32_t>(chosen.size()), task, look);
   if (failed_.load(std::memory_order_relaxed) || cancelled_.load(std::memory_order_relaxed)) {
     throw_failures();
   }

@@ -52,6 +52,9 @@ class InlineGroup {
   struct Options {
     std::size_t copies = 1;
     std::size_t threads = 0;  // the calling thread included; 0: one for each processor
+    /// A group whose threads this one uses, instead of `threads` of its own. The two are called in
+    /// turn, never at the same time.
+    const InlineGroup* sharing = nullptr;
     /// `segment` is the begin of the names in messages: "pam[3]".
     BackendOptions backend;
   };
@@ -85,7 +88,7 @@ class InlineGroup {
   ~InlineGroup();
 
   std::size_t copies() const noexcept { return copies_.size(); }
-  std::size_t threads() const noexcept { return pool_.workers() + 1; }
+  std::size_t threads() const noexcept { return pool_->workers() + 1; }
   const Description& description() const;
   /// Throws InvalidArgument with the known requests.
   std::uint32_t request_index(const std::string& name) const;
@@ -156,7 +159,7 @@ class InlineGroup {
 
   std::atomic<bool> closed_{false};
   ForkGuard guard_;
-  WorkerPool pool_;  // last: its threads end first
+  std::shared_ptr<WorkerPool> pool_;  // last: its threads end first
 };
 
 }  // namespace o80

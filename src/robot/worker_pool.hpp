@@ -30,6 +30,10 @@ class WorkerPool {
 
   std::size_t workers() const noexcept { return threads_.size(); }
 
+  /// For owners that share the pool: true if the caller may call run() until release().
+  bool try_claim() noexcept { return !claimed_.exchange(true, std::memory_order_acquire); }
+  void release() noexcept { claimed_.store(false, std::memory_order_release); }
+
   /// Calls task(i) once for each i below `count`, in all threads; returns when all have returned.
   /// `look_around` is called in the calling thread between its tasks, and about every 50 ms while
   /// it waits for the workers. Neither may throw.
@@ -65,6 +69,7 @@ class WorkerPool {
   std::atomic<std::uint32_t> count_{0};
   alignas(64) std::atomic<std::uint32_t> round_{0};  // futex of the workers; number of the call
   std::atomic<bool> stop_{false};
+  std::atomic<bool> claimed_{false};
   alignas(64) std::atomic<std::uint64_t> left_{0};  // the round << 32 | tasks that nobody has taken
   alignas(64) std::atomic<std::uint32_t> done_{0};  // futex of the caller; tasks that have returned
   std::atomic<bool> waiting_{false};                // the caller sleeps on done_

@@ -356,3 +356,52 @@ def test_delayed_targets_are_taken_within_the_burst() -> None:
             np.testing.assert_array_equal(burst.rows["desired"][:, 2], burst.targets[:, 0])
         with pytest.raises(o80.InvalidArgument, match="delay of a burst of 5 iterations must be"):
             group.prepared_burst(5, delay=5)
+
+
+def workers() -> int:
+    """Threads of groups besides the calling ones."""
+    tasks = Path("/proc/self/task").iterdir()
+    return sum((task / "comm").read_text() == "o80-group\n" for task in tasks)
+
+
+def test_groups_that_share_threads_are_called_in_turn(group: o80.InlineGroup) -> None:
+    with o80.robots.load("two_joints").inline(copies=3, threads=group) as other:
+        assert other.threads == group.threads == 2
+        bursts = [each.prepared_burst(3) for each in (group, other)]
+        for burst in bursts:
+            burst.targets = np.zeros(burst.targets.shape)
+        for _ in range(50):
+            for burst in bursts:
+                burst.run()
+        assert workers() == 1
+        group.close()
+        bursts[1].run()
+        assert other.latest()["iteration"].tolist() == [153] * 3
+
+
+def test_groups_that_share_threads_refuse_to_be_called_at_the_same_time(
+    group: o80.InlineGroup,
+) -> None:
+    with o80.robots.load("two_joints").inline(copies=3, threads=group, history=20_000) as other:
+        long, short = other.prepared_burst(20_000), group.prepared_burst(1)
+        long.targets, short.targets = np.zeros((3, 1, 2)), np.zeros((COPIES, 1, 2))
+        refused: list[o80.Error] = []
+
+        def call() -> None:
+            while not refused:
+                try:
+                    short.run()
+                except o80.Error as error:
+                    refused.append(error)
+
+        caller = threading.Thread(target=call)
+        caller.start()
+        while not refused:
+            try:
+                long.run()
+            except o80.Error as error:
+                refused.append(error)
+        caller.join()
+        assert "shares them with: call one after the other" in str(refused[0])
+        long.run()
+        short.run()

@@ -30,12 +30,18 @@ class GroupRig:
         self, copies: int, settings: RigSettings, *, delay: int, threads: int | None = None
     ) -> None:
         """delay: iterations from the beginning of a step until its pressures act."""
-        common: dict[str, Any] = {"threads": threads, "frequency": settings.frequency}
+        common: dict[str, Any] = {"frequency": settings.frequency}
         with ExitStack() as stack:
-            arms = o80.robots.load("pam").inline(copies=copies, **common, **arm_options(settings))
+            arms = o80.robots.load("pam").inline(
+                copies=copies, threads=threads, **common, **arm_options(settings)
+            )
             stack.enter_context(arms)
             twins = o80.robots.load("mujoco").inline(
-                copies=copies, **common, lane_blocks=LANE_BLOCKS, **twin_options(settings)
+                copies=copies,
+                threads=arms,
+                lane_blocks=LANE_BLOCKS,
+                **common,
+                **twin_options(settings),
             )
             stack.enter_context(twins)
             self.arms, self.twins = Arms(arms, delay=delay), Twins(twins)
