@@ -143,7 +143,6 @@ class TableTennisCopies(Task):
 
     def flagged(self) -> NDArray[np.bool_]:
         """(copies,) whose episode may have ended, or whose step is paid."""
-        # the environment counts a step after it
         flags: NDArray[np.bool_] = self._task.eventful(self._state)
         return flags
 

@@ -91,13 +91,9 @@ class EndRule:
         """(...) the first reason that holds, as numbers of `End`."""
         on_half = np.where(beyond_net(record), int(End.RETURNED), int(End.OWN_HALF))
         landed_at = np.where(on_top(record), on_half, int(End.TABLE_SIDE))
-        reasons = [
-            (record.touched_net, End.NET),
-            (record.landed, landed_at),
-            (record.touched_floor, End.FLOOR),
-            (y < self.passed_y, End.PASSED),
-            (steps >= self.most_steps, End.OUT_OF_STEPS),
-        ]
-        holds = np.broadcast_arrays(*(reason for reason, _ in reasons))
-        ends = np.broadcast_arrays(holds[0], *(np.asarray(end, np.int64) for _, end in reasons))
-        return np.select(holds, ends[1:], int(End.RUNNING))
+        # the first reasons last: they replace the others
+        ends = np.where(steps >= self.most_steps, int(End.OUT_OF_STEPS), int(End.RUNNING))
+        ends = np.where(y < self.passed_y, int(End.PASSED), ends)
+        ends = np.where(record.touched_floor, int(End.FLOOR), ends)
+        ends = np.where(record.landed, landed_at, ends)
+        return np.where(record.touched_net, int(End.NET), ends)
