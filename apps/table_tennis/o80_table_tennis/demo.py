@@ -26,6 +26,7 @@ import o80
 from .balls.sources import balls_from
 from .environment import TableTennisEnvironment
 from .players.baselines import BASELINES
+from .players.learned_policy import shipped_policy
 from .players.policies import DEFAULT_FACTOR, default_policy
 from .playing import play
 from .report.episode_summary import EpisodeSummary
@@ -64,6 +65,11 @@ class DemoSettings:
         """The file with every row of all modes."""
         return self.output / "run.mcap"
 
+    @property
+    def learned_recording(self) -> Path:
+        """The file with every row of the learned policy's episodes."""
+        return self.output / "learned.mcap"
+
     def episodes_of(self, pacing: Pacing) -> int:
         """How many episodes are played like this."""
         return self.real_time_episodes if pacing.real_time else self.episodes
@@ -73,7 +79,8 @@ def run_demo(settings: DemoSettings, console: Console) -> Report:
     """Plays all modes, writes all files, returns the report."""
     begin = time.monotonic()
     settings.output.mkdir(parents=True, exist_ok=True)
-    settings.recording.unlink(missing_ok=True)
+    for recording in (settings.recording, settings.learned_recording):
+        recording.unlink(missing_ok=True)
     available = len(balls_from(settings.task().balls))
     modes: dict[Pacing, Played] = {}
     with _progress(console) as progress:
@@ -91,6 +98,7 @@ def run_demo(settings: DemoSettings, console: Console) -> Report:
             modes,
             policies,
             _recorded(settings, modes),
+            recorded_episodes(settings.learned_recording),
             film=settings.film,
             begin=begin,
         )
@@ -116,10 +124,13 @@ def _play_mode(
 def _compared(
     settings: DemoSettings, modes: Mapping[Pacing, Played], available: int, progress: Progress
 ) -> dict[str, Played]:
-    """The scripted policy and the baselines on the same balls, all as fast as they can."""
+    """All policies and the baselines on the same balls, as fast as they can."""
     scripted = modes.get(Pacing.INLINE) or modes[Pacing.REAL_TIME]
-    compared = {"scripted": scripted}
     episodes = len(scripted.episodes)
+    compared = {
+        "scripted": scripted,
+        "learned": _play_learned(settings, episodes, available, progress),
+    }
     for name, baseline in BASELINES.items():
         bar = progress.add_task(name, total=episodes, returns="0 returned")
         task = replace(settings.task(), factor=baseline.factor)
@@ -134,6 +145,26 @@ def _compared(
                 after_each=_advance(progress, bar),
             )
     return compared
+
+
+def _play_learned(
+    settings: DemoSettings, episodes: int, available: int, progress: Progress
+) -> Played:
+    """The policy that was learned, with the same balls, on the arm and in the noise that it knows.
+
+    Its rows go to a recording of their own.
+    """
+    policy = shipped_policy()
+    bar = progress.add_task("learned", total=episodes, returns="0 returned")
+    task = replace(policy.conditions.task(fly_out=False), balls=settings.task().balls)
+    environment = TableTennisEnvironment(
+        rig=policy.conditions.rig(), task=task, record=settings.learned_recording
+    )
+    with closing(environment):
+        balls = (number % available for number in range(episodes))
+        return play(
+            environment, policy, balls, seed=settings.seed, after_each=_advance(progress, bar)
+        )
 
 
 def _recorded(
@@ -224,7 +255,7 @@ def _say_where(settings: DemoSettings, console: Console) -> None:
     arm = next(iter(o80.open(recording)))
     lines = (
         f"report, plots and film: {settings.output}",
-        f"recording of every row: {recording}",
+        f"recording of every row: {recording}; of the learned policy: {settings.learned_recording}",
         f"  o80 view {recording}      # arm, table and balls in the browser, back in time too",
         f"  o80 replay {recording}    # repeats all of it and compares bit for bit",
         f"  o80 plot {recording} --segment {arm} --fields agonist_1,extended.joint_positions",

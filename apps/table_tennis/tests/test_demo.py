@@ -79,7 +79,9 @@ def test_processes_and_inline_played_the_same(report: dict[str, Any]) -> None:
 
 def test_baselines_stand_beside_the_policy(report: dict[str, Any]) -> None:
     policies = report["policies"]
-    assert list(policies) == ["scripted", "still arm", "random, fine", "random, coarse"]
+    assert list(policies) == [
+        *("scripted", "learned", "still arm", "random, fine", "random, coarse")
+    ]
     inline = report["modes"]["inline"]
     for key in ("episodes", "touched", "returned", "mean_reward"):
         assert policies["scripted"][key] == inline[key]
@@ -125,6 +127,8 @@ def test_plots_are_there(played: tuple[Path, str]) -> None:
 def test_the_film_is_there(played: tuple[Path, str], report: dict[str, Any]) -> None:
     assert report["film_frames"] > 20
     assert (played[0] / "episode.mp4").stat().st_size > 1_000
+    assert report["side_by_side_frames"] > 10
+    assert (played[0] / "side_by_side.mp4").stat().st_size > 1_000
 
 
 @pytest.mark.parametrize("mode", MODES)

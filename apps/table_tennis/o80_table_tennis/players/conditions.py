@@ -36,8 +36,11 @@ class Conditions:
         """The arm and its twin."""
         return RigSettings(pacing=pacing, preset=self.preset)
 
-    def task(self, *, ball_seed: int = 0) -> TaskSettings:
-        """The task; each `ball_seed` has simulated shots of its own."""
+    def task(self, *, ball_seed: int = 0, fly_out: bool = True) -> TaskSettings:
+        """The task; each `ball_seed` has simulated shots of its own.
+
+        Without `fly_out` the rows of the ball's flight after the touch are there, for a film.
+        """
         return TaskSettings(
             balls=self.balls,
             ball_seed=ball_seed,
@@ -50,7 +53,7 @@ class Conditions:
                 ball_velocity=self.ball_velocity_noise,
                 start_posture=self.start_noise,
             ),
-            fly_out=True,
+            fly_out=fly_out,
         )
 
     def playing(self, balls: str | None) -> Conditions:

@@ -6,7 +6,7 @@ import ctypes.util
 import importlib
 import os
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from types import TracebackType
@@ -27,6 +27,8 @@ FloatArray = NDArray[np.float64]
 CAMERAS = ("side", "behind", "close")
 SIZE = (640, 480)
 """Width and height of pictures [pixels]."""
+HALF_SIZE = (480, 360)
+"""Of each picture in a film of several."""
 SHADOWS = 1024
 """Size of the map of shadows [pixels]: finer ones take software renderers much longer."""
 OTHER_BALL = (0.95, 0.95, 0.92, 0.8)
@@ -129,6 +131,38 @@ def film_episode(
         pictures = (
             scene.draw(joints[row], balls[row], camera=camera)
             for row in range(0, len(joints), step)
+        )
+        return write_film(path, pictures, frames_per_second=frames_per_second)
+
+
+def film_side_by_side(
+    path: Path,
+    episodes: Sequence[tuple[FloatArray, FloatArray]],
+    *,
+    period: float,
+    slow: float = 2.0,
+    frames_per_second: float = 12.5,
+    camera: str = "side",
+) -> int:
+    """One film of several episodes, each of joints (T, 4) [rad] and its ball (T, 3) [m].
+
+    They begin together; one that has ended shows its last row. Returns how many frames it has.
+    """
+    step = max(1, round(1.0 / (frames_per_second * slow * period)))
+    rows = max(len(joints) for joints, _ in episodes)
+    with Scene(size=HALF_SIZE) as scene:  # drawn one after the other: a renderer costs much memory
+        pictures = (
+            np.hstack(
+                [
+                    scene.draw(
+                        joints[min(row, len(joints) - 1)],
+                        ball[min(row, len(ball) - 1), None],
+                        camera=camera,
+                    )
+                    for joints, ball in episodes
+                ]
+            )
+            for row in range(0, rows, step)
         )
         return write_film(path, pictures, frames_per_second=frames_per_second)
 

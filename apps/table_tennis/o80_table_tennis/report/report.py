@@ -89,12 +89,16 @@ def write_report(
     modes: Mapping[Pacing, Played],
     policies: Mapping[str, Played],
     recorded: Mapping[Pacing, Sequence[RecordedEpisode]],
+    learned: Sequence[RecordedEpisode],
     *,
     film: bool,
     begin: float,
 ) -> Report:
-    """Draws the plots and the film, and writes report.json; `begin` is monotonic time [s]."""
+    """Draws the plots and the films, and writes report.json; `begin` is monotonic time [s]."""
     drawn = _draw(output, modes, recorded, film=film)
+    if film:
+        scripted = [episode for episodes in recorded.values() for episode in episodes]
+        drawn |= _film_side_by_side(output, scripted, learned)
     numbers = {
         pacing.value: mode_numbers(pacing, played, recorded[pacing])
         for pacing, played in modes.items()
@@ -219,6 +223,49 @@ def _film(output: Path, episode: RecordedEpisode) -> dict[str, Value]:
     except Exception as error:
         return {"film_frames": 0, "no_film_because": f"{type(error).__name__}: {error}"}
     return {"film_frames": frames}
+
+
+def shown_together(
+    scripted: Sequence[RecordedEpisode], learned: Sequence[RecordedEpisode]
+) -> tuple[RecordedEpisode, RecordedEpisode] | None:
+    """An episode of each with the same ball, which both returned if there is such a ball."""
+    pairs = [
+        (one, other)
+        for one in scripted
+        for other in learned
+        if one.summary.ball == other.summary.ball
+    ]
+    return max(
+        pairs,
+        key=lambda pair: (
+            sum(each.summary.returned for each in pair)
+            + 0.01 * sum(each.summary.reward for each in pair)
+        ),
+        default=None,
+    )
+
+
+def _film_side_by_side(
+    output: Path, scripted: Sequence[RecordedEpisode], learned: Sequence[RecordedEpisode]
+) -> dict[str, Value]:
+    """The scripted policy on the left, the learned one on the right, with the same ball."""
+    from .rendering import film_side_by_side
+
+    pair = shown_together(scripted, learned)
+    if pair is None:
+        return {}
+    try:
+        frames = film_side_by_side(
+            output / "side_by_side.mp4",
+            [(each.twin.observed.joints["position"], each.balls[:, 0]) for each in pair],
+            period=pair[0].period,
+        )
+    except Exception as error:
+        return {
+            "side_by_side_frames": 0,
+            "not_side_by_side_because": f"{type(error).__name__}: {error}",
+        }
+    return {"side_by_side_frames": frames}
 
 
 def _percentiles(name: str, values: Any) -> dict[str, Value]:
