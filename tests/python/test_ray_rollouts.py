@@ -3,54 +3,30 @@
 from __future__ import annotations
 
 import os
-import shutil
 import signal
-import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
+from ray_cluster import NODE, ray_cluster
+from rollout_ppo import learned
 from rollout_tasks import INFOS, assert_same_rollouts, maker, policies
 
 import o80
 from o80.learning.rollouts import LocalWorkers, RayWorkers, Replacement, Rollout
 
-pytestmark = pytest.mark.check
+pytestmark = [pytest.mark.check, pytest.mark.timeout(900)]
 
 STEPS = 25
 WORKERS = 2
-MEMORY = 80 << 20  # for the objects of a node [B]
 
 
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[Any]:
-    """Two raylets with a processor each."""
-    ray = pytest.importorskip("ray")
-    from ray.cluster_utils import Cluster
-
-    folder = tempfile.mkdtemp(prefix="ray-", dir="/tmp")  # short: paths of sockets go below it
-    patch = pytest.MonkeyPatch()
-    patch.setenv("RAY_TMPDIR", folder)
-    patch.setenv("RAY_USAGE_STATS_ENABLED", "0")
-    patch.setenv("PYTHONPATH", str(Path(__file__).parent))  # actors find rollout_tasks
-    started = Cluster(
-        initialize_head=True,
-        head_node_args={
-            "num_cpus": 1,
-            "include_dashboard": False,
-            "object_store_memory": MEMORY,
-        },
-    )
-    try:
-        started.add_node(num_cpus=1, object_store_memory=MEMORY)
-        ray.init(address=started.address, log_to_driver=False)
+    pytest.importorskip("ray")
+    with ray_cluster() as started:
         yield started
-    finally:
-        ray.shutdown()
-        started.shutdown()
-        patch.undo()
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 def ray_workers(folder: Path, **options: Any) -> RayWorkers:
@@ -78,6 +54,13 @@ def test_rollouts_are_those_of_local_workers_bit_for_bit(cluster: Any, tmp_path:
         for policy, local in zip(policies(4), expected, strict=True):
             assert_same_rollouts(workers.collect(policy, steps=STEPS), local)
         assert not workers.replacements
+
+
+def test_ppo_learns_the_same_from_actors_and_from_local_workers(
+    cluster: Any, tmp_path: Path
+) -> None:
+    local = LocalWorkers(maker(tmp_path), workers=WORKERS, seed=5, infos=INFOS)
+    assert learned(ray_workers(tmp_path), STEPS, 3) == learned(local, STEPS, 3)
 
 
 def test_killed_actors_are_replaced_and_the_training_goes_on(cluster: Any, tmp_path: Path) -> None:
@@ -135,7 +118,7 @@ def test_workers_of_a_machine_that_goes_begin_on_another(cluster: Any, tmp_path:
     given = policies(4)
     with ray_workers(tmp_path) as workers:
         rollouts = [workers.collect(given[0], steps=STEPS)]
-        cluster.add_node(num_cpus=1, object_store_memory=MEMORY)
+        cluster.add_node(**NODE)
         cluster.remove_node(going, allow_graceful=False)
         rollouts += [workers.collect(policy, steps=STEPS) for policy in given[1:]]
         (replacement,) = workers.replacements

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from o80.learning.rollouts.rollout import Rollout
-from o80.learning.rollouts.worker import Make, Policy, Worker
+from o80.learning.rollouts.worker import Make, Policy, Spaces, Worker
 from o80.learning.rollouts.workers import Workers
 
 
@@ -34,6 +34,11 @@ class LocalWorkers(Workers):
             iteration=self.iteration,
             infos=self._infos,
         )
+
+    @property
+    def spaces(self) -> Spaces:
+        """Of the environments of one worker."""
+        return self._workers[0].spaces
 
     def _collected(self, policy: Policy, steps: int) -> list[Rollout]:
         rollouts = []

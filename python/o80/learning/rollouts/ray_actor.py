@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import o80
 from o80.learning.rollouts.rollout import Rollout
-from o80.learning.rollouts.worker import Policy, Worker
+from o80.learning.rollouts.worker import Policy, Spaces, Worker
 
 
 class About(NamedTuple):
@@ -20,6 +20,8 @@ class About(NamedTuple):
     process: int
     version: str
     """Of o80 there."""
+    spaces: Spaces
+    """Of its environments."""
 
 
 class RolloutActor:
@@ -32,8 +34,8 @@ class RolloutActor:
 
     def about(self) -> About:
         """Begins."""
-        self._worker()
-        return About(socket.gethostname(), os.getpid(), o80.__version__)
+        spaces = self._worker().spaces
+        return About(socket.gethostname(), os.getpid(), o80.__version__, spaces)
 
     def collect(self, policy: Policy, steps: int, iteration: int) -> Rollout:
         """The rollout of an iteration."""

@@ -10,7 +10,7 @@ from o80.errors import Error, TimeoutError
 from o80.extras import needed
 from o80.learning.rollouts.ray_actor import About, RolloutActor
 from o80.learning.rollouts.rollout import Rollout
-from o80.learning.rollouts.worker import Make, Policy
+from o80.learning.rollouts.worker import Make, Policy, Spaces
 from o80.learning.rollouts.workers import Workers
 
 ATTEMPTS = 3
@@ -56,7 +56,9 @@ class RayWorkers(Workers):
         self._actors: list[Any] = []
         try:
             self._actors = [self._new(worker) for worker in range(self.count)]
-            self._refuse_other_versions(self.about)
+            about = self.about
+            self._refuse_other_versions(about)
+            self._spaces = about[0].spaces
         except BaseException:
             self.close()
             raise
@@ -65,6 +67,11 @@ class RayWorkers(Workers):
     def about(self) -> list[About]:
         """Process and machine of each worker, now."""
         return self._of_all(lambda actor: actor.about.remote(), "begun")
+
+    @property
+    def spaces(self) -> Spaces:
+        """Of the environments of one worker."""
+        return self._spaces
 
     def _new(self, worker: int) -> Any:
         return self._actor.remote(

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from types import TracebackType
-from typing import Any, Protocol, Self
+from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
+from gymnasium import Space
 from gymnasium.spaces import Box
 from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
@@ -17,6 +18,15 @@ from o80.learning.rollouts.rollout import Rollout
 
 Make = Callable[[], "VectorEnv[Any, Any, Any]"]
 """Makes the vector environment of a worker, in autoreset mode SameStep."""
+
+
+class Spaces(NamedTuple):
+    """What the environments of a worker are like."""
+
+    copies: int
+    observation: Space[Any]
+    """Of one copy."""
+    action: Space[Any]
 
 
 class Policy(Protocol):
@@ -65,6 +75,12 @@ class Worker:
         except BaseException:
             self.close()
             raise
+
+    @property
+    def spaces(self) -> Spaces:
+        """Of the environments."""
+        made = self._environments
+        return Spaces(made.num_envs, made.single_observation_space, made.single_action_space)
 
     def collect(self, policy: Policy, *, steps: int, iteration: int) -> Rollout:
         """The rollout of `iteration`: so many steps of all copies, from where they are."""

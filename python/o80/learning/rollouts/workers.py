@@ -10,7 +10,7 @@ from typing import NamedTuple, Self
 from o80.checked import whole
 from o80.errors import Closed
 from o80.learning.rollouts.rollout import Rollout
-from o80.learning.rollouts.worker import Make, Policy
+from o80.learning.rollouts.worker import Make, Policy, Spaces
 
 
 class Replacement(NamedTuple):
@@ -77,6 +77,18 @@ class Workers(ABC):
             raise IndexError(f"there are workers 0 to {self.count - 1}, not {worker}")
         self.replacements.append(Replacement(self.iteration, worker))
         self._replace(worker)
+
+    def restart(self, iteration: int) -> None:
+        """All workers begin anew, in `iteration`: for a training that resumes there."""
+        self.iteration = whole(iteration, "iteration", 0)
+        for worker in range(self.count):
+            self.replace(worker)
+        self._uneven = False
+
+    @property
+    @abstractmethod
+    def spaces(self) -> Spaces:
+        """Of the environments of one worker."""
 
     @abstractmethod
     def _collected(self, policy: Policy, steps: int) -> list[Rollout]:

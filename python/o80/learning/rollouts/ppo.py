@@ -1,0 +1,252 @@
+"""Stable-Baselines3's PPO, which learns from the rollouts of workers.
+
+with RayWorkers(make, workers=4, seed=1) as workers:
+    model = RolloutPPO("MlpPolicy", VecNormalize(WorkersEnv(workers), norm_reward=False))
+    model.learn(1_000_000)
+
+Needs the extra `stable-baselines3`. See docs/learning.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o80.errors import InvalidArgument
+from o80.extras import needed
+from o80.learning.rollouts.rollout import Rollout
+from o80.learning.rollouts.sb3_policy import gaussian_policy
+from o80.learning.rollouts.workers import Workers
+
+needed("stable_baselines3", "stable-baselines3", "o80.learning.rollouts.ppo")
+
+import torch  # noqa: E402
+from stable_baselines3 import PPO  # noqa: E402
+from stable_baselines3.common.buffers import RolloutBuffer  # noqa: E402
+from stable_baselines3.common.callbacks import BaseCallback  # noqa: E402
+from stable_baselines3.common.vec_env import VecEnv  # noqa: E402
+
+Info = dict[str, Any]
+
+
+class WorkersEnv(VecEnv):
+    """Stands for the copies of all workers in a RolloutPPO, which alone can step them."""
+
+    np_random: Sequence[np.random.Generator] = ()
+    """Random numbers follow from the seed of the workers and the iteration: nothing to keep."""
+
+    def __init__(self, workers: Workers) -> None:
+        self.workers = workers
+        self.render_mode = None
+        copies, observation_space, action_space = workers.spaces
+        super().__init__(copies * workers.count, observation_space, action_space)
+
+    def reset(self) -> Any:
+        """Zeros: a rollout begins with the observations of its workers."""
+        space = self.observation_space
+        return np.zeros((self.num_envs, *(space.shape or ())), space.dtype)
+
+    def step_async(self, actions: Any) -> None:
+        """Refused."""
+        raise InvalidArgument("workers step by themselves: give WorkersEnv to a RolloutPPO only")
+
+    def step_wait(self) -> Any:
+        """Refused."""
+        raise InvalidArgument("workers step by themselves: give WorkersEnv to a RolloutPPO only")
+
+    def close(self) -> None:
+        """Ends the workers."""
+        self.workers.close()
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """An attribute of this object, for each copy."""
+        return [getattr(self, attr_name)] * len(list(self._get_indices(indices)))
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Refused."""
+        raise InvalidArgument(f"give '{attr_name}' to what makes the environments of the workers")
+
+    def env_method(self, method_name: str, *_: Any, indices: Any = None, **__: Any) -> list[Any]:
+        """Refused."""
+        raise InvalidArgument(f"'{method_name}' cannot be called in workers")
+
+    def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
+        """Whether ends have the info `episode`, as those of a Monitor."""
+        from stable_baselines3.common.monitor import Monitor
+
+        return [issubclass(Monitor, wrapper_class)] * len(list(self._get_indices(indices)))
+
+
+class RolloutPPO(PPO):
+    """PPO whose rollouts are collected by workers, with the weights of the last update.
+
+    Its environment is a WorkersEnv, or a VecNormalize of one without `norm_reward`. Statistics of
+    observations are updated after each rollout, not in each step. The iteration is the number of
+    updates; a model that was loaded makes the workers begin anew there.
+    """
+
+    def __init__(
+        self, *arguments: Any, visible: NDArray[Any] | None = None, **options: Any
+    ) -> None:
+        """visible: (M,) 0 for numbers of an observation that the policy must not see, else 1.
+
+        The others: those of PPO.
+        """
+        self._visible = visible
+        super().__init__(*arguments, **options)
+        normalisation = self._vec_normalize_env
+        inner = normalisation.unwrapped if normalisation is not None else self.env
+        if not isinstance(inner, WorkersEnv) or (normalisation and normalisation.norm_reward):
+            raise InvalidArgument(
+                "RolloutPPO needs a WorkersEnv, or VecNormalize(WorkersEnv(workers), "
+                f"norm_reward=False), got {self.env!r}"
+            )
+        self._workers = inner.workers
+        gaussian_policy(self.policy, self._vec_normalize_env, self._visible)  # may refuse
+
+    def _excluded_save_params(self) -> list[str]:
+        return [*super()._excluded_save_params(), "_workers"]
+
+    def _setup_learn(self, *arguments: Any, **options: Any) -> Any:
+        """Without the zeros of WorkersEnv.reset in the statistics."""
+        normalisation = self._vec_normalize_env
+        if normalisation is None:
+            return super()._setup_learn(*arguments, **options)
+        training, normalisation.training = normalisation.training, False
+        try:
+            return super()._setup_learn(*arguments, **options)
+        finally:
+            normalisation.training = training
+
+    def collect_rollouts(
+        self,
+        env: VecEnv,
+        callback: BaseCallback,
+        rollout_buffer: RolloutBuffer,
+        n_rollout_steps: int,
+    ) -> bool:
+        """Fills the buffer with a rollout of each worker."""
+        self.policy.set_training_mode(False)
+        rollout_buffer.reset()
+        callback.on_rollout_start()
+        together = _Together(self._collected(n_rollout_steps), self._visible)
+        rewards, values, log_probabilities = self._valued(together)
+        starts = self._last_episode_starts
+        normalised = self._normalised(together.observations)
+        for step in range(n_rollout_steps):
+            self.num_timesteps += self.n_envs
+            dones, infos = together.over[step], together.infos(step)
+            told = {"rewards": together.rewards[step], "dones": dones, "infos": infos}
+            callback.update_locals(told)
+            if not callback.on_step():
+                return False
+            self._update_info_buffer(infos, dones)
+            rollout_buffer.add(
+                normalised[step],
+                together.actions[step],
+                rewards[step],
+                starts,  # type: ignore[arg-type]
+                values[step],
+                log_probabilities[step],
+            )
+            starts = dones
+        self._last_episode_starts = starts
+        self._last_obs = normalised[-1]
+        rollout_buffer.compute_returns_and_advantage(last_values=values[-1], dones=starts)  # type: ignore[arg-type]
+        if self._vec_normalize_env is not None and self._vec_normalize_env.training:
+            statistics: Any = self._vec_normalize_env.obs_rms
+            statistics.update(together.observations[:-1].reshape(-1, *env.observation_space.shape))  # type: ignore[misc]
+        callback.on_rollout_end()
+        return True
+
+    def _collected(self, steps: int) -> list[Rollout]:
+        """The rollouts of the iteration that this model has come to."""
+        iteration = self.num_timesteps // (steps * self.n_envs)
+        if self._workers.iteration != iteration:
+            self._workers.restart(iteration)
+        policy = gaussian_policy(self.policy, self._vec_normalize_env, self._visible)
+        return self._workers.collect(policy, steps=steps)
+
+    def _normalised(self, observations: NDArray[Any]) -> NDArray[Any]:
+        if self._vec_normalize_env is None:
+            return observations
+        normalised: Any = self._vec_normalize_env.normalize_obs(observations)
+        return normalised  # type: ignore[no-any-return]
+
+    def _valued(self, together: _Together) -> tuple[NDArray[Any], Any, Any]:
+        """Rewards (T, N) with the values that truncated episodes still had, values (T + 1, N), and
+        log-probabilities (T, N): of torch, with which the update compares its own.
+        """
+        steps, count = together.rewards.shape
+        rewards = together.rewards.copy()
+        with torch.no_grad():
+            values = self._values(together.observations).reshape(steps + 1, count)
+            seen = self._tensor(self._normalised(together.observations[:-1])).flatten(0, 1)
+            acted = self._tensor(together.actions).flatten(0, 1)
+            _, log_probabilities, _ = self.policy.evaluate_actions(seen, acted)
+            cut, last = together.cut_off()
+            if len(last):
+                rewards[cut] += self.gamma * self._values(last).numpy()
+        return rewards, values, log_probabilities.reshape(steps, count)
+
+    def _values(self, observations: NDArray[Any]) -> torch.Tensor:
+        """Of the states (..., M), as (n,)."""
+        seen = self._tensor(self._normalised(observations))
+        values: torch.Tensor = self.policy.predict_values(seen.flatten(0, -2)).flatten().cpu()
+        return values
+
+    def _tensor(self, array: NDArray[Any]) -> torch.Tensor:
+        return torch.as_tensor(np.array(array), dtype=torch.float32, device=self.device)
+
+
+class _Together:
+    """The rollouts of all workers side by side: copies of worker 0, then those of worker 1, ..."""
+
+    def __init__(self, rollouts: Sequence[Rollout], visible: NDArray[Any] | None) -> None:
+        self._rollouts, self._visible = rollouts, visible
+        self.observations = self._seen(_beside([each.observations for each in rollouts]))
+        self.actions = _beside([each.actions for each in rollouts])
+        self.rewards = _beside([each.rewards for each in rollouts])
+        self.over = _beside([each.terminated | each.truncated for each in rollouts])
+        self._infos: dict[int, dict[int, Info]] = {}
+        for step, copy, info in self._ends():
+            self._infos.setdefault(step, {})[copy] = info
+
+    def infos(self, step: int) -> list[Info]:
+        """Of all copies, as Stable-Baselines3 wants them: with entries where an episode ended."""
+        ended = self._infos.get(step, {})
+        return [ended.get(copy, {}) for copy in range(self.rewards.shape[1])]
+
+    def cut_off(self) -> tuple[tuple[list[int], list[int]], NDArray[Any]]:
+        """Index (steps, copies) and last observations of the episodes that were only truncated."""
+        found = [
+            (step, copy, info["terminal_observation"])
+            for step, copy, info in self._ends()
+            if info["TimeLimit.truncated"]
+        ]
+        steps, copies = [each[0] for each in found], [each[1] for each in found]
+        return (steps, copies), np.array([each[2] for each in found])
+
+    def _ends(self) -> Iterator[tuple[int, int, Info]]:
+        first = 0
+        for rollout in self._rollouts:
+            ends = rollout.ends
+            for number in range(len(ends.steps)):
+                step, copy = int(ends.steps[number]), int(ends.copies[number])
+                info = {name: values[number] for name, values in ends.infos.items()}
+                info["terminal_observation"] = self._seen(ends.observations[number])
+                info["TimeLimit.truncated"] = not rollout.terminated[step, copy]
+                reward, length = float(ends.rewards[number]), int(ends.lengths[number])
+                info["episode"] = {"r": reward, "l": length}
+                yield step, first + copy, info
+            first += rollout.rewards.shape[1]
+
+    def _seen(self, observations: NDArray[Any]) -> NDArray[Any]:
+        return observations if self._visible is None else observations * self._visible
+
+
+def _beside(arrays: Sequence[NDArray[Any]]) -> NDArray[Any]:
+    return np.concatenate(arrays, axis=1)

@@ -1,0 +1,215 @@
+"""Stable-Baselines3's PPO learns from the rollouts of workers (o80.learning.rollouts.ppo)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+import torch
+from gymnasium.spaces import Box
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from rollout_ppo import copied, learned, model_of
+from rollout_tasks import COPIES, INFOS, assert_same_rollouts, maker
+from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.vec_env import VecNormalize
+
+import o80
+from o80.learning.rollouts import LocalWorkers, Rollout
+from o80.learning.rollouts.ppo import RolloutPPO, WorkersEnv
+
+STEPS = 16
+
+
+class Told(BaseCallback):
+    """Keeps the rollouts of the workers, the buffer of each update, and the ends of episodes."""
+
+    def __init__(self, workers: LocalWorkers) -> None:
+        super().__init__()
+        self.rollouts: list[list[Rollout]] = []
+        self.ends: list[Any] = []
+        self.buffers: list[Any] = []
+        self.before: Any = None
+        collect = workers.collect
+
+        def kept(policy: Any, *, steps: int) -> list[Rollout]:
+            assert isinstance(self.model, PPO)
+            self.before = copied(self.model)
+            self.rollouts.append(collect(policy, steps=steps))
+            return self.rollouts[-1]
+
+        workers.collect = kept  # type: ignore[method-assign]
+
+    def _on_step(self) -> bool:
+        for copy in np.flatnonzero(self.locals["dones"]):
+            self.ends.append(self.locals["infos"][copy])
+        return True
+
+    def _on_rollout_end(self) -> None:
+        assert isinstance(self.model, PPO)
+        buffer = self.model.rollout_buffer
+        names = ("observations", "actions", "log_probs", "values", "advantages", "returns")
+        kept: dict[str, Any] = {name: getattr(buffer, name).copy() for name in names}
+        self.buffers.append(kept | {"starts": buffer.episode_starts.copy()})
+
+
+def workers_of(folder: Path, count: int = 2) -> LocalWorkers:
+    return LocalWorkers(maker(folder), workers=count, seed=5, infos=INFOS)
+
+
+@pytest.fixture(autouse=True)
+def one_thread() -> None:
+    torch.set_num_threads(1)
+
+
+def test_log_probabilities_are_those_of_the_workers_and_advantages_of_their_rewards(
+    tmp_path: Path,
+) -> None:
+    with workers_of(tmp_path) as workers:
+        told = Told(workers)
+        model = model_of(workers, steps=STEPS)
+        model.learn(3 * STEPS * 2 * COPIES, callback=told)
+    assert len(told.buffers) == 3
+    cut_off = 0
+    for rollouts, buffer in zip(told.rollouts, told.buffers, strict=True):
+        columns = {
+            name: np.concatenate([getattr(each, name) for each in rollouts], axis=1)
+            for name in ("log_probabilities", "actions", "terminated", "truncated")
+        }
+        assert buffer["log_probs"] == pytest.approx(columns["log_probabilities"], abs=1e-4)
+        assert buffer["actions"].tobytes() == columns["actions"].tobytes()
+        over = columns["terminated"] | columns["truncated"]
+        assert buffer["starts"][1:].tolist() == over[:-1].astype(float).tolist()
+        cut_off += int((columns["truncated"] & ~columns["terminated"]).sum())
+    assert cut_off > 10
+
+    # the last one by hand, with the model as it was then
+    rollouts, buffer = told.rollouts[-1], told.buffers[-1]
+    expected = [advantages(told.before, each) for each in rollouts]
+    assert buffer["advantages"] == pytest.approx(np.concatenate(expected, axis=1), abs=1e-3)
+
+
+def advantages(model: Any, rollout: Rollout) -> Any:
+    """Generalised advantage estimates (T, N)."""
+    values = model.values(rollout.observations)
+    final = {
+        (step, copy): model.values(seen)
+        for step, copy, seen in zip(
+            rollout.ends.steps.tolist(),
+            rollout.ends.copies.tolist(),
+            rollout.ends.observations,
+            strict=True,
+        )
+    }
+    found = np.zeros_like(rollout.rewards)
+    for copy in range(rollout.rewards.shape[1]):
+        after = 0.0
+        for step in reversed(range(len(found))):
+            next_value = values[step + 1, copy]
+            if rollout.terminated[step, copy]:
+                next_value, after = 0.0, 0.0
+            elif rollout.truncated[step, copy]:
+                next_value, after = final[step, copy], 0.0
+            error = rollout.rewards[step, copy] + model.gamma * next_value - values[step, copy]
+            after = found[step, copy] = error + model.gamma * model.trace * after
+    return found
+
+
+def test_the_callback_hears_of_every_end(tmp_path: Path) -> None:
+    with workers_of(tmp_path) as workers:
+        told = Told(workers)
+        model_of(workers, steps=STEPS).learn(2 * STEPS * 2 * COPIES, callback=told)
+    ends = [each.ends for both in told.rollouts for each in both]
+    for name in INFOS:
+        expected = sorted(str(value) for each in ends for value in each.infos[name])
+        assert sorted(str(info[name]) for info in told.ends) == expected
+    paid = sorted(reward for each in ends for reward in each.rewards.tolist())
+    assert sorted(info["episode"]["r"] for info in told.ends) == paid
+
+
+def test_statistics_are_those_of_the_observations_of_all_rollouts(tmp_path: Path) -> None:
+    with workers_of(tmp_path) as workers:
+        told = Told(workers)
+        model = model_of(workers, steps=STEPS)
+        model.learn(3 * STEPS * 2 * COPIES, callback=told)
+        normalisation = model.get_vec_normalize_env()
+    assert normalisation is not None
+    seen = [each.observations[:-1].reshape(-1, 6) for both in told.rollouts for each in both]
+    statistics: Any = normalisation.obs_rms
+    assert statistics.mean == pytest.approx(np.concatenate(seen).mean(axis=0), abs=1e-4)
+    assert statistics.var == pytest.approx(np.concatenate(seen).var(axis=0), abs=1e-3)
+
+
+def test_a_resumed_training_goes_on_where_its_workers_begin_anew(tmp_path: Path) -> None:
+    each = STEPS * 2 * COPIES
+    with workers_of(tmp_path) as workers:
+        model = model_of(workers, steps=STEPS)
+        model.learn(each)
+        saved = copied(model)
+        told = Told(workers)
+        workers.restart(1)
+        model.learn(each, callback=told, reset_num_timesteps=False)
+    with workers_of(tmp_path) as workers:
+        resumed = model_of(workers, steps=STEPS)
+        saved.into(resumed)
+        again = Told(workers)
+        resumed.learn(each, callback=again, reset_num_timesteps=False)
+        assert {each.iteration for each in workers.replacements} == {1}
+    assert_same_rollouts(again.rollouts[0], told.rollouts[0])
+    assert copied(resumed).weights() == copied(model).weights()
+
+
+def test_numbers_that_are_not_visible_change_nothing(tmp_path: Path) -> None:
+    visible = np.array([1, 1, 1, 1, 0, 0])
+    with workers_of(tmp_path) as workers:
+        told = Told(workers)
+        model_of(workers, steps=STEPS, visible=visible).learn(2 * STEPS * 2 * COPIES, callback=told)
+    for rollouts, buffer in zip(told.rollouts, told.buffers, strict=True):
+        assert not buffer["observations"][..., 4:].any()
+        assert buffer["observations"][..., :4].any()
+        logarithms = np.concatenate([each.log_probabilities for each in rollouts], axis=1)
+        assert buffer["log_probs"] == pytest.approx(logarithms, abs=1e-4)
+
+
+def test_the_same_seed_gives_the_same_weights(tmp_path: Path) -> None:
+    assert learned(workers_of(tmp_path), STEPS, 3) == learned(workers_of(tmp_path), STEPS, 3)
+
+
+class Guess(gymnasium.Env[Any, Any]):
+    """Episodes of one step, worth most for the actions (0.4, -0.6)."""
+
+    observation_space = Box(-1, 1, (3,), np.float32)
+    action_space = Box(-1, 1, (2,), np.float32)
+
+    def reset(self, **_: Any) -> Any:
+        return np.zeros(3, np.float32), {}
+
+    def step(self, action: Any) -> Any:
+        worth = -float(np.square(action - [0.4, -0.6]).sum())
+        return np.zeros(3, np.float32), worth, True, False, {}
+
+
+def test_it_learns() -> None:
+    def make() -> Any:
+        return SyncVectorEnv([Guess] * 4, autoreset_mode=AutoresetMode.SAME_STEP)
+
+    with LocalWorkers(make, workers=2, seed=1) as workers:
+        model = model_of(workers, steps=32, batch=64, policy_kwargs={"log_std_init": -1.2})
+        model.learn(12 * 32 * 8)
+    action, _ = model.predict(np.zeros((1, 3), np.float32), deterministic=True)
+    assert action[0] == pytest.approx([0.4, -0.6], abs=0.15)
+
+
+def test_mistakes_are_named(tmp_path: Path) -> None:
+    with workers_of(tmp_path) as workers:
+        environments = WorkersEnv(workers)
+        with pytest.raises(o80.InvalidArgument, match="give WorkersEnv to a RolloutPPO only"):
+            PPO("MlpPolicy", environments, n_steps=2, batch_size=2, device="cpu").learn(2)
+        with pytest.raises(o80.InvalidArgument, match="norm_reward=False"):
+            RolloutPPO("MlpPolicy", VecNormalize(environments), device="cpu")
+        options: Any = {"activation_fn": torch.nn.ReLU}
+        with pytest.raises(o80.InvalidArgument, match="layers of tanh"):
+            RolloutPPO("MlpPolicy", environments, policy_kwargs=options, device="cpu")
