@@ -19,4 +19,5 @@ void bind_journal(nanobind::module_& module);
 void bind_provenance(nanobind::module_& module);
 void bind_played_segment(nanobind::module_& module);
 void bind_nearest_name(nanobind::module_& module);
+void bind_python_driver(nanobind::module_& module);
 void bind_replay(nanobind::module_& module);

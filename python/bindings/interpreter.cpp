@@ -27,11 +27,17 @@ WithoutGil::WithoutGil() : around_(std::exchange(released, PyEval_SaveThread()))
 WithoutGil::~WithoutGil() { take(std::exchange(released, around_)); }
 
 WithGil::WithGil() : taken_(std::exchange(released, nullptr)) {
-  if (taken_ != nullptr) take(taken_);
+  if (taken_ != nullptr) {
+    take(taken_);
+  } else if (PyGILState_Check() == 0) {
+    if (ended.load(std::memory_order_relaxed)) stay();
+    own_ = call_python([] { return PyGILState_Ensure(); });
+  }
 }
 
 WithGil::~WithGil() {
   if (taken_ != nullptr) released = PyEval_SaveThread();
+  if (own_) PyGILState_Release(*own_);
 }
 
 void bind_interpreter(nanobind::module_&) {

@@ -4,6 +4,7 @@
 
 #include <cxxabi.h>
 
+#include <optional>
 #include <utility>
 
 /// Sleeps until the process ends.
@@ -35,7 +36,8 @@ class WithoutGil {
   PyThreadState* around_;  // released by an outer WithoutGil of this thread
 };
 
-/// Holds the GIL until it is destroyed, also if this thread had it already.
+/// Holds the GIL until it is destroyed: in a thread that had it already, in one that released it by
+/// WithoutGil, and in one that is not of Python.
 class WithGil {
  public:
   WithGil();
@@ -44,7 +46,8 @@ class WithGil {
   ~WithGil();
 
  private:
-  PyThreadState* taken_;  // null: this thread had the GIL already
+  PyThreadState* taken_;  // null: this thread had the GIL already, or is not of Python
+  std::optional<PyGILState_STATE> own_;
 };
 
 /// From this call on, threads that request the GIL after the interpreter has ended sleep for ever.

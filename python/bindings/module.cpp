@@ -33,4 +33,5 @@ NB_MODULE(_core, m) {
   bind_played_segment(m);
   bind_nearest_name(m);
   bind_replay(m);
+  bind_python_driver(m);
 }

@@ -1,6 +1,7 @@
 #include "schema_builder.hpp"
 
 #include <nanobind/stl/array.h>
+#include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
@@ -63,6 +64,14 @@ void SchemaBuilder::add_labels(o80::FieldRow& field, const nb::dict& labels) {
   }
 }
 
+std::shared_ptr<o80::Description> SchemaBuilder::description() const {
+  auto description = std::make_shared<o80::Description>();
+  description->schema = schema;
+  description->schema.head.block = o80::round_up(schema.head.block, 8);
+  description->layout = o80::row_layout(description->schema);
+  return description;
+}
+
 void bind_schema_builder(nb::module_& m) {
   nb::class_<SchemaBuilder>(m, "SchemaBuilder", "The schema of a robot under construction.")
       .def(nb::init<const std::string&>(), "robot"_a)
@@ -77,6 +86,8 @@ void bind_schema_builder(nb::module_& m) {
       .def("set_follow", &SchemaBuilder::set_follow, "actuator"_a)
       .def("set_limits", &SchemaBuilder::set_limits, "actuator"_a, "field"_a, "limits"_a)
       .def("rests_at", &SchemaBuilder::rests_at, "actuator"_a, "field"_a, "value"_a)
+      .def("of_the_world", &SchemaBuilder::of_the_world)
+      .def("description", &SchemaBuilder::description)
       .def("set_model", &SchemaBuilder::set_model, "mjcf"_a, "file"_a)
       .def("moves_joint", &SchemaBuilder::moves_joint, "actuator"_a, "joint"_a)
       .def("sensor_moves_joint", &SchemaBuilder::sensor_moves_joint, "field"_a, "index"_a,

@@ -4,10 +4,12 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "o80/describe/schema.hpp"
+#include "o80/runtime/observation.hpp"
 
 /// A schema that Python code fills.
 struct SchemaBuilder {
@@ -58,6 +60,11 @@ struct SchemaBuilder {
   void rests_at(std::uint32_t actuator, const std::string& field, double value) {
     schema.actuator(actuator).rests_at(field, value);
   }
+
+  void of_the_world() { schema.of_the_world(); }
+
+  /// The schema as readers see it.
+  std::shared_ptr<o80::Description> description() const;
 
   /// Sets the model that viewers draw.
   void set_model(const std::string& mjcf, const std::string& file) {

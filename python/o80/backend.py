@@ -25,9 +25,10 @@ class StartAfresh:
 
     The backend makes a fresh start: it drops all queues and publishes an extra row with this
     reading and desired = observed (or `desired`). Iterations continue to count.
+    A driver (`o80.drivers`) returns StartAfresh(), and its next reading has the numbers.
     """
 
-    observed: Any
+    observed: Any = None
     extended: Any = None
     desired: Any = None
 
@@ -425,6 +426,8 @@ def read_afresh(
     desired: NDArray[Any],
 ) -> None:
     """Writes the reading of a fresh start into the buffers of a row."""
+    if answer.observed is None:
+        raise InvalidArgument("StartAfresh needs the new reading: o80.StartAfresh(observed, ...)")
     fill(observed, answer.observed, "observed")
     if answer.extended is not None:
         fill(extended, answer.extended, "extended")

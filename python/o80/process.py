@@ -7,7 +7,8 @@ import signal
 import subprocess
 import time
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, Self
 from weakref import WeakSet
@@ -22,7 +23,6 @@ from o80.errors import (
     UsedAfterFork,
 )
 from o80.frontend import Frontend
-from o80.installation import prefix
 
 GRACE = 5.0  # [s] for a robot to stop
 LOOK = 0.002  # [s] between checks of a robot that starts
@@ -182,15 +182,20 @@ os.register_at_fork(after_in_child=_let_go_of_all)
 
 
 def start_process(
-    library: str, segment: str, flags: Sequence[str], timeout: float | None
+    program: Sequence[str | Path],
+    segment: str,
+    flags: Sequence[str],
+    timeout: float | None,
+    environment: Mapping[str, str] | None = None,
 ) -> Process:
-    """Starts a robot library in a process and waits until it runs."""
+    """Starts the program of a robot and waits until it runs. environment: None: as here."""
     import tempfile  # here, for it takes a tenth of the time to import o80
 
     output = tempfile.TemporaryFile()  # noqa: SIM115, it lives as long as the process
     try:
         popen = subprocess.Popen(
-            [prefix() / "bin" / "o80-run", library, f"--segment={segment}", "--until-eof", *flags],
+            [*program, f"--segment={segment}", "--until-eof", *flags],
+            env=environment,
             stdin=subprocess.PIPE,
             stdout=output,
             stderr=subprocess.STDOUT,

@@ -8,8 +8,10 @@ with o80.robots.load("two_joints").inline() as arm:
 """
 
 import builtins
+import inspect
 import numbers
 import os
+import sys
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -21,6 +23,7 @@ from o80.announced import announced
 from o80.checked import whole
 from o80.errors import DriverError, InvalidArgument
 from o80.frontend import Frontend
+from o80.installation import prefix
 from o80.loop_options import did_you_mean, loop_options, loop_texts, text_of
 from o80.process import Process, start_process
 
@@ -85,28 +88,66 @@ def path_of(name_or_path: str | os.PathLike[str]) -> Path:
     raise DriverError(_core.no_such_robot(text, [*found, *packaged]))
 
 
-def load(name_or_path: str | os.PathLike[str]) -> "Robot":
-    """Loads a robot, by its name or by the path of its library.
+def load(name_or_path: str | os.PathLike[str] | type[Any]) -> "Robot":
+    """Loads a robot: by its name, by the path of its library, or a driver class in Python.
 
+    A class is given itself, or as "module:Class" or "file.py:Class", which imports the module.
     Raises DriverError with the known robots in its text.
     """
+    if isinstance(name_or_path, type):
+        return PythonRobot(name_or_path)
+    place = os.fspath(name_or_path)
+    if is_place(place):
+        return PythonRobot(place)
+    if (announced_class := _announced_class(place)) is not None:
+        return PythonRobot(announced_class)
     return Robot(_core.load_robot(str(path_of(name_or_path))))
 
 
-def _path_of(point: "EntryPoint") -> Path:
+def is_place(text: str) -> bool:
+    """True for "module:Class" and "file.py:Class"."""
+    where, colon, name = text.rpartition(":")
+    return bool(colon and where) and name.isidentifier()
+
+
+def place_of(robot: str) -> str | None:
+    """Where the driver class of a robot is found, if it is in Python: "module:Class"."""
+    if is_place(robot):
+        return robot
+    driver = _announced_class(robot)
+    return None if driver is None else f"{driver.__module__}:{driver.__qualname__}"
+
+
+def _announced_class(name: str) -> type[Any] | None:
+    """The driver class that a Python package announces under a name."""
+    point = announced(GROUP).get(name)
+    if point is None or name in dict(_core.find_robots()):
+        return None
+    value = _value_of(point)
+    return value if isinstance(value, type) else None
+
+
+def _value_of(point: "EntryPoint") -> Any:
+    """What an entry point names: a driver class, a path, or what its function returns."""
     package = point.dist.name if point.dist is not None else point.module
     try:
         value = point.load()
-        path = value() if callable(value) else value
+        return value if isinstance(value, type) or not callable(value) else value()
     except Exception as error:
         raise DriverError(
             f"robot '{point.name}' is left out: the package {package}, which announces it, failed "
             f"with {type(error).__name__}: {error}. Repair the package or uninstall it"
         ) from error
+
+
+def _path_of(point: "EntryPoint") -> Path:
+    path = _value_of(point)
+    if isinstance(path, type):
+        return Path(inspect.getsourcefile(path) or path.__module__)
     if not isinstance(path, (str, os.PathLike)):
         raise DriverError(
-            f"entry point '{point.name}' of the group {GROUP} gives {path!r}: it must be the path "
-            f"of a robot library, or a function that gives it"
+            f"entry point '{point.name}' of the group {GROUP} gives {path!r}: it must be a driver "
+            f"class, the path of a robot library, or a function that gives it"
         )
     return Path(path)
 
@@ -145,6 +186,16 @@ class Robot:
             )
             for option in self._library.options
         ]
+
+    @property
+    def _program(self) -> builtins.list[str | Path]:
+        """What runs this robot in a process."""
+        return [prefix() / "bin" / "o80-run", self._library.path]
+
+    @property
+    def _environment(self) -> dict[str, str] | None:
+        """Of that process; None: that of this one."""
+        return None
 
     def start(
         self,
@@ -221,7 +272,9 @@ class Robot:
         ]
         known = [option.name for option in loop_options().values() if option.of_start]
         words += [f"--{name}={text}" for name, text in self._config(config, known)]
-        return start_process(self._library.path, segment or self.name, words, timeout)
+        return start_process(
+            self._program, segment or self.name, words, timeout, self._environment
+        )
 
     @overload
     def inline(
@@ -361,3 +414,38 @@ class Robot:
 
     def __repr__(self) -> str:
         return f"<o80.robots.Robot '{self.name}' of {self.path}>"
+
+
+class PythonRobot(Robot):
+    """A driver class in Python. Its process is a Python program."""
+
+    def __init__(self, driver: str | type[Any]) -> None:
+        """driver: the class, or where it is found. Raises DriverError."""
+        from o80.drivers.driver_class import found, library_of
+
+        self._class = found(driver) if isinstance(driver, str) else driver
+        super().__init__(library_of(self._class, driver if isinstance(driver, str) else None))
+
+    @property
+    def path(self) -> Path:
+        """Path of the file with the class."""
+        return Path(inspect.getsourcefile(self._class) or self._class.__module__)
+
+    @property
+    def _program(self) -> builtins.list[str | Path]:
+        place = self._library.path
+        if not place:
+            raise DriverError(
+                f"{self._class.__name__} was typed in, so another process cannot import it: write "
+                "it into a file, or use inline()"
+            )
+        return [sys.executable, "-u", "-m", "o80.run_driver", place]
+
+    @property
+    def _environment(self) -> dict[str, str]:
+        """With the folders in which modules are found here."""
+        folders = [folder or os.getcwd() for folder in sys.path]
+        return {**os.environ, "PYTHONPATH": os.pathsep.join(folders)}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return load, (self._class,)

@@ -49,13 +49,22 @@ fs::path holder_of(const RobotTable& table) {
   return fs::canonical(name.has_parent_path() ? name : fs::path("/proc/self/exe"), error);
 }
 
+struct KnownLibraries {
+  std::mutex guard;
+  std::map<const RobotTable*, std::pair<std::string, std::string>> of;  // path and hash
+};
+
+KnownLibraries& known_libraries() {
+  static KnownLibraries known;
+  return known;
+}
+
 /// The library of a robot and its hash, which are computed once: a library stays loaded until the
 /// process ends.
 std::pair<std::string, std::string> library_of(const RobotTable& table) {
-  static std::mutex guard;
-  static std::map<const RobotTable*, std::pair<std::string, std::string>> known;
-  const std::scoped_lock lock(guard);
-  const auto [found, is_new] = known.try_emplace(&table);
+  KnownLibraries& libraries = known_libraries();
+  const std::scoped_lock lock(libraries.guard);
+  const auto [found, is_new] = libraries.of.try_emplace(&table);
   if (is_new) {
     const fs::path path = holder_of(table);
     found->second = {path.string(), sha256_of(path)};
@@ -64,6 +73,12 @@ std::pair<std::string, std::string> library_of(const RobotTable& table) {
 }
 
 }  // namespace
+
+void name_library(const RobotTable& table, const std::string& path) {
+  KnownLibraries& libraries = known_libraries();
+  const std::scoped_lock lock(libraries.guard);
+  libraries.of[&table] = {path, sha256_of(path)};
+}
 
 Provenance provenance_of(const RobotTable& table, const OptionValues& options) {
   Provenance provenance;

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 
 import typer
@@ -14,10 +15,12 @@ from o80.cli.screen import style
 def run(context: typer.Context) -> None:
     """Run a robot: [bold]o80 run ROBOT FLAGS[/bold].
 
-    ROBOT is a name (see [bold]o80 run[/bold] alone) or the path of a robot library.
+    ROBOT is a name (see [bold]o80 run[/bold] alone), the path of a robot library, or a driver class
+    in Python: module:Class or file.py:Class.
     [bold]o80 run ROBOT --help[/bold] lists the flags of this robot and those of every robot:
     --segment, --frequency, --bursting, --history, --policy, --cpus and more.
-    The process becomes a C++ program without Python; Ctrl-C stops it in order.
+    The process becomes a C++ program (without Python, unless the driver is in Python); Ctrl-C stops
+    it in order.
     """
     arguments = context.args
     if not arguments or arguments[0] in ("-h", "--help"):
@@ -25,6 +28,8 @@ def run(context: typer.Context) -> None:
         _print_robots()
         raise typer.Exit(0 if arguments else 2)
     robot, flags = arguments[0], arguments[1:]
+    if (place := o80.robots.place_of(robot)) is not None:
+        os.execv(sys.executable, [sys.executable, "-u", "-m", "o80.run_driver", place, *flags])
     program = Path(o80.prefix()) / "bin" / "o80-run"
     os.execv(program, [str(program), str(o80.robots.path_of(robot)), *flags])
 

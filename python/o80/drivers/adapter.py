@@ -1,0 +1,186 @@
+"""One driver object as the compiled loop calls it."""
+
+from __future__ import annotations
+
+import inspect
+import traceback
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o80 import _core
+from o80.checked import mapping
+from o80.description import SchemaWriter
+from o80.drivers.reading import Answer, Desired, Fault, Reading
+from o80.errors import Error, InvalidArgument, RequestRejected
+from o80.layout import Layout, dtype_of_type
+from o80.record import Record
+
+NANOSECOND = 1e-9
+
+
+def fault_of(error: BaseException) -> str:
+    """The text that frontends read of an exception of a driver."""
+    if isinstance(error, (Fault, Error)):
+        return str(error)
+    text = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    frames = traceback.extract_tb(error.__traceback__)
+    if frames:
+        where = frames[-1]
+        text += f" ({where.filename}:{where.lineno}, in {where.name})"
+    return text
+
+
+class Adapter:
+    """Holds the memory through which rows pass, and calls the verbs.
+
+    The compiled loop fills `desired_block` and `active_words` before `write`, fills
+    `observed_block` and `extended_block` before `read`, and takes them after it; `fresh_block` has
+    the desired states of a fresh start.
+    """
+
+    def __init__(self, driver: Any, name: str) -> None:
+        self._driver = driver
+        self._name = name
+        self.period = 0
+
+    def describe(self, asked: int) -> _core.SchemaBuilder:
+        """The schema of the driver. asked: period that the user gave [ns]; 0: none."""
+        self.period = self._period(asked)
+        writer = SchemaWriter(self._name, mapping(self._told("units"), "units", "fields to units"))
+        writer.add_actuators(self._told("actuators", ()), self._told("dtype", float))
+        if (extended := self._told("extended")) is not None:
+            writer.set_extended(extended)
+        requests = mapping(self._told("requests"), "requests", "names to dtypes or None")
+        writer.add_requests(requests, self._told("while_halted", ()))
+        writer.set_limits(mapping(self._told("limits"), "limits", "actuators to limits"))
+        rests = mapping(self._told("rests_at"), "rests_at", "actuators to fields and values")
+        writer.set_rests(rests)
+        writer.set_idle(self._told("when_idle", "hold"))
+        joints = mapping(self._told("joints"), "joints", "joints to what moves them")
+        writer.set_model(self._told("model"), joints)
+        if self._told("of_the_world", True):
+            writer.builder.of_the_world()
+        self._make_blocks(Layout(writer.builder.description()))
+        return writer.builder
+
+    def _told(self, name: str, otherwise: Any = None) -> Any:
+        return getattr(self._driver, name, otherwise)
+
+    def _period(self, asked: int) -> int:
+        own = self._told("frequency")
+        if own is None:
+            return asked
+        if not isinstance(own, (int, float)) or not 0 < own <= 1e9:
+            raise InvalidArgument(f"frequency must be a positive number, got {own!r}")
+        period = round(1.0 / own / NANOSECOND)
+        if asked not in (0, period):
+            raise InvalidArgument(
+                f"the driver runs at {own:g} Hz, but {1 / (asked * NANOSECOND):g} Hz was "
+                f"requested: leave the frequency out, or set it to {own:g}"
+            )
+        return period
+
+    def _make_blocks(self, layout: Layout) -> None:
+        """Memory for the states and the sensor values of a row."""
+        schema = layout.schema
+        actuators = [row["name"] for row in schema["actuators"]]
+        self._requests: list[Mapping[str, Any]] = schema["requests"]
+        names = [row["name"] for row in self._requests]
+        for name in names:
+            if not callable(getattr(self._driver, f"on_{name}", None)):
+                raise InvalidArgument(
+                    f"{type(self._driver).__name__} lists the request '{name}': give it the method "
+                    f"on_{name}(self, fields)"
+                )
+        self.payload_sizes = [dtype_of_type(row["type"]).itemsize for row in self._requests]
+
+        def states() -> tuple[NDArray[np.uint8], NDArray[Any]]:
+            element, shape = layout.states.subdtype or (layout.states, ())
+            block = np.zeros(layout.states.itemsize, np.uint8)
+            return block, np.ndarray(shape, element, block)
+
+        self.desired_block, desired = states()
+        self.observed_block, observed = states()
+        self.fresh_block, fresh = states()
+        self.extended_block = np.zeros(layout.extras.itemsize, np.uint8)
+        extended: NDArray[Any] = np.ndarray((), layout.extras, self.extended_block)
+        self.active_words = np.zeros(8 * ((len(actuators) + 63) // 64), np.uint8)
+        self._desired = Desired(desired, self.active_words, len(actuators))
+        self._reading = Reading(observed, extended, fresh, actuators, names)
+
+    # ------------------------------------------------------------------ verbs
+
+    def start(self) -> None:
+        if verb := self._told("start"):
+            verb()
+
+    def wait(self, due: int) -> None:
+        self._driver.wait(due)
+
+    def write(self, iteration: int, time: int, period: int) -> None:
+        if verb := self._told("write"):
+            desired = self._desired
+            desired.iteration, desired.time = iteration, time
+            desired.period = period * NANOSECOND
+            verb(desired)
+
+    def read(
+        self, iteration: int, time: int, fresh: bool, runs: Sequence[bool]
+    ) -> tuple[Any, ...] | None:
+        self._reading.begin(iteration, time, fresh, runs)
+        self._driver.read(self._reading)
+        return self._reading.report()
+
+    def request(self, index: int, payload: bytes) -> tuple[int, str]:
+        row = self._requests[index]
+        described = dtype_of_type(row["type"])
+        fields = Record(np.ndarray((), described, bytearray(payload)))
+        handler = getattr(self._driver, f"on_{row['name']}")
+        try:
+            return Answer.of(handler(fields), f"on_{row['name']}")
+        except RequestRejected as why:
+            return Answer.REJECTED, str(why) or "the handler gave no reason"
+
+    def halt(self) -> None:
+        self._driver.halt()
+
+    def resume(self) -> tuple[int, str]:
+        try:
+            self._driver.resume()
+        except RequestRejected as why:
+            return Answer.REJECTED, str(why) or "resume() gave no reason"
+        return Answer.DONE, ""
+
+    def stop(self) -> None:
+        if verb := self._told("stop"):
+            try:
+                verb()
+            except Exception:
+                traceback.print_exc()
+
+
+def check_verbs(driver: type[Any]) -> None:
+    """Raises InvalidArgument for a verb that is missing or takes other arguments."""
+    wanted = {
+        "start": (),
+        "write": ("desired",),
+        "read": ("reading",),
+        "wait": ("due",),
+        "halt": (),
+        "resume": (),
+        "stop": (),
+    }
+    if not callable(getattr(driver, "read", None)):
+        raise InvalidArgument(f"{driver.__name__} is no driver: give it read(self, reading)")
+    for name, arguments in wanted.items():
+        verb = getattr(driver, name, None)
+        if verb is None:
+            continue
+        call = f"{name}({', '.join(('self', *arguments))})"
+        try:
+            inspect.signature(verb).bind(None, *arguments)
+        except (TypeError, ValueError):
+            raise InvalidArgument(f"{driver.__name__}.{name} must be {call}") from None

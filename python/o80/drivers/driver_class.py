@@ -1,0 +1,114 @@
+"""A driver class in Python as a robot: found by "module:Class", described for the compiled loop."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import inspect
+import platform
+import re
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from o80 import _core
+from o80.drivers.adapter import Adapter, check_verbs
+from o80.drivers.option import Options
+from o80.errors import DriverError, InvalidArgument
+
+
+def found(place: str) -> type[Any]:
+    """The class at "module:Class" or "file.py:Class". Raises DriverError."""
+    where, _, name = place.rpartition(":")
+    try:
+        module = _file(Path(where)) if where.endswith(".py") else importlib.import_module(where)
+    except Exception as error:
+        raise DriverError(
+            f"the driver {place!r} cannot be imported: {type(error).__name__}: {error}"
+        ) from error
+    driver = getattr(module, name, None)
+    if not isinstance(driver, type):
+        classes = [key for key, value in vars(module).items() if isinstance(value, type)]
+        raise DriverError(
+            f"{where} has no class '{name}'{_core.names_instead(name, sorted(classes))}"
+        )
+    return driver
+
+
+def _file(path: Path) -> Any:
+    """Imports a file as the module of its name; its folder is searched for other modules."""
+    path = path.resolve()
+    known = sys.modules.get(path.stem)
+    if known is not None and getattr(known, "__file__", None) == str(path):
+        return known
+    if str(path.parent) not in sys.path:
+        sys.path.insert(0, str(path.parent))
+    return importlib.import_module(path.stem)
+
+
+def place_of(driver: type[Any]) -> str:
+    """Where another process finds a class."""
+    if driver.__module__ == "__main__":
+        file = getattr(sys.modules["__main__"], "__file__", None)
+        return f"{Path(file).resolve()}:{driver.__qualname__}" if file else ""
+    return f"{driver.__module__}:{driver.__qualname__}"
+
+
+class DriverClass:
+    """A driver class as the compiled loop sees it."""
+
+    def __init__(self, driver: type[Any], place: str) -> None:
+        """Raises InvalidArgument if the class is no driver."""
+        check_verbs(driver)
+        self._driver = driver
+        self._options = Options.of(driver)
+        self.path = place
+        name = getattr(driver, "name", None)
+        self.name: str = name if isinstance(name, str) else _words(driver.__name__)
+        self.built_with = f"o80 {_core.version()}; Python {platform.python_version()}"
+        self.has_wait = hasattr(driver, "wait")
+        self.has_halt = hasattr(driver, "halt")
+        self.has_resume = hasattr(driver, "resume")
+
+    @property
+    def options(self) -> list[list[str]]:
+        """Name, kind, default, help and unit of each option."""
+        return self._options.rows
+
+    def config(self, texts: Sequence[tuple[str, str]]) -> Any:
+        """The Config of options; None without one. Raises InvalidArgument."""
+        values = self._options.values(texts)
+        return None if self._options.config is None else self._options.config(**values)
+
+    def make(self, texts: Sequence[tuple[str, str]]) -> Adapter:
+        """A driver object."""
+        config = self.config(texts)
+        return Adapter(self._driver() if config is None else self._driver(config), self.name)
+
+    def library(self) -> _core.RobotLibrary:
+        """The class as a robot."""
+        try:
+            file = inspect.getsourcefile(self._driver) or ""
+        except TypeError:
+            file = ""
+        return _core.python_library(self, file)
+
+
+_libraries: dict[type[Any], _core.RobotLibrary] = {}
+
+
+def library_of(driver: type[Any], place: str | None = None) -> _core.RobotLibrary:
+    """A driver class as a robot; the same one for each call. Raises DriverError."""
+    if driver not in _libraries:
+        try:
+            described = DriverClass(driver, place or place_of(driver))
+        except InvalidArgument as error:
+            raise DriverError(str(error)) from None
+        _libraries[driver] = described.library()
+    return _libraries[driver]
+
+
+def _words(name: str) -> str:
+    """ "BallTracker" as ball_tracker."""
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", name).lower()

@@ -1,0 +1,186 @@
+"""The options of a driver in Python: the fields of its Config, a dataclass."""
+
+from __future__ import annotations
+
+import dataclasses
+import types
+import typing
+from collections.abc import Callable, Sequence
+from enum import Enum
+from typing import Any, Literal, NewType, get_args, get_origin
+
+from o80 import _core
+from o80.errors import InvalidArgument
+
+Seed = NewType("Seed", int)
+"""A field of this type is drawn at each start, unless it is given, and recorded."""
+
+SEED_KIND = "seed"
+DRAWN = "drawn at each start"
+YES, NO = ("true", "1", "yes", "True"), ("false", "0", "no", "False")
+
+
+def option(default: Any, help: str = "", unit: str = "") -> Any:
+    """A field of a Config with a text for `--help`, and a unit such as "rad/s"."""
+    metadata = {"help": help, "unit": unit}
+    if isinstance(default, list):
+        return dataclasses.field(default_factory=lambda: list(default), metadata=metadata)
+    return dataclasses.field(default=default, metadata=metadata)
+
+
+@dataclasses.dataclass(frozen=True)
+class Kind:
+    """A type of options."""
+
+    name: str
+    """number, integer, boolean, text, "one of: a, b", "3 x number", or seed"""
+    parse: Callable[[str], Any]
+    """Raises ValueError."""
+    text: Callable[[Any], str] = str
+
+
+@dataclasses.dataclass(frozen=True)
+class Options:
+    """The options of a driver class."""
+
+    config: type[Any] | None
+    kinds: dict[str, Kind]
+    rows: list[list[str]]
+    """Name, kind, default, help and unit of each."""
+
+    @classmethod
+    def of(cls, driver: type[Any]) -> Options:
+        """Those of the class `Config` in a driver class. Raises InvalidArgument."""
+        config = getattr(driver, "Config", None)
+        if config is None:
+            return cls(None, {}, [])
+        if not (isinstance(config, type) and dataclasses.is_dataclass(config)):
+            raise InvalidArgument(
+                f"{driver.__name__}.Config must be a dataclass: write @dataclass above it"
+            )
+        hints = typing.get_type_hints(config)
+        kinds, rows = {}, []
+        for field in dataclasses.fields(config):
+            if not field.init:
+                continue
+            name = f"{driver.__name__}.Config.{field.name}"
+            kinds[field.name] = kind = kind_of(hints[field.name], _default(field), name)
+            otherwise = DRAWN if kind.name == SEED_KIND else kind.text(_default(field))
+            about = field.metadata
+            rows.append(
+                [field.name, kind.name, otherwise, about.get("help", ""), about.get("unit", "")]
+            )
+        return cls(config, kinds, rows)
+
+    def values(self, texts: Sequence[tuple[str, str]]) -> dict[str, Any]:
+        """The values of options. Raises InvalidArgument."""
+        values = {}
+        for name, text in texts:
+            if name not in self.kinds:
+                instead = _core.names_instead(name, list(self.kinds))
+                raise InvalidArgument(f"there is no option '{name}'{instead}")
+            kind = self.kinds[name]
+            try:
+                values[name] = kind.parse(text)
+            except ValueError:
+                raise InvalidArgument(
+                    f"option '{name}' must be {_with_article(kind.name)}, got '{text}'"
+                ) from None
+        return values
+
+
+def _default(field: dataclasses.Field[Any]) -> Any:
+    if field.default is not dataclasses.MISSING:
+        return field.default
+    if field.default_factory is not dataclasses.MISSING:
+        return field.default_factory()
+    raise InvalidArgument(
+        f"option '{field.name}' has no default: give the field of Config one, for every robot can "
+        "be started without options"
+    )
+
+
+def kind_of(annotation: Any, default: Any, name: str) -> Kind:
+    """The kind of an option. Raises InvalidArgument for a type that cannot be one."""
+    simple = _simple_kind(annotation)
+    if simple is not None:
+        return simple
+    if get_origin(annotation) in (list, tuple) and isinstance(default, (list, tuple)):
+        elements = [each for each in get_args(annotation) if each is not Ellipsis]
+        element = _simple_kind(elements[0]) if len(set(elements)) == 1 else None
+        if element is not None and default:
+            return _several(element, len(default), get_origin(annotation))
+    raise InvalidArgument(
+        f"{name} must be a float, an int, a bool, a str, a Path, an Enum, a Literal of texts, a "
+        f"Seed, or a list or tuple of one of them with a default of its length; it is {annotation}"
+    )
+
+
+def _simple_kind(annotation: Any) -> Kind | None:
+    from pathlib import Path
+
+    if annotation is Seed:
+        return Kind(SEED_KIND, _seed)
+    if annotation is bool:
+        return Kind("boolean", _boolean, lambda value: "true" if value else "false")
+    if annotation is int:
+        return Kind("integer", int)
+    if annotation is float:
+        return Kind("number", float, lambda value: repr(float(value)))
+    if annotation is str:
+        return Kind("text", str)
+    if annotation is Path:
+        return Kind("text", Path)
+    if isinstance(annotation, type) and issubclass(annotation, Enum):
+        labels = ", ".join(annotation.__members__)
+        return Kind(f"one of: {labels}", lambda text: _member(annotation, text), lambda v: v.name)
+    if get_origin(annotation) is Literal and all(isinstance(w, str) for w in get_args(annotation)):
+        words = get_args(annotation)
+        return Kind(f"one of: {', '.join(words)}", lambda text: _word(words, text))
+    return None
+
+
+def _several(element: Kind, count: int, make: Any) -> Kind:
+    def parse(text: str) -> Any:
+        parts = text.split(",")
+        if len(parts) != count:
+            raise ValueError(text)
+        return make(element.parse(part) for part in parts)
+
+    return Kind(
+        f"{count} x {element.name}", parse, lambda values: ",".join(map(element.text, values))
+    )
+
+
+def _seed(text: str) -> int:
+    value = int(text)
+    if not 0 <= value < 2**64:
+        raise ValueError(text)
+    return value
+
+
+def _boolean(text: str) -> bool:
+    if text not in YES + NO:
+        raise ValueError(text)
+    return text in YES
+
+
+def _member(labels: type[Enum], text: str) -> Enum:
+    members: types.MappingProxyType[str, Enum] = labels.__members__
+    if text not in members:
+        raise ValueError(text)
+    return members[text]
+
+
+def _word(words: Sequence[str], text: str) -> str:
+    if text not in words:
+        raise ValueError(text)
+    return text
+
+
+def _with_article(kind: str) -> str:
+    if kind == SEED_KIND:
+        return "a whole number, at least 0"
+    if kind.startswith("one of") or kind[0].isdigit():
+        return kind
+    return f"an {kind}" if kind == "integer" else f"a {kind}"

@@ -1,0 +1,196 @@
+"""What the verbs of a driver get: the desired states to write, and a reading to fill."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o80 import _core
+from o80.backend import Running, StartAfresh, fill
+from o80.errors import InvalidArgument
+from o80.record import Record
+
+
+class Fault(Exception):
+    """Ends the loop; see `Reading.fault`."""
+
+
+def numbered(name: str | int, known: Sequence[str], what: str) -> int:
+    """The number of an actuator or a request, by its name or number. Raises InvalidArgument."""
+    if isinstance(name, str) and name in known:
+        return known.index(name)
+    if isinstance(name, int) and not isinstance(name, bool) and 0 <= name < len(known):
+        return name
+    raise InvalidArgument(f"there is no {what} {name!r}{_core.names_instead(str(name), [*known])}")
+
+
+class Desired:
+    """The desired states of an iteration. Its arrays change with the next one: copy what you keep."""
+
+    def __init__(self, block: NDArray[Any], active: NDArray[np.uint8], count: int) -> None:
+        self._block = block
+        self._words = active
+        self._count = count
+        self.iteration = 0
+        self.time = 0  #: [ns]
+        self.period = 0.0  #: [s]
+
+    @property
+    def states(self) -> Any:
+        """An array (actuators,), or a record of groups of actuators."""
+        return self._block if self._block.ndim else Record(self._block)
+
+    @property
+    def active(self) -> NDArray[np.bool_]:
+        """(actuators,) True where a command or braking gives the state."""
+        bits = np.unpackbits(self._words, count=self._count, bitorder="little")
+        return bits.view(np.bool_)
+
+    def __getitem__(self, index: Any) -> Any:
+        return self.states[index]
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        return np.array(self._block, dtype=dtype, copy=copy)
+
+
+class Reading:
+    """What came of an iteration: fill `observed` and `extended`. They begin with the last reading."""
+
+    def __init__(
+        self,
+        observed: NDArray[Any],
+        extended: NDArray[Any],
+        desired: NDArray[Any],
+        actuators: Sequence[str],
+        requests: Sequence[str],
+    ) -> None:
+        self._observed = observed
+        self._extended = extended
+        self._desired = desired
+        self._actuators = actuators
+        self._requests = requests
+        self.begin(0, 0, False, [])
+
+    def begin(self, iteration: int, time: int, fresh: bool, runs: Sequence[bool]) -> None:
+        """A new reading."""
+        self.iteration = iteration
+        self.time = time  #: [ns], of the row
+        self.fresh = fresh
+        """True for row 0, and after a reset, a restore or a resume: go on from what is read now."""
+        self._runs = runs
+        self._finished = self._missed = self._has_desired = False
+        self._halt: str | None = None
+        self._interrupted: list[int] = []
+        self._reports: list[tuple[int, int, str]] = []
+
+    @property
+    def observed(self) -> NDArray[Any]:
+        """(actuators,), or a structured array of groups: assign to it, or to its elements."""
+        return self._observed
+
+    @observed.setter
+    def observed(self, values: Any) -> None:
+        fill(self._observed, values, "observed")
+
+    @property
+    def extended(self) -> NDArray[Any]:
+        """The sensor values: `reading.extended["force"] = ...`, or a mapping for all of them."""
+        return self._extended
+
+    @extended.setter
+    def extended(self, values: Any) -> None:
+        fill(self._extended, values, "extended")
+
+    def halt(self, reason: str) -> None:
+        """Halts the robot. May be repeated with each reading; the same text is the same halt."""
+        self._halt = reason
+
+    def fault(self, reason: str) -> None:
+        """Ends the loop at once; frontends raise the reason."""
+        raise Fault(reason)
+
+    def finish(self) -> None:
+        """Ends the loop in order: in real time the robot brakes first."""
+        self._finished = True
+
+    def missed(self) -> None:
+        """This tick brought no reading: it counts as an overrun."""
+        self._missed = True
+
+    def interrupt(self, actuator: int | str) -> None:
+        """Ends the commands of an actuator as interrupted."""
+        self._interrupted.append(numbered(actuator, self._actuators, "actuator"))
+
+    def go_on_from(self, desired: Any) -> None:
+        """In a fresh start: the desired states to go on from, instead of the observed ones."""
+        fill(self._desired, desired, "desired")
+        self._has_desired = True
+
+    def runs(self, request: str) -> bool:
+        """True if a request was answered with o80.Running and has not ended."""
+        return self._runs[numbered(request, self._requests, "request")]
+
+    def progress(self, request: str, text: str) -> None:
+        """Sets the text that frontends see while a request runs: at most 247 bytes."""
+        self._report(request, Answer.RUNNING, text)
+
+    def ended(
+        self, request: str, answer: StartAfresh | None = None, *, rejected: str | None = None
+    ) -> None:
+        """Ends a request that runs: done, with a fresh start, or rejected for a reason."""
+        if rejected is not None:
+            self._report(request, Answer.REJECTED, rejected)
+        else:
+            self._report(request, Answer.DONE if answer is None else Answer.START_AFRESH, "")
+
+    def _report(self, request: str, answer: int, text: str) -> None:
+        index = numbered(request, self._requests, "request")
+        self._reports = [each for each in self._reports if each[0] != index]
+        self._reports.append((index, answer, text))
+
+    def report(self) -> tuple[Any, ...] | None:
+        """What was called, for the compiled loop; None: nothing."""
+        if not (
+            self._finished
+            or self._missed
+            or self._has_desired
+            or self._halt is not None
+            or self._interrupted
+            or self._reports
+        ):
+            return None
+        return (
+            self._finished,
+            self._missed,
+            self._has_desired,
+            self._halt,
+            self._interrupted,
+            self._reports,
+        )
+
+
+class Answer:
+    """Results of a request, as the compiled loop numbers them."""
+
+    DONE = 0
+    REJECTED = 1
+    START_AFRESH = 2
+    FAILED = 3
+    RUNNING = 4
+
+    @staticmethod
+    def of(answer: Any, what: str) -> tuple[int, str]:
+        """Of what a handler returned. Raises InvalidArgument."""
+        if answer is None:
+            return Answer.DONE, ""
+        if isinstance(answer, Running):
+            return Answer.RUNNING, answer.progress
+        if isinstance(answer, StartAfresh):
+            return Answer.START_AFRESH, ""
+        raise InvalidArgument(
+            f"{what} must return None, o80.StartAfresh() or o80.Running(...), or raise "
+            f"o80.RequestRejected; got {answer!r}"
+        )

@@ -1,0 +1,25 @@
+"""Runs a driver in Python as a process: python -m o80.run_driver module:Class FLAGS."""
+
+import signal
+import sys
+
+signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the loop stops in order by it
+
+
+def main() -> int:
+    """Returns the exit code."""
+    from o80 import _core
+    from o80.drivers.driver_class import found, library_of
+    from o80.errors import Error
+
+    place, *flags = sys.argv[1:]
+    try:
+        library = library_of(found(place), place)
+    except Error as error:
+        print(f"o80: {error}", file=sys.stderr)
+        return 1
+    return _core.run_driver(library, [place, *flags])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,362 @@
+"""A driver class in Python is a robot like any other."""
+
+import signal
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import o80
+import room_sensor
+from o80.drivers import Reading
+from room_sensor import Joint, Paced, RoomSensor
+
+WAIT = 60.0  # [s] longer than anything here takes
+HERE = Path(__file__).parent
+
+
+def command(*words: str, code: int = 0) -> str:
+    """Runs the program o80 in the folder of the drivers."""
+    program = [str(Path(sys.executable).parent / "o80"), *words]
+    done = subprocess.run(program, cwd=HERE, capture_output=True, text=True, timeout=WAIT)
+    assert done.returncode == code, done.stdout + done.stderr
+    return done.stdout + done.stderr
+
+
+# ---------------------------------------------------------------------- options
+
+
+def test_every_option_reaches_the_driver_and_the_provenance(segment: str) -> None:
+    given: dict[str, Any] = {
+        "mean": 2.0,
+        "times": 3,
+        "loud": True,
+        "port": "usb",
+        "folder": "there",
+        "colour": "BLUE",
+        "mode": "fast",
+        "gains": [0.25, 0.5],
+        "offsets": (4, 5, 6),
+        "seed": 7,
+    }
+    with o80.robots.load(RoomSensor).inline(segment, **given) as room:
+        assert room.latest().extended.temperature == 6.75
+        assert room.latest().extended.seed == 7
+        told = room.provenance
+    assert told.options == {
+        "mean": "2.0",
+        "times": "3",
+        "loud": "true",
+        "port": "usb",
+        "folder": "there",
+        "colour": "BLUE",
+        "mode": "fast",
+        "gains": "0.25,0.5",
+        "offsets": "4,5,6",
+        "seed": "7",
+    }
+    assert told.robot == "room"
+    assert told.library == str(Path(room_sensor.__file__).resolve())
+    assert len(told.library_sha256) == 64
+
+
+def test_a_seed_that_is_not_given_is_drawn_and_recorded(segment: str) -> None:
+    seeds = set()
+    for _ in range(3):
+        with o80.robots.load(RoomSensor).inline(segment) as room:
+            seeds.add(int(room.latest().extended.seed))
+            assert room.provenance.options["seed"] == str(room.latest().extended.seed)
+    assert len(seeds) == 3
+
+
+def test_options_are_listed_like_those_of_any_robot() -> None:
+    options = {each.name: each for each in o80.robots.load("room_sensor:RoomSensor").options}
+    assert options["mean"].help == "of the room"
+    assert options["mean"].unit == "C"
+    assert options["mean"].default == "21.0"
+    assert [each.kind for each in options.values()] == [
+        "number",
+        "integer",
+        "boolean",
+        "text",
+        "text",
+        "one of: RED, BLUE",
+        "one of: fast, slow",
+        "2 x number",
+        "3 x integer",
+        "seed",
+    ]
+    said = command("run", "room_sensor:RoomSensor", "--help")
+    assert "--mean number" in said
+    assert "of the room [C] (default: 21.0)" in said
+    assert "--frequency" in said
+
+
+@pytest.mark.parametrize(
+    ("given", "text"),
+    [
+        ({"maen": 1.0}, "has no option 'maen'. Did you mean 'mean'"),
+        ({"mean": "warm"}, "must be a number"),
+        ({"times": 1.5}, "option 'times' must be an integer, got '1.5'"),
+        ({"loud": "maybe"}, "option 'loud' must be a boolean"),
+        ({"colour": "GREEN"}, "option 'colour' must be one of: RED, BLUE"),
+        ({"mode": "medium"}, "option 'mode' must be one of: fast, slow"),
+        ({"gains": [1.0]}, "option 'gains' must be 2 x number"),
+        ({"seed": -1}, "option 'seed' must be a whole number, at least 0"),
+    ],
+)
+def test_wrong_options_are_named(given: dict[str, Any], text: str, segment: str) -> None:
+    with pytest.raises(o80.InvalidArgument, match=text):
+        o80.robots.load(RoomSensor).inline(segment, **given)
+
+
+# ---------------------------------------------------------------------- verbs
+
+
+def test_commands_limits_and_rows_are_those_of_any_robot(segment: str) -> None:
+    with o80.robots.load(Joint).inline(segment, gain=1.0) as joint:
+        assert [each.name for each in joint.actuators] == ["shoulder", "elbow"]
+        with pytest.raises(o80.InvalidArgument, match="elbow"):
+            joint.add_command("elbow", 1.5)
+        joint.add_command(["shoulder", "elbow"], [2.0, -0.5], iterations=4)
+        joint.burst(4)
+        rows = joint.history(4)
+        np.testing.assert_allclose(rows.observed[:, 0], [0.5, 1.0, 1.5, 2.0])
+        np.testing.assert_allclose(rows.observed, rows.desired)
+        assert rows.active.all()
+
+
+def test_requests_answer_like_those_of_a_driver_in_cpp(segment: str) -> None:
+    with o80.robots.load(Joint).inline(segment) as joint:
+        with pytest.raises(o80.RequestRejected, match="too far"):
+            joint.request("home", place=2.0)
+        joint.request("home", place=0.75)
+        row = joint.latest()
+        assert row.observed.tolist() == row.desired.tolist() == [0.75, 0.75]
+        joint.add_request("calibrate")
+        batch = joint.pulse()
+        joint.burst(3)
+        assert joint.running_requests[0].progress == "at 3"
+        joint.burst(5)
+        assert batch.statuses == [o80.Status.COMPLETED]
+        assert joint.latest().observed.tolist() == [0.25, 0.25]
+
+
+def test_a_halt_and_a_resume_are_told(segment: str) -> None:
+    with o80.robots.load(Joint).inline(segment) as joint:
+        joint.halt("enough")
+        joint.burst(2)
+        joint.resume()
+        joint.burst(1)
+        assert joint.latest().extended.halts == 1
+        assert joint.latest().extended.resumes == 1
+    with o80.robots.load(Joint).inline(segment, fails_in="refuse") as joint:
+        joint.halt("enough")
+        joint.burst(1)
+        with pytest.raises(o80.Error, match="the bus is down"):
+            joint.resume()
+
+
+@pytest.mark.parametrize("verb", ["__init__", "start"])
+def test_an_exception_before_the_first_row_tells_where_it_was_raised(
+    verb: str, segment: str
+) -> None:
+    with pytest.raises(o80.DriverError, match=rf"broken {verb} \(.*room_sensor.py:\d+, in _may"):
+        o80.robots.load(Joint).inline(segment, fails_in=verb)
+
+
+@pytest.mark.parametrize("verb", ["write", "read", "on_home", "halt", "resume"])
+def test_an_exception_of_a_verb_ends_the_robot_as_failed(verb: str, segment: str) -> None:
+    with o80.robots.load(Joint).inline(segment, fails_in=verb) as joint:
+
+        def use() -> None:
+            joint.burst(5)
+            if verb in ("halt", "resume"):
+                joint.halt("enough")
+                joint.burst(1)
+                joint.resume()
+            joint.request("home", place=0.0)
+
+        with pytest.raises(o80.Error, match=f"RuntimeError: broken {verb}"):
+            use()
+        with pytest.raises(o80.BackendFailed, match=f"broken {verb}"):
+            joint.burst(1)
+
+
+def test_what_a_reading_reports_reaches_the_loop(segment: str) -> None:
+    def start(fails_in: str) -> o80.Frontend:
+        return o80.robots.load(Joint).inline(segment, fails_in=fails_in)
+
+    with start("fault") as joint, pytest.raises(o80.DriverError, match="the bus is gone$"):
+        joint.burst(5)
+    with start("halting") as joint:
+        with pytest.raises(o80.BackendHalted):
+            joint.burst(5)
+        assert joint.halted
+        assert joint.halted.reason == "too hot"
+    with start("finish") as joint, pytest.raises(o80.BackendStopped):
+        joint.burst(10)
+    with start("interrupt") as joint:
+        joint.add_command(["elbow"], [0.5], iterations=10)
+        batch = joint.pulse()
+        joint.burst(5)
+        assert batch.statuses == [o80.Status.INTERRUPTED]
+    with start("unknown") as joint, pytest.raises(o80.DriverError, match="no actuator 'wrist'"):
+        joint.burst(5)
+
+
+def test_an_exception_in_stop_is_printed_and_ends_nothing_else(
+    segment: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with o80.robots.load(Joint).inline(segment, fails_in="stop") as joint:
+        joint.burst(1)
+    assert "broken stop" in capfd.readouterr().err
+
+
+def test_copies_of_a_driver_are_stepped_together() -> None:
+    with o80.robots.load(Joint).inline(copies=5, threads=2, gain=1.0) as group:
+        burst = group.prepared_burst(3)
+        burst.targets = np.arange(10).reshape(5, 1, 2) * 0.1
+        burst.run()
+        np.testing.assert_allclose(burst.rows["observed"][:, -1], burst.targets[:, 0])
+
+
+# ---------------------------------------------------------------------- a process
+
+
+def test_a_process_serves_a_driver_in_python(segment: str) -> None:
+    robot = o80.robots.load("room_sensor:Joint")
+    with robot.start(segment, frequency=200, gain=1.0) as process:
+        joint = process.frontend(WAIT)
+        joint.add_command("elbow", 0.5, iterations=10)
+        joint.pulse_and_wait(WAIT)
+        assert joint.latest().observed[1] == 0.5
+        assert joint.robot == "joint"
+    assert "stopped" in process.output
+    assert process.wait() == 0
+
+
+@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_frontends_learn_how_the_process_ended(end: signal.Signals, segment: str) -> None:
+    with o80.robots.load(Joint).start(segment, frequency=200) as process:
+        joint = process.frontend(WAIT)
+        joint.wait_for(5, timeout=WAIT)
+        process._popen.send_signal(end)
+        gone = o80.BackendKilled if end == signal.SIGKILL else o80.BackendStopped
+        with pytest.raises(gone):
+            joint.wait_for(10**9, timeout=WAIT)
+        assert process.wait(WAIT) == (-end if end == signal.SIGKILL else 0)
+
+
+def test_an_exception_of_a_process_reaches_its_frontends(segment: str) -> None:
+    with o80.robots.load(Joint).start(segment, frequency=200, fails_in="read") as process:
+        with pytest.raises(o80.BackendFailed, match="RuntimeError: broken read"):
+            process.frontend(WAIT).wait_for(10**9, timeout=WAIT)
+        assert process.wait(WAIT) == 1
+    with pytest.raises(o80.DriverError, match="broken start"):
+        o80.robots.load(Joint).start(segment, fails_in="start")
+    with pytest.raises(o80.InvalidArgument, match="must be a number"):
+        o80.robots.load(Joint).start(segment, gain="much")
+
+
+def test_a_driver_may_pace_the_loop_by_its_own_clock(segment: str) -> None:
+    with o80.robots.load(Paced).start(segment) as process:
+        paced = process.frontend(WAIT)
+        paced.wait_for(20, timeout=WAIT)
+        assert paced.period == pytest.approx(1 / 250)
+        assert paced.latest().extended.due > 0
+    with pytest.raises(o80.DriverError, match="the driver runs at 250 Hz, but 100 Hz"):
+        o80.robots.load(Paced).inline(segment, frequency=100)
+
+
+def test_a_file_names_a_driver_too(segment: str, tmp_path: Path) -> None:
+    file = tmp_path / "thermometer_of_a_user.py"
+    file.write_text(
+        "class Thermometer:\n"
+        "    extended = {'temperature': float}\n"
+        "    def read(self, reading):\n"
+        "        reading.extended['temperature'] = 20.5\n"
+    )
+    with o80.robots.load(f"{file}:Thermometer").start(segment) as process:
+        assert process.frontend(WAIT).latest().extended.temperature == 20.5
+
+
+# ---------------------------------------------------------------------- mistakes
+
+
+@pytest.mark.parametrize(
+    ("place", "text"),
+    [
+        ("no_such_module:Driver", "cannot be imported: ModuleNotFoundError"),
+        ("room_sensor:RoomSensr", "has no class 'RoomSensr'.*Did you mean 'RoomSensor'"),
+        ("room_sensor:Colour", "Colour is no driver: give it read"),
+    ],
+)
+def test_a_class_that_is_no_driver_is_named(place: str, text: str) -> None:
+    with pytest.raises(o80.DriverError, match=text):
+        o80.robots.load(place)
+    assert "o80: " in command("run", place, code=1)
+
+
+class Reads:
+    def read(self, reading: Reading) -> None: ...
+
+
+def made(**members: Any) -> type[Any]:
+    return type("Wrong", (Reads,), members)
+
+
+@dataclass
+class NoDefault:
+    port: str
+
+
+@dataclass
+class OddOption:
+    table: dict[str, int] = None  # type: ignore[assignment]
+
+
+@pytest.mark.parametrize(
+    ("members", "text"),
+    [
+        ({"write": lambda self: None}, r"Wrong.write must be write\(self, desired\)"),
+        ({"halt": lambda self, why: None}, r"Wrong.halt must be halt\(self\)"),
+        ({"Config": int}, "Config must be a dataclass"),
+        ({"Config": NoDefault}, "option 'port' has no default"),
+        ({"Config": OddOption}, r"Config.table must be a float, an int"),
+        ({"requests": {"home": None}}, r"the method on_home\(self, fields\)"),
+        ({"actuators": ["a"], "limits": {"b": (0, 1)}}, "no actuator 'b'"),
+        ({"frequency": -1}, "frequency must be a positive number"),
+        ({"extended": {"image": object}}, "must be a number of 1 to 8 bytes"),
+    ],
+)
+def test_a_driver_that_is_wrong_is_refused_with_a_cure(
+    members: dict[str, Any], text: str, segment: str
+) -> None:
+    with pytest.raises(o80.DriverError, match=text):
+        o80.robots.load(made(**members)).inline(segment)
+
+
+def test_a_recording_cannot_name_a_class_to_import(segment: str, tmp_path: Path) -> None:
+    """It is replayed without its driver, or not at all."""
+    snapshots = {name: {"slot": np.uint32} for name in ("snapshot", "restore")}
+    members = {
+        "of_the_world": False,
+        "name": "joint",
+        "requests": {"reset": {"seed": np.uint64}} | snapshots,
+        **{f"on_{name}": lambda self, fields: None for name in ("reset", "snapshot", "restore")},
+    }
+    simulated = type("Simulated", (Reads,), members)
+    for driver, file in ((Joint, "run.mcap"), (simulated, "simulated.mcap")):
+        with (
+            o80.robots.load(driver).inline(segment) as joint,
+            o80.Recording(tmp_path / file, [segment]),
+        ):
+            joint.burst(5)
+    assert o80.replay(tmp_path / "run.mcap").identical  # by its readings, without the driver
+    with pytest.raises(o80.DriverError, match="joint"):
+        o80.replay(tmp_path / "simulated.mcap")
