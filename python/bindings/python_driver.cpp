@@ -258,8 +258,7 @@ RequestAnswer answer_of(nb::handle told, FaultText* text) {
   return static_cast<RequestAnswer>(answer);
 }
 
-RequestAnswer request(void* robot, std::uint32_t index, const std::byte* payload,
-                      FaultText* text) {
+RequestAnswer request(void* robot, std::uint32_t index, const std::byte* payload, FaultText* text) {
   return guarded<RequestAnswer>(text, RequestAnswer::failed, [&] {
     PythonDriver& self = driver(robot);
     const auto size = nb::cast<std::size_t>(self.adapter.attr("payload_sizes")[index]);
@@ -301,8 +300,10 @@ o80::RobotLibrary library_of(const nb::object& described, const std::string& pat
                            "o80.robots.load returns");
   }
   constexpr auto kMakers = makers(std::make_index_sequence<kMostClasses>());
-  auto* made = new PythonClass{described, nb::cast<std::string>(described.attr("name")),
-                               nb::cast<std::string>(described.attr("built_with")), {}};
+  auto* made = new PythonClass{described,
+                               nb::cast<std::string>(described.attr("name")),
+                               nb::cast<std::string>(described.attr("built_with")),
+                               {}};
   o80::RobotTable& table = made->table;
   table.version = o80::kRobotTableVersion;
   table.size = sizeof table;

@@ -272,9 +272,7 @@ class Robot:
         ]
         known = [option.name for option in loop_options().values() if option.of_start]
         words += [f"--{name}={text}" for name, text in self._config(config, known)]
-        return start_process(
-            self._program, segment or self.name, words, timeout, self._environment
-        )
+        return start_process(self._program, segment or self.name, words, timeout, self._environment)
 
     @overload
     def inline(

@@ -33,7 +33,7 @@ class RoomSensor:
         mode: Literal["fast", "slow"] = "slow"
         gains: list[float] = field(default_factory=lambda: [1.0, 2.0])
         offsets: tuple[int, ...] = (1, 2, 3)
-        seed: Seed = Seed(0)
+        seed: Seed = Seed(0)  # noqa: RUF009
 
     def __init__(self, config: Config) -> None:
         self.config = config

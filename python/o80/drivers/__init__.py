@@ -6,10 +6,10 @@ class Thermometer:
     def read(self, reading):
         reading.extended["temperature"] = 21.5
 
-`o80 run module:Thermometer` and `o80.robots.load("module:Thermometer")` then run it, like any robot.
-The attributes `actuators`, `dtype`, `extended`, `requests`, `limits`, `rests_at`, `when_idle`,
-`units`, `while_halted`, `model` and `joints`, of the class or of the object, describe its rows: they
-are those of `o80.Backend`. See docs/python_drivers.md.
+`o80 run module:Thermometer` and `o80.robots.load("module:Thermometer")` run it like any robot. The
+attributes `actuators`, `dtype`, `extended`, `requests`, `limits`, `rests_at`, `when_idle`, `units`,
+`while_halted`, `model` and `joints`, of the class or of the object, describe its rows, as the
+arguments of `o80.Backend` do. See docs/drivers.md.
 """
 
 from o80.drivers.option import Seed, option

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from o80 import _core
 from o80.checked import mapping
 from o80.description import SchemaWriter
-from o80.drivers.reading import Answer, Desired, Fault, Reading
+from o80.drivers.reading import Answer, Desired, DriverFaultError, Reading
 from o80.errors import Error, InvalidArgument, RequestRejected
 from o80.layout import Layout, dtype_of_type
 from o80.record import Record
@@ -23,7 +23,7 @@ NANOSECOND = 1e-9
 
 def fault_of(error: BaseException) -> str:
     """The text that frontends read of an exception of a driver."""
-    if isinstance(error, (Fault, Error)):
+    if isinstance(error, (DriverFaultError, Error)):
         return str(error)
     text = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
     frames = traceback.extract_tb(error.__traceback__)

@@ -14,7 +14,7 @@ from o80.errors import InvalidArgument
 from o80.record import Record
 
 
-class Fault(Exception):
+class DriverFaultError(Exception):
     """Ends the loop; see `Reading.fault`."""
 
 
@@ -28,7 +28,7 @@ def numbered(name: str | int, known: Sequence[str], what: str) -> int:
 
 
 class Desired:
-    """The desired states of an iteration. Its arrays change with the next one: copy what you keep."""
+    """The desired states of an iteration. Its arrays change with the next one: copy to keep them."""
 
     def __init__(self, block: NDArray[Any], active: NDArray[np.uint8], count: int) -> None:
         self._block = block
@@ -57,7 +57,7 @@ class Desired:
 
 
 class Reading:
-    """What came of an iteration: fill `observed` and `extended`. They begin with the last reading."""
+    """What came of an iteration: fill `observed` and `extended`; they hold the last reading."""
 
     def __init__(
         self,
@@ -110,7 +110,7 @@ class Reading:
 
     def fault(self, reason: str) -> None:
         """Ends the loop at once; frontends raise the reason."""
-        raise Fault(reason)
+        raise DriverFaultError(reason)
 
     def finish(self) -> None:
         """Ends the loop in order: in real time the robot brakes first."""
