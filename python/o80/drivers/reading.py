@@ -28,7 +28,7 @@ def numbered(name: str | int, known: Sequence[str], what: str) -> int:
 
 
 class Desired:
-    """The desired states of an iteration. Its arrays change with the next one: copy to keep them."""
+    """Desired states of an iteration. Its arrays change with the next one: copy them to keep."""
 
     def __init__(self, block: NDArray[Any], active: NDArray[np.uint8], count: int) -> None:
         self._block = block
