@@ -10,7 +10,7 @@ import o80
 from ..world.arm import JOINTS
 from ..world.timing import ITERATIONS
 from .pressure_range import PressureRange
-from .row_words import words
+from .row_words import words, words_of
 
 FloatArray = NDArray[np.float64]
 Index = slice | NDArray[np.intp]
@@ -32,9 +32,10 @@ class Arms:
         """Of the raw pressures."""
         self._burst = group.prepared_burst(ITERATIONS, mode="overwrite", delay=delay)
         self._raw: FloatArray = self._burst.targets[:, 0]
-        self._rows = self._burst.rows
-        dtype = self._rows.dtype
-        numbers = self._rows.view(np.float64).reshape(group.copies, ITERATIONS, -1)
+        dtype = self._burst.rows.dtype
+        row_words = words_of(self._burst.rows)
+        self._last_words = row_words[:, -1]
+        numbers = row_words.view(np.float64)
         q = words(dtype, "extended", "joint_positions")
         dq = words(dtype, "extended", "joint_velocities")
         assert q.stop == dq.start, "angles and velocities of the joints lie side by side"
@@ -67,4 +68,4 @@ class Arms:
     def reset(self, copies: NDArray[np.intp], seeds: list[int]) -> None:
         """These to the start."""
         self.group.request("reset", copies=copies, seed=seeds)
-        self._rows[copies, -1] = self.group.latest(copies)
+        self._last_words[copies] = words_of(self.group.latest(copies))

@@ -9,9 +9,15 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 WORD = 8
 """[bytes]"""
+
+
+def words_of(rows: NDArray[Any]) -> NDArray[np.uint64]:
+    """Rows (...) as words (..., W), a view: NumPy copies these ten times as fast as rows."""
+    return rows.view(np.uint64).reshape(*rows.shape, -1)
 
 
 def words(dtype: np.dtype[Any], *path: str) -> slice:

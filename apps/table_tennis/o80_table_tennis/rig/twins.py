@@ -15,7 +15,7 @@ from ..world.arm import JOINT_NAMES, JOINTS
 from ..world.timing import ITERATIONS
 from .arms import TIMEOUT, Index
 from .ball_records import RECORDS, BallRecords, fly_out_fields
-from .row_words import words
+from .row_words import words, words_of
 from .twin import BALL_STATE, SEEN_NUMBERS
 
 FloatArray = NDArray[np.float64]
@@ -37,13 +37,14 @@ class Twins:
         self._motion = states.reshape(group.copies, JOINTS, ITERATIONS, 2)
         assert np.shares_memory(self._motion, states)
         self._first = group.prepared_burst(1, self._joint_names)
-        self._last = self._burst.rows[:, -1]
-        dtype = self._last.dtype
-        numbers = self._burst.rows.view(np.float64).reshape(group.copies, ITERATIONS, -1)[:, -1]
+        self._last_words = words_of(self._burst.rows)[:, -1]
+        self._first_words = words_of(self._first.rows)
+        dtype = self._burst.rows.dtype
+        numbers = self._last_words.view(np.float64)
         ball = words(dtype, "observed", "balls").start
         self.ball: FloatArray = numbers[:, ball : ball + SEEN_NUMBERS]
         self.joint_positions: FloatArray = numbers[:, words(dtype, "observed", "joints")][:, ::2]
-        self._records = BallRecords(self._last[RECORDS[0]][RECORDS[1]][:, 0])
+        self._records = BallRecords(self._burst.rows[:, -1][RECORDS[0]][RECORDS[1]][:, 0])
 
     @property
     def records(self) -> BallRecord:
@@ -62,7 +63,7 @@ class Twins:
         targets, motion = self._first.targets[:, 0], self._motion[copies, :, -1]
         targets["position"][copies], targets["velocity"][copies] = motion[..., 0], motion[..., 1]
         self._first.run(copies, timeout=TIMEOUT)
-        self._last[copies] = self._first.rows[copies, 0]
+        self._last_words[copies] = self._first_words[copies, 0]
 
     def reset(
         self,
@@ -84,4 +85,4 @@ class Twins:
                 frontend.add_trajectory(flight.states.view(BALL_STATE)[:, 0], self._ball_name)
                 frontend.pulse()
         self._first.run(copies, timeout=TIMEOUT)
-        self._last[copies] = self._first.rows[copies, 0]
+        self._last_words[copies] = self._first_words[copies, 0]
