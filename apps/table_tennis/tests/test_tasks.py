@@ -96,7 +96,7 @@ def test_extra_balls_are_judged_by_the_task_too() -> None:
     settings = TaskSettings(task="hit", factor=COARSE)
     policy = default_policy()
     with closing(TableTennisEnvironment(rig=RigSettings(extra_balls=40), task=settings)) as env:
-        observation, info = env.reset(seed=1)
+        observation, info = env.reset(seed=2)
         paid, over = np.zeros(40), False
         while not over:
             observation, _, terminated, truncated, info = env.step(policy.act(observation))

@@ -6,13 +6,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..physics.prediction import predict
-from ..world.ball import BALL_GUN_SPIN
 from ..world.scene import Vector
 from .frame_stamps import FRAME_PERIOD
 from .sampled_flight import SampledFlight
@@ -66,43 +66,54 @@ class LaunchDistribution(Protocol):
 
 @dataclass(frozen=True)
 class NormalLaunches:
-    """Means and standard deviations, each number by itself."""
+    """A normal distribution of position [m], velocity [m/s] and spin [rad/s], nine numbers."""
 
-    position: Vector = (0.46, 2.95, 1.37)
-    """[m]"""
-    position_deviation: Vector = (0.01, 0.013, 0.016)
-    """[m]"""
-    velocity: Vector = (0.24, -4.14, 2.28)
-    """[m/s]"""
-    velocity_deviation: Vector = (0.09, 0.07, 0.17)
-    """[m/s]"""
-    spin: Vector = BALL_GUN_SPIN
-    """[rad/s]"""
-    spin_deviation: Vector = (2.0, 3.0, 2.0)
-    """[rad/s]"""
+    mean: tuple[float, ...]
+    """(9,)"""
+    factor: tuple[tuple[float, ...], ...]
+    """(9, 9) lower triangle L of the covariance L L^T; rows may end with their last number."""
 
     def draw(self, rng: np.random.Generator) -> Launch:
         """Another launch."""
-        return Launch(
-            rng.normal(self.position, self.position_deviation),
-            rng.normal(self.velocity, self.velocity_deviation),
-            rng.normal(self.spin, self.spin_deviation),
-        )
+        numbers = self._mean + self._factor @ rng.standard_normal(9)
+        return Launch(numbers[:3], numbers[3:6], numbers[6:])
+
+    @cached_property
+    def _mean(self) -> FloatArray:
+        return np.array(self.mean)
+
+    @cached_property
+    def _factor(self) -> FloatArray:
+        return np.array([[*row, *[0.0] * (9 - len(row))] for row in self.factor])
 
 
-NARROW = NormalLaunches()
-"""Like the recorded shots of the ball gun."""
+NARROW = NormalLaunches(
+    mean=(0.4592, 2.9540, 1.3696, 0.2371, -4.1304, 2.2861, 64.3667, 1.0882, -3.2837),
+    factor=(
+        (0.0087,),
+        (-0.0015, 0.0117),
+        (0.0004, -0.0115, 0.0127),
+        (0.0975, 0.0076, 0.0021, 0.0211),
+        (-0.0020, 0.0191, -0.0360, -0.0007, 0.0490),
+        (-0.0043, -0.0283, 0.1535, -0.0013, -0.0221, 0.0276),
+        (-1.0449, 0.8676, -5.1517, -0.8690, -3.2575, 2.2162, 5.4930),
+        (1.8194, -1.0130, 2.5388, -1.9186, 0.2045, -1.2435, -1.0031, 5.1595),
+        (-2.7453, -0.1803, 1.7132, -0.2434, 0.5993, -0.7898, -0.4311, 1.7903, 4.2418),
+    ),
+)
+"""Like the recorded shots of the ball gun: fitted to 40 of them, tested on the other 40, by
+`python -m o80_table_tennis.fit_launches`."""
 
 
 @dataclass(frozen=True)
 class UniformLaunches:
-    """Means, and how far each number may lie from its mean, all values alike."""
+    """Means, those of the ball gun, and how far each number may lie from its mean, all alike."""
 
-    position: Vector = NARROW.position
+    position: Vector = (0.46, 2.95, 1.37)
     """[m]"""
     position_spread: float = 0.05
     """Along each axis, either way [m]."""
-    velocity: Vector = NARROW.velocity
+    velocity: Vector = (0.24, -4.14, 2.28)
     """[m/s]"""
     velocity_spread: float = 0.3
     """Along each axis, either way [m/s]."""

@@ -1,0 +1,111 @@
+"""The distribution of recorded launches, and how simulated shots compare with recorded ones.
+
+A shot is 9 numbers at its first row (position, velocity, spin) and 9 more: time and place of its
+bounce, and time, place and velocity at the plane of the racket. A distribution is fitted to the
+launches of one half of a set and compared with the other half, number by number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..physics.prediction import predict, predict_crossing
+from .flight_fit import FlightFit
+from .launches import Launch
+from .trajectories import BallTrajectory
+
+FloatArray = NDArray[np.float64]
+
+PLANE = 0.3
+"""y of the plane that the racket reaches [m]."""
+NAMES = (
+    *("x", "y", "z", "vx", "vy", "vz", "wx", "wy", "wz"),
+    *("bounce time", "bounce x", "bounce y"),
+    *("crossing time", "crossing x", "crossing z"),
+    *("crossing vx", "crossing vy", "crossing vz"),
+)
+LAUNCH = slice(0, 9)
+"""The numbers of the launch."""
+
+
+@dataclass(frozen=True, eq=False)
+class FittedLaunches:
+    """A normal distribution of launches."""
+
+    mean: FloatArray
+    """(9,)"""
+    covariance: FloatArray
+    """(9, 9)"""
+
+
+def halves(count: int) -> tuple[FloatArray, FloatArray]:
+    """Numbers of the shots to fit, and of those to test: drawn once and for all."""
+    shuffled = np.random.default_rng(0).permutation(count)
+    return np.sort(shuffled[: count // 2]), np.sort(shuffled[count // 2 :])
+
+
+def fitted(launches: FloatArray) -> FittedLaunches:
+    """The distribution of launches (N, 9)."""
+    return FittedLaunches(launches.mean(axis=0), np.cov(launches.T))
+
+
+def recorded_numbers(shots: Sequence[BallTrajectory]) -> FloatArray:
+    """(N, 18) of the shots that bounce and then reach the plane, as they were recorded."""
+    rows = [_recorded(shot.fit) for shot in shots]
+    return np.array([row for row in rows if row is not None])
+
+
+def simulated_numbers(launches: Sequence[Launch]) -> FloatArray:
+    """(N, 18) of launches, as they are predicted to fly."""
+    return np.array([_predicted(launch) for launch in launches])
+
+
+def _recorded(fit: FlightFit) -> list[float] | None:
+    if not len(fit.bounce_times):
+        return None
+    bounce = fit.bounce_times[:1]
+    times = np.arange(bounce[0], fit.end, 0.001)
+    positions, velocities = fit.at(times)
+    if not (positions[:, 1] < PLANE).any():
+        return None
+    row = int(np.argmax(positions[:, 1] < PLANE))
+    first = fit.at(np.array([fit.start]))
+    spin = fit.spins(np.array([fit.start]), first[1])[0]
+    place = fit.at(bounce)[0][0]
+    return [
+        *(*first[0][0], *first[1][0], *spin),
+        *(float(bounce[0]) - fit.start, *place[:2]),
+        *(float(times[row]) - fit.start, *positions[row, [0, 2]], *velocities[row]),
+    ]
+
+
+def _predicted(launch: Launch) -> list[float]:
+    start = launch.position, launch.velocity
+    bounce = predict(*start, 1.5, spin=launch.spin)
+    crossing = predict_crossing(*start, axis=1, at=PLANE, spin=launch.spin)
+    assert crossing is not None, "a shot that can be played reaches the plane"
+    time = float(bounce.bounce_times[0])
+    place = predict(*start, time, spin=launch.spin, period=time).positions[-1]
+    return [
+        *(*launch.position, *launch.velocity, *launch.spin),
+        *(time, *place[:2]),
+        *(crossing.time, *crossing.position[[0, 2]], *crossing.velocity),
+    ]
+
+
+def probability_of_same(one: FloatArray, other: FloatArray) -> float:
+    """Of Kolmogorov and Smirnov's test that two samples (N,), (M,) come from one distribution."""
+    one, other = np.sort(one), np.sort(other)
+    places = np.concatenate([one, other])
+    below = [np.searchsorted(each, places, side="right") / len(each) for each in (one, other)]
+    largest = float(np.abs(below[0] - below[1]).max())
+    root = np.sqrt(len(one) * len(other) / (len(one) + len(other)))
+    scaled = (root + 0.12 + 0.11 / root) * largest
+    if scaled < 0.2:  # the series below converges slowly there
+        return 1.0
+    k = np.arange(1, 101)
+    return float(np.clip(2 * np.sum((-1.0) ** (k - 1) * np.exp(-2 * (k * scaled) ** 2)), 0, 1))
