@@ -33,6 +33,7 @@ from .report.episode_summary import EpisodeSummary
 from .report.played import Played
 from .report.recorded_episodes import RecordedEpisode, recorded_episodes
 from .report.report import Report, write_report
+from .rig.arm_numbers import ArmNumbers
 from .settings import Pacing, RigSettings, TaskSettings
 
 
@@ -118,7 +119,8 @@ def _play_mode(
     )
     with closing(environment):
         balls = (number % available for number in range(settings.episodes_of(pacing)))
-        return play(environment, default_policy(), balls, seed=settings.seed, after_each=after_each)
+        policy = default_policy(ArmNumbers.of(environment.rig.arm.frontend))
+        return play(environment, policy, balls, seed=settings.seed, after_each=after_each)
 
 
 def _compared(

@@ -12,11 +12,13 @@ from hypothesis import strategies as st
 
 import o80_table_tennis
 from o80_table_tennis.balls.sources import balls_from
+from o80_table_tennis.environment import TableTennisEnvironment
 from o80_table_tennis.players.arm_dynamics import ArmModel
 from o80_table_tennis.players.hitting_policy import HittingPolicy, HittingSettings
 from o80_table_tennis.players.policies import DEFAULT_FACTOR, default_policy
 from o80_table_tennis.playing import play
-from o80_table_tennis.settings import TaskSettings
+from o80_table_tennis.rig.arm_numbers import ArmNumbers
+from o80_table_tennis.settings import RigSettings, TaskSettings
 from o80_table_tennis.task.observations import SIZE, ObservationBounds
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -82,3 +84,14 @@ def test_most_balls_are_hit_and_fly_back() -> None:
         environment.close()
     assert len(played.episodes) == count
     assert played.returns >= count / 2
+
+
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize("count", [6, pytest.param(80, marks=pytest.mark.check)])
+def test_an_arm_with_dead_time_returns_balls_too(count: int) -> None:
+    rig = RigSettings(preset="identified")
+    policy = default_policy(ArmNumbers.of_rig(rig))
+    task = TaskSettings(factor=DEFAULT_FACTOR, fly_out=True)
+    with TableTennisEnvironment(rig=rig, task=task) as environment:
+        played = play(environment, policy, range(count), seed=1)
+    assert played.returns >= 0.75 * count

@@ -60,6 +60,11 @@ class Describing(_core.Frontend):
         name: str = self.schema["robot"]
         return name
 
+    @property
+    def model(self) -> str:
+        """The model (MJCF) that draws the robot; empty if its driver names none."""
+        return self._layout.model
+
     @cached_property
     def actuators(self) -> list[Actuator]:
         """The actuators: index, name, unit, limits."""

@@ -9,6 +9,7 @@ from pathlib import Path
 from ..players.conditions import Conditions
 from ..players.learned_policy import SHIPPED, LearnedPolicy
 from ..players.policies import DEFAULT_FACTOR, Policy, RandomPolicy, StillPolicy, default_policy
+from ..rig.arm_numbers import ArmNumbers
 
 Contestant = tuple[Policy, Conditions]
 
@@ -46,4 +47,8 @@ def contestant(name: str, *, balls: str | None = None, preset: str | None = None
             "(policy.npz)"
         )
     conditions = conditions.playing(balls)
-    return policy, conditions if preset is None else replace(conditions, preset=preset)
+    if preset is not None:
+        conditions = replace(conditions, preset=preset)
+    if name == "scripted":
+        policy = default_policy(ArmNumbers.of_rig(conditions.rig()))
+    return policy, conditions

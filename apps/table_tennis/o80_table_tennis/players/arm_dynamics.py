@@ -68,6 +68,33 @@ class ArmModel:
             torque3 += mass * (up3 * outwards - out3 * upwards)
         return np.array([torque1, torque2, torque3, t4 * a4]) + np.array(self.damping) * dq
 
+    def speeds_after(
+        self, q: FloatArray, dq: FloatArray, torque: FloatArray, duration: float
+    ) -> FloatArray:
+        """Speeds (4,) after `duration` [s] of these torques (4,), damping taken implicitly."""
+        at_rest = np.zeros_like(q)
+        bias = self.torque(q, dq, at_rest) - np.array(self.damping) * dq
+        # joint 1 turns the plane in which joints 2 and 3 bend the arm
+        s2, c2 = math.sin(q[1]), math.cos(q[1])
+        s23, c23 = math.sin(q[1] + q[2]), math.cos(q[1] + q[2])
+        mass = np.diag(np.array(self.turning) + duration * np.array(self.damping))
+        for weight, along_upper, along_fore in self._points():
+            out2, up2, out3, up3 = (
+                along_upper * s2,
+                along_upper * c2,
+                along_fore * s23,
+                along_fore * c23,
+            )
+            out, up = out2 + out3, up2 + up3
+            mass[0, 0] += weight * out * out
+            mass[1, 1] += weight * (up * up + out * out)
+            mass[1, 2] += weight * (up * up3 + out * out3)
+            mass[2, 1] += weight * (up3 * up + out3 * out)
+            mass[2, 2] += weight * (up3 * up3 + out3 * out3)
+        change = np.linalg.solve(mass, duration * (torque - bias - np.array(self.damping) * dq))
+        result: FloatArray = dq + change
+        return result
+
     def _points(self) -> tuple[tuple[float, float, float], ...]:
         """Mass [kg], and how far it lies along the upper arm and the forearm [m]."""
         return (

@@ -1,13 +1,20 @@
-"""A policy that hits: it predicts the ball, plans a strike and drives the arm through it."""
+"""A policy that hits: it predicts the ball, plans a strike and drives the arm through it.
+
+An arm with dead time obeys late. Then all is planned and controlled for the time at which an action
+begins to act: ball and arm are predicted that far, the arm by the actions in flight.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import math
+from collections import deque
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..physics.impact import bounced
+from ..rig.arm_numbers import ArmNumbers
 from ..task.actions import COARSE
 from ..task.observations import (
     BALL_POSITION,
@@ -22,6 +29,7 @@ from ..world.scene import Vector
 from ..world.table import TABLE
 from ..world.timing import STEP
 from .arm_dynamics import ArmModel
+from .arm_prediction import ArmPredictor, ArmState
 from .interception import ComingBall, InterceptionSettings, Strike, StrikePlanner, coming_ball
 from .pressure_control import MusclePair, PressureActions, PressureLag
 from .swing import JointMotion, Swing
@@ -75,8 +83,30 @@ class HittingSettings:
     arm: ArmModel = field(default_factory=ArmModel)
     muscles: MusclePair = field(default_factory=MusclePair)
     lag: PressureLag = field(default_factory=PressureLag)
+    dead_time: tuple[float, ...] = (0.0,) * JOINTS
+    """Of the muscles of each joint [s]."""
     factor: float = COARSE
     """Of the environment's actions."""
+
+    def for_arm(self, arm: ArmNumbers) -> HittingSettings:
+        """The same for another arm than the standard one."""
+        muscles = MusclePair(
+            pulley=arm.pulley,
+            maximum_force=arm.maximum_force,
+            stroke=arm.stroke,
+            contracted=arm.contraction,
+            neutral=arm.neutral,
+            directions=arm.directions,
+            least=arm.least,
+            most=arm.most,
+        )
+        return replace(
+            self,
+            muscles=muscles,
+            lag=PressureLag(tuple(np.repeat(arm.lag, 2).tolist())),
+            dead_time=arm.dead_time,
+            arm=replace(self.arm, damping=arm.damping),
+        )
 
 
 class HittingPolicy:
@@ -86,6 +116,11 @@ class HittingPolicy:
         self._settings = settings or HittingSettings()
         self._planner = StrikePlanner(self._settings.interception)
         self._actions = PressureActions(factor=self._settings.factor)
+        s = self._settings
+        self._predictor = ArmPredictor(s.arm, s.muscles, s.lag, s.dead_time, s.control.begin)
+        self._ahead = self._predictor.longest
+        """All is planned for this long after an observation [s]."""
+        self._planned: deque[Swing] = deque(maxlen=1 + math.ceil(self._ahead / STEP))
         self.reset()
 
     def reset(self) -> None:
@@ -106,11 +141,17 @@ class HittingPolicy:
         row = observation.astype(np.float64)
         if self._swing is None:
             self._actions.start(row[PRESSURES])
+            self._predictor.start(self._actions.asked)
             self._swing = Swing.resting_at(row[JOINT_POSITIONS])
+            self._planned.clear()
 
         # ball => strike => swing => torques => pressures => action
         self._swing = self._plan(row[BALL_POSITION], row[BALL_VELOCITY], self._swing.later(STEP))
-        return self._drive(row[JOINT_POSITIONS], row[JOINT_VELOCITIES], row[PRESSURES], self._swing)
+        self._planned.append(self._swing)
+        seen = ArmState(row[JOINT_POSITIONS], row[JOINT_VELOCITIES], row[PRESSURES])
+        action = self._drive(self._predictor.predict(seen))
+        self._predictor.ask(self._actions.asked)
+        return action
 
     def _plan(self, position: FloatArray, velocity: FloatArray, swing: Swing) -> Swing:
         """The motion from now on, which was to be `swing`."""
@@ -126,7 +167,8 @@ class HittingPolicy:
             self.strike = None
         else:
             self._follow(position, velocity)
-            self.strike = None if self._ball is None else self._planner.plan(self._ball)
+            ball = None if self._ball is None else self._ball.later(self._ahead)
+            self.strike = None if ball is None else self._planner.plan(ball)
         now = swing.at(0.0)
         if self.strike is None:
             return Swing.between(now, _resting(now, control.stop), control.stop)
@@ -153,15 +195,30 @@ class HittingPolicy:
         x, y, z, vx, vy, vz = self._seen.tolist()
         return bounced((x, y, z, vx, vy, vz), self._spin)[1]
 
-    def _drive(
-        self, q: FloatArray, dq: FloatArray, pressures: FloatArray, swing: Swing
-    ) -> NDArray[np.float32]:
+    def _wanted(self, after: float) -> JointMotion:
+        """The planned motion of each joint, `after` [s] its dead time."""
+        motions = [self._planned_at(dead_time + after) for dead_time in self._settings.dead_time]
+        return JointMotion(
+            *(
+                np.array([getattr(motion, name)[joint] for joint, motion in enumerate(motions)])
+                for name in ("q", "dq", "ddq")
+            )
+        )
+
+    def _planned_at(self, time: float) -> JointMotion:
+        """In `time` [s] from now, by the plan that was made for that time."""
+        early = self._ahead - time
+        back = min(max(math.ceil(early / STEP - 1e-9), 0), len(self._planned) - 1)
+        # an older plan began so many steps earlier
+        return self._planned[-1 - back].at(max(0.0, back * STEP - early))
+
+    def _drive(self, arm: ArmState) -> NDArray[np.float32]:
         s, control = self._settings, self._settings.control
-        wanted = swing.at(control.ahead)
-        start = swing.at(0.0)
-        # where the arm will be: as far from the swing as it is now, going on at its speed
-        q_error = (start.q - q) + control.ahead * (start.dq - dq)
-        dq_error = start.dq - dq
+        wanted, start = self._wanted(control.ahead), self._wanted(0.0)
+        q, pressures = arm.q, arm.pressures
+        # where the arm will be: as far from the swing as it is then, going on at its speed
+        q_error = (start.q - q) + control.ahead * (start.dq - arm.dq)
+        dq_error = start.dq - arm.dq
         acceleration = wanted.ddq + control.stiffness * q_error + control.damping * dq_error
         torque = s.arm.torque(wanted.q, wanted.dq, acceleration)
         torque[WRIST] += control.wrist_stiffness * q_error[WRIST]

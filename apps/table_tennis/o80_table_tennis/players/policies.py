@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..rig.arm_numbers import ArmNumbers
 from ..task.actions import COARSE
 from ..task.observations import BALL_POSITION, BALL_VELOCITY, JOINT_POSITIONS, Float32Array
 from ..world.arm import MUSCLES
@@ -81,6 +82,11 @@ class SweepPolicy:
         return action
 
 
-def default_policy() -> Policy:
-    """The best policy there is."""
-    return HittingPolicy(found_settings())
+def default_policy(arm: ArmNumbers | None = None) -> Policy:
+    """The best policy there is for an arm; None: the standard one.
+
+    `ArmNumbers.of(frontend)` reads those of an arm that runs, `ArmNumbers.of_rig(settings)` those
+    of an arm to come.
+    """
+    settings = found_settings()
+    return HittingPolicy(settings if arm is None else settings.for_arm(arm))

@@ -8,42 +8,76 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..task.actions import COARSE, changed_pressures
-from ..world.arm import MUSCLES
+from ..world.arm import JOINTS, MUSCLES
 
 FloatArray = NDArray[np.float64]
+PerJoint = float | tuple[float, ...]
+PerMuscle = tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True)
 class MusclePair:
-    """Two muscles against each other on one pulley: force linear in pressure and in length."""
+    """Two muscles against each other on one pulley: force linear in activation and in length.
+
+    Numbers hold for all joints, tuples for each of them. The defaults are those of the standard
+    arm, in which the normalised pressure is the activation.
+    """
 
     pulley: float = 0.037
     """[m]"""
-    maximum_force: float = 1500.0
-    """[N], full pressure, not contracted."""
-    stroke: float = 0.10
+    maximum_force: PerJoint = 1500.0
+    """[N], fully activated, not contracted."""
+    stroke: PerJoint = 0.10
     """Contraction without any force [m]."""
     contracted: float = 0.02
-    """Contraction of both when the joint is at zero [m]."""
+    """Contraction of both where they are equally long [m]."""
+    neutral: PerJoint = 0.0
+    """Angle at which they are equally long [rad]."""
+    directions: PerJoint = 1.0
+    """1: the agonist turns the joint towards larger angles; -1: towards smaller ones."""
+    least: PerMuscle = ((0.0, 0.0),) * JOINTS
+    """(4, 2) activation at the least pressure."""
+    most: PerMuscle = ((1.0, 1.0),) * JOINTS
+    """(4, 2) activation at the most pressure."""
 
     def pressures(self, torque: FloatArray, q: FloatArray, mean: float) -> FloatArray:
         """Normalised pressures (4, 2) in agonists and antagonists for torques (4,) at q (4,).
 
-        `mean` is that of both muscles and sets the stiffness; it is raised where a pressure would
-        become negative.
+        `mean` is that of both muscles and sets the stiffness; where a muscle reaches an end of its
+        range, the other one makes the torque.
         """
-        at_zero = 1.0 - self.contracted / self.stroke
-        change = self.pulley / self.stroke * q
-        agonist, antagonist = at_zero - change, at_zero + change
-        share = torque / (self.pulley * self.maximum_force)
-        difference = (share + 2.0 * mean * change) / at_zero / 2.0
-        pressures = np.stack([mean + difference, mean - difference], axis=1)
-        # one end reached: the other muscle alone makes the torque
-        slack_antagonist = pressures[:, 1] < 0.0
-        slack_agonist = pressures[:, 0] < 0.0
-        pressures[slack_antagonist, 0] = (share / agonist)[slack_antagonist]
-        pressures[slack_agonist, 1] = (-share / antagonist)[slack_agonist]
-        return np.clip(pressures, 0.0, 1.0)
+        agonist, antagonist = self._lengths(q)
+        share = np.asarray(self.directions) * torque / (self.pulley * self._force)
+        low, high = np.array(self.least), np.array(self.most)
+        middle = (low + mean * (high - low)).mean(axis=1)
+        difference = (share - middle * (agonist - antagonist)) / (agonist + antagonist)
+
+        one = np.clip(middle + difference, low[:, 0], high[:, 0])
+        other = np.clip((one * agonist - share) / antagonist, low[:, 1], high[:, 1])
+        one = np.clip((share + other * antagonist) / agonist, low[:, 0], high[:, 0])
+        activations = np.stack([one, other], axis=1)
+        result: FloatArray = (activations - low) / (high - low)
+        return result
+
+    def torque(self, pressures: FloatArray, q: FloatArray) -> FloatArray:
+        """Torques (4,) [Nm] of normalised pressures (8,) in the muscles, at q (4,)."""
+        low, high = np.array(self.least), np.array(self.most)
+        activations = low + pressures.reshape(JOINTS, 2) * (high - low)
+        agonist, antagonist = self._lengths(q)
+        pull = activations[:, 0] * agonist - activations[:, 1] * antagonist
+        result: FloatArray = np.asarray(self.directions) * (self.pulley * self._force) * pull
+        return result
+
+    @property
+    def _force(self) -> FloatArray:
+        return np.asarray(self.maximum_force, dtype=np.float64)
+
+    def _lengths(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(4,) each: force of agonists and antagonists per maximum force and activation."""
+        stroke = np.asarray(self.stroke, dtype=np.float64)
+        at_zero = 1.0 - self.contracted / stroke
+        change = self.pulley / stroke * np.asarray(self.directions) * (q - np.asarray(self.neutral))
+        return at_zero - change, at_zero + change
 
 
 @dataclass(frozen=True)

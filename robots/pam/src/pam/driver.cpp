@@ -81,7 +81,7 @@ void PamDriver::describe(Schema& schema) const {
         .limits({.minimum = static_cast<double>(range.minimum),
                  .maximum = static_cast<double>(range.maximum)});
   }
-  schema.shown.mjcf = shown_model();
+  schema.shown.mjcf = shown_model(plant_.config());
   for (std::uint32_t j = 0; j < kJoints; ++j) {
     schema.sensor_moves_joint("joint_positions", j, kShownJoints[j]);
   }

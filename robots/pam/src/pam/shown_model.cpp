@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdio>
 #include <stdexcept>
+#include <string>
 
 #include "pam/arm.hpp"
 
@@ -40,12 +41,45 @@ constexpr const char* kModel = R"(<mujoco model="pam">
       </body>
     </body>
   </worldbody>
-</mujoco>
 )";
+
+template <std::size_t N>
+std::string numeric(const char* name, const std::array<double, N>& values) {
+  std::string text = std::string("    <numeric name=\"") + name + "\" data=\"";
+  for (const double value : values) {
+    std::array<char, 32> number{};
+    std::snprintf(number.data(), number.size(), "%.17g ", value);
+    text += number.data();
+  }
+  text.back() = '"';
+  return text + "/>\n";
+}
+
+/// Numbers of each joint, or of each muscle.
+std::string numbers_of(const Plant::Config& config) {
+  std::array<double, kMuscles> idle{};
+  std::array<double, kMuscles> full{};
+  for (std::size_t m = 0; m < kMuscles; ++m) {
+    idle[m] = config.ranges[m].idle;
+    full[m] = config.ranges[m].full;
+  }
+  const LinearMuscle linear;
+  const std::array<double, 1> contraction{linear.full_force_length - kRestLength};
+  const char* law = config.muscle == MuscleModel::hill ? "hill" : "linear";
+  return std::string("  <custom>\n    <text name=\"muscle\" data=\"") + law + "\"/>\n" +
+         numeric("idle_pressure", idle) + numeric("full_pressure", full) +
+         numeric("maximum_force", config.maximum_force) + numeric("stroke", config.stroke) +
+         numeric("contraction", contraction) +
+         numeric("pulley_radius", std::array<double, 1>{kPulleyRadius}) +
+         numeric("neutral", config.neutral) + numeric("directions", config.directions) +
+         numeric("lag", config.lag) + numeric("dead_time", config.dead_time) +
+         numeric("damping", config.arm.damping) + numeric("friction", config.arm.friction) +
+         "  </custom>\n";
+}
 
 }  // namespace
 
-std::string shown_model() {
+std::string shown_model(const Plant::Config& config) {
   const Vector base = Arm::Config{}.base;
   const double handle = kForearmLength - kBladeHalfLength;
   std::array<char, 4096> text{};
@@ -56,7 +90,8 @@ std::string shown_model() {
   if (length <= 0 || static_cast<std::size_t>(length) >= text.size()) {
     throw std::length_error("the text of the arm's model is longer than its buffer");
   }
-  return {text.data(), static_cast<std::size_t>(length)};
+  return std::string(text.data(), static_cast<std::size_t>(length)) + numbers_of(config) +
+         "</mujoco>\n";
 }
 
 }  // namespace o80::pam

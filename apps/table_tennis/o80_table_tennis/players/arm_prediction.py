@@ -1,0 +1,106 @@
+"""Where the arm will be when an action begins to act: the actions in flight are known.
+
+An arm with dead time goes on by pressures that were asked for before. From its present state and
+those pressures a model of muscles and links is integrated over the dead time of each joint.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..world.arm import JOINTS
+from ..world.timing import STEP
+from .arm_dynamics import ArmModel
+from .pressure_control import MusclePair, PressureLag
+
+FloatArray = NDArray[np.float64]
+
+INTEGRATION_STEP = 0.0025
+"""Longest one of the model [s]."""
+
+
+@dataclass(frozen=True)
+class ArmState:
+    """Of each joint at a time of its own."""
+
+    q: FloatArray
+    """(4,) [rad]"""
+    dq: FloatArray
+    """(4,) [rad/s]"""
+    pressures: FloatArray
+    """(8,) normalised, in the muscles"""
+
+
+class ArmPredictor:
+    """Predicts each joint over its dead time."""
+
+    def __init__(
+        self,
+        arm: ArmModel,
+        muscles: MusclePair,
+        lag: PressureLag,
+        dead_time: tuple[float, ...],
+        begin: float,
+    ) -> None:
+        """`begin`: from an observation until its action is asked for [s]."""
+        self._arm, self._muscles, self._lag = arm, muscles, lag
+        self._dead_time, self._begin = dead_time, begin
+        self.longest = max(dead_time)
+        """[s]"""
+        self._asked: deque[FloatArray] = deque(maxlen=2 + math.ceil(self.longest / STEP))
+
+    def start(self, asked: FloatArray) -> None:
+        """The pressures (8,) that an arm at rest was asked for until now."""
+        self._asked.clear()
+        self._asked.append(asked)
+
+    def ask(self, asked: FloatArray) -> None:
+        """These are asked for in the step that begins now."""
+        self._asked.append(asked)
+
+    def predict(self, now: ArmState) -> ArmState:
+        """The state of each joint when what is asked for now begins to act on it."""
+        if self.longest == 0.0:
+            return now
+        q, dq, pressures = now.q.copy(), now.dq.copy(), now.pressures.copy()
+        result = ArmState(q.copy(), dq.copy(), pressures.copy())
+        steps = math.ceil(self.longest / INTEGRATION_STEP)
+        duration = self.longest / steps
+        for number in range(steps):
+            for joint, dead_time in enumerate(self._dead_time):
+                if round(dead_time / duration) == number:
+                    _take(result, joint, q, dq, pressures)
+            targets = self._targets((number + 0.5) * duration)
+            pressures = self._lag.after(pressures, targets, duration)
+            torque = self._muscles.torque(pressures, q)
+            dq = self._arm.speeds_after(q, dq, torque, duration)
+            q = q + duration * dq
+        for joint, dead_time in enumerate(self._dead_time):
+            if round(dead_time / duration) >= steps:
+                _take(result, joint, q, dq, pressures)
+        return result
+
+    def _targets(self, time: float) -> FloatArray:
+        """Pressures (8,) that act at `time` from now [s]."""
+        targets = np.empty(2 * JOINTS)
+        for joint, dead_time in enumerate(self._dead_time):
+            # steps back from the newest: it is asked for from begin - STEP on
+            back = math.floor((dead_time + self._begin - time) / STEP)
+            index = max(len(self._asked) - 1 - max(back, 0), 0)
+            part = slice(2 * joint, 2 * joint + 2)
+            targets[part] = self._asked[index][part]
+        return targets
+
+
+def _take(
+    state: ArmState, joint: int, q: FloatArray, dq: FloatArray, pressures: FloatArray
+) -> None:
+    """Copies what belongs to one joint."""
+    part = slice(2 * joint, 2 * joint + 2)
+    state.q[joint], state.dq[joint] = q[joint], dq[joint]
+    state.pressures[part] = pressures[part]
