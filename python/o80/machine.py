@@ -25,7 +25,9 @@ class Machine:
     def from_json(cls, text: str) -> Self:
         """Raises ValueError, KeyError, TypeError if it is damaged."""
         found = json.loads(text)
-        return cls(str(found["libc"]), str(found["architecture"]), tuple(found["features"]))
+        return cls(
+            str(found["libc"]), str(found["architecture"]), tuple(map(str, found["features"]))
+        )
 
     def difference(self, other: "Machine") -> str:
         """What of another machine differs, in words; empty if nothing does."""

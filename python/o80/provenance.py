@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any, Self
 
+_TEXTS = ("robot", "version", "source_hash", "library", "library_sha256", "built_with")
+
 
 @dataclass(frozen=True)
 class ProvenanceFile:
@@ -41,10 +43,29 @@ class Provenance:
 
     @classmethod
     def from_json(cls, text: str) -> Self:
-        """The provenance that `as_json` has written; fields of later versions are left out."""
+        """The provenance that `as_json` has written; fields of later versions are left out.
+
+        Raises ValueError, TypeError, KeyError, RecursionError if it is damaged.
+        """
         found = json.loads(text)
         known = {field.name for field in fields(cls)}
-        return cls.from_fields({name: found[name] for name in found if name in known})
+        provenance = cls.from_fields({name: found[name] for name in found if name in known})
+        if not all(isinstance(each, dict) for each in (provenance.options, provenance.run_options)):
+            raise TypeError("options are no mapping")
+        texts = [
+            *(getattr(provenance, name) for name in _TEXTS),
+            *(
+                text
+                for pairs in (provenance.options, provenance.run_options)
+                for text in (*pairs.keys(), *pairs.values())
+            ),
+            *(text for file in provenance.files for text in vars(file).values()),
+        ]
+        if not all(isinstance(text, str) for text in texts):
+            raise ValueError("a value is no text")
+        if not isinstance(provenance.wall_clock_offset, int):
+            raise ValueError("the offset to the wall clock is no whole number")
+        return provenance
 
     @classmethod
     def from_fields(cls, given: Mapping[str, Any]) -> Self:

@@ -11,7 +11,7 @@ import o80
 from o80 import _core
 from o80.cli.attach import attach
 from o80.cli.condition import halt_text, pace_text, running_texts, watchdog_text
-from o80.cli.screen import Column, print_json, print_table, style
+from o80.cli.screen import Column, plain, print_json, print_table, style
 
 if TYPE_CHECKING:
     from o80.provenance import Provenance
@@ -69,25 +69,20 @@ def _started_with(provenance: Provenance) -> list[str]:
     """Library, options and versions, in lines."""
     lines = []
     if provenance.library:
-        built = f"  {style(_plain(provenance.built_with), 'dim')}" if provenance.built_with else ""
-        lines.append(f"library  {_plain(provenance.library)}{built}")
+        built = f"  {style(plain(provenance.built_with), 'dim')}" if provenance.built_with else ""
+        lines.append(f"library  {plain(provenance.library)}{built}")
     if provenance.options:
         lines.append(f"options  {_assignments(provenance.options)}")
     lines.append(f"loop     {_assignments(provenance.run_options)}")
     for file in provenance.files:
         hashed = f"sha256 {file.sha256[:12]}" if file.sha256 else "not read"
-        lines.append(f"file     {_plain(file.path)}  {style(hashed, 'dim')}")
+        lines.append(f"file     {plain(file.path)}  {style(hashed, 'dim')}")
     version = f"{provenance.version}, sources {provenance.source_hash[:12]}"
-    return [*lines, f"o80      {_plain(version)}"]
+    return [*lines, f"o80      {plain(version)}"]
 
 
 def _assignments(options: dict[str, str]) -> str:
-    return ", ".join(f"{_plain(name)}={_plain(text)}" for name, text in options.items())
-
-
-def _plain(text: str) -> str:
-    """A text from shared memory, safe for a terminal."""
-    return "".join(c if c.isprintable() else "?" for c in text)
+    return ", ".join(f"{plain(name)}={plain(text)}" for name, text in options.items())
 
 
 def _print_actuators(schema: dict[str, Any]) -> None:

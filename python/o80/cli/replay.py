@@ -10,6 +10,7 @@ import typer
 
 import o80
 from o80.cli.diff import _tolerances
+from o80.cli.screen import plain
 
 _ENOUGH = 1000  # rows for a speed that is not that of the start
 
@@ -81,9 +82,9 @@ def replay(
     if sys.stderr.isatty():
         print("\r\033[K", end="", file=sys.stderr)
     for run in report:
-        print(run)
+        print(plain(str(run)))
         for note in run.notes:
-            print(f"  note: {note}")
+            print(f"  note: {plain(note)}")
         if run.rows >= _ENOUGH and run.seconds > 0:
             speed = run.recorded_seconds / run.seconds
             print(f"  {run.rows / run.seconds:.0f} rows/s, {speed:.3g} times as fast as it ran")

@@ -1,5 +1,6 @@
 """One run of a backend in a recording: its channel, its description, its clock."""
 
+import re
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -8,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.errors import RecordingError
 from o80.machine import this_machine
 from o80.recording.blocks import Block
 from o80.recording.joint_states import JointWriter
@@ -24,6 +26,9 @@ DESCRIPTION = "application/x-o80-description"
 """Media type of the attachment with the description of a robot, as it is in a segment."""
 GAP = "o80.gap"
 """Name of the metadata record of rows that were overwritten before they were read."""
+
+
+_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,63}")  # as src/memory/segment_name.cpp allows
 
 
 @dataclass(frozen=True)
@@ -43,7 +48,15 @@ class EpochNote:
 
     @classmethod
     def of(cls, texts: Mapping[str, str]) -> "EpochNote | None":
-        """None for a channel that is not one of rows."""
+        """None for a channel that is not one of rows.
+
+        Raises RecordingError for a name that no segment has: it could lead to other folders.
+        """
+        name = texts.get("segment", "x")
+        if not _NAME.fullmatch(name):
+            raise RecordingError(
+                f"the recording is damaged: {name[:80]!r} cannot be the name of a segment"
+            )
         try:
             return cls(
                 segment=texts["segment"],

@@ -31,7 +31,18 @@ class Mark:
 
     @classmethod
     def of(cls, message: bytes) -> "Mark":
-        return cls(**json.loads(message))
+        """Raises ValueError, TypeError, RecursionError if it is damaged."""
+        mark = cls(**json.loads(message))
+        is_whole = (
+            isinstance(mark.name, str)
+            and isinstance(mark.time, int)
+            and isinstance(mark.values, dict)
+            and isinstance(mark.rows, dict)
+            and all(isinstance(row, int) for row in mark.rows.values())
+        )
+        if not is_whole:
+            raise ValueError("a mark is damaged")
+        return mark
 
 
 def _plain(value: Any) -> Any:

@@ -48,7 +48,7 @@ class RecordingFile:
             try:
                 with path.open("rb") as file:
                     marks += marks_in(file, found)
-            except (ValueError, TypeError, struct.error) as error:
+            except (ValueError, TypeError, RecursionError, struct.error) as error:
                 raise RecordingError(f"{path}: {error}") from error
         return marks
 
@@ -113,7 +113,10 @@ def _no_such_file(path: Path) -> str:
 def _parts_of(path: Path, found: Scan) -> Iterator[EpochPart]:
     journals = channels_of(found, JOURNAL)
     for channel in found.channels.values():
-        note = EpochNote.of(channel.metadata)
+        try:
+            note = EpochNote.of(channel.metadata)
+        except RecordingError as error:
+            raise RecordingError(f"{path}: {error}") from None
         if note is not None:
             journal = journals.get((note.segment, note.number))
             yield EpochPart(path, found, channel.id, note, journal)

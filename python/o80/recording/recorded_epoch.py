@@ -166,7 +166,7 @@ class RecordedEpoch:
     def _started(self, key: str, read: Callable[[str], T]) -> T:
         try:
             return read(self._provenance_texts[key])
-        except (KeyError, TypeError, ValueError) as error:
+        except (KeyError, TypeError, ValueError, RecursionError) as error:
             raise RecordingError(
                 f"{self._parts[0].path}: the record {self._note.provenance} is damaged"
             ) from error

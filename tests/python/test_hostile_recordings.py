@@ -1,0 +1,208 @@
+"""A damaged or hostile recording is refused with a message; it never crashes what reads it."""
+
+import json
+import random
+import struct
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import o80
+from o80 import _core
+from o80.machine import Machine
+from o80.provenance import Provenance
+from o80.recording.epoch import EpochNote
+from o80.recording.marks import Mark
+from o80.replaying.recorded_run import FileRun, runs_in
+
+RECORDING = Path(__file__).resolve().parents[1] / "data" / "recordings" / "format_1.mcap"
+WAIT = 60.0  # [s] longer than any command should take
+
+
+def record(path: Path, segment: str) -> Path:
+    with (
+        o80.robots.load("two_joints").inline(segment) as arm,
+        o80.Recording(path, arm) as recording,
+    ):
+        recording.mark("episode", task="x")
+        arm.burst(20)
+    return path
+
+
+def o80_command(*words: str | Path) -> subprocess.CompletedProcess[str]:
+    program = Path(sys.executable).parent / "o80"
+    return subprocess.run(
+        [program, *words], capture_output=True, text=True, timeout=WAIT, check=False
+    )
+
+
+@pytest.mark.parametrize("name", ["../../evil", "/etc/x", "x\x1b[31m", "", ".hidden", "a" * 65])
+def test_a_name_that_leads_elsewhere_is_refused(
+    name: str, segment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    honest = EpochNote.texts
+    with monkeypatch.context() as lies:
+        lies.setattr(EpochNote, "texts", lambda self: honest(self) | {"segment": name})
+        path = record(tmp_path / "run.mcap", segment)
+    with pytest.raises(o80.RecordingError, match="cannot be the name of a segment") as refused:
+        o80.open(path)
+    assert "\x1b" not in str(refused.value)
+
+
+PROVENANCES = [
+    "null",
+    "[]",
+    "[" * 100_000,
+    '{"robot": 5}',
+    '{"options": "abc"}',
+    '{"options": {"gain": 3}}',
+    '{"run_options": [1]}',
+    '{"files": 3}',
+    '{"files": [{"option": 1, "path": 2, "sha256": 3}]}',
+    '{"files": [[]]}',
+    '{"library": {"a": 1}}',
+    '{"wall_clock_offset": "soon"}',
+    '{"version": null}',
+]
+
+
+@pytest.mark.parametrize("text", PROVENANCES)
+def test_a_damaged_provenance_is_told(
+    text: str, segment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    honest = Provenance.as_json
+
+    def forged(self: Provenance) -> str:
+        try:
+            lies = json.loads(text)
+        except RecursionError:
+            return text
+        return json.dumps(json.loads(honest(self)) | lies) if isinstance(lies, dict) else text
+
+    with monkeypatch.context() as lies:
+        lies.setattr(Provenance, "as_json", forged)
+        path = record(tmp_path / "run.mcap", segment)
+    (epoch,) = o80.open(path)[segment].epochs
+    assert len(epoch.history()) == 21
+    for read in (lambda: epoch.provenance, lambda: o80.replay(path)):
+        with pytest.raises(o80.RecordingError, match="provenance is damaged"):
+            read()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "{}",
+        "[1]",
+        "5",
+        "[" * 100_000,
+        '{"name": 1}',
+        '{"name": "a", "time": 0, "rows": [1]}',
+        '{"name": "a", "time": 0, "rows": {"x": "y"}}',
+        '{"name": "a", "time": 0, "values": 3}',
+    ],
+)
+def test_a_damaged_mark_is_told(
+    text: str, segment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as lies:
+        lies.setattr(Mark, "message", lambda _: text.encode())
+        path = record(tmp_path / "run.mcap", segment)
+    with pytest.raises(o80.RecordingError):
+        _ = o80.open(path).marks
+
+
+def test_texts_of_a_recording_do_not_control_the_terminal(
+    segment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    honest = Machine.as_json
+    with monkeypatch.context() as lies:
+        lies.setattr(
+            Machine,
+            "as_json",
+            lambda self: json.dumps(json.loads(honest(self)) | {"libc": "\x1b[2J\x07 1"}),
+        )
+        path = record(tmp_path / "run.mcap", segment)
+    done = o80_command("replay", path)
+    assert "recorded it" in done.stdout
+    assert not {"\x1b", "\x07"} & set(done.stdout + done.stderr)
+
+
+# ---------------------------------------------------------------------------- random damage
+
+
+def changed(journal: bytes, choose: random.Random) -> bytes:
+    """A journal some of whose entries say something else."""
+    places = []
+    at = 0
+    while at < len(journal):
+        length = 8 * struct.unpack_from("<H", journal, at)[0]
+        places.append((at, length))
+        at += length
+    damaged = bytearray(journal)
+    for _ in range(choose.randrange(1, 6)):
+        at, length = choose.choice(places)
+        how = choose.randrange(4)
+        if how == 0:
+            damaged[at + 2] = choose.randrange(25)  # another kind
+        elif how == 1 and length > 32:
+            damaged[at + 32 + choose.randrange(length - 32)] = choose.randrange(256)
+        elif how == 2 and length > 32:
+            word = choose.choice([-1, 2**63 - 1, -(2**63), 2**31, 0xFFFF, choose.randrange(64)])
+            struct.pack_into(
+                "<q", damaged, at + 32 + 8 * choose.randrange((length - 32) // 8), word
+            )
+        else:
+            damaged[at + choose.choice([2, 3, 4, 16, 24])] = choose.randrange(256)
+    return bytes(damaged)
+
+
+def replay_of(run: FileRun, name: str) -> Callable[[], Any]:
+    loop = [("bursting", "true"), ("lane_blocks", "1024"), ("history", "1024")]
+    return lambda: _core.DriverlessReplay(run.description, name, loop, run.schema["period"])
+
+
+def test_a_replay_of_a_damaged_journal_ends_in_order() -> None:
+    run = runs_in(o80.open(RECORDING))[0]
+    journal = b"".join(run.epoch.journal_parts())
+    rows = b"".join(np.ascontiguousarray(block.rows).tobytes() for block in run.blocks())
+    size = next(run.blocks()).rows.itemsize
+    told = 0
+    for seed in range(300):
+        choose = random.Random(seed)
+        damaged = bytearray(rows)
+        for _ in range(choose.randrange(3)):
+            at = choose.randrange(len(rows))
+            if at % size >= 8:  # not its iteration
+                damaged[at] = choose.randrange(256)
+        name = _core.unused_segment_name("replay")
+        replay = replay_of(run, name)()
+        try:
+            replay.add(_core.RecordedJournal(run.description, 0).decode(changed(journal, choose)))
+            replay.run(bytes(damaged))
+        except o80.Error:
+            told += 1
+        finally:
+            replay.close()
+            _core.clean(name)
+    assert 0 < told < 300
+
+
+def test_a_damaged_description_is_told() -> None:
+    table = runs_in(o80.open(RECORDING))[0].description.table()
+    told = 0
+    for seed in range(300):
+        choose = random.Random(seed)
+        damaged = bytearray(table)
+        for _ in range(choose.randrange(1, 4)):
+            damaged[choose.randrange(len(table))] = choose.choice([0, 255, choose.randrange(256)])
+        try:
+            _core.Description(bytes(damaged)).json()
+        except o80.Error:
+            told += 1
+    assert told > 0
