@@ -30,7 +30,10 @@ def test_options_and_presets_are_told_as_they_act() -> None:
     # 15000 to 25000 raw are 1.21 to 3.21 bar, of 3.6 at full activation
     assert numbers.least[0][0] == pytest.approx(1.2112 / 3.6)
     assert numbers.most[0][0] == pytest.approx(3.2112 / 3.6)
-    options: dict[str, Any] = {"dead_time": [0.002, 0.004, 0.006, 0.008], "damping": [3.0, -1, -1, -1]}
+    options: dict[str, Any] = {
+        "dead_time": [0.002, 0.004, 0.006, 0.008],
+        "damping": [3.0, -1, -1, -1],
+    }
     with o80.robots.load("pam").inline(preset="identified", **options) as arm:
         other = ArmNumbers.of(arm)
     assert other.dead_time == (0.002, 0.004, 0.006, 0.008)
