@@ -11,7 +11,7 @@ demo:
 # one seed of table tennis from scratch, 30 minutes on one processor: build/learn/report.json
 learn:
 	@tools/setup.sh learn
-	@.venv/bin/python -m o80_table_tennis.train $(ARGS)
+	@.venv/bin/python -m o80_table_tennis.train --blind-share 0.3 $(ARGS)
 
 # what a change can break; ARGS chooses tests: make test ARGS=control, ARGS=tests/python/test_bursts.py
 test:

@@ -15,10 +15,11 @@ from typer.testing import CliRunner
 
 import o80
 from o80_table_tennis import train
-from o80_table_tennis.learning import checkpoint, curve
+from o80_table_tennis.learning import checkpoint, curve, seeds
+from o80_table_tennis.learning.curve import CURVE
 from o80_table_tennis.learning.environments import BALL_PARTS, generators_of
 from o80_table_tennis.learning.settings import WAYS, LearningSettings, PpoSettings
-from o80_table_tennis.learning.training import CURVE, POLICY, Training
+from o80_table_tennis.learning.training import POLICY, Training
 from o80_table_tennis.players.learned_policy import LearnedPolicy
 from o80_table_tennis.task.full_observation import FullObservation
 
@@ -203,6 +204,14 @@ def test_the_command_trains_and_tells_how_well(
     for words in ("learned", "blind", "still arm", "random actions"):
         assert words in result.output
 
+    compared = typer.Typer()
+    compared.command()(seeds.main)
+    picture = tmp_path / "seeds.png"
+    result = CliRunner().invoke(compared, [str(tmp_path), "--picture", str(picture)])
+    assert result.exit_code == 0, result.output
+    assert f"median {100 * report['returned_simulated']:.1f} %" in result.output
+    assert picture.stat().st_size > 1000
+
 
 def test_a_missing_library_is_named_with_its_extra(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -218,3 +227,12 @@ def test_a_missing_library_is_named_with_its_extra(
 def test_an_unknown_way_is_refused_with_those_there_are() -> None:
     with pytest.raises(ValueError, match="unknown way 'hers'; there are: ours, published"):
         train.chosen("hers", balls=None, minutes=None)
+
+
+@pytest.mark.check
+def test_a_short_training_learns_to_touch_the_ball(tmp_path: Path) -> None:
+    settings = LearningSettings(decisions=300_000, evaluate_every=300_000, evaluated=200)
+    with Training(settings, tmp_path) as training:
+        training.run()
+    last = curve.read(tmp_path / CURVE)[-1]
+    assert last.evaluated_touched >= 0.6

@@ -6,6 +6,8 @@ import csv
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 
+CURVE = "curve.csv"
+"""The file in the folder of a training."""
 NOT_EVALUATED = float("nan")
 
 

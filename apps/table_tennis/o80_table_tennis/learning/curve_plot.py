@@ -14,10 +14,12 @@ from .episodes import Shares
 RESOLUTION = 110
 """[dots per inch]"""
 AXES = (
-    ("decisions", "decisions", 1.0),
-    ("episodes", "episodes, each a motion of the arm", 1.0),
-    ("processor_minutes", "processor time [min]", 1.0),
+    ("decisions", "decisions"),
+    ("episodes", "episodes, each a motion of the arm"),
+    ("processor_minutes", "processor time [min]"),
 )
+FEWEST = 200
+"""Shares of fewer episodes are not drawn: they say nothing yet."""
 STYLES = ("--", ":", "-.", (0, (1, 3)))
 
 
@@ -33,7 +35,7 @@ def plot_curves(
     figure.suptitle(title)
     grid = figure.subplots(3, len(AXES), sharey="row", sharex="col")
     for row, name in enumerate(("touched", "returned", "reward")):
-        for column, (along, label, _) in enumerate(AXES):
+        for column, (along, label) in enumerate(AXES):
             axes = grid[row][column]
             _draw(axes, curves, along, name)
             for style, (baseline, shares) in zip(STYLES, baselines.items(), strict=False):
@@ -57,9 +59,10 @@ def plot_curves(
 def _draw(axes: Axes, curves: Mapping[str, Sequence[CurvePoint]], along: str, name: str) -> None:
     for number, (label, points) in enumerate(curves.items()):
         colour = f"C{number}"
+        counted = [point for point in points if point.episodes >= FEWEST]
         axes.plot(
-            [getattr(point, along) for point in points],
-            [getattr(point, name) for point in points],
+            [getattr(point, along) for point in counted],
+            [getattr(point, name) for point in counted],
             color=colour,
             linewidth=0.7,
             alpha=0.7,

@@ -17,8 +17,9 @@ from rich.console import Console
 
 from ..players.conditions import Conditions
 from . import curve
+from .curve import CURVE
 from .settings import LearningSettings, PpoSettings
-from .training import CURVE, Training
+from .training import Training
 from .verdict import write_report
 
 FIRST_SEED = 101

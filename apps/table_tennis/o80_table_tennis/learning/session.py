@@ -13,17 +13,15 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 
 from ..players.learned_policy import LearnedPolicy
 from . import curve
-from .curve import CurvePoint
+from .curve import CURVE, CurvePoint
 from .curve_plot import plot_curves
 from .episodes import Shares
 from .evaluation import Evaluation, evaluate
 from .landing_plot import plot_landings
 from .settings import LearningSettings
-from .training import CURVE, Training
-from .verdict import baselines, print_table, write_report
+from .training import Training
+from .verdict import REPORT, baselines, print_table, write_report
 from .verdict import recorded as with_recorded
-
-REPORT = "report.json"
 
 
 class Session:

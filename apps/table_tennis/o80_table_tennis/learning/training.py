@@ -14,14 +14,14 @@ import o80
 from ..players.learned_policy import LearnedPolicy
 from . import checkpoint, curve
 from .checkpoint import Progress
-from .curve import CurvePoint
+from .curve import CURVE, CurvePoint
 from .episodes import EpisodeCounter
 from .learner import network_of, new_model, training_environments
 from .settings import LearningSettings
 from .validation import Validation
 
-CURVE, POLICY = "curve.csv", "policy.npz"
-"""Files of a training in its folder."""
+POLICY = "policy.npz"
+"""The file in the folder of a training."""
 
 Told = Callable[[CurvePoint], None]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,8 @@ from ..players.policies import RandomPolicy, StillPolicy
 from ..world.table import TARGET
 from .evaluation import VERDICT_BALLS, Evaluation, evaluate
 
-Told = Callable[[str], None]
+REPORT = "report.json"
+"""The file in the folder of a training."""
 
 
 def baselines(conditions: Conditions, *, balls: int = VERDICT_BALLS) -> list[Evaluation]:
