@@ -81,6 +81,12 @@ def test_a_crossing_is_near_the_predicted_one() -> None:
     assert (np.percentile(np.abs(off), 90, axis=0) < [0.004, 0.01, 0.02, 0.04, 0.08, 0.005]).all()
 
 
+@pytest.mark.parametrize("spin", [-5000.0, 5000.0])
+def test_an_absurd_estimate_is_a_number_all_the_same(spin: float) -> None:
+    ball = (0.4, 2.0, 2.5, 1.0, -25.0, 8.0, spin)
+    assert np.isfinite([*at_table(ball, NUMBERS)[0], *at_plane(ball, 0.3, NUMBERS)]).all()
+
+
 def columns(balls: list[Ball]) -> tuple[FloatArray, ...]:
     return tuple(np.array(balls).T)
 

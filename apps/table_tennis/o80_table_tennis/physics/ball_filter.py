@@ -167,7 +167,7 @@ class ManyBallFilter:
             ball[:, flying], time[flying] = at_table(tuple(ball[:, flying]), ARRAYS)
         found = np.array(at_plane(tuple(ball), plane, ARRAYS))
         found[5] += time
-        found *= comes
+        found[:, ~comes] = 0.0  # not by multiplication, which would make -0
         return found
 
 

@@ -113,7 +113,8 @@ def at_table(ball: Ball, maths: Maths) -> tuple[Ball, Number]:
     _, _, z, vx, vy, vz, spin = ball
     ax, ay, az = acceleration(vx, vy, vz, spin, maths)
     fall = maths.maximum(z - _HEIGHT, 0.0)
-    time = (vz + maths.sqrt(vz * vz - 2.0 * az * fall)) / -az
+    falling = maths.maximum(-az, 1.0)  # however wrong the estimate of the spin is
+    time = (vz + maths.sqrt(vz * vz + 2.0 * falling * fall)) / falling
     x, y, z, vx, vy, vz, spin = _flown(ball, (ax, ay, az), time, maths)
     # the forces have changed on the way
     above, speed = z - _HEIGHT, maths.maximum(-vz, 0.5)
