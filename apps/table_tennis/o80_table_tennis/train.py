@@ -47,6 +47,10 @@ def main(
         Path | None, typer.Option(help="Recordings that the finished policy plays too.")
     ] = None,
     evaluated: Annotated[int, typer.Option(min=1, help="Fresh balls for the verdict.")] = 400,
+    actors: Annotated[
+        int,
+        typer.Option(min=0, help="Actors of Ray that collect; --minutes do not count theirs."),
+    ] = 0,
     output: Annotated[Path, typer.Option(help="Folder that is written.")] = OUTPUT,
     resume: Annotated[bool, typer.Option(help="Go on from the checkpoint in the folder.")] = False,
 ) -> None:
@@ -57,7 +61,13 @@ def main(
         for module in ("torch", "stable_baselines3"):
             needed(module, "learn", "learning", package="o80-table-tennis")
         settings = chosen(
-            way, seed=seed, blind=blind, balls=balls, decisions=decisions, minutes=minutes
+            way,
+            seed=seed,
+            blind=blind,
+            balls=balls,
+            decisions=decisions,
+            minutes=minutes,
+            actors=actors,
         )
         from .learning.session import Session
 

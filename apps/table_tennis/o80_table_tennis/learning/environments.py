@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn, VecEnvWrapper
 
 import o80
 
-from ..entry_points import vector_environment
 from ..players.conditions import Conditions
 from ..task.full_observation import full_observation
+from .copies import training_copies
 
 Float32Array = NDArray[np.float32]
-
-HISTORY = 64
-"""Rows that arms and twins keep: few, as nobody looks back."""
-
 
 BALL_PARTS = (
     *("ball_position", "ball_velocity", "spin"),
@@ -73,14 +67,8 @@ class Masked(VecEnvWrapper):
 
 def opened(conditions: Conditions, *, count: int, seed: int, ball_seed: int) -> VecEnv:
     """Environments that play the shots of `ball_seed`; copy i is seeded with seed + i."""
-    vector = vector_environment(
-        num_envs=count,
-        rig=replace(conditions.rig(), history=HISTORY),
-        task=conditions.task(ball_seed=ball_seed),
-        threads=1,
-        autoreset_mode=AutoresetMode.SAME_STEP,
-    )
-    environments: VecEnv = o80.learning.stable_baselines3(vector, infos="ends")
+    copies = training_copies(conditions, count=count, ball_seed=ball_seed)
+    environments: VecEnv = o80.learning.stable_baselines3(copies, infos="ends")
     environments.seed(seed)
     return environments
 

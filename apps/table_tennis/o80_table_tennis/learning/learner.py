@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 import torch
 from stable_baselines3 import PPO
-from stable_baselines3.common.vec_env import VecNormalize
+from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 from ..players.network import CLIP, Network
 from .environments import Float32Array, Masked, opened, visible_numbers
@@ -16,24 +18,46 @@ from .settings import LearningSettings
 
 def training_environments(settings: LearningSettings) -> VecNormalize:
     """The environments of a training: masked if it is blind, then normalised."""
+    masked = _actors(settings) if settings.actors else _masked(settings)
+    return VecNormalize(
+        masked, norm_obs=True, norm_reward=False, clip_obs=CLIP, gamma=settings.ppo.discount
+    )
+
+
+def _masked(settings: LearningSettings) -> VecEnv:
     inner = opened(
         settings.conditions,
         count=settings.ppo.environments,
         seed=settings.seed,
         ball_seed=settings.seed,
     )
-    size = _size(inner.observation_space)
-    visible = visible_numbers(settings.conditions, size, blind=settings.blind)
-    masked = Masked(inner, visible) if settings.blind else inner
-    return VecNormalize(
-        masked, norm_obs=True, norm_reward=False, clip_obs=CLIP, gamma=settings.ppo.discount
-    )
+    return Masked(inner, _visible(settings, inner)) if settings.blind else inner
+
+
+def _actors(settings: LearningSettings) -> VecEnv:
+    from .actors import actor_environments
+
+    return actor_environments(settings)
+
+
+def _visible(settings: LearningSettings, environments: VecEnv) -> Float32Array:
+    (size,) = environments.observation_space.shape or ()
+    return visible_numbers(settings.conditions, size, blind=settings.blind)
+
+
+def _kind(settings: LearningSettings, environments: VecEnv) -> Callable[..., PPO]:
+    """PPO, or the one that learns from the rollouts of actors."""
+    if not settings.actors:
+        return PPO
+    from o80.learning.rollouts.ppo import RolloutPPO
+
+    return partial(RolloutPPO, visible=_visible(settings, environments))
 
 
 def new_model(settings: LearningSettings, environments: VecNormalize) -> PPO:
     """A learner that knows nothing; the same seed gives the same one."""
     ppo = settings.ppo
-    return PPO(
+    return _kind(settings, environments)(
         "MlpPolicy",
         environments,
         n_steps=ppo.steps,
@@ -81,8 +105,3 @@ def network_of(model: PPO, normalisation: VecNormalize, settings: LearningSettin
 def _array(parameter: torch.Tensor) -> Float32Array:
     array: Float32Array = parameter.detach().cpu().numpy().astype(np.float32).copy()
     return array
-
-
-def _size(space: Any) -> int:
-    (size,) = space.shape
-    return int(size)
