@@ -63,11 +63,12 @@ def print_json(value: Any) -> None:
 
 
 def plain(text: str) -> str:
-    """A text from shared memory or a recording, which must not control the terminal."""
-    return "".join(c if c.isprintable() or c == "\n" else "?" for c in text)
+    """A text of one line, from shared memory or a recording: it must not control the terminal."""
+    return "".join(c if c.isprintable() else "?" for c in text)
 
 
 def complain(text: str) -> None:
     """Prints an error or a remark on stderr."""
     sys.stdout.flush()
-    print(f"{style('o80:', 'red', sys.stderr)} {plain(text)}", file=sys.stderr, flush=True)
+    said = "\n".join(map(plain, text.split("\n")))
+    print(f"{style('o80:', 'red', sys.stderr)} {said}", file=sys.stderr, flush=True)
