@@ -213,6 +213,20 @@ def test_the_command_trains_and_tells_how_well(
     assert picture.stat().st_size > 1000
 
 
+def test_a_training_resumes_that_was_stopped_before_its_blind_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Training(SMALL, tmp_path) as training:
+        training.run()
+    monkeypatch.setitem(WAYS, "ours", SMALL)
+    app = typer.Typer()
+    app.command()(train.main)
+    arguments = ["--resume", "--evaluated", "1", "--blind-share", "0.5", "--output", str(tmp_path)]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 0, result.output
+    assert (tmp_path / "blind" / "policy.npz").is_file()
+
+
 def test_a_missing_library_is_named_with_its_extra(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

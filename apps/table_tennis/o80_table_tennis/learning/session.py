@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from ..players.learned_policy import LearnedPolicy
-from . import curve
+from . import checkpoint, curve
 from .curve import CURVE, CurvePoint
 from .curve_plot import plot_curves
 from .episodes import Shares
@@ -45,7 +45,9 @@ class Session:
             unseeing = replace(
                 settings, blind=True, decisions=max(1, round(blind_share * settings.decisions))
             )
-            blind_policy, more = self._train(unseeing, output / "blind", resume=resume)
+            folder = output / "blind"
+            begun = checkpoint.found(folder) is not None  # not if the first one was interrupted
+            blind_policy, more = self._train(unseeing, folder, resume=resume and begun)
             minutes += more
             blind = self._play("blind", blind_policy)
             evaluations.append(blind)
