@@ -36,17 +36,24 @@ class BlockPool {
 
   /// Copies one block to the end of a chain; false if the pool is empty.
   bool append(BlockChain& chain, const void* block) noexcept {
+    std::byte* const to = spare();
+    if (to == nullptr) return false;
+    std::memcpy(to, block, kBlockBytes);
+    append_spare(chain);
+    return true;
+  }
+  /// The block that append_spare() appends, to be filled in place; null if the pool is empty.
+  std::byte* spare() noexcept { return free_ == kNoBlock ? nullptr : bytes(free_); }
+  /// Call it only if spare() is not null.
+  void append_spare(BlockChain& chain) noexcept {
     const BlockIndex taken = free_;
-    if (taken == kNoBlock) return false;
     free_ = next_[taken];
     --available_;
-    std::memcpy(bytes(taken), block, kBlockBytes);
     next_[taken] = kNoBlock;
     (chain.first == kNoBlock ? chain.first : next_[chain.last]) = taken;
     chain.last = taken;
     ++chain.blocks;
     ends_[chain.first] = {taken, chain.blocks};
-    return true;
   }
   /// Frees the chain from `first` to `last`.
   void release(BlockIndex first, BlockIndex last, std::uint32_t blocks) noexcept {

@@ -7,45 +7,40 @@
 #include <string>
 #include <string_view>
 
+#include "memory/word_pair.hpp"
+
 namespace o80 {
 
 // Copies between private and shared memory in relaxed atomic words of 8 bytes: another process may
 // write the shared side during the copy. `shared` is aligned to 8, `bytes` is a multiple of 8, the
-// private side needs no alignment.
+// private side needs no alignment. Unrolled by hand, because compilers do not unroll loops over
+// atomics: every row is copied here.
 
 inline void store_words(std::byte* shared, const std::byte* from, std::size_t bytes) noexcept {
   auto* words = reinterpret_cast<std::uint64_t*>(shared);
-  const auto copy = [&](std::size_t i) {
+  std::size_t i = 0;
+  for (; i + 4 <= bytes / 8; i += 4) {
+    store_pair(words + i, from + 8 * i);
+    store_pair(words + i + 2, from + 8 * i + 16);
+  }
+  for (std::size_t left = bytes / 8 % 4; left > 0; --left, ++i) {
     std::uint64_t word;
     std::memcpy(&word, from + 8 * i, 8);
     std::atomic_ref(words[i]).store(word, std::memory_order_relaxed);
-  };
-  // unrolled by hand, because compilers do not unroll loops over atomics: every row is copied here
-  std::size_t i = 0;
-  for (; i + 4 <= bytes / 8; i += 4) {
-    copy(i);
-    copy(i + 1);
-    copy(i + 2);
-    copy(i + 3);
   }
-  for (std::size_t left = bytes / 8 % 4; left > 0; --left) copy(i++);
 }
 
 inline void load_words(std::byte* to, const std::byte* shared, std::size_t bytes) noexcept {
   auto* words = reinterpret_cast<std::uint64_t*>(const_cast<std::byte*>(shared));
-  const auto copy = [&](std::size_t i) {
-    const std::uint64_t word = std::atomic_ref(words[i]).load(std::memory_order_relaxed);
-    std::memcpy(to + 8 * i, &word, 8);
-  };
-  // unrolled as above, for bulk reads
   std::size_t i = 0;
   for (; i + 4 <= bytes / 8; i += 4) {
-    copy(i);
-    copy(i + 1);
-    copy(i + 2);
-    copy(i + 3);
+    load_pair(to + 8 * i, words + i);
+    load_pair(to + 8 * i + 16, words + i + 2);
   }
-  for (std::size_t left = bytes / 8 % 4; left > 0; --left) copy(i++);
+  for (std::size_t left = bytes / 8 % 4; left > 0; --left, ++i) {
+    const std::uint64_t word = std::atomic_ref(words[i]).load(std::memory_order_relaxed);
+    std::memcpy(to + 8 * i, &word, 8);
+  }
 }
 
 /// Writes a text with a terminating zero; excess characters are dropped. Release: see `load_text`.

@@ -7,7 +7,6 @@
 #include <cstring>
 
 #include "base/crash_point.hpp"
-#include "memory/prefetch.hpp"
 
 // As in history.cpp: the thread sanitizer does not model fences, and every word that they order is
 // atomic.
@@ -32,42 +31,37 @@ JournalWriter::JournalWriter(const SegmentView& view) noexcept
       sector_shift_(bytes_ == 0 ? 0 : std::countr_zero(bytes_ / kJournalSectors)),
       most_(bytes_ == 0 ? 0 : std::min<std::uint64_t>(kMostJournalPayload, bytes_ / 4)) {}
 
-void JournalWriter::write(JournalHead head, const void* payload, std::size_t bytes) noexcept {
+void JournalWriter::write(const JournalHead& head, const void* payload,
+                          std::size_t bytes) noexcept {
   if (bytes_ == 0) return;
   begin(bytes);
   add(static_cast<const std::byte*>(payload), bytes);
-  publish(head, added_);
+  publish(head);
 }
 
 void JournalWriter::begin(std::size_t most) noexcept {
   if (bytes_ == 0) return;
   added_ = 0;
+  room_ = std::min(most, most_);
+  const std::uint64_t at = position_ & (bytes_ - 1);
+  entry_ = at + sizeof(JournalHead) + room_ <= bytes_ ? ring_ + at : nullptr;
   O80_CRASH_POINT("journal.before_begun");
-  counters_->begun.store(position_ + sizeof(JournalHead) + std::min(most, most_),
-                         std::memory_order_relaxed);
+  counters_->begun.store(position_ + sizeof(JournalHead) + room_, std::memory_order_relaxed);
   std::atomic_thread_fence(std::memory_order_release);  // sync entry
   O80_CRASH_POINT("journal.before_entry");
 }
 
-void JournalWriter::end(JournalHead head) noexcept {
-  if (bytes_ != 0 && added_ > 0) publish(head, added_);
+void JournalWriter::end(const JournalHead& head) noexcept {
+  if (bytes_ != 0 && added_ > 0) publish(head);
 }
 
-void JournalWriter::expect() noexcept {
-  if (position_ == expected_) return;
-  const std::uint64_t bytes = std::min<std::uint64_t>(position_ - expected_, kMostExpected);
-  for (std::uint64_t at = 0; at <= bytes; at += kLineBytes) {
-    prefetch_to_write(ring_ + ((position_ + at) & (bytes_ - 1)));
-  }
-  expected_ = position_;
-}
-
-void JournalWriter::publish(JournalHead& head, std::size_t payload) noexcept {
-  const std::size_t bytes = sizeof head + payload;
-  head.number = number_;
+void JournalWriter::publish(const JournalHead& head) noexcept {
+  const std::size_t bytes = sizeof head + added_;
+  // whole words: to load them from a head that was written field by field would take longer
+  const std::array words{head.first_word(bytes / 8), number_,
+                         static_cast<std::uint64_t>(head.iteration), head.id};
   number_ += head.numbers();
-  head.words = static_cast<std::uint16_t>(bytes / 8);
-  store(position_, reinterpret_cast<const std::byte*>(&head), sizeof head);
+  store(0, reinterpret_cast<const std::byte*>(words.data()), sizeof words);
   const std::uint64_t sector = position_ >> sector_shift_;
   if (sector != marked_) {
     marked_ = sector;
@@ -79,10 +73,11 @@ void JournalWriter::publish(JournalHead& head, std::size_t payload) noexcept {
   O80_CRASH_POINT("journal.after_published");
 }
 
-/// Stores bytes that wrap around the end of the ring.
-void JournalWriter::store_across(std::uint64_t at, const std::byte* from,
+/// The same for an entry that may wrap around the end of the ring.
+void JournalWriter::store_across(std::size_t offset, const std::byte* from,
                                  std::size_t bytes) noexcept {
-  const std::size_t before_end = bytes_ - at;
+  const std::uint64_t at = (position_ + offset) & (bytes_ - 1);
+  const std::size_t before_end = std::min<std::uint64_t>(bytes, bytes_ - at);
   store_words(ring_ + at, from, before_end);
   store_words(ring_, from + before_end, bytes - before_end);
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <type_traits>
@@ -29,6 +30,12 @@ struct JournalHead {
   Iteration iteration = 0;
   std::uint64_t id = 0;  // of a batch, record or halt; incarnation of an owner; an actuator
 
+  /// The fields before `number`, with this length.
+  constexpr std::uint64_t first_word(std::uint64_t length) const noexcept {
+    static_assert(std::endian::native == std::endian::little);
+    return length | std::uint64_t{static_cast<std::uint8_t>(kind)} << 16 |
+           std::uint64_t{lane} << 24 | std::uint64_t{what} << 32;
+  }
   /// The numbers that the entry takes.
   constexpr std::uint64_t numbers() const noexcept {
     const bool is_many = kind == JournalKind::statuses || kind == JournalKind::status;
@@ -43,13 +50,11 @@ struct JournalHead {
   constexpr std::uint8_t reason() const noexcept { return static_cast<std::uint8_t>(what >> 8); }
   constexpr std::uint8_t detail() const noexcept { return static_cast<std::uint8_t>(what >> 16); }
 };
+static_assert(offsetof(JournalHead, lane) == 3 && offsetof(JournalHead, what) == 4);
 static_assert(sizeof(JournalHead) == 32 && std::is_trivially_copyable_v<JournalHead>);
 
 /// Largest payload of an entry [bytes].
 inline constexpr std::size_t kMostJournalPayload = 0xFFFF * 8 - sizeof(JournalHead);
-
-/// Most bytes that JournalWriter::expect() prefetches.
-inline constexpr std::size_t kMostExpected = 4096;
 
 /// Appends entries to the journal. Without a journal in the segment every call does nothing.
 ///
@@ -68,7 +73,8 @@ class JournalWriter {
   bool fits(std::size_t payload) const noexcept { return payload <= most_; }
   /// Appends an entry; sets `number` and `words` of its head. `bytes`: a multiple of 8. A payload
   /// larger than kMostJournalPayload or a quarter of the ring is left out.
-  void write(JournalHead head, const void* payload = nullptr, std::size_t bytes = 0) noexcept;
+  void write(const JournalHead& head, const void* payload = nullptr,
+             std::size_t bytes = 0) noexcept;
 
   /// The next entry has this number: entries before it are missing. A smaller one has no effect.
   void skip_to(std::uint64_t number) noexcept { number_ = number > number_ ? number : number_; }
@@ -76,25 +82,23 @@ class JournalWriter {
   // an entry whose payload comes in pieces: begin, add any number of times, end
   /// `most`: upper bound of the payload.
   void begin(std::size_t most) noexcept;
+  /// A piece that does not fit in `most` is left out.
   void add(const std::byte* piece, std::size_t bytes) noexcept {
-    if (added_ + bytes > most_) return;
-    store(position_ + sizeof(JournalHead) + added_, piece, bytes);
+    if (added_ + bytes > room_) return;
+    store(sizeof(JournalHead) + added_, piece, bytes);
     added_ += bytes;
   }
   /// Appends the entry; without any payload, nothing.
-  void end(JournalHead head) noexcept;
-
-  /// Prefetches as many cache lines as were written since the last call, at most kMostExpected.
-  void expect() noexcept;
+  void end(const JournalHead& head) noexcept;
 
  private:
-  void store(std::uint64_t position, const std::byte* from, std::size_t bytes) noexcept {
-    const std::uint64_t at = position & (bytes_ - 1);
-    if (at + bytes > bytes_) return store_across(at, from, bytes);
-    store_words(ring_ + at, from, bytes);
+  /// Stores a part of the entry that was begun.
+  void store(std::size_t offset, const std::byte* from, std::size_t bytes) noexcept {
+    if (entry_ == nullptr) return store_across(offset, from, bytes);
+    store_words(entry_ + offset, from, bytes);
   }
-  void store_across(std::uint64_t at, const std::byte* from, std::size_t bytes) noexcept;
-  void publish(JournalHead& head, std::size_t payload) noexcept;
+  void store_across(std::size_t offset, const std::byte* from, std::size_t bytes) noexcept;
+  void publish(const JournalHead& head) noexcept;
 
   JournalCounters* counters_;
   std::byte* ring_;
@@ -104,8 +108,10 @@ class JournalWriter {
   std::uint64_t position_ = 0;
   std::uint64_t marked_ = ~std::uint64_t{0};  // last sector with a mark, counted over all laps
   std::uint64_t number_ = 0;
-  std::size_t added_ = 0;       // payload of the entry that was begun
-  std::uint64_t expected_ = 0;  // position at the last expect()
+  // the entry that was begun
+  std::byte* entry_ = nullptr;  // null if it may wrap around the end of the ring
+  std::size_t room_ = 0;        // for its payload; 0: without a journal
+  std::size_t added_ = 0;       // its payload
 };
 
 /// An entry that was read.

@@ -32,13 +32,6 @@ bool LaneReceiver::is_possible(std::uint64_t cursor) const noexcept {
   return committed_ - cursor <= mask_ + 1 - in_flight();
 }
 
-bool LaneReceiver::take(std::byte* block) noexcept {
-  if (cursor_ == committed_ && available() == 0) return false;
-  load_words(block, transport_ + (cursor_ & mask_) * kBlockSize, kBlockSize);
-  ++cursor_;
-  return true;
-}
-
 std::uint64_t LaneReceiver::peek_word(std::size_t offset) const noexcept {
   std::uint64_t word;
   load_words(reinterpret_cast<std::byte*>(&word),
@@ -76,7 +69,7 @@ void LaneReceiver::free(std::uint32_t blocks) noexcept {
   has_news_ = true;
 }
 
-void LaneReceiver::set_status(std::uint64_t id, StatusWord word) noexcept {
+void LaneReceiver::set_status_word(std::uint64_t id, std::uint64_t word) noexcept {
   StatusSlot& slot = statuses_[id & (2 * (mask_ + 1) - 1)];
   const std::uint64_t owner = slot.id.load(std::memory_order_relaxed);
   if (owner > id) return;  // the slot belongs to a later id: this one is forgotten
@@ -87,7 +80,7 @@ void LaneReceiver::set_status(std::uint64_t id, StatusWord word) noexcept {
     slot.id.store(id, std::memory_order_release);  // sync status_id
   }
   O80_CRASH_POINT("status.before_word");
-  slot.word.store(word.packed(), std::memory_order_release);  // sync status
+  slot.word.store(word, std::memory_order_release);  // sync status
   O80_CRASH_POINT("status.after_word");
 }
 

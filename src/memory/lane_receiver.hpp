@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "memory/atomic_words.hpp"
 #include "memory/segment_layout.hpp"
 #include "memory/status_word.hpp"
 
@@ -36,7 +37,12 @@ class LaneReceiver {
   /// The same, but only blocks of one owner: a batch never spans two owners.
   std::uint32_t available_of_one() noexcept;
   /// Copies the next block (64 bytes) and advances the cursor; false if none is committed.
-  bool take(std::byte* block) noexcept;
+  bool take(std::byte* block) noexcept {
+    if (cursor_ == committed_ && available() == 0) return false;
+    load_words(block, transport_ + (cursor_ & mask_) * kBlockSize, kBlockSize);
+    ++cursor_;
+    return true;
+  }
   /// The 8 bytes at `offset` of the next block. Call it only if available() is not 0.
   std::uint64_t peek_word(std::size_t offset) const noexcept;
   /// Skips committed blocks that were not taken, after invalid data. Taken blocks stay in flight.
@@ -54,7 +60,11 @@ class LaneReceiver {
   std::uint64_t in_flight() const noexcept { return cursor_ - freed_; }
 
   /// Visible at once; waiters wake up after flag() and flush().
-  void set_status(std::uint64_t id, StatusWord word) noexcept;
+  void set_status(std::uint64_t id, StatusWord word) noexcept {
+    set_status_word(id, word.packed());
+  }
+  /// The same for a packed StatusWord.
+  void set_status_word(std::uint64_t id, std::uint64_t word) noexcept;
   /// Stores a text for an id, cut to 247 bytes. Call it before the set_status() that it explains.
   void set_message(std::uint64_t id, std::string_view text) noexcept;
   /// True if a batch may have this id: ids grow by limited steps. Otherwise one owner could use up

@@ -331,7 +331,7 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
     under_way_ = false;
     count_burst();
   }
-  journal.end_iteration();
+  journal.flush();
   wake_sleepers(segment.view(),
                 {.lanes = !fresh && lanes.announce(), .rows = row_signal.announce(current)});
   if (!begun_) segment.set_state(BackendState::running);

@@ -69,6 +69,24 @@ void DecisionJournal::decided(const StagedBatch& sent, const StatusChange& chang
         &payload, sizeof payload);
 }
 
+void DecisionJournal::statuses(std::uint32_t lane, JournalStatusRun run) noexcept {
+  if (!writer_.is_on()) return;
+  while (run.count > 0) {
+    if (statuses_ == kMostStatuses || status_lane_ != lane) flush();
+    status_lane_ = lane;
+    const std::uint64_t count = std::min<std::uint64_t>(run.count, kMostStatuses - statuses_);
+    JournalStatusRun* const last = statuses_ > 0 ? &runs_[runs_used_ - 1] : nullptr;
+    if (last != nullptr && run.first_id == last->first_id + last->count && run.word == last->word) {
+      last->count += count;
+    } else {
+      runs_[runs_used_++] = {run.first_id, count, run.word};
+    }
+    statuses_ += static_cast<std::uint32_t>(count);
+    run.first_id += count;
+    run.count -= count;
+  }
+}
+
 void DecisionJournal::flush() noexcept {
   if (statuses_ == 0) return;
   writer_.write(head(JournalKind::statuses, status_lane_, 0, statuses_), runs_.data(),

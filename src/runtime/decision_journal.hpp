@@ -79,7 +79,7 @@ class DecisionJournal {
   /// The blocks of a batch, while they are copied: begin, add each, end. `first`: index of the
   /// first of them. `sender`: incarnation that sends, 0 if it has left.
   void begin_blocks(std::uint32_t lane, std::uint64_t sender, std::uint32_t most) noexcept;
-  void add_block(const Block& block) noexcept { writer_.add(block.bytes.data(), kBlockBytes); }
+  void add_block(const std::byte* block) noexcept { writer_.add(block, kBlockBytes); }
   void end_blocks(std::uint32_t lane, CommandId batch, std::uint32_t first) noexcept;
   void dropped(std::uint32_t lane, CommandId batch) noexcept;
   void scheduled(const StagedBatch& sent, CommandId batch) noexcept;
@@ -89,13 +89,8 @@ class DecisionJournal {
 
   /// Statuses of one lane are gathered in one entry, which ends with the next other entry, or with
   /// flush().
-  void status(const StatusChange& change) noexcept;
+  void statuses(std::uint32_t lane, JournalStatusRun run) noexcept;
   void flush() noexcept;
-  /// Call it at the end of an iteration.
-  void end_iteration() noexcept {
-    flush();
-    writer_.expect();
-  }
 
   // halts
   void halt(JournalKind halt_or_reason, const Halt& halt) noexcept;
@@ -173,22 +168,5 @@ class DecisionJournal {
   std::uint32_t status_lane_ = 0;
   Iteration iteration_ = 0;
 };
-
-inline void DecisionJournal::status(const StatusChange& change) noexcept {
-  // the entries of the batch tell the others
-  if (!writer_.is_on() || change.of != StatusChange::Of::record) return;
-  if (statuses_ == kMostStatuses || status_lane_ != change.lane) flush();
-  const StatusWord word{static_cast<std::uint8_t>(change.status),
-                        static_cast<std::uint8_t>(change.reason), change.detail, change.iteration};
-  const std::uint64_t packed = word.packed();
-  JournalStatusRun* const last = statuses_ > 0 ? &runs_[runs_used_ - 1] : nullptr;
-  if (last != nullptr && change.id == last->first_id + last->count && packed == last->word) {
-    ++last->count;
-  } else {
-    runs_[runs_used_++] = {change.id, 1, packed};
-  }
-  status_lane_ = change.lane;
-  ++statuses_;
-}
 
 }  // namespace o80

@@ -71,17 +71,16 @@ bool Staging::copy_and_check(std::uint32_t lane, std::uint32_t& budget) noexcept
 bool Staging::copy(std::uint32_t lane, std::uint32_t& budget) noexcept {
   Stage& stage = stages_[lane];
   LaneReceiver& from = lanes_[lane];
-  Block block{};
   while (stage.left > 0 && budget > 0) {
-    const bool taken = from.take(block.bytes.data());
-    BatchRecord first;
-    std::memcpy(&first, block.bytes.data(), sizeof first);
-    const bool expected = stage.chain.blocks > 0 || from.expects(first.id);
     --budget;
-    if (!taken || !expected || !pool_.append(stage.chain, &block)) {
-      if (taken) from.free(1);
+    std::byte* const block = pool_.spare();
+    if (block == nullptr || !from.take(block)) return false;
+    const bool is_first = stage.chain.blocks == 0;
+    if (is_first && !from.expects(load<BatchRecord>(block).id)) {
+      from.free(1);
       return false;
     }
+    pool_.append_spare(stage.chain);
     journal_.add_block(block);
     --stage.left;
   }

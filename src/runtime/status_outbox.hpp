@@ -1,16 +1,18 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "control/status_sink.hpp"
 #include "memory/lane_receiver.hpp"
+#include "memory/status_word.hpp"
 #include "runtime/decision_journal.hpp"
 
 namespace o80 {
 
-/// Reports statuses to their lanes and to the journal. The journal gets no begin of a command that
-/// ends in the same iteration, unless the changes of others come between the two. An end that comes
+/// Reports statuses to their lanes and to the journal. The begin of a command that ends in the same
+/// iteration is not reported, unless the changes of others come between the two. An end that comes
 /// during a step is reported after its row is published, so that no command is reported as
 /// completed by a backend that dies before.
 ///
@@ -26,7 +28,7 @@ class StatusOutbox {
 
   void begin_step() noexcept { stepping_ = true; }
   void end_step() noexcept {
-    note_begin();
+    report_begin();
     stepping_ = false;
   }
   void put(const StatusChange& change) noexcept;
@@ -36,15 +38,32 @@ class StatusOutbox {
   void report_no_row() noexcept;
 
  private:
-  void note_begin() noexcept;
-  void report(const StatusChange& change) noexcept;
+  /// The same change of consecutive ids.
+  struct Run {
+    CommandId first_id = 0;
+    std::uint64_t word = 0;  // a packed StatusWord
+    std::uint32_t count = 0;
+    std::uint32_t lane = 0;
+    bool of_records = false;  // the journal has the others in the entries of their batch
+  };
+
+  void wait(const Run& end) noexcept;
+  void report_begin() noexcept {
+    if (begun_.count != 0) report_the_begin();
+  }
+  void report_the_begin() noexcept;
+  void report_now(const Run& run, bool ends) noexcept;
+  void note(const Run& run) noexcept {
+    if (run.of_records) journal_.statuses(run.lane, {run.first_id, run.count, run.word});
+  }
+  void tell(const Run& run, bool ends) noexcept;
 
   LaneReceivers& lanes_;
   DecisionJournal& journal_;
-  std::vector<StatusChange> waiting_;
-  /// The last command that began in this step, until it is known whether its end follows at once:
-  /// then the journal gets only the end. Unused if `id` is 0, which no command has.
-  StatusChange begun_;
+  std::vector<Run> waiting_;  // ends
+  /// The last command that began in this step, until it is known whether its end follows at once.
+  /// Unused if `count` is 0.
+  Run begun_;
   bool stepping_ = false;
 };
 

@@ -132,6 +132,20 @@ TEST_F(JournalTest, AnEntryMayComeInPieces) {
   EXPECT_FALSE(reader_.next(item_));
 }
 
+TEST_F(JournalTest, APieceBeyondTheAnnouncedPayloadIsLeftOutAlsoAtTheEndOfTheRing) {
+  const std::array<std::uint64_t, 8> piece{};
+  const auto* bytes = reinterpret_cast<const std::byte*>(piece.data());
+  for (int lap = 0; lap < 3 * 4096 / 96; ++lap) {
+    writer_.begin(sizeof piece);
+    for (int i = 0; i < 3; ++i) writer_.add(bytes, sizeof piece);
+    writer_.end({.kind = JournalKind::records});
+    ASSERT_EQ(writer_.position(), (lap + 1) * 96U);
+    ASSERT_EQ(segment_.view().counters().journal.begun.load(), writer_.position());
+    ASSERT_TRUE(reader_.next(item_));
+    ASSERT_EQ(item_.payload.size(), sizeof piece);
+  }
+}
+
 TEST_F(JournalTest, APayloadThatIsTooLargeIsLeftOut) {
   std::vector<std::uint64_t> large(kRing / 8);
   writer_.write({.kind = JournalKind::halt}, large.data(), kRing);

@@ -11,8 +11,8 @@
 //   - slot.id.store(id, std::memory_order_release);  // sync status_id
 //   + slot.id.store(id, std::memory_order_relaxed);
 // mutant word_relaxed: src/memory/lane_receiver.cpp
-//   - slot.word.store(word.packed(), std::memory_order_release);
-//   + slot.word.store(word.packed(), std::memory_order_relaxed);
+//   - slot.word.store(word, std::memory_order_release);
+//   + slot.word.store(word, std::memory_order_relaxed);
 // mutant word_looked_at_once: src/memory/lane_sender.cpp
 //   - slot.word.load(std::memory_order_relaxed) == word) return
 //   + true) return
