@@ -64,10 +64,10 @@ def test_the_motion_of_the_dead_time_is_predicted_from_the_actions_in_flight() -
     for joint, ahead in enumerate(dead_steps):
         errors, moved, continued = [], [], []
         for step in range(8, steps - 4):
-            later, now = rows[step + ahead], rows[step]
+            later, present = rows[step + ahead], rows[step]
             errors.append(predicted[step].q[joint] - later[joint])
-            moved.append(now[joint] - later[joint])
-            continued.append(moved[-1] + ahead * STEP * now[JOINTS + joint])
+            moved.append(present[joint] - later[joint])
+            continued.append(moved[-1] + ahead * STEP * present[JOINTS + joint])
             assert abs(later[joint]) < 1.5
             speed = predicted[step].dq[joint] - later[JOINTS + joint]
             assert abs(speed) < 0.35, (joint, step)

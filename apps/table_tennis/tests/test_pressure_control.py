@@ -23,7 +23,7 @@ def test_pressures_make_their_torques() -> None:
     for torque in np.random.default_rng(1).uniform(-8.0, 8.0, (20, 4)):
         pressures = muscles.pressures(torque, q, 0.45)
         contraction = muscles.contracted + np.outer(q, [1.0, -1.0]) * muscles.pulley
-        force = muscles.maximum_force * pressures * (1.0 - contraction / muscles.stroke)
+        force = np.asarray(muscles.maximum_force) * pressures * (1.0 - contraction / muscles.stroke)
         assert muscles.pulley * (force[:, 0] - force[:, 1]) == pytest.approx(torque)
 
 
