@@ -22,16 +22,30 @@ def test_the_robot_is_found_by_its_name() -> None:
     assert ("pam", o80_pam.library()) in [(r.name, r.path) for r in o80.robots.list()]
 
 
-def test_the_first_minute_of_the_readme(tmp_path: Path) -> None:
-    (program,) = re.findall(r"```python\n(.*?)```", (PACKAGE / "README.md").read_text(), re.DOTALL)
+def printed_by_the_readme(number: int, folder: Path) -> list[str]:
+    """Lines that one of its programs prints."""
+    programs = re.findall(r"```python\n(.*?)```", (PACKAGE / "README.md").read_text(), re.DOTALL)
+    assert len(programs) == 2
     done = subprocess.run(
-        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, timeout=60
+        [sys.executable, "-c", programs[number]],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=60,
     )
-
     assert done.returncode == 0, done.stderr
-    names, angle = done.stdout.splitlines()
+    return done.stdout.splitlines()
+
+
+def test_the_first_minute_of_the_readme(tmp_path: Path) -> None:
+    names, angle = printed_by_the_readme(0, tmp_path)
     assert names.count("'") == 2 * 8
     assert float(angle.split()[0]) > 0.05
+
+
+def test_the_model_tells_the_numbers_of_the_arm(tmp_path: Path) -> None:
+    (dead_time,) = printed_by_the_readme(1, tmp_path)
+    assert [float(each) for each in dead_time.split()] == [0.04, 0.04, 0.02, 0.01]
 
 
 def test_the_identified_arm_moves_after_its_dead_time_and_against_the_sign_of_joint_1() -> None:
