@@ -35,7 +35,8 @@ def named() -> dict[str, set[str]]:
             package = heading[1]
             continue
         for name in re.findall(r"`(\w+)`", cell):
-            home = "" if name == "settings" else package
+            # the settings of the environments stand beside the packages, among those of the rig
+            home = "" if (package, name) == ("rig", "settings") else package
             found.setdefault(home, set()).add(name)
     return found
 
