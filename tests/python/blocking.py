@@ -60,7 +60,7 @@ CALLS = {
     "stop": Call("o80.stop(frozen.segment, 1e6)", "None", ""),
     "Process.frontend": Call("unborn.frontend(None)", "begin(unborn.segment)", ""),
     "Robot.start": Call(
-        "start_process(never, late, [], None)", "open(never, 'wb').close()", "DriverError"
+        "start_process([RUN, never], late, [], None)", "open(never, 'wb').close()", "DriverError"
     ),
 }
 
@@ -75,7 +75,7 @@ def waiting_methods() -> set[str]:
         thing: Any = o80
         for part in name.split("."):
             thing = getattr(thing, part)
-        short = name.rpartition(".")[2]
+        short = thing.__name__ if isinstance(thing, type) else name.rpartition(".")[2]
         if callable(thing) and not isinstance(thing, type) and "timeout" in signature_of(thing):
             found.add(short)
         if not isinstance(thing, type) or issubclass(thing, BaseException):
@@ -159,6 +159,7 @@ class Place:
             "o80": o80,
             "os": os,
             "start_process": start_process,
+            "RUN": o80.prefix() / "bin" / "o80-run",
             "begin": self.begin,
             "SIGCONT": signal.SIGCONT,
         }

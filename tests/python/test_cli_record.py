@@ -119,4 +119,4 @@ def test_repair_refuses_what_is_no_recording(tmp_path: Path) -> None:
     (tmp_path / "x.mcap").write_text("not this")
 
     assert "is not an MCAP file" in run("repair", tmp_path / "x.mcap", code=1)
-    assert "cannot be read" in run("repair", tmp_path / "missing.mcap", code=1)
+    assert "there is no file" in run("repair", tmp_path / "missing.mcap", code=1)

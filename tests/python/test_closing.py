@@ -51,7 +51,7 @@ CALLS: dict[str, dict[str, Callable[[Any], Any]]] = {
 DATA = {
     "Frontend": {
         *("segment", "schema", "robot", "actuators", "requests", "enums", "period", "frequency"),
-        *("bursting", "epoch", "initial_states", "closed", "close", "aio", "provenance"),
+        *("bursting", "epoch", "initial_states", "closed", "close", "aio", "provenance", "model"),
     },
     "Backend": {"segment", "schema", "close"},
     "Process": {"segment", "frontend"},

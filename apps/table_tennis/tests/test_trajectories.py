@@ -40,7 +40,8 @@ def test_the_sampled_flight_is_smooth_except_for_its_bounce() -> None:
     assert np.delete(off, bounce).max() < 1e-3
     # no jump of the position at the bounce
     assert off[bounce] * sampled.period < 0.02
-    assert sampled.positions[:, 2].min() == pytest.approx(0.795, abs=0.008)
+    around = sampled.positions[bounce - 5 : bounce + 6, 2]
+    assert around.min() == pytest.approx(0.795, abs=0.008)
     assert sampled.residual < 0.001
     assert len(sampled.positions) == len(sampled.velocities)
     assert sampled.duration == pytest.approx(shot.duration, abs=0.002)
