@@ -16,8 +16,9 @@ from typer.testing import CliRunner
 from o80.learning.rollouts import LocalWorkers
 from o80_table_tennis import train
 from o80_table_tennis.learning import actors, curve
+from o80_table_tennis.learning.curve import CURVE
 from o80_table_tennis.learning.settings import LearningSettings, PpoSettings
-from o80_table_tennis.learning.training import CURVE, POLICY, Training
+from o80_table_tennis.learning.training import POLICY, Training
 
 SMALL = LearningSettings(
     ppo=PpoSettings(environments=4, steps=48, batch=64, epochs=2, hidden=8),

@@ -45,14 +45,14 @@ def test_each_ball_has_exactly_the_episode_of_a_played_one(observation: str) -> 
     assert not motion.touched.all()
     with closing(environment(task, balls=BALLS)) as single:
         for ball, number in enumerate(motion.balls.tolist()):
-            observation, _ = single.reset(seed=3, options={"ball": number})
+            seen, _ = single.reset(seed=3, options={"ball": number})
             length = int(motion.lengths[ball])
             for step in range(length):
-                assert np.array_equal(observation, motion.observations[step, ball])
-                observation, reward, terminated, truncated, info = single.step(motion.actions[step])
+                assert np.array_equal(seen, motion.observations[step, ball])
+                seen, reward, terminated, truncated, info = single.step(motion.actions[step])
                 assert np.float32(reward) == motion.rewards[step, ball]
                 assert (terminated or truncated) == (step == length - 1)
-            assert np.array_equal(observation, motion.observations[length, ball])
+            assert np.array_equal(seen, motion.observations[length, ball])
             assert terminated == motion.terminated[ball]
             assert info["touched"] == motion.touched[ball]
             assert info["returned"] == motion.returned[ball]
