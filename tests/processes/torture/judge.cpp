@@ -274,7 +274,9 @@ class Judge {
     }
     if (status == Status::limited && !is_limited(batch, command))
       return add(Fault::falsely_told, slot, batch, command, "no target was outside of the limits");
-    if (!done.empty() && command.arrives_early == 0 && status != Status::limited)
+    // within limits of acceleration a motion may rest on its target before its last iteration
+    const bool early = command.arrives_early != 0 || is_limited(batch, command);
+    if (!done.empty() && !early && status != Status::limited)
       add(Fault::falsely_told, slot, batch, command,
           "done at " + std::to_string(done[0].iteration) + " all the same");
   }
