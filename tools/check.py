@@ -15,7 +15,7 @@ from sources import ROOT
 from steps import LOGS, PASSED, PYTHON, Step, build, cpp, processor_time, pytest, run, use_tools
 
 PROOF = [sys.executable, "tests/proofs/run.py"]
-PACKAGES = ("o80", "o80_mujoco", "o80_pam", "o80_table_tennis")
+PACKAGES = ("o80", "o80_mujoco", "o80_pam", "o80_devices", "o80_table_tennis")
 TYPED = ("tools", "benchmarks", "examples", "tests/proofs", "conftest.py")  # beside the packages
 TYPED_TESTS = (
     "tests/python",
@@ -24,6 +24,7 @@ TYPED_TESTS = (
     "tests/tools",
     "robots/pam/tests",
     "simulators/mujoco/tests",
+    "devices/tests",
     "apps/table_tennis/tests",
 )
 TORTURE = ("--kills", "2000", "--halts", "300", "--seed", "77")  # the same mixes in every run

@@ -18,7 +18,8 @@ class NoSuchTestsError(Exception):
 
 def _packages() -> dict[str, Path]:
     """The folders of the packages beside the core, by name."""
-    found = (f for group in ("robots", "simulators", "apps") for f in (ROOT / group).glob("*/"))
+    found = [f for group in ("robots", "simulators", "apps") for f in (ROOT / group).glob("*/")]
+    found.append(ROOT / "devices")
     return {folder.name: folder for folder in sorted(found) if (folder / "tests").is_dir()}
 
 

@@ -67,7 +67,7 @@ install_tools() {
   pip install -r build/requirements.txt --group build ${1:+--group "$1"}
 }
 
-# install_package NAME FOLDER: one of the four packages, whose requirements are there
+# install_package NAME FOLDER: one of the five packages, whose requirements are there
 install_package() {
   say "building and installing $1"
   pip install --no-build-isolation --no-deps "-Cbuild-dir=$PWD/build/pip/$1" "$2"
@@ -81,6 +81,7 @@ install_packages() {
   headers=$(state_of include cmake/o80_add_robot.cmake cmake/o80Config.cmake.in)
   once pam "$headers $(package_state robots/pam)" install_package o80-pam ./robots/pam
   once mujoco "$headers $(package_state simulators/mujoco)" install_package o80-mujoco ./simulators/mujoco
+  once devices "$(package_state devices)" install_package o80-devices ./devices
   once table_tennis "$(package_state apps/table_tennis)" \
     install_package o80-table-tennis ./apps/table_tennis
 }
@@ -112,10 +113,11 @@ case $purpose in
   check | wheels) group=$purpose ;;
   *) group= ;;
 esac
-# torch and the rest that learning needs, for those that learn or test it
+# torch and the rest that learning needs, clients of devices: for those that use or test them
 case $purpose in
   demo | bench) extras= ;;
+  test | tools | check) extras="learn zeromq cameras motioncapture" ;;
   *) extras=learn ;;
 esac
-once "tools-${group:-build$extras}" "$(state_of pyproject.toml ./*/*/pyproject.toml)" install_tools "$group"
+once "tools-${group:-build$extras}" "$(state_of pyproject.toml ./*/pyproject.toml ./*/*/pyproject.toml)" install_tools "$group"
 [ "$purpose" = tools ] || install_packages

@@ -11,7 +11,7 @@ import o80
 
 ROOT = Path(__file__).resolve().parents[2]
 INSTALLED = Path(o80.__file__).parent
-OTHERS = ("simulators/mujoco", "robots/pam", "apps/table_tennis")
+OTHERS = ("simulators/mujoco", "robots/pam", "devices", "apps/table_tennis")
 
 
 def pyproject(folder: str = ".") -> dict[str, Any]:

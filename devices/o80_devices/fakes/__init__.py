@@ -1,0 +1,1 @@
+"""Counterparts of the devices that speak their wire protocols."""
