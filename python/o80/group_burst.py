@@ -66,7 +66,8 @@ class GroupBurst:
         timeout: for all of them together [s].
 
         Raises CopyFailed with the exception of each copy that failed (for example targets that the
-        robot cannot follow, a halt, a fault of its driver); all others are done. TimeoutError and
+        robot cannot follow, a halt, a fault of its driver); all others are done, and the rows of
+        those that failed are not valid. TimeoutError and
         Ctrl-C leave each copy between two iterations; some have not run at all then.
         """
         chosen = self._all

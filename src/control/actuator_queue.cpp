@@ -97,6 +97,19 @@ ActuatorQueue::Moved ActuatorQueue::step(Iteration iteration, const std::byte* o
   return limited_.limit == Limit::none ? Moved::active : Moved::clamped;
 }
 
+void ActuatorQueue::begin_given(Mode mode) noexcept {
+  if (mode == Mode::overwrite) carry_.reset();
+  motion_.rest();
+  limiter_.release();
+  limiter_.begin();
+  streams_ = false;
+}
+
+ActuatorQueue::Moved ActuatorQueue::go_to(const std::byte* target) noexcept {
+  layout_->copy(desired_, target);
+  return limiter_.follow(desired_).limit == Limit::none ? Moved::active : Moved::clamped;
+}
+
 Limited ActuatorQueue::move(Iteration iteration) noexcept {
   motion_.state(iteration, desired_);
   if (!limiter_.any()) return {};

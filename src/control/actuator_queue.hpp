@@ -48,6 +48,11 @@ class ActuatorQueue {
   /// `late_budget`: number of late commands that may still be rejected in this iteration.
   Moved step(Iteration iteration, const std::byte* observed, std::uint32_t& late_budget) noexcept;
   bool empty() const noexcept { return queue_.empty(); }
+  bool has_no_command() const noexcept { return queue_.empty() && !running_; }
+  /// For targets that are given without a command, to a queue that has none: begins a row of them.
+  void begin_given(Mode mode) noexcept;
+  /// Then, in each iteration: goes to the next one, as a command of one iteration would.
+  Moved go_to(const std::byte* target) noexcept;
   /// True if a direct value keeps a number away from its rest value.
   bool holds() const noexcept { return limiter_.holds(); }
   /// True if an iteration without a command would change nothing.

@@ -38,6 +38,8 @@ Controller::Controller(const Schema& schema, BlockPool& pool, StatusSink& sink, 
   clamped_mask_.resize(words);
   braking_mask_.resize(words);
   busy_.resize(words);
+  stepped_.resize(words);
+  dropped_.resize(words);
   follow_.resize(words);
   actuators_.reserve(count);
   auto* block = reinterpret_cast<std::byte*>(desired_.data());
@@ -87,16 +89,19 @@ void Controller::step(Iteration iteration, const std::byte* observed) noexcept {
   std::uint32_t late_budget = kStatusesPerIteration;
   told_ = 0;
   if (ledger_.open_groups() > 0) step_groups(iteration, observed, late_budget);
+  const bool gives = given_.acts(iteration);
+  if (gives) step_given(iteration);
   for (std::size_t word = 0; word < busy_.size(); ++word) {
     const auto base = static_cast<std::uint32_t>(word * 64);
-    std::uint64_t active = 0;
-    std::uint64_t clamped = 0;
+    const std::uint64_t stepped = gives ? stepped_[word] : 0;
+    std::uint64_t active = stepped;
+    std::uint64_t clamped = gives ? clamped_mask_[word] & stepped : 0;
     std::uint64_t braking = 0;
 
     // idle actuators follow the observed state, busy ones step
     each_bit(follow_[word] & ~busy_[word], base,
              [&](std::uint32_t i) { actuators_[i].follow(of(i, observed)); });
-    each_bit(busy_[word], base, [&](std::uint32_t i) {
+    each_bit(busy_[word] & ~stepped, base, [&](std::uint32_t i) {
       ActuatorQueue& queue = actuators_[i];
       const std::uint64_t bit = std::uint64_t{1} << (i % 64);
       switch (queue.step(iteration, of(i, observed), late_budget)) {
@@ -120,6 +125,37 @@ void Controller::step(Iteration iteration, const std::byte* observed) noexcept {
     braking_mask_[word] = braking;
   }
   told_ += kStatusesPerIteration - late_budget;
+}
+
+bool Controller::has_no_command(std::span<const std::uint32_t> actuators) const noexcept {
+  return std::ranges::all_of(actuators,
+                             [&](std::uint32_t i) { return actuators_[i].has_no_command(); });
+}
+
+/// The targets of this iteration => desired.
+void Controller::step_given(Iteration iteration) noexcept {
+  const bool first = !std::exchange(was_given_, true);
+  if (first) std::ranges::fill(dropped_, 0);
+  std::ranges::fill(stepped_, 0);
+  const auto step = static_cast<std::size_t>(iteration - given_.first);
+  const std::byte* states = given_.states;
+  for (const std::uint32_t i : given_.actuators) {
+    const std::size_t size = types_[i]->size();
+    const std::byte* target = states + step * size;
+    states += given_.steps * size;
+    const std::uint64_t bit = std::uint64_t{1} << (i % 64);
+    if ((dropped_[i / 64] & bit) != 0) continue;
+    if (first) actuators_[i].begin_given(given_.mode);
+    const bool clamped = actuators_[i].go_to(target) == ActuatorQueue::Moved::clamped;
+    stepped_[i / 64] |= bit;
+    busy_[i / 64] |= bit;
+    clamped_mask_[i / 64] = clamped ? clamped_mask_[i / 64] | bit : clamped_mask_[i / 64] & ~bit;
+  }
+}
+
+/// Ends targets that have begun: they no longer reach this actuator.
+void Controller::forget_given(std::uint32_t actuator) noexcept {
+  if (was_given_) dropped_[actuator / 64] |= std::uint64_t{1} << (actuator % 64);
 }
 
 bool Controller::finish_pending() noexcept {
@@ -164,6 +200,7 @@ void Controller::halt(Iteration iteration) noexcept {
 }
 
 void Controller::interrupt(std::uint32_t actuator, Iteration iteration) noexcept {
+  forget_given(actuator);
   each(actuator,
        [&](ActuatorQueue& queue) { queue.drop(Status::interrupted, Reason::none, iteration); });
 }

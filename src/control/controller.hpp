@@ -8,6 +8,7 @@
 #include "control/actuator_queue.hpp"
 #include "control/batch_handler.hpp"
 #include "control/batch_plan.hpp"
+#include "control/direct_targets.hpp"
 #include "control/ledger.hpp"
 #include "control/pool.hpp"
 #include "control/purge_tickets.hpp"
@@ -65,6 +66,17 @@ class Controller {
   void end(BlockIndex request, const Outcome& outcome, Iteration iteration) noexcept {
     ledger_.end(request, outcome.status, outcome.reason, outcome.detail, iteration);
   }
+
+  /// True if none of these actuators has a command: give() may be called.
+  bool has_no_command(std::span<const std::uint32_t> actuators) const noexcept;
+  /// Gives targets to the next iterations, as if a batch with a trajectory for each actuator were
+  /// taken in iteration `targets.first`. Their memory must outlive those iterations, or
+  /// take_back().
+  void give(const DirectTargets& targets) noexcept {
+    given_ = targets;
+    was_given_ = false;
+  }
+  void take_back() noexcept { given_.steps = 0; }
 
   /// Commands => desired. `observed`: the observed block of the last row.
   void step(Iteration iteration, const std::byte* observed) noexcept;
@@ -124,6 +136,8 @@ class Controller {
   void take_purge(const Taking& from, const RecordHead& head, Iteration iteration) noexcept;
   void step_groups(Iteration iteration, const std::byte* observed,
                    std::uint32_t& late_budget) noexcept;
+  void step_given(Iteration iteration) noexcept;
+  void forget_given(std::uint32_t actuator) noexcept;
   const std::byte* of(std::uint32_t actuator, const std::byte* block) const noexcept {
     return block + offsets_[actuator];
   }
@@ -151,9 +165,13 @@ class Controller {
   std::vector<std::uint32_t> offsets_;     // offset of each actuator in a block of states [bytes]
   std::vector<const StateLayout*> types_;  // layout of each actuator
   std::vector<ActuatorQueue> actuators_;
-  std::vector<std::uint64_t> busy_;    // mask: has commands, or is not known to be at rest
-  std::vector<std::uint64_t> follow_;  // mask: follows the observed state when idle
-  std::uint32_t told_ = 0;             // statuses reported by the last step()
+  std::vector<std::uint64_t> busy_;     // mask: has commands, or is not known to be at rest
+  std::vector<std::uint64_t> stepped_;  // mask: has its desired state from given_ already
+  std::vector<std::uint64_t> follow_;   // mask: follows the observed state when idle
+  DirectTargets given_;
+  std::vector<std::uint64_t> dropped_;  // mask: no longer gets its targets
+  bool was_given_ = false;              // the first target of given_
+  std::uint32_t told_ = 0;              // statuses reported by the last step()
 };
 
 }  // namespace o80

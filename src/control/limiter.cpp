@@ -136,6 +136,17 @@ Limited Limiter::follow(const Motion& motion, std::byte* state, const std::uint6
   return result;
 }
 
+Limited Limiter::follow(std::byte* state) noexcept {
+  Limited result;
+  for (Number& each : numbers_) {
+    const Limit limit = each.limiter.follow(layout_.number(each.number, state));
+    if (limit == Limit::none) continue;
+    publish(each, state);
+    if (result.limit == Limit::none) result = {limit, each.number};
+  }
+  return result;
+}
+
 bool Limiter::brake(std::byte* state) noexcept {
   bool moves = false;
   for (Number& each : numbers_) {

@@ -48,6 +48,8 @@ class Limiter {
   /// command has a speed; it catches up at most at `most` [1/iteration].
   Limited follow(const Motion& motion, std::byte* state, const std::uint64_t* mask,
                  std::uint32_t one, double most) noexcept;
+  /// The same for a target that is to be reached in this iteration; `state` holds it.
+  Limited follow(std::byte* state) noexcept;
   /// One iteration of braking. Numbers with a rest value go to it, unless they are held. True while
   /// a number moves.
   bool brake(std::byte* state) noexcept;

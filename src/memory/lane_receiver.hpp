@@ -161,6 +161,10 @@ class LaneReceivers {
   }
   /// True if the ticket counter has decreased since the last call (an invalid write).
   bool tickets_were_put_back() noexcept { return std::exchange(put_back_, false); }
+  /// True if all committed blocks of all lanes were taken.
+  bool are_quiet() const noexcept {
+    return std::ranges::all_of(lanes_, [](const LaneReceiver& lane) { return lane.is_quiet(); });
+  }
   /// The next look() starts a scan even if the bell is unchanged (the owner of a lane died).
   void look_again() noexcept { pending_ = true; }
   /// The same, but only if next() found batches in other lanes, or if this lane has more. Later

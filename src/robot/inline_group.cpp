@@ -316,18 +316,60 @@ void InlineGroup::burst(const BurstPlan& plan, std::span<const std::uint32_t> ch
   const std::size_t targets = plan.targets.size() / copies();
   const std::size_t rows = plan.rows.size() / copies();
   const std::size_t row = description().layout.size;
+  const bool may_be_direct = this->may_be_direct(plan);
   for_each(chosen, timeout, keep_waiting, [&](std::uint32_t place, Copy& copy) {
     const std::uint32_t i = chosen[place];
+    const std::span<const std::byte> to = plan.targets.subspan(i * targets, targets);
+    const std::span<std::byte> own = plan.rows.subspan(i * rows, rows);
+    if (may_be_direct && burst_directly(copy, plan, to, own)) {
+      return read_gathered(i, own.data() + rows - row);
+    }
     if (!plan.actuators.empty()) {
-      copy.frontend.add_trajectories(plan.actuators, plan.steps,
-                                     plan.targets.subspan(i * targets, targets), plan.command);
+      copy.frontend.add_trajectories(plan.actuators, plan.steps, to, plan.command);
     }
     PulseOptions pulse;
     if (plan.delay > 0) pulse.at = copy.frontend.published() + 1 + plan.delay;
-    const std::span<std::byte> own = plan.rows.subspan(i * rows, rows);
     copy.frontend.burst_rows(own, {}, go_on_, pulse);
     read_gathered(i, own.data() + rows - row);
   });
+}
+
+/// True if the targets of each actuator are for consecutive iterations of the burst.
+bool InlineGroup::may_be_direct(const BurstPlan& plan) const {
+  const PaceSpec& pace = plan.command.pace;
+  const std::size_t actuators = description().schema.actuators.size();
+  for (auto each = plan.actuators.begin(); each != plan.actuators.end(); ++each) {
+    const bool again = std::find(plan.actuators.begin(), each, *each) != each;
+    if (*each >= actuators || again) return false;  // the batch says what is wrong
+  }
+  return pace.pace == Pace::iterations && pace.amount == 1 &&
+         plan.command.on_limit != OnLimit::go_on && plan.steps > 0 &&
+         static_cast<std::int64_t>(plan.steps) <= plan.iterations - plan.delay;
+}
+
+/// Runs the burst of a copy without a batch. False if it needs one.
+bool InlineGroup::burst_directly(Copy& copy, const BurstPlan& plan,
+                                 std::span<const std::byte> targets,
+                                 std::span<std::byte> rows) const {
+  Link& link = *copy.frontend.link();
+  link.check_usable();
+  if (!link.builder.empty()) return false;
+  const std::size_t size = targets.size() / std::max<std::size_t>(1, plan.actuators.size());
+  for (std::size_t i = 0; i < plan.actuators.size(); ++i) {
+    link.command_check.targets(plan.actuators[i], targets.subspan(i * size, size));
+  }
+  DirectBurst burst{plan.iterations, plan.delay, {}};
+  if (!plan.actuators.empty()) {
+    burst.targets = {plan.actuators, plan.steps, targets.data(), plan.command.mode, 0};
+  }
+  const std::optional<std::size_t> done = copy.robot->run(burst, rows);
+  if (!done) return false;
+  if (static_cast<std::int64_t>(*done) == plan.iterations) return true;
+  link.segment.throw_if_gone();
+  const Iteration last = copy.frontend.published();
+  const std::string halt = link.halt_text(last + 1);
+  throw BackendHalted("the burst of '" + copy.frontend.segment() + "' ended in iteration " +
+                      std::to_string(last) + ": " + (halt.empty() ? "it was cut" : halt));
 }
 
 void InlineGroup::request(std::uint32_t request, std::span<const std::uint32_t> chosen,

@@ -137,6 +137,9 @@ class InlineGroup {
   void choose(std::span<const std::uint32_t> chosen);
   [[noreturn]] void throw_failures();
   void throw_unless_completed(std::uint32_t request, const Batch& batch) const;
+  bool may_be_direct(const BurstPlan& plan) const;
+  bool burst_directly(Copy& copy, const BurstPlan& plan, std::span<const std::byte> targets,
+                      std::span<std::byte> rows) const;
   void read_gathered(std::uint32_t copy, const std::byte* row) noexcept;
 
   std::string name_;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstring>
 #include <utility>
 
 #include "memory/futex.hpp"
@@ -65,6 +66,32 @@ void InlineRobot::run() {
   if (keep_waiting_) looked_at_ = monotonic_now();
   Step step = Step::run;
   while (!stopping_ && (step = loop_.run_granted(at_once_)) == Step::run) look_around();
+  throw_if_ended(step);
+}
+
+std::optional<std::size_t> InlineRobot::run(const DirectBurst& burst, std::span<std::byte> rows) {
+  refuse_nested();
+  const Turn turn(*this, keep_waiting_);
+  if (stopping_ || !loop_.begin_direct(burst)) return {};
+  const auto iterations = static_cast<std::size_t>(burst.iterations);
+  const std::size_t size = loop_.backend().layout().size;
+  // a burst shorter than the next look at the clock needs no clock
+  if (keep_waiting_ && iterations >= at_once_) looked_at_ = monotonic_now();
+  std::size_t done = 0;
+  std::uint32_t unlooked = 0;
+  // one step more than iterations: it sees what came of the last one, as run() does
+  Step step = Step::run;
+  while (!stopping_ && (step = loop_.run_granted(1)) == Step::run) {
+    if (done < iterations) std::memcpy(rows.data() + done++ * size, loop_.row(), size);
+    if (++unlooked < at_once_) continue;
+    unlooked = 0;
+    look_around();
+  }
+  throw_if_ended(step);
+  return done;
+}
+
+void InlineRobot::throw_if_ended(Step step) {
   if (stopping_) {
     loop_.stop();
     throw Closed("the inline robot of '" + segment() + "' was closed during a burst");

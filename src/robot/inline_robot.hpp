@@ -1,12 +1,16 @@
 #pragma once
 
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
+#include <span>
 #include <thread>
 
 #include "o80/runtime/frontend.hpp"
 #include "robot/loop.hpp"
+#include "runtime/direct_burst.hpp"
 #include "runtime/inline_runner.hpp"
 
 namespace o80 {
@@ -24,6 +28,10 @@ class InlineRobot final : public InlineRunner {
 
   /// Runs granted iterations; threads take turns. Throws DriverError, and Closed after `stop`.
   void run() override;
+  /// Runs a direct burst and copies its rows; returns their number, which is less than its
+  /// iterations if a halt or the end of the robot has cut it. Empty, without an iteration, if a
+  /// batch is needed instead (UntypedBackend::begin_direct). Throws as run().
+  std::optional<std::size_t> run(const DirectBurst& burst, std::span<std::byte> rows);
   void refuse_nested() const override;
   bool runs_here() const noexcept override {
     return runner_.load(std::memory_order_relaxed) == std::this_thread::get_id();
@@ -39,6 +47,7 @@ class InlineRobot final : public InlineRunner {
  private:
   class Turn;
   void look_around();
+  void throw_if_ended(Step step);
 
   std::atomic<std::uint32_t> turn_{0};     // futex lock of Turn: 0 free, 1 held, 2 contended
   std::atomic<std::thread::id> runner_{};  // the thread that runs iterations

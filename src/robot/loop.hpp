@@ -43,6 +43,12 @@ class Loop final : public RequestServer {
   /// Bursting only: runs at most `most` granted iterations in this thread; `Step::run` if more are
   /// granted.
   Step run_granted(std::uint32_t most) noexcept;
+  /// Bursting only: as UntypedBackend::begin_direct; run_granted then runs the iterations.
+  bool begin_direct(const DirectBurst& burst) noexcept {
+    return !ended_ && !finished_ && backend_.begin_direct(burst);
+  }
+  /// The current row. Between two iterations: the last one.
+  const std::byte* row() noexcept { return backend_.observed() - backend_.layout().observed; }
   /// Runs the iterations of a recorded run up to this one, without waiting; `Step::ended` if the
   /// driver failed.
   Step replay(Iteration last) noexcept;

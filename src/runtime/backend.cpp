@@ -206,6 +206,7 @@ UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, Reques
 /// In bursting mode waits at most `at_most` [ns] for a burst.
 Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
   if (recorded_ != nullptr) return step_recorded();
+  if (burst_.is_direct()) return step_direct();
   const std::int64_t give_up =
       at_most > 0 && at_most < kForEver ? monotonic_now() + at_most : at_most;
   const std::uint32_t most_looks = 2 + pool.size() / kWorkPerIteration;

@@ -68,6 +68,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   bool publish_first() noexcept;
   void publish(bool fresh) noexcept;
   Step step(std::int64_t at_most) noexcept;
+  bool begin_direct(const DirectBurst& burst) noexcept;
   void stop_burst(BurstEnd end = BurstEnd::done) noexcept;
   void end(BackendState state, std::string_view text) noexcept;
   void ask_to_halt(HaltCause cause, std::string_view text) noexcept;
@@ -125,6 +126,10 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   bool is_called_off() const noexcept;
   void count_burst() noexcept;
   void end_burst(Iteration row, BurstEnd end = BurstEnd::done) noexcept;
+
+  // direct bursts
+  bool is_undisturbed() const noexcept;
+  Step step_direct() noexcept;
 
   void move() noexcept;
   std::int64_t real_time() const noexcept;

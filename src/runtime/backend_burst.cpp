@@ -25,6 +25,10 @@ void UntypedBackend::Body::count_burst() noexcept {
 }
 
 void UntypedBackend::Body::end_burst(Iteration row, BurstEnd end) noexcept {
+  if (burst_.is_direct()) {
+    controller.take_back();
+    return burst_.end();
+  }
   lanes[burst_.lane()].set_burst_done(burst_.batch(), row, end);
   journal.burst_ended(burst_.lane(), burst_.incarnation(), burst_.batch(), row, end);
   burst_.end();

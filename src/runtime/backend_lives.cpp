@@ -31,10 +31,11 @@ void UntypedBackend::Body::stale(std::uint32_t lane, Reason reason) noexcept {
 }
 
 void UntypedBackend::Body::look_at_lives() noexcept {
-  if (burst_.runs()) {
+  const bool has_sender = burst_.runs() && !burst_.is_direct();
+  if (has_sender) {
     on_owner_death(burst_.lane(), lanes[burst_.lane()].dead_predecessor());
+    if (burst_.runs() && is_called_off()) stop_burst();
   }
-  if (burst_.runs() && is_called_off()) stop_burst();
   // any frontend can corrupt the bell, so all lanes are scanned after each round of the helper
   const std::uint32_t rounds = liveness.rounds();
   if (rounds != seen_rounds_) lanes.look_again();

@@ -21,6 +21,8 @@ class BurstGrant {
   std::uint32_t lane() const noexcept { return lane_; }
   std::uint64_t incarnation() const noexcept { return incarnation_; }
   CommandId batch() const noexcept { return batch_; }
+  /// True for a burst without a sender, from begin_direct() to end().
+  bool is_direct() const noexcept { return direct_; }
   bool runs_for(std::uint32_t lane) const noexcept { return runs() && lane_ == lane; }
   bool is_in_last_iteration() const noexcept { return left_ == 1; }
   /// True if this status is the end of the batch for which a kUntilEnded burst waits.
@@ -35,6 +37,10 @@ class BurstGrant {
     batch_ = batch;
     incarnation_ = incarnation;
   }
+  void begin_direct(std::int64_t iterations) noexcept {
+    begin(kNobody, 0, 0, iterations);
+    direct_ = true;
+  }
   /// Counts an iteration; true if it was the last one.
   bool count() noexcept {
     if (left_ <= 0) return false;
@@ -46,6 +52,7 @@ class BurstGrant {
   void end() noexcept {
     left_ = 0;
     lane_ = kNobody;
+    direct_ = false;
   }
 
  private:
@@ -53,6 +60,7 @@ class BurstGrant {
   std::uint32_t lane_ = kNobody;
   CommandId batch_ = 0;
   std::uint64_t incarnation_ = 0;
+  bool direct_ = false;
 };
 
 }  // namespace o80

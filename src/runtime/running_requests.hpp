@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -34,6 +35,9 @@ class RunningRequests {
   bool may_begin(std::uint32_t request, ShortText<248>& why) const noexcept;
   void begin(std::uint32_t request, std::uint32_t lane, std::uint64_t id, BlockIndex record,
              Iteration now, std::string_view progress) noexcept;
+  bool any() const noexcept {
+    return std::ranges::any_of(entries_, [](const Entry& entry) { return entry.runs; });
+  }
   bool runs(std::uint32_t request) const noexcept { return find(request) != nullptr; }
   void show_progress(std::uint32_t request, std::string_view progress) noexcept;
   /// Records how a request ended in the current row. No effect if it does not run.

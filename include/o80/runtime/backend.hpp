@@ -21,6 +21,7 @@ namespace o80 {
 
 class OwnedSegment;
 enum class Verb : std::uint8_t;
+struct DirectBurst;
 class RecordedDecisions;
 
 /// Options of a backend that do not depend on the robot.
@@ -110,6 +111,10 @@ class UntypedBackend {
   Step try_step() noexcept;
   /// As `step`, but waits for at most `at_most` [ns]; then returns `standing`.
   Step step_within(std::int64_t at_most) noexcept;
+  /// Of an inline group: grants the next iterations, with targets for them, as a batch would. False
+  /// if a batch is needed, because others command or a journal is written. Call it between two
+  /// iterations; the memory of the targets must outlive those iterations.
+  bool begin_direct(const DirectBurst& burst) noexcept;
   /// Cancels the rest of the current burst. Call it between two iterations.
   void cut_burst() noexcept;
   /// Call it instead of `step` before an end in order: all commands end, the actuators brake. `run`

@@ -1,6 +1,7 @@
 // A group gives the rows of as many single robots, bit for bit, with any number of threads.
 
 #include <random>
+#include <set>
 
 #include "robot/drifter.hpp"
 #include "robot/library.hpp"
@@ -10,20 +11,31 @@ namespace {
 
 using Bytes = std::vector<std::byte>;
 
+/// How the targets of a burst are reached.
+struct Manner {
+  std::int64_t each = 3;  // iterations to each target; 1: targets that need no batch
+  std::int64_t delay = 0;
+  CommandOptions command = {};
+};
+
 /// What both sides can do; each returns all rows of its copies so far.
 class Side {
  public:
   virtual ~Side() = default;
   virtual std::size_t copies() const = 0;
   /// `targets`: for each copy those of its actuators.
-  virtual void burst(const std::vector<double>& targets,
+  virtual void burst(const Manner& manner, const std::vector<double>& targets,
                      const std::vector<std::uint32_t>& chosen) = 0;
   virtual void request(std::uint32_t which, const Bytes& payload,
                        const std::vector<std::uint32_t>& chosen) = 0;
   /// Halts a copy, and resumes it later.
   void halt(std::size_t copy) { frontend(copy).halt("a test"); }
   void resume(std::size_t copy) {
-    frontend(copy).resume(frontend(copy).halted()->number, kPatience);
+    try {
+      frontend(copy).resume(frontend(copy).halted()->number, kPatience);
+    } catch (const Error&) {
+      said.push_back("braking " + std::to_string(copy));
+    }
   }
   bool is_halted(std::size_t copy) { return frontend(copy).halted().has_value(); }
   /// A slow motion that another frontend adds.
@@ -49,17 +61,19 @@ class Group final : public Side {
       : group_(table, {},
                {.copies = copies, .threads = threads, .backend = InlineGroup::default_options()}),
         burst_(group_, kActuators, kSteps, kIterations) {
-    burst_.plan.command.pace = iterations(3);
     seen.resize(copies);
     for (std::size_t i = 0; i < copies; ++i) frontends_.push_back(group_.attach(i));
   }
   std::size_t copies() const override { return group_.copies(); }
-  void burst(const std::vector<double>& targets,
+  void burst(const Manner& manner, const std::vector<double>& targets,
              const std::vector<std::uint32_t>& chosen) override {
+    burst_.plan.command = manner.command;
+    burst_.plan.delay = manner.delay;
     burst_.targets = targets;
     std::ranges::fill(burst_.rows, std::byte{0});
-    collect([&] { group_.burst(burst_.plan, chosen, kPatience); });
+    const auto failed = collect([&] { group_.burst(burst_.plan, chosen, kPatience); });
     for (const std::uint32_t copy : chosen) {
+      if (failed.contains(copy)) continue;
       const auto rows = burst_.of(copy);
       seen[copy].insert(seen[copy].end(), rows.begin(), rows.end());
     }
@@ -79,13 +93,19 @@ class Group final : public Side {
   }
 
  private:
+  /// The copies that failed in a call.
   template <class Call>
-  void collect(Call&& call) {
+  std::set<std::size_t> collect(Call&& call) {
+    std::set<std::size_t> copies;
     try {
       call();
     } catch (const CopyFailed& failed) {
-      for (const auto& [copy, error] : failed.failures()) said.push_back(std::to_string(copy));
+      for (const auto& [copy, error] : failed.failures()) {
+        said.push_back(std::to_string(copy));
+        copies.insert(copy);
+      }
     }
+    return copies;
   }
   UntypedFrontend& frontend(std::size_t copy) override { return *frontends_[copy]; }
 
@@ -108,19 +128,21 @@ class Singles final : public Side {
     }
   }
   std::size_t copies() const override { return robots_.size(); }
-  void burst(const std::vector<double>& targets,
+  void burst(const Manner& manner, const std::vector<double>& targets,
              const std::vector<std::uint32_t>& chosen) override {
     const std::size_t own = targets.size() / copies();
     for (const std::uint32_t copy : chosen) {
       Bytes rows(static_cast<std::size_t>(kIterations) * frontends_[copy]->layout().size);
-      collect(copy, [&] {
+      const bool done = collect(copy, [&] {
         const std::vector<std::uint32_t> actuators{0, 1};
         frontends_[copy]->add_trajectories(
             actuators, kSteps, std::as_bytes(std::span(targets).subspan(copy * own, own)),
-            {.pace = iterations(3)});
-        frontends_[copy]->burst_rows(rows, kPatience);
+            manner.command);
+        PulseOptions pulse;
+        if (manner.delay > 0) pulse.at = frontends_[copy]->published() + 1 + manner.delay;
+        frontends_[copy]->burst_rows(rows, kPatience, {}, pulse);
       });
-      seen[copy].insert(seen[copy].end(), rows.begin(), rows.end());
+      if (done) seen[copy].insert(seen[copy].end(), rows.begin(), rows.end());
     }
   }
   void request(std::uint32_t which, const Bytes& payload,
@@ -139,12 +161,15 @@ class Singles final : public Side {
   }
 
  private:
+  /// True if the call has not failed.
   template <class Call>
-  void collect(std::uint32_t copy, Call&& call) {
+  bool collect(std::uint32_t copy, Call&& call) {
     try {
       call();
+      return true;
     } catch (const Error&) {
       said.push_back(std::to_string(copy));
+      return false;
     }
   }
   UntypedFrontend& frontend(std::size_t copy) override { return *others_[copy]; }
@@ -177,7 +202,12 @@ void play(Side& side, std::uint64_t seed, double largest) {
   for (int round = 0; round < 60; ++round) {
     std::vector<double> targets(side.copies() * kActuators * kSteps);
     for (double& target : targets) target = number();
-    side.burst(targets, some());
+    Manner manner{.each = draw(4) == 0 ? 3 : 1, .delay = static_cast<std::int64_t>(draw(6))};
+    manner.command = {.pace = iterations(manner.each),
+                      .mode = draw(2) == 0 ? Mode::queue : Mode::overwrite,
+                      .profile = draw(2) == 0 ? Profile::linear : Profile::minimum_jerk,
+                      .start = draw(2) == 0 ? Start::desired : Start::observed};
+    side.burst(manner, targets, some());
     const std::uint32_t slot = static_cast<std::uint32_t>(draw(3));
     const std::size_t copy = draw(side.copies());
     const double target = number();
@@ -205,6 +235,63 @@ void play(Side& side, std::uint64_t seed, double largest) {
   }
 }
 
+/// A plant with limits of every kind. Its first actuator is interrupted now and then, its second
+/// one follows when it is idle.
+class Guarded {
+ public:
+  using Actuators = std::array<double, 2>;
+  using Extended = Drifter::Sensors;
+  using Requests = o80::Requests<Reset, Snapshot, Restore, Dawdle>;
+  struct Config {
+    double start = 0;
+  };
+
+  explicit Guarded(const Config& config) { now_.at.fill(config.start); }
+  void describe(Schema& schema) const {
+    schema.actuator(0).name("left").limits(
+        {.minimum = -30, .maximum = 30, .speed = 20'000, .acceleration = 1e7, .jerk = 4e9});
+    schema.actuator(1).name("right").limits({.minimum = -31, .maximum = 31});
+    schema.actuator(1).when_idle(WhenIdle::follow);
+  }
+  void start() {}
+  void write(const Desired<Guarded>& desired) {
+    for (std::size_t i = 0; i < 2; ++i) now_.at[i] += 0.4 * (desired.states[i] - now_.at[i]);
+    now_.sensors.sum += now_.at[0] - now_.at[1];
+    ++now_.sensors.count;
+  }
+  void read(Reading<Guarded>& reading) {
+    reading.observed = now_.at;
+    reading.extended = now_.sensors;
+    if (now_.sensors.count % 7 == 3) reading.interrupt(0);
+    if (now_.sensors.count % 31 == 17) reading.halt("it is time for a halt");
+  }
+  Served on(const Reset& reset) {
+    now_ = {};
+    now_.at[0] = static_cast<double>(reset.seed % 20);
+    return Served::start_afresh();
+  }
+  Served on(const Snapshot& snapshot) {
+    saved_[snapshot.slot] = now_;
+    return Served::done();
+  }
+  Served on(const Restore& restore) {
+    if (!saved_.contains(restore.slot)) return Served::rejected("nothing was saved there");
+    now_ = saved_[restore.slot];
+    return Served::start_afresh();
+  }
+  Served on(const Dawdle&) { return Served::done(); }
+  void stop() noexcept {}
+
+ private:
+  struct State {
+    std::array<double, 2> at{};
+    Drifter::Sensors sensors;
+  };
+  State now_;
+  std::map<std::uint32_t, State> saved_;
+};
+O80_DESCRIBE(Guarded::Config, start);
+
 class GroupEqualityTest : public StationTest {
  protected:
   static void expect_equality(const RobotTable& table, double largest) {
@@ -229,6 +316,10 @@ class GroupEqualityTest : public StationTest {
 };
 
 TEST_F(GroupEqualityTest, HoldsForRandomRunsOfAPlantWithMemory) { expect_equality(drifter(), 40); }
+
+TEST_F(GroupEqualityTest, HoldsForLimitsInterruptsAndActuatorsThatFollow) {
+  expect_equality(*robot_table<Guarded>("guarded"), 31);
+}
 
 TEST_F(GroupEqualityTest, HoldsForTheBundledRobot) {
   static const RobotLibrary library = RobotLibrary::load(kTwoJoints);

@@ -8,6 +8,7 @@
 #include "memory/child_process.hpp"
 #include "o80/memory/segment_list.hpp"
 #include "robot/drifter.hpp"
+#include "runtime/link.hpp"
 
 namespace o80::test {
 namespace {
@@ -50,6 +51,25 @@ TEST_F(InlineGroupTest, SendsEachCopyItsTargetsAndReturnsItsRows) {
       EXPECT_EQ(unpack<double>(row + layout.desired), static_cast<double>(copy));
       EXPECT_EQ(unpack<double>(row + layout.desired + 8), -1);
     }
+  }
+}
+
+TEST_F(InlineGroupTest, SendsNoBatchForTargetsOfEachIterationUnlessAJournalNeedsIt) {
+  for (const std::int64_t journal : {0, 1 << 20}) {
+    InlineGroup::Options options = group_of(1);
+    options.backend.journal = journal;
+    InlineGroup group(drifter(), {}, options);
+    const auto batches = [&, frontend = group.attach(0)] {
+      return frontend->link()->segment.view().bell().tickets.load();
+    };
+    GroupBurst burst(group, 2, 2, 6);
+    burst.plan.command.pace = iterations(1);
+    const std::uint64_t before = batches();
+    burst.run();
+    EXPECT_EQ(batches() - before, journal == 0 ? 0 : 1);
+    burst.plan.command.pace = iterations(3);
+    burst.run();
+    EXPECT_EQ(batches() - before, journal == 0 ? 1 : 2);
   }
 }
 
