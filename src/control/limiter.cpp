@@ -25,6 +25,8 @@ void store_integer(std::byte* at, double value) noexcept {
   std::memcpy(at, &whole, sizeof whole);
 }
 
+void store_double(std::byte* at, double value) noexcept { std::memcpy(at, &value, sizeof value); }
+
 /// Range of the values of a kind. It also bounds the motion to rest.
 std::pair<double, double> range_of(Kind kind) noexcept {
   return visit_number(kind, []<class T>(T) {
@@ -65,7 +67,11 @@ Limiter::Limiter(const Schema& schema, const ActuatorRow& actuator, const StateL
         {i,
          NumberLimiter(std::max(row.minimum, lowest), std::min(row.maximum, highest), rates),
          row.resting != 0 ? std::optional(row.rest) : std::nullopt,
-         {}});
+         {},
+         lowest,
+         highest,
+         layout.numbers()[i].offset,
+         layout.numbers()[i].kind == Kind::float64 && layout.hooks().blend == nullptr});
   }
 }
 
@@ -80,6 +86,7 @@ void Limiter::begin() noexcept {
 
 /// Writes one number to the state, rounded to its kind.
 void Limiter::publish(const Number& number, std::byte* state) const noexcept {
+  if (number.is_double) return store_double(state + number.offset, number.limiter.position());
   const NumberPlace& place = layout_.numbers()[number.number];
   std::byte* at = state + place.offset;
   const double value = number.limiter.position();
@@ -125,8 +132,9 @@ Limited Limiter::follow(const Motion& motion, std::byte* state, const std::uint6
     }
     const double speed = each.number == one ? most : kUnlimited;
     // rounding of the motion may leave the range of the kind
-    const auto [lowest, highest] = range_of(layout_.numbers()[each.number].kind);
-    const double wanted = std::clamp(motion.number(each.number), lowest, highest);
+    const double moved =
+        each.is_double ? load<double>(state + each.offset) : motion.number(each.number);
+    const double wanted = std::clamp(moved, each.lowest, each.highest);
     const Limit limit = each.limiter.follow(wanted, speed);
     // `state` already holds the exact target
     if (limit == Limit::none && arrived) continue;

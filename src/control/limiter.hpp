@@ -94,6 +94,10 @@ class Limiter {
     NumberLimiter limiter;
     std::optional<double> rest;
     FastestMotion fastest;
+    double lowest;         // range of its kind
+    double highest;        //
+    std::uint32_t offset;  // in the state [bytes]
+    bool is_double;        // the state has exactly its position
     bool planned = false;  // part of the fastest motion
     bool held = false;     // does not go to its rest value
 

@@ -43,9 +43,9 @@ double NumberLimiter::rounding() const noexcept {
          std::max({scale_, std::abs(position_), std::abs(wanted_)});
 }
 
-double NumberLimiter::slack() const noexcept {
-  const double finest = std::min({rates_.speed, rates_.acceleration, rates_.jerk});
-  return rounding() + (std::isfinite(finest) ? kLimitRounding * finest : 0.0);
+double NumberLimiter::tolerance_of(const Rates& rates) noexcept {
+  const double finest = std::min({rates.speed, rates.acceleration, rates.jerk});
+  return std::isfinite(finest) ? kLimitRounding * finest : 0.0;
 }
 
 /// Within the bounds, or no further outside than `before`.
@@ -71,12 +71,28 @@ void NumberLimiter::forget_rounding() noexcept {
   }
 }
 
-Limit NumberLimiter::follow(double wanted, double most) noexcept {
-  const double step = wanted - wanted_;
-  const double lag = position_ - wanted_;
-  wanted_ = wanted;
-  return std::isfinite(rates_.jerk) ? follow_with_jerk(step, lag, most)
-                                    : follow_with_acceleration(step, lag, most);
+/// Without an acceleration limit: reaches the wanted position in this iteration, as far as speed
+/// and bounds allow. The same results as follow_with_acceleration(), bit for bit, with less work:
+/// most actuators have bounds only.
+Limit NumberLimiter::follow_at_once() noexcept {
+  const double before = position_;
+  const double speed = wanted_ - before;
+  const double up = std::max(0.0, maximum_ - before);
+  const double down = std::max(0.0, before - minimum_);
+  const double highest = std::min(rates_.speed, up);
+  const double lowest = std::max(-rates_.speed, -down);
+  const bool is_inside = speed <= highest && speed >= lowest;  // mostly, so no slack is needed
+  if (is_inside || (speed <= highest + slack() && speed >= lowest - slack())) {
+    move(speed);
+    position_ = inside(wanted_, before);
+    if (std::abs(speed_) <= slack() / 100.0 + 2.0 * rounding()) speed_ = acceleration_ = 0.0;
+    return position_ == wanted_ ? Limit::none : Limit::acceleration;
+  }
+  const bool upward = speed > highest;
+  const double bound = upward ? highest : lowest;
+  move(upward ? std::max(highest, lowest) : std::min(highest, lowest));
+  if (bound == (upward ? up : -down)) return upward ? Limit::maximum : Limit::minimum;
+  return Limit::speed;
 }
 
 Limit NumberLimiter::follow_with_acceleration(double step, double lag, double most) noexcept {

@@ -22,7 +22,7 @@ enum class Limit : std::uint8_t { none, minimum, maximum, speed, acceleration, j
 class NumberLimiter {
  public:
   NumberLimiter(double minimum, double maximum, const Rates& rates) noexcept
-      : minimum_(minimum), maximum_(maximum), rates_(rates) {}
+      : minimum_(minimum), maximum_(maximum), rates_(rates), tolerance_(tolerance_of(rates)) {}
 
   const Rates& rates() const noexcept { return rates_; }
   double minimum() const noexcept { return minimum_; }
@@ -47,13 +47,21 @@ class NumberLimiter {
 
   /// One iteration towards `wanted`; returns the limit that kept it from there. It catches up at
   /// most at `most`, or at its present speed if that is higher.
-  Limit follow(double wanted, double most = std::numeric_limits<double>::infinity()) noexcept;
+  Limit follow(double wanted, double most = std::numeric_limits<double>::infinity()) noexcept {
+    const double step = wanted - wanted_;
+    const double lag = position_ - wanted_;
+    wanted_ = wanted;
+    if (!std::isfinite(rates_.acceleration) && !std::isfinite(rates_.jerk)) return follow_at_once();
+    return std::isfinite(rates_.jerk) ? follow_with_jerk(step, lag, most)
+                                      : follow_with_acceleration(step, lag, most);
+  }
   /// One iteration of braking, as fast as the limits allow.
   void brake() noexcept;
 
  private:
   struct Candidate;
 
+  Limit follow_at_once() noexcept;
   Limit follow_with_acceleration(double step, double lag, double most) noexcept;
   Limit follow_with_jerk(double step, double lag, double most) noexcept;
   Candidate candidate(double acceleration) const noexcept;
@@ -63,13 +71,15 @@ class NumberLimiter {
   void move(double speed) noexcept;
   void slow_down() noexcept;
   void forget_rounding() noexcept;
+  static double tolerance_of(const Rates& rates) noexcept;
   double inside(double position, double before) const noexcept;
   double rounding() const noexcept;
-  double slack() const noexcept;
+  double slack() const noexcept { return rounding() + tolerance_; }
 
   double minimum_;
   double maximum_;
   Rates rates_;
+  double tolerance_;  // of the finest rate
   double position_ = 0.0;
   double speed_ = 0.0;
   double acceleration_ = 0.0;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <random>
 
@@ -51,6 +52,36 @@ struct Witness {
     acceleration = next_acceleration;
   }
 };
+
+TEST_F(NumberLimiterTest, WithoutAnAccelerationLimitMovesBitForBitAsWithAnEnormousOne) {
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  constexpr double kEnormous = 1e300;
+  std::array<int, 6> limits{};
+  for (int round = 0; round < 2000; ++round) {
+    const double speed = magnitude(-2, 1);
+    const double minimum = one_in(4) ? -kNone : real(-1, 0);
+    const double maximum = one_in(4) ? kNone : real(0, 1);
+    NumberLimiter limiter(minimum, maximum, {speed, kNone, kNone});
+    NumberLimiter general(minimum, maximum, {speed, kEnormous, kNone});
+    const double start = real(-2, 2);
+    limiter.restart(start);
+    general.restart(start);
+    double wanted = start;
+    for (int i = 0; i < 50; ++i) {
+      if (one_in(10)) limiter.begin(), general.begin();
+      if (!one_in(4)) wanted = one_in(3) ? real(-2, 2) : wanted + real(-1, 1) * magnitude(-17, 0);
+      const Limit limit = limiter.follow(wanted);
+      ASSERT_EQ(limit, general.follow(wanted)) << round;
+      ASSERT_EQ(limiter.position(), general.position()) << round;
+      ASSERT_EQ(limiter.speed(), general.speed()) << round;
+      ASSERT_EQ(limiter.acceleration(), general.acceleration()) << round;
+      ++limits[static_cast<std::size_t>(limit)];
+    }
+  }
+  for (const Limit limit : {Limit::none, Limit::minimum, Limit::maximum, Limit::speed}) {
+    EXPECT_GT(limits[static_cast<std::size_t>(limit)], 100) << static_cast<int>(limit);
+  }
+}
 
 TEST_F(NumberLimiterTest, KeepsItsLimitsWhateverItIsAskedToFollow) {
   for (int round = 0; round < 3000; ++round) {
