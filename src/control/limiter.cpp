@@ -147,7 +147,9 @@ Limited Limiter::follow(const Motion& motion, std::byte* state, const std::uint6
 Limited Limiter::follow(std::byte* state) noexcept {
   Limited result;
   for (Number& each : numbers_) {
-    const Limit limit = each.limiter.follow(layout_.number(each.number, state));
+    const double wanted =
+        each.is_double ? load<double>(state + each.offset) : layout_.number(each.number, state);
+    const Limit limit = each.limiter.follow(wanted);
     if (limit == Limit::none) continue;
     publish(each, state);
     if (result.limit == Limit::none) result = {limit, each.number};
