@@ -44,6 +44,7 @@ def test_a_training_writes_a_row_for_each_update_a_policy_and_a_checkpoint(tmp_p
     assert [point.decisions for point in points] == [64, 128]
     assert [point.decisions for point in told] == [64, 128]
     assert all(point.evaluated for point in points)
+    assert all(0 < point.environment < 1 for point in points)
     assert checkpoint.found(tmp_path) is not None
     loaded = LearnedPolicy.load(tmp_path / POLICY)
     assert loaded.conditions == SMALL.conditions
@@ -159,7 +160,7 @@ def test_a_training_ends_when_its_time_is_spent(tmp_path: Path) -> None:
 
 def test_curves_are_read_as_they_were_written(tmp_path: Path) -> None:
     path = tmp_path / "curve.csv"
-    point = curve.CurvePoint(10, 2, 2, 0.5, 0.25, 0.5, 0.25, -0.125, 0.75)
+    point = curve.CurvePoint(10, 2, 2, 0.5, 0.25, 0.5, 0.25, -0.125, 0.75, 1, 0.5)
     seen = replace(
         point, decisions=20, evaluated_touched=1, evaluated_returned=0.5, evaluated_reward=1.5
     )
@@ -201,7 +202,9 @@ def test_the_command_trains_and_tells_how_well(
     assert report["returned_recorded"] is None
     for name in ("curve.png", "landings.png", "policy.npz", "policy.json", "curve.csv"):
         assert (tmp_path / name).stat().st_size > 100
-    for words in ("learned", "blind", "still arm", "random actions"):
+    assert 0 < report["environment_share"] < 1
+    share = "of the processor time was spent in the environments"
+    for words in (share, "learned", "blind", "still arm", "random actions"):
         assert words in result.output
 
     compared = typer.Typer()

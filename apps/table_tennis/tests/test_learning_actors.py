@@ -56,6 +56,7 @@ def test_a_training_with_workers_is_repeatable_and_counts_episodes(
     assert [point.decisions for point in points] == [192, 384, 576]
     assert points[-1].episodes >= 4
     assert np.isfinite(points[-1].reward)
+    assert np.isnan(points[-1].environment)
     assert (tmp_path / "one" / POLICY).is_file()
 
 

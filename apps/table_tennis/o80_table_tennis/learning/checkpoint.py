@@ -35,6 +35,12 @@ class Progress:
     episodes: int
     minutes: float
     processor_minutes: float
+    restarts: int = 0
+    """Networks that were replaced by new ones."""
+    begun: int = 0
+    """Decisions at which the present network began."""
+    stuck: bool = False
+    """It is to be replaced before the next decision."""
 
 
 def save(output: Path, model: PPO, progress: Progress) -> None:

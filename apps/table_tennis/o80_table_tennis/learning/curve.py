@@ -29,6 +29,11 @@ class CurvePoint:
     """Mean sum over an episode."""
     exploration: float
     """Mean standard deviation of the actions."""
+    restarts: int
+    """Networks that were replaced by new ones, because they had got stuck."""
+    environment: float
+    """Share of the processor time that the environments took, without evaluations; NaN if actors
+    stepped them."""
     evaluated_touched: float = NOT_EVALUATED
     """The same without exploration, on balls of their own; not in every row."""
     evaluated_returned: float = NOT_EVALUATED
@@ -41,7 +46,7 @@ class CurvePoint:
 
 
 NAMES = [each.name for each in fields(CurvePoint)]
-_WHOLE = ("decisions", "episodes", "motions")
+_WHOLE = ("decisions", "episodes", "motions", "restarts")
 
 
 def append(path: Path, point: CurvePoint) -> None:

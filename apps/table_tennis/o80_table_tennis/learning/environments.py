@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import numpy as np
@@ -63,6 +64,26 @@ class Masked(VecEnvWrapper):
     def _masked(self, observations: Any) -> Float32Array:
         masked: Float32Array = observations * self._visible
         return masked
+
+
+class Timed(VecEnvWrapper):
+    """Environments that count the processor time spent in them."""
+
+    seconds = 0.0
+
+    def reset(self) -> VecEnvObs:
+        """The first observations."""
+        begun = time.process_time()
+        observations = self.venv.reset()
+        self.seconds += time.process_time() - begun
+        return observations
+
+    def step_wait(self) -> VecEnvStepReturn:
+        """The outcome of the step under way, which is carried out here."""
+        begun = time.process_time()
+        outcome = self.venv.step_wait()
+        self.seconds += time.process_time() - begun
+        return outcome
 
 
 def opened(conditions: Conditions, *, count: int, seed: int, ball_seed: int) -> VecEnv:

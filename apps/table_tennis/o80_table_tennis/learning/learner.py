@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -12,7 +13,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 from ..players.network import CLIP, Network
-from .environments import Float32Array, Masked, opened, visible_numbers
+from .environments import Float32Array, Masked, Timed, opened, visible_numbers
 from .settings import LearningSettings
 
 
@@ -25,11 +26,13 @@ def training_environments(settings: LearningSettings) -> VecNormalize:
 
 
 def _masked(settings: LearningSettings) -> VecEnv:
-    inner = opened(
-        settings.conditions,
-        count=settings.ppo.environments,
-        seed=settings.seed,
-        ball_seed=settings.seed,
+    inner = Timed(
+        opened(
+            settings.conditions,
+            count=settings.ppo.environments,
+            seed=settings.seed,
+            ball_seed=settings.seed,
+        )
     )
     return Masked(inner, _visible(settings, inner)) if settings.blind else inner
 
@@ -76,6 +79,23 @@ def new_model(settings: LearningSettings, environments: VecNormalize) -> PPO:
         seed=settings.seed,
         device="cpu",
     )
+
+
+def begin_anew(model: PPO) -> None:
+    """New weights and a new optimiser; call it between two updates."""
+    policy: Any = model.policy_class(
+        model.observation_space, model.action_space, model.lr_schedule, **model.policy_kwargs
+    )
+    policy.set_training_mode(False)
+    model.policy = policy.to(model.device)
+
+
+def seconds_in(environments: VecNormalize) -> float:
+    """Processor time that the environments have taken [s]; NaN if actors step them."""
+    wrapped: Any = environments
+    while wrapped is not None and not isinstance(wrapped, Timed):
+        wrapped = getattr(wrapped, "venv", None)
+    return wrapped.seconds if wrapped is not None else math.nan
 
 
 def learning_rate(settings: LearningSettings) -> Any:

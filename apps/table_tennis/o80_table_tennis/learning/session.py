@@ -32,12 +32,13 @@ class Session:
     ) -> None:
         self._settings, self._output, self._console = settings, output, console
         self._evaluated = evaluated
+        self._restarts = 0
         torch.set_num_threads(1)  # small networks: more threads wait for each other
 
     def run(self, *, resume: bool, blind_share: float, recorded: Path | None) -> None:
         """Trains, evaluates, writes."""
         settings, output = self._settings, self._output
-        policy, minutes = self._train(settings, output, resume=resume)
+        policy, minutes, environment = self._train(settings, output, resume=resume)
         name = "blind" if settings.blind else "learned"
         evaluations = [*baselines(settings.conditions, balls=self._evaluated)]
         blind = None
@@ -47,16 +48,17 @@ class Session:
             )
             folder = output / "blind"
             begun = checkpoint.found(folder) is not None  # not if the first one was interrupted
-            blind_policy, more = self._train(unseeing, folder, resume=resume and begun)
+            blind_policy, more, _ = self._train(unseeing, folder, resume=resume and begun)
             minutes += more
             blind = self._play("blind", blind_policy)
             evaluations.append(blind)
         verdict = self._play(name, policy)
         evaluations.append(verdict)
-        told = {
+        told: dict[str, Any] = {
             "returned_simulated": verdict.returned,
             "returned_recorded": None,
             "returned_blind": None if blind is None else blind.returned,
+            "environment_share": environment,
         }
         if recorded is not None:
             conditions = with_recorded(settings.conditions, recorded)
@@ -67,17 +69,32 @@ class Session:
 
     def _train(
         self, settings: LearningSettings, output: Path, *, resume: bool
-    ) -> tuple[LearnedPolicy, float]:
-        """The policy, and the processor time that it took [min]."""
+    ) -> tuple[LearnedPolicy, float, float | None]:
+        """The policy, the processor time that it took [min], and the environments' share of it."""
         what = "blind" if settings.blind else "learning"
         with Training(settings, output, resume=resume) as training, _bar(self._console) as bar:
             task = bar.add_task(what, total=settings.decisions, now="")
+            self._restarts = training.progress.restarts
             policy = training.run(lambda point: self._tell(bar, task, what, point))
-            return policy, training.progress.processor_minutes
+            return policy, training.progress.processor_minutes, self._share(what, training)
+
+    def _share(self, what: str, training: Training) -> float | None:
+        share = training.environment_share
+        if share != share:  # NaN
+            return None
+        self._console.print(
+            f"{what}: {100 * share:.0f} % of the processor time was spent in the environments",
+            highlight=False,
+            soft_wrap=True,
+        )
+        return round(share, 4)
 
     def _tell(self, bar: Progress, task: Any, what: str, point: CurvePoint) -> None:
         now = f"touched {point.touched:.2f}, returned {point.returned:.2f}"
         bar.update(task, completed=point.decisions, now=now)
+        if point.restarts > self._restarts:
+            bar.console.print(f"{what}: the network had got stuck; a new one begins")
+        self._restarts = point.restarts
         if point.evaluated:
             bar.console.print(
                 f"{what}: {point.decisions:9d} decisions, {point.episodes:7d} episodes, "
@@ -115,6 +132,7 @@ class Session:
             "minutes": round(minutes, 4),
             "decisions": policy.training["decisions"],
             "seed": self._settings.seed,
+            "restarts": policy.training["restarts"],
             "evaluations": {each.name: each.as_json() for each in evaluations},
             "conditions": policy.conditions.as_json(),
         }

@@ -45,11 +45,27 @@ class PpoSettings:
 
 
 @dataclass(frozen=True)
+class RestartSettings:
+    """When a network that has got stuck is replaced by a new one, see `restarts`."""
+
+    after: int = 600_000
+    """Decisions of a network, after which it is judged, once."""
+    touched: float = 0.65
+    """Share of the balls that it must touch by then, with exploration; 0: all are kept."""
+
+    def __post_init__(self) -> None:
+        whole(self.after, "after", 1)
+        if not 0 <= self.touched <= 1:
+            raise ValueError(f"touched must lie in [0, 1], got {self.touched}")
+
+
+@dataclass(frozen=True)
 class LearningSettings:
     """A whole training. Raises ValueError or TypeError."""
 
     conditions: Conditions = field(default_factory=Conditions)
     ppo: PpoSettings = field(default_factory=PpoSettings)
+    restart: RestartSettings = field(default_factory=RestartSettings)
     seed: int = 1
     decisions: int = 3_000_000
     """After which the training ends."""
@@ -94,6 +110,7 @@ WAYS: Mapping[str, LearningSettings] = {
         ppo=PpoSettings(
             discount=0.9999, trace=1.0, learning_rate=1.5e-4, clip=0.4, hidden=380, steps=160
         ),
+        restart=RestartSettings(touched=0.0),
     ),
 }
 """Sets of settings by name; `published`: fine actions, the published simulation and reward."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -16,7 +17,8 @@ from . import checkpoint, curve
 from .checkpoint import Progress
 from .curve import CURVE, CurvePoint
 from .episodes import EpisodeCounter
-from .learner import network_of, new_model, training_environments
+from .learner import begin_anew, network_of, new_model, seconds_in, training_environments
+from .restarts import stuck
 from .settings import LearningSettings
 from .validation import Validation
 
@@ -46,6 +48,9 @@ class Training:
             (output / CURVE).unlink(missing_ok=True)
         self._counter = EpisodeCounter(settings.ppo.environments, episodes=self._begun.episodes)
         self._clock, self._processor = time.monotonic(), time.process_time()
+        self._evaluating = 0.0
+        self._restarts, self._network_begun = self._begun.restarts, self._begun.begun
+        self._stuck = self._begun.stuck
 
     def __enter__(self) -> Training:
         return self
@@ -67,6 +72,9 @@ class Training:
             self._counter.episodes,
             begun.minutes + (time.monotonic() - self._clock) / 60,
             begun.processor_minutes + (time.process_time() - self._processor) / 60,
+            self._restarts,
+            self._network_begun,
+            self._stuck,
         )
 
     @property
@@ -82,6 +90,7 @@ class Training:
                 "decisions": progress.decisions,
                 "episodes": progress.episodes,
                 "processor_minutes": round(progress.processor_minutes, 2),
+                "restarts": progress.restarts,
             },
         )
 
@@ -100,6 +109,34 @@ class Training:
             self.save()
         return self.policy
 
+    @property
+    def environment_share(self) -> float:
+        """Of the processor time since the start or the last resumption, without evaluations; NaN
+        if actors stepped the environments, or nobody did.
+        """
+        spent = time.process_time() - self._processor - self._evaluating
+        inside = seconds_in(self._environments)
+        return inside / spent if inside > 0 else math.nan
+
+    def judge(self) -> None:
+        """Notes whether the network has got stuck."""
+        self._stuck = stuck(
+            self.settings,
+            begun=self._network_begun,
+            decisions=self.model.num_timesteps,
+            touched=self._counter.shares.touched,
+        )
+
+    def replace_if_stuck(self) -> None:
+        """Begins with a new network if this one has got stuck; decisions, normalisation and the
+        learning rate go on.
+        """
+        if self._stuck:
+            begin_anew(self.model)
+            self._restarts += 1
+            self._network_begun = self.model.num_timesteps
+            self._stuck = False
+
     def save(self) -> None:
         """Writes checkpoint and policy."""
         checkpoint.save(self.output, self.model, self.progress)
@@ -112,7 +149,9 @@ class Training:
         evaluated = {}
         if evaluate:
             network = network_of(self.model, self._environments, self.settings)
+            begun = time.process_time()
             seen = self._validation.play(network)
+            self._evaluating += time.process_time() - begun
             evaluated = {f"evaluated_{name}": value for name, value in seen._asdict().items()}
         return CurvePoint(
             progress.decisions,
@@ -122,6 +161,8 @@ class Training:
             progress.processor_minutes,
             *shares,
             float(policy.log_std.exp().mean().item()),
+            progress.restarts,
+            self.environment_share,
             **evaluated,
         )
 
@@ -141,9 +182,13 @@ class _Updates(BaseCallback):
         spent = self._training.progress.processor_minutes
         return spent < self._training.settings.minutes
 
+    def _on_rollout_start(self) -> None:
+        self._training.replace_if_stuck()  # the update before was still of the old network
+
     def _on_rollout_end(self) -> None:
         training = self._training
         settings = training.settings
+        training.judge()
         evaluate = self.num_timesteps >= min(self._next, settings.decisions)
         point = training.point(evaluate=evaluate)
         curve.append(training.output / CURVE, point)
