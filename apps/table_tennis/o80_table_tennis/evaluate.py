@@ -20,6 +20,7 @@ import o80
 
 from .learning.contestants import contestant
 from .learning.evaluation import VERDICT_BALLS, VERDICT_SEED, Evaluation, evaluate
+from .learning.paired import Paired
 from .learning.verdict import print_table, write_report
 from .settings import Pacing
 
@@ -71,7 +72,10 @@ def main(
         print(f"o80: {error}", file=sys.stderr)
         raise typer.Exit(1) from error
     print_table(played, console)
-    _write(played, output, console)
+    paired = _paired(policies, played) if real_time else {}
+    for name, pair in paired.items():
+        console.print(f"{name}: {pair}", highlight=False)
+    _write(played, paired, output, console)
 
 
 def _play(name: str, match: Match, pacing: Pacing, bars: Progress, *, named: bool) -> Evaluation:
@@ -91,12 +95,21 @@ def _play(name: str, match: Match, pacing: Pacing, bars: Progress, *, named: boo
     )
 
 
-def _write(played: list[Evaluation], output: Path, console: Console) -> None:
+def _paired(policies: list[str], played: list[Evaluation]) -> dict[str, Paired]:
+    """By policy; each was played accelerated, then in real time."""
+    ways = zip(played[::2], played[1::2], strict=True)
+    return {name: Paired.of(*each) for name, each in zip(policies, ways, strict=True)}
+
+
+def _write(
+    played: list[Evaluation], paired: dict[str, Paired], output: Path, console: Console
+) -> None:
     from .learning.landing_plot import plot_landings
 
     output.mkdir(parents=True, exist_ok=True)
     plot_landings(output / "landings.png", played)
     figures: dict[str, Any] = {each.name: each.as_json() for each in played}
+    figures |= {f"{name}, paired": each.as_json() for name, each in paired.items()}
     write_report(output / "evaluation.json", figures)
     console.print(f"landings.png, evaluation.json: {output}", soft_wrap=True)
 

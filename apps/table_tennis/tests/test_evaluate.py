@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 from o80_table_tennis import evaluate as program
 from o80_table_tennis.learning.contestants import contestant
 from o80_table_tennis.learning.evaluation import evaluate
+from o80_table_tennis.learning.paired import Paired
 from o80_table_tennis.players.conditions import Conditions
 from o80_table_tennis.players.policies import StillPolicy
 
@@ -77,3 +78,36 @@ def test_conditions_of_a_file_are_those_that_were_written() -> None:
     conditions = Conditions(preset="standard", repeat=3)
     assert Conditions.of_json(conditions.as_json()) == conditions
     assert replace(conditions, repeat=2) != conditions
+
+
+def test_the_same_balls_are_compared_accelerated_and_in_real_time(
+    runner: tuple[CliRunner, typer.Typer], tmp_path: Path
+) -> None:
+    tester, app = runner
+    arguments = ["learned", "--real-time", "--count", "2", "--output", str(tmp_path)]
+    result = tester.invoke(app, arguments)
+    assert result.exit_code == 0, result.output
+    figures = json.loads((tmp_path / "evaluation.json").read_text())
+    assert list(figures) == ["learned, inline", "learned, real time", "learned, paired"]
+    pair = figures["learned, paired"]
+    assert pair["balls"] == 2
+    assert 0 <= pair["late_actions"] <= pair["actions"]
+    assert pair["actions"] > 0
+    for way, name in (("inline", "accelerated"), ("real time", "real_time")):
+        once = pair["returned_both"] + pair[f"returned_only_{name}"]
+        assert 2 * figures[f"learned, {way}"]["returned"] == once
+    assert "of 2 balls" in " ".join(result.output.split())
+
+
+def test_pairs_are_of_the_same_balls() -> None:
+    one = evaluate("still", StillPolicy(), Conditions(), balls=2)
+    first, second = (replace(one.episodes[0], returned=each) for each in (True, False))
+    accelerated, real_time = (
+        replace(one, episodes=[replace(first, ball=0), replace(other, ball=1)])
+        for other in (first, second)
+    )
+    pair = Paired.of(accelerated, real_time)
+    assert (pair.both, pair.only_accelerated, pair.only_real_time, pair.neither) == (1, 1, 0, 0)
+    assert "difference -50.0 points" in str(pair)
+    with pytest.raises(ValueError, match="the same balls"):
+        Paired.of(accelerated, replace(real_time, episodes=real_time.episodes[::-1]))

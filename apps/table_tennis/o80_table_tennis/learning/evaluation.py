@@ -15,6 +15,7 @@ from ..players.conditions import Conditions
 from ..players.policies import Policy
 from ..playing import play
 from ..report.episode_summary import EpisodeSummary
+from ..report.statistics import Statistics
 from ..settings import Pacing
 
 VERDICT_SEED = 7_000_001
@@ -28,6 +29,8 @@ class Evaluation:
 
     name: str
     episodes: Sequence[EpisodeSummary]
+    statistics: Statistics
+    """Of the environment that played them."""
 
     @property
     def touched(self) -> float:
@@ -85,7 +88,7 @@ def evaluate(
     count = available if balls is None else min(balls, available)
     with TableTennisEnvironment(rig=conditions.rig(pacing), task=task) as environment:
         played = play(environment, policy, range(count), seed=seed, after_each=after_each)
-    return Evaluation(name, played.episodes)
+    return Evaluation(name, played.episodes, played.statistics)
 
 
 def _mean(values: Any) -> float:
