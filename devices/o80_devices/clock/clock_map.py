@@ -1,0 +1,199 @@
+"""The map from stamps of a device to the monotonic clock of this machine."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from o80.errors import InvalidArgument
+from o80_devices.clock.lower_envelope import LowerEnvelope
+
+SECOND = 1e9  # [ns]
+MILLISECOND = 1e6  # [ns]
+
+WINDOW = 30.0 * SECOND  # of the points that give the line
+BUCKET = 0.5 * SECOND  # whose lowest point is kept
+SETTLE = 10  # buckets that must all be late before the clock is taken to have been set back
+RECENT = 2  # buckets whose least delay counts as an error: the clock may have been set back
+
+UNKNOWN = 10.0 * MILLISECOND  # error of a first point, whose delay nobody knows
+STEP = 5.0 * MILLISECOND  # a smaller one is taken for a delay, or for its end
+STEP_SCATTERS = 10.0  # likewise, in mean delays
+REORDERED = 0.2 * SECOND  # a stamp that is older by less is a late packet, not a restart
+OLD_IN_A_ROW = 10  # so many late packets one after the other are a restart
+USUAL_RATE = 1e-4  # how far the rates of quartz clocks differ
+
+
+@dataclass(frozen=True)
+class Capture:
+    """When a value was captured."""
+
+    time: int  #: [ns] on the monotonic clock of this machine
+    error: int  #: estimate of how far off the time may be [ns], about two standard deviations
+    epoch: int  #: increases when the clock of the device has jumped or started again
+
+
+class ClockMap:
+    """Maps stamps of a device to capture times, from the times at which the stamps arrived.
+
+    The delay between capture and arrival is at least `latency`, and varies above it. The map is
+    the line below all arrivals of the last 30 s, less that latency: it follows the drift of the
+    device's clock, and a packet that waited in a queue does not move it. Capture times never
+    decrease and are never later than the arrival.
+
+    Known from the stamps: the rate, jumps, restarts. Not known: the least delay itself. Measure it
+    (`o80 latency`) and give it as `latency`.
+    """
+
+    def __init__(
+        self,
+        *,
+        tick: float = 1.0,
+        wrap: int | None = None,
+        latency: float = 0.0,
+        latency_error: float = 0.0,
+        max_rate: float = 5e-4,
+    ) -> None:
+        """tick: what a stamp counts [ns]: 1000 for microseconds, 1e9 / 300 for frames at 300 Hz.
+
+        wrap: the number of stamps after which the counter begins again, such as 2**32.
+        latency, latency_error: from capture to the earliest arrival [s].
+        max_rate: how much faster or slower than its tick the device's clock may run.
+        """
+        if not tick > 0:
+            raise InvalidArgument(f"tick must be positive [ns], got {tick}")
+        if wrap is not None and wrap < 2:
+            raise InvalidArgument(f"wrap must be at least 2, got {wrap}")
+        if not (latency >= 0 and latency_error >= 0):
+            raise InvalidArgument(
+                f"latency and latency_error must be at least 0 s, got {latency}, {latency_error}"
+            )
+        if not 0 <= max_rate <= 0.1:
+            raise InvalidArgument(f"max_rate must be between 0 and 0.1, got {max_rate}")
+        self._tick = tick
+        self._wrap = wrap
+        self._latency = round(latency * SECOND)
+        self._own_error = latency_error * SECOND + (tick if tick > 1.0 else 0.0)
+        self._max_rate = max_rate
+        self._epoch = -1
+        self._envelope = self._new_envelope(0.0, min(USUAL_RATE, max_rate))
+        self._scatter: float | None = None  # of the epoch before [ns]
+        self._first = self._first_arrival = 0
+        self._last = self._last_arrival = 0
+        self._last_old = 0
+        self._old_in_a_row = 0
+        self._time: int | None = None
+
+    # ------------------------------------------------------------------ the map
+
+    def capture(self, stamp: int, arrival: int) -> Capture | None:
+        """The capture time of what came with a stamp; None for an old or repeated stamp: drop it.
+
+        stamp: [ticks]. arrival: [ns] on the monotonic clock (`time.monotonic_ns`).
+        """
+        arrival = max(arrival, self._last_arrival)
+        if self._epoch < 0:
+            self._begin_epoch(stamp, arrival)
+        else:
+            stamp = self._unwrapped(stamp, arrival)
+            if self._is_old(stamp):
+                return None
+            x, y = self._point(stamp, arrival)
+            if stamp <= self._last or self._was_set_forward(x, y) or self._was_set_back():
+                self._begin_epoch(stamp, arrival)
+        self._last, self._last_arrival, self._old_in_a_row = stamp, arrival, 0
+        x, y = self._point(stamp, arrival)
+        self._envelope.add(x, y)
+        return self._capture(x, arrival)
+
+    @property
+    def rate(self) -> float:
+        """How much slower the device's clock runs than this machine's: 1e-6 is a microsecond a
+        second."""
+        return self._envelope.rate
+
+    def _capture(self, x: float, arrival: int) -> Capture:
+        earliest = self._first_arrival + round(x + self._envelope.at(x)) - self._latency
+        time = min(earliest, arrival - self._latency)
+        if self._time is not None:
+            time = min(max(time, self._time), arrival)
+        self._time = time
+        error = self._line_error(x) + self._own_error + abs(time - earliest)
+        return Capture(time, round(error), self._epoch)
+
+    def _line_error(self, x: float) -> float:
+        """Of the line at x [ns]."""
+        envelope = self._envelope
+        if envelope.buckets <= RECENT:
+            count = envelope.count
+            before = UNKNOWN if self._scatter is None else 4.0 * self._scatter
+            return (3.0 * envelope.scatter() + before / count) / math.sqrt(count)
+        recent = envelope.least_above(RECENT)
+        rate = envelope.rate_error * envelope.from_middle(x)
+        return recent + rate + envelope.error
+
+    # ------------------------------------------------------------------ jumps of the clock
+
+    def _unwrapped(self, stamp: int, arrival: int) -> int:
+        """The stamp on a counter that does not wrap: nearest to where it is expected."""
+        if self._wrap is None:
+            return stamp
+        expected = self._last + round((arrival - self._last_arrival) / self._tick)
+        half = self._wrap // 2
+        return expected + (stamp - expected + half) % self._wrap - half
+
+    def _is_old(self, stamp: int) -> bool:
+        """Whether a stamp is repeated or overtaken, rather than the first after a restart."""
+        if stamp > self._last:
+            return False
+        behind = (self._last - stamp) * self._tick
+        if stamp == self._last or behind < REORDERED:
+            goes_on = self._old_in_a_row == 0 or stamp > self._last_old
+            self._old_in_a_row = self._old_in_a_row + 1 if goes_on else 1
+            self._last_old = stamp
+            return self._old_in_a_row < OLD_IN_A_ROW
+        return False
+
+    def _point(self, stamp: int, arrival: int) -> tuple[float, float]:
+        x = (stamp - self._first) * self._tick
+        return x, (arrival - self._first_arrival) - x
+
+    def _step(self, but_last: int = 0) -> float:
+        """What is too much for a delay, by those that were, without the newest buckets [ns]."""
+        return max(STEP, STEP_SCATTERS * self._envelope.scatter(but_last))
+
+    def _was_set_forward(self, x: float, y: float) -> bool:
+        """Whether a value would have arrived before it was captured."""
+        above = self._envelope.above(x, y)
+        if above > -STEP:
+            return False
+        unsure = self._envelope.rate_error * self._envelope.since_newest(x)
+        return above < -self._step() - unsure
+
+    def _was_set_back(self) -> bool:
+        """Whether all values have arrived late for so long that it is no queue."""
+        envelope = self._envelope
+        return (
+            envelope.buckets > SETTLE
+            and envelope.least_above(RECENT) > STEP
+            and envelope.newest_count(SETTLE) >= 2 * SETTLE
+            and envelope.least_above(SETTLE) > self._step(but_last=SETTLE)
+        )
+
+    def _begin_epoch(self, stamp: int, arrival: int) -> None:
+        """Forgets the offset between the clocks, and keeps their rate."""
+        before = self._envelope
+        if before:
+            self._scatter = before.scatter(but_last=SETTLE) or before.scatter()
+            self._envelope = self._new_envelope(before.rate, before.rate_error)
+        self._epoch += 1
+        self._first, self._first_arrival = stamp, arrival
+
+    def _new_envelope(self, rate: float, rate_error: float) -> LowerEnvelope:
+        return LowerEnvelope(
+            window=WINDOW,
+            bucket=BUCKET,
+            max_rate=self._max_rate,
+            rate=rate,
+            rate_error=rate_error,
+        )
