@@ -158,6 +158,9 @@ bool UntypedBackend::Body::take_staged(std::uint32_t lane) noexcept {
 /// Takes a batch, schedules it for its iteration, or rejects it.
 void UntypedBackend::Body::accept(const StagedBatch& sent) noexcept {
   break_silence(sent.lane);
+  // A process may have halted and then sent this batch since the step has begun. The halt begins
+  // before the batch, or its resume would find no halt in force and do nothing.
+  if (halts.look()) begin_halt();
   if (!suits_halt(sent)) return;
   const BatchRecord batch = pool.batch(sent.batch);
   const bool bursts = batch.burst > 0 || (batch.flags & kBurstUntilEnded) != 0;

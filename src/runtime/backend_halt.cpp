@@ -186,10 +186,12 @@ Outcome UntypedBackend::Body::resume(std::uint32_t lane, CommandId id,
   }
   driver_halted_ = false;
   const bool confirmed = recorded_ == nullptr || recorded_->confirms(JournalKind::resume);
+  // before the halt is cleared: a driver's thread that halts again for the same reason from then on
+  // requests a new halt
+  for (auto& last : own_halts_) last.store(0, std::memory_order_seq_cst);
   if (!confirmed || !halts.clear()) {
     return refuse("another halt was requested meanwhile: read its reason, then resume that one");
   }
-  for (auto& last : own_halts_) last.store(0, std::memory_order_relaxed);
   reason_missing_ = false;
   journal.resume(lane, taking_owner_, number);
   if (server_ != nullptr) return start_afresh(lane, id);

@@ -79,6 +79,22 @@ TEST_F(HaltTest, CommandsAreRejectedWithCauseIterationAndWho) {
   EXPECT_EQ(desired(frontend.latest()), 0.0);
 }
 
+TEST_F(HaltTest, NoRequestIsServedThatWasSentAfterAHaltInTheSameStep) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  Batch request;
+  station.on_refuse = [&] {
+    frontend.halt("in the middle of a step");
+    add_request(frontend, Break{});
+    request = frontend.pulse();
+  };
+  add_request(frontend, Refuse{});
+  const Batch scheduled = frontend.pulse({.at = 2});
+  station.run(2);
+  EXPECT_EQ(request.handle(0).status, Status::halted);
+}
+
 TEST_F(HaltTest, EndsWhatWasSentBeforeItWhereverItIs) {
   Station station;
   station.start();

@@ -42,6 +42,29 @@ TEST_F(ResumeTest, StartsAfreshFromWhereTheRobotIs) {
   EXPECT_EQ(batch.handle(0).status, Status::completed);
 }
 
+TEST_F(ResumeTest, OfAHaltThatWasRequestedInTheSameStepClearsIt) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  Batch resume;
+  // a scheduled request is served after the step has looked for halts, and before it takes batches
+  station.on_refuse = [&] {
+    BatchBuilder builder;
+    builder.resume(frontend.halt("in the middle of a step"));
+    resume = frontend.pulse(builder);
+  };
+  add_request(frontend, Refuse{});
+  const Batch scheduled = frontend.pulse({.at = 2});
+  const Batch motion = send(frontend, 0, 10.0, {.pace = iterations(10)});
+  station.run(2);
+  EXPECT_EQ(resume.handle(0).status, Status::completed);
+  EXPECT_EQ(motion.handle(0).status, Status::halted);
+  EXPECT_FALSE(frontend.halted());
+  station.run(1);
+  EXPECT_EQ(frontend.latest().head().halted, 0U)
+      << "the halt acts after its resume was reported as completed";
+}
+
 TEST_F(ResumeTest, IsRefusedUntilTheRobotHasBraked) {
   // a backend that stands still latches a halt without an iteration in which it could brake
   BurstingStation bursting("pair", {}, [](Schema& schema) {

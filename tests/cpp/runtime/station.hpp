@@ -85,6 +85,7 @@ class Station final : private RequestServer {
   std::array<double, 2> now{};
   double total = 0;
   std::function<void()> before_publish;
+  std::function<void()> on_refuse;  // while a request `refuse` is served
   UntypedBackend backend;
   // what a request `snapshot` gives to the journal
   std::uint32_t kept_slot = 0;
@@ -135,6 +136,7 @@ class Station final : private RequestServer {
         total = kept_.total;
         return Served::start_afresh();
       case 3:
+        if (on_refuse) on_refuse();
         return Served::rejected("it does not want to");
       default:
         return Served::failed("the arm fell off");
