@@ -232,7 +232,18 @@ void throw_if_halted(const Link& link, const Batch& batch) {
   }
 }
 
-void throw_rejected(const Link& link, const char* what, const Batch& batch) {
+namespace {
+/// Throws why the backend ended. It rejects batches shortly before it shows that it has ended.
+[[noreturn]] void throw_ended(Link& link) {
+  constexpr std::chrono::milliseconds kLongestEnd{200};
+  const Deadline deadline{Timeout(kLongestEnd)};
+  link.rows.wait_for_row(link.history.published() + 1, deadline);
+  throw BackendStopped("'" + link.segment.name() + "': its backend is stopping.");
+}
+}  // namespace
+
+void throw_rejected(Link& link, const char* what, const Batch& batch) {
+  if (batch.rejected_by() == Reason::stopped) throw_ended(link);
   const std::string text = "the " + std::string(what) + " sent to '" + link.segment.name() +
                            "' was rejected: " + batch.rejection();
   if (batch.rejected_by() == Reason::halted) throw BackendHalted(text);

@@ -26,8 +26,8 @@ Iteration wait_for_burst(const Link& link, LaneSender& lane, CommandId id, Timeo
                          std::optional<std::uint32_t> events_before_send = {});
 /// Throws BackendHalted if a halt ended a command of this batch, which must have ended.
 void throw_if_halted(const Link& link, const Batch& batch);
-/// Throws Error, or BackendHalted, with the reason why a batch was rejected.
-[[noreturn]] void throw_rejected(const Link& link, const char* what, const Batch& batch);
+/// Throws Error, BackendHalted or BackendGone, with the reason why a batch was rejected.
+[[noreturn]] void throw_rejected(Link& link, const char* what, const Batch& batch);
 /// Copies the row that wait_for_burst returned. Throws RowOverwritten.
 void read_last_row(const Link& link, Iteration row, UntypedObservation& observation);
 

@@ -223,6 +223,25 @@ TEST_F(BurstTest, EndsWithAnErrorWhenTheBackendStopsInIt) {
   EXPECT_FALSE(burst.done());
 }
 
+TEST_F(BurstTest, ThatIsRejectedBecauseTheBackendEndsSaysWhyItEnded) {
+  for (const BackendState state : {BackendState::stopped, BackendState::failed}) {
+    Station station({.segment = "pair", .bursting = true});
+    station.start();
+    UntypedFrontend frontend("pair");
+    add(frontend, 0, 1.0);
+    const Burst burst = frontend.start_burst(5, {.at = 3});
+    ASSERT_EQ(station.iterate(), Step::run);
+    station.backend.end(state, "the elbow is too hot");
+    EXPECT_TRUE(burst.done());
+    const auto wait = [&] { burst.wait(kPatience); };
+    if (state == BackendState::stopped) {
+      EXPECT_THROW(wait(), BackendStopped);
+    } else {
+      EXPECT_THAT(message_of<BackendFailed>(wait), ::testing::HasSubstr("the elbow is too hot"));
+    }
+  }
+}
+
 TEST_F(BurstTest, AMovementIsNotCalledEndedWhenTheBackendStopsInIt) {
   BurstingStation bursting;
   UntypedFrontend frontend("pair");
