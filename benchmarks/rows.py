@@ -320,6 +320,22 @@ ROWS = (
         at_least=True,
     ),
     Row(
+        name="instructions-pam",
+        row="instructions of an iteration of the arm in a group, counted",
+        budget="1.25 x those of plain calls",
+        program="groups",
+        measured="instructions_pam_group",
+        limit=(1.25, "instructions_pam_plain"),
+    ),
+    Row(
+        name="instructions-twin",
+        row="the same, of the table-tennis twin",
+        budget="1.25 x",
+        program="groups",
+        measured="instructions_twin_group",
+        limit=(1.25, "instructions_twin_plain"),
+    ),
+    Row(
         name="vector-64",
         row="table tennis in 64 copies (make_vec), 2 threads, resets included",
         budget="0.8 x plain C++ steps and resets, 2 threads",

@@ -1,5 +1,9 @@
 // Iterations a second of an inline group on two threads, beside the same drivers stepped by plain
 // calls on two threads. Arguments: rounds, a word for the samples, a robot library, its options.
+// `pam` sends one target a burst, `twin` one for each iteration, as the table-tennis environment.
+//
+// With `count SIDE BURSTS` instead of the rounds: makes so many bursts of four copies in one
+// thread, for a tool that counts instructions. SIDE is group or plain.
 
 #include <array>
 
@@ -66,8 +70,9 @@ class PlainDriver {
 /// Plain calls in as many threads.
 class Plain {
  public:
-  Plain(const RobotTable& table, const OptionValues& options, std::size_t copies)
-      : pool_(kThreads - 1) {
+  Plain(const RobotTable& table, const OptionValues& options, std::size_t copies,
+        std::size_t threads = kThreads)
+      : pool_(threads - 1) {
     for (std::size_t i = 0; i < copies; ++i) {
       drivers_.push_back(std::make_unique<PlainDriver>(table, options));
     }
@@ -85,21 +90,32 @@ class Plain {
 /// A group that holds its first actuators, of one type, where they are.
 class Group {
  public:
-  Group(const RobotTable& table, const OptionValues& options, std::size_t copies)
+  Group(const std::string& word, const RobotTable& table, const OptionValues& options,
+        std::size_t copies, std::size_t threads = kThreads)
       : group_(table, options,
-               {.copies = copies, .threads = kThreads, .backend = InlineGroup::default_options()}),
+               {.copies = copies, .threads = threads, .backend = InlineGroup::default_options()}),
         rows_(copies * kIterations * group_.description().layout.size) {
     const Schema& schema = group_.description().schema;
     const std::uint32_t type = schema.actuators[0].type;
     for (std::uint32_t i = 0; i < schema.actuators.size() && schema.actuators[i].type == type; ++i)
       plan_.actuators.push_back(i);
     const UntypedObservation row = group_.attach(0)->latest();
-    const std::size_t size = schema.types[type].size * plan_.actuators.size();
+    const std::size_t size = schema.types[type].size;
+    plan_.command.pace = iterations(1);
+    if (word == "pam") {
+      plan_.command.mode = Mode::overwrite;
+      plan_.delay = 1;
+    } else {
+      plan_.steps = kIterations;
+    }
     for (std::uint32_t i = 0; i < copies; ++i) {
       all_.push_back(i);
-      targets_.insert(targets_.end(), row.desired(), row.desired() + size);
+      for (std::size_t at = 0; at < size * plan_.actuators.size(); at += size) {
+        for (std::uint32_t step = 0; step < plan_.steps; ++step) {
+          targets_.insert(targets_.end(), row.desired() + at, row.desired() + at + size);
+        }
+      }
     }
-    plan_.command.pace = iterations(kIterations);
     plan_.iterations = kIterations;
     plan_.targets = targets_;
     plan_.rows = rows_;
@@ -127,7 +143,7 @@ void measure(int rounds, const std::string& word, const RobotTable& table,
              const OptionValues& options) {
   for (const std::size_t copies : kCopies) {
     Plain plain(table, options, copies);
-    Group group(table, options, copies);
+    Group group(word, table, options, copies);
     const double step = nanoseconds([&] { plain.step(); });
     const int calls = std::max(1, static_cast<int>(kLongEnough / step));
     rate(group, copies, calls);
@@ -139,21 +155,41 @@ void measure(int rounds, const std::string& word, const RobotTable& table,
   }
 }
 
+/// Bursts of one side alone.
+int count(const std::string& side, int bursts, const std::string& word, const RobotTable& table,
+          const OptionValues& options) {
+  constexpr std::size_t kCopiesCounted = 4;
+  const auto step = [&](auto&& counted) {
+    for (int i = 0; i < bursts; ++i) counted.step();
+  };
+  if (side == "plain") {
+    step(Plain(table, options, kCopiesCounted, 1));
+  } else {
+    step(Group(word, table, options, kCopiesCounted, 1));
+  }
+  return 0;
+}
+
 }  // namespace
 }  // namespace o80::bench
 
 int main(int argc, char** argv) {
-  if (argc < 4) {
-    std::fprintf(stderr, "usage: %s ROUNDS WORD LIBRARY [OPTION=VALUE...]\n", argv[0]);
+  const bool counts = argc > 1 && std::string(argv[1]) == "count";
+  const int first = counts ? 4 : 2;  // argument
+  if (argc < first + 2) {
+    std::fprintf(stderr, "usage: %s ROUNDS | count SIDE BURSTS  WORD LIBRARY [OPTION=VALUE...]\n",
+                 argv[0]);
     return 2;
   }
   o80::OptionValues options;
-  for (int i = 4; i < argc; ++i) {
+  for (int i = first + 2; i < argc; ++i) {
     const std::string text = argv[i];
     const std::size_t sign = text.find('=');
     options.emplace_back(text.substr(0, sign), text.substr(sign + 1));
   }
-  const o80::RobotLibrary library = o80::RobotLibrary::load(argv[3]);
+  const o80::RobotLibrary library = o80::RobotLibrary::load(argv[first + 1]);
+  const std::string word = argv[first];
+  if (counts) return o80::bench::count(argv[2], std::atoi(argv[3]), word, *library.table, options);
   o80::bench::take_priority();
-  o80::bench::measure(o80::bench::rounds_of(argc, argv), argv[2], *library.table, options);
+  o80::bench::measure(o80::bench::rounds_of(argc, argv), word, *library.table, options);
 }

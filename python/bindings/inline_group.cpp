@@ -44,7 +44,7 @@ struct GroupPlan {
   GroupPlan(std::vector<std::uint32_t> actuators, std::uint32_t steps, nb::handle each,
             nb::handle mode, nb::handle profile, nb::handle start, std::int64_t delay,
             std::int64_t iterations, nb::handle given, nb::handle filled)
-      : targets(given), rows(filled, PyBUF_WRITABLE) {
+      : targets(given, PyBUF_WRITABLE), rows(filled, PyBUF_WRITABLE) {
     plan.actuators = std::move(actuators);
     plan.steps = steps;
     plan.command = {.pace = pace_of(nb::none(), nb::none(), nb::none(), each),
@@ -60,6 +60,22 @@ struct GroupPlan {
   Bytes targets;
   Bytes rows;
   o80::InlineGroup::BurstPlan plan;
+};
+
+/// A burst of another group that follows one: the compiled half of o80.ChainedBurst.
+struct GroupChain {
+  /// From, to, stride, size: as in o80::InlineGroup::Feed [bytes].
+  using Feed = std::tuple<std::uint32_t, std::uint32_t, std::uint32_t, std::uint32_t>;
+
+  GroupChain(GroupPlan& following, const std::vector<Feed>& given) : plan(following) {
+    for (const auto& [from, to, stride, size] : given) feeds.push_back({from, to, stride, size});
+  }
+  o80::InlineGroup::Following in(o80::InlineGroup& group) const {
+    return {&group, &plan.plan, plan.targets.writable(), feeds};
+  }
+
+  GroupPlan& plan;
+  std::vector<o80::InlineGroup::Feed> feeds;
 };
 
 /// Offset in the row and type of a number, as NumPy names it.
@@ -109,6 +125,19 @@ class Group {
     const auto group = group_;
     const Waiting waiting;
     group->burst(plan.plan, numbers_of<std::uint32_t>(chosen), patience, kKeepWaiting);
+  }
+  void check_chain(const GroupPlan& plan, const Group& second, const GroupChain& chain) const {
+    group_->check(plan.plan, chain.in(*second.group_));
+  }
+  void burst_chain(const GroupPlan& plan, const Group& second, const GroupChain& chain,
+                   nb::handle copies, nb::handle timeout) const {
+    const Bytes chosen(copies);
+    const o80::Timeout patience = timeout_of(timeout);
+    const auto group = group_;
+    const auto following = second.group_;
+    const o80::InlineGroup::Following then = chain.in(*following);
+    const Waiting waiting;
+    group->burst(plan.plan, numbers_of<std::uint32_t>(chosen), patience, kKeepWaiting, &then);
   }
   /// `fields`: a mapping for each copy.
   void request(const std::string& name, nb::handle copies, const std::vector<nb::object>& fields,
@@ -187,6 +216,11 @@ void bind_inline_group(nb::module_& m) {
            "actuators"_a, "steps"_a, "each"_a, "mode"_a, "profile"_a, "start"_a, "delay"_a,
            "iterations"_a, "targets"_a, "rows"_a);
 
+  nb::class_<GroupChain> chain(m, "GroupChain", "The compiled half of o80.ChainedBurst.");
+  refuse_to_pickle(chain, "a burst of two groups", "what each of them sends");
+  chain.def(nb::init<GroupPlan&, const std::vector<GroupChain::Feed>&>(), "following"_a, "feeds"_a,
+            nb::keep_alive<1, 2>());
+
   nb::class_<Group> group(m, "InlineGroup", "The compiled half of o80.InlineGroup.");
   refuse_to_pickle(group, "an inline group", "its rows");
   group.def_prop_ro("copies", [](const Group& self) { return self.inner().copies(); })
@@ -201,6 +235,9 @@ void bind_inline_group(nb::module_& m) {
       .def("check",
            [](const Group& self, const GroupPlan& checked) { self.inner().check(checked.plan); })
       .def("burst", &Group::burst, "plan"_a, "copies"_a, "timeout"_a.none())
+      .def("check_chain", &Group::check_chain, "plan"_a, "second"_a, "chain"_a)
+      .def("burst_chain", &Group::burst_chain, "plan"_a, "second"_a, "chain"_a, "copies"_a,
+           "timeout"_a.none())
       .def("request", &Group::request, "name"_a, "copies"_a, "fields"_a, "timeout"_a.none())
       .def("latest", &Group::latest, "copies"_a, "rows"_a)
       .def("gather", &Group::gather, "numbers"_a, "flags"_a, "observations"_a, "raised"_a)

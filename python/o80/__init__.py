@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from o80.actuator import Actuator, Number
     from o80.backend import Backend, Running, StartAfresh
     from o80.burst_group import BurstGroup, burst
+    from o80.chained_burst import ChainedBurst
     from o80.first import wait_for_first
     from o80.frontend import Frontend
     from o80.frontend_classes import register_frontend
@@ -86,6 +87,7 @@ _LAZY = {
     "History": "o80.history",
     "Gather": "o80.inline_group",
     "Gathered": "o80.inline_group",
+    "ChainedBurst": "o80.chained_burst",
     "GroupBurst": "o80.inline_group",
     "InlineGroup": "o80.inline_group",
     "prefix": "o80.installation",
@@ -157,6 +159,7 @@ __all__ = [
     "Burst",
     "BurstGroup",
     "Cancelled",
+    "ChainedBurst",
     "Closed",
     "ControlTaken",
     "CopyFailed",

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from o80 import _core
+from o80.chained_burst import ChainedBurst
 from o80.errors import InvalidArgument
 from o80.prepared_burst import fill_targets
 
@@ -70,10 +72,24 @@ class GroupBurst:
         those that failed are not valid. TimeoutError and
         Ctrl-C leave each copy between two iterations; some have not run at all then.
         """
-        chosen = self._all
-        if copies is not None:
-            chosen = chosen_copies(copies, self._everybody).view(np.uint8)
-        self._group.burst(self._plan, chosen, timeout)
+        self._group.burst(self._plan, self._chosen(copies), timeout)
+
+    def then(self, following: GroupBurst, numbers: str | Mapping[str, str]) -> ChainedBurst:
+        """This burst and one of another group that follows it, copy by copy, in one call.
+
+        numbers: for each field of the targets of `following` the path in the rows of this one
+            that gives it: `{"position": "extended.joint_positions"}`; for targets of one number
+            the path itself. Row i gives step i. Other fields keep their values.
+
+        The other group has as many copies and shares the threads of this one (`threads=group`).
+        Raises InvalidArgument.
+        """
+        return ChainedBurst(self, following, numbers)
+
+    def _chosen(self, copies: Copies) -> NDArray[np.uint8]:
+        if copies is None:
+            return self._all
+        return chosen_copies(copies, self._everybody).view(np.uint8)
 
 
 def chosen_copies(copies: Copies, everybody: NDArray[np.uint32]) -> NDArray[np.uint32]:

@@ -158,7 +158,7 @@ void Controller::forget_given(std::uint32_t actuator) noexcept {
   if (was_given_) dropped_[actuator / 64] |= std::uint64_t{1} << (actuator % 64);
 }
 
-bool Controller::finish_pending() noexcept {
+bool Controller::finish_all_pending() noexcept {
   const std::uint32_t told = std::min(std::exchange(told_, 0), kStatusesPerIteration);
   ledger_.report_ends(kStatusesPerIteration - told);
   return !ledger_.pending();

@@ -96,7 +96,11 @@ class Controller {
 
   /// Reports the end statuses of dropped commands, at most kStatusesPerIteration minus those that
   /// the last step() has reported. False if some are left.
-  bool finish_pending() noexcept;
+  bool finish_pending() noexcept {
+    if (ledger_.pending()) return finish_all_pending();
+    told_ = 0;
+    return true;
+  }
 
   /// The desired block, in the layout of the schema.
   const std::byte* desired() const noexcept {
@@ -136,6 +140,7 @@ class Controller {
   void take_purge(const Taking& from, const RecordHead& head, Iteration iteration) noexcept;
   void step_groups(Iteration iteration, const std::byte* observed,
                    std::uint32_t& late_budget) noexcept;
+  bool finish_all_pending() noexcept;
   void step_given(Iteration iteration) noexcept;
   void forget_given(std::uint32_t actuator) noexcept;
   const std::byte* of(std::uint32_t actuator, const std::byte* block) const noexcept {

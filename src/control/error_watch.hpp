@@ -21,6 +21,9 @@ class ErrorWatch {
  public:
   explicit ErrorWatch(const Schema& schema);
 
+  /// True if no number has an error limit.
+  bool empty() const noexcept { return watched_.empty(); }
+
   /// A number whose desired and observed values differ by more than its limit.
   struct Excess {
     std::uint32_t actuator = 0;

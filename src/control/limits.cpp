@@ -144,6 +144,17 @@ bool CommandCheck::within(std::uint32_t actuator, const std::byte* state,
   return true;
 }
 
+bool CommandCheck::admits(std::span<const std::uint32_t> actuators, std::uint32_t steps,
+                          const std::byte* states) const noexcept {
+  for (const std::uint32_t actuator : actuators) {
+    const std::size_t size = layouts_[schema_.actuators[actuator].type]->size();
+    for (std::uint32_t step = 0; step < steps; ++step, states += size) {
+      if (!within(actuator, states, nullptr)) return false;
+    }
+  }
+  return true;
+}
+
 std::uint32_t CommandCheck::words_of_mask(std::uint32_t actuator) const {
   const StateLayout& layout = *layouts_[schema_.actuators[actuator].type];
   return mask_words(static_cast<std::uint32_t>(layout.numbers().size()));

@@ -7,6 +7,18 @@
 #include "describe/visit_number.hpp"
 
 namespace o80 {
+namespace {
+
+/// Copies a number of 1, 2, 4 or 8 bytes.
+void copy_number(std::byte* to, const std::byte* from, std::uint32_t size) noexcept {
+  if (size == sizeof(double)) {  // most numbers: no call
+    std::memcpy(to, from, sizeof(double));
+  } else {
+    std::memcpy(to, from, size);
+  }
+}
+
+}  // namespace
 
 StateLayout::StateLayout(const Schema& schema, std::uint32_t type)
     : hooks_(type < schema.hooks.size() ? schema.hooks[type] : TypeHooks{}),
@@ -38,7 +50,7 @@ StateLayout::StateLayout(const Schema& schema, std::uint32_t type)
 
 void StateLayout::copy_numbers(std::byte* to, const std::byte* from) const noexcept {
   for (const NumberPlace& place : numbers_) {
-    std::memcpy(to + place.offset, from + place.offset, place.size);
+    copy_number(to + place.offset, from + place.offset, place.size);
   }
 }
 
@@ -46,7 +58,7 @@ void StateLayout::copy(std::byte* to, const std::byte* from,
                        const std::uint64_t* mask) const noexcept {
   for (std::size_t i = 0; i < numbers_.size(); ++i) {
     if (!masked(mask, i)) continue;
-    std::memcpy(to + numbers_[i].offset, from + numbers_[i].offset, numbers_[i].size);
+    copy_number(to + numbers_[i].offset, from + numbers_[i].offset, numbers_[i].size);
   }
 }
 
@@ -54,7 +66,7 @@ void StateLayout::copy_finite(std::byte* to, const std::byte* from,
                               const std::uint64_t* mask) const noexcept {
   for (std::size_t i = 0; i < numbers_.size(); ++i) {
     if (!masked(mask, i) || !finite_number(i, from)) continue;
-    std::memcpy(to + numbers_[i].offset, from + numbers_[i].offset, numbers_[i].size);
+    copy_number(to + numbers_[i].offset, from + numbers_[i].offset, numbers_[i].size);
   }
 }
 

@@ -3,6 +3,7 @@
 #include <sched.h>
 
 #include <algorithm>
+#include <cstring>
 #include <utility>
 
 #include "control/batch_builder.hpp"
@@ -109,6 +110,31 @@ class InlineGroup::Call {
   InlineGroup& group_;
 };
 
+/// Marks a group as running in the call of another one, while it lives.
+class InlineGroup::FollowingCall {
+ public:
+  FollowingCall(InlineGroup& leader, InlineGroup* group) : group_(group) {
+    if (group_ == nullptr) return;
+    group_->check_usable();
+    std::uint32_t free = 0;
+    if (!group_->running_.compare_exchange_strong(free, 1, std::memory_order_acquire)) {
+      throw Error("the group of '" + group_->name_ + "' runs a call of another thread: call it " +
+                  "from one thread at a time");
+    }
+    group_->leader_.store(&leader, std::memory_order_relaxed);
+  }
+  FollowingCall(const FollowingCall&) = delete;
+  FollowingCall& operator=(const FollowingCall&) = delete;
+  ~FollowingCall() {
+    if (group_ == nullptr) return;
+    group_->leader_.store(nullptr, std::memory_order_relaxed);
+    group_->running_.store(0, std::memory_order_release);
+  }
+
+ private:
+  InlineGroup* group_;
+};
+
 BackendOptions InlineGroup::default_options() {
   BackendOptions options;
   options.history = 64;
@@ -194,6 +220,8 @@ InlineGroup::Copy& InlineGroup::at(std::size_t copy) const {
 
 /// Whether the iterations of a copy go on; called about every 50 ms of a burst.
 bool InlineGroup::go_on() {
+  InlineGroup* const leader = leader_.load(std::memory_order_relaxed);
+  if (leader != nullptr && working_for == leader) return leader->go_on();
   // a frontend of a single copy
   if (working_for != this) return !otherwise_ || otherwise_();
   if (std::this_thread::get_id() == caller_) look_around();
@@ -311,27 +339,72 @@ void InlineGroup::check(const BurstPlan& plan) const {
   }
 }
 
+void InlineGroup::check(const BurstPlan& plan, const Following& then) const {
+  if (then.group == this || then.group->pool_ != pool_ || then.group->copies() != copies()) {
+    throw InvalidArgument("the group of '" + then.group->name_ + "' must have as many copies as '" +
+                          name_ + "', and share its threads: start it with threads=first_group");
+  }
+  if (then.plan->steps != plan.iterations) {
+    throw InvalidArgument("a burst that follows one of " + std::to_string(plan.iterations) +
+                          " iterations needs as many steps, got " +
+                          std::to_string(then.plan->steps));
+  }
+  refuse_size("targets", then.targets.size(), then.plan->targets.size(), "bytes");
+  const std::size_t last = then.plan->steps - 1;
+  const std::size_t own = then.targets.size() / copies();
+  for (const Feed& feed : then.feeds) {
+    const bool fits = std::size_t{feed.from} + feed.size <= description().layout.size &&
+                      feed.to + last * feed.stride + feed.size <= own;
+    if (!fits) throw InvalidArgument("a number of the rows lies outside of rows or targets");
+  }
+}
+
 void InlineGroup::burst(const BurstPlan& plan, std::span<const std::uint32_t> chosen,
-                        Timeout timeout, const KeepWaiting& keep_waiting) {
+                        Timeout timeout, const KeepWaiting& keep_waiting, const Following* then) {
+  const bool may_be_direct = this->may_be_direct(plan);
+  const bool follows_directly = then != nullptr && then->group->may_be_direct(*then->plan);
+  const FollowingCall following(*this, then == nullptr ? nullptr : then->group);
+  for_each(chosen, timeout, keep_waiting, [&](std::uint32_t place, Copy&) {
+    burst_copy(plan, may_be_direct, chosen[place]);
+    if (then != nullptr) follow(plan, *then, follows_directly, chosen[place]);
+  });
+}
+
+void InlineGroup::burst_copy(const BurstPlan& plan, bool may_be_direct, std::uint32_t i) {
+  Copy& copy = *copies_[i];
   const std::size_t targets = plan.targets.size() / copies();
   const std::size_t rows = plan.rows.size() / copies();
-  const std::size_t row = description().layout.size;
-  const bool may_be_direct = this->may_be_direct(plan);
-  for_each(chosen, timeout, keep_waiting, [&](std::uint32_t place, Copy& copy) {
-    const std::uint32_t i = chosen[place];
-    const std::span<const std::byte> to = plan.targets.subspan(i * targets, targets);
-    const std::span<std::byte> own = plan.rows.subspan(i * rows, rows);
-    if (may_be_direct && burst_directly(copy, plan, to, own)) {
-      return read_gathered(i, own.data() + rows - row);
-    }
+  const std::span<const std::byte> to = plan.targets.subspan(i * targets, targets);
+  const std::span<std::byte> own = plan.rows.subspan(i * rows, rows);
+  if (!may_be_direct || !burst_directly(copy, plan, to, own)) {
     if (!plan.actuators.empty()) {
       copy.frontend.add_trajectories(plan.actuators, plan.steps, to, plan.command);
     }
     PulseOptions pulse;
     if (plan.delay > 0) pulse.at = copy.frontend.published() + 1 + plan.delay;
     copy.frontend.burst_rows(own, {}, go_on_, pulse);
-    read_gathered(i, own.data() + rows - row);
-  });
+  }
+  read_gathered(i, own.data() + rows - description().layout.size);
+}
+
+/// Rows of the copy => targets of the copy that follows => its burst.
+void InlineGroup::follow(const BurstPlan& plan, const Following& then, bool may_be_direct,
+                         std::uint32_t i) {
+  const std::size_t size = description().layout.size;
+  const std::byte* rows = plan.rows.data() + i * (plan.rows.size() / copies());
+  std::byte* targets = then.targets.data() + i * (then.targets.size() / copies());
+  for (const Feed& feed : then.feeds) {
+    for (std::size_t step = 0; step < then.plan->steps; ++step) {
+      std::byte* to = targets + feed.to + step * feed.stride;
+      const std::byte* from = rows + step * size + feed.from;
+      if (feed.size == sizeof(double)) {  // mostly: no call
+        std::memcpy(to, from, sizeof(double));
+      } else {
+        std::memcpy(to, from, feed.size);
+      }
+    }
+  }
+  then.group->burst_copy(*then.plan, may_be_direct, i);
 }
 
 /// True if the targets of each actuator are for consecutive iterations of the burst.
@@ -354,10 +427,8 @@ bool InlineGroup::burst_directly(Copy& copy, const BurstPlan& plan,
   Link& link = *copy.frontend.link();
   link.check_usable();
   if (!link.builder.empty()) return false;
-  const std::size_t size = targets.size() / std::max<std::size_t>(1, plan.actuators.size());
-  for (std::size_t i = 0; i < plan.actuators.size(); ++i) {
-    link.command_check.targets(plan.actuators[i], targets.subspan(i * size, size));
-  }
+  // the batch says which target is wrong
+  if (!link.command_check.admits(plan.actuators, plan.steps, targets.data())) return false;
   DirectBurst burst{plan.iterations, plan.delay, {}};
   if (!plan.actuators.empty()) {
     burst.targets = {plan.actuators, plan.steps, targets.data(), plan.command.mode, 0};

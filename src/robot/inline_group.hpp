@@ -69,6 +69,22 @@ class InlineGroup {
     std::span<const std::byte> targets;
     std::span<std::byte> rows;  // for each copy `iterations` rows
   };
+  /// A number of the rows of a burst that becomes a target of the burst that follows it: row i
+  /// gives target i.
+  struct Feed {
+    std::uint32_t from = 0;    // in a row [bytes]
+    std::uint32_t to = 0;      // in the targets of a copy: that of the first row [bytes]
+    std::uint32_t stride = 0;  // from target to target [bytes]
+    std::uint32_t size = 0;    // [bytes]
+  };
+  /// A burst of another group that follows, copy by copy, in the same call: a simulation that
+  /// mirrors a robot, say.
+  struct Following {
+    InlineGroup* group = nullptr;  // as many copies, on the same threads
+    const BurstPlan* plan = nullptr;
+    std::span<std::byte> targets;  // those of the plan
+    std::span<const Feed> feeds;
+  };
   /// Memory for what a RowGather reads of each copy.
   struct Gathered {
     std::span<float> observations;
@@ -100,11 +116,14 @@ class InlineGroup {
   /// Throws InvalidArgument if the memory of the plan does not have the size it needs, or if its
   /// iterations do not fit into the history.
   void check(const BurstPlan& plan) const;
-  /// Sends the targets of the chosen copies and runs their iterations. `chosen`: their numbers,
-  /// each once. Copies between two iterations when it throws: CopyFailed; TimeoutError, Cancelled
-  /// and what `keep_waiting` throws, after which copies whose turn had not come have run nothing.
+  /// The same for a burst that follows one of this group. Throws InvalidArgument.
+  void check(const BurstPlan& plan, const Following& then) const;
+  /// Sends the targets of the chosen copies and runs their iterations, then those of the same
+  /// copies of the group that follows, if any. `chosen`: their numbers, each once. Copies between
+  /// two iterations when it throws: CopyFailed; TimeoutError, Cancelled and what `keep_waiting`
+  /// throws, after which copies whose turn had not come have run nothing.
   void burst(const BurstPlan& plan, std::span<const std::uint32_t> chosen, Timeout timeout = {},
-             const KeepWaiting& keep_waiting = {});
+             const KeepWaiting& keep_waiting = {}, const Following* then = nullptr);
   /// Sends a request to the chosen copies, with a payload for each, and runs each until its request
   /// has ended. Throws as burst(); a request that is not completed is a failure of its copy.
   void request(std::uint32_t request, std::span<const std::uint32_t> chosen,
@@ -125,6 +144,7 @@ class InlineGroup {
  private:
   struct Copy;
   class Call;
+  class FollowingCall;
 
   void add_copy(const RobotTable& table, const OptionValues& options,
                 const BackendOptions& backend);
@@ -137,6 +157,8 @@ class InlineGroup {
   void choose(std::span<const std::uint32_t> chosen);
   [[noreturn]] void throw_failures();
   void throw_unless_completed(std::uint32_t request, const Batch& batch) const;
+  void burst_copy(const BurstPlan& plan, bool may_be_direct, std::uint32_t i);
+  void follow(const BurstPlan& plan, const Following& then, bool may_be_direct, std::uint32_t i);
   bool may_be_direct(const BurstPlan& plan) const;
   bool burst_directly(Copy& copy, const BurstPlan& plan, std::span<const std::byte> targets,
                       std::span<std::byte> rows) const;
@@ -150,7 +172,8 @@ class InlineGroup {
   KeepWaiting go_on_;      // calls go_on()
 
   // of the call that runs
-  std::atomic<std::uint32_t> running_{0};  // 1: a call runs
+  std::atomic<std::uint32_t> running_{0};      // 1: a call runs
+  std::atomic<InlineGroup*> leader_{nullptr};  // the group whose call runs this one too
   std::atomic<bool> cancelled_{false};
   std::thread::id caller_;
   const KeepWaiting* ask_ = nullptr;

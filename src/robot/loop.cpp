@@ -146,14 +146,13 @@ bool Loop::pace() noexcept {
 }
 
 bool Loop::read() noexcept {
-  std::fill(interrupted_.begin(), interrupted_.end(), 0);
-  ReadingView view{};
-  view.observed = backend_.observed();
-  view.extended = backend_.extended();
-  if (!read_into(view)) return false;
-  if (paced_ && view.missed != 0) backend_.set_timing(pacer_.missed());
+  view_.observed = backend_.observed();
+  view_.extended = backend_.extended();
+  view_.desired = nullptr;
+  if (!read_into_view()) return false;
+  if (paced_ && view_.missed != 0) backend_.set_timing(pacer_.missed());
   for (std::uint32_t word = 0; word < interrupted_.size(); ++word) {
-    for (std::uint64_t bits = interrupted_[word]; bits != 0; bits &= bits - 1) {
+    for (std::uint64_t bits = std::exchange(interrupted_[word], 0); bits != 0; bits &= bits - 1) {
       const auto actuator = word * 64 + static_cast<std::uint32_t>(std::countr_zero(bits));
       if (actuator < backend_.schema().actuators.size()) backend_.interrupt(actuator);
     }
@@ -161,19 +160,26 @@ bool Loop::read() noexcept {
   return true;
 }
 
-bool Loop::read_into(ReadingView& view) noexcept {
-  view.interrupted = interrupted_.data();
-  view.iteration = backend_.iteration();
-  view.time = backend_.time();
-  view.requests = reports_.data();
-  for (std::uint32_t i = 0; i < reports_.size(); ++i) {
-    reports_[i].runs = backend_.runs(i) ? 1 : 0;
-    reports_[i].changed = 0;
+/// Reads into the places that `view_` names. `interrupted_` is zero before.
+bool Loop::read_into_view() noexcept {
+  view_.interrupted = interrupted_.data();
+  view_.iteration = backend_.iteration();
+  view_.time = backend_.time();
+  view_.requests = reports_.data();
+  view_.finished = view_.has_desired = view_.missed = view_.halted = view_.reported = 0;
+  // reports change only while requests run, and by drivers that say so
+  if (const bool any = backend_.runs_any(); any || reported_) {
+    for (std::uint32_t i = 0; i < reports_.size(); ++i) {
+      reports_[i].runs = backend_.runs(i) ? 1 : 0;
+      reports_[i].changed = 0;
+    }
+    reported_ = any;
   }
-  if (!calls(Verb::read, [&] { return robot_->read(view); })) return failed("read");
-  finished_ = finished_ || view.finished != 0;
-  note_halt(view);
-  if (view.reported != 0) note_requests(view);
+  if (!calls(Verb::read, [&] { return robot_->read(view_); })) return failed("read");
+  finished_ = finished_ || view_.finished != 0;
+  note_halt(view_);
+  reported_ = reported_ || view_.reported != 0;
+  if (view_.reported != 0) note_requests(view_);
   return true;
 }
 
@@ -233,13 +239,13 @@ KeptState Loop::kept_state(std::uint32_t request, std::span<const std::byte> pay
 }
 
 bool Loop::read_fresh(FreshReading& reading) noexcept {
-  ReadingView view{};
-  view.observed = reading.observed;
-  view.extended = reading.extended;
-  view.desired = reading.desired;
-  if (!read_into(view)) return false;
-  reading.has_desired = view.has_desired != 0;
-  return true;
+  view_.observed = reading.observed;
+  view_.extended = reading.extended;
+  view_.desired = reading.desired;
+  const bool reads = read_into_view();
+  std::ranges::fill(interrupted_, 0);  // there is nothing to interrupt
+  reading.has_desired = view_.has_desired != 0;
+  return reads;
 }
 
 void Loop::note_halt(const ReadingView& view) noexcept {

@@ -81,7 +81,7 @@ class Loop final : public RequestServer {
   bool pace() noexcept;
   bool iterate() noexcept;
   void brake() noexcept;
-  bool read_into(ReadingView& view) noexcept;
+  bool read_into_view() noexcept;
   void note_requests(const ReadingView& view) noexcept;
   void note_halt(const ReadingView& view) noexcept;
   bool begin();
@@ -109,7 +109,9 @@ class Loop final : public RequestServer {
   std::string fault_;  // capacity reserved, so that run() does not allocate
   std::vector<std::uint64_t> interrupted_;
   std::vector<RequestReport> reports_;  // of each request
-  std::uint32_t snapshot_;              // index of that request
+  bool reported_ = true;                // `reports_` must be filled before the next reading
+  ReadingView view_{};
+  std::uint32_t snapshot_;  // index of that request
 };
 
 }  // namespace o80

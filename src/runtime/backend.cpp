@@ -315,7 +315,11 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
   head.halted = halts.acts() ? 1 : 0;
   std::memcpy(row(), &head, sizeof head);
   if (layout.block > 0) std::memcpy(row() + layout.desired, controller.desired(), layout.block);
-  if (layout.mask_words > 0) {
+  if (layout.mask_words == 1) {  // mostly: no calls
+    std::memcpy(row() + layout.active, controller.active_mask(), 8);
+    std::memcpy(row() + layout.clamped, controller.clamped_mask(), 8);
+    std::memcpy(row() + layout.braking, controller.braking_mask(), 8);
+  } else if (layout.mask_words > 1) {
     std::memcpy(row() + layout.active, controller.active_mask(), layout.mask_words * 8);
     std::memcpy(row() + layout.clamped, controller.clamped_mask(), layout.mask_words * 8);
     std::memcpy(row() + layout.braking, controller.braking_mask(), layout.mask_words * 8);
@@ -419,6 +423,7 @@ void UntypedBackend::show_progress(std::uint32_t request, std::string_view text)
 bool UntypedBackend::runs(std::uint32_t request) const noexcept {
   return body_->running.runs(request);
 }
+bool UntypedBackend::runs_any() const noexcept { return body_->running.any(); }
 
 void UntypedBackend::interrupt(std::uint32_t actuator) noexcept { body_->interrupt(actuator); }
 

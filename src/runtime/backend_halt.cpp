@@ -57,7 +57,7 @@ void UntypedBackend::Body::show_acts() noexcept {
 
 /// Halts if the published row exceeds an error limit.
 void UntypedBackend::Body::watch_errors() noexcept {
-  if (halts.acts()) return;
+  if (halts.acts() || errors_.empty()) return;
   const auto excess = errors_.find(controller.desired(), row() + layout.observed);
   if (!excess) return;
   ShortText<248> text;

@@ -29,6 +29,7 @@ void RunningRequests::begin(std::uint32_t request, std::uint32_t lane, std::uint
   if (free == entries_.end()) return;  // see may_begin
   *free = {};
   free->runs = true;
+  ++count_;
   free->record = record;
   free->shown.request = request;
   free->shown.lane = lane;
@@ -62,6 +63,7 @@ void RunningRequests::note_end(std::uint32_t request, const Served& how) noexcep
 
 void RunningRequests::forget(Entry& entry) noexcept {
   hide_running(view_.counters().running[static_cast<std::size_t>(&entry - entries_.data())]);
+  if (entry.runs) --count_;
   entry = {};
 }
 
@@ -71,7 +73,7 @@ const RunningRequests::Entry* RunningRequests::find(std::uint32_t request) const
   return found == entries_.end() ? nullptr : &*found;
 }
 
-const RunningRequests::Entry* RunningRequests::wanting_fresh_start() const noexcept {
+const RunningRequests::Entry* RunningRequests::find_wanting_fresh_start() const noexcept {
   const auto found = std::ranges::find_if(entries_, [](const Entry& entry) {
     return entry.runs && entry.end && entry.end->kind == Served::Kind::start_afresh;
   });

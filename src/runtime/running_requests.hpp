@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -35,9 +34,7 @@ class RunningRequests {
   bool may_begin(std::uint32_t request, ShortText<248>& why) const noexcept;
   void begin(std::uint32_t request, std::uint32_t lane, std::uint64_t id, BlockIndex record,
              Iteration now, std::string_view progress) noexcept;
-  bool any() const noexcept {
-    return std::ranges::any_of(entries_, [](const Entry& entry) { return entry.runs; });
-  }
+  bool any() const noexcept { return count_ != 0; }
   bool runs(std::uint32_t request) const noexcept { return find(request) != nullptr; }
   void show_progress(std::uint32_t request, std::string_view progress) noexcept;
   /// Records how a request ended in the current row. No effect if it does not run.
@@ -48,12 +45,15 @@ class RunningRequests {
   /// Calls `visit(Entry&)` for each running request; `visit` may call forget().
   template <class Visit>
   void each(Visit&& visit) noexcept {
+    if (!any()) return;
     for (Entry& entry : entries_) {
       if (entry.runs) visit(entry);
     }
   }
   /// A request that has ended and needs a fresh start; null if there is none.
-  const Entry* wanting_fresh_start() const noexcept;
+  const Entry* wanting_fresh_start() const noexcept {
+    return any() ? find_wanting_fresh_start() : nullptr;
+  }
   /// True if the request continues during a halt.
   bool is_while_halted(const Entry& entry) const noexcept {
     return schema_.requests[entry.shown.request].while_halted != 0;
@@ -65,6 +65,7 @@ class RunningRequests {
 
  private:
   const Entry* find(std::uint32_t request) const noexcept;
+  const Entry* find_wanting_fresh_start() const noexcept;
   Entry* find(std::uint32_t request) noexcept {
     return const_cast<Entry*>(std::as_const(*this).find(request));
   }
@@ -73,6 +74,7 @@ class RunningRequests {
   const Schema& schema_;
   SegmentView view_;
   std::array<Entry, kMostRunning> entries_;
+  std::uint32_t count_ = 0;  // that run
   std::uint64_t writes_ = 0;
 };
 

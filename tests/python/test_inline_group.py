@@ -29,14 +29,15 @@ def files() -> list[str]:
     return [file.name for file in folder.glob("o80-*")]
 
 
+@pytest.mark.parametrize("each", [1, 3])
 @pytest.mark.parametrize("threads", [1, 2, 4])
-def test_gives_the_rows_of_single_robots_bit_for_bit(threads: int) -> None:
+def test_gives_the_rows_of_single_robots_bit_for_bit(threads: int, each: int) -> None:
     random = np.random.default_rng(3)
     robot = o80.robots.load("two_joints")
     with robot.inline(copies=COPIES, threads=threads, gain=30.0) as group:
         singles = [robot.inline(gain=30.0) for _ in range(COPIES)]
-        burst = group.prepared_burst(6, steps=2, each=3)
-        bursts = [single.prepared_burst(6, steps=2, each=3) for single in singles]
+        burst = group.prepared_burst(6, steps=2, each=each)
+        bursts = [single.prepared_burst(6, steps=2, each=each) for single in singles]
         for turn in range(20):
             burst.targets = random.uniform(-2, 2, (COPIES, 2, 2))
             burst.run()
@@ -53,6 +54,70 @@ def test_gives_the_rows_of_single_robots_bit_for_bit(threads: int) -> None:
                     assert group.latest()[i].tobytes() == single.history(1).rows[0].tobytes()
         for single in singles:
             single.close()
+
+
+def test_a_chained_burst_does_what_two_bursts_do_bit_for_bit() -> None:
+    random, robot = np.random.default_rng(5), o80.robots.load("two_joints")
+    with (
+        robot.inline(copies=COPIES, threads=2) as leader,
+        robot.inline(copies=COPIES, threads=leader, gain=30.0) as mirror,
+        robot.inline(copies=COPIES, threads=2) as alone,
+        robot.inline(copies=COPIES, threads=alone, gain=30.0) as beside,
+    ):
+        first = leader.prepared_burst(4, mode="overwrite", delay=1)
+        second = mirror.prepared_burst(4, steps=4)
+        chain = first.then(second, "observed")
+        assert chain.bursts == (first, second)
+        one = alone.prepared_burst(4, mode="overwrite", delay=1)
+        other = beside.prepared_burst(4, steps=4)
+        for turn in range(20):
+            one.targets = first.targets = random.uniform(-2, 2, (COPIES, 1, 2))
+            some = None if turn % 2 else random.permutation(COPIES)[:3]
+            chain.run(some)
+            one.run(some)
+            some = slice(None) if some is None else some
+            other.targets[some] = one.rows["observed"][some]
+            other.run(some)
+            assert first.rows.tobytes() == one.rows.tobytes()
+            assert second.rows.tobytes() == other.rows.tobytes()
+
+
+def test_a_copy_whose_first_burst_fails_is_not_followed(group: o80.InlineGroup) -> None:
+    with o80.robots.load("two_joints").inline(copies=COPIES, threads=group) as mirror:
+        first, second = group.prepared_burst(4), mirror.prepared_burst(4, steps=4)
+        chain = first.then(second, "observed")
+        first.targets[...] = 0.5
+        group[1].halt("a test")
+        mirror[3].halt("a test")
+        with pytest.raises(o80.CopyFailed) as failed:
+            chain.run()
+        assert sorted(failed.value.errors) == [1, 3]
+        assert mirror.latest()["iteration"].tolist() == [4, 0, 4, 0, 4]
+        group[1].resume()
+        mirror[3].resume()
+        chain.run()
+
+
+def test_what_a_chained_burst_cannot_do_is_said_when_it_is_made(group: o80.InlineGroup) -> None:
+    robot = o80.robots.load("two_joints")
+    first = group.prepared_burst(4)
+    with (
+        robot.inline(copies=COPIES, threads=group) as mirror,
+        robot.inline(copies=COPIES, threads=2) as stranger,
+    ):
+        with pytest.raises(o80.InvalidArgument, match="share its threads"):
+            first.then(stranger.prepared_burst(4, steps=4), "observed")
+        with pytest.raises(o80.InvalidArgument, match="share its threads"):
+            first.then(group.prepared_burst(4, steps=4), "observed")
+        with pytest.raises(o80.InvalidArgument, match="needs as many steps, got 2"):
+            first.then(mirror.prepared_burst(4, steps=2), "observed")
+        second = mirror.prepared_burst(4, steps=4)
+        with pytest.raises(o80.InvalidArgument, match=r"no path in a row 'extended\.speed'"):
+            first.then(second, "extended.speed")
+        with pytest.raises(o80.InvalidArgument, match="must have a float64 for each of 2"):
+            first.then(second, "iteration")
+        with pytest.raises(o80.InvalidArgument, match="no field of the targets 'position'"):
+            first.then(second, {"position": "observed"})
 
 
 def test_leaves_no_file_and_names_a_copy_on_request(group: o80.InlineGroup) -> None:

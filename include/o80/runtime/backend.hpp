@@ -154,6 +154,8 @@ class UntypedBackend {
   /// True if the request was answered `running` and has not ended. A halt ends it, unless it is
   /// served during halts.
   bool runs(std::uint32_t request) const noexcept;
+  /// True if any request runs.
+  bool runs_any() const noexcept;
 
   /// Ends the commands of an actuator as interrupted, in the current iteration.
   void interrupt(std::uint32_t actuator) noexcept;

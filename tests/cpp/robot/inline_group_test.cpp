@@ -73,6 +73,44 @@ TEST_F(InlineGroupTest, SendsNoBatchForTargetsOfEachIterationUnlessAJournalNeeds
   }
 }
 
+TEST_F(InlineGroupTest, IsFollowedByAnotherGroupCopyByCopyInTheSameCall) {
+  InlineGroup leader(drifter(), {}, group_of(9, 3));
+  InlineGroup::Options sharing = group_of(9);
+  sharing.sharing = &leader;
+  InlineGroup follower(drifter(), {}, sharing);
+  InlineGroup first(drifter(), {}, group_of(9, 1));
+  InlineGroup second(drifter(), {}, group_of(9, 1));
+  GroupBurst leading(leader, 2, 1, 4), following(follower, 2, 4, 4);
+  GroupBurst one(first, 2, 1, 4), other(second, 2, 4, 4);
+  for (GroupBurst* each : {&leading, &following, &one, &other})
+    each->plan.command.pace = iterations(1);
+
+  // observed states of `leader` => targets of `follower`
+  const RowLayout layout = leader.description().layout;
+  std::vector<InlineGroup::Feed> feeds;
+  for (std::uint32_t i = 0; i < 2; ++i) feeds.push_back({layout.observed + 8 * i, 32 * i, 8, 8});
+  const auto targets = std::as_writable_bytes(std::span(following.targets));
+  const InlineGroup::Following then{&follower, &following.plan, targets, feeds};
+  leader.check(leading.plan, then);
+  for (int turn = 0; turn < 50; ++turn) {
+    for (std::size_t i = 0; i < one.targets.size(); ++i) {
+      leading.targets[i] = one.targets[i] = static_cast<double>((turn * 7 + i * 3) % 20);
+    }
+    leader.burst(leading.plan, leading.all, kPatience, {}, &then);
+    one.run();
+    for (std::size_t copy = 0; copy < 9; ++copy) {
+      for (std::size_t step = 0; step < 4; ++step) {
+        const std::byte* row = one.of(copy).data() + step * layout.size;
+        for (std::size_t i = 0; i < 2; ++i) {
+          other.target(copy, i, step) = unpack<double>(row + layout.observed + 8 * i);
+        }
+      }
+    }
+    other.run();
+    ASSERT_TRUE(leading.rows == one.rows && following.rows == other.rows) << turn;
+  }
+}
+
 TEST_F(InlineGroupTest, RunsOnlyTheChosenCopies) {
   InlineGroup group(drifter(), {}, group_of(4));
   GroupBurst burst(group, 2, 1, 4);

@@ -13,7 +13,7 @@ import o80
 
 from ..balls.sampled_flight import SampledFlight
 from ..settings import RigSettings
-from .arms import Arms, Index
+from .arms import TIMEOUT, Arms, Index
 from .robot_options import arm_options, twin_options
 from .twins import Twins
 
@@ -21,6 +21,8 @@ FloatArray = NDArray[np.float64]
 
 LANE_BLOCKS = 2048
 """Of 64 bytes in a lane of a twin: the states of a recorded flight are one batch."""
+MIRRORED = {"position": "extended.joint_positions", "velocity": "extended.joint_velocities"}
+"""Of the joints of a twin, by the rows of its arm."""
 
 
 class GroupRig:
@@ -45,6 +47,7 @@ class GroupRig:
             )
             stack.enter_context(twins)
             self.arms, self.twins = Arms(arms, delay=delay), Twins(twins)
+            self._step = self.arms.burst.then(self.twins.burst, MIRRORED)
             self._stack = stack.pop_all()
 
     def reset(
@@ -61,8 +64,8 @@ class GroupRig:
 
     def step(self, pressures: FloatArray, copies: Index) -> None:
         """These arms are asked for normalised pressures (n, 8); five rows of each."""
-        self.arms.step(pressures, copies)
-        self.twins.step(self.arms.motion, copies)
+        self.arms.ask(pressures, copies)
+        self._step.run(copies, timeout=TIMEOUT)
 
     def close(self) -> None:
         """Ends arms and twins; may be called twice."""

@@ -13,7 +13,7 @@ from ..balls.sampled_flight import SampledFlight
 from ..task.ball_record import BallRecord
 from ..world.arm import JOINT_NAMES, JOINTS
 from ..world.timing import ITERATIONS
-from .arms import TIMEOUT, Index
+from .arms import TIMEOUT
 from .ball_records import RECORDS, BallRecords, fly_out_fields
 from .row_words import words, words_of
 from .twin import BALL_STATE, SEEN_NUMBERS
@@ -32,29 +32,25 @@ class Twins:
         names = [actuator.name for actuator in group[0].actuators]
         self._joint_names, self._ball_name = names[:JOINTS], names[JOINTS]
         assert tuple(self._joint_names) == JOINT_NAMES, "the twin moves the joints of the scene"
-        self._burst = group.prepared_burst(ITERATIONS, self._joint_names, steps=ITERATIONS)
-        states = self._burst.targets.swapaxes(1, 2).view(np.float64)
+        self.burst = group.prepared_burst(ITERATIONS, self._joint_names, steps=ITERATIONS)
+        """Of a step: it mirrors the rows of the arms."""
+        states = self.burst.targets.swapaxes(1, 2).view(np.float64)
         self._motion = states.reshape(group.copies, JOINTS, ITERATIONS, 2)
         assert np.shares_memory(self._motion, states)
         self._first = group.prepared_burst(1, self._joint_names)
-        self._last_words = words_of(self._burst.rows)[:, -1]
+        self._last_words = words_of(self.burst.rows)[:, -1]
         self._first_words = words_of(self._first.rows)
-        dtype = self._burst.rows.dtype
+        dtype = self.burst.rows.dtype
         numbers = self._last_words.view(np.float64)
         ball = words(dtype, "observed", "balls").start
         self.ball: FloatArray = numbers[:, ball : ball + SEEN_NUMBERS]
         self.joint_positions: FloatArray = numbers[:, words(dtype, "observed", "joints")][:, ::2]
-        self._records = BallRecords(self._burst.rows[:, -1][RECORDS[0]][RECORDS[1]][:, 0])
+        self._records = BallRecords(self.burst.rows[:, -1][RECORDS[0]][RECORDS[1]][:, 0])
 
     @property
     def records(self) -> BallRecord:
         """What has happened to each ball (N,) until the last rows."""
         return self._records.read()
-
-    def step(self, motion: FloatArray, copies: Index) -> None:
-        """These mirror angle and velocity of each joint in their arm's last rows (N, 4, 5, 2)."""
-        self._motion[copies] = motion[copies]
-        self._burst.run(copies, timeout=TIMEOUT)
 
     def fly_out(self, copies: NDArray[np.intp], every: int, passed_y: float) -> None:
         """Their balls fly to the end of their flights, see `fly_out_fields`, in one iteration."""
