@@ -75,8 +75,8 @@ def test_a_chained_burst_does_what_two_bursts_do_bit_for_bit() -> None:
             some = None if turn % 2 else random.permutation(COPIES)[:3]
             chain.run(some)
             one.run(some)
-            some = slice(None) if some is None else some
-            other.targets[some] = one.rows["observed"][some]
+            where = np.arange(COPIES) if some is None else some
+            other.targets[where] = one.rows["observed"][where]
             other.run(some)
             assert first.rows.tobytes() == one.rows.tobytes()
             assert second.rows.tobytes() == other.rows.tobytes()
