@@ -1,7 +1,7 @@
 # The robots that come with o80, and those of the repository's other packages. A package has a
 # pyproject.toml and installs its robot itself.
 file(GLOB robot_lists CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/robots/*/CMakeLists.txt
-     ${PROJECT_SOURCE_DIR}/simulators/*/CMakeLists.txt
+     ${PROJECT_SOURCE_DIR}/simulators/*/CMakeLists.txt ${PROJECT_SOURCE_DIR}/devices/CMakeLists.txt
 )
 set(o80_robots) # all that are built
 set(o80_bundled_robots)

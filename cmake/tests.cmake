@@ -6,6 +6,7 @@ include(GoogleTest)
 
 file(GLOB test_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tests/cpp/*/*.cpp
      ${PROJECT_SOURCE_DIR}/robots/*/tests/cpp/*.cpp ${PROJECT_SOURCE_DIR}/simulators/*/tests/cpp/*.cpp
+     ${PROJECT_SOURCE_DIR}/devices/tests/cpp/*.cpp
 )
 set(test_folders)
 foreach(source IN LISTS test_sources)

@@ -9,6 +9,7 @@ FOLDERS = (
     "python",
     "robots",
     "simulators",
+    "devices",
     "apps",
     "examples",
     "benchmarks",

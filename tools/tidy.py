@@ -18,7 +18,7 @@ from pathlib import Path
 
 from sources import ROOT
 
-CHECKED = ("src", "robots", "simulators")
+CHECKED = ("src", "robots", "simulators", "devices")
 BUILD = ROOT / "build" / "tidy"
 # the static analyzer looks into what is included too; what it finds it finds early
 ANALYZER = [

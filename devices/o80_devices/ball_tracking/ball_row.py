@@ -1,0 +1,51 @@
+"""What a row of a tracked ball holds."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+
+
+class Reason(IntEnum):
+    """Why a row has no ball."""
+
+    seen = 0
+    """The row has a ball."""
+    no_image = 1
+    """No new images came: the cameras stand still, are late, or are gone."""
+    not_found = 2
+    """Fewer than two cameras see anything like a ball."""
+    no_agreement = 3
+    """Cameras see something, but not at one place in the world."""
+    unexpected = 4
+    """What was seen does not continue the flight; once more, and it is a hit or another ball."""
+
+
+EXTENDED: dict[str, Any] = {
+    "capture_time": np.int64,
+    "reason": Reason,
+    "ball": np.int64,
+    "position": (np.float64, (3,)),
+    "velocity": (np.float64, (3,)),
+    "spin": (np.float64, (3,)),
+    "covariance": (np.float64, (9, 9)),
+    "error": np.float64,
+    "measured": (np.float64, (3,)),
+    "cameras": np.uint64,
+    "residual": np.float64,
+    "image_time": np.int64,
+    "stamp": np.int64,
+}
+UNITS = {
+    "capture_time": "ns",
+    "position": "m",
+    "velocity": "m/s",
+    "spin": "rad/s",
+    "error": "m",
+    "measured": "m",
+    "residual": "px",
+    "image_time": "ns",
+    "stamp": "ns",
+}

@@ -1,0 +1,110 @@
+"""Where to look in each image, and what is there.
+
+While a ball is followed, each camera looks around the place where the ball will be. Otherwise it
+looks around what it saw before, and one camera at a time searches its whole image, at every
+third pixel of every third row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o80_devices import _vision
+from o80_devices.ball_tracking.rig import Rig
+
+FloatArray = NDArray[np.float64]
+Image = NDArray[np.uint8]
+
+STEP = 3
+"""Of a search of a whole image [px]."""
+AROUND = 24
+"""Half the side of a region, besides what the ball's size and uncertainty ask for [px]."""
+LARGEST = 120
+"""Most that half a side grows to [px]."""
+MOST_PLACES = 3
+"""Places in an image that are looked at again."""
+
+
+class Detector:
+    """Finds what may be the ball in the images of all cameras."""
+
+    def __init__(self, rig: Rig, colours: NDArray[np.uint8]) -> None:
+        self._cameras = rig.models()
+        self._sizes = [camera.size for camera in rig.cameras]
+        self._names = [camera.name for camera in rig.cameras]
+        self._focal = [max(camera.focal) for camera in rig.cameras]
+        self._radius = rig.flight.radius
+        self._finder = _vision.BlobFinder(np.ascontiguousarray(colours))
+        self._places: list[list[tuple[float, float]]] = [[] for _ in self._cameras]
+        self._next = 0
+
+    def detect(
+        self, images: Sequence[Image | None], expected: FloatArray | None, spread: float
+    ) -> FloatArray:
+        """(n, 4): camera, x and y [px], area [px^2]. spread: of the expected place [m]."""
+        searching = self._next if expected is None else None
+        if expected is None:
+            self._next = (self._next + 1) % len(self._cameras)
+        found: list[tuple[float, float, float, float]] = []
+        for index, image in enumerate(images):
+            if image is None:
+                continue
+            self._check(index, image)
+            regions = self._regions(index, image, expected, spread, searching == index)
+            blobs = self._blobs(image, regions)
+            self._places[index] = [(blob[1], blob[2]) for blob in blobs[:MOST_PLACES]]
+            found += [(index, *blob[1:]) for blob in blobs]
+        return np.array(found, dtype=float).reshape(-1, 4)
+
+    def _check(self, index: int, image: Image) -> None:
+        width, height = self._sizes[index]
+        if image.shape != (height, width, 3):
+            raise ValueError(
+                f"the image of {self._names[index]} has the shape {image.shape}, the rig says "
+                f"{(height, width, 3)}"
+            )
+
+    def _regions(
+        self,
+        index: int,
+        image: Image,
+        expected: FloatArray | None,
+        spread: float,
+        searches: bool,
+    ) -> list[tuple[int, int, int, int]]:
+        if expected is not None:
+            x, y, depth = self._cameras[index].project(expected[np.newaxis])[0]
+            if not np.isfinite(x):
+                return []
+            per_metre = self._focal[index] / depth
+            half = AROUND + (4 * spread + 3 * self._radius) * per_metre
+            return [_square(x, y, min(half, LARGEST))]
+        places = self._places[index]
+        if searches:
+            coarse = self._finder.find(image, step=STEP, least_area=1.0)
+            places = [(x, y) for x, y, *_ in coarse[:MOST_PLACES]] + places
+        # a place once, though the search and the image before found it
+        kept: list[tuple[float, float]] = []
+        for x, y in places:
+            if all(abs(x - a) + abs(y - b) > AROUND for a, b in kept):
+                kept.append((x, y))
+        return [_square(x, y, 2 * AROUND) for x, y in kept[:MOST_PLACES]]
+
+    def _blobs(
+        self, image: Image, regions: list[tuple[int, int, int, int]]
+    ) -> list[tuple[float, float, float, float]]:
+        """Weight, x, y and area of blobs, the largest weight first, each once."""
+        found: list[tuple[float, float, float, float]] = []
+        for region in regions:
+            for x, y, area, weight, cut in self._finder.find(image, region).tolist():
+                known = any(abs(x - b[1]) + abs(y - b[2]) < 2 for b in found)
+                if not cut and not known:
+                    found.append((weight, x, y, area))
+        return sorted(found, reverse=True)
+
+
+def _square(x: float, y: float, half: float) -> tuple[int, int, int, int]:
+    return int(x - half), int(y - half), int(x + half) + 1, int(y + half) + 1

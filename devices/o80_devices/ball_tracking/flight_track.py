@@ -1,0 +1,173 @@
+"""Which ball it is, and how it flies: the filter, and what to do when it is surprised."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o80_devices import _vision
+from o80_devices.ball_tracking.ball_row import Reason
+
+FloatArray = NDArray[np.float64]
+
+NANOSECOND = 1e-9
+FASTEST = 20.0
+"""No ball moves faster [m/s]."""
+SLACK = 0.05
+"""Added to how far a ball can have come [m]."""
+
+
+def _nothing() -> FloatArray:
+    return np.full(3, np.nan)
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """The ball at a time, or why there is none; numbers are then NaN."""
+
+    time: int
+    """[ns]"""
+    reason: Reason
+    ball: int = 0
+    """Number of the ball, from 1; another ball has another number. 0: none."""
+    position: FloatArray = field(default_factory=_nothing)
+    """(3,) by the filter [m]."""
+    velocity: FloatArray = field(default_factory=_nothing)
+    """(3,) [m/s]"""
+    spin: FloatArray = field(default_factory=_nothing)
+    """(3,) [rad/s]; the covariance tells whether it is known."""
+    covariance: FloatArray = field(default_factory=lambda: np.full((9, 9), np.nan))
+    """(9, 9) of position, velocity and spin."""
+    measured: FloatArray = field(default_factory=_nothing)
+    """(3,) The place on which the cameras agree in this moment alone [m]."""
+    cameras: int = 0
+    """Bits, of those that agree."""
+    residual: float = float("nan")
+    """[px]"""
+
+    @property
+    def seen(self) -> bool:
+        return self.reason == Reason.seen
+
+    @property
+    def error(self) -> float:
+        """Standard deviation of the position, of all three numbers together [m]."""
+        return float(np.sqrt(np.trace(self.covariance[:3, :3])))
+
+
+@dataclass(frozen=True)
+class Point:
+    """Where the cameras agree, in one moment."""
+
+    time: int
+    place: FloatArray
+    covariance: FloatArray
+
+    def reaches(self, other: Point) -> bool:
+        """Whether a ball can have come from here to the other place."""
+        way = float(np.linalg.norm(other.place - self.place))
+        return way <= FASTEST * (other.time - self.time) * NANOSECOND + SLACK
+
+
+class FlightTrack:
+    """Follows one ball. A surprise must come twice: then it is a hit, or another ball."""
+
+    def __init__(self, law: _vision.FlightLaw, forget: float) -> None:
+        self._law = law
+        self._forget = forget
+        self._filter = _vision.BallFilter(law)
+        self._last: Point | None = None  # where the ball was seen last
+        self._surprise: Point | None = None
+        self._time = 0  # of the filter [ns]
+        self._balls = 0
+
+    @property
+    def follows(self) -> bool:
+        return self._last is not None
+
+    def expected(self, time: int) -> tuple[FloatArray | None, float]:
+        """Where the ball will be, and the standard deviation of that [m]. None: nowhere known."""
+        self._go_to(time)
+        if self._last is None:
+            return None, 0.0
+        spread = float(np.sqrt(np.max(np.diag(self._filter.covariance)[:3])))
+        return self._filter.position, spread
+
+    def lost(self, time: int, reason: Reason) -> Tracked:
+        self._go_to(time)
+        return Tracked(time, reason)
+
+    def seen(
+        self,
+        time: int,
+        place: FloatArray,
+        covariance: FloatArray,
+        cameras: int,
+        residual: float,
+        *,
+        may_surprise: bool,
+    ) -> Tracked:
+        """Takes the place on which cameras agree.
+
+        may_surprise: enough of them to believe that the ball was hit, or that it is another one.
+        """
+        self._go_to(time)
+        point = Point(time, place, covariance)
+        reason = self._take(point, may_surprise)
+        if reason != Reason.seen:
+            return Tracked(time, reason)
+        self._last = point
+        return Tracked(
+            time,
+            Reason.seen,
+            self._balls,
+            self._filter.position,
+            self._filter.velocity,
+            self._filter.spin,
+            self._filter.covariance,
+            place,
+            cameras,
+            residual,
+        )
+
+    def _take(self, point: Point, may_surprise: bool) -> Reason:
+        covariance = point.covariance
+        if self._last is None:
+            self._balls += 1
+            self._filter.begin(point.place, covariance)
+            self._surprise = None
+            return Reason.seen
+        if self._filter.distance(point.place, covariance) <= self._filter.gate:
+            self._filter.update(point.place, covariance)
+            self._surprise = None
+            return Reason.seen
+        if not may_surprise:
+            return Reason.unexpected
+        before = self._surprise
+        if before is None or before.time >= point.time or not before.reaches(point):
+            self._surprise = point
+            return Reason.unexpected
+        if not self._last.reaches(before):
+            self._balls += 1
+        self._begin_between(before, point)
+        return Reason.seen
+
+    def _begin_between(self, before: Point, point: Point) -> None:
+        duration = (point.time - before.time) * NANOSECOND
+        velocity = (point.place - before.place) / duration
+        variance = float(np.max(np.diag(before.covariance + point.covariance)))
+        spread = float(np.sqrt(variance)) / duration + 1.0
+        self._filter.begin(point.place, point.covariance, velocity, spread)
+        self._surprise = None
+
+    def _go_to(self, time: int) -> None:
+        """Moves the filter to a time; a ball not seen for too long is given up."""
+        last = self._last
+        gone = last is not None and not 0 <= (time - last.time) * NANOSECOND <= self._forget
+        if gone:
+            self._last = self._surprise = None
+        elif last is not None and time > self._time:
+            self._filter.predict((time - self._time) * NANOSECOND)
+        self._time = time

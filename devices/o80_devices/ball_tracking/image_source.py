@@ -1,0 +1,153 @@
+"""The images of all cameras of a rig from the segments that hold them, taken at one time."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+import o80
+from o80_devices.ball_tracking.rig import Rig, RigCamera
+
+Image = NDArray[np.uint8]
+
+RETRY = 0.1
+"""Between two attempts to attach to a segment that is not there [s]."""
+
+
+@dataclass(frozen=True)
+class Images:
+    """One moment: an image for each camera of the rig, None where there is none."""
+
+    images: list[Image | None]
+    time: int
+    """Of capture [ns]."""
+
+
+class CameraSegment:
+    """One segment with images: of one camera, or of several that capture at the same time."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self._frontend: o80.Frontend | None = None
+        self._iteration = -1
+        self._tried: float | None = None
+        self.images: list[Image] = []
+        self.time = 0
+
+    def attach(self, timeout: float) -> None:
+        """Raises TimeoutError, InvalidArgument if the segment holds no images."""
+        self._frontend = o80.Frontend(self.name, timeout=timeout, read_only=True)
+        self._iteration = -1
+        fields = self._frontend.latest().extended
+        if "images" not in fields or "capture_time" not in fields:
+            raise o80.InvalidArgument(
+                f"the segment '{self.name}' holds no images: its rows need the extended values "
+                "'images' (cameras, bytes of an image) and 'capture_time'"
+            )
+
+    def wait(self, timeout: float) -> bool:
+        """Waits for images that were not read yet, at most so long [s]. False: none came."""
+        if self._frontend is None:
+            return False
+        try:
+            self._frontend.wait_for(self._iteration + 1, timeout=max(timeout, 0.0))
+        except o80.RowOverwritten:
+            return True
+        except o80.TimeoutError:
+            return False
+        except o80.BackendGone:
+            return False
+        return True
+
+    def read(self, now: float) -> bool:
+        """Takes the newest row. False: there is none since the last one. now: any clock [s]."""
+        if self._frontend is None and not self._attached_again(now):
+            return False
+        assert self._frontend is not None
+        if not self._frontend.alive:
+            self.close()
+            return False
+        if self._frontend.published == self._iteration:
+            return False
+        row = self._frontend.latest()
+        self._iteration = row.iteration
+        capture = int(row.extended["capture_time"])
+        if capture == 0:  # the cameras themselves have nothing
+            return False
+        images = np.asarray(row.extended["images"])
+        self.images, self.time = list(np.atleast_2d(images)), capture
+        return True
+
+    def close(self) -> None:
+        if self._frontend is not None:
+            self._frontend.close()
+        self._frontend = None
+
+    def _attached_again(self, now: float) -> bool:
+        if self._tried is not None and 0 <= now - self._tried < RETRY:
+            return False
+        self._tried = now
+        try:
+            self.attach(timeout=0.0)
+        except o80.Error:
+            self.close()
+        return self._frontend is not None
+
+
+class ImageSource:
+    """The newest images of all segments; only those taken at the same time as the newest count.
+
+    skew: how far apart in time images may be that count as taken together [s].
+    """
+
+    def __init__(self, segments: Sequence[str], rig: Rig, skew: float) -> None:
+        self._segments = [CameraSegment(name) for name in segments]
+        self._cameras = rig.cameras
+        self._skew = round(skew * 1e9)
+
+    def attach(self, timeout: float) -> None:
+        """Waits for all segments. Raises TimeoutError, InvalidArgument."""
+        for each in self._segments:
+            each.attach(timeout)
+
+    def wait(self, timeout: float) -> None:
+        """Waits for images of the first segment, at most so long [s], and not much less."""
+        end = time.monotonic() + timeout
+        if not self._segments[0].wait(timeout):
+            time.sleep(max(0.0, end - time.monotonic()))
+
+    def read(self, now: float) -> Images | None:
+        """Images not read before; None: there are none. Raises InvalidArgument."""
+        came = [each.read(now) for each in self._segments]
+        if not any(came):
+            return None
+        newest = max(each.time for each, new in zip(self._segments, came, strict=True) if new)
+        images: list[Image | None] = []
+        for each, new in zip(self._segments, came, strict=True):
+            together = new and abs(each.time - newest) <= self._skew
+            images += each.images if together else [None] * max(1, len(each.images))
+        if len(images) != len(self._cameras):
+            raise o80.InvalidArgument(
+                f"the rig has {len(self._cameras)} cameras, the segments have {len(images)}"
+            )
+        shaped = [self._shaped(*each) for each in zip(images, self._cameras, strict=True)]
+        return Images(shaped, newest)
+
+    def _shaped(self, image: Image | None, camera: RigCamera) -> Image | None:
+        if image is None:
+            return None
+        width, height = camera.size
+        if image.size != height * width * 3:
+            raise o80.InvalidArgument(
+                f"images of {camera.name} must have {width} x {height} pixels of 3 bytes as in the "
+                f"rig, got {image.size} bytes"
+            )
+        return image.reshape(height, width, 3)
+
+    def close(self) -> None:
+        for each in self._segments:
+            each.close()

@@ -1,0 +1,206 @@
+"""The rig: cameras with their lenses and places, the ball, and the table, in a file of JSON.
+
+The frame of the world: z up, lengths in metres. A camera's own frame is that of OpenCV: x to the
+right of its image, y down, z ahead. `point_in_camera = rotation @ point + translation`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o80.errors import InvalidArgument
+from o80_devices import _vision
+
+FORMAT = "o80-ball-rig-1"
+Vector = tuple[float, float, float]
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RigCamera:
+    """One calibrated camera."""
+
+    name: str
+    size: tuple[int, int]
+    """Width and height [px]."""
+    focal: tuple[float, float]
+    """[px]"""
+    centre: tuple[float, float]
+    """[px]; the centre of the first pixel is (0, 0)."""
+    distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    """k1, k2, p1, p2, k3, as OpenCV writes them."""
+    rotation: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    """World to camera, row by row."""
+    translation: Vector = (0.0, 0.0, 0.0)
+    """World to camera [m]."""
+
+    def model(self) -> _vision.Camera:
+        """The compiled camera. Raises InvalidArgument."""
+        try:
+            return _vision.Camera(
+                self.size, self.focal, self.centre, self.distortion, self.rotation, self.translation
+            )
+        except (TypeError, ValueError) as error:
+            raise InvalidArgument(f"camera '{self.name}' of the rig: {error}") from None
+
+    @property
+    def place(self) -> FloatArray:
+        """(3,) in the world [m]."""
+        rotation = np.reshape(self.rotation, (3, 3))
+        place: FloatArray = -rotation.T @ self.translation
+        return place
+
+    def moved(self, rotation: FloatArray, translation: FloatArray) -> RigCamera:
+        """The same camera elsewhere."""
+        return replace(
+            self,
+            rotation=tuple(float(x) for x in np.ravel(rotation)),
+            translation=vector(translation),
+        )
+
+
+@dataclass(frozen=True)
+class Flight:
+    """What air and gravity do to the ball; src/vision/flight.hpp has the formulas.
+
+    The numbers are those of the balls of the table-tennis application.
+    """
+
+    radius: float = 0.02
+    """[m]"""
+    drag: float = 0.1098
+    """[1/m]"""
+    magnus: float = 0.00626
+    saturation: float = 0.06
+    """Of the lift [m]."""
+    spin_decay: float = 0.5
+    """[1/s]"""
+    gravity: Vector = (0.0, 0.0, -9.81)
+    """[m/s^2]"""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table on which the ball bounces; its edges are parallel to the axes of the world."""
+
+    middle: Vector = (0.4, 1.57, 0.775)
+    """Of its surface [m]."""
+    half: tuple[float, float] = (0.7625, 1.37)
+    """Half its width along x and half its length along y [m]."""
+    kept_normal: float = 0.92
+    kept_tangential: float = 0.505
+    friction: float = 0.25
+
+    @property
+    def corners(self) -> FloatArray:
+        """(4, 3) of its surface [m], counter-clockwise from the smallest x and y."""
+        signs = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)])
+        corners: FloatArray = np.asarray(self.middle) + signs * (*self.half, 0.0)
+        return corners
+
+
+@dataclass(frozen=True)
+class Rig:
+    """The cameras and what they look at."""
+
+    cameras: tuple[RigCamera, ...]
+    flight: Flight = field(default_factory=Flight)
+    table: Table | None = field(default_factory=Table)
+
+    def models(self) -> list[_vision.Camera]:
+        return [camera.model() for camera in self.cameras]
+
+    def law(self) -> _vision.FlightLaw:
+        """The law of flight and bounce for the filter."""
+        law = _vision.FlightLaw()
+        for name, value in asdict(self.flight).items():
+            setattr(law, name, value)
+        law.has_table = self.table is not None
+        if self.table is not None:
+            law.table = self.table.middle
+            law.half = self.table.half
+            law.kept_normal = self.table.kept_normal
+            law.kept_tangential = self.table.kept_tangential
+            law.friction = self.table.friction
+        return law
+
+    def save(self, path: Path | str) -> None:
+        text = json.dumps({"format": FORMAT, **asdict(self)}, indent=1)
+        Path(path).write_text(text + "\n")
+
+    @staticmethod
+    def load(path: Path | str) -> Rig:
+        """Reads a rig. Raises InvalidArgument, which names the file and what is wrong in it."""
+        try:
+            read = json.loads(Path(path).read_text())
+            if not isinstance(read, dict) or read.pop("format", None) != FORMAT:
+                raise InvalidArgument(f'"format" must be "{FORMAT}"')
+            cameras = tuple(RigCamera(**_tuples(each)) for each in read["cameras"])
+            table = read.get("table")
+            rig = Rig(
+                cameras,
+                Flight(**_tuples(read.get("flight", {}))),
+                None if table is None else Table(**_tuples(table)),
+            )
+            rig.check()
+        except (OSError, KeyError, TypeError, ValueError) as error:
+            raise InvalidArgument(f"the rig {path} cannot be used: {error}") from error
+        return rig
+
+    def check(self) -> None:
+        """Raises InvalidArgument for a rig that cannot be used."""
+        if not 2 <= len(self.cameras) <= 16:
+            raise InvalidArgument(f"a rig has 2 to 16 cameras, got {len(self.cameras)}")
+        names = [camera.name for camera in self.cameras]
+        if len(set(names)) < len(names):
+            raise InvalidArgument(f"two cameras have one name: {', '.join(names)}")
+        self.models()
+        try:
+            self.law()
+        except TypeError:
+            raise InvalidArgument("the flight or the table has a value that is no number") from None
+
+
+def _tuples(fields: dict[str, Any]) -> dict[str, Any]:
+    return {k: tuple(np.ravel(v).tolist()) if isinstance(v, list) else v for k, v in fields.items()}
+
+
+def vector(values: FloatArray | Sequence[float]) -> Vector:
+    x, y, z = (float(value) for value in values)
+    return x, y, z
+
+
+def looking(place: Sequence[float], at: Sequence[float]) -> tuple[FloatArray, FloatArray]:
+    """Rotation (3, 3) and translation (3,) of a camera that stands upright and looks at a point."""
+    ahead = np.subtract(at, place) / np.linalg.norm(np.subtract(at, place))
+    right = np.cross(ahead, (0.0, 0.0, 1.0))
+    right /= np.linalg.norm(right)
+    rotation = np.array([right, np.cross(ahead, right), ahead])
+    return rotation, -rotation @ np.asarray(place, float)
+
+
+def four_cameras() -> Rig:
+    """A rig for tests and demonstrations: a camera beside each corner of the table, 2.4 m high.
+
+    640 x 480 pixels, focal length 520 px (63 degrees wide), baselines 3.0 m across the table and
+    3.8 m along it; the middle of the table is 2.9 m from each camera.
+    """
+    places = [(-1.1, -0.33, 2.4), (1.9, -0.33, 2.4), (1.9, 3.47, 2.4), (-1.1, 3.47, 2.4)]
+    cameras = []
+    for i, place in enumerate(places):
+        lens = RigCamera(
+            name=f"camera_{i}",
+            size=(640, 480),
+            focal=(520.0 + 2 * i, 520.0 + 2 * i),
+            centre=(320.0 + i, 238.0 - i),
+            distortion=(-0.11, 0.06, 0.0004, -0.0003, -0.01),
+        )
+        cameras.append(lens.moved(*looking(place, (0.4, 1.57, 1.0))))
+    return Rig(tuple(cameras))

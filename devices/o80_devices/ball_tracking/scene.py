@@ -1,0 +1,143 @@
+"""What a camera of a rig sees: a room with the table, and a ball, through its lens.
+
+The ball is drawn as it is during the exposure: a fast one is a streak, a boundary lies between
+pixels, the lens bends it, light comes from above. The background with its noise is prepared.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o80_devices.ball_tracking.rig import Rig, Table
+
+FloatArray = NDArray[np.float64]
+Image = NDArray[np.uint8]
+
+BALL = np.array([245.0, 130.0, 35.0])
+FLOOR = np.array([[112.0, 104.0, 96.0], [124.0, 117.0, 108.0]])
+WALL = np.array([150.0, 152.0, 156.0])
+TOP = np.array([32.0, 74.0, 128.0])
+LINE = np.array([225.0, 226.0, 228.0])
+LINE_WIDTH = 0.02  # [m]
+TILE = 0.5  # [m]
+LIGHT = np.array([0.2, -0.1, 0.97])
+MOMENTS = 6  # of an exposure
+
+
+class Scene:
+    """The images of all cameras of a rig.
+
+    exposure: how long the shutter is open; images are of the middle of it [s].
+    noise: standard deviation of a value of a pixel, of 255.
+    variations: prepared noises of a background, used in turn.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        *,
+        exposure: float = 0.002,
+        noise: float = 3.0,
+        variations: int = 4,
+        seed: int = 0,
+    ) -> None:
+        self._cameras = rig.models()
+        self._sizes = [camera.size for camera in rig.cameras]
+        self._focal = [max(camera.focal) for camera in rig.cameras]
+        self._radius = rig.flight.radius
+        self._exposure = exposure
+        self._noise = noise
+        self._random = np.random.default_rng(seed)
+        self._rays = [self._directions(i) for i in range(len(self._cameras))]
+        self._backgrounds = [
+            self._with_noise(self._background(i, rig.table), variations)
+            for i in range(len(self._cameras))
+        ]
+        self._images = 0
+
+    def image(
+        self,
+        camera: int,
+        position: FloatArray | None = None,
+        velocity: FloatArray | None = None,
+        into: Image | None = None,
+    ) -> Image:
+        """What a camera sees; position None: no ball. into: (height, width, 3), to be filled."""
+        backgrounds = self._backgrounds[camera]
+        self._images += 1
+        prepared = backgrounds[self._images % len(backgrounds)]
+        if into is None:
+            into = prepared.copy()
+        else:
+            into[...] = prepared
+        if position is not None:
+            self._draw(camera, into, position, np.zeros(3) if velocity is None else velocity)
+        return into
+
+    def _directions(self, camera: int) -> FloatArray:
+        """(height, width, 3) Where each pixel looks; NaN: nowhere."""
+        width, height = self._sizes[camera]
+        x, y = np.meshgrid(np.arange(width, dtype=float), np.arange(height, dtype=float))
+        pixels = np.stack([x.ravel(), y.ravel()], axis=1)
+        return self._cameras[camera].directions(pixels).reshape(height, width, 3)
+
+    def _background(self, camera: int, table: Table | None) -> FloatArray:
+        rays, place = self._rays[camera], self._cameras[camera].place
+        down = np.minimum(rays[..., 2], -1e-9)
+        floor = place + rays * (-place[2] / down)[..., np.newaxis]
+        tile = (np.floor(floor[..., 0] / TILE) + np.floor(floor[..., 1] / TILE)) % 2
+        seen: FloatArray = FLOOR[np.nan_to_num(tile).astype(int)]
+        far = ~(np.linalg.norm(floor[..., :2] - place[:2], axis=-1) < 6.0)
+        seen[far] = WALL
+        if table is not None:
+            top = place + rays * ((table.middle[2] - place[2]) / down)[..., np.newaxis]
+            beside = np.abs(top[..., :2] - table.middle[:2])
+            inside = np.array(table.half) - beside
+            on_top = (inside > 0).all(-1)
+            line = (inside.min(-1) < LINE_WIDTH) | (beside[..., 0] < LINE_WIDTH / 4)
+            seen[on_top] = TOP
+            seen[on_top & line] = LINE
+        return seen
+
+    def _with_noise(self, background: FloatArray, variations: int) -> list[Image]:
+        shape, noises = background.shape, []
+        for _ in range(variations):
+            noise = self._noise * self._random.standard_normal(shape, np.float32)
+            noises.append(np.clip(np.rint(background + noise), 0, 255).astype(np.uint8))
+        return noises
+
+    def _draw(self, camera: int, image: Image, position: FloatArray, velocity: FloatArray) -> None:
+        """Draws the ball into the rectangle that it crosses during the exposure."""
+        share = (np.arange(MOMENTS) + 0.5) / MOMENTS - 0.5
+        places = position + np.outer(share * self._exposure, velocity)
+        seen = self._cameras[camera].project(np.ascontiguousarray(places))
+        if not np.isfinite(seen).all():
+            return
+        margin = 3 + self._radius * self._focal[camera] / seen[:, 2].min()
+        width, height = self._sizes[camera]
+        left, top = np.maximum(np.floor(seen[:, :2].min(0) - margin), 0).astype(int)
+        right, bottom = (np.ceil(seen[:, :2].max(0) + margin) + 1).astype(int)
+        patch = image[top : min(bottom, height), left : min(right, width)]
+        rays = self._rays[camera][top : min(bottom, height), left : min(right, width)]
+        if patch.size == 0:
+            return
+
+        # ray of each pixel, ball in each moment => share of the pixel that it covers, its light
+        covered, light = np.zeros(patch.shape[:2]), np.zeros(patch.shape[:2])
+        for place in places - self._cameras[camera].place:
+            along = rays @ place
+            aside = rays * along[..., np.newaxis] - place
+            distance = np.linalg.norm(aside, axis=-1)
+            per_metre = self._focal[camera] / np.linalg.norm(place)
+            part = np.clip(0.5 + (self._radius - distance) * per_metre, 0, 1)
+            normal = aside / self._radius
+            towards = np.sqrt(np.maximum(0, 1 - (normal**2).sum(-1)))
+            shade = normal @ LIGHT - towards * (rays @ LIGHT)
+            covered += part
+            light += part * (0.62 + 0.38 * np.clip(shade, 0, 1))
+        noise = self._random.normal(0, self._noise, patch.shape)
+        mixed = patch * (1 - covered / MOMENTS)[..., np.newaxis]
+        mixed = mixed + (light / MOMENTS)[..., np.newaxis] * BALL
+        mixed += noise * (covered / MOMENTS)[..., np.newaxis]
+        patch[...] = np.clip(np.round(np.nan_to_num(mixed)), 0, 255).astype(np.uint8)
