@@ -31,9 +31,11 @@ Distorted distorted(const std::array<double, 5>& lens, double x, double y) noexc
 void Camera::prepare() noexcept {
   // the first r2 at which a larger angle no longer moves the pixel outwards
   const auto [k1, k2, p1, p2, k3] = distortion;
-  constexpr double kMost = 9;  // tan(72 degrees)^2
-  widest = kMost;
-  for (double r2 = 0; r2 < kMost; r2 += 0.01) {
+  constexpr int kSteps = 900;
+  constexpr double kStep = 0.01;  // up to tan(72 degrees)^2
+  widest = kSteps * kStep;
+  for (int i = 0; i < kSteps; ++i) {
+    const double r2 = i * kStep;
     if (1 + r2 * (3 * k1 + r2 * (5 * k2 + r2 * 7 * k3)) > 0) continue;
     widest = r2;
     return;
