@@ -40,6 +40,7 @@ def one_thread() -> None:
         (0, 602_047, 0.1, True),  # still the first update after 600 000
         (0, 602_048, 0.1, False),
         (600_000, 1_200_000, 0.1, True),
+        (1_800_000, 2_400_000, 0.1, True),
         (600_000, 800_000, 0.1, False),
         (1_800_001, 2_400_001, 0.1, False),  # no time left for a new one
         (0, 600_000, math.nan, False),
@@ -62,13 +63,13 @@ def test_the_published_way_replaces_no_network() -> None:
 def test_a_stuck_network_is_replaced_while_decisions_go_on(tmp_path: Path) -> None:
     with Training(IMPATIENT, tmp_path / "anew") as training:
         training.run()
-        assert training.progress.restarts == 3
-        assert training.policy.training["restarts"] == 3
+        assert training.progress.restarts == 4
+        assert training.policy.training["restarts"] == 4
     points = curve.read(tmp_path / "anew" / CURVE)
     assert [point.decisions for point in points] == [UPDATE * each for each in range(1, 6)]
-    assert [point.restarts for point in points] == [0, 1, 2, 3, 3]
+    assert [point.restarts for point in points] == [0, 1, 2, 3, 4]
     start = points[0].exploration
-    assert [point.exploration == start for point in points] == [True, True, True, True, False]
+    assert [point.exploration == start for point in points] == [True] * 5
 
     with Training(SMALL, tmp_path / "kept") as training:
         training.run()
@@ -104,8 +105,8 @@ def test_a_training_that_was_stopped_with_a_stuck_network_resumes_with_a_new_one
     with Training(replace(IMPATIENT, decisions=3 * UPDATE), tmp_path, resume=True) as resumed:
         assert resumed.progress.stuck
         resumed.run()
-        assert resumed.progress.restarts == 1
-    assert [point.restarts for point in curve.read(tmp_path / CURVE)] == [0, 1, 1]
+        assert resumed.progress.restarts == 2
+    assert [point.restarts for point in curve.read(tmp_path / CURVE)] == [0, 1, 2]
 
 
 def test_settings_of_restarts_are_checked() -> None:

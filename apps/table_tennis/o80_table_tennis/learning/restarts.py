@@ -9,16 +9,13 @@ from __future__ import annotations
 
 from .settings import LearningSettings
 
-NEEDED = 2
-"""A new network begins only if the training leaves it this many times the decisions after which it
-is judged."""
-
 
 def stuck(settings: LearningSettings, *, begun: int, decisions: int, touched: float) -> bool:
     """Whether a network that began at the decision `begun` should be replaced now.
 
-    It is judged in one update only, the first after as many decisions as the settings say. A blind
-    network is never replaced: it cannot touch so many balls.
+    It is judged in one update only, the first after as many decisions as the settings say. It is
+    kept if the training ends before a new one could be judged. A blind network is always kept, as
+    it cannot touch so many balls.
 
     touched: share of the last balls, with exploration.
     """
@@ -27,5 +24,5 @@ def stuck(settings: LearningSettings, *, begun: int, decisions: int, touched: fl
     update = ppo.steps * ppo.environments
     judged = restart.after <= age < restart.after + update
     left = settings.decisions - decisions
-    enough_left = left >= NEEDED * restart.after
+    enough_left = left >= restart.after
     return judged and enough_left and not settings.blind and touched < restart.touched
