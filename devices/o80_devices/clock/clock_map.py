@@ -167,8 +167,7 @@ class ClockMap:
         above = self._envelope.above(x, y)
         if above > -STEP:
             return False
-        unsure = self._envelope.rate_error * self._envelope.since_newest(x)
-        return above < -self._step() - unsure
+        return above < -self._step() - self._line_error(x)
 
     def _was_set_back(self) -> bool:
         """Whether all values have arrived late for so long that it is no queue."""

@@ -136,10 +136,6 @@ class LowerEnvelope:
     def _newest(self, count: int) -> Iterator[Bucket]:
         return islice(reversed(self._buckets), count)
 
-    def since_newest(self, x: float) -> float:
-        """How far x is from the lowest point of the newest bucket [ns]."""
-        return abs(x - self._buckets[-1].x)
-
     def from_middle(self, x: float) -> float:
         """How far x is from the mean of the window [ns]: there the rate matters least."""
         return abs(x - self._middle)

@@ -1,0 +1,10 @@
+"""Motion capture systems as sensors: the poses of named subjects, or why there are none.
+
+`Playback` plays recorded frames, `Qualisys` is a client of Qualisys Track Manager, `Watched` uses
+the package `motioncapture` for Vicon, OptiTrack and VRPN.
+"""
+
+from o80_devices.motion_capture.playback import Playback
+from o80_devices.motion_capture.sensor import Reason
+
+__all__ = ["Playback", "Reason"]

@@ -1,0 +1,28 @@
+"""What a motion capture system tells of one moment."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+NOWHERE = (float("nan"),) * 3
+NO_ROTATION = (float("nan"),) * 4
+
+
+@dataclass(frozen=True)
+class Subject:
+    """The pose of a rigid body."""
+
+    visible: bool
+    position: tuple[float, ...] = NOWHERE  #: [m]
+    quaternion: tuple[float, ...] = NO_ROTATION  #: x, y, z, w
+    quality: float = float("nan")  #: residual, as the system defines it; NaN: it tells none
+
+
+@dataclass(frozen=True)
+class Frame:
+    number: int
+    stamp: int | None  #: of the device, [ticks] of its clock; None: it gives none
+    arrival: int  #: [ns] on the monotonic clock of this machine
+    subjects: Mapping[str, Subject]
+    latency: int = 0  #: from capture to arrival, as far as the device knows it [ns]

@@ -1,0 +1,221 @@
+"""What all motion capture drivers share: the rows, the capture times, and the gaps."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from o80.drivers import Desired, Reading, option
+from o80.errors import InvalidArgument
+from o80_devices.clock import ClockMap
+from o80_devices.motion_capture.frame import Frame, Subject
+from o80_devices.motion_capture.frame_pace import FramePace
+from o80_devices.motion_capture.transform import Transform
+
+SECOND = 1_000_000_000  # [ns]
+
+
+class Reason(IntEnum):
+    """Why a row has no poses, or SEEN."""
+
+    SEEN = 0
+    NO_NEW_FRAME = 1  #: since the row before; the next one is not late yet
+    SILENT = 2  #: connected, but no frame for longer than the option gap
+    CONNECTING = 3
+    DISCONNECTED = 4  #: refused, closed by the other side, or its process died
+    ENDED = 5  #: a recording was played to its end
+
+
+class Frames(Protocol):
+    """Where frames come from."""
+
+    @property
+    def names(self) -> Sequence[str]:
+        """Of the subjects that it knows. Asked for before `start`, if the user names none."""
+
+    @property
+    def tick(self) -> float:
+        """What a stamp counts [ns]."""
+
+    @property
+    def reason(self) -> Reason:
+        """Why there is no frame at the moment."""
+
+    def start(self) -> None: ...
+
+    def stop(self) -> None: ...
+
+    def taken(self, now: int) -> Frame | None:
+        """The next of the frames that have arrived. now: [ns] on the clock of the rows."""
+
+    def next(self, deadline: int) -> Frame | None:
+        """The next frame, waiting until a time [ns on the monotonic clock]; None: none came."""
+
+
+@dataclass
+class SensorConfig:
+    subjects: str = option("", "names, separated by commas; empty: those that the system knows")
+    transform: str = option("", "file with the transform from the system to the world")
+    latency: float = option(0.0, "from capture to arrival, beside what the system tells", "s")
+    latency_error: float = option(0.0, "of this latency", "s")
+    gap: float = option(0.1, "without a frame, after which rows say why", "s")
+
+
+class Sensor:
+    """A motion capture system as a driver."""
+
+    units = {  # noqa: RUF012
+        "capture_time": "ns",
+        "capture_error": "ns",
+        "position": "m",
+    }
+
+    def __init__(self, config: SensorConfig, frames: Frames) -> None:
+        if not config.gap > 0:
+            raise InvalidArgument(f"gap must be positive, got {config.gap}")
+        self._config = config
+        self._frames = frames
+        self._world = Transform.load(Path(config.transform)) if config.transform else None
+        self._waited: Frame | None = None
+        self._has_waited = False
+        self._pace = FramePace()
+        self._begin = self._last_arrival = 0
+        self._last_number: int | None = None
+        self._lost = 0
+
+    @cached_property
+    def subjects(self) -> dict[str, str]:
+        """Names in rows of the subjects, by their names in the system. Raises InvalidArgument."""
+        given = [name.strip() for name in self._config.subjects.split(",")]
+        names = [name for name in given if name] or list(self._frames.names)
+        found: dict[str, str] = {}
+        for name in names:
+            field = field_name(name)
+            if field in found.values() or field in FRAME_FIELDS:
+                raise InvalidArgument(
+                    f"the subject '{name}' would be the field '{field}', which is there already: "
+                    "rename it in the motion capture system"
+                )
+            found[name] = field
+        if not found:
+            raise InvalidArgument(
+                "the motion capture system knows no subject: name them with --subjects A,B"
+            )
+        return found
+
+    @property
+    def extended(self) -> dict[str, Any]:
+        return FRAME_FIELDS | dict.fromkeys(self.subjects.values(), SUBJECT_FIELDS)
+
+    # ------------------------------------------------------------------ verbs
+
+    def start(self) -> None:
+        config = self._config
+        self._clock = ClockMap(
+            tick=self._frames.tick, latency=config.latency, latency_error=config.latency_error
+        )
+        self._frames.start()
+
+    def write(self, desired: Desired) -> None:
+        self._pace.period = round(desired.period * SECOND)
+
+    def wait(self, due: int) -> None:
+        earliest, latest = self._pace.times(due)
+        self._waited = self._frames.next(latest)
+        self._has_waited = True
+        time.sleep(max(0, earliest - time.monotonic_ns()) / SECOND)
+        self._pace.returned(time.monotonic_ns(), missed=self._waited is None)
+
+    def read(self, reading: Reading) -> None:
+        self._begin = self._begin or reading.time
+        frame = self._waited if self._has_waited else self._frames.taken(reading.time)
+        self._waited, self._has_waited = None, False
+        if frame is None or not self._tell(frame, reading):
+            reason = self._why_none(reading.time)
+            reading.extended = {"reason": reason, "capture_time": 0, "capture_error": 0, "stamp": 0}
+            reading.extended = dict.fromkeys(self.subjects.values(), UNSEEN)
+
+    def stop(self) -> None:
+        self._frames.stop()
+
+    # ------------------------------------------------------------------ rows
+
+    def _tell(self, frame: Frame, reading: Reading) -> bool:
+        """Fills the row; False for a frame that is older than the last one."""
+        arrival = frame.arrival - frame.latency
+        if frame.stamp is None:
+            capture_time = arrival - round(self._config.latency * SECOND)
+            error, epoch = round(self._config.latency_error * SECOND), 0
+        else:
+            capture = self._clock.capture(frame.stamp, arrival)
+            if capture is None:
+                return False
+            capture_time, error, epoch = capture.time, capture.error, capture.epoch
+        self._last_arrival = frame.arrival
+        self._count_lost(frame.number)
+        reading.extended = {
+            "reason": Reason.SEEN,
+            "capture_time": capture_time,
+            "capture_error": error,
+            "stamp": frame.stamp or 0,
+            "stamped": frame.stamp is not None,
+            "epoch": epoch,
+            "frame_number": frame.number,
+            "lost_frames": self._lost,
+        }
+        for name, field in self.subjects.items():
+            reading.extended[field] = self._row_of(frame.subjects.get(name))
+        return True
+
+    def _row_of(self, subject: Subject | None) -> tuple[Any, ...]:
+        if subject is None or not subject.visible:
+            return UNSEEN
+        position, quaternion = subject.position, subject.quaternion
+        if self._world is not None:
+            position, quaternion = self._world.of_pose(position, quaternion)
+        return True, position, quaternion, subject.quality
+
+    def _count_lost(self, number: int) -> None:
+        if self._last_number is not None and number > self._last_number:
+            self._lost += number - self._last_number - 1
+        self._last_number = number
+
+    def _why_none(self, now: int) -> Reason:
+        reason = self._frames.reason
+        if reason is not Reason.SEEN:
+            return reason
+        silence = now - max(self._last_arrival, self._begin)
+        return Reason.SILENT if silence > self._config.gap * SECOND else Reason.NO_NEW_FRAME
+
+
+FRAME_FIELDS: dict[str, Any] = {
+    "reason": Reason,
+    "capture_time": np.int64,
+    "capture_error": np.int64,
+    "stamp": np.int64,
+    "stamped": bool,
+    "epoch": np.int32,
+    "frame_number": np.int64,
+    "lost_frames": np.int64,
+}
+SUBJECT_FIELDS: dict[str, Any] = {
+    "visible": bool,
+    "position": (float, 3),
+    "quaternion": (float, 4),
+    "quality": float,
+}
+UNSEEN = (False, Subject(False).position, Subject(False).quaternion, float("nan"))
+
+
+def field_name(subject: str) -> str:
+    """A name of a subject as the name of a field: "TT Platte 1" is TT_Platte_1."""
+    name = re.sub(r"[^0-9A-Za-z_]+", "_", subject).strip("_")
+    return f"subject_{name}" if not name or name[0].isdigit() else name
