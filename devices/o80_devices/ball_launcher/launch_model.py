@@ -1,0 +1,110 @@
+"""How a ball leaves the launcher: place, velocity and spin, from angles and motor speeds.
+
+In the frame of the launcher: the origin below the muzzle on the ground plane of the recording, x
+forward, y to the left, z up. The wheels touch the ball at 120 degrees. Their speeds give its speed,
+their differences its spin. The numbers are fitted to recorded shots of two settings of the wheels
+and one of the angles (`python -m o80_table_tennis.fit_launcher`): how far the angles turn the
+launcher is not in the recordings, see `LaunchModel.azimuth_range`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+HALF_CHORD = math.sin(math.radians(60.0))
+"""How far the upper wheels touch the ball to the side, in radii of the ball."""
+
+
+@dataclass(frozen=True, eq=False)
+class Launch:
+    """A ball as it leaves the launcher."""
+
+    position: FloatArray
+    """(3,) [m]"""
+    velocity: FloatArray
+    """(3,) [m/s]"""
+    spin: FloatArray
+    """(3,) [rad/s]"""
+
+    def placed(self, position: tuple[float, float, float], yaw: float) -> Launch:
+        """In a world where the launcher stands at `position` [m] and is turned by `yaw` [rad]."""
+        c, s = 69.0
+        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        return Launch(
+            turn @ self.position + np.array(position), turn @ self.velocity, turn @ self.spin
+        )
+
+
+@dataclass(frozen=True)
+class LaunchModel:
+    """The launcher, by numbers."""
+
+    muzzle: tuple[float, float, float] = (0.0, -0.001, 1.057)
+    """[m]"""
+    azimuth: float = 0.0116
+    """With phi = 0.5 [rad]."""
+    altitude: float = 0.3557
+    """With theta = 0.5 and equal wheels [rad]."""
+    lift: float = 3.0e-5
+    """Altitude for each revolution a minute that the upper wheels are faster [rad min]."""
+    top_gain: float = 1.595e-3
+    """Speed of the ball for that of each upper wheel [m/s min]."""
+    bottom_gain: float = 1.148e-3
+    """Speed of the ball for that of the lower wheel [m/s min]."""
+    spin: float = 47.0
+    """Top spin with equal wheels [rad/s]."""
+    spin_gain: float = 0.0787
+    """Spin for a difference of the wheels [rad/s min]."""
+    azimuth_range: float = 0.5
+    """Between phi = 0 and 1: assumed, not fitted [rad]."""
+    altitude_range: float = 0.5
+    """Between theta = 0 and 1: assumed, not fitted [rad]."""
+    speed_scatter: float = 0.03
+    """Standard deviation from shot to shot, as the next ones [m/s]."""
+    azimuth_scatter: float = 0.005
+    """[rad]"""
+    altitude_scatter: float = 0.006
+    """[rad]"""
+    spin_scatter: float = 10.0
+    """About each axis [rad/s]."""
+
+    def launch(
+        self,
+        phi: float,
+        theta: float,
+        speeds: tuple[float, float, float],
+        rng: np.random.Generator | None = None,
+    ) -> Launch:
+        """A ball. speeds: of the motors top left, top right, bottom [1/min]. rng: of the scatter,
+        None for the mean ball."""
+        scatter = np.zeros(6) if rng is None else rng.standard_normal(6)
+        left, right, bottom = speeds
+        upper = (left + right) / 2
+        azimuth = self.azimuth + self.azimuth_range * (phi - 0.5)
+        azimuth += self.azimuth_scatter * scatter.item(0)
+        altitude = self.altitude + self.altitude_range * (theta - 0.5)
+        altitude += self.lift * (upper - bottom) + self.altitude_scatter * scatter.item(1)
+        speed = self.top_gain * (left + right) + self.bottom_gain * bottom
+        speed += self.speed_scatter * scatter.item(2) if speed > 0.0 else 0.0
+
+        # a ball that is thrown forward with top spin turns about +y, to the left with it about +z
+        forward = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
+        left_of = np.array([-forward[1], forward[0], 0.0])
+        up = np.array([0.0, 0.0, 1.0])
+        ahead = math.cos(altitude) * forward + math.sin(altitude) * up
+        top = self.spin + self.spin_gain * (upper - bottom)
+        side = -self.spin_gain * HALF_CHORD * (left - right)
+        spin = top * left_of + side * np.cross(ahead, left_of)
+        return Launch(
+            np.array(self.muzzle), max(0.0, speed) * ahead, spin + self.spin_scatter * scatter[3:]
+        )
+
+
+LAUNCH_MODEL = LaunchModel()
+"""Fitted to the recorded shots."""

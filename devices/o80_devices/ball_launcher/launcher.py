@@ -1,0 +1,232 @@
+"""The protocol of the launcher as a machine of states, stepped by its user; it never blocks.
+
+One exchange runs at a time. A launch is sent only after the launcher has confirmed the state, is
+sent at most once, and after one whose outcome nobody knows the launcher is *unknown*: no launch is
+sent for the longest time that one takes, nor before two states have been confirmed. Two, because a
+server takes requests of several connections in turn: at the second reply it holds no older request.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Protocol
+
+from o80.errors import RequestRejected
+from o80_devices.ball_launcher.exchange import Exchange, Outcome
+from o80_devices.ball_launcher.messages import Kind, Request, State
+
+SECOND = 1_000_000_000  # [ns]
+CONFIRMATIONS = 2  # of the state, after which no older request can be waiting
+
+
+class Status(IntEnum):
+    """What the launcher does, or why it cannot launch."""
+
+    disconnected = 0
+    setting = 1
+    """It is being told the state, and has not confirmed it."""
+    ready = 2
+    launching = 3
+    unknown = 4
+    """A launch was not answered: it may still be under way."""
+    refused = 5
+    """It has refused the state; it is asked again."""
+
+
+class LastLaunch(IntEnum):
+    """How the last launch ended."""
+
+    none = 0
+    completed = 1
+    rejected = 2
+    """By the launcher: no ball, for example."""
+    not_sent = 3
+    timed_out = 4
+    """Sent, and not answered: nobody knows whether a ball was launched."""
+
+
+@dataclass(frozen=True)
+class Timing:
+    """How long things may take [ns]."""
+
+    deliver: int = SECOND // 2
+    """Until a connection is there for a request."""
+    state: int = 5 * SECOND
+    """A change of state."""
+    launch: int = 15 * SECOND
+    """The longest that a launch takes."""
+    retry: int = SECOND
+    """Between attempts to set a state that was refused or not answered."""
+
+
+class Wire(Protocol):
+    """Where exchanges begin."""
+
+    def exchange(self, request: Request, deliver_by: int, wait: int) -> Exchange: ...
+
+
+class Launcher:
+    """Keeps the launcher in the wanted state, and launches when asked."""
+
+    def __init__(self, wire: Wire, timing: Timing = Timing()) -> None:
+        self._wire = wire
+        self._timing = timing
+        self._exchange: Exchange | None = None
+        self._kind = Kind.SET_STATE
+        self._sending = self._wanted = State()
+        self._confirmed: State | None = None
+        self._to_confirm = CONFIRMATIONS
+        self._connected = False
+        self._asked = False
+        self._frozen: State | None = None  # the wanted state when the launch was asked for
+        self._retry_at = self._unknown_until = 0
+        self._refused: State | None = None
+        self._end: tuple[LastLaunch, str] | None = None
+        self.last_launch = LastLaunch.none
+        self.counts = dict.fromkeys(LastLaunch, 0)
+        self.launched_at = 0
+        """When the last launch was confirmed [ns]."""
+
+    # ------------------------------------------------------------------ what is known
+
+    def status(self, now: int) -> Status:
+        if self._exchange is not None and self._kind is Kind.LAUNCH_BALL:
+            return Status.launching
+        if now < self._unknown_until:
+            return Status.unknown
+        if not self._connected:
+            return Status.disconnected
+        if self._refused is not None:
+            return Status.refused
+        is_set = self._is_confirmed() and self._confirmed == self._wanted
+        return Status.ready if is_set else Status.setting
+
+    @property
+    def confirmed(self) -> State | None:
+        """The state that the launcher has; None: not known."""
+        return self._confirmed if self._connected else None
+
+    def unknown_for(self, now: int) -> int:
+        """How long no launch will be sent [ns]."""
+        return max(0, self._unknown_until - now)
+
+    def _is_confirmed(self) -> bool:
+        return self._confirmed is not None and self._to_confirm == 0
+
+    # ------------------------------------------------------------------ launches
+
+    def ask(self, now: int) -> None:
+        """Asks for a launch. Raises RequestRejected if it cannot be."""
+        status = self.status(now)
+        if self._asked or status is Status.launching:
+            raise RequestRejected("a launch is under way: wait until it has ended")
+        if status is Status.disconnected:
+            raise RequestRejected("the launcher is not connected: see that it runs at the address")
+        if status is Status.unknown:
+            raise RequestRejected(
+                "a launch was not answered and may still be under way: no launch for "
+                f"{self.unknown_for(now) / SECOND:.1f} s"
+            )
+        if status is Status.refused:
+            raise RequestRejected("the launcher has refused the desired state: change it")
+        self._asked, self._frozen, self._end = True, None, None
+
+    def cancel(self) -> None:
+        """Takes back a launch that was not sent; one that was sent goes on."""
+        if self._asked and not self._is_launching():
+            self._asked = False
+
+    def ended(self) -> tuple[LastLaunch, str] | None:
+        """How the launch that was asked for ended, once."""
+        end, self._end = self._end, None
+        return end
+
+    def _is_launching(self) -> bool:
+        return self._exchange is not None and self._kind is Kind.LAUNCH_BALL
+
+    def _end_launch(self, how: LastLaunch, why: str = "") -> None:
+        self._asked, self._end = False, (how, why)
+        self.last_launch = how
+        self.counts[how] += 1
+
+    # ------------------------------------------------------------------ a step
+
+    def step(self, now: int, connected: bool, wanted: State) -> None:
+        """Goes on with what is under way, and begins what comes next. now: [ns]"""
+        if not connected:
+            self._forget_state()
+        self._connected, self._wanted = connected, wanted.rounded()
+        if self._exchange is not None:
+            outcome = self._exchange.poll(now)
+            if outcome is Outcome.pending:
+                return
+            self._exchange = None
+            take = self._take_launch if self._kind is Kind.LAUNCH_BALL else self._take_state
+            take(outcome, now)
+        self._begin(now, self._wanted)
+
+    def close(self) -> None:
+        """Ends what is under way."""
+        if self._exchange is not None:
+            self._exchange.close()
+            self._exchange = None
+
+    def _forget_state(self) -> None:
+        self._confirmed = self._refused = None
+        self._to_confirm = max(self._to_confirm, 1)
+
+    def _begin(self, now: int, wanted: State) -> None:
+        if not self._connected:
+            if self._asked:
+                why = "the launcher was disconnected before the launch was sent"
+                self._end_launch(LastLaunch.not_sent, why)
+            return
+        if now < self._unknown_until:
+            return
+        if self._asked:
+            self._frozen = wanted = self._frozen or wanted
+        if self._refused is not None and self._refused != wanted:
+            self._refused, self._retry_at = None, now
+        if not self._is_confirmed() or self._confirmed != wanted:
+            if now >= self._retry_at:
+                self._sending = wanted
+                self._send(Kind.SET_STATE, now)
+        elif self._asked:
+            self._send(Kind.LAUNCH_BALL, now)
+
+    def _send(self, kind: Kind, now: int) -> None:
+        wait = self._timing.launch if kind is Kind.LAUNCH_BALL else self._timing.state
+        request = Request(kind, self._sending if kind is Kind.SET_STATE else None)
+        self._kind = kind
+        self._exchange = self._wire.exchange(request, now + self._timing.deliver, wait)
+
+    def _take_state(self, outcome: Outcome, now: int) -> None:
+        if outcome is Outcome.done and self._connected:
+            self._confirmed, self._refused = self._sending, None
+            self._to_confirm = max(0, self._to_confirm - 1)
+            return
+        self._confirmed = None
+        self._to_confirm = CONFIRMATIONS if outcome is Outcome.unanswered else 1
+        self._refused = self._sending if outcome is Outcome.refused else None
+        self._retry_at = now + self._timing.retry
+        if self._asked:
+            why = f"nothing was launched: the launcher's state was {outcome.value}"
+            self._end_launch(LastLaunch.not_sent, why)
+
+    def _take_launch(self, outcome: Outcome, now: int) -> None:
+        if outcome is Outcome.done:
+            self.launched_at = now
+            self._end_launch(LastLaunch.completed)
+        elif outcome is Outcome.refused:
+            self._end_launch(LastLaunch.rejected, "the launcher refused: is its magazine empty?")
+        elif outcome is Outcome.not_delivered:
+            why = "the launch was not delivered, and will not be sent later"
+            self._end_launch(LastLaunch.not_sent, why)
+            self._forget_state()
+        else:
+            self._unknown_until = now + self._timing.launch
+            self._confirmed, self._to_confirm = None, CONFIRMATIONS
+            seconds = self._timing.launch / SECOND
+            why = f"timed out: the launch may still be under way; no other for {seconds:g} s"
+            self._end_launch(LastLaunch.timed_out, why)

@@ -1,0 +1,50 @@
+"""Whether the launcher is there: a connection of its own that carries heartbeats only."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from o80.errors import DriverError
+
+RECONNECT = 50  # [ms]
+
+
+class Link:
+    """Watches the connection. A pulled cable shows as missing heartbeats."""
+
+    def __init__(self, zmq: Any, context: Any, address: str, timeout: float) -> None:
+        """timeout: without a heartbeat [s]; 0: no heartbeats, for servers older than ZMTP 3.1."""
+        self._zmq = zmq
+        self._up = False
+        self._socket = context.socket(zmq.REQ)
+        self._socket.setsockopt(zmq.LINGER, 0)
+        self._socket.setsockopt(zmq.RECONNECT_IVL, RECONNECT)
+        if timeout > 0:
+            interval = max(1, round(1000 * timeout / 4))
+            self._socket.setsockopt(zmq.HEARTBEAT_IVL, interval)
+            self._socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, round(1000 * timeout) - interval)
+            self._socket.setsockopt(zmq.CONNECT_TIMEOUT, 1000)
+        events = zmq.EVENT_HANDSHAKE_SUCCEEDED | zmq.EVENT_DISCONNECTED
+        self._monitor = self._socket.get_monitor_socket(events)
+        try:
+            self._socket.connect(address)
+        except zmq.ZMQError as error:
+            self.close()
+            raise DriverError(
+                f"address '{address}' cannot be used ({error}): give one such as "
+                "tcp://192.168.0.5:5555"
+            ) from None
+
+    def is_up(self) -> bool:
+        """Whether the launcher is connected, by what is known now."""
+        from zmq.utils.monitor import recv_monitor_message
+
+        while self._monitor.poll(0):
+            event = recv_monitor_message(self._monitor, self._zmq.NOBLOCK)["event"]
+            self._up = event == self._zmq.EVENT_HANDSHAKE_SUCCEEDED
+        return self._up
+
+    def close(self) -> None:
+        self._socket.disable_monitor()
+        self._monitor.close(linger=0)
+        self._socket.close(linger=0)

@@ -1,0 +1,228 @@
+"""A ball launcher that is none: it speaks the protocol, takes its time, and fails when asked to.
+
+python -m o80_devices.fakes.ball_launcher --magazine 20 --refuse 0.1
+"""
+
+from __future__ import annotations
+
+import errno
+import time
+from collections.abc import Callable
+from dataclasses import astuple, dataclass
+from typing import Any
+
+import numpy as np
+
+from o80_devices import zeromq
+from o80_devices.ball_launcher.launch_model import LAUNCH_MODEL, Launch, LaunchModel
+from o80_devices.ball_launcher.messages import Kind, Request, State
+from o80_devices.ball_launcher.wheel_speeds import actuation_of, speed_of
+
+SECOND = 1_000_000_000  # [ns]
+FREED_WITHIN = 2.0
+"""How long an address may be in use when the launcher starts again [s]."""
+LEAVES = 0.8
+"""Share of the time of a launch after which the ball leaves."""
+
+
+@dataclass(frozen=True)
+class Behaviour:
+    """Times and faults."""
+
+    state_time: float = 1.0
+    """Of a change of state [s]."""
+    launch_time: float = 3.0
+    """Of a launch, with the stirring [s]."""
+    magazine: int = 100
+    """Balls in it; a launch without one fails."""
+    refuse: float = 0.0
+    """Share of the requests that fail."""
+    crash_at: int = 0
+    """The launch, from 1, in the middle of which the launcher dies; 0: none."""
+    seed: int = 0
+
+
+class FakeLauncher:
+    """A launcher that is stepped: `step` returns at once. After a crash it is dead until `bind`."""
+
+    def __init__(
+        self,
+        behaviour: Behaviour = Behaviour(),
+        *,
+        model: LaunchModel = LAUNCH_MODEL,
+        on_launch: Callable[[Launch], None] | None = None,
+        say: Callable[[str], None] | None = None,
+    ) -> None:
+        self._zmq = zeromq.required()
+        self._context = self._zmq.Context()
+        self._behaviour = behaviour
+        self._model = model
+        self._on_launch = on_launch
+        self._say = say or (lambda text: None)
+        self._rng = np.random.default_rng(behaviour.seed)
+        self._socket: Any = None
+        self.state = State()
+        self.magazine = behaviour.magazine
+        self.requests: list[Request] = []
+        """All that were received."""
+        self.launches: list[Launch] = []
+        """All balls that have left."""
+        self._busy: Request | None = None
+        self._began = self._until = 0
+        self._ball_left = False
+
+    # ------------------------------------------------------------------ life and death
+
+    def bind(self, address: str) -> str:
+        """Listens; port 0 takes any. Returns the address."""
+        self._socket = self._context.socket(self._zmq.REP)
+        self._socket.setsockopt(self._zmq.LINGER, 0)
+        end = time.monotonic() + FREED_WITHIN
+        while True:
+            try:
+                self._socket.bind(address)
+                break
+            except self._zmq.ZMQError as error:
+                if error.errno != errno.EADDRINUSE or time.monotonic() > end:
+                    raise
+                time.sleep(0.005)  # ZeroMQ closes the socket of an earlier life in the background
+        bound: str = self._socket.getsockopt(self._zmq.LAST_ENDPOINT).decode().rstrip("\0")
+        return bound
+
+    def die(self) -> None:
+        """Loses its connections, what it was doing, and its state."""
+        if self._socket is not None:
+            self._socket.close(linger=0)
+        self._socket, self._busy, self.state = None, None, State()
+
+    def close(self) -> None:
+        self.die()
+        self._context.destroy(linger=0)
+
+    @property
+    def alive(self) -> bool:
+        return self._socket is not None
+
+    @property
+    def busy(self) -> Request | None:
+        """What it is doing."""
+        return self._busy
+
+    # ------------------------------------------------------------------ work
+
+    def step(self, now: int, wait: float = 0.0) -> None:
+        """Goes on with a request, or takes one, for which it waits at most `wait` [s]."""
+        if self._socket is None:
+            return
+        if self._busy is None:
+            if self._socket.poll(round(1000 * wait)):
+                self._take(self._socket.recv(self._zmq.NOBLOCK), now)
+            return
+        if self._busy.kind is Kind.LAUNCH_BALL:
+            self._launch(now)
+        if self._busy is not None and now >= self._until:
+            self._answer()
+
+    def _take(self, content: bytes, now: int) -> None:
+        try:
+            request = Request.decoded(content)
+        except ValueError as error:
+            self._say(str(error))
+            self._socket.send(b"0")
+            return
+        self.requests.append(request)
+        self._say(f"received {request.kind.name}{_told(request.state)}")
+        behaviour = self._behaviour
+        takes = behaviour.launch_time if request.kind is Kind.LAUNCH_BALL else behaviour.state_time
+        self._busy, self._began, self._until = request, now, now + round(takes * SECOND)
+        self._fails = bool(self._rng.random() < behaviour.refuse)
+        if request.kind is Kind.LAUNCH_BALL and self.magazine == 0:
+            self._fails = True
+        self._ball_left = False
+
+    def _launch(self, now: int) -> None:
+        """The ball leaves near the end; a crash comes before."""
+        share = (now - self._began) / max(1, self._until - self._began)
+        kinds = [request.kind for request in self.requests]
+        if share >= 0.5 and kinds.count(Kind.LAUNCH_BALL) == self._behaviour.crash_at:
+            self._say("crashes in the middle of a launch")
+            self.die()
+            return
+        if share >= LEAVES and not self._ball_left and not self._fails:
+            self._ball_left = True
+            self.magazine -= 1
+            speeds = tuple(speed_of(value) for value in astuple(self.state)[2:])
+            assert len(speeds) == 3
+            ball = self._model.launch(self.state.phi, self.state.theta, speeds, self._rng)
+            self.launches.append(ball)
+            self._say(
+                f"launched a ball at {float(np.linalg.norm(ball.velocity)):.2f} m/s, "
+                f"{self.magazine} left"
+            )
+            if self._on_launch is not None:
+                self._on_launch(ball)
+
+    def _answer(self) -> None:
+        assert self._busy is not None
+        request, self._busy = self._busy, None
+        if not self._fails:
+            self._set(request)
+        self._say(f"{'failed' if self._fails else 'done'}: {request.kind.name}")
+        self._socket.send(b"0" if self._fails else b"1")
+
+    def _set(self, request: Request) -> None:
+        if request.state is None or request.kind is Kind.LAUNCH_BALL:
+            return
+        if request.kind is Kind.SET_RPM:
+            motors = (actuation_of(min(3970.0, max(0.0, v))) for v in astuple(request.state)[2:])
+            self.state = State(self.state.phi, self.state.theta, *motors)
+        else:
+            self.state = request.state
+
+
+def _told(state: State | None) -> str:
+    return "" if state is None else " " + " ".join(f"{value:.3g}" for value in astuple(state))
+
+
+def serve(fake: FakeLauncher, address: str, restart: float) -> None:
+    """Serves until Ctrl-C; after a crash it starts again after `restart` [s], or ends (below 0)."""
+    while True:
+        fake.bind(address)
+        while fake.alive:
+            fake.step(time.monotonic_ns(), wait=0.1)
+            if fake.busy is not None:
+                time.sleep(0.005)
+        if restart < 0:
+            return
+        time.sleep(restart)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    import argparse
+
+    usual = Behaviour()
+    parser = argparse.ArgumentParser(
+        prog="python -m o80_devices.fakes.ball_launcher", description="A fake ball launcher."
+    )
+    parser.add_argument("--address", default="tcp://127.0.0.1:5555", help="where it listens")
+    parser.add_argument("--state-time", type=float, default=usual.state_time, help="[s]")
+    parser.add_argument("--launch-time", type=float, default=usual.launch_time, help="[s]")
+    parser.add_argument("--magazine", type=int, default=usual.magazine, help="balls in it")
+    parser.add_argument("--refuse", type=float, default=0.0, help="share of requests that fail")
+    parser.add_argument("--crash-at", type=int, default=0, help="dies in the middle of this launch")
+    parser.add_argument("--restart", type=float, default=-1.0, help="after a crash [s]; -1: never")
+    parser.add_argument("--seed", type=int, default=0)
+    given = vars(parser.parse_args(arguments))
+    address, restart = given.pop("address"), given.pop("restart")
+    fake = FakeLauncher(Behaviour(**given), say=lambda text: print(text, flush=True))
+    print(f"fake ball launcher at {address}; Ctrl-C ends it", flush=True)
+    try:
+        serve(fake, address, restart)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        fake.close()
+
+
+if __name__ == "__main__":
+    main()
