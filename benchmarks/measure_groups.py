@@ -28,7 +28,7 @@ def measure(word: str, robot: str, options: dict[str, Any]) -> None:
     program = built() / "bin" / "o80-bench-groups"
     texts = [f"{name}={text_of(value)}" for name, value in options.items()]
     library = o80.robots.path_of(robot)
-    robot_words = [word, library, *texts]
+    robot_words = [word, str(library), *texts]
     subprocess.run([program, str(rounds()), *robot_words], check=True)
     if shutil.which("valgrind") is None:
         print("without valgrind no instructions are counted", file=sys.stderr)
@@ -42,7 +42,7 @@ def measure(word: str, robot: str, options: dict[str, Any]) -> None:
 def instructions(program: Path, side: str, bursts: int, robot: list[str]) -> int:
     """Of the whole program, in user mode."""
     tool = ["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null"]
-    command = [*tool, program, "count", side, str(bursts), *robot]
+    command = [*tool, str(program), "count", side, str(bursts), *robot]
     ended = subprocess.run(command, check=True, capture_output=True, text=True)
     counted = re.search(r"Collected : (\d+)", ended.stderr)
     assert counted, ended.stderr
