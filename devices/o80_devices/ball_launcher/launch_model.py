@@ -34,7 +34,7 @@ class Launch:
 
     def placed(self, position: tuple[float, float, float], yaw: float) -> Launch:
         """In a world where the launcher stands at `position` [m] and is turned by `yaw` [rad]."""
-        c, s = 69.0
+        c, s = math.cos(yaw), math.sin(yaw)
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         return Launch(
             turn @ self.position + np.array(position), turn @ self.velocity, turn @ self.spin
@@ -57,7 +57,7 @@ class LaunchModel:
     """Speed of the ball for that of each upper wheel [m/s min]."""
     bottom_gain: float = 1.148e-3
     """Speed of the ball for that of the lower wheel [m/s min]."""
-    spin: float = 47.0
+    spin: float = 69.0
     """Top spin with equal wheels [rad/s]."""
     spin_gain: float = 0.0787
     """Spin for a difference of the wheels [rad/s min]."""
