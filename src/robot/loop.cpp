@@ -167,6 +167,7 @@ bool Loop::read_into_view() noexcept {
   view_.time = backend_.time();
   view_.requests = reports_.data();
   view_.finished = view_.has_desired = view_.missed = view_.halted = view_.reported = 0;
+  view_.halt_text.text[0] = 0;
   // reports change only while requests run, and by drivers that say so
   if (const bool any = backend_.runs_any(); any || reported_) {
     for (std::uint32_t i = 0; i < reports_.size(); ++i) {
