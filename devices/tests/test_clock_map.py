@@ -185,6 +185,20 @@ def test_a_slow_sensor_whose_clock_was_set_back_is_right_after_some_seconds() ->
     assert worst(between(found, 22.0)) < MILLISECOND
 
 
+def test_a_restart_that_is_told_is_an_epoch_however_small_the_jump() -> None:
+    clock = ClockMap(latency=0.002)
+    found = []
+    for packet in Device(jumps=[(10.0, -0.1)]).packets():
+        if packet.captured == 10.0 * SECOND:
+            clock.restarted()
+        capture = clock.capture(packet.stamp, packet.arrival)
+        assert capture is not None
+        found.append((packet, capture))
+    assert_in_order(found)
+    assert [each.epoch for _, each in found] == [0] * 3000 + [1] * 3000
+    assert share_within(between(found, 10.0)) > 0.95
+
+
 def test_a_restarted_device_keeps_the_rate_that_was_found() -> None:
     clock = ClockMap(latency=0.002)
     found = mapped(Device(rate=150e-6, jumps=[(20.0, -1e5)], seconds=21.0), clock)

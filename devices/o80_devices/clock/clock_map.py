@@ -83,6 +83,7 @@ class ClockMap:
         self._last_old = 0
         self._old_in_a_row = 0
         self._time: int | None = None
+        self._restarted = False
 
     # ------------------------------------------------------------------ the map
 
@@ -92,7 +93,7 @@ class ClockMap:
         stamp: [ticks]. arrival: [ns] on the monotonic clock (`time.monotonic_ns`).
         """
         arrival = max(arrival, self._last_arrival)
-        if self._epoch < 0:
+        if self._epoch < 0 or self._restarted:
             self._begin_epoch(stamp, arrival)
         else:
             stamp = self._unwrapped(stamp, arrival)
@@ -105,6 +106,10 @@ class ClockMap:
         x, y = self._point(stamp, arrival)
         self._envelope.add(x, y)
         return self._capture(x, arrival)
+
+    def restarted(self) -> None:
+        """The device may have started again, as after a reconnection: begins an epoch."""
+        self._restarted = True
 
     @property
     def rate(self) -> float:
@@ -186,6 +191,7 @@ class ClockMap:
             self._scatter = before.scatter(but_last=SETTLE) or before.scatter()
             self._envelope = self._new_envelope(before.rate, before.rate_error)
         self._epoch += 1
+        self._restarted = False
         self._first, self._first_arrival = stamp, arrival
 
     def _new_envelope(self, rate: float, rate_error: float) -> LowerEnvelope:

@@ -26,3 +26,4 @@ class Frame:
     arrival: int  #: [ns] on the monotonic clock of this machine
     subjects: Mapping[str, Subject]
     latency: int = 0  #: from capture to arrival, as far as the device knows it [ns]
+    connection: int = 0  #: increases when the device may have started again

@@ -90,6 +90,7 @@ class Sensor:
         self._begin = self._last_arrival = 0
         self._last_number: int | None = None
         self._lost = 0
+        self._connection = 0
 
     @cached_property
     def subjects(self) -> dict[str, str]:
@@ -155,6 +156,9 @@ class Sensor:
             capture_time = arrival - round(self._config.latency * SECOND)
             error, epoch = round(self._config.latency_error * SECOND), 0
         else:
+            if frame.connection != self._connection:
+                self._clock.restarted()
+                self._connection = frame.connection
             capture = self._clock.capture(frame.stamp, arrival)
             if capture is None:
                 return False

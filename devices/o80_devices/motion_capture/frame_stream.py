@@ -1,0 +1,98 @@
+"""Frames of a connection that is opened again whenever it fails."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import replace
+from threading import Condition, Event, Thread
+from typing import Protocol
+
+from o80_devices.motion_capture.frame import Frame
+from o80_devices.motion_capture.sensor import SECOND, Reason
+
+MOST_WAITING = 4  # frames; older ones are dropped, because their time is over
+WAIT = 0.05  # for a frame, before the thread looks whether it is to stop [s]
+SILENCE = 1.0  # of a connection that is then given up: a pulled cable does not close it [s]
+RETRY = 0.2  # after a failure [s]
+STOPPING = 2.0  # that a thread may take to end [s]
+
+
+class Connection(Protocol):
+    def receive(self, timeout: float) -> Frame | None:
+        """The next frame; None: none came. Raises OSError or ValueError when it is broken."""
+
+    def close(self) -> None: ...
+
+
+class FrameStream:
+    """Receives frames in a thread, which stamps them as they arrive.
+
+    Writer:  the thread.
+    Reader:  the loop of the driver, which never waits for the network.
+    """
+
+    def __init__(self, connect: Callable[[], Connection]) -> None:
+        """connect: opens a connection within about a second, or raises OSError or ValueError."""
+        self._connect = connect
+        self._frames: deque[Frame] = deque(maxlen=MOST_WAITING)
+        self._arrived = Condition()
+        self._stopping = Event()
+        self._thread: Thread | None = None
+        self.reason = Reason.CONNECTING
+        self.trouble = ""  #: text of the last failure
+        self.connections = 0
+
+    def start(self) -> None:
+        self._stopping.clear()
+        self._thread = Thread(target=self._run, name="motion capture", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        self._stopping.set()
+        if self._thread is not None:
+            self._thread.join(STOPPING)
+            self._thread = None
+
+    def taken(self, now: int) -> Frame | None:
+        with self._arrived:
+            return self._frames.popleft() if self._frames else None
+
+    def next(self, deadline: int) -> Frame | None:
+        with self._arrived:
+            while not self._frames:
+                left = deadline - time.monotonic_ns()
+                if left <= 0:
+                    return None
+                self._arrived.wait(left / SECOND)
+            return self._frames.popleft()
+
+    # ------------------------------------------------------------------ the thread
+
+    def _run(self) -> None:
+        while not self._stopping.is_set():
+            try:
+                connection = self._connect()
+                self.connections += 1
+                try:
+                    self._receive_from(connection)
+                finally:
+                    connection.close()
+            except (OSError, ValueError) as error:
+                self.trouble = str(error) or type(error).__name__
+            self.reason = Reason.DISCONNECTED
+            self._stopping.wait(RETRY)
+
+    def _receive_from(self, connection: Connection) -> None:
+        self.reason = Reason.SEEN
+        last = time.monotonic()
+        while not self._stopping.is_set():
+            frame = connection.receive(WAIT)
+            if frame is not None:
+                last = time.monotonic()
+                with self._arrived:
+                    self._frames.append(replace(frame, connection=self.connections))
+                    self._arrived.notify()
+            elif time.monotonic() - last > SILENCE:
+                raise TimeoutError(f"connected, but no frame for {SILENCE:g} s")

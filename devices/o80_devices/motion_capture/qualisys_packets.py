@@ -1,0 +1,126 @@
+"""Packets of the real-time protocol of Qualisys Track Manager, little endian, both directions."""
+
+from __future__ import annotations
+
+import socket
+import struct
+import time
+from collections.abc import Sequence
+from enum import IntEnum
+
+import numpy as np
+
+from o80_devices.motion_capture.frame import Subject
+from o80_devices.motion_capture.transform import quaternion_of
+
+PORT = 22223  # where it speaks little endian
+VERSION = "1.19"
+GREETING = "QTM RT Interface connected"
+MILLIMETRE = 1e-3  # [m]
+LARGEST = 1 << 24  # of a packet [bytes]; a larger size is noise
+
+HEADER = struct.Struct("<II")  # size with the header, type
+DATA = struct.Struct("<qII")  # time stamp [us], frame number, components
+COMPONENT = struct.Struct("<II")  # size with its header, type
+BODIES = struct.Struct("<Ihh")  # number, rates of dropped and out of sync frames
+BODY = struct.Struct("<3f9ff")  # position [mm], rotation by columns, residual [mm]
+SIX_D_WITH_RESIDUAL = 11
+
+
+class Type(IntEnum):
+    ERROR = 0
+    COMMAND = 1
+    XML = 2
+    DATA = 3
+    NO_MORE_DATA = 4
+    EVENT = 6
+
+
+def packet(kind: Type, payload: bytes) -> bytes:
+    return HEADER.pack(HEADER.size + len(payload), kind) + payload
+
+
+def text(kind: Type, words: str) -> bytes:
+    return packet(kind, words.encode() + b"\0")
+
+
+def words_of(payload: bytes) -> str:
+    return payload.rstrip(b"\0").decode(errors="replace")
+
+
+class Packets:
+    """Packets of a TCP connection. Raises OSError when it is closed, ValueError for noise."""
+
+    def __init__(self, connected: socket.socket) -> None:
+        self._socket = connected
+        self._buffer = b""
+
+    def send(self, kind: Type, words: str) -> None:
+        self._socket.sendall(text(kind, words))
+
+    def receive(self, timeout: float) -> tuple[int, bytes] | None:
+        """Type and content of the next packet; None: none came in time."""
+        end = time.monotonic() + timeout
+        while (found := self._whole()) is None:
+            self._socket.settimeout(max(1e-4, end - time.monotonic()))
+            try:
+                got = self._socket.recv(1 << 16)
+            except TimeoutError:
+                return None
+            if not got:
+                raise ConnectionError("the server has closed the connection")
+            self._buffer += got
+        return found
+
+    def close(self) -> None:
+        self._socket.close()
+
+    def _whole(self) -> tuple[int, bytes] | None:
+        if len(self._buffer) < HEADER.size:
+            return None
+        size, kind = HEADER.unpack_from(self._buffer)
+        if not HEADER.size <= size <= LARGEST:
+            raise ValueError(f"a packet of {size} bytes: is this the little-endian port {PORT}?")
+        if len(self._buffer) < size:
+            return None
+        content, self._buffer = self._buffer[HEADER.size : size], self._buffer[size:]
+        return kind, content
+
+
+def data_packet(stamp: int, number: int, bodies: Sequence[bytes]) -> bytes:
+    """stamp: [us]. bodies: each packed by BODY."""
+    content = BODIES.pack(len(bodies), 0, 0) + b"".join(bodies)
+    component = COMPONENT.pack(COMPONENT.size + len(content), SIX_D_WITH_RESIDUAL) + content
+    return packet(Type.DATA, DATA.pack(stamp, number, 1) + component)
+
+
+def parsed_data(content: bytes) -> tuple[int, int, list[Subject]]:
+    """Time stamp [us], frame number and the bodies of a data packet. Raises ValueError."""
+    try:
+        stamp, number, components = DATA.unpack_from(content)
+        place = DATA.size
+        for _ in range(components):
+            size, kind = COMPONENT.unpack_from(content, place)
+            if kind == SIX_D_WITH_RESIDUAL:
+                return stamp, number, _bodies(content, place + COMPONENT.size)
+            place += max(size, COMPONENT.size)
+    except struct.error as error:
+        raise ValueError(f"a data packet is cut: {error}") from error
+    return stamp, number, []
+
+
+def _bodies(content: bytes, place: int) -> list[Subject]:
+    count, _, _ = BODIES.unpack_from(content, place)
+    place += BODIES.size
+    bodies = []
+    for _ in range(count):
+        x, y, z, *numbers = BODY.unpack_from(content, place)
+        place += BODY.size
+        rotation = np.array(numbers[:9]).reshape(3, 3).T
+        if not (np.isfinite([x, y, z]).all() and np.isfinite(rotation).all()):
+            bodies.append(Subject(False))  # not seen: the server sends NaN
+            continue
+        position = (x * MILLIMETRE, y * MILLIMETRE, z * MILLIMETRE)
+        residual = numbers[9] * MILLIMETRE
+        bodies.append(Subject(True, position, quaternion_of(rotation), residual))
+    return bodies

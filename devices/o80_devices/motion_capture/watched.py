@@ -1,0 +1,133 @@
+"""Vicon, OptiTrack and VRPN by the package `motioncapture`, in a process that is watched.
+
+Its clients block without a timeout and some ignore Ctrl-C. They therefore run in a child process,
+which is killed when it is silent for too long or when the driver stops. The package gives no time
+stamps: the capture time is the arrival less the option latency, and `stamped` is False.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import json
+import os
+import selectors
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+from o80.drivers import option
+from o80.errors import DriverError, InvalidArgument
+from o80_devices.motion_capture.frame import Frame, Subject
+from o80_devices.motion_capture.frame_stream import FrameStream
+from o80_devices.motion_capture.sensor import Sensor, SensorConfig
+
+CHILD = "o80_devices.motion_capture.watched_child"
+FOUND = 5.0  # within which a subject must appear, if the user names none [s]
+LONGEST_LINE = 1 << 20  # [bytes]
+
+
+class ChildConnection:
+    """The child process, whose frames are lines of JSON."""
+
+    def __init__(self, system: str, host: str) -> None:
+        self._child = subprocess.Popen(
+            [sys.executable, "-m", CHILD, system, host],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            start_new_session=True,  # Ctrl-C is for the driver, which then kills it
+        )
+        assert self._child.stdout is not None
+        self._pipe = self._child.stdout.fileno()
+        os.set_blocking(self._pipe, False)
+        self._selector = selectors.DefaultSelector()
+        self._selector.register(self._pipe, selectors.EVENT_READ)
+        self._buffer = b""
+        self._number = 0
+
+    def receive(self, timeout: float) -> Frame | None:
+        end = time.monotonic() + timeout
+        while b"\n" not in self._buffer:
+            if not self._selector.select(max(0.0, end - time.monotonic())):
+                return None
+            got = os.read(self._pipe, 1 << 16)
+            if not got:
+                raise ConnectionError(f"the client has ended with code {self._child.wait()}")
+            self._buffer += got
+            if len(self._buffer) > LONGEST_LINE:
+                raise ValueError("the client prints something that is no frame")
+        line, _, self._buffer = self._buffer.partition(b"\n")
+        return self._frame(line)
+
+    def _frame(self, line: bytes) -> Frame | None:
+        """The frame of a line; None if it holds no subject: the connection may be silent."""
+        arrival, bodies = json.loads(line)
+        if not bodies:
+            return None
+        self._number += 1
+        subjects = {
+            name: Subject(True, tuple(position), tuple(quaternion))
+            for name, (position, quaternion) in bodies.items()
+        }
+        return Frame(self._number, None, arrival, subjects)
+
+    def close(self) -> None:
+        self._selector.close()
+        with contextlib.suppress(ProcessLookupError):
+            self._child.kill()
+        self._child.wait()
+        if self._child.stdout is not None:
+            self._child.stdout.close()
+
+
+class WatchedFrames(FrameStream):
+    """Frames of the child process, which is started again when it is silent or has died."""
+
+    tick = 1.0
+
+    def __init__(self, system: str, host: str) -> None:
+        super().__init__(lambda: ChildConnection(system, host))
+        self._system = system
+        self._host = host
+
+    @cached_property
+    def names(self) -> Sequence[str]:
+        """Of the subjects of the first frame. Raises DriverError."""
+        connection = ChildConnection(self._system, self._host)
+        end = time.monotonic() + FOUND
+        try:
+            while time.monotonic() < end:
+                frame = connection.receive(0.1)
+                if frame is not None:
+                    return sorted(frame.subjects)
+            trouble = f"no subject within {FOUND:g} s"
+        except (OSError, ValueError) as error:
+            trouble = str(error)
+        finally:
+            connection.close()
+        raise DriverError(
+            f"the {self._system} system at {self._host} tells no subjects: {trouble}. Start it, "
+            "correct --host, or name the subjects with --subjects"
+        )
+
+
+class Watched(Sensor):
+    """`o80 run o80_devices.motion_capture.watched:Watched --system vicon --host 10.0.0.2`."""
+
+    name = "motion_capture"
+
+    @dataclass
+    class Config(SensorConfig):
+        system: Literal["vicon", "optitrack", "vrpn", "mock"] = option("vicon", "its kind")
+        host: str = option("127.0.0.1", "of the system")
+
+    def __init__(self, config: Config) -> None:
+        if importlib.util.find_spec("motioncapture") is None:
+            raise InvalidArgument(
+                "the package motioncapture is not installed: pip install 'o80-devices[motioncapture]'"
+            )
+        super().__init__(config, WatchedFrames(config.system, config.host))

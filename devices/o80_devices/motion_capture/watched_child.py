@@ -1,0 +1,46 @@
+"""The process in which `motioncapture` may block: prints each frame as a line of JSON."""
+
+from __future__ import annotations
+
+import ctypes
+import importlib
+import json
+import os
+import signal
+import sys
+import time
+from typing import Any
+
+PR_SET_PDEATHSIG = 1
+
+
+def main() -> None:
+    # a client that blocks does not notice that the driver has died
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    # its library prints to the standard output: frames go to a copy, the rest to the errors
+    frames = os.dup(1)
+    os.dup2(2, 1)
+    system, host = sys.argv[1:3]
+    connection: Any = importlib.import_module("motioncapture").connect(system, {"hostname": host})
+    while True:
+        connection.waitForNextFrame()
+        arrival = time.monotonic_ns()
+        line = json.dumps((arrival, bodies_of(connection.rigidBodies))) + "\n"
+        try:
+            os.write(frames, line.encode())
+        except BrokenPipeError:
+            return
+
+
+def bodies_of(rigid_bodies: Any) -> dict[str, Any]:
+    """Position and quaternion (x, y, z, w) by name."""
+    found = {}
+    for name, body in rigid_bodies.items():
+        rotation = body.rotation
+        quaternion = [rotation.x, rotation.y, rotation.z, rotation.w]
+        found[name] = ([float(each) for each in body.position], quaternion)
+    return found
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,93 @@
+"""Clients that block, in a process that is watched: the real ones, with nobody at the other end."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import o80
+from o80_devices.motion_capture.sensor import Reason
+from o80_devices.motion_capture.watched import Watched
+from o80_devices.motion_capture.watched_child import bodies_of
+
+WAIT = 60.0  # [s] longer than anything here takes
+ROBOT = o80.robots.load(Watched)
+
+
+def row_where(system: Any, condition: Callable[[Any], bool]) -> Any:
+    end = time.monotonic() + WAIT
+    while time.monotonic() < end:
+        system.burst(1)
+        row = system.latest().extended
+        if condition(row):
+            return row
+        time.sleep(0.001)
+    raise AssertionError(f"no such row within {WAIT} s; the last one: {row}")
+
+
+def clients() -> list[int]:
+    """Child processes of this one that run a client."""
+    found = []
+    for task in Path("/proc/self/task").iterdir():
+        for child in (task / "children").read_text().split():
+            words = Path(f"/proc/{child}/cmdline").read_bytes()
+            if b"watched_child" in words:
+                found.append(int(child))
+    return found
+
+
+@pytest.mark.parametrize("kind", ["mock", "vicon"])
+def test_a_client_without_poses_is_a_gap_and_is_started_again(kind: str, segment: str) -> None:
+    """The mock gives empty frames for ever; that of Vicon blocks and ignores signals."""
+    with ROBOT.inline(segment, frequency=1000, system=kind, subjects="racket") as system:
+        row = row_where(system, lambda row: row.reason == Reason.SILENT)
+        assert not row.racket.visible
+        assert row.capture_time == 0
+        row_where(system, lambda row: bool(clients()))
+        first = clients()
+        row_where(system, lambda row: bool(clients()) and clients() != first)
+    assert not clients()
+
+
+def test_a_client_that_dies_is_started_again(segment: str) -> None:
+    with ROBOT.inline(segment, frequency=1000, system="vicon", subjects="racket") as system:
+        row_where(system, lambda row: bool(clients()))
+        (first,) = clients()
+        os.kill(first, signal.SIGKILL)
+        row_where(system, lambda row: bool(clients()) and first not in clients())
+
+
+def test_an_interrupt_ends_a_driver_whose_client_blocks(segment: str) -> None:
+    o80_program = str(Path(sys.executable).parent / "o80")
+    place = "o80_devices.motion_capture.watched:Watched"
+    run = subprocess.Popen(
+        [
+            *(o80_program, "run", place, "--segment", segment, "--frequency", "300"),
+            *("--system", "vicon", "--subjects", "racket"),
+        ],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    with o80.Frontend(segment, timeout=WAIT) as system:
+        system.wait_for(50, timeout=WAIT)
+    run.send_signal(signal.SIGINT)
+    output, _ = run.communicate(timeout=WAIT)
+    assert run.returncode == 0, output
+
+
+def test_bodies_are_read_from_the_bindings() -> None:
+    class Rotation:
+        x, y, z, w = 0.0, 0.0, 1.0, 0.0
+
+    class Body:
+        position = (1.0, 2.0, 3.0)
+        rotation = Rotation()
+
+    assert bodies_of({"a": Body()}) == {"a": ([1.0, 2.0, 3.0], [0.0, 0.0, 1.0, 0.0])}
