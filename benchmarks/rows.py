@@ -380,4 +380,12 @@ ROWS = (
         limit=(0.6, "steps_plain"),
         at_least=True,
     ),
+    Row(
+        name="ball-tracking",
+        row="tracking a ball in four images of 640 x 480, 180 times a second",
+        budget="50 % of a processor",
+        program="ball-tracking",
+        measured="ball_tracking",
+        limit=50.0,
+    ),
 )

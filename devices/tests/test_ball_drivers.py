@@ -94,7 +94,7 @@ def test_a_segment_without_images_is_refused() -> None:
     with (
         o80.robots.load("two_joints").inline(name),
         pytest.raises(o80.DriverError, match="holds no images"),
-        o80.robots.load(BallTracker).inline(f"{name}-ball", frequency=RATE, cameras=name),
+        o80.robots.load(BallTracker).inline(frequency=RATE, cameras=name),
     ):
         pass
 

@@ -17,6 +17,7 @@ from o80_devices.ball_tracking.ball_tracker import BallTracker
 from o80_devices.ball_tracking.rig import Rig, RigCamera, four_cameras
 from o80_devices.ball_tracking.synthetic_cameras import SyntheticCameras
 from o80_devices.ball_tracking.tracker import Tracker
+from o80_devices.ball_tracking.video_cameras import VideoCameras
 
 __all__ = [
     "BallTracker",
@@ -25,5 +26,6 @@ __all__ = [
     "RigCamera",
     "SyntheticCameras",
     "Tracker",
+    "VideoCameras",
     "four_cameras",
 ]

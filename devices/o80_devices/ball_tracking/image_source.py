@@ -35,7 +35,7 @@ class CameraSegment:
         self._frontend: o80.Frontend | None = None
         self._iteration = -1
         self._tried: float | None = None
-        self.images: list[Image] = []
+        self.images: list[Image | None] = []
         self.time = 0
 
     def attach(self, timeout: float) -> None:
@@ -80,6 +80,10 @@ class CameraSegment:
             return False
         images = np.asarray(row.extended["images"])
         self.images, self.time = list(np.atleast_2d(images)), capture
+        if "valid" in row.extended:
+            valid = np.atleast_1d(row.extended["valid"])
+            pairs = zip(self.images, valid, strict=True)
+            self.images = [image if new else None for image, new in pairs]
         return True
 
     def close(self) -> None:

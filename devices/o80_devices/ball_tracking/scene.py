@@ -124,18 +124,17 @@ class Scene:
             return
 
         # ray of each pixel, ball in each moment => share of the pixel that it covers, its light
-        covered, light = np.zeros(patch.shape[:2]), np.zeros(patch.shape[:2])
-        for place in places - self._cameras[camera].place:
-            along = rays @ place
-            aside = rays * along[..., np.newaxis] - place
-            distance = np.linalg.norm(aside, axis=-1)
-            per_metre = self._focal[camera] / np.linalg.norm(place)
-            part = np.clip(0.5 + (self._radius - distance) * per_metre, 0, 1)
-            normal = aside / self._radius
-            towards = np.sqrt(np.maximum(0, 1 - (normal**2).sum(-1)))
-            shade = normal @ LIGHT - towards * (rays @ LIGHT)
-            covered += part
-            light += part * (0.62 + 0.38 * np.clip(shade, 0, 1))
+        towards = (places - self._cameras[camera].place).T
+        along = rays @ towards
+        size = (towards**2).sum(0)
+        aside2 = np.maximum(0, size - along**2)
+        per_metre = self._focal[camera] / np.sqrt(size)
+        part = np.clip(0.5 + (self._radius - np.sqrt(aside2)) * per_metre, 0, 1)
+        to_light = (rays @ LIGHT)[..., np.newaxis]
+        bulge = np.sqrt(np.maximum(0, 1 - aside2 / self._radius**2))
+        shade = (along * to_light - LIGHT @ towards) / self._radius - bulge * to_light
+        covered = part.sum(-1)
+        light = (part * (0.62 + 0.38 * np.clip(shade, 0, 1))).sum(-1)
         noise = self._random.normal(0, self._noise, patch.shape)
         mixed = patch * (1 - covered / MOMENTS)[..., np.newaxis]
         mixed = mixed + (light / MOMENTS)[..., np.newaxis] * BALL

@@ -11,9 +11,9 @@ from o80_devices.ball_tracking.rig import Rig, Table
 
 FloatArray = NDArray[np.float64]
 
-FLIGHT = 1.3
+FLIGHT = 1.1
 """How long a ball is in the air [s]."""
-PAUSE = 0.5
+PAUSE = 0.4
 """Between two balls; longer than the tracker takes to forget one [s]."""
 
 
