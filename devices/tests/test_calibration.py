@@ -87,7 +87,7 @@ def test_a_board_gives_the_lens() -> None:
     random = np.random.default_rng(3)
     pictures = []
     for i in range(14):
-        turn = np.asarray(cv2.Rodrigues(random.uniform(-0.5, 0.5, 3))[0])
+        turn = np.asarray(cv2.Rodrigues(random.uniform(-0.5, 0.5, 3))[0], np.float64)
         middle = np.array([0.1 * (i % 3 - 1), 0.07 * (i // 3 % 3 - 1), 0.42])
         pictures.append(board_picture(turn, middle - turn @ np.array([0.15, 0.105, 0])))
     found = lens_from_board("first", pictures, (9, 6), 0.03)

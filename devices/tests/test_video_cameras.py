@@ -23,7 +23,7 @@ def films(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     scene, throws = Scene(rig, variations=1), Throws(rig, 1)
     paths = [folder / f"{camera.name}.avi" for camera in rig.cameras]
     for k, path in enumerate(paths):
-        code = cv2.VideoWriter_fourcc(*"MJPG")
+        code = cv2.VideoWriter.fourcc(*"MJPG")
         film = cv2.VideoWriter(str(path), code, 30, (640, 480))
         for i in range(36):
             ball = throws.at(0.3 + i / RATE)
