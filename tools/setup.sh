@@ -88,9 +88,9 @@ install_packages() {
 
 case $purpose in
   demo | learn) ;;
-  tools | test) need_packages g++ libgtest-dev libgmock-dev ;;
+  tools | test) need_packages g++ ccache libgtest-dev libgmock-dev ;;
   check) # compilers of the sanitizers and of another machine, model checkers, emulators, stress, browser
-    need_packages g++ libgtest-dev libgmock-dev googletest clang-19 libclang-rt-19-dev \
+    need_packages g++ ccache libgtest-dev libgmock-dev googletest clang-19 libclang-rt-19-dev \
       llvm-19 g++-aarch64-linux-gnu qemu-user-static relacy-dev spin strace stress-ng rt-tests \
       qemu-system-x86 busybox-static cpio chromium
     ;;

@@ -110,7 +110,7 @@ def readme_program(package: str) -> str:
 def test_there_is_a_wheel_of_every_package_for_every_machine_of_the_platform(built: Path) -> None:
     wheels = {file.name.partition("-")[0]: file.name for file in (built / "wheels").iterdir()}
 
-    assert set(wheels) == {"o80", "o80_mujoco", "o80_pam", "o80_table_tennis"}
+    assert set(wheels) == {"o80", "o80_mujoco", "o80_pam", "o80_devices", "o80_table_tennis"}
     assert wheels["o80_table_tennis"].endswith("-py3-none-any.whl")
     assert "-py3-none-manylinux_2_35_" in wheels["o80_mujoco"]
     assert "-py3-none-manylinux_2_35_" in wheels["o80_pam"]
@@ -227,7 +227,7 @@ def test_robots_of_packages_are_found_in_spawned_processes(everything: Environme
     assert "('pam', 'mujoco')" in everything.run("python", "spawned.py")
 
 
-@pytest.mark.parametrize("package", ["o80", "o80_mujoco", "o80_pam", "o80_table_tennis"])
+@pytest.mark.parametrize("package", ["o80_mujoco", "o80_pam", "o80_devices", "o80_table_tennis"])
 def test_a_source_distribution_becomes_a_wheel(built: Path, tmp_path: Path, package: str) -> None:
     (sdist,) = (built / "sdists").glob(f"{package}-[0-9]*.tar.gz")
     builder = Environment(tmp_path / "builder", compiler=True)
@@ -241,11 +241,27 @@ def test_a_source_distribution_becomes_a_wheel(built: Path, tmp_path: Path, pack
     assert wheel.name.split("-")[:4] == shipped.name.split("-")[:4]
 
 
-def test_packages_install_together_from_a_checkout(built: Path, tmp_path: Path) -> None:
+def unpack(sdist: Path, folder: Path) -> Path:
+    """The files of a source distribution, without the folder that holds them there."""
+    folder.mkdir(parents=True)
+    subprocess.run(["tar", "xf", sdist, "--strip-components=1", f"-C{folder}"], check=True)
+    return folder
+
+
+def test_source_distributions_that_lie_as_in_a_checkout_install_together(
+    built: Path, tmp_path: Path
+) -> None:
+    """What the core ships is enough to build it, and the arm finds it beside itself."""
+    root = ROOT / "build" / "unpacked"  # the same in each run, for ccache
+    shutil.rmtree(root, ignore_errors=True)
+    unpacked = []
+    for folder, name in ((".", "o80"), ("robots/pam", "o80_pam"), ("apps/tt", "o80_table_tennis")):
+        (sdist,) = (built / "sdists").glob(f"{name}-[0-9]*.tar.gz")
+        unpacked.append(unpack(sdist, root / folder))
     environment = Environment(tmp_path / "environment", compiler=True)
     # the simulator has the build backend of the arm, so it is not compiled here
     (simulator,) = (built / "wheels").glob("o80_mujoco-*")
-    environment.install(ROOT, ROOT / "robots/pam", ROOT / "apps/table_tennis", simulator)
+    environment.install(*unpacked, simulator)
     names = ["two_joints", "pam", "mujoco"]
     robots = f"import o80; print([o80.robots.load(name).name for name in {names}])"
     assert environment.python(robots) == str(names)
@@ -253,5 +269,5 @@ def test_packages_install_together_from_a_checkout(built: Path, tmp_path: Path) 
     # and one again, alone, editable and against the o80 that is installed
     environment.install("scikit-build-core==1.1.2", "cmake", "ninja")
     options = ("--no-build-isolation", "--no-deps", "--editable")
-    environment.install(*options, ROOT / "robots" / "pam")
+    environment.install(*options, root / "robots" / "pam")
     assert environment.python(robots) == str(names)

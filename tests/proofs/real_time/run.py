@@ -60,6 +60,7 @@ LEFT_OUT_OF_SHORT = (
     "LyingOwnerTest.*",
     "MakeTableTest.*",
     "OwnedSegmentTest.*",
+    "*ReplayTest.*",
     "RunOptionsTest.*",
     "StartRaceTest.*",
     "TakeOverTest.*",
