@@ -6,7 +6,7 @@ import ctypes.util
 import importlib
 import os
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping
 from contextlib import AbstractContextManager
 from pathlib import Path
 from types import TracebackType
@@ -29,6 +29,8 @@ SIZE = (640, 480)
 """Width and height of pictures [pixels]."""
 HALF_SIZE = (480, 360)
 """Of each picture in a film of several."""
+TITLE_HEIGHT = 28
+"""Of the line above each of them."""
 SHADOWS = 1024
 """Size of the map of shadows [pixels]: finer ones take software renderers much longer."""
 OTHER_BALL = (0.95, 0.95, 0.92, 0.8)
@@ -137,7 +139,7 @@ def film_episode(
 
 def film_side_by_side(
     path: Path,
-    episodes: Sequence[tuple[FloatArray, FloatArray]],
+    episodes: Mapping[str, tuple[FloatArray, FloatArray]],
     *,
     period: float,
     slow: float = 2.0,
@@ -146,25 +148,36 @@ def film_side_by_side(
 ) -> int:
     """One film of several episodes, each of joints (T, 4) [rad] and its ball (T, 3) [m].
 
-    They begin together; one that has ended shows its last row. Returns how many frames it has.
+    Each has its name above it. They begin together; one that has ended shows its last row. Returns
+    how many frames it has.
     """
     step = max(1, round(1.0 / (frames_per_second * slow * period)))
-    rows = max(len(joints) for joints, _ in episodes)
+    rows = max(len(joints) for joints, _ in episodes.values())
+    titles = np.hstack([_title(name, HALF_SIZE[0]) for name in episodes])
     with Scene(size=HALF_SIZE) as scene:  # drawn one after the other: a renderer costs much memory
+
+        def at(row: int, joints: FloatArray, ball: FloatArray) -> Image:
+            there = ball[min(row, len(ball) - 1), None]
+            return scene.draw(joints[min(row, len(joints) - 1)], there, camera=camera)
+
         pictures = (
-            np.hstack(
-                [
-                    scene.draw(
-                        joints[min(row, len(joints) - 1)],
-                        ball[min(row, len(ball) - 1), None],
-                        camera=camera,
-                    )
-                    for joints, ball in episodes
-                ]
-            )
+            np.vstack([titles, np.hstack([at(row, *each) for each in episodes.values()])])
             for row in range(0, rows, step)
         )
         return write_film(path, pictures, frames_per_second=frames_per_second)
+
+
+def _title(text: str, width: int) -> Image:
+    """A line of text in black on white (TITLE_HEIGHT, width, 3)."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width / 100, TITLE_HEIGHT / 100), dpi=100)
+    figure.text(0.5, 0.5, text, ha="center", va="center", fontsize=11)
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.draw()
+    picture: Image = np.asarray(canvas.buffer_rgba())[..., :3].copy()
+    return picture
 
 
 def write_picture(path: Path, picture: Image) -> None:

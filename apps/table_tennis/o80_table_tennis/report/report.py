@@ -257,7 +257,10 @@ def _film_side_by_side(
     try:
         frames = film_side_by_side(
             output / "side_by_side.mp4",
-            [(each.twin.observed.joints["position"], each.balls[:, 0]) for each in pair],
+            {
+                name: (each.twin.observed.joints["position"], each.balls[:, 0])
+                for name, each in zip(("scripted policy", "learned policy"), pair, strict=True)
+            },
             period=pair[0].period,
         )
     except Exception as error:
