@@ -1,0 +1,116 @@
+"""Recordings of a robot beside a tracked ball, as the tracking server would have sent the ball.
+
+A line is a tuple `((ball, unix time [ns], position, velocity), (steady time [ns], q, dq))`, at
+250 Hz. The ball is that of the newest message, which repeats; ball -1: it was not seen, and the
+position is an old one. The two times are of two clocks.
+"""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o80.errors import InvalidArgument
+from o80_devices.ball_tracking.server_messages import Message
+from o80_devices.clock import ClockMap
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+UNSEEN = -1
+
+
+@dataclass(frozen=True, eq=False)
+class RobotAndBall:
+    """The rows of a recording."""
+
+    ball: IntArray
+    """(N,) number of the ball; -1: not seen."""
+    stamp: IntArray
+    """(N,) of the tracker, unix time [ns]."""
+    position: FloatArray
+    """(N, 3) [m]"""
+    velocity: FloatArray
+    """(N, 3), as it was recorded [m/s]."""
+    time: IntArray
+    """(N,) of the robot, steady clock [ns]."""
+    q: FloatArray
+    """(N, 4) [rad]"""
+    dq: FloatArray
+    """(N, 4) [rad/s]"""
+
+    @classmethod
+    def load(cls, path: str | Path) -> RobotAndBall:
+        """A file. Raises InvalidArgument, naming file and line."""
+        rows = []
+        for number, line in enumerate(Path(path).read_text().splitlines(), start=1):
+            try:
+                ball, robot = ast.literal_eval(line)
+                row = (int(ball[0]), int(ball[1]), ball[2], ball[3], int(robot[0]), *robot[1:])
+                if [len(part) for part in (row[2], row[3], row[5], row[6])] != [3, 3, 4, 4]:
+                    raise ValueError("wrong lengths")
+                rows.append(row)
+            except (ValueError, SyntaxError, TypeError, IndexError) as error:
+                raise InvalidArgument(
+                    f"{path}, line {number}: not a row of robot and ball ({error})"
+                ) from None
+        if not rows:
+            raise InvalidArgument(f"{path}: the file is empty")
+        return cls(*(np.array(column) for column in zip(*rows, strict=True)))
+
+    def first_rows(self) -> IntArray:
+        """The rows in which a message of the tracker shows for the first time."""
+        new = np.diff(self.stamp, prepend=self.stamp[0] - 1) > 0
+        return np.flatnonzero(new & (self.ball != UNSEEN))
+
+    def messages(self) -> list[tuple[int, Message]]:
+        """When each message came, on the clock of the robot [ns], and the message.
+
+        While the ball was not seen, one without a ball for each row of the robot, with the stamp
+        that the tracker's clock had then.
+        """
+        shown = set(self.first_rows().tolist())
+        ahead = self._clock_ahead()
+        sent: list[tuple[int, Message]] = []
+        for row, time in enumerate(self.time.tolist()):
+            if row in shown:
+                sent.append((time, Message(int(self.stamp[row]), self.position[row])))
+            elif self.ball[row] == UNSEEN:
+                sent.append((time, Message(time + ahead, None)))
+        return _rising(sent)
+
+    def capture_times(self) -> tuple[IntArray, IntArray]:
+        """Rows with a new ball, and when it was captured on the clock of the robot [ns]."""
+        clock, rows, times = ClockMap(), [], []
+        for row in self.first_rows().tolist():
+            capture = clock.capture(int(self.stamp[row]), int(self.time[row]))
+            if capture is not None:
+                rows.append(row)
+                times.append(capture.time)
+        return np.array(rows, np.int64), np.array(times, np.int64)
+
+    def _clock_ahead(self) -> int:
+        """The tracker's clock less the robot's, by the message that came fastest [ns]."""
+        rows = self.first_rows()
+        return int((self.stamp - self.time)[rows].max()) if len(rows) else 0
+
+
+def _rising(sent: list[tuple[int, Message]]) -> list[tuple[int, Message]]:
+    """Without the messages that carry no ball and would be sent after a later one."""
+    seen = [message.stamp for _, message in sent if message.place is not None]
+    next_seen = iter([*seen, None])
+    following, newest, kept = next(next_seen), None, []
+    for time, message in sent:
+        if message.place is not None:
+            following = next(next_seen)
+        elif (newest is not None and message.stamp <= newest) or (
+            following is not None and message.stamp >= following
+        ):
+            continue
+        newest = message.stamp
+        kept.append((time, message))
+    return kept

@@ -1,0 +1,170 @@
+"""From the messages of a tracking server to the ball: JSON, clock, frame, flight.
+
+A message is `{"time": <int, ns>, "obs": [x, y, z]}` in metres in the frame of the tracker, or
+`"obs": null` without a ball.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o80_devices.ball_tracking.ball_row import Reason
+from o80_devices.ball_tracking.flight_track import FlightTrack, Tracked
+from o80_devices.ball_tracking.rig import four_cameras
+from o80_devices.clock import Capture, ClockMap
+
+FloatArray = NDArray[np.float64]
+SECOND = 1_000_000_000  # [ns]
+LARGEST_STAMP = 2**62
+FARTHEST = 1e3
+"""A ball further away than this is no ball [m]."""
+
+
+class ServerReason(IntEnum):
+    """Why a row has no ball."""
+
+    seen = 0
+    """The row has a ball, of a message that no row had before."""
+    no_new_message = 1
+    """None has come since the last row; the next one may be on its way."""
+    silent = 2
+    """No message for longer than `timeout`: the server, the network or the cable."""
+    not_seen = 3
+    """The server says that it sees no ball."""
+    unexpected = 4
+    """The place does not continue the flight; once more, and it is a hit or another ball."""
+    late = 5
+    """The message is older than `most_age`."""
+    invalid = 6
+    """The message could not be understood."""
+
+
+@dataclass(frozen=True)
+class Message:
+    """What the server says of one frame."""
+
+    stamp: int
+    """On its own clock [ns]."""
+    place: FloatArray | None
+    """(3,) in the frame of the tracker [m]."""
+
+    @classmethod
+    def decoded(cls, content: bytes) -> Message:
+        """Raises ValueError if the bytes are no message."""
+        try:
+            read = json.loads(content)
+            stamp, place = read["time"], read["obs"]
+        except (ValueError, KeyError, TypeError, RecursionError) as error:
+            raise ValueError(f"not a message of a tracking server: {error}") from None
+        if type(stamp) is not int or abs(stamp) > LARGEST_STAMP:
+            raise ValueError(f"`time` must be an integer in nanoseconds, got {stamp!r}")
+        if place is None:
+            return cls(stamp, None)
+        if not (
+            isinstance(place, list)
+            and len(place) == 3
+            and all(_is_length(value) for value in place)
+        ):
+            raise ValueError(f"`obs` must be three numbers in metres or null, got {place!r}")
+        return cls(stamp, np.array(place, dtype=np.float64))
+
+    def encoded(self) -> bytes:
+        place = None if self.place is None else [float(value) for value in self.place]
+        return json.dumps({"time": self.stamp, "obs": place}).encode()
+
+
+def _is_length(value: Any) -> bool:
+    return type(value) in (int, float) and math.isfinite(value) and abs(value) < FARTHEST
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A row: the ball, or the reason why there is none."""
+
+    reason: ServerReason
+    ball: Tracked
+    capture: Capture | None = None
+    stamp: int = 0
+
+
+@dataclass(frozen=True)
+class Place:
+    """The frame of the tracker in the world."""
+
+    translation: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """[m]"""
+    rotation: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Roll, pitch and yaw: about the axes x, y and z of the world, in this order [rad]."""
+
+    def in_world(self, point: FloatArray) -> FloatArray:
+        """(3,) [m]"""
+        turned = point
+        for axis, angle in enumerate(self.rotation):
+            c, s = math.cos(angle), math.sin(angle)
+            one, other = (axis + 1) % 3, (axis + 2) % 3
+            turn = np.eye(3)
+            turn[one, one] = turn[other, other] = c
+            turn[one, other], turn[other, one] = -s, s
+            turned = turn @ turned
+        world: FloatArray = turned + np.array(self.translation)
+        return world
+
+
+class ServerTrack:
+    """Follows the ball by the messages; time is given by the caller."""
+
+    def __init__(
+        self,
+        place: Place = Place(),
+        *,
+        noise: float = 0.003,
+        latency: float = 0.0,
+        timeout: float = 0.05,
+        most_age: float = 0.1,
+        forget: float = 0.3,
+    ) -> None:
+        """noise: standard deviation of a place [m]. Others in [s]."""
+        self._place = place
+        self._covariance = noise**2 * np.eye(3)
+        self._clock = ClockMap(latency=latency)
+        self._timeout, self._most_age = round(timeout * SECOND), round(most_age * SECOND)
+        self._flight = FlightTrack(four_cameras().law(), forget)
+        self._newest: int | None = None  # arrival [ns]
+
+    def silent(self, now: int) -> Seen:
+        """A row without a message."""
+        gone = self._newest is None or now - self._newest > self._timeout
+        reason = ServerReason.silent if gone else ServerReason.no_new_message
+        return Seen(reason, Tracked(now, Reason.no_image))
+
+    def take(self, content: bytes, now: int) -> Seen:
+        """A row with a message that arrived `now` [ns]."""
+        try:
+            message = Message.decoded(content)
+        except ValueError:
+            return Seen(ServerReason.invalid, Tracked(now, Reason.no_image))
+        capture = self._clock.capture(message.stamp, now)
+        if capture is None:  # repeated or overtaken
+            return self.silent(now)
+        self._newest = now
+        if now - capture.time > self._most_age:
+            return self._without(ServerReason.late, capture, message)
+        if message.place is None:
+            return self._without(ServerReason.not_seen, capture, message)
+        place = self._place.in_world(message.place)
+        ball = self._flight.seen(
+            capture.time, place, self._covariance, 0, math.nan, may_surprise=True
+        )
+        reason = ServerReason.seen if ball.seen else ServerReason.unexpected
+        return Seen(reason, ball, capture, message.stamp)
+
+    def _without(self, reason: ServerReason, capture: Capture, message: Message) -> Seen:
+        ball = self._flight.lost(capture.time, Reason.not_found)
+        return Seen(reason, ball, capture, message.stamp)

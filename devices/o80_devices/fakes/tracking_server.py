@@ -1,0 +1,101 @@
+"""A tracking server that is none: it publishes thrown balls, or recorded ones.
+
+python -m o80_devices.fakes.tracking_server --lose 0.1
+python -m o80_devices.fakes.tracking_server --recording o80_robot_ball_002
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from o80_devices import zeromq
+from o80_devices.ball_tracking.rig import four_cameras
+from o80_devices.ball_tracking.robot_and_ball import RobotAndBall
+from o80_devices.ball_tracking.server_messages import Message
+from o80_devices.ball_tracking.throws import Throws
+
+SECOND = 1_000_000_000  # [ns]
+RATE = 180.0  # [1/s]
+
+
+class FakeTrackingServer:
+    """Publishes what it is given."""
+
+    def __init__(self, address: str) -> None:
+        """address: port 0 takes any."""
+        zmq = zeromq.required()
+        self._context = zmq.Context()
+        self._socket: Any = self._context.socket(zmq.PUB)
+        self._socket.setsockopt(zmq.LINGER, 0)
+        self._socket.bind(address)
+        self.address: str = self._socket.getsockopt(zmq.LAST_ENDPOINT).decode().rstrip("\0")
+
+    def publish(self, message: Message | bytes) -> None:
+        self._socket.send(message if isinstance(message, bytes) else message.encoded())
+
+    def close(self) -> None:
+        if self._socket.closed:
+            return
+        self._socket.close(linger=0)
+        self._context.destroy(linger=0)
+
+
+def thrown(seed: int, noise: float, rate: float = RATE) -> Iterator[tuple[int, Message]]:
+    """Balls over the table, one by one: when each message is sent [ns], and the message."""
+    throws, rng = Throws(four_cameras(), seed), np.random.default_rng(seed)
+    for frame in count():
+        at = round(frame * SECOND / rate)
+        ball = throws.at(at / SECOND)
+        place = ball.position + noise * rng.standard_normal(3) if ball.number else None
+        yield at, Message(at, place)
+
+
+def recorded(path: Path) -> Iterator[tuple[int, Message]]:
+    """The messages of a recording, from 0 on."""
+    messages = RobotAndBall.load(path).messages()
+    for at, message in messages:
+        yield at - messages[0][0], message
+
+
+def main(arguments: list[str] | None = None) -> None:
+    import argparse
+
+    parser = argparse.ArgumentParser(
+        prog="python -m o80_devices.fakes.tracking_server", description="A fake tracking server."
+    )
+    parser.add_argument("--address", default="tcp://127.0.0.1:7660", help="where it publishes")
+    parser.add_argument("--recording", type=Path, help="file of a robot and a ball to play")
+    parser.add_argument("--noise", type=float, default=0.003, help="of thrown balls [m]")
+    parser.add_argument("--lose", type=float, default=0.0, help="share of messages that are lost")
+    parser.add_argument("--clock", type=float, default=1e9, help="its clock at the start [s]")
+    parser.add_argument("--pause-at", type=float, default=-1.0, help="when it falls silent [s]")
+    parser.add_argument("--pause", type=float, default=2.0, help="for how long [s]")
+    parser.add_argument("--seed", type=int, default=0)
+    given = parser.parse_args(arguments)
+    messages = recorded(given.recording) if given.recording else thrown(given.seed, given.noise)
+    server = FakeTrackingServer(given.address)
+    print(f"fake tracking server at {server.address}; Ctrl-C ends it", flush=True)
+    rng, start = np.random.default_rng(given.seed), time.monotonic_ns()
+    first: int | None = None
+    try:
+        for at, message in messages:
+            time.sleep(max(0.0, (start + at - time.monotonic_ns()) / SECOND))
+            first = message.stamp if first is None else first
+            stamp = message.stamp - first + round(given.clock * SECOND)
+            paused = 0.0 <= at / SECOND - given.pause_at < given.pause and given.pause_at >= 0.0
+            if not paused and rng.random() >= given.lose:
+                server.publish(Message(stamp, message.place))
+    except KeyboardInterrupt:
+        pass
+    finally:
+        server.close()
+
+
+if __name__ == "__main__":
+    main()
