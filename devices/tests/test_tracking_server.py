@@ -110,10 +110,11 @@ def test_thrown_balls_are_numbered_and_their_velocity_is_better_than_by_differen
         elif before is not None and seen.reason is ServerReason.seen:
             true = throws.at(at / SECOND)
             balls.add(seen.ball.ball)
+            assert seen.ball.ball == true.number
             errors.append(np.linalg.norm(seen.ball.velocity - true.velocity))
             differences.append(np.linalg.norm((message.place - before) * 180.0 - true.velocity))
         before = message.place
-    assert balls == {1, 2, 3}
+    assert len(balls) > 2
     assert np.median(errors) < 0.2 * np.median(differences)
 
 
