@@ -199,7 +199,7 @@ def test_a_foreign_server_is_told(segment: str) -> None:
 
 def test_in_real_time_a_row_is_a_frame(server: FakeQualisys, segment: str) -> None:
     port = server.port
-    robot = o80.robots.load("o80_devices.motion_capture.qualisys:Qualisys")
+    robot = o80.robots.load("o80_devices.motion_capture:Qualisys")
     with (
         robot.start(segment, frequency=200, port=port),
         o80.Frontend(segment) as system,

@@ -65,7 +65,7 @@ def test_a_client_that_dies_is_started_again(segment: str) -> None:
 
 def test_an_interrupt_ends_a_driver_whose_client_blocks(segment: str) -> None:
     o80_program = str(Path(sys.executable).parent / "o80")
-    place = "o80_devices.motion_capture.watched:Watched"
+    place = "o80_devices.motion_capture:Watched"
     run = subprocess.Popen(
         [
             *(o80_program, "run", place, "--segment", segment, "--frequency", "300"),

@@ -5,6 +5,9 @@ the package `motioncapture` for Vicon, OptiTrack and VRPN.
 """
 
 from o80_devices.motion_capture.playback import Playback
+from o80_devices.motion_capture.qualisys import Qualisys
 from o80_devices.motion_capture.sensor import Reason
+from o80_devices.motion_capture.transform import Transform
+from o80_devices.motion_capture.watched import Watched
 
-__all__ = ["Playback", "Reason"]
+__all__ = ["Playback", "Qualisys", "Reason", "Transform", "Watched"]

@@ -123,7 +123,7 @@ class QualisysFrames(FrameStream):
 
 
 class Qualisys(Sensor):
-    """A Qualisys system: `o80 run o80_devices.motion_capture.qualisys:Qualisys --host 10.0.0.2`."""
+    """A Qualisys system: `o80 run o80_devices.motion_capture:Qualisys --host 10.0.0.2`."""
 
     name = "motion_capture"
 

@@ -66,7 +66,7 @@ class SensorConfig:
     transform: str = option("", "file with the transform from the system to the world")
     latency: float = option(0.0, "from capture to arrival, beside what the system tells", "s")
     latency_error: float = option(0.0, "of this latency", "s")
-    gap: float = option(0.1, "without a frame, after which rows say why", "s")
+    gap: float = option(0.08, "without a frame, after which rows say why", "s")
 
 
 class Sensor:

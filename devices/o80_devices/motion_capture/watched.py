@@ -116,7 +116,7 @@ class WatchedFrames(FrameStream):
 
 
 class Watched(Sensor):
-    """`o80 run o80_devices.motion_capture.watched:Watched --system vicon --host 10.0.0.2`."""
+    """`o80 run o80_devices.motion_capture:Watched --system vicon --host 10.0.0.2`."""
 
     name = "motion_capture"
 
@@ -128,6 +128,7 @@ class Watched(Sensor):
     def __init__(self, config: Config) -> None:
         if importlib.util.find_spec("motioncapture") is None:
             raise InvalidArgument(
-                "the package motioncapture is not installed: pip install 'o80-devices[motioncapture]'"
+                "the package motioncapture is not installed: "
+                "pip install 'o80-devices[motioncapture]'"
             )
         super().__init__(config, WatchedFrames(config.system, config.host))
