@@ -34,9 +34,35 @@ JournalWriter::JournalWriter(const SegmentView& view) noexcept
 void JournalWriter::write(const JournalHead& head, const void* payload,
                           std::size_t bytes) noexcept {
   if (bytes_ == 0) return;
-  begin(bytes);
-  add(static_cast<const std::byte*>(payload), bytes);
-  publish(head);
+  const std::uint64_t at = position_ & (bytes_ - 1);
+  const std::size_t length = sizeof head + bytes;
+  if (bytes > most_ || at + length > bytes_) [[unlikely]] {
+    begin(bytes);
+    add(static_cast<const std::byte*>(payload), bytes);
+    return publish(head);
+  }
+  // the same for most entries, small and without a wrap
+  announce(length);
+  store_words(ring_ + at + sizeof head, static_cast<const std::byte*>(payload), bytes);
+  const std::array<std::uint64_t, 4> words = words_of(head, length);
+  store_words(ring_ + at, reinterpret_cast<const std::byte*>(words.data()), sizeof words);
+  finish(head, length);
+}
+
+/// Before the ring is written: readers learn how far it may be overwritten.
+void JournalWriter::announce(std::size_t length) noexcept {
+  O80_CRASH_POINT("journal.before_begun");
+  counters_->begun.store(position_ + length, std::memory_order_relaxed);
+  std::atomic_thread_fence(std::memory_order_release);  // sync entry
+  O80_CRASH_POINT("journal.before_entry");
+}
+
+/// The head in whole words: to load them from a head that was written field by field would take
+/// longer.
+std::array<std::uint64_t, 4> JournalWriter::words_of(const JournalHead& head,
+                                                     std::size_t length) const noexcept {
+  return {head.first_word(length / 8), number_, static_cast<std::uint64_t>(head.iteration),
+          head.id};
 }
 
 void JournalWriter::begin(std::size_t most) noexcept {
@@ -45,10 +71,7 @@ void JournalWriter::begin(std::size_t most) noexcept {
   room_ = std::min(most, most_);
   const std::uint64_t at = position_ & (bytes_ - 1);
   entry_ = at + sizeof(JournalHead) + room_ <= bytes_ ? ring_ + at : nullptr;
-  O80_CRASH_POINT("journal.before_begun");
-  counters_->begun.store(position_ + sizeof(JournalHead) + room_, std::memory_order_relaxed);
-  std::atomic_thread_fence(std::memory_order_release);  // sync entry
-  O80_CRASH_POINT("journal.before_entry");
+  announce(sizeof(JournalHead) + room_);
 }
 
 void JournalWriter::end(const JournalHead& head) noexcept {
@@ -56,18 +79,20 @@ void JournalWriter::end(const JournalHead& head) noexcept {
 }
 
 void JournalWriter::publish(const JournalHead& head) noexcept {
-  const std::size_t bytes = sizeof head + added_;
-  // whole words: to load them from a head that was written field by field would take longer
-  const std::array words{head.first_word(bytes / 8), number_,
-                         static_cast<std::uint64_t>(head.iteration), head.id};
-  number_ += head.numbers();
+  const std::size_t length = sizeof head + added_;
+  const std::array<std::uint64_t, 4> words = words_of(head, length);
   store(0, reinterpret_cast<const std::byte*>(words.data()), sizeof words);
+  finish(head, length);
+}
+
+void JournalWriter::finish(const JournalHead& head, std::size_t length) noexcept {
+  number_ += head.numbers();
   const std::uint64_t sector = position_ >> sector_shift_;
   if (sector != marked_) {
     marked_ = sector;
     counters_->marks[sector % kJournalSectors].store(position_, std::memory_order_relaxed);
   }
-  position_ += bytes;
+  position_ += length;
   O80_CRASH_POINT("journal.before_published");
   counters_->published.store(position_, std::memory_order_release);  // sync journal
   O80_CRASH_POINT("journal.after_published");

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -99,6 +100,9 @@ class JournalWriter {
   }
   void store_across(std::size_t offset, const std::byte* from, std::size_t bytes) noexcept;
   void publish(const JournalHead& head) noexcept;
+  void announce(std::size_t length) noexcept;
+  std::array<std::uint64_t, 4> words_of(const JournalHead& head, std::size_t length) const noexcept;
+  void finish(const JournalHead& head, std::size_t length) noexcept;
 
   JournalCounters* counters_;
   std::byte* ring_;
