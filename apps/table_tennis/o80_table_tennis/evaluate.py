@@ -80,7 +80,7 @@ def main(
 
 def _play(name: str, match: Match, pacing: Pacing, bars: Progress, *, named: bool) -> Evaluation:
     policy, conditions = contestant(name, balls=match.balls, preset=match.preset)
-    simulated = conditions.balls in ("wide", "narrow")
+    simulated = conditions.balls in ("wide", "narrow", "launcher")
     count = VERDICT_BALLS if match.count is None and simulated else match.count
     label = f"{name}, {pacing.value}" if named else name
     bar = bars.add_task(label, total=count)

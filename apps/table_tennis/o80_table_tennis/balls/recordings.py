@@ -56,7 +56,7 @@ def recording_files(path: Path) -> list[Path]:
     if not path.is_dir():
         raise FileNotFoundError(
             f"{path}: no such file or folder; give a recording ({', '.join(FORMATS)}), "
-            "a folder of them, or the name of simulated shots: narrow, wide"
+            "a folder of them, or the name of simulated shots: narrow, wide, launcher"
         )
     files = sorted(file for file in path.iterdir() if file.suffix in FORMATS)
     if not files:

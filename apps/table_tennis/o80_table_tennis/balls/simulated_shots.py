@@ -7,12 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..world.timing import PERIOD
+from .launcher_shots import LAUNCHER
 from .launches import NARROW, WIDE, Launch, LaunchDistribution
 from .playable import Verdict, verdict
 from .sampled_flight import SampledFlight
 from .trajectories import BallTrajectory
 
-DISTRIBUTIONS: dict[str, LaunchDistribution] = {"narrow": NARROW, "wide": WIDE}
+DISTRIBUTIONS: dict[str, LaunchDistribution] = {
+    "narrow": NARROW,
+    "wide": WIDE,
+    "launcher": LAUNCHER,
+}
 """By the names that `TaskSettings.balls` takes."""
 NUMBERS = 2**31
 """How many shots there are of a distribution and a seed."""

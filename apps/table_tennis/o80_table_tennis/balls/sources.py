@@ -85,7 +85,7 @@ def _of_shot(shot: BallTrajectory, period: float) -> SampledFlight:
 def balls_from(
     balls: str | None, seed: int = 0, period: float = PERIOD, count: int | None = None
 ) -> Flights:
-    """Simulated shots, "narrow" or "wide", or the recorded ones of a path; None: narrow ones.
+    """Simulated shots: "narrow", "wide", "launcher"; or the recorded ones of a path. None: narrow.
 
     `seed` is that of simulated shots, of which there are `count`; None: no end of them. Shared in
     this process. Raises FileNotFoundError or ValueError.

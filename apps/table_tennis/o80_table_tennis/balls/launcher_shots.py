@@ -1,0 +1,49 @@
+"""Shots of the ball launcher, by the launch model of the package o80-devices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .launches import Launch
+from .recordings import LAUNCHER_FRAME
+
+SETTINGS = ((1200.0, 1200.0, 1200.0), (1800.0, 1800.0, 400.0))
+"""Of the motors [1/min], without and with top spin: those of the recorded shots."""
+
+
+def launcher_launch(
+    speeds: tuple[float, float, float], rng: np.random.Generator | None = None
+) -> Launch:
+    """A ball of the launcher at the far end of the table, which shoots at the arm.
+
+    speeds: of the motors top left, top right, bottom [1/min]. rng: of the scatter; None: the mean.
+    Raises ImportError without the package o80-devices.
+    """
+    try:
+        from o80_devices.ball_launcher import LAUNCH_MODEL
+    except ImportError as error:
+        raise ImportError(
+            f"shots of the launcher need its model ({error}): pip install o80-devices"
+        ) from error
+    ball = LAUNCH_MODEL.launch(0.5, 0.5, speeds, rng)
+    ball = ball.placed(LAUNCHER_FRAME.offset, LAUNCHER_FRAME.yaw)
+    return Launch(ball.position, ball.velocity, ball.spin)
+
+
+@dataclass(frozen=True)
+class LauncherShots:
+    """Motor speeds between the two recorded settings, and the scatter of the launcher."""
+
+    def draw(self, rng: np.random.Generator) -> Launch:
+        """Another launch."""
+        share = rng.uniform()
+        left, right, bottom = (
+            (1 - share) * plain + share * top for plain, top in zip(*SETTINGS, strict=True)
+        )
+        return launcher_launch((left, right, bottom), rng)
+
+
+LAUNCHER = LauncherShots()
+"""Like the shots of the recorded launcher, and between its two settings."""
