@@ -87,7 +87,7 @@ class Sensor:
         self._waited: Frame | None = None
         self._has_waited = False
         self._pace = FramePace()
-        self._begin = self._last_arrival = 0
+        self._last_seen: int | None = None  # [ns] on the clock of the rows
         self._last_number: int | None = None
         self._lost = 0
         self._connection = 0
@@ -136,10 +136,13 @@ class Sensor:
         self._pace.returned(time.monotonic_ns(), missed=self._waited is None)
 
     def read(self, reading: Reading) -> None:
-        self._begin = self._begin or reading.time
+        if self._last_seen is None:
+            self._last_seen = reading.time
         frame = self._waited if self._has_waited else self._frames.taken(reading.time)
         self._waited, self._has_waited = None, False
-        if frame is None or not self._tell(frame, reading):
+        if frame is not None and self._tell(frame, reading):
+            self._last_seen = reading.time
+        else:
             reason = self._why_none(reading.time)
             reading.extended = {"reason": reason, "capture_time": 0, "capture_error": 0, "stamp": 0}
             reading.extended = dict.fromkeys(self.subjects.values(), UNSEEN)
@@ -163,7 +166,6 @@ class Sensor:
             if capture is None:
                 return False
             capture_time, error, epoch = capture.time, capture.error, capture.epoch
-        self._last_arrival = frame.arrival
         self._count_lost(frame.number)
         reading.extended = {
             "reason": Reason.SEEN,
@@ -196,7 +198,7 @@ class Sensor:
         reason = self._frames.reason
         if reason is not Reason.SEEN:
             return reason
-        silence = now - max(self._last_arrival, self._begin)
+        silence = now - (self._last_seen or 0)
         return Reason.SILENT if silence > self._config.gap * SECOND else Reason.NO_NEW_FRAME
 
 
