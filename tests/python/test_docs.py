@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-FOLDERS = ("apps", "benchmarks", "docs", "examples", "robots", "simulators", "tests")
+FOLDERS = ("apps", "benchmarks", "devices", "docs", "examples", "robots", "simulators", "tests")
 PAGES = sorted([*ROOT.glob("*.md"), *(page for f in FOLDERS for page in (ROOT / f).rglob("*.md"))])
 LINK = re.compile(r"\]\(([^)#\s]*)(?:#([^)\s]+))?\)")
 NAME = re.compile(r"`(?:(\w+)::)?(\w+)`")
@@ -14,7 +14,7 @@ SOURCE = re.compile(r"`([\w/]+\.(?:cpp|hpp|py))`")
 PAGE = re.compile(r"((?:\b(?:docs|tests/proofs/models|benchmarks)/\w+|\b[A-Z]+)\.md)(?:#([\w-]+))?")
 SOURCES = [
     path
-    for folder in ("apps", "include", "python", "robots", "simulators", "src", "tests")
+    for folder in ("apps", "devices", "include", "python", "robots", "simulators", "src", "tests")
     for path in (ROOT / folder).rglob("*")
     if path.suffix in {".hpp", ".cpp", ".py"} and path != Path(__file__)
 ]

@@ -41,7 +41,7 @@ def main(
     ],
     balls: Annotated[
         str | None,
-        typer.Option(help="wide, narrow, or recordings. [default: of the policy]"),
+        typer.Option(help="wide, narrow, launcher, or recordings. [default: of the policy]"),
     ] = None,
     count: Annotated[
         int | None,

@@ -110,8 +110,9 @@ class TaskSettings:
     task: str | Task = "return"
     """return, smash, hit or reach; or an object of your own, see `task.task.Task`."""
     balls: str | None = None
-    """Simulated shots, "narrow" (like those of the recorded ball gun) or "wide"; or the path of a
-    recording, or of a folder of them. None: narrow."""
+    """Simulated shots: "narrow" (like those of the recorded ball gun), "wide", or "launcher" (those
+    of the ball launcher, needs o80-devices). Or the path of a recording, or of a folder of them.
+    None: narrow."""
     ball_seed: int = 0
     """Of the simulated shots: each seed has its own."""
     ball_count: int | None = None

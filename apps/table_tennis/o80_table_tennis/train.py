@@ -36,7 +36,8 @@ def main(
     ] = None,
     way: Annotated[str, typer.Option(help="Set of settings: ours or published.")] = "ours",
     balls: Annotated[
-        str | None, typer.Option(help="To train with: wide, narrow, or recordings. [default: wide]")
+        str | None,
+        typer.Option(help="To train with: wide, narrow, launcher, or recordings. [default: wide]"),
     ] = None,
     blind: Annotated[bool, typer.Option(help="Train without seeing the ball: a baseline.")] = False,
     blind_share: Annotated[

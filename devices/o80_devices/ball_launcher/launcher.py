@@ -1,9 +1,10 @@
-"""The protocol of the launcher as a machine of states, stepped by its user; it never blocks.
+"""The protocol of the launcher as a state machine that its user steps; it never blocks.
 
-One exchange runs at a time. A launch is sent only after the launcher has confirmed the state, is
-sent at most once, and after one whose outcome nobody knows the launcher is *unknown*: no launch is
-sent for the longest time that one takes, nor before two states have been confirmed. Two, because a
-server takes requests of several connections in turn: at the second reply it holds no older request.
+One exchange runs at a time. A launch is sent only after the launcher has confirmed the state, and
+at most once. If the outcome of a launch is unknown, no other launch is sent for the longest time
+that a launch takes, nor before two states have been confirmed. One confirmation would not suffice:
+the server takes requests of several connections in turn, so only at the second reply does it hold
+no older request.
 """
 
 from __future__ import annotations
@@ -25,13 +26,13 @@ class Status(IntEnum):
 
     disconnected = 0
     setting = 1
-    """It is being told the state, and has not confirmed it."""
+    """The state was sent and is not confirmed yet."""
     ready = 2
     launching = 3
     unknown = 4
     """A launch was not answered: it may still be under way."""
     refused = 5
-    """It has refused the state; it is asked again."""
+    """It has refused the state, which is sent again."""
 
 
 class LastLaunch(IntEnum):
@@ -43,7 +44,7 @@ class LastLaunch(IntEnum):
     """By the launcher: no ball, for example."""
     not_sent = 3
     timed_out = 4
-    """Sent, and not answered: nobody knows whether a ball was launched."""
+    """Sent and not answered: a ball may have been launched."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +118,7 @@ class Launcher:
     # ------------------------------------------------------------------ launches
 
     def ask(self, now: int) -> None:
-        """Asks for a launch. Raises RequestRejected if it cannot be."""
+        """Asks for a launch. Raises RequestRejected if a launch is impossible now."""
         status = self.status(now)
         if self._asked or status is Status.launching:
             raise RequestRejected("a launch is under way: wait until it has ended")
@@ -133,7 +134,7 @@ class Launcher:
         self._asked, self._frozen, self._end = True, None, None
 
     def cancel(self) -> None:
-        """Takes back a launch that was not sent; one that was sent goes on."""
+        """Cancels a launch that was not sent yet; a launch that was sent goes on."""
         if self._asked and not self._is_launching():
             self._asked = False
 

@@ -1,4 +1,4 @@
-"""Whether the launcher is there: a connection of its own that carries heartbeats only."""
+"""Whether the launcher is connected: a connection of its own that carries heartbeats only."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where to look in each image, and what is there.
+"""Where to look in each image, and what is found there.
 
 While a ball is followed, each camera looks around the place where the ball will be. Otherwise it
 looks around what it saw before, and one camera at a time searches its whole image, at every

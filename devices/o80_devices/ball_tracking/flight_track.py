@@ -1,4 +1,4 @@
-"""Which ball it is, and how it flies: the filter, and what to do when it is surprised."""
+"""Number and flight of the ball: the filter, and what to do with unexpected positions."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Tracked:
     covariance: FloatArray = field(default_factory=lambda: np.full((9, 9), np.nan))
     """(9, 9) of position, velocity and spin."""
     measured: FloatArray = field(default_factory=_nothing)
-    """(3,) The place on which the cameras agree in this moment alone [m]."""
+    """(3,) The place on which the cameras agree at this moment, not filtered [m]."""
     cameras: int = 0
     """Bits, of those that agree."""
     residual: float = float("nan")
@@ -72,7 +72,7 @@ class Point:
 
 
 class FlightTrack:
-    """Follows one ball. A surprise must come twice: then it is a hit, or another ball."""
+    """Follows one ball. Two unexpected positions that agree are a hit, or another ball."""
 
     def __init__(self, law: _vision.FlightLaw, forget: float) -> None:
         self._law = law

@@ -1,4 +1,4 @@
-"""A ball launcher that is none: it speaks the protocol, takes its time, and fails when asked to.
+"""A fake ball launcher: it speaks the protocol, with its delays, and with faults on request.
 
 python -m o80_devices.fakes.ball_launcher --magazine 20 --refuse 0.1
 """

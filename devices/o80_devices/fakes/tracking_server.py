@@ -1,4 +1,4 @@
-"""A tracking server that is none: it publishes thrown balls, or recorded ones.
+"""A fake tracking server: it publishes thrown balls, or recorded ones.
 
 python -m o80_devices.fakes.tracking_server --lose 0.1
 python -m o80_devices.fakes.tracking_server --recording o80_robot_ball_002
@@ -74,7 +74,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--noise", type=float, default=0.003, help="of thrown balls [m]")
     parser.add_argument("--lose", type=float, default=0.0, help="share of messages that are lost")
     parser.add_argument("--clock", type=float, default=1e9, help="its clock at the start [s]")
-    parser.add_argument("--pause-at", type=float, default=-1.0, help="when it falls silent [s]")
+    parser.add_argument("--pause-at", type=float, default=-1.0, help="when it makes a pause [s]")
     parser.add_argument("--pause", type=float, default=2.0, help="for how long [s]")
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args(arguments)

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from o80.extras import needed
+
 from .launches import Launch
 from .recordings import LAUNCHER_FRAME
+
+if TYPE_CHECKING:
+    from o80_devices.ball_launcher import LaunchModel
 
 SETTINGS = ((1200.0, 1200.0, 1200.0), (1800.0, 1800.0, 400.0))
 """Of the motors [1/min], without and with top spin: those of the recorded shots."""
@@ -19,22 +25,19 @@ def launcher_launch(
     """A ball of the launcher at the far end of the table, which shoots at the arm.
 
     speeds: of the motors top left, top right, bottom [1/min]. rng: of the scatter; None: the mean.
-    Raises ImportError without the package o80-devices.
+    Raises o80.MissingExtra without the package o80-devices.
     """
-    try:
-        from o80_devices.ball_launcher import LAUNCH_MODEL
-    except ImportError as error:
-        raise ImportError(
-            f"shots of the launcher need its model ({error}): pip install o80-devices"
-        ) from error
-    ball = LAUNCH_MODEL.launch(0.5, 0.5, speeds, rng)
+    model: LaunchModel = needed(
+        "o80_devices.ball_launcher", None, "a shot of the launcher", package="o80-devices"
+    ).LAUNCH_MODEL
+    ball = model.launch(0.5, 0.5, speeds, rng)
     ball = ball.placed(LAUNCHER_FRAME.offset, LAUNCHER_FRAME.yaw)
     return Launch(ball.position, ball.velocity, ball.spin)
 
 
 @dataclass(frozen=True)
 class LauncherShots:
-    """Motor speeds between the two recorded settings, and the scatter of the launcher."""
+    """Motor speeds drawn between the two recorded settings, with the scatter of the launcher."""
 
     def draw(self, rng: np.random.Generator) -> Launch:
         """Another launch."""

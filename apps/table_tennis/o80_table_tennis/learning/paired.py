@@ -1,4 +1,4 @@
-"""The same balls played twice by one policy, accelerated and in real time: ball by ball."""
+"""One policy plays the same balls accelerated and in real time: the results ball by ball."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .evaluation import Evaluation
 
 @dataclass(frozen=True)
 class Paired:
-    """Balls by where they were returned, and how late the actions were in real time."""
+    """How many balls were returned in which way, and how many actions were late in real time."""
 
     both: int
     only_accelerated: int
@@ -19,9 +19,9 @@ class Paired:
     actions: int
     """In real time."""
     late_actions: int
-    """That came after the iteration for which they were meant, and acted at once."""
+    """Actions that were sent after their iteration had begun, and acted at once."""
     stalled_episodes: int
-    """That ended because the player fell too far behind."""
+    """Episodes that ended because the player fell too far behind."""
 
     @classmethod
     def of(cls, accelerated: Evaluation, real_time: Evaluation) -> Paired:

@@ -1,8 +1,8 @@
 """Whether a network has got stuck, so that the training continues with a new one.
 
-Some networks learn early to return the balls of one side and then stay there: the way to the others
-leads through worse returns. Longer training does not help them, see docs/learning.md. The share of
-touched balls shows it before half of the training is over.
+Some networks learn early to return the balls that fly to one side, and never learn the others.
+Longer training does not help them, see docs/learning.md. A low share of touched balls shows this
+before half of the training is over.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from .settings import LearningSettings
 def stuck(settings: LearningSettings, *, begun: int, decisions: int, touched: float) -> bool:
     """Whether a network that began at the decision `begun` should be replaced now.
 
-    It is judged in one update only, the first after as many decisions as the settings say. It is
-    kept if the training ends before a new one could be judged. A blind network is always kept, as
-    it cannot touch so many balls.
+    A network is judged once, in the first update after `restart.after` decisions. It is kept if a
+    new network could not be judged before the end of the training. A blind network is always kept,
+    because it cannot touch so many balls.
 
     touched: share of the last balls, with exploration.
     """

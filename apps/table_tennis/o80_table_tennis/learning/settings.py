@@ -49,7 +49,7 @@ class RestartSettings:
     """When a network that has got stuck is replaced by a new one, see `restarts`."""
 
     after: int = 600_000
-    """Decisions of a network, after which it is judged, once."""
+    """A network is judged once, after so many decisions of its own."""
     touched: float = 0.65
     """Share of the balls that it must touch by then, with exploration; 0: all are kept."""
 

@@ -111,8 +111,8 @@ class Training:
 
     @property
     def environment_share(self) -> float:
-        """Of the processor time since the start or the last resumption, without evaluations; NaN
-        if actors stepped the environments, or nobody did.
+        """The environments' share of the processor time since the start or the last resumption,
+        without evaluations; NaN if they were not stepped in this process.
         """
         spent = time.process_time() - self._processor - self._evaluating
         inside = seconds_in(self._environments)
@@ -183,7 +183,7 @@ class _Updates(BaseCallback):
         return spent < self._training.settings.minutes
 
     def _on_rollout_start(self) -> None:
-        self._training.replace_if_stuck()  # the update before was still of the old network
+        self._training.replace_if_stuck()  # after the last update of the old network
 
     def _on_rollout_end(self) -> None:
         training = self._training

@@ -30,7 +30,7 @@ class Conditions:
     """Steps of 10 ms that an action lasts."""
     reward: str = "ordered"
     balls: str = "wide"
-    """Simulated shots, wide or narrow; or a path of recordings."""
+    """Simulated shots: wide, narrow or launcher; or a path of recordings."""
 
     def rig(self, pacing: Pacing = Pacing.INLINE) -> RigSettings:
         """The arm and its twin."""

@@ -148,8 +148,8 @@ def film_side_by_side(
 ) -> int:
     """One film of several episodes, each of joints (T, 4) [rad] and its ball (T, 3) [m].
 
-    Each has its name above it. They begin together; one that has ended shows its last row. Returns
-    how many frames it has.
+    The name of each episode stands above its picture. All begin together; an episode that has ended
+    shows its last row. Returns the number of frames.
     """
     step = max(1, round(1.0 / (frames_per_second * slow * period)))
     rows = max(len(joints) for joints, _ in episodes.values())
