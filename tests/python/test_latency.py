@@ -120,9 +120,15 @@ def test_the_command_tells_the_delay_in_a_recording(segment: str, tmp_path: Path
     assert "write SEGMENT:FIELD" in command("arm", observed, *where, code=1)
 
 
-def test_the_program_of_the_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
-    (program,) = re.findall(r"^```python\n(.*?)^```", PAGE.read_text(), re.MULTILINE | re.DOTALL)
-    exec(compile(program, str(PAGE), "exec"), {})
-    shape, other, age = capsys.readouterr().out.splitlines()
+def test_the_programs_of_the_page_run(capsys: pytest.CaptureFixture[str]) -> None:
+    programs = re.findall(r"^```python\n(.*?)^```", PAGE.read_text(), re.MULTILINE | re.DOTALL)
+    assert len(programs) == 2
+    for program in programs:
+        exec(compile(program, str(PAGE), "exec"), {})
+    shape, other, age, capture = capsys.readouterr().out.splitlines()
     assert (shape, other) == ("(501,)", "(501, 2)")
     assert 0 < float(age) < 1 / 180
+    time, error, epoch = capture.split()
+    assert int(time) > 0
+    assert int(error) > 0
+    assert int(epoch) >= 0

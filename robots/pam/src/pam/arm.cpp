@@ -123,11 +123,15 @@ void rub(const Joints& friction, const JointMatrix& lower, double duration, Join
   // projected Gauss-Seidel on the impulses
   const JointMatrix response = responses(lower);
   Joints impulse{};
-  for (int sweep = 0; sweep < 20; ++sweep) {
+  bool settled = false;
+  for (int sweep = 0; sweep < 20 && !settled; ++sweep) {
+    settled = true;
     for (std::size_t j = 0; j < kJoints; ++j) {
       const double most = duration * friction[j];
       const double next = std::clamp(impulse[j] - dq[j] / response[j][j], -most, most);
       const double change = next - impulse[j];
+      if (change == 0.0) continue;
+      settled = false;
       impulse[j] = next;
       for (std::size_t i = 0; i < kJoints; ++i) dq[i] += response[j][i] * change;
     }
@@ -146,13 +150,17 @@ void stop_at_limits(const Joints& q, const JointMatrix& lower, double duration, 
   // projected Gauss-Seidel on the impulses; at most one of the two stops of a joint is near
   const JointMatrix response = responses(lower);
   Joints impulse{};
-  for (int sweep = 0; sweep < 20; ++sweep) {
+  bool settled = false;
+  for (int sweep = 0; sweep < 20 && !settled; ++sweep) {
+    settled = true;
     for (std::size_t j = 0; j < kJoints; ++j) {
       const double side = q[j] > 0.0 ? 1.0 : -1.0;
       const double allowed = (kJointLimit - side * q[j]) / duration;  // speed towards the stop
       const double excess = side * dq[j] - allowed;
       const double next = std::max(0.0, impulse[j] + excess / response[j][j]);
       const double change = side * (next - impulse[j]);
+      if (change == 0.0) continue;
+      settled = false;
       impulse[j] = next;
       for (std::size_t i = 0; i < kJoints; ++i) dq[i] -= response[j][i] * change;
     }
