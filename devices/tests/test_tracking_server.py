@@ -6,6 +6,7 @@ import os
 import time
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from o80_devices.ball_tracking.server_messages import (
     ServerTrack,
 )
 from o80_devices.ball_tracking.throws import Throws
+from o80_devices.ball_tracking.tracking_server import Options, TrackingServer
 from o80_devices.fakes.tracking_server import FakeTrackingServer, thrown
 
 PATIENCE = 60.0  # [s] longer than anything here takes on any machine
@@ -53,6 +55,7 @@ def test_a_message_is_read_as_it_was_sent() -> None:
         b'{"time": 5, "obs": [1, 2]}',
         b'{"time": 5, "obs": [1, 2, NaN]}',
         b'{"time": 5, "obs": [1, 2, 1e9]}',
+        b'{"time": 5, "obs": [1, 2, 1' + b"0" * 400 + b"]}",  # larger than any float
         b'{"time": 5, "obs": [1, 2, "3"]}',
         b"[" * 100_000,
     ],
@@ -62,6 +65,23 @@ def test_a_message_that_is_none_is_marked_and_the_next_one_is_taken(content: byt
     assert track.take(content, SECOND).reason is ServerReason.invalid
     good = track.take(Message(OFFSET, np.zeros(3)).encoded(), 2 * SECOND)
     assert good.reason is ServerReason.seen
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"noise": 0.0},
+        {"timeout": math.nan},
+        {"latency": -0.001},
+        {"latency": math.inf},
+        {"translation": (math.nan, 0.0, 0.0)},
+        {"rotation": (0.0, 0.0, math.inf)},
+    ],
+)
+def test_an_option_out_of_range_is_named(options: dict[str, Any]) -> None:
+    (name,) = options
+    with pytest.raises(o80.InvalidArgument, match=f"{name} must be"):
+        TrackingServer(Options(**options))
 
 
 def test_a_place_is_turned_and_moved_into_the_world() -> None:

@@ -81,7 +81,7 @@ class Message:
 
 
 def _is_length(value: Any) -> bool:
-    return type(value) in (int, float) and math.isfinite(value) and abs(value) < FARTHEST
+    return type(value) in (int, float) and abs(value) < FARTHEST  # also false for NaN
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,6 @@ from o80.errors import DriverError
 from o80_devices import zeromq
 from o80_devices.ball_tracking.server_messages import Place, Seen, ServerReason, ServerTrack
 
-
 @dataclass
 class Options:
     """Options of the client of a tracking server."""
@@ -66,6 +65,13 @@ class TrackingServer:
         for name in ("noise", "timeout", "most_age", "forget"):
             if not 0.0 < getattr(config, name) < 1e6:
                 raise o80.InvalidArgument(f"{name} must be positive, got {getattr(config, name):g}")
+        if not 0.0 <= config.latency < 1e6:
+            raise o80.InvalidArgument(f"latency must be at least 0 s, got {config.latency:g}")
+        for name in ("translation", "rotation"):
+            if not np.isfinite(getattr(config, name)).all():
+                raise o80.InvalidArgument(
+                    f"{name} must be three finite numbers, got {getattr(config, name)}"
+                )
         self._config = config
         self._track = ServerTrack(
             Place(config.translation, config.rotation),
