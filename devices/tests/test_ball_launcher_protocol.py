@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 import pytest
 import zmq
 from launcher_bench import PATIENCE, Bench
+from zmq.utils.monitor import parse_monitor_message
 
 from o80 import RequestRejected
 from o80_devices.ball_launcher.exchange import DELIVERED_WITHIN, Exchange, Outcome
@@ -29,6 +30,29 @@ def make() -> Iterator[Make]:
     yield bench
     for each in made:
         each.close()
+
+
+class Missed:
+    """The events of a connection that was lost and came back, all read at once."""
+
+    def __init__(self, monitor: zmq.Socket[bytes]) -> None:
+        self._monitor = monitor
+        self._events: list[list[bytes]] = []
+        newest = None
+        while newest != zmq.EVENT_HANDSHAKE_SUCCEEDED:
+            assert monitor.poll(round(1000 * PATIENCE))
+            self._events.append(monitor.recv_multipart())
+            newest = parse_monitor_message(self._events[-1])["event"]
+        assert len(self._events) > 1
+
+    def poll(self, timeout: int) -> bool:
+        return bool(self._events) or self._monitor.poll(timeout) > 0
+
+    def recv_multipart(self, flags: int) -> list[bytes]:
+        return self._events.pop(0) if self._events else self._monitor.recv_multipart(flags)
+
+    def close(self, linger: int) -> None:
+        self._monitor.close(linger)
 
 
 def finished(bench: Bench) -> LastLaunch:
@@ -155,6 +179,22 @@ def test_a_launch_that_was_asked_for_before_the_connection_broke_is_not_sent(mak
     bench.fake.bind(bench.address)
     bench.until(lambda: bench.status is Status.ready)
     assert bench.received == 0
+
+
+def test_a_launcher_that_restarts_between_two_steps_is_told_its_state_again(make: Make) -> None:
+    """A late step of the driver sees both the loss and the new connection."""
+    bench = make()
+    bench.wanted = State(0.4, 0.6)
+    bench.step()
+    bench.until(lambda: bench.status is Status.ready)
+    bench.fake.die()
+    bench.fake.bind(bench.address)
+    assert bench.fake.state == State()
+    bench.link._monitor = Missed(bench.link._monitor)
+    bench.step()
+    assert bench.status is not Status.ready
+    bench.until(lambda: bench.status is Status.ready)
+    assert bench.fake.state == bench.wanted.rounded()
 
 
 def test_the_kernel_gives_up_a_request_after_a_pulled_cable(make: Make) -> None:

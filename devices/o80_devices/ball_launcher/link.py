@@ -36,13 +36,19 @@ class Link:
             ) from None
 
     def is_up(self) -> bool:
-        """Whether the launcher is connected, by what is known now."""
+        """Whether the launcher is connected, and was at every moment since the last call.
+
+        A launcher that has started again between two calls has lost its state, so that one call
+        must return False although the connection stands.
+        """
         from zmq.utils.monitor import recv_monitor_message
 
+        was_lost = False
         while self._monitor.poll(0):
             event = recv_monitor_message(self._monitor, self._zmq.NOBLOCK)["event"]
             self._up = event == self._zmq.EVENT_HANDSHAKE_SUCCEEDED
-        return self._up
+            was_lost = was_lost or not self._up
+        return self._up and not was_lost
 
     def close(self) -> None:
         self._socket.disable_monitor()
