@@ -1,5 +1,6 @@
 """The ball launcher as a robot, beside a fake one in the same process."""
 
+import math
 import threading
 import time
 from collections.abc import Iterator
@@ -7,7 +8,8 @@ from collections.abc import Iterator
 import pytest
 
 import o80
-from o80_devices.ball_launcher import LastLaunch, Status
+from o80_devices.ball_launcher import BallLauncher, LastLaunch, Status
+from o80_devices.ball_launcher.driver import Options
 from o80_devices.ball_launcher.messages import State
 from o80_devices.fakes.ball_launcher import Behaviour, FakeLauncher
 
@@ -95,6 +97,53 @@ def test_a_halt_stops_the_motors(served: Served, robot: o80.Frontend) -> None:
     robot.burst(5)
     assert served.fake.state == State()
     assert list(robot.latest().desired) == [0.5, 0.5, 0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"launch_timeout": 0.5},
+        {"state_timeout": 0.0},
+        {"stop_timeout": -1.0},
+        {"heartbeat_timeout": 0.0001},
+        {"heartbeat_timeout": math.nan},
+        {"phi": math.nan},
+    ],
+)
+def test_an_option_out_of_range_is_named(options: dict[str, float]) -> None:
+    (name,) = options
+    with pytest.raises(o80.InvalidArgument, match=f"{name} must be"):
+        BallLauncher(Options(**options))
+
+
+def test_a_stop_without_connection_says_that_the_motors_may_turn(
+    served: Served, capsys: pytest.CaptureFixture[str]
+) -> None:
+    launcher = o80.robots.load(ROBOT)
+    with launcher.inline("test-launcher", address=served.address, heartbeat_timeout=0.0) as robot:
+        until(robot, "status", Status.ready)
+        served.die()
+        until(robot, "status", Status.disconnected)
+    assert "cannot be told to stop its motors" in capsys.readouterr().out
+
+
+def test_a_stop_while_a_state_is_set_is_confirmed_after_it(
+    served: Served, robot: o80.Frontend
+) -> None:
+    """The launcher takes requests of two connections in turn: the older one may come second."""
+    until(robot, "status", Status.ready)
+    served.fake._behaviour = Behaviour(state_time=0.2)
+    robot.add_command("bottom_motor", 0.5, iterations=1)
+    robot.pulse()
+    robot.burst(1)
+    end = time.monotonic() + PATIENCE
+    while served.fake.requests[-1].state != State(bottom_motor=0.5):
+        assert time.monotonic() < end
+        robot.burst(1)
+    robot.close()
+    assert served.fake.state == State()
+    assert served.fake.busy is None
+    assert [request.state for request in served.fake.requests[-2:]] == [State(), State()]
 
 
 def test_without_a_launcher_no_value_is_given_and_it_comes_back(

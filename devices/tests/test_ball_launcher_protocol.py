@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator
+from typing import cast
 
 import pytest
 import zmq
@@ -10,7 +11,7 @@ from zmq.utils.monitor import parse_monitor_message
 
 from o80 import RequestRejected
 from o80_devices.ball_launcher.exchange import DELIVERED_WITHIN, Exchange, Outcome
-from o80_devices.ball_launcher.launcher import SECOND, LastLaunch, Status
+from o80_devices.ball_launcher.launcher import CONFIRMATIONS, SECOND, LastLaunch, Launcher, Status
 from o80_devices.ball_launcher.messages import Kind, Request, State
 from o80_devices.fakes.ball_launcher import Behaviour, FakeLauncher
 
@@ -132,6 +133,53 @@ def test_a_crash_in_a_launch_is_unknown_at_once_and_ends_after_the_longest_launc
     bench.client.ask(bench.now)
     assert finished(bench) is LastLaunch.completed
     assert bench.received == 2
+
+
+def test_a_new_state_is_sent_while_a_launch_is_unknown(make: Make) -> None:
+    """A halt must stop the motors, also in that time. It does not end the wait for the launch."""
+    bench = make(Behaviour(state_time=0.0, launch_time=2.0, crash_at=1))
+    bench.wanted = State(top_left_motor=0.5)
+    bench.client.ask(bench.now)
+    assert finished(bench) is LastLaunch.timed_out
+    bench.fake.bind(bench.address)
+    bench.wanted = State(phi=0.25)
+    bench.until(lambda: bench.fake.state == bench.wanted)
+    assert bench.status is Status.unknown
+    states = len(bench.fake.requests)
+    bench.until(lambda: bench.status is not Status.unknown, SECOND // 10)
+    assert bench.status is Status.setting
+    assert len(bench.fake.requests) <= states + 1, "the state is sent again and again"
+    bench.until(lambda: bench.status is Status.ready)
+    assert len(bench.fake.requests) >= states + CONFIRMATIONS
+
+
+class Scripted:
+    """Exchanges that end as they are told, in this order."""
+
+    def __init__(self, *outcomes: Outcome) -> None:
+        self.outcomes = list(outcomes)
+        self.requests: list[Request] = []
+        self.sent = True
+
+    def exchange(self, request: Request, deliver_by: int, wait: int) -> Exchange:
+        self.requests.append(request)
+        return cast(Exchange, self)
+
+    def poll(self, now: int) -> Outcome:
+        return self.outcomes.pop(0)
+
+
+def test_a_state_that_was_not_delivered_does_not_count_as_a_confirmation() -> None:
+    """The launcher may still hold a launch: two replies are needed to know that it does not."""
+    done = Outcome.done
+    wire = Scripted(Outcome.unanswered, Outcome.not_delivered, done, done)
+    launcher, now = Launcher(wire), SECOND
+    while len(wire.outcomes) > 1:
+        launcher.step(now, True, State())
+        now += 10 * SECOND
+    assert launcher.status(now) is Status.setting
+    launcher.step(now, True, State())
+    assert launcher.status(now) is Status.ready
 
 
 def test_an_old_launch_is_waited_for_even_if_the_launcher_sleeps_longer(make: Make) -> None:

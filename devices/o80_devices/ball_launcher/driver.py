@@ -11,12 +11,20 @@ import numpy as np
 import o80
 from o80.drivers import Desired, Reading, option
 from o80_devices import zeromq
-from o80_devices.ball_launcher.exchange import Exchange, Outcome
-from o80_devices.ball_launcher.launcher import SECOND, LastLaunch, Launcher, Status, Timing
+from o80_devices.ball_launcher.exchange import DELIVERED_WITHIN, Exchange, Outcome
+from o80_devices.ball_launcher.launcher import (
+    CONFIRMATIONS,
+    SECOND,
+    LastLaunch,
+    Launcher,
+    Status,
+    Timing,
+)
 from o80_devices.ball_launcher.link import Link
 from o80_devices.ball_launcher.messages import NAMES, Kind, Request, State
 
 POLL = 0.005  # [s]
+LEAST_WAIT = 1e-3 * DELIVERED_WITHIN  # for a reply [s]
 
 
 @dataclass
@@ -32,7 +40,7 @@ class Options:
     heartbeat_timeout: float = option(
         0.1, "without a heartbeat, after which it is disconnected; 0: no heartbeats", "s"
     )
-    stop_timeout: float = option(2.0, "for stopping the motors at the end", "s")
+    stop_timeout: float = option(3.0, "for stopping the motors at the end", "s")
 
 
 class BallLauncher:
@@ -66,9 +74,16 @@ class BallLauncher:
                 raise o80.InvalidArgument(
                     f"{name} must be positive [s], got {getattr(config, name):g}"
                 )
-        if not 0.0 <= config.heartbeat_timeout < 60.0:
+        for name in ("state_timeout", "launch_timeout"):
+            if getattr(config, name) < LEAST_WAIT:
+                raise o80.InvalidArgument(
+                    f"{name} must be at least {LEAST_WAIT:g} s, because the kernel may deliver a "
+                    f"request so late, got {getattr(config, name):g}"
+                )
+        if config.heartbeat_timeout != 0.0 and not 0.01 <= config.heartbeat_timeout <= 60.0:
             raise o80.InvalidArgument(
-                f"heartbeat_timeout must be 0, or less than 60 s, got {config.heartbeat_timeout:g}"
+                "heartbeat_timeout must be 0, or between 0.01 and 60 s, got "
+                f"{config.heartbeat_timeout:g}"
             )
         for name in ("phi", "theta"):
             if not 0.0 <= getattr(config, name) <= 1.0:
@@ -77,7 +92,7 @@ class BallLauncher:
                 )
         self._config = config
         self._wanted = self._known = State(config.phi, config.theta)
-        self._halted = False
+        self._halted = self._was_connected = False
         self._zmq: Any = None
 
     # ------------------------------------------------------------------ verbs
@@ -110,6 +125,7 @@ class BallLauncher:
         if not reading.runs("launch"):
             launcher.cancel()
         connected = self._link.is_up()
+        self._was_connected = self._was_connected or connected
         launcher.step(now, connected, self._wanted)
         status = launcher.status(now)
         if (end := launcher.ended()) is not None:
@@ -146,28 +162,35 @@ class BallLauncher:
     def stop(self) -> None:
         if self._zmq is None or not hasattr(self, "_launcher"):
             return
+        replies = CONFIRMATIONS if self._launcher.may_hold_older_requests else 1
         self._launcher.close()
         if self._link.is_up():
-            self._stop_motors()
+            self._stop_motors(replies)
+        elif self._was_connected:
+            self._warn("is disconnected, and cannot be told to stop its motors")
         self._link.close()
         self._context.destroy(linger=0)
 
-    def _stop_motors(self) -> None:
-        wait = round(self._config.stop_timeout * SECOND)
-        state = State(self._wanted.phi, self._wanted.theta)
+    def _stop_motors(self, replies: int) -> None:
+        seconds = self._config.stop_timeout
+        end = time.monotonic_ns() + round(seconds * SECOND)
+        if not all(self._motors_stop(end) for _ in range(replies)):
+            self._warn(f"did not confirm within {seconds:g} s that its motors stop")
+
+    def _motors_stop(self, end: int) -> bool:
+        """Whether the launcher confirms it until a time [ns]."""
         now = time.monotonic_ns()
-        last = self.exchange(Request(Kind.SET_STATE, state), now + wait, wait)
-        end = now + wait
+        state = State(self._wanted.phi, self._wanted.theta)
+        last = self.exchange(Request(Kind.SET_STATE, state), end, max(0, end - now))
         while last.poll(now) is Outcome.pending and now < end:
             time.sleep(POLL)
             now = time.monotonic_ns()
         last.close()
-        if last.outcome is not Outcome.done:
-            print(
-                f"the ball launcher at {self._config.address} did not confirm within "
-                f"{self._config.stop_timeout:g} s that its motors stop: look whether they do",
-                flush=True,
-            )
+        return last.outcome is Outcome.done
+
+    def _warn(self, what: str) -> None:
+        address = self._config.address
+        print(f"the ball launcher at {address} {what}: look whether they stand still", flush=True)
 
 
 _PROGRESS = {

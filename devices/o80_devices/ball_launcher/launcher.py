@@ -2,9 +2,10 @@
 
 One exchange runs at a time. A launch is sent only after the launcher has confirmed the state, and
 at most once. If the outcome of a launch is unknown, no other launch is sent for the longest time
-that a launch takes, nor before two states have been confirmed. One confirmation would not suffice:
-the server takes requests of several connections in turn, so only at the second reply does it hold
-no older request.
+that a launch takes, nor before two states have been confirmed after that time. One confirmation
+would not suffice: the server takes requests of several connections in turn, so only at the second
+reply does it hold no older request. New states are sent also in that time: a halt must stop the
+motors.
 """
 
 from __future__ import annotations
@@ -78,7 +79,7 @@ class Launcher:
         self._sending = self._wanted = State()
         self._confirmed: State | None = None
         self._to_confirm = CONFIRMATIONS
-        self._connected = False
+        self._connected = self._began_unknown = False
         self._asked = False
         self._frozen: State | None = None  # the wanted state when the launch was asked for
         self._retry_at = self._unknown_until = 0
@@ -167,6 +168,12 @@ class Launcher:
             take(outcome, now)
         self._begin(now, self._wanted)
 
+    @property
+    def may_hold_older_requests(self) -> bool:
+        """Whether the launcher may execute an older request after it has replied to a newer one."""
+        is_sent = self._exchange is not None and self._exchange.sent
+        return is_sent or self._to_confirm == CONFIRMATIONS
+
     def close(self) -> None:
         """Ends what is under way."""
         if self._exchange is not None:
@@ -183,32 +190,34 @@ class Launcher:
                 why = "the launcher was disconnected before the launch was sent"
                 self._end_launch(LastLaunch.not_sent, why)
             return
-        if now < self._unknown_until:
-            return
         if self._asked:
             self._frozen = wanted = self._frozen or wanted
         if self._refused is not None and self._refused != wanted:
             self._refused, self._retry_at = None, now
-        if not self._is_confirmed() or self._confirmed != wanted:
+        unknown = now < self._unknown_until
+        if self._confirmed != wanted or not (unknown or self._is_confirmed()):
             if now >= self._retry_at:
                 self._sending = wanted
                 self._send(Kind.SET_STATE, now)
-        elif self._asked:
+        elif self._asked and not unknown:
             self._send(Kind.LAUNCH_BALL, now)
 
     def _send(self, kind: Kind, now: int) -> None:
         wait = self._timing.launch if kind is Kind.LAUNCH_BALL else self._timing.state
         request = Request(kind, self._sending if kind is Kind.SET_STATE else None)
         self._kind = kind
+        self._began_unknown = now < self._unknown_until
         self._exchange = self._wire.exchange(request, now + self._timing.deliver, wait)
 
     def _take_state(self, outcome: Outcome, now: int) -> None:
         if outcome is Outcome.done and self._connected:
             self._confirmed, self._refused = self._sending, None
-            self._to_confirm = max(0, self._to_confirm - 1)
+            if not self._began_unknown:
+                self._to_confirm = max(0, self._to_confirm - 1)
             return
         self._confirmed = None
-        self._to_confirm = CONFIRMATIONS if outcome is Outcome.unanswered else 1
+        unanswered = outcome is Outcome.unanswered
+        self._to_confirm = CONFIRMATIONS if unanswered else max(1, self._to_confirm)
         self._refused = self._sending if outcome is Outcome.refused else None
         self._retry_at = now + self._timing.retry
         if self._asked:

@@ -14,6 +14,7 @@ from o80.errors import DriverError
 from o80_devices import zeromq
 from o80_devices.ball_tracking.server_messages import Place, Seen, ServerReason, ServerTrack
 
+
 @dataclass
 class Options:
     """Options of the client of a tracking server."""
