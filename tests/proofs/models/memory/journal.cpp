@@ -8,11 +8,11 @@
 //   - std::atomic_thread_fence(std::memory_order_acquire);
 //   +
 // mutant never_begun: src/memory/journal.cpp
-//   - counters_->begun.store(position_ + sizeof(JournalHead) + room_, std::memory_order_relaxed);
+//   - counters_->begun.store(position_ + length, std::memory_order_relaxed);
 //   +
 // mutant begun_without_its_head: src/memory/journal.cpp
-//   - counters_->begun.store(position_ + sizeof(JournalHead) + room_, std::memory_order_relaxed);
-//   + counters_->begun.store(position_ + room_, std::memory_order_relaxed);
+//   - counters_->begun.store(position_ + length, std::memory_order_relaxed);
+//   + counters_->begun.store(position_ + length - sizeof(JournalHead), std::memory_order_relaxed);
 // mutant published_relaxed: src/memory/journal.cpp
 //   - counters_->published.store(position_, std::memory_order_release);
 //   + counters_->published.store(position_, std::memory_order_relaxed);
