@@ -2,9 +2,9 @@
 
 In the frame of the launcher: the origin below the muzzle on the ground plane of the recording, x
 forward, y to the left, z up. The wheels touch the ball at 120 degrees. Their speeds give its speed,
-their differences its spin. The numbers are fitted to 13 of 25 recorded shots, of two settings of
-the wheels and one of the angles (a test of o80-table-tennis compares it with the others): how far
-the angles turn the launcher is not in the recordings, see `LaunchModel.azimuth_range`.
+their differences its spin. The numbers are fitted to 13 of 25 recorded shots (see fit.py), of two
+settings of the wheels and one of the angles. How far the angles turn the launcher is not in the
+recordings, see `LaunchModel.azimuth_range`.
 """
 
 from __future__ import annotations
