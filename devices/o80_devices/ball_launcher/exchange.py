@@ -20,7 +20,7 @@ class Outcome(Enum):
     not_delivered = "not delivered"
     """The request was not sent, and never will be."""
     unanswered = "unanswered"
-    """The request was sent: nobody knows whether it is executed."""
+    """The request was sent and not answered: it may still be executed."""
 
 
 class Exchange:

@@ -16,7 +16,7 @@ BUCKET = 0.5 * SECOND  # whose lowest point is kept
 SETTLE = 10  # buckets that must all be late before the clock is taken to have been set back
 RECENT = 2  # buckets whose least delay counts as an error: the clock may have been set back
 
-UNKNOWN = 10.0 * MILLISECOND  # error of a first point, whose delay nobody knows
+UNKNOWN = 10.0 * MILLISECOND  # error of a first point, whose delay is unknown
 STEP = 5.0 * MILLISECOND  # a smaller one is taken for a delay, or for its end
 STEP_SCATTERS = 10.0  # likewise, in mean delays
 REORDERED = 0.2 * SECOND  # a stamp that is older by less is a late packet, not a restart

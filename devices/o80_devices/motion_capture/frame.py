@@ -1,4 +1,4 @@
-"""What a motion capture system tells of one moment."""
+"""A frame: what a motion capture system measured at one moment."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Subject:
     visible: bool
     position: tuple[float, ...] = NOWHERE  #: [m]
     quaternion: tuple[float, ...] = NO_ROTATION  #: x, y, z, w
-    quality: float = float("nan")  #: residual, as the system defines it; NaN: it tells none
+    quality: float = float("nan")  #: residual, as the system defines it; NaN: it gives none
 
 
 @dataclass(frozen=True)

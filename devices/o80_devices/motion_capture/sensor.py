@@ -64,7 +64,7 @@ class Frames(Protocol):
 class SensorConfig:
     subjects: str = option("", "names, separated by commas; empty: those that the system knows")
     transform: str = option("", "file with the transform from the system to the world")
-    latency: float = option(0.0, "from capture to arrival, beside what the system tells", "s")
+    latency: float = option(0.0, "from capture to arrival, added to what the system reports", "s")
     latency_error: float = option(0.0, "of this latency", "s")
     gap: float = option(0.08, "without a frame, after which rows say why", "s")
 

@@ -110,7 +110,7 @@ class WatchedFrames(FrameStream):
         finally:
             connection.close()
         raise DriverError(
-            f"the {self._system} system at {self._host} tells no subjects: {trouble}. Start it, "
+            f"the {self._system} system at {self._host} has no subjects: {trouble}. Start it, "
             "correct --host, or name the subjects with --subjects"
         )
 
