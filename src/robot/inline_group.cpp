@@ -85,7 +85,7 @@ struct InlineGroup::Copy {
 /// Marks the group as running while it lives.
 class InlineGroup::Call {
  public:
-  explicit Call(InlineGroup& group) : group_(group) {
+  explicit Call(InlineGroup& group) : group_(group), outer_(innermost_) {
     group.check_usable();
     std::uint32_t free = 0;
     if (!group.running_.compare_exchange_strong(free, 1, std::memory_order_acquire)) {
@@ -98,16 +98,27 @@ class InlineGroup::Call {
       throw Error("the threads of the group of '" + group.name_ +
                   "' run a call of the group that it shares them with: call one after the other");
     }
+    innermost_ = this;
   }
   Call(const Call&) = delete;
   Call& operator=(const Call&) = delete;
   ~Call() {
+    innermost_ = outer_;
     group_.pool_->release();
     group_.running_.store(0, std::memory_order_release);
   }
+  /// True if this thread has called the group and the call has not returned: in a signal handler.
+  static bool is_within(const InlineGroup* group) noexcept {
+    const Call* call = innermost_;
+    while (call != nullptr && &call->group_ != group) call = call->outer_;
+    return call != nullptr;
+  }
 
  private:
+  inline static thread_local const Call* innermost_ = nullptr;  // of this thread
+
   InlineGroup& group_;
+  const Call* outer_;
 };
 
 /// Marks a group as running in the call of another one, while it lives.
@@ -217,6 +228,14 @@ InlineGroup::Copy& InlineGroup::at(std::size_t copy) const {
 }
 
 // ------------------------------------------------------------------------------ a call
+
+/// True inside a call of this group, or of one that it follows, in one of the threads of that call.
+bool InlineGroup::runs_here() const noexcept {
+  const auto is_inside = [](const InlineGroup* group) {
+    return group != nullptr && (working_for == group || Call::is_within(group));
+  };
+  return is_inside(this) || is_inside(leader_.load(std::memory_order_relaxed));
+}
 
 /// Whether the iterations of a copy go on; called about every 50 ms of a burst.
 bool InlineGroup::go_on() {
@@ -508,7 +527,7 @@ void InlineGroup::close() noexcept {
     if (copy->robot) copy->robot->stop();
   }
   // in a signal handler during a call: the end of that call, which throws Closed, comes later
-  if (working_for == this || guard_.forked()) return;
+  if (runs_here() || guard_.forked()) return;
   while (running_.load(std::memory_order_acquire) != 0) futex_wait(running_, 1, kClosePoll);
   for (const auto& copy : copies_) {
     copy->frontend.close();

@@ -149,6 +149,7 @@ class InlineGroup {
   void add_copy(const RobotTable& table, const OptionValues& options,
                 const BackendOptions& backend);
   Copy& at(std::size_t copy) const;
+  bool runs_here() const noexcept;
   bool go_on();
   void look_around() noexcept;
   template <class Each>

@@ -3,7 +3,9 @@
 #include <malloc.h>
 #include <sys/resource.h>
 
+#include <atomic>
 #include <filesystem>
+#include <thread>
 
 #include "memory/child_process.hpp"
 #include "o80/memory/segment_list.hpp"
@@ -388,6 +390,79 @@ TEST_F(InlineGroupTest, IsClosedWithAllItsCopies) {
   EXPECT_THROW(burst.run(), Closed);
   EXPECT_EQ(watcher->life(), Life::stopped);
   EXPECT_THROW(watcher->burst(1, kPatience), BackendStopped);
+}
+
+/// A robot with which the calling thread of a group has nothing to do but wait for its worker.
+class Gated {
+ public:
+  struct Gate {
+    std::thread::id caller;
+    std::atomic<bool> worker_has_begun{false};
+    std::atomic<bool> open{true};
+  };
+  static Gate gate;
+  using Config = Drifter::Config;
+  using Actuators = std::array<double, 1>;
+
+  explicit Gated(const Config& /*config*/) {}
+  void describe(Schema& schema) const { schema.actuator(0).name("gate"); }
+  void start() {}
+  void write(const Desired<Gated>& /*desired*/) {
+    const bool calls = std::this_thread::get_id() == gate.caller;
+    if (!calls) gate.worker_has_begun = true;
+    while (!gate.open && !(calls && gate.worker_has_begun)) std::this_thread::yield();
+  }
+  void read(Reading<Gated>& reading) { reading.observed = {0}; }
+  void stop() noexcept {}
+};
+Gated::Gate Gated::gate;
+
+/// Calls `close` in a signal handler of the thread that has called `burst`, while it waits for its
+/// worker.
+template <class RunBurst, class Close>
+void expect_close_during(RunBurst&& burst, Close&& close) {
+  Gated::gate.caller = std::this_thread::get_id();
+  Gated::gate.worker_has_begun = false;
+  Gated::gate.open = false;
+  bool closed = false;
+  const KeepWaiting handler = [&] {
+    EXPECT_TRUE(Gated::gate.worker_has_begun);
+    Gated::gate.open = true;
+    close();
+    closed = true;
+    return true;
+  };
+  try {
+    burst(handler);
+  } catch (const Error&) {  // its copies may have been done before the close
+  }
+  EXPECT_TRUE(closed);
+}
+
+TEST_F(InlineGroupTest, IsClosedInASignalHandlerOfItsCallWhichDoesNotWaitForItself) {
+  const RobotTable& robot = *robot_table<Gated>("gated");
+  InlineGroup leader(robot, {}, group_of(2));
+  InlineGroup::Options sharing = group_of(2);
+  sharing.sharing = &leader;
+  InlineGroup follower(robot, {}, sharing);
+  GroupBurst leading(leader, 1, 1, 1), following(follower, 1, 1, 1);
+  const auto targets = std::as_writable_bytes(std::span(following.targets));
+  const InlineGroup::Following then{&follower, &following.plan, targets, {}};
+
+  expect_close_during(
+      [&](const KeepWaiting& handler) {
+        leader.burst(leading.plan, leading.all, kPatience, handler, &then);
+      },
+      [&] { follower.close(); });
+  EXPECT_THROW(following.run(), Closed);
+  EXPECT_NO_THROW(leading.run());
+
+  expect_close_during(
+      [&](const KeepWaiting& handler) {
+        leader.burst(leading.plan, leading.all, kPatience, handler);
+      },
+      [&] { leader.close(); });
+  EXPECT_THROW(leading.run(), Closed);
 }
 
 TEST_F(InlineGroupTest, LetsAnotherThreadUseAFrontendOfACopyMeanwhile) {
