@@ -254,9 +254,14 @@ def test_repeated_and_overtaken_packets_are_dropped() -> None:
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        ({"tick": 0}, "tick must be positive"),
+        ({"tick": float("inf")}, "tick must be positive and finite"),
+        ({"tick": 0}, "tick must be positive and finite"),
         ({"wrap": 1}, "wrap must be at least 2, got 1"),
-        ({"latency": -0.1}, "latency and latency_error must be at least 0 s, got -0.1"),
+        ({"latency": -0.1}, "latency and latency_error must be finite and at least 0 s, got -0.1"),
+        (
+            {"latency": float("inf")},
+            "latency and latency_error must be finite and at least 0 s, got inf",
+        ),
         ({"max_rate": 2.0}, "max_rate must be between 0 and 0.1, got 2.0"),
     ],
 )

@@ -112,7 +112,8 @@ def test_a_hidden_body_is_marked_and_has_no_numbers(
 def test_a_row_without_a_new_frame_has_no_values(system: o80.Frontend) -> None:
     row_where(system, is_seen)
     row = row_where(system, lambda row: row.reason == Reason.NO_NEW_FRAME)
-    assert row.capture_time == 0
+    assert row.capture_time == row.frame_number == 0
+    assert not row.stamped
     assert not row.racket.visible
     assert np.isnan(row.racket.position).all()
 

@@ -13,7 +13,7 @@ import pytest
 
 import o80
 from o80_devices.motion_capture.sensor import Reason
-from o80_devices.motion_capture.watched import Watched
+from o80_devices.motion_capture.watched import CHILD, Watched
 from o80_devices.motion_capture.watched_child import bodies_of
 
 WAIT = 60.0  # [s] longer than anything here takes
@@ -91,3 +91,58 @@ def test_bodies_are_read_from_the_bindings() -> None:
         rotation = Rotation()
 
     assert bodies_of({"a": Body()}) == {"a": ([1.0, 2.0, 3.0], [0.0, 0.0, 1.0, 0.0])}
+
+
+SLOW_CLIENT = """
+import math
+import time
+
+time.sleep(1.5)  # longer than the silence that ends a client
+
+
+class Rotation:
+    x = y = z = 0.0
+    w = 1.0
+
+
+class Body:
+    rotation = Rotation()
+
+    def __init__(self, x):
+        self.position = (x, 0.0, 0.0)
+
+
+class Connection:
+    rigidBodies = {"racket": Body(1.0), "covered": Body(math.nan)}
+
+    def waitForNextFrame(self):
+        time.sleep(0.01)
+
+
+def connect(system, options):
+    return Connection()
+"""
+
+
+@pytest.fixture
+def slow_client(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A package motioncapture that takes its time to be imported."""
+    (tmp_path / "motioncapture.py").write_text(SLOW_CLIENT)
+    before = os.environ.get("PYTHONPATH")
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{before}" if before else str(tmp_path))
+
+
+@pytest.mark.usefixtures("slow_client")
+def test_a_client_that_starts_slowly_is_not_killed_before_it_connects(segment: str) -> None:
+    with ROBOT.inline(segment, frequency=1000, subjects="racket,covered") as system:
+        row = row_where(system, lambda row: row.reason == Reason.SEEN)
+        assert list(row.racket.position) == [1.0, 0.0, 0.0]
+        assert not row.covered.visible
+    assert not clients()
+
+
+def test_a_client_whose_driver_has_died_meanwhile_ends() -> None:
+    """The kernel kills it with the driver, but only from its first line on."""
+    nobody = "0"
+    command = [sys.executable, "-m", CHILD, "vicon", "127.0.0.1", nobody]
+    assert subprocess.run(command, timeout=WAIT, check=False).returncode == 0

@@ -60,13 +60,14 @@ class ClockMap:
         latency, latency_error: from capture to the earliest arrival [s].
         max_rate: how much faster or slower than its tick the device's clock may run.
         """
-        if not tick > 0:
-            raise InvalidArgument(f"tick must be positive [ns], got {tick}")
+        if not 0 < tick < math.inf:
+            raise InvalidArgument(f"tick must be positive and finite [ns], got {tick}")
         if wrap is not None and wrap < 2:
             raise InvalidArgument(f"wrap must be at least 2, got {wrap}")
-        if not (latency >= 0 and latency_error >= 0):
+        if not (0 <= latency < math.inf and 0 <= latency_error < math.inf):
             raise InvalidArgument(
-                f"latency and latency_error must be at least 0 s, got {latency}, {latency_error}"
+                "latency and latency_error must be finite and at least 0 s, got "
+                f"{latency}, {latency_error}"
             )
         if not 0 <= max_rate <= 0.1:
             raise InvalidArgument(f"max_rate must be between 0 and 0.1, got {max_rate}")

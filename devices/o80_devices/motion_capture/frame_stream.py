@@ -20,6 +20,10 @@ STOPPING = 2.0  # that a thread may take to end [s]
 
 
 class Connection(Protocol):
+    @property
+    def patience(self) -> float:
+        """How long it may be without a frame, counted from the last one or from its begin [s]."""
+
     def receive(self, timeout: float) -> Frame | None:
         """The next frame; None: none came. Raises OSError or ValueError when it is broken."""
 
@@ -79,7 +83,8 @@ class FrameStream:
                     self._receive_from(connection)
                 finally:
                     connection.close()
-            except (OSError, ValueError) as error:
+            except Exception as error:
+                # whatever a damaged message causes: the next connection may be better
                 self.trouble = str(error) or type(error).__name__
             self.reason = Reason.DISCONNECTED
             self._stopping.wait(RETRY)
@@ -94,5 +99,5 @@ class FrameStream:
                 with self._arrived:
                     self._frames.append(replace(frame, connection=self.connections))
                     self._arrived.notify()
-            elif time.monotonic() - last > SILENCE:
-                raise TimeoutError(f"connected, but no frame for {SILENCE:g} s")
+            elif time.monotonic() - last > (patience := connection.patience):
+                raise TimeoutError(f"connected, but no frame for {patience:g} s")

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from o80.drivers import option
-from o80.errors import DriverError
+from o80.errors import DriverError, InvalidArgument
 from o80_devices.motion_capture.frame import Frame
-from o80_devices.motion_capture.frame_stream import FrameStream
+from o80_devices.motion_capture.frame_stream import SILENCE, FrameStream
 from o80_devices.motion_capture.qualisys_packets import (
     GREETING,
     PORT,
@@ -30,6 +30,8 @@ TICK = 1000.0  # of its time stamps [ns]
 
 class QualisysConnection:
     """A connection that streams the poses of all bodies."""
+
+    patience = SILENCE
 
     def __init__(self, host: str, port: int) -> None:
         """Raises OSError or ValueError."""
@@ -133,4 +135,6 @@ class Qualisys(Sensor):
         port: int = option(PORT, "little endian")
 
     def __init__(self, config: Config) -> None:
+        if not 0 < config.port < 1 << 16:
+            raise InvalidArgument(f"port must be between 1 and 65535, got {config.port}")
         super().__init__(config, QualisysFrames(config.host, config.port))

@@ -14,6 +14,7 @@ HEADER = struct.Struct("<iiddqQ")  # format, number, rate, latency, time stamp, 
 VALUES = struct.Struct("<?8d")  # visible; quaternion x y z w, position; quality
 FORMAT = 4
 MOST_SUBJECTS = 10_000
+LEAST_RATE, MOST_RATE = 1e-3, 1e6  # [Hz]; others are noise
 
 
 @dataclass(frozen=True)
@@ -40,12 +41,12 @@ def load(file: Path) -> RecordedFrames:
         for _ in range(count):
             frame, rate, place = _frame(content, place)
             frames.append(frame)
-    except (struct.error, ValueError) as error:
+    except (struct.error, ValueError, OverflowError) as error:
         raise InvalidArgument(
             f"{file} is no recording of motion capture, or is cut after frame {len(frames)}: "
             f"{error}"
         ) from error
-    if not frames or not rate > 0:
+    if not frames or not LEAST_RATE < rate < MOST_RATE:
         raise InvalidArgument(f"{file} holds no frame with a rate")
     return RecordedFrames(frames, rate)
 

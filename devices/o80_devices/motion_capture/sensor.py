@@ -144,7 +144,7 @@ class Sensor:
             self._last_seen = reading.time
         else:
             reason = self._why_none(reading.time)
-            reading.extended = {"reason": reason, "capture_time": 0, "capture_error": 0, "stamp": 0}
+            reading.extended = NO_FRAME | {"reason": reason}
             reading.extended = dict.fromkeys(self.subjects.values(), UNSEEN)
 
     def stop(self) -> None:
@@ -212,6 +212,14 @@ FRAME_FIELDS: dict[str, Any] = {
     "frame_number": np.int64,
     "lost_frames": np.int64,
 }
+NO_FRAME = {
+    "capture_time": 0,
+    "capture_error": 0,
+    "stamp": 0,
+    "stamped": False,
+    "frame_number": 0,
+}
+"""Of a row without a frame; `epoch` and `lost_frames` stay."""
 SUBJECT_FIELDS: dict[str, Any] = {
     "visible": bool,
     "position": (float, 3),

@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import importlib.util
 import json
+import math
 import os
 import selectors
 import subprocess
@@ -23,10 +24,13 @@ from typing import Literal
 from o80.drivers import option
 from o80.errors import DriverError, InvalidArgument
 from o80_devices.motion_capture.frame import Frame, Subject
-from o80_devices.motion_capture.frame_stream import FrameStream
+from o80_devices.motion_capture.frame_stream import SILENCE, FrameStream
 from o80_devices.motion_capture.sensor import Sensor, SensorConfig
+from o80_devices.motion_capture.watched_child import STARTED
 
 CHILD = "o80_devices.motion_capture.watched_child"
+STARTING = 60.0  # until the child has imported its modules; a busy machine is slow [s]
+FIRST = 3.0  # from then to the first frame: the client connects [s]
 FOUND = 5.0  # within which a subject must appear, if the user names none [s]
 LONGEST_LINE = 1 << 20  # [bytes]
 
@@ -36,7 +40,7 @@ class ChildConnection:
 
     def __init__(self, system: str, host: str) -> None:
         self._child = subprocess.Popen(
-            [sys.executable, "-m", CHILD, system, host],
+            [sys.executable, "-m", CHILD, system, host, str(os.getpid())],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             start_new_session=True,  # Ctrl-C is for the driver, which then kills it
@@ -48,6 +52,15 @@ class ChildConnection:
         self._selector.register(self._pipe, selectors.EVENT_READ)
         self._buffer = b""
         self._number = 0
+        self._begin = time.monotonic()
+        self.started_after: float | None = None
+        """How long the child took to import its modules; None: it has not yet [s]."""
+
+    @property
+    def patience(self) -> float:
+        if self.started_after is None:
+            return STARTING
+        return SILENCE if self._number else self.started_after + FIRST
 
     def receive(self, timeout: float) -> Frame | None:
         end = time.monotonic() + timeout
@@ -65,12 +78,15 @@ class ChildConnection:
 
     def _frame(self, line: bytes) -> Frame | None:
         """The frame of a line; None if it holds no subject: the connection may be silent."""
+        if line == STARTED:
+            self.started_after = time.monotonic() - self._begin
+            return None
         arrival, bodies = json.loads(line)
         if not bodies:
             return None
         self._number += 1
         subjects = {
-            name: Subject(True, tuple(position), tuple(quaternion))
+            name: subject_of(tuple(position), tuple(quaternion))
             for name, (position, quaternion) in bodies.items()
         }
         return Frame(self._number, None, arrival, subjects)
@@ -82,6 +98,12 @@ class ChildConnection:
         self._child.wait()
         if self._child.stdout is not None:
             self._child.stdout.close()
+
+
+def subject_of(position: tuple[float, ...], quaternion: tuple[float, ...]) -> Subject:
+    """Some clients tell a subject that no camera sees by NaN, or by a quaternion of zeros."""
+    seen = all(map(math.isfinite, position + quaternion)) and any(quaternion)
+    return Subject(True, position, quaternion) if seen else Subject(False)
 
 
 class WatchedFrames(FrameStream):
@@ -98,9 +120,9 @@ class WatchedFrames(FrameStream):
     def names(self) -> Sequence[str]:
         """Of the subjects of the first frame. Raises DriverError."""
         connection = ChildConnection(self._system, self._host)
-        end = time.monotonic() + FOUND
+        begin = time.monotonic()
         try:
-            while time.monotonic() < end:
+            while time.monotonic() - begin < FOUND + (connection.started_after or STARTING):
                 frame = connection.receive(0.1)
                 if frame is not None:
                     return sorted(frame.subjects)

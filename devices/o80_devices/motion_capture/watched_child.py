@@ -12,16 +12,22 @@ import time
 from typing import Any
 
 PR_SET_PDEATHSIG = 1
+STARTED = b"started"
+"""The first line: from now on the client connects."""
 
 
 def main() -> None:
     # a client that blocks does not notice that the driver has died
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    system, host, driver = sys.argv[1:4]
+    if os.getppid() != int(driver):
+        return  # the driver died before the line above
     # its library prints to the standard output: frames go to a copy, the rest to the errors
     frames = os.dup(1)
     os.dup2(2, 1)
-    system, host = sys.argv[1:3]
-    connection: Any = importlib.import_module("motioncapture").connect(system, {"hostname": host})
+    client: Any = importlib.import_module("motioncapture")
+    os.write(frames, STARTED + b"\n")
+    connection = client.connect(system, {"hostname": host})
     while True:
         connection.waitForNextFrame()
         arrival = time.monotonic_ns()
