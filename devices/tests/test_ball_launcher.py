@@ -4,6 +4,7 @@ import math
 import threading
 import time
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
@@ -110,7 +111,7 @@ def test_a_halt_stops_the_motors(served: Served, robot: o80.Frontend) -> None:
         {"phi": math.nan},
     ],
 )
-def test_an_option_out_of_range_is_named(options: dict[str, float]) -> None:
+def test_an_option_out_of_range_is_named(options: dict[str, Any]) -> None:
     (name,) = options
     with pytest.raises(o80.InvalidArgument, match=f"{name} must be"):
         BallLauncher(Options(**options))

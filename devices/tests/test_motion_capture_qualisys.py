@@ -1,6 +1,7 @@
 """The Qualisys client against a fake server at the wire, with what goes wrong in a lab."""
 
 import math
+import socket
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -14,8 +15,11 @@ from o80_devices.motion_capture.qualisys import Qualisys, body_names
 from o80_devices.motion_capture.qualisys_packets import (
     BODY,
     HEADER,
+    Packets,
+    Type,
     data_packet,
     parsed_data,
+    text,
 )
 from o80_devices.motion_capture.sensor import Reason
 
@@ -74,6 +78,28 @@ def test_a_cut_packet_is_told() -> None:
     for length in range(len(content)):
         with pytest.raises(ValueError, match="a data packet is cut"):
             parsed_data(content[:length])
+
+
+class Endless(socket.socket):
+    """Sends a large packet in small parts."""
+
+    def recv(self, size: int, flags: int = 0) -> bytes:
+        return b"\xff\xff\x00\x00"  # read as a size: 65535 bytes
+
+
+def test_a_packet_that_comes_in_parts_is_taken_when_it_is_whole() -> None:
+    ours, theirs = socket.socketpair()
+    with ours, theirs:
+        packets, sent = Packets(ours), text(Type.COMMAND, "hello")
+        theirs.sendall(sent[:5])
+        assert packets.receive(timeout=0.0) is None
+        theirs.sendall(sent[5:])
+        assert packets.receive(timeout=WAIT) == (Type.COMMAND, b"hello\0")
+
+
+def test_a_packet_that_does_not_end_is_silence() -> None:
+    with Endless() as line:
+        assert Packets(line).receive(timeout=0.0) is None
 
 
 def test_bodies_are_named_in_the_order_of_the_settings() -> None:
@@ -187,7 +213,6 @@ def test_unknown_bodies_of_a_missing_server_are_an_error_that_says_what_to_do(
 
 
 def test_a_foreign_server_is_told(segment: str) -> None:
-    import socket
     from threading import Thread
 
     listener = socket.create_server(("127.0.0.1", 0))
