@@ -3,6 +3,7 @@
 #include "runtime/link.hpp"
 
 #include <algorithm>
+#include <thread>
 #include <utility>
 
 #include "o80/base/nearest_name.hpp"
@@ -88,11 +89,25 @@ Iteration UntypedFrontend::oldest() const {
 
 void UntypedFrontend::latest(std::byte* row) const {
   link_->check_usable();
-  if (link_->history.latest(row) < 0) {
+  if (link_->history.latest(row) < 0) wait_for_latest(row);
+}
+
+/// There is no row, or the next one follows a gap: until it is there, readers cannot tell whether
+/// the newest one is being overwritten.
+void UntypedFrontend::wait_for_latest(std::byte* row) const {
+  const Deadline deadline(std::chrono::seconds(5));
+  do {
     if (link_->history.is_damaged()) throw damaged();
-    throw Error("'" + segment() +
-                "' has published no row yet, its robot is still starting: use wait_for(0)");
-  }
+    if (link_->history.published() < 0) {
+      throw Error("'" + segment() +
+                  "' has published no row yet, its robot is still starting: use wait_for(0)");
+    }
+    std::this_thread::yield();
+    if (link_->history.latest(row) >= 0) return;
+  } while (!is_over(link_->segment.life()) && !deadline.over());
+  throw Error("'" + segment() +
+              "' was ended or stopped while it published a row after a gap: read rows up to " +
+              std::to_string(published()) + " by their number");
 }
 
 UntypedObservation UntypedFrontend::latest() const {

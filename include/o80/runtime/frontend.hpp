@@ -224,6 +224,7 @@ class UntypedFrontend {
   void refuse_if_full(const BatchBuilder& builder, const BatchRecord& wanted,
                       const LaneSender& lane) const;
   [[noreturn]] void missing(Iteration k) const;
+  void wait_for_latest(std::byte* row) const;
   SegmentError damaged() const;
 
   std::shared_ptr<Link> link_;

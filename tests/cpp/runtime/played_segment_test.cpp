@@ -4,11 +4,14 @@
 #include <signal.h>
 
 #include <cstring>
+#include <fstream>
+#include <optional>
 #include <thread>
 
 #include "describe/table.hpp"
 #include "memory/child_process.hpp"
 #include "memory/lane.hpp"
+#include "memory/segment_name.hpp"
 #include "runtime/loop_state.hpp"
 #include "runtime/station.hpp"
 
@@ -349,6 +352,39 @@ TEST_F(PlayedSegmentTest, ReadersNeverSeeARowThatIsNotThere) {
   one.join();
   other.join();
   EXPECT_FALSE(wrong);
+}
+
+TEST_F(PlayedSegmentTest, ReadersWaitForARowAfterAGapWhileItsPlayerLives) {
+  std::optional<PlayedSegment> played;
+  played.emplace(PlayedOptions{.segment = "pair", .description = description_, .history = 8});
+  played->publish(rows(0, 0), {});
+  const UntypedFrontend reader("pair", {.access = Access::read_only});
+  std::vector<std::byte> row(rows(0, 0).begin(), rows(0, 0).end());
+
+  // as a player leaves the counters that is stopped before it writes the row
+  const auto stop_before = [&](Iteration k) {
+    std::memcpy(row.data() + offsetof(RowHead, iteration), &k, sizeof k);
+    std::fstream file(segment_path("pair"), std::ios::binary | std::ios::in | std::ios::out);
+    for (const std::size_t counter : {offsetof(Counters, first), offsetof(Counters, begun)}) {
+      file.seekp(
+          static_cast<std::streamoff>(reader.link()->segment.view().offsets.counters + counter));
+      file.write(reinterpret_cast<const char*>(&k), sizeof k).flush();
+    }
+  };
+  stop_before(20);
+  std::atomic<bool> reads{false};
+  std::thread other([&] {
+    reads = true;
+    EXPECT_EQ(reader.latest().iteration(), 20);
+  });
+  while (!reads) std::this_thread::yield();
+  played->publish(row, {});
+  other.join();
+
+  stop_before(50);
+  played.reset();
+  EXPECT_THAT([&] { static_cast<void>(reader.latest()); },
+              ThrowsMessage<Error>(HasSubstr("a row after a gap: read rows up to 20")));
 }
 
 }  // namespace
