@@ -56,8 +56,22 @@ def measure(rows: list[NDArray[np.uint8]]) -> None:
     sample("ball_tracking", "%", 100 * RATE * used / len(rows))
 
 
+def rendering() -> float:
+    """Of four synthetic images of a flying ball [s]: what the simulation takes, not the tracker."""
+    rig = four_cameras()
+    scene, throws = Scene(rig), Throws(rig, 1)
+    images = [np.empty((480, 640, 3), np.uint8) for _ in rig.cameras]
+    balls = [throws.at(i / RATE) for i in range(60)]
+    begin = time.process_time()
+    for ball in balls:
+        for k, image in enumerate(images):
+            scene.image(k, ball.position, ball.velocity, image)
+    return (time.process_time() - begin) / len(balls)
+
+
 def main() -> None:
     rows = prepared()
+    sample("ball_images_rendered", "%", 100 * RATE * rendering())
     for _ in range(rounds()):
         measure(rows)
         copied = [seconds(rows[0].copy) for _ in range(20)]

@@ -1,7 +1,8 @@
 """Steps a second of table tennis in many copies on two threads, resets included.
 
 Beside them, in the same run: the same plants and simulations stepped and reset by plain calls of
-C++ on two threads, and as many processes under Gymnasium's AsyncVectorEnv.
+C++ on two threads, and as many processes under Gymnasium's AsyncVectorEnv. All of it with the
+standard arm, which `gymnasium.make_vec` takes, and with the identified one, which trainings take.
 """
 
 import ctypes
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from o80_table_tennis.balls.sources import balls_from
 from o80_table_tennis.entry_points import accelerated_environment, vector_environment
 from o80_table_tennis.rig.ball_records import RECORDS
-from o80_table_tennis.settings import TaskSettings
+from o80_table_tennis.settings import RigSettings, TaskSettings
 from o80_table_tennis.task.actions import COARSE, changed_pressures
 from o80_table_tennis.world.arm import MUSCLES
 from o80_table_tennis.world.timing import PERIOD
@@ -26,6 +27,8 @@ from sampling import built, rounds, sample, seconds, take_priority
 
 THREADS = 2
 COPIES = (64, 16)
+PRESETS = {"standard": "", "identified": "identified_"}
+"""Of the arm, with what the names of their figures begin."""
 PROCESSES = 16
 COPY_STEPS = 16_000  # of all copies together, in a round
 TASK = TaskSettings(factor=COARSE)
@@ -102,27 +105,32 @@ def random_actions(*shape: int) -> NDArray[np.float32]:
     return np.random.default_rng(1).uniform(-1, 1, shape).astype(np.float32)
 
 
-def plain_environments(stack: ExitStack, count: int) -> list[PlainEnvironment]:
-    with closing(accelerated_environment()) as one:
+def plain_environments(stack: ExitStack, rig: RigSettings, count: int) -> list[PlainEnvironment]:
+    with closing(accelerated_environment(rig=rig)) as one:
         rows = one.rig.twins[0].frontend.history(1).rows
         record = rows.dtype[RECORDS[0]][RECORDS[1]].base
         pressures = one.rig.arm.range
     library = built() / "lib" / "plain_table_tennis.so"
     return [
-        stack.enter_context(closing(PlainEnvironment(library, record, pressures)))
+        stack.enter_context(closing(PlainEnvironment(library, record, pressures, rig.preset)))
         for _ in range(count)
     ]
 
 
-def measure(copies: int) -> None:
+def measure(copies: int, preset: str) -> None:
+    rig = RigSettings(preset=preset)
     with ExitStack() as stack:
         vector = vector_environment(
-            num_envs=copies, threads=THREADS, task=TASK, autoreset_mode=AutoresetMode.SAME_STEP
+            num_envs=copies,
+            threads=THREADS,
+            task=TASK,
+            rig=rig,
+            autoreset_mode=AutoresetMode.SAME_STEP,
         )
         played: dict[str, Played | Plain] = {"vector": Played(stack.enter_context(vector))}
-        if copies == PROCESSES:
+        if copies == PROCESSES and preset == "standard":
             processes = AsyncVectorEnv(
-                [partial(accelerated_environment, task=TASK)] * copies,
+                [partial(accelerated_environment, task=TASK, rig=rig)] * copies,
                 autoreset_mode=AutoresetMode.SAME_STEP,
             )
             played["async"] = Played(stack.enter_context(closing(processes)))
@@ -130,19 +138,20 @@ def measure(copies: int) -> None:
         first = played["vector"]
         assert isinstance(first, Played)
         first.play(steps)
-        played["plain"] = Plain(plain_environments(stack, copies), first.episode)
+        played["plain"] = Plain(plain_environments(stack, rig, copies), first.episode)
         for each in played.values():
             each.play(steps // 8)  # everybody warms up
         for _ in range(rounds()):
             for name, each in played.items():
                 taken = seconds(partial(each.play, steps))
-                sample(f"{name}_{copies}", "steps/s", copies * steps / taken)
+                sample(f"{PRESETS[preset]}{name}_{copies}", "steps/s", copies * steps / taken)
 
 
 def main() -> None:
     take_priority()
-    for copies in COPIES:
-        measure(copies)
+    for preset in PRESETS:
+        for copies in COPIES:
+            measure(copies, preset)
 
 
 if __name__ == "__main__":

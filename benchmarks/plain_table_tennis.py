@@ -35,12 +35,18 @@ class PlainEnvironment(gymnasium.Env[Float32Array, Float32Array]):
     """Same plant, model, observation and reward as the environment; nothing in between.
 
     `record` is the dtype of the contacts of a ball, as the environment's twin publishes them;
-    `pressures` are the range of its arm.
+    `pressures` are the range of its arm, `preset` names the numbers of it.
     """
 
-    def __init__(self, library: Path, record: np.dtype[Any], pressures: PressureRange) -> None:
+    def __init__(
+        self,
+        library: Path,
+        record: np.dtype[Any],
+        pressures: PressureRange,
+        preset: str = "standard",
+    ) -> None:
         self.library = ctypes.CDLL(str(library))
-        plain = self._create()
+        plain = self._create(preset)
         if not plain:
             raise RuntimeError(f"{library.name} could not be set up")
         self.handle = ctypes.c_void_p(plain)
@@ -63,7 +69,7 @@ class PlainEnvironment(gymnasium.Env[Float32Array, Float32Array]):
         self._over = True
         self.steps, self.seconds_stepping = 0, 0.0
 
-    def _create(self) -> int | None:
+    def _create(self, preset: str) -> int | None:
         options = {
             "model": MODEL,
             "joints": JOINT_NAMES,
@@ -73,6 +79,7 @@ class PlainEnvironment(gymnasium.Env[Float32Array, Float32Array]):
         texts = ctypes.c_char_p * len(options)
         self.library.plain_create.restype = ctypes.c_void_p
         plain: int | None = self.library.plain_create(
+            preset.encode(),
             texts(*(name.encode() for name in options)),
             texts(*(text_of(value).encode() for value in options.values())),
             ctypes.c_size_t(len(options)),

@@ -20,7 +20,6 @@ from o80.extras import needed
 from o80.learning.rollouts import GaussianPolicy, RayWorkers
 
 COPIES = 16
-STEPS = 128  # of all copies, in a rollout
 LEAST_PROCESSORS = 4
 
 
@@ -33,19 +32,19 @@ def made() -> gymnasium.vector.VectorEnv:
     )
 
 
-def decisions_a_second(actors: int, rounds: int) -> float:
+def decisions_a_second(actors: int, rounds: int, steps: int) -> float:
     """The median over some iterations; each waits for the slowest actor."""
     with RayWorkers(made, workers=actors, seed=1) as workers:
         spaces = workers.spaces
         (inputs,), (outputs,) = spaces.observation.shape or (), spaces.action.shape or ()
         policy = GaussianPolicy.new(inputs, outputs, log_std=-1.0)
-        workers.collect(policy, steps=STEPS)
+        workers.collect(policy, steps=steps)
         seconds = []
         for _ in range(rounds):
             begin = time.perf_counter()
-            workers.collect(policy, steps=STEPS)
+            workers.collect(policy, steps=steps)
             seconds.append(time.perf_counter() - begin)
-    return actors * COPIES * STEPS / median(seconds)
+    return actors * COPIES * steps / median(seconds)
 
 
 def numbers_of_actors(processors: int) -> list[int]:
@@ -58,6 +57,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--actors", type=int, nargs="+", help="numbers of actors")
     parser.add_argument("--rounds", type=int, default=7, help="rollouts of each (default: 7)")
+    parser.add_argument("--steps", type=int, default=128, help="of each copy in a rollout (128)")
     asked = parser.parse_args()
     processors = len(os.sched_getaffinity(0))
     if not asked.actors and processors < LEAST_PROCESSORS:
@@ -72,7 +72,7 @@ def main() -> None:
     table = Table("actors", "decisions/s", "share of linear scaling", title="Ray actors")
     first = 0.0
     for actors in numbers:
-        rate = decisions_a_second(actors, asked.rounds)
+        rate = decisions_a_second(actors, asked.rounds, asked.steps)
         first = first or rate / actors
         table.add_row(str(actors), f"{rate:.0f}", f"{100 * rate / (actors * first):.0f} %")
     ray.shutdown()

@@ -88,14 +88,15 @@ install_packages() {
 
 case $purpose in
   demo | learn) ;;
-  tools | test) need_packages g++ ccache libgtest-dev libgmock-dev ;;
+  tools | test) need_packages g++ ccache libgtest-dev libgmock-dev libaravis-0.8-0 aravis-tools ;;
   check) # compilers of the sanitizers and of another machine, model checkers, emulators, stress, browser
-    need_packages g++ ccache libgtest-dev libgmock-dev googletest clang-19 libclang-rt-19-dev \
+    need_packages g++ ccache libgtest-dev libgmock-dev libaravis-0.8-0 aravis-tools googletest \
+      clang-19 libclang-rt-19-dev \
       llvm-19 g++-aarch64-linux-gnu qemu-user-static relacy-dev spin strace stress-ng rt-tests \
       qemu-system-x86 busybox-static cpio chromium
     ;;
   wheels) need_packages g++ ;;
-  bench) need_packages g++ rt-tests stress-ng ;;
+  bench) need_packages g++ rt-tests stress-ng libaravis-0.8-0 aravis-tools ;;
   systemd) # what `make systemd` needs beside what `check` brings
     need_packages systemd
     exit
@@ -115,7 +116,8 @@ case $purpose in
 esac
 # torch and the rest that learning needs, clients of devices: for those that use or test them
 case $purpose in
-  demo | bench) extras= ;;
+  demo) extras= ;;
+  bench) extras="zeromq cameras" ;;
   test | tools | check) extras="learn zeromq cameras motioncapture" ;;
   *) extras=learn ;;
 esac

@@ -12,7 +12,8 @@
 
 #include "driver/simulation.hpp"
 #include "o80/describe/options.hpp"
-#include "pam/plant.hpp"
+#include "pam/driver.hpp"
+#include "pam/presets.hpp"
 
 namespace {
 
@@ -31,7 +32,8 @@ struct Seen {
 
 class Plain {
  public:
-  explicit Plain(const o80::mujoco::Config& config) : twin_(config) {}
+  Plain(const o80::pam::Plant::Config& arm, const o80::mujoco::Config& twin)
+      : arm_(arm), twin_(twin) {}
 
   void reset(std::uint64_t seed, std::span<const o80::mujoco::BallState> flight, Seen& seen) {
     arm_.reset(seed);
@@ -96,14 +98,17 @@ class Plain {
 
 extern "C" {
 
-/// `names` and `texts` are the options of the simulation.
-__attribute__((visibility("default"))) Plain* plain_create(const char* const* names,
+/// `preset` is that of the arm, `names` and `texts` are the options of the simulation.
+__attribute__((visibility("default"))) Plain* plain_create(const char* preset,
+                                                           const char* const* names,
                                                            const char* const* texts,
                                                            std::size_t options) {
   try {
+    o80::pam::PamDriver::Config arm;
+    o80::set_option(arm, "preset", preset);
     o80::mujoco::Config config;
     for (std::size_t i = 0; i < options; ++i) o80::set_option(config, names[i], texts[i]);
-    return new Plain(config);
+    return new Plain(o80::pam::preset(arm.preset), config);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return nullptr;

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import o80
+from o80.drivers import Reading
 from o80_devices.ball_tracking import BallTracker, Reason, SyntheticCameras, four_cameras
 
 RATE = 180
@@ -47,6 +48,37 @@ def test_a_burst_of_the_tracker_follows_the_newest_images() -> None:
             assert np.linalg.norm(row["position"] - place) < 0.01
             assert row["error"] < 0.02
     assert found > 120
+
+
+class StampedCameras(SyntheticCameras):
+    """Their times are not exact."""
+
+    def __init__(self, config: SyntheticCameras.Config) -> None:
+        super().__init__(config)
+        self.extended["errors"] = (np.int64, (4,))
+
+    def read(self, reading: Reading) -> None:
+        super().read(reading)
+        reading.extended["errors"] = [100, 700, 300, 200]
+
+
+def test_a_row_of_the_tracker_has_the_largest_error_of_the_times_of_its_images() -> None:
+    name = f"test-{os.getpid()}-stamped"
+    found = set()
+    with (
+        o80.robots.load(StampedCameras).inline(name, frequency=RATE, history=4) as cameras,
+        o80.robots.load(BallTracker).inline(
+            f"{name}-ball", frequency=RATE, cameras=name
+        ) as tracker,
+    ):
+        for i in range(60):
+            if i != 50:
+                cameras.burst(1)
+            tracker.burst(1)
+            row = tracker.latest().extended
+            found.add(Reason(int(row["reason"])))
+            assert row["capture_error"] == (700 if row["reason"] == Reason.seen else 0)
+    assert {Reason.seen, Reason.no_image} <= found
 
 
 def test_without_new_images_the_row_says_so_and_holds_nothing() -> None:

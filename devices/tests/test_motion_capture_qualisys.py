@@ -125,6 +125,24 @@ def test_bodies_are_found_and_their_poses_are_those_of_the_server(system: o80.Fr
     assert row.frame_number * 5000 == row.stamp
 
 
+def test_a_rotation_about_all_axes_is_not_its_transpose(segment: str) -> None:
+    """(0.1, 0.2, 0.3, w), whose matrix has nine different numbers."""
+    x, y, z = 0.1, 0.2, 0.3
+    w = math.sqrt(1 - x * x - y * y - z * z)
+    rows = (
+        *(1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        *(2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        *(2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+    )
+    with (
+        FakeQualisys(["racket"], poses=lambda *_: ((1.0, 2.0, 3.0), rows)) as server,
+        ROBOT.inline(segment, frequency=1000, port=server.port) as system,
+    ):
+        row = row_where(system, is_seen)
+        assert row.racket.quaternion == pytest.approx((x, y, z, w), abs=1e-6)
+        assert row.racket.position == pytest.approx((1.0, 2.0, 3.0))
+
+
 def test_a_hidden_body_is_marked_and_has_no_numbers(
     server: FakeQualisys, system: o80.Frontend
 ) -> None:
@@ -210,6 +228,42 @@ def test_unknown_bodies_of_a_missing_server_are_an_error_that_says_what_to_do(
         port = unused.port
     with pytest.raises(o80.DriverError, match=r"Start it, correct --host and --port, or name"):
         ROBOT.inline(segment, port=port)
+
+
+def test_a_misspelled_subject_is_told_with_the_nearest_name(
+    server: FakeQualisys, segment: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    told = ""
+
+    def comes(_: Any) -> bool:
+        nonlocal told
+        told += capfd.readouterr().err
+        return "TT Platte 1" in told
+
+    with ROBOT.inline(
+        segment, frequency=1000, port=server.port, subjects="rackett,TT Plate 1"
+    ) as system:
+        row_where(system, comes)
+        rows = [row_where(system, is_seen) for _ in range(100)]
+    told += capfd.readouterr().err
+    assert (
+        told.count("subject 'rackett': it is covered, or misspelled; did you mean 'racket'?") == 1
+    )
+    assert told.count("subject 'TT Plate 1': it is covered, or misspelled; did you mean") == 1
+    assert not rows[-1].rackett.visible
+
+
+def test_a_server_that_refuses_is_told_on_the_standard_error(
+    segment: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with FakeQualisys() as unused:
+        port = unused.port
+    with ROBOT.inline(segment, frequency=1000, port=port, subjects="racket") as system:
+        row_where(system, lambda row: row.reason == Reason.DISCONNECTED)
+        row_where(system, lambda row: row.reason == Reason.DISCONNECTED)
+    told = capfd.readouterr().err
+    assert told.count(f"o80: Qualisys at 127.0.0.1:{port}: ") == 1
+    assert "Connection refused; tries again" in told
 
 
 def test_a_foreign_server_is_told(segment: str) -> None:

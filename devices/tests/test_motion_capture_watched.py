@@ -9,15 +9,29 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from exclusive import alone_with
 
 import o80
+from o80_devices.fakes.qualisys import FakeQualisys
 from o80_devices.motion_capture.sensor import Reason
+from o80_devices.motion_capture.transform import quaternion_of
 from o80_devices.motion_capture.watched import CHILD, Watched
 from o80_devices.motion_capture.watched_child import bodies_of
 
+PORT = 22223
 WAIT = 60.0  # [s] longer than anything here takes
 ROBOT = o80.robots.load(Watched)
+
+
+def matrix_of_angles(roll: float, pitch: float, yaw: float) -> tuple[float, ...]:
+    """Row by row; roll about x, then pitch about the new y, then yaw about the new z [rad]."""
+    a, b, c = (np.cos(each) + 1j * np.sin(each) for each in (roll, pitch, yaw))
+    about_x = np.array([[1, 0, 0], [0, a.real, -a.imag], [0, a.imag, a.real]])
+    about_y = np.array([[b.real, 0, b.imag], [0, 1, 0], [-b.imag, 0, b.real]])
+    about_z = np.array([[c.real, -c.imag, 0], [c.imag, c.real, 0], [0, 0, 1]])
+    return tuple((about_x @ about_y @ about_z).ravel().tolist())
 
 
 def row_where(system: Any, condition: Callable[[Any], bool]) -> Any:
@@ -146,3 +160,35 @@ def test_a_client_whose_driver_has_died_meanwhile_ends() -> None:
     nobody = "0"
     command = [sys.executable, "-m", CHILD, "vicon", "127.0.0.1", nobody]
     assert subprocess.run(command, timeout=WAIT, check=False).returncode == 0
+
+
+TILTED = ((1.0, -2.0, 0.5), matrix_of_angles(0.3, -0.4, 1.1))
+
+
+def test_a_pose_of_a_real_client_comes_through_the_process(segment: str) -> None:
+    """The client of `motioncapture` for Qualisys, which uses the ports 22223 and 6734."""
+    with (
+        alone_with("qualisys"),
+        FakeQualisys(["racket", "table"], port=PORT, poses=lambda *_: TILTED) as server,
+        ROBOT.inline(segment, frequency=1000, system="qualisys", subjects="racket") as system,
+    ):
+        row = row_where(system, lambda row: row.reason == Reason.SEEN)
+        check_tilted(row)
+        server.faults.hidden = {"racket"}
+        row = row_where(system, lambda row: row.reason == Reason.SEEN and not row.racket.visible)
+        assert np.isnan(row.racket.position).all()
+        server.faults.silent = True
+        row_where(system, lambda row: row.reason == Reason.SILENT)
+        row_where(system, lambda row: row.reason == Reason.DISCONNECTED)
+        server.faults.silent, server.faults.hidden = False, set()
+        check_tilted(row_where(system, lambda row: row.reason == Reason.SEEN))
+    assert not clients()
+
+
+def check_tilted(row: Any) -> None:
+    """Also tells a rotation from its transpose."""
+    assert row.racket.visible
+    assert row.racket.position == pytest.approx(TILTED[0], abs=1e-6)
+    expected = np.array(quaternion_of(np.reshape(TILTED[1], (3, 3))))
+    measured = np.asarray(row.racket.quaternion)
+    assert measured * np.sign(measured[3]) == pytest.approx(expected, abs=1e-5)

@@ -156,6 +156,27 @@ class Group {
     const Waiting waiting;
     group->request(index, numbers_of<std::uint32_t>(chosen), payloads, patience, kKeepWaiting);
   }
+  /// The bytes of a request with these fields.
+  nb::bytes payload(const std::string& name, const nb::object& fields) const {
+    const o80::Schema& schema = group_->description().schema;
+    const std::uint32_t index = group_->request_index(name);
+    const StateBytes payload(schema, schema.requests[index].type, fields, "request '" + name + "'",
+                             Missing::by_default);
+    return nb::bytes(payload.bytes.data(), payload.bytes.size());
+  }
+  std::uint32_t request_index(const std::string& name) const { return group_->request_index(name); }
+  /// `payloads`: one for each of the copies; `rows`: one for each copy of the group.
+  void send_request(std::uint32_t request, nb::handle copies, nb::handle payloads, nb::handle rows,
+                    nb::handle timeout) const {
+    const Bytes chosen(copies);
+    const Bytes given(payloads);
+    const Bytes filled(rows, PyBUF_WRITABLE);
+    const o80::Timeout patience = timeout_of(timeout);
+    const auto group = group_;
+    const Waiting waiting;
+    group->request(request, numbers_of<std::uint32_t>(chosen), given.span(), patience, kKeepWaiting,
+                   filled.writable());
+  }
   void latest(nb::handle copies, nb::handle rows) const {
     const Bytes chosen(copies);
     const Bytes filled(rows, PyBUF_WRITABLE);
@@ -239,6 +260,10 @@ void bind_inline_group(nb::module_& m) {
       .def("burst_chain", &Group::burst_chain, "plan"_a, "second"_a, "chain"_a, "copies"_a,
            "timeout"_a.none())
       .def("request", &Group::request, "name"_a, "copies"_a, "fields"_a, "timeout"_a.none())
+      .def("payload", &Group::payload, "name"_a, "fields"_a)
+      .def("request_index", &Group::request_index, "name"_a)
+      .def("send_request", &Group::send_request, "request"_a, "copies"_a, "payloads"_a, "rows"_a,
+           "timeout"_a.none())
       .def("latest", &Group::latest, "copies"_a, "rows"_a)
       .def("gather", &Group::gather, "numbers"_a, "flags"_a, "observations"_a, "raised"_a)
       .def("close", &Group::close);

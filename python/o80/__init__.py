@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from o80.frontend_classes import register_frontend
     from o80.halts import Halt, halt
     from o80.history import History
-    from o80.inline_group import Gather, Gathered, GroupBurst, InlineGroup
+    from o80.inline_group import Gather, Gathered, GroupBurst, GroupRequest, InlineGroup
     from o80.installation import prefix
     from o80.joining.align import Aligned, AlignedHistory, align
     from o80.joining.latency import Latency, latency
@@ -89,6 +89,7 @@ _LAZY = {
     "Gathered": "o80.inline_group",
     "ChainedBurst": "o80.chained_burst",
     "GroupBurst": "o80.inline_group",
+    "GroupRequest": "o80.inline_group",
     "InlineGroup": "o80.inline_group",
     "prefix": "o80.installation",
     "Aligned": "o80.joining.align",
@@ -169,6 +170,7 @@ __all__ = [
     "Gather",
     "Gathered",
     "GroupBurst",
+    "GroupRequest",
     "Halt",
     "Handle",
     "History",

@@ -446,6 +446,9 @@ def fill(block: NDArray[Any], values: Any, what: str) -> None:
             if names is None or name not in names:
                 instead = _core.names_instead(str(name), list(names or ()))
                 raise InvalidArgument(f"{what} has no field {name!r}{instead}")
+            if isinstance(value, Mapping):  # NumPy would take it for one value, which is true
+                fill(block[name], value, f"{what}.{name}")
+                continue
             try:
                 block[name] = value
             except (TypeError, ValueError) as error:

@@ -49,6 +49,11 @@ def _feeds(
 ) -> Iterator[tuple[int, int, int, int]]:
     """Of each number of each actuator: offset in the row and in the targets, stride, size."""
     state = second.targets.dtype
+    if second.targets.ndim == 1:
+        raise InvalidArgument(
+            "a burst that follows needs targets of one type: prepare it for actuators whose states "
+            f"are alike, not for {', '.join(state.names or ())}"
+        )
     steps, actuators = second.targets.shape[1:]
     if isinstance(numbers, str):
         if state.fields is not None:

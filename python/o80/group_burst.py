@@ -23,6 +23,8 @@ class GroupBurst:
     targets: (copies, steps, actuators), to be filled before a run: numbers for states of one
         number, otherwise structured. Floats that are not filled are NaN and refused. Targets keep
         their values from run to run. An array that is assigned is copied into them.
+        If the states of the actuators are of several types: structured (copies,), with a field
+        (steps,) for each actuator: `targets["gripper"][:, 0]`.
     rows: (copies, iterations), structured like `history().rows`: the rows of the last run of each
         copy. Every run overwrites them: copy rows that you keep.
     """
@@ -34,27 +36,29 @@ class GroupBurst:
         states: NDArray[Any],
         rows: NDArray[Any],
         *,
+        steps: int,
         pace: tuple[int, str, str, str, int],
         everybody: NDArray[np.uint32],
     ) -> None:
         states.view(np.uint8).fill(255)
-        self._targets: NDArray[Any] = states.swapaxes(1, 2)
+        self._targets: NDArray[Any] = states if states.ndim == 1 else states.swapaxes(1, 2)
         self._rows = rows
         self._group = group
         self._everybody = everybody
         self._all = everybody.view(np.uint8)
         memory = states.view(np.uint8), rows.view(np.uint8)
-        self._plan = _core.GroupPlan(actuators, states.shape[2], *pace, rows.shape[1], *memory)
+        self._plan = _core.GroupPlan(actuators, steps, *pace, rows.shape[1], *memory)
         group.check(self._plan)
 
     @property
     def targets(self) -> NDArray[Any]:
-        """The targets of the next run, (copies, steps, actuators)."""
+        """The targets of the next run, (copies, steps, actuators), or (copies,): see the class."""
         return self._targets
 
     @targets.setter
     def targets(self, values: ArrayLike) -> None:
-        fill_targets(self._targets, values, "(copies, steps, actuators)")
+        axes = "(copies,)" if self._targets.ndim == 1 else "(copies, steps, actuators)"
+        fill_targets(self._targets, values, axes)
 
     @property
     def rows(self) -> NDArray[Any]:

@@ -24,15 +24,16 @@ from o80.errors import InvalidArgument, UsedAfterFork
 from o80.frontend import Frontend
 from o80.gather import Comparison, Gather, Gathered, flags_from, numbers_from
 from o80.group_burst import GroupBurst, chosen_copies
-from o80.layout import Layout
+from o80.group_request import GroupRequest
+from o80.layout import Layout, dtype_of_type
 from o80.prepared_burst import checked_count
-from o80.trajectory import common_type
+from o80.trajectory import common_type, state_types
 from o80.words import ModeWord, ProfileWord, StartWord
 
 if TYPE_CHECKING:
     from o80.group_burst import Copies
 
-__all__ = ["Gather", "Gathered", "GroupBurst", "InlineGroup"]
+__all__ = ["Gather", "Gathered", "GroupBurst", "GroupRequest", "InlineGroup"]
 
 
 class InlineGroup(Closeable):
@@ -104,7 +105,8 @@ class InlineGroup(Closeable):
         """Prepares a burst of the copies that is repeated: it sends targets and returns all rows.
 
         iterations: number of iterations of each burst.
-        actuators: indices or names of the actuators that get targets (None: all).
+        actuators: indices or names of the actuators that get targets (None: all). Their states may
+            be of several types, see `GroupBurst`.
         steps: number of targets of each actuator in a burst.
         each: iterations to reach each target.
         mode, profile, start: as in `Frontend.add_command`.
@@ -114,16 +116,26 @@ class InlineGroup(Closeable):
         """
         self._group.check_usable()
         chosen, _ = self[0]._chosen(actuators)
-        shape = self.copies, len(chosen), checked_count(steps, "steps")
         count = checked_count(iterations, "iterations")
         return GroupBurst(
             self._group,
             chosen,
-            np.empty(shape, common_type(chosen, self._layout)),
+            self._states(chosen, checked_count(steps, "steps")),
             np.zeros((self.copies, count), self._layout.row),
+            steps=steps,
             pace=(checked_count(each, "each"), mode, profile, start, whole(delay, "delay", 0)),
             everybody=self._all,
         )
+
+    def _states(self, actuators: list[int], steps: int) -> NDArray[Any]:
+        """Memory for targets: in each copy those of the first actuator, then of the second, ..."""
+        if not actuators or len(set(state_types(actuators, self._layout))) == 1:
+            kind = common_type(actuators, self._layout)
+            return np.empty((self.copies, len(actuators), steps), kind)
+        kinds = state_types(actuators, self._layout)
+        names = [self._layout.schema["actuators"][actuator]["name"] for actuator in actuators]
+        columns = [(name, kind, (steps,)) for name, kind in zip(names, kinds, strict=True)]
+        return np.empty(self.copies, np.dtype(columns))
 
     def request(
         self, name: str, /, *, copies: Copies = None, timeout: float | None = None, **fields: Any
@@ -142,6 +154,25 @@ class InlineGroup(Closeable):
         spread = {field: self._spread(name, field, fields[field], len(chosen)) for field in fields}
         each = [{field: values[i] for field, values in spread.items()} for i in range(len(chosen))]
         self._group.request(name, chosen.view(np.uint8), each, timeout)
+
+    def prepared_request(self, name: str, /, **fields: Any) -> GroupRequest:
+        """Prepares a request that is repeated, as the reset of a simulation.
+
+        name: name of the request.
+        fields: fields of the request, the same for all copies; `GroupRequest.fields` changes them.
+
+        Raises InvalidArgument.
+        """
+        payload = self._group.payload(name, fields)
+        described = next(each for each in self._layout.schema["requests"] if each["name"] == name)
+        kind = dtype_of_type(described["type"])
+        return GroupRequest(
+            self._group,
+            name,
+            np.frombuffer(payload * self.copies, kind).copy(),
+            np.zeros(self.copies, self._layout.row),
+            self._all,
+        )
 
     def latest(self, copies: Copies = None) -> NDArray[Any]:
         """The newest row of each copy, structured like `history().rows`: (copies,)."""

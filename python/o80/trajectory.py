@@ -54,6 +54,13 @@ def states_from(targets: ArrayLike, kind: np.dtype[Any]) -> NDArray[Any]:
     return array
 
 
+def state_types(actuators: Sequence[int], layout: Layout) -> list[np.dtype[Any]]:
+    """The state type of each of these actuators."""
+    schema = layout.schema
+    groups = [schema["actuators"][actuator]["group"] for actuator in actuators]
+    return [dtype_of_type(schema["groups"][group]["type"]) for group in groups]
+
+
 def common_type(actuators: Sequence[int], layout: Layout) -> np.dtype[Any]:
     """The state type of all these actuators. Raises InvalidArgument if they differ."""
     schema = layout.schema

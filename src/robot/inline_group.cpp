@@ -60,7 +60,7 @@ std::string text_of(const std::string& group, const std::vector<CopyFailed::Fail
 
 void refuse_size(const char* what, std::size_t given, std::size_t wanted, const char* unit) {
   if (given == wanted) return;
-  throw InvalidArgument(std::string("the ") + what + " of a group's burst take " +
+  throw InvalidArgument(std::string("the ") + what + " of a call of a group take " +
                         std::to_string(wanted) + ' ' + unit + ", the memory given has " +
                         std::to_string(given));
 }
@@ -464,8 +464,10 @@ bool InlineGroup::burst_directly(Copy& copy, const BurstPlan& plan,
 
 void InlineGroup::request(std::uint32_t request, std::span<const std::uint32_t> chosen,
                           std::span<const std::byte> payloads, Timeout timeout,
-                          const KeepWaiting& keep_waiting) {
+                          const KeepWaiting& keep_waiting, std::span<std::byte> rows) {
   check_usable();
+  const std::size_t row = description().layout.size;
+  if (!rows.empty()) refuse_size("rows", rows.size(), copies() * row, "bytes");
   const std::size_t size = payloads.size() / std::max<std::size_t>(1, chosen.size());
   const CommandCheck& robot = copies_.front()->frontend.command_check();
   for (std::size_t i = 0; i < chosen.size(); ++i) {
@@ -479,6 +481,7 @@ void InlineGroup::request(std::uint32_t request, std::span<const std::uint32_t> 
     throw_unless_completed(request, sent);
     copy.frontend.latest(copy.bytes());
     read_gathered(chosen[place], copy.bytes());
+    if (!rows.empty()) std::memcpy(rows.data() + chosen[place] * row, copy.bytes(), row);
   });
 }
 

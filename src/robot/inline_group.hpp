@@ -126,9 +126,11 @@ class InlineGroup {
              const KeepWaiting& keep_waiting = {}, const Following* then = nullptr);
   /// Sends a request to the chosen copies, with a payload for each, and runs each until its request
   /// has ended. Throws as burst(); a request that is not completed is a failure of its copy.
+  /// `rows`: if not empty, a row for each copy of the group, in which those that were chosen get
+  /// their newest one.
   void request(std::uint32_t request, std::span<const std::uint32_t> chosen,
                std::span<const std::byte> payloads, Timeout timeout = {},
-               const KeepWaiting& keep_waiting = {});
+               const KeepWaiting& keep_waiting = {}, std::span<std::byte> rows = {});
   /// Copies the newest rows of the chosen copies.
   void latest(std::span<const std::uint32_t> chosen, std::span<std::byte> rows);
 

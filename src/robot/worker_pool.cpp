@@ -11,12 +11,12 @@
 
 namespace o80 {
 
-WorkerPool::WorkerPool(std::size_t workers) {
+WorkerPool::WorkerPool(std::size_t workers) : shares_(workers + 1) {
   sigset_t every, before;
   sigfillset(&every);
   pthread_sigmask(SIG_BLOCK, &every, &before);
   threads_.reserve(workers);
-  for (std::size_t i = 0; i < workers; ++i) threads_.emplace_back([this] { work(); });
+  for (std::size_t i = 0; i < workers; ++i) threads_.emplace_back([this, i] { work(i + 1); });
   pthread_sigmask(SIG_SETMASK, &before, nullptr);
 }
 
@@ -39,8 +39,17 @@ void WorkerPool::begin(std::uint32_t count, Call call, const void* object) noexc
   count_.store(count, std::memory_order_relaxed);
   done_.store(0, std::memory_order_relaxed);
   const std::uint32_t round = round_.load(std::memory_order_relaxed) + 1;
-  left_.store(std::uint64_t{round} << 32 | count, std::memory_order_release);  // sync left
-  round_.store(round, std::memory_order_release);                              // sync round
+  std::uint64_t first = 0;
+  for (std::size_t i = 0; i < shares_.size(); ++i) {
+    // rounded up: the only task of a call is the caller's
+    const std::uint64_t end =
+        (std::uint64_t{count} * (i + 1) + shares_.size() - 1) / shares_.size();
+    shares_[i].first.store(static_cast<std::uint32_t>(first), std::memory_order_relaxed);
+    shares_[i].left.store(std::uint64_t{round} << 32 | (end - first),
+                          std::memory_order_release);  // sync left
+    first = end;
+  }
+  round_.store(round, std::memory_order_release);  // sync round
   // one task is for the caller
   if (count > 1 && !threads_.empty()) {
     const auto most = std::min<std::size_t>(count - 1, threads_.size());
@@ -48,17 +57,24 @@ void WorkerPool::begin(std::uint32_t count, Call call, const void* object) noexc
   }
 }
 
-/// Takes a task of this round; false if there is none. A worker that comes late finds 0 tasks left,
-/// or another round, and so cannot take a task of a later call: round and number of tasks change in
-/// one store.
-bool WorkerPool::take(std::uint32_t round, std::uint32_t& i) noexcept {
-  std::uint64_t left = left_.load(std::memory_order_acquire);  // sync left
-  do {
-    i = static_cast<std::uint32_t>(left) - 1;
-    if (left >> 32 != round || static_cast<std::uint32_t>(left) == 0) return false;
-  } while (!left_.compare_exchange_weak(left, left - 1, std::memory_order_acq_rel,
-                                        std::memory_order_acquire));
-  return true;
+/// Takes a task of this round, of the own share if there is one; false if there is none. A worker
+/// that comes late finds 0 tasks left, or another round, and so cannot take a task of a later call:
+/// round and number of tasks of a share change in one store.
+bool WorkerPool::take(std::uint32_t round, std::size_t own, std::uint32_t& i) noexcept {
+  for (std::size_t k = 0; k < shares_.size(); ++k) {
+    Share& share = shares_[(own + k) % shares_.size()];
+    std::uint64_t left = share.left.load(std::memory_order_acquire);  // sync left
+    while (left >> 32 == round && static_cast<std::uint32_t>(left) > 0) {
+      const std::uint32_t first = share.first.load(std::memory_order_relaxed);
+      if (!share.left.compare_exchange_weak(left, left - 1, std::memory_order_acq_rel,
+                                            std::memory_order_acquire)) {
+        continue;
+      }
+      i = first + static_cast<std::uint32_t>(left) - 1;
+      return true;
+    }
+  }
+  return false;
 }
 
 bool WorkerPool::finished() noexcept {
@@ -78,7 +94,7 @@ bool WorkerPool::wait_for_workers(std::uint32_t count) noexcept {
   return all();
 }
 
-void WorkerPool::work() noexcept {
+void WorkerPool::work(std::size_t own) noexcept {
   // set from inside: set by another thread, the name would create an entry below /proc that the
   // kernel has to remove when the thread ends
   pthread_setname_np(pthread_self(), "o80-group");
@@ -94,7 +110,7 @@ void WorkerPool::work() noexcept {
     if (stop_.load(std::memory_order_relaxed)) return;
     round = round_.load(std::memory_order_acquire);  // sync round
     std::uint32_t i = 0;
-    while (take(round, i)) {
+    while (take(round, own, i)) {
       call_(object_, i);
       const bool last = finished();
       if (last && waiting_.load(std::memory_order_seq_cst)) futex_wake(done_, 1);  // sync waiting

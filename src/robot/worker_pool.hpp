@@ -14,8 +14,10 @@ namespace o80 {
 /// Threads that share the tasks of one call with the calling thread.
 ///
 /// Between two calls the workers sleep on a futex (after a spin of at most 50 us, as every wait of
-/// o80). They block all signals, which belong to the threads of the program. Tasks are handed out
-/// one after the other by one counter, so a slow task delays only its own thread.
+/// o80). They block all signals, which belong to the threads of the program. Each thread has a
+/// share of the tasks, the same one in every call of as many tasks, so that what a task works on
+/// stays in the caches of one processor. A thread that is done takes tasks from the shares of the
+/// others, so a slow task delays only its own thread.
 ///
 /// Writer:   one thread at a time calls run().
 /// Realtime: no; run() allocates nothing.
@@ -44,7 +46,7 @@ class WorkerPool {
     };
     begin(count, call, &task);
     std::uint32_t i = 0;
-    while (take(round_.load(std::memory_order_relaxed), i)) {
+    while (take(round_.load(std::memory_order_relaxed), 0, i)) {
       task(i);
       finished();
       look_around();
@@ -56,13 +58,19 @@ class WorkerPool {
   using Call = void (*)(const void* object, std::uint32_t i);
 
   void begin(std::uint32_t count, Call call, const void* object) noexcept;
-  bool take(std::uint32_t round, std::uint32_t& i) noexcept;
+  bool take(std::uint32_t round, std::size_t own, std::uint32_t& i) noexcept;
   /// True if it was the last task of the call.
   bool finished() noexcept;
   bool wait_for_workers(std::uint32_t count) noexcept;
-  void work() noexcept;
+  void work(std::size_t own) noexcept;
 
-  // written by the caller before `left_` changes; a worker reads call_ and object_ only after it
+  /// Tasks of one thread.
+  struct alignas(64) Share {
+    std::atomic<std::uint64_t> left{0};   // the round << 32 | tasks that nobody has taken
+    std::atomic<std::uint32_t> first{0};  // task of the round
+  };
+
+  // written by the caller before the shares change; a worker reads call_ and object_ only after it
   // has taken a task, and the call cannot end before that task
   Call call_ = nullptr;
   const void* object_ = nullptr;
@@ -70,7 +78,7 @@ class WorkerPool {
   alignas(64) std::atomic<std::uint32_t> round_{0};  // futex of the workers; number of the call
   std::atomic<bool> stop_{false};
   std::atomic<bool> claimed_{false};
-  alignas(64) std::atomic<std::uint64_t> left_{0};  // the round << 32 | tasks that nobody has taken
+  std::vector<Share> shares_;                       // that of the caller, then those of the workers
   alignas(64) std::atomic<std::uint32_t> done_{0};  // futex of the caller; tasks that have returned
   std::atomic<bool> waiting_{false};                // the caller sleeps on done_
   Spinner caller_spin_;

@@ -193,17 +193,33 @@ std::uint32_t UntypedFrontend::add_trajectory(std::uint32_t actuator, std::uint3
   return add_trajectories({&actuator, 1}, rows, states, options, times);
 }
 
+/// Bytes of the rows of one of several actuators, of the `left` ones; for the last one, all of
+/// these: the check of its targets says what is wrong with them.
+std::size_t UntypedFrontend::size_of_rows(std::uint32_t actuator, std::uint32_t rows,
+                                          std::size_t left,
+                                          std::span<const std::uint32_t> actuators) const {
+  if (actuator == actuators.back()) return left;
+  const Schema& schema = link_->description->schema;
+  const std::uint32_t index = link_->command_check.actuator(std::int64_t{actuator});
+  return std::min(left, std::size_t{rows} * schema.types[schema.actuators[index].type].size);
+}
+
 std::uint32_t UntypedFrontend::add_trajectories(std::span<const std::uint32_t> actuators,
                                                 std::uint32_t rows,
                                                 std::span<const std::byte> states,
                                                 const CommandOptions& options,
                                                 std::span<const std::int64_t> times) {
-  const std::size_t each = states.size() / std::max<std::size_t>(1, actuators.size());
-  CommandOptions paced = options;
-  for (std::size_t i = 0; i < actuators.size(); ++i) {
-    paced = checked_trajectory(actuators[i], rows, states.subspan(i * each, each), options, times);
+  for (const std::uint32_t actuator : actuators) {
+    link_->command_check.actuator(std::int64_t{actuator});
   }
   refuse_twice(actuators);
+  CommandOptions paced = options;
+  std::size_t at = 0;
+  for (const std::uint32_t actuator : actuators) {
+    const std::size_t size = size_of_rows(actuator, rows, states.size() - at, actuators);
+    paced = checked_trajectory(actuator, rows, states.subspan(at, size), options, times);
+    at += size;
+  }
   const std::span<const std::int64_t> ends = rows > 1 ? times : std::span<const std::int64_t>{};
   const auto lock = link_->lock_to_add();
   if (actuators.size() == 1) {
@@ -211,9 +227,12 @@ std::uint32_t UntypedFrontend::add_trajectories(std::span<const std::uint32_t> a
                                   states);
   }
   link_->members.clear();
-  for (std::size_t i = 0; i < actuators.size(); ++i) {
+  at = 0;
+  for (const std::uint32_t actuator : actuators) {
+    const std::size_t size = size_of_rows(actuator, rows, states.size() - at, actuators);
     link_->members.push_back(
-        {head_of(actuators[i], paced, Profile::linear), {}, states.subspan(i * each, each)});
+        {head_of(actuator, paced, Profile::linear), {}, states.subspan(at, size)});
+    at += size;
   }
   return link_->builder.group(link_->members, ends, rows);
 }

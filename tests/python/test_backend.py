@@ -415,3 +415,15 @@ def test_a_forked_child_leaves_a_backend_to_its_parent(segment: str) -> None:
         with o80.Frontend(segment) as frontend:
             assert frontend.alive
             assert frontend.latest().iteration == 0
+
+
+def test_a_mapping_within_a_mapping_fills_the_fields_that_it_names(segment: str) -> None:
+    sensors = {"missing": {"arm": bool, "world": bool}, "count": int}
+    with o80.Backend(segment, extended=sensors) as backend:
+        backend.publish(extended={"missing": {"arm": False, "world": True}, "count": 1})
+        with o80.Frontend(segment, read_only=True) as observer:
+            missing = observer.latest().extended.missing
+            assert missing.world and not missing.arm
+        backend.step()
+        with pytest.raises(o80.InvalidArgument, match=r"extended.missing has no field 'wrold'"):
+            backend.publish(extended={"missing": {"wrold": True}})

@@ -1,5 +1,6 @@
 """o80 record, o80 save and o80 repair."""
 
+import json
 import os
 import signal
 import subprocess
@@ -120,3 +121,37 @@ def test_repair_refuses_what_is_no_recording(tmp_path: Path) -> None:
 
     assert "is not an MCAP file" in run("repair", tmp_path / "x.mcap", code=1)
     assert "there is no file" in run("repair", tmp_path / "missing.mcap", code=1)
+
+
+def test_info_describes_a_recording(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    for gain in (13.0, 13.0, 15.0):
+        with (
+            o80.robots.load("two_joints").inline("arm", gain=gain) as arm,
+            o80.Recording(path, arm, proceed=path.exists()) as recording,
+        ):
+            recording.mark("episode")
+            arm.burst(100)
+
+    said = run("info", path)
+    assert f"{path}: 1 segment, " in said
+    assert said.count("two_joints  20") == 3  # a row of the table for each run, with its date
+    assert "arm, runs 0, 1: started with" in said
+    assert "arm, run 2: started with" in said
+    assert "gain=15" in said
+    assert "marks  episode (3)" in said
+    told = json.loads(run("info", path, "--json"))
+    assert [each["rows"] for each in told] == [each.rows for each in o80.open(path)["arm"].epochs]
+
+
+def test_info_tells_what_a_damaged_recording_is(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with o80.robots.load("two_joints").inline("arm") as arm, o80.Recording(path, arm):
+        arm.burst(100)
+    whole = path.read_bytes()
+
+    path.write_bytes(whole[: len(whole) - 20])
+    assert "o80 repair" in run("info", path)
+    path.write_bytes(b"")
+    assert "is not an MCAP file" in run("info", path, code=1)
+    assert "there is no file" in run("info", tmp_path / "other.mcap", code=1)

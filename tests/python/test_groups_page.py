@@ -10,7 +10,7 @@ PAGE = Path(__file__).resolve().parents[2] / "docs" / "groups.md"
 
 def test_the_programs_of_the_page_run(capsys: pytest.CaptureFixture[str]) -> None:
     programs = re.findall(r"^```python\n(.*?)^```", PAGE.read_text(), re.MULTILINE | re.DOTALL)
-    assert len(programs) == 4
+    assert len(programs) == 5
     names: dict[str, object] = {}
     for program in programs:
         exec(compile(program, str(PAGE), "exec"), names)
@@ -20,5 +20,6 @@ def test_the_programs_of_the_page_run(capsys: pytest.CaptureFixture[str]) -> Non
     followed = [float(number) for number in printed[1].strip("[]").split()]
     assert all(0 < number < 0.5 for number in followed)
     assert len(followed) == 2
-    assert printed[2].startswith("(16, 4) ['observed.shoulder', 'observed.elbow', 'extended")
-    assert printed[3].startswith("{2: BackendHalted(")
+    assert printed[2].startswith("[0")  # after the reset
+    assert printed[3].startswith("(16, 4) ['observed.shoulder', 'observed.elbow', 'extended")
+    assert printed[4].startswith("{2: BackendHalted(")

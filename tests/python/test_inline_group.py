@@ -193,6 +193,45 @@ def test_gathers_what_numpy_would(group: o80.InlineGroup) -> None:
     assert np.array_equal(gather.observations[~reset], expected[~reset])
 
 
+def test_a_prepared_request_does_what_a_request_does_bit_for_bit(group: o80.InlineGroup) -> None:
+    with o80.robots.load("two_joints").inline(copies=COPIES, threads=1) as other:
+        for each in (group, other):
+            burst = each.prepared_burst(10)
+            burst.targets = np.linspace(-1, 1, burst.targets.size).reshape(burst.targets.shape)
+            burst.run()
+        before = group.latest()
+        reset = group.prepared_request("reset", seed=4)
+        assert (reset.fields["seed"] == 4).all()
+        reset.fields["seed"][[1, 3]] = [8, 9]
+        reset.run([3, 0])
+        other.request("reset", copies=[3, 0], seed=[9, 4])
+        assert group.latest().tobytes() == other.latest().tobytes()
+        assert reset.rows[[0, 3]].tobytes() == other.latest([0, 3]).tobytes()
+        assert not reset.rows["iteration"][[1, 2, 4]].any()
+        assert group.latest([1, 2, 4]).tobytes() == before[[1, 2, 4]].tobytes()
+        reset.run()
+        other.request("reset", seed=[4, 8, 4, 9, 4])
+        assert reset.rows.tobytes() == other.latest().tobytes()
+
+
+def test_a_prepared_request_refuses_what_a_request_refuses(group: o80.InlineGroup) -> None:
+    with pytest.raises(o80.InvalidArgument, match=r"'rest'.*Did you mean 'reset'"):
+        group.prepared_request("rest")
+    with pytest.raises(o80.InvalidArgument, match="seeds"):
+        group.prepared_request("reset", seeds=3)
+    reset = group.prepared_request("reset", seed=1)
+    with pytest.raises(o80.InvalidArgument, match="copies 0 to 4"):
+        reset.run([5])
+    restore = group.prepared_request("restore", slot=9)  # there are slots 0 to 7
+    with pytest.raises(o80.CopyFailed, match="copy 2 of 'two_joints' failed"):
+        restore.run([2])
+    with pytest.raises(TypeError, match="pickle"):
+        pickle.dumps(reset)
+    group.close()
+    with pytest.raises(o80.Closed):
+        reset.run()
+
+
 @pytest.mark.parametrize(
     ("numbers", "flags", "words"),
     [

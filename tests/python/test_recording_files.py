@@ -10,6 +10,7 @@ from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
 import o80
+from o80.recording.file_writer import FileWriter
 from o80.recording.recorder import Recorder
 from o80.recording.scan import scan
 
@@ -141,6 +142,18 @@ def test_a_file_that_exists_is_not_overwritten(arm: o80.Frontend, tmp_path: Path
     with pytest.raises(o80.RecordingError, match="exists"):
         Recorder(path, [arm.segment])
     assert path.read_bytes() == b"precious"
+
+
+def test_a_disk_without_room_for_the_beginning_of_a_file_is_left_without_it(tmp_path: Path) -> None:
+    path = tmp_path / "0004.mcap"
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10, limits[1]))
+    try:
+        with pytest.raises(OSError, match="large"):
+            FileWriter(path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert not path.exists()
 
 
 def record_for_ever(arm: o80.Frontend, recorder: Recorder) -> None:

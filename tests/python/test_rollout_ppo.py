@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from rollout_ppo import copied, learned, model_of
 from rollout_tasks import COPIES, INFOS, assert_same_rollouts, maker
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.vec_env import VecNormalize
 
 import o80
@@ -203,11 +205,24 @@ def test_it_learns() -> None:
     assert action[0] == pytest.approx([0.4, -0.6], abs=0.15)
 
 
+def test_it_leaves_no_temporary_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def make() -> Any:
+        return SyncVectorEnv([Guess] * 2, autoreset_mode=AutoresetMode.SAME_STEP)
+
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.delenv("SB3_LOGDIR", raising=False)
+    with LocalWorkers(make, workers=1, seed=1) as workers:
+        model_of(workers, steps=8, batch=16).learn(16)
+    assert not list(tmp_path.iterdir())
+
+
 def test_mistakes_are_named(tmp_path: Path) -> None:
     with workers_of(tmp_path) as workers:
         environments = WorkersEnv(workers)
+        model = PPO("MlpPolicy", environments, n_steps=2, batch_size=2, device="cpu")
+        model.set_logger(Logger(None, []))
         with pytest.raises(o80.InvalidArgument, match="give WorkersEnv to a RolloutPPO only"):
-            PPO("MlpPolicy", environments, n_steps=2, batch_size=2, device="cpu").learn(2)
+            model.learn(2)
         with pytest.raises(o80.InvalidArgument, match="norm_reward=False"):
             RolloutPPO("MlpPolicy", VecNormalize(environments), device="cpu")
         options: Any = {"activation_fn": torch.nn.ReLU}

@@ -102,6 +102,7 @@ def test_another_autoreset_mode_is_refused() -> None:
 def test_ppo_learns_on_copies() -> None:
     import torch
     from stable_baselines3 import PPO
+    from stable_baselines3.common.logger import Logger
 
     class Near(Reach):
         """Without noise and flags: the elbow should be at its goal."""
@@ -120,6 +121,7 @@ def test_ppo_learns_on_copies() -> None:
         model = PPO(
             "MlpPolicy", copies, n_steps=64, batch_size=256, seed=1, device="cpu", gamma=0.8
         )
+        model.set_logger(Logger(None, []))  # the default one leaves a folder in /tmp
         model.learn(2048)
         before = np.mean([each["r"] for each in model.ep_info_buffer or []])
         model.learn(16_000)

@@ -14,7 +14,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from o80.learning import Index, Outcome, Task
+from o80.learning import EVERY, Index, Outcome, Task
 
 from .arguments import refuse_unless_for_copies, refuse_wrong_balls, refuse_wrong_options
 from .balls.sources import balls_from
@@ -34,6 +34,12 @@ Numbers = NDArray[np.intp]
 
 TEXTS = np.array([end.text for end in End], object)
 """Of the ends, by their numbers."""
+
+
+def _running(copies: int) -> dict[str, NDArray[Any]]:
+    """Entries of `info` where no episode has ended."""
+    ends = np.full(copies, End.RUNNING, np.int64)
+    return {"stalled": np.zeros(copies, np.bool_), "end": ends, "end_text": TEXTS[ends]}
 
 
 class TableTennisCopies(Task):
@@ -70,12 +76,13 @@ class TableTennisCopies(Task):
         )
         self._rig = GroupRig(copies, rig, delay=settings.delay, threads=threads)
         arms, twins = self._rig.arms, self._rig.twins
-        self._asked = arms.pressures
+        self._asked = arms.asked(EVERY)
+        pressures = np.zeros((copies, MUSCLES))
         self._ends = np.zeros(copies, np.int64)
         self._state = State(
             self.steps,
             arms.last_motion,
-            arms.pressures,
+            pressures,
             arms.last_racket,
             twins.ball,
             twins.records,
@@ -84,6 +91,11 @@ class TableTennisCopies(Task):
         self._scene: Scene | None = None
         self._observations = np.zeros((copies, self._observer.size), np.float32)
         self._unobserved = False
+        self._gathered: list[NDArray[np.float32]] = []
+        if self._observer.is_ball_play:
+            self._gathered = self._rig.gather(self._observer.low, self._observer.high)
+        self._running = _running(copies)
+        self._some_ended = False
 
     def begin(
         self,
@@ -108,8 +120,9 @@ class TableTennisCopies(Task):
         self._state.goal[copies] = [draw.goal for draw in draws]
         self._ends[copies] = End.RUNNING
         self._look()
-        state, asked = self._state.at(copies), self._asked[copies]
-        self._observations[copies] = self._observer.begin(state, asked, generators, copies)
+        if not self._gathered:
+            state, asked = self._state.at(copies), self._asked[copies]
+            self._observations[copies] = self._observer.begin(state, asked, generators, copies)
         self._unobserved = False
 
     def step(self, actions: Any, copies: Index) -> None:
@@ -119,13 +132,12 @@ class TableTennisCopies(Task):
             asked = changed_pressures(asked, actions, factor=self._factor)
             self._rig.step(asked, copies)
         self._asked[copies] = asked
-        self._ends[copies] = End.RUNNING
+        self._ends[copies], self._some_ended = End.RUNNING, False
         self._look()
-        if self._fly_out:
+        if self._fly_out and np.count_nonzero(self._state.record.touched):
             touched = np.zeros(self.copies, np.bool_)
             touched[copies] = np.asarray(self._state.record.touched)[copies]
-            if touched.any():
-                self._fly(np.flatnonzero(touched))
+            self._fly(np.flatnonzero(touched))
         self._unobserved = True
 
     def _fly(self, touched: Numbers) -> None:
@@ -138,7 +150,7 @@ class TableTennisCopies(Task):
 
     def _look(self) -> None:
         """What of the state is no view of the newest rows."""
-        self._state.pressures = self._rig.arms.pressures
+        self._rig.arms.read_pressures(self._state.pressures)
         self._state.record = self._rig.twins.records
 
     def flagged(self) -> NDArray[np.bool_]:
@@ -150,12 +162,16 @@ class TableTennisCopies(Task):
         """Ends and rewards of these."""
         state = self._state.at(copies)
         ends = self._task.end(state)
-        self._ends[copies] = ends
+        self._ends[copies], self._some_ended = ends, True
         by_event = terminated(ends)
         return Outcome(self._task.reward(state), by_event, ~by_event & (ends != End.RUNNING))
 
     def observe(self, copies: Index) -> Any:
         """(n, M); those that have been stepped are observed once, when first asked for."""
+        if self._gathered:
+            if isinstance(copies, slice):
+                return np.concatenate(self._gathered, axis=1)
+            return np.concatenate([part[copies] for part in self._gathered], axis=1)
         if self._unobserved:
             state, asked = self._of(copies), self._asked[copies]
             self._observations[copies] = self._observer.observe(state, asked, copies)
@@ -164,8 +180,10 @@ class TableTennisCopies(Task):
 
     def info(self, copies: Index) -> Mapping[str, Any]:
         """As that of the single environment."""
-        state, ends = self._of(copies), self._ends[copies]
-        info = self._task.info(state)
+        info = self._task.info(self._of(copies))
+        if not self._some_ended and isinstance(copies, slice):
+            return info | self._running
+        ends = self._ends[copies]
         info["stalled"] = ends == End.STALLED
         info["end"], info["end_text"] = ends, TEXTS[ends]
         return info

@@ -273,6 +273,11 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
         """Arm and twins, to be watched."""
         return self._rig
 
+    @property
+    def observer(self) -> Observer:
+        """What makes observations of states."""
+        return self._observer
+
     def statistics(self) -> Statistics:
         """Rates and lateness since the environment was made."""
         return statistics_of(self._counts, self._rig.arm.frontend, step=self._rig_settings.step)

@@ -48,6 +48,9 @@ class RigSettings:
     """Name of the arm's segment; None: an unused one."""
     attach: bool = False
     """The arm runs already, in another process, as `arm_segment`: only the twins are started."""
+    twin_segment: str | None = None
+    """The first twin runs already, bursting, in another process under this name; None: it is
+    started too. `rig.robot_options.twin_options` has its options."""
     twins: int = 1
     """Simulations that mirror the arm; the first one holds the ball that is played."""
     extra_balls: int = 0
@@ -78,6 +81,8 @@ class RigSettings:
             raise ValueError("to attach to an arm, give the name of its segment: arm_segment")
         if self.attach and self.pacing is Pacing.INLINE:
             raise ValueError("an arm in another process cannot be inline; choose another pacing")
+        if self.twin_segment is not None and self.pacing is Pacing.INLINE:
+            raise ValueError("a twin in another process cannot be inline; choose another pacing")
 
     @property
     def period(self) -> float:

@@ -1,4 +1,4 @@
-"""Recorded bounces: what the law of the bounce predicts, and how flights are handed over."""
+"""Recorded bounces: what the law of the bounce predicts."""
 
 from dataclasses import replace
 from functools import cache
@@ -14,7 +14,7 @@ from o80_table_tennis.balls.bounce_fit import Law, errors, fitted
 from o80_table_tennis.balls.recordings import load_trajectories
 from o80_table_tennis.balls.trajectories import BallTrajectory
 from o80_table_tennis.fit_bounces import SPINLESS, BounceSet, bounce_set, rms
-from o80_table_tennis.physics.aerodynamics import AERODYNAMICS, derivative
+from o80_table_tennis.physics.aerodynamics import AERODYNAMICS
 from o80_table_tennis.physics.impact import bounced, leaving
 from o80_table_tennis.world.ball import BALL_GUN_SPIN, BALL_RADIUS
 from o80_table_tennis.world.materials import TABLE_RESTITUTION, Restitution
@@ -59,34 +59,6 @@ def test_the_constants_are_those_of_the_fit(sets: list[BounceSet]) -> None:
         found = rms(errors(Law(), each.bounces))
         assert found < most, each.name
         assert found < rms(errors(SPINLESS, each.bounces)), each.name
-
-
-def lift(row: FloatArray) -> FloatArray:
-    """Magnus acceleration (3,) of a ball in free flight: position, velocity and spin (9,)."""
-    air = AERODYNAMICS
-    x, y, z, vx, vy, vz, wx, wy, wz = row.tolist()
-    halved_at = air.halved_at(float(np.linalg.norm([wx, wy, wz])))
-    turn = (air.magnus * wx, air.magnus * wy, air.magnus * wz)
-    return np.array(derivative((x, y, z, vx, vy, vz), turn, 0.0, 0.0, halved_at)[3:])
-
-
-@pytest.mark.recordings("spin_2022")
-@pytest.mark.parametrize("name", SETS)
-def test_the_lift_does_not_jump_where_a_recorded_flight_is_handed_over(name: str) -> None:
-    jumps = []
-    for shot in shots(name)[:20]:
-        fit, sampled = shot.fit, shot.resample()
-        times = fit.start + np.arange(len(sampled.positions)) * sampled.period
-        bounce = fit.bounce_times[0] if len(fit.bounce_times) else np.inf
-        falling = sampled.velocities[:, 2] < -1.0
-        for row in np.flatnonzero((times < bounce) & falling)[::-10]:
-            recorded = np.cross(fit.flights[0].turn, sampled.velocities[row])
-            np.testing.assert_allclose(lift(sampled.states[row]), recorded, rtol=0, atol=0.02)
-        if bounce < times[-1]:
-            recorded = np.cross(fit.flights[1].turn, sampled.velocities[-1])
-            jumps.append(np.linalg.norm(lift(sampled.states[-1]) - recorded))
-    # after a bounce, spins come from the law of the bounce: nearly as fitted, where there are rows
-    assert np.median(jumps) < 0.5
 
 
 @pytest.mark.recordings("spin_2022")

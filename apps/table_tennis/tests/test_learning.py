@@ -3,6 +3,7 @@
 import json
 import math
 import sys
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -50,6 +51,20 @@ def test_a_training_writes_a_row_for_each_update_a_policy_and_a_checkpoint(tmp_p
     assert loaded.conditions == SMALL.conditions
     observation = np.ones(loaded.network.inputs, np.float32)
     assert loaded.act(observation).tobytes() == policy.act(observation).tobytes()
+
+
+def test_a_training_leaves_no_temporary_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
+    monkeypatch.delenv("SB3_LOGDIR", raising=False)
+    with Training(SMALL, tmp_path / "training") as training:
+        training.run()
+    with Training(replace(SMALL, decisions=192), tmp_path / "training", resume=True) as resumed:
+        resumed.run()
+    assert not list(temporary.iterdir())
 
 
 def test_the_policy_of_numpy_acts_as_the_one_that_was_trained(tmp_path: Path) -> None:
@@ -248,7 +263,8 @@ def test_an_unknown_way_is_refused_with_those_there_are() -> None:
 
 @pytest.mark.check
 def test_a_short_training_learns_to_touch_the_ball(tmp_path: Path) -> None:
-    settings = LearningSettings(decisions=300_000, evaluate_every=300_000, evaluated=200)
+    small = PpoSettings(epochs=5, hidden=64)  # a third of the time of the default ones
+    settings = LearningSettings(ppo=small, decisions=300_000, evaluate_every=300_000, evaluated=200)
     with Training(settings, tmp_path) as training:
         training.run()
     last = curve.read(tmp_path / CURVE)[-1]

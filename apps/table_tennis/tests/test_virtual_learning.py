@@ -1,6 +1,10 @@
 """SAC with virtual balls: the fast update, and whole trainings, small ones."""
 
 import math
+import signal
+import subprocess
+import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,9 +17,10 @@ import typer
 from gymnasium import spaces
 from rich.console import Console
 from stable_baselines3 import SAC
-from stable_baselines3.common.logger import configure
+from stable_baselines3.common.logger import Logger
 from typer.testing import CliRunner
 
+import o80
 from o80_table_tennis.learning.virtual import __main__ as command
 from o80_table_tennis.learning.virtual import curves
 from o80_table_tennis.learning.virtual.comparison import PICTURE, run
@@ -55,7 +60,7 @@ def learned(kind: type[SAC], updates: int, **optimizer: Any) -> SAC:
         seed=1,
         device="cpu",
     )
-    sac.set_logger(configure(None, []))
+    sac.set_logger(Logger(None, []))
     buffer: Any = sac.replay_buffer
     generator = np.random.default_rng(0)
     for name in ("observations", "next_observations", "rewards", "actions"):
@@ -143,3 +148,23 @@ def test_a_comparison_goes_on_where_it_was_stopped_and_draws_what_is_there(
 def test_an_unknown_way_is_named_with_those_that_there_are() -> None:
     with pytest.raises(ValueError, match="unknown way 'some'; there are: none, more_steps, all"):
         VirtualSettings(way="some")
+
+
+@pytest.mark.check
+def test_a_comparison_that_is_terminated_leaves_no_segment(tmp_path: Path) -> None:
+    module = "o80_table_tennis.learning.virtual"
+    arguments = ["--way", "none", "--seed", "1", "--output", str(tmp_path)]
+    process = subprocess.Popen([sys.executable, "-m", module, *arguments])
+
+    def left() -> list[str]:
+        return [each.name for each in o80.segments() if f"-{process.pid}-" in each.name]
+
+    try:
+        while process.poll() is None and len(left()) < 2:  # arm and twin
+            time.sleep(0.05)
+        process.terminate()
+        assert process.wait() == 128 + signal.SIGTERM
+        assert not left()
+    finally:
+        process.kill()
+        process.wait()

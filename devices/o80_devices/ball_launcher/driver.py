@@ -38,7 +38,7 @@ class Options:
     launch_timeout: float = option(15.0, "the longest that a launch takes", "s")
     deliver_timeout: float = option(0.5, "for the connection of a request", "s")
     heartbeat_timeout: float = option(
-        0.1, "without a heartbeat, after which it is disconnected; 0: no heartbeats", "s"
+        0.075, "without a heartbeat, after which it is disconnected; 0: no heartbeats", "s"
     )
     stop_timeout: float = option(3.0, "for stopping the motors at the end", "s")
 

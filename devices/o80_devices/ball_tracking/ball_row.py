@@ -37,6 +37,7 @@ EXTENDED: dict[str, Any] = {
     "residual": np.float64,
     "image_time": np.int64,
     "stamp": np.int64,
+    "capture_error": np.int64,
 }
 UNITS = {
     "capture_time": "ns",
@@ -48,4 +49,5 @@ UNITS = {
     "residual": "px",
     "image_time": "ns",
     "stamp": "ns",
+    "capture_error": "ns",
 }

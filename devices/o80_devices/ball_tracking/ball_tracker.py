@@ -69,15 +69,17 @@ class BallTracker:
             reading.missed()
             fill(reading, Tracked(reading.time, Reason.no_image), 0)
             return
-        fill(reading, self._tracker.track(images.images, images.time), images.time)
+        ball = self._tracker.track(images.images, images.time)
+        fill(reading, ball, images.time, images.error)
 
     def stop(self) -> None:
         self._source.close()
 
 
-def fill(reading: Reading, ball: Tracked, image_time: int) -> None:
-    """Writes the row. image_time: 0 without images [ns]."""
+def fill(reading: Reading, ball: Tracked, image_time: int, error: int = 0) -> None:
+    """Writes the row. image_time: 0 without images [ns]. error: of this time [ns]."""
     row = reading.extended
+    row["capture_error"] = error if ball.seen else 0
     row["capture_time"] = ball.time if ball.seen else 0
     row["reason"] = ball.reason
     row["ball"] = ball.ball

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from o80.errors import InvalidArgument
 from o80.extras import needed
 from o80_devices.ball_tracking import calibration
+from o80_devices.ball_tracking.board import PURPOSE
 from o80_devices.ball_tracking.rig import RigCamera
 
 FloatArray = NDArray[np.float64]
@@ -22,7 +23,7 @@ def first_places(lenses: Sequence[RigCamera], waved: FloatArray) -> list[RigCame
     The first two cameras come by their essential matrix, every other one by the points that these
     have found (perspective of n points).
     """
-    cv2: Any = needed("cv2", "cameras", calibration.PURPOSE, package="o80-devices")
+    cv2: Any = needed("cv2", "cameras", PURPOSE, package="o80-devices")
     flat = [calibration.without_place(lens) for lens in lenses]
     seen: NDArray[np.bool_] = np.asarray(np.isfinite(waved).all(-1))
     shared = seen.T.astype(int) @ seen.astype(int)
@@ -71,10 +72,10 @@ def _plane(lens: RigCamera, pixels: FloatArray) -> FloatArray:
 
 def adjusted(cameras: Sequence[RigCamera], waved: FloatArray) -> list[RigCamera]:
     """The places of cameras and ball that fit best in all images (bundle adjustment)."""
-    optimize: Any = needed("scipy.optimize", "cameras", calibration.PURPOSE, package="o80-devices")
-    sparse: Any = needed("scipy.sparse", "cameras", calibration.PURPOSE, package="o80-devices")
+    optimize: Any = needed("scipy.optimize", "cameras", PURPOSE, package="o80-devices")
+    sparse: Any = needed("scipy.sparse", "cameras", PURPOSE, package="o80-devices")
     rotations: Any = needed(
-        "scipy.spatial.transform", "cameras", calibration.PURPOSE, package="o80-devices"
+        "scipy.spatial.transform", "cameras", PURPOSE, package="o80-devices"
     ).Rotation
     points = calibration.triangulated(cameras, waved)
     used = np.isfinite(points).all(1)

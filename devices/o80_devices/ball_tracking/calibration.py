@@ -1,4 +1,4 @@
-"""Calibration of a rig: lenses from pictures of a board, places from a waved ball.
+"""Calibration of a rig: places from a waved ball. lenses.py has the lenses.
 
 A ball waved through the room, seen by all cameras at the same moments, tells where the cameras are
 relative to each other, except for the size of everything. The corners of the table, marked in the
@@ -9,21 +9,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from o80.errors import InvalidArgument
-from o80.extras import needed
 from o80_devices import _vision
 from o80_devices.ball_tracking.rig import RigCamera
+from o80_devices.ball_tracking.waved_ball import check_motion
+from o80_devices.ball_tracking.world_frame import in_world
 
 FloatArray = NDArray[np.float64]
-Image = NDArray[np.uint8]
-PURPOSE = "the calibration of cameras"
 LEAST_SHARED = 20
 """Moments in which two cameras must see the waved ball together."""
+LEAST_DEPTH = 0.02
+"""Extent of the waved ball's places in their thinnest direction, as a share of the widest."""
 
 
 @dataclass(frozen=True)
@@ -33,44 +33,6 @@ class Calibrated:
     cameras: tuple[RigCamera, ...]
     residual: float
     """Root mean square in the images [px]."""
-
-
-def lens_from_board(
-    name: str, images: Sequence[Image], inner_corners: tuple[int, int], square: float
-) -> Calibrated:
-    """Focal lengths, centre and distortion from at least 8 pictures of a chessboard.
-
-    inner_corners: how many along a row and along a column. square: length of a side [m].
-    Raises InvalidArgument, MissingExtra.
-    """
-    cv2: Any = needed("cv2", "cameras", PURPOSE, package="o80-devices")
-    columns, rows = inner_corners
-    board = np.zeros((columns * rows, 3), np.float32)
-    board[:, :2] = square * np.mgrid[:columns, :rows].T.reshape(-1, 2)
-    places, corners = [], []
-    for image in images:
-        grey = np.ascontiguousarray(np.asarray(image).mean(-1).astype(np.uint8))
-        found, pixels = cv2.findChessboardCorners(grey, inner_corners)
-        if found:
-            end = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 30, 0.001)
-            corners.append(cv2.cornerSubPix(grey, pixels, (5, 5), (-1, -1), end))
-            places.append(board)
-    if len(corners) < 8:
-        raise InvalidArgument(
-            f"the board of {columns} x {rows} inner corners was found in {len(corners)} of "
-            f"{len(images)} pictures of {name}: at least 8 are needed, from different sides"
-        )
-    height, width = images[0].shape[:2]
-    residual, matrix, lens, _, _ = cv2.calibrateCamera(places, corners, (width, height), None, None)
-    k1, k2, p1, p2, k3 = (float(value) for value in np.ravel(lens)[:5])
-    camera = RigCamera(
-        name=name,
-        size=(width, height),
-        focal=(float(matrix[0, 0]), float(matrix[1, 1])),
-        centre=(float(matrix[0, 2]), float(matrix[1, 2])),
-        distortion=(k1, k2, p1, p2, k3),
-    )
-    return Calibrated((camera,), float(residual))
 
 
 def places_from_ball(
@@ -94,15 +56,44 @@ def places_from_ball(
         raise InvalidArgument(
             f"waved must have the shape (moments, {len(lenses)}, 2), got {waved.shape}"
         )
+    check_motion(lenses, waved)
     cameras = bundle.adjusted(bundle.first_places(lenses, waved), waved)
-    seen = triangulated(cameras, np.moveaxis(np.asarray(corner_pixels, float), 0, 1))
-    known = np.isfinite(seen).all(1)
-    if known.sum() < 3:
+    _check_depth(cameras, waved)
+    marks = np.moveaxis(np.asarray(corner_pixels, float), 0, 1)
+    seen = triangulated(cameras, marks)
+    known: NDArray[np.bool_] = np.asarray(np.isfinite(seen).all(1))
+    _check_corners(lenses, marks, known)
+    placed = in_world(cameras, seen[known], np.asarray(corners, float)[known])
+    return Calibrated(placed, reprojection(placed, waved))
+
+
+def _check_depth(cameras: Sequence[RigCamera], waved: FloatArray) -> None:
+    """A ball that stays in a plane leaves the places of the cameras ambiguous."""
+    points = triangulated(cameras, waved)
+    points = points[np.isfinite(points).all(1)]
+    extents = np.linalg.svd(points - points.mean(0), compute_uv=False) if len(points) > 3 else None
+    if extents is None or not extents[2] > LEAST_DEPTH * extents[0]:
         raise InvalidArgument(
-            f"{known.sum()} corners of the table are seen by two cameras or more: 3 are needed"
+            "the ball was waved in a plane, which does not determine the places of the cameras: "
+            "wave it in all three directions"
         )
-    cameras = _in_world(cameras, seen[known], np.asarray(corners, float)[known])
-    return Calibrated(tuple(cameras), reprojection(cameras, waved))
+
+
+def _check_corners(
+    lenses: Sequence[RigCamera], marks: FloatArray, known: NDArray[np.bool_]
+) -> None:
+    by_two = np.isfinite(marks).all(-1).sum(1) >= 2
+    if by_two.sum() < 3:
+        raise InvalidArgument(
+            f"{by_two.sum()} corners of the table are seen by two cameras or more: 3 are needed"
+        )
+    if (by_two & ~known).any():
+        corner = int(np.flatnonzero(by_two & ~known)[0])
+        by = [lens.name for lens, mark in zip(lenses, marks[corner], strict=True) if mark[0] >= 0]
+        raise InvalidArgument(
+            f"corner {corner} is marked at different places of the room by {', '.join(by)}: the "
+            "corners must have the same order in all images"
+        )
 
 
 def triangulated(cameras: Sequence[RigCamera], pixels: FloatArray) -> FloatArray:
@@ -130,23 +121,21 @@ def reprojection(cameras: Sequence[RigCamera], pixels: FloatArray) -> float:
     return float(np.sqrt(np.mean(np.concatenate(squares))))
 
 
-def _in_world(cameras: Sequence[RigCamera], seen: FloatArray, known: FloatArray) -> list[RigCamera]:
-    """Cameras moved, turned and scaled so that the points seen come to the known ones (Umeyama)."""
-    seen_middle, known_middle = seen.mean(0), known.mean(0)
-    apart, wanted = seen - seen_middle, known - known_middle
-    left, sizes, right = np.linalg.svd(wanted.T @ apart)
-    if sizes[1] < 1e-6 * sizes[0]:
-        raise InvalidArgument("the corners lie in one line: they give no frame of the world")
-    mirror = np.array([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
-    turn = left @ np.diag(mirror) @ right
-    scale = float((sizes * mirror).sum() / (apart**2).sum())
+def left_out_distances(cameras: Sequence[RigCamera], pixels: FloatArray) -> FloatArray:
+    """How far a place moves if one of the cameras that see it is left out [m].
+
+    Of all places seen by three cameras or more, and each of their cameras.
+    """
+    whole = triangulated(cameras, pixels)
     moved = []
-    for camera in cameras:
-        # world = scale turn (own - seen_middle) + known_middle
-        rotation = np.reshape(camera.rotation, (3, 3)) @ turn.T
-        place = scale * turn @ (camera.place - seen_middle) + known_middle
-        moved.append(camera.moved(rotation, -rotation @ place))
-    return moved
+    for k in range(len(cameras)):
+        others = pixels.copy()
+        others[:, k] = np.nan
+        moved.append(np.linalg.norm(triangulated(cameras, others) - whole, axis=1))
+        moved[-1][~np.isfinite(pixels[:, k]).all(1)] = np.nan
+    distances = np.concatenate(moved)
+    kept: FloatArray = distances[np.isfinite(distances)]
+    return kept
 
 
 def without_place(camera: RigCamera) -> RigCamera:

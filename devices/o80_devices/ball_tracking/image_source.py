@@ -25,6 +25,8 @@ class Images:
     images: list[Image | None]
     time: int
     """Of capture [ns]."""
+    error: int = 0
+    """Estimated error of this time, the largest of all cameras with an image [ns]; 0 if exact."""
 
 
 class CameraSegment:
@@ -37,6 +39,7 @@ class CameraSegment:
         self._tried: float | None = None
         self.images: list[Image | None] = []
         self.time = 0
+        self.error = 0
 
     def attach(self, timeout: float) -> None:
         """Raises TimeoutError, InvalidArgument if the segment holds no images."""
@@ -84,6 +87,7 @@ class CameraSegment:
             valid = np.atleast_1d(row.extended["valid"])
             pairs = zip(self.images, valid, strict=True)
             self.images = [image if new else None for image, new in pairs]
+        self.error = int(np.max(row.extended["errors"])) if "errors" in row.extended else 0
         return True
 
     def close(self) -> None:
@@ -139,7 +143,8 @@ class ImageSource:
                 f"the rig has {len(self._cameras)} cameras, the segments have {len(images)}"
             )
         shaped = [self._shaped(*each) for each in zip(images, self._cameras, strict=True)]
-        return Images(shaped, newest)
+        error = max(each.error for each, new in zip(self._segments, came, strict=True) if new)
+        return Images(shaped, newest, error)
 
     def _shaped(self, image: Image | None, camera: RigCamera) -> Image | None:
         if image is None:

@@ -23,6 +23,8 @@ from o80_devices.clock import Capture, ClockMap
 FloatArray = NDArray[np.float64]
 SECOND = 1_000_000_000  # [ns]
 LARGEST_STAMP = 2**62
+LARGEST_MESSAGE = 1 << 16
+"""Of another publisher; it is not parsed [bytes]."""
 FARTHEST = 1e3
 """A ball further away than this is no ball [m]."""
 
@@ -58,6 +60,8 @@ class Message:
     @classmethod
     def decoded(cls, content: bytes) -> Message:
         """Raises ValueError if the bytes are no message."""
+        if len(content) > LARGEST_MESSAGE:
+            raise ValueError(f"a message of {len(content)} bytes is not of a tracking server")
         try:
             read = json.loads(content)
             stamp, place = read["time"], read["obs"]

@@ -1,4 +1,4 @@
-"""A driver that plays all cameras of a rig, which see balls that are thrown."""
+"""A driver that plays all cameras of a rig, which see balls that are thrown, or that of a world."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from o80.drivers import Reading, Seed, option
+from o80_devices.ball_tracking.ball_of_segment import BallOfSegment
 from o80_devices.ball_tracking.rig import Rig, four_cameras
 from o80_devices.ball_tracking.scene import Scene
 from o80_devices.ball_tracking.throws import Throws
@@ -15,6 +16,9 @@ from o80_devices.ball_tracking.throws import Throws
 
 class SyntheticCameras:
     """The images of all cameras, taken at the same time, and the true ball beside them.
+
+    With the ball of another segment the images are older than their rows by `latency`, so that the
+    rows around their time are there. An image whose rows never came has capture_time 0.
 
     Start it with a short history (`--history 4`): a row of four cameras takes 3.7 MB.
     """
@@ -28,9 +32,14 @@ class SyntheticCameras:
         exposure: float = option(0.002, "time for which the shutter is open", "s")
         noise: float = option(3.0, "standard deviation of a value of a pixel, of 255")
         seed: Seed = Seed(0)  # noqa: RUF009
+        ball: str = option("", "segment of a world whose ball is seen; without one, thrown balls")
+        field: str = option("observed.balls", "of that segment: position and velocity of the ball")
+        times: str = option("", "segment that says when rows of a bursting world were")
+        latency: float = option(0.025, "age of the images of that ball", "s")
 
     def __init__(self, config: Config) -> None:
         self._config = config
+        self.of_the_world = bool(config.ball)  # a replay has no world to look at
         self.rig = Rig.load(config.rig) if config.rig else four_cameras()
         sizes = {camera.size for camera in self.rig.cameras}
         if len(sizes) > 1:
@@ -56,17 +65,32 @@ class SyntheticCameras:
             self.rig, exposure=config.exposure, noise=config.noise, seed=config.seed
         )
         self._throws = Throws(self.rig, config.seed)
+        self._world = (
+            BallOfSegment(config.ball, config.field, config.times) if config.ball else None
+        )
 
     def read(self, reading: Reading) -> None:
         if self._begin is None:
             self._begin = reading.time
-        ball = self._throws.at((reading.time - self._begin) * 1e-9)
-        flies = ball.number > 0
-        row = reading.extended
-        row["capture_time"] = reading.time
-        row["true_ball"]["number"] = ball.number
+        row, ball, time = reading.extended, None, reading.time
+        if self._world is None:
+            ball = self._throws.at((time - self._begin) * 1e-9)
+        else:
+            time -= round(self._config.latency * 1e9)
+            ball = self._world.at(time, reading.time)
+        flies = ball is not None and ball.number > 0
+        row["capture_time"] = 0 if ball is None else time
+        row["true_ball"]["number"] = 0 if ball is None else ball.number
         for name in ("position", "velocity", "spin"):
             row["true_ball"][name] = getattr(ball, name) if flies else np.nan
+        if ball is None:
+            return
         for i, image in enumerate(row["images"]):
             into = image.reshape(self._shape)
-            self._scene.image(i, ball.position if flies else None, ball.velocity, into)
+            self._scene.image(
+                i, ball.position if flies else None, ball.velocity if flies else None, into
+            )
+
+    def stop(self) -> None:
+        if self._world is not None:
+            self._world.close()

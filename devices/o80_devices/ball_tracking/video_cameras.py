@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 from o80.drivers import Reading, option
 from o80.errors import InvalidArgument
 from o80.extras import needed
+from o80_devices.trouble import Trouble
 
 Image = NDArray[np.uint8]
 AGAIN = 0.5  # between two attempts to open a camera [s]
+KERNEL_ERROR = 1_000_000  # of its stamps: the end of the transfer, or the begin, by the driver [ns]
 
 
 class NewestFrame:
@@ -26,15 +28,17 @@ class NewestFrame:
         self._source = int(source) if source.isdigit() else source
         self._shape = shape
         self._lock = threading.Lock()
-        self._newest: tuple[Image, int] | None = None
+        self._newest: tuple[Image, int, int] | None = None
+        self._last = 0  # arrival [ns]
+        self._trouble = Trouble(f"camera {source}")
         self.wrong = ""
         """What is wrong with the camera, for the user; empty: nothing."""
         self._ends = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
-    def take(self) -> tuple[Image, int] | None:
-        """The frame and its time [ns], once; None: none came since."""
+    def take(self) -> tuple[Image, int, int] | None:
+        """The frame, its time and the error of that [ns], once; None: none came since."""
         with self._lock:
             newest, self._newest = self._newest, None
         return newest
@@ -50,8 +54,10 @@ class NewestFrame:
             while not self._ends.is_set():
                 read, frame = capture.read()
                 if not read:
-                    break  # unplugged, or never there
-                self._keep(frame, self._time_of(capture))
+                    self._trouble.tell("gives no image: it is unplugged, or another program has it")
+                    break
+                self._trouble.is_over()
+                self._keep(frame, *self._time_of(capture))
             capture.release()
             self._ends.wait(AGAIN)
 
@@ -61,18 +67,21 @@ class NewestFrame:
         capture.set(self._cv2.CAP_PROP_FRAME_HEIGHT, height)
         capture.set(self._cv2.CAP_PROP_BUFFERSIZE, 1)
 
-    def _time_of(self, capture: Any) -> int:
-        """Of capture as the kernel says, where it does; of arrival otherwise [ns]."""
+    def _time_of(self, capture: Any) -> tuple[int, int]:
+        """Of capture as the kernel says, where it does; of arrival otherwise. Its error [ns]."""
         now = time.monotonic_ns()
+        between, self._last = now - self._last, now
         said = int(1e6 * float(capture.get(self._cv2.CAP_PROP_POS_MSEC)))
-        return said if 0 <= now - said < 1_000_000_000 else now
+        if 0 <= now - said < 1_000_000_000:
+            return said, KERNEL_ERROR
+        return now, min(between, 1_000_000_000)
 
-    def _keep(self, frame: Image, when: int) -> None:
+    def _keep(self, frame: Image, when: int, error: int) -> None:
         if frame.shape != self._shape:
             self.wrong = f"gives images of {frame.shape}, not {self._shape}"
             return
         with self._lock:
-            self._newest = frame, when
+            self._newest = frame, when, error
 
 
 class VideoCameras:
@@ -82,7 +91,7 @@ class VideoCameras:
     Films are played with one frame an iteration, and end the process.
     """
 
-    units: ClassVar = {"capture_time": "ns", "times": "ns"}
+    units: ClassVar = {"capture_time": "ns", "times": "ns", "errors": "ns"}
 
     @dataclass
     class Config:
@@ -103,6 +112,7 @@ class VideoCameras:
         self.extended: dict[str, Any] = {
             "capture_time": np.int64,
             "times": (np.int64, (count,)),
+            "errors": (np.int64, (count,)),
             "valid": (np.bool_, (count,)),
             "images": (np.uint8, (count, config.height * config.width * 3)),
         }
@@ -111,6 +121,8 @@ class VideoCameras:
 
     def start(self) -> None:
         cv2 = needed("cv2", "cameras", "a camera", package="o80-devices")
+        # of a camera that is not there it warns at each attempt; Trouble tells once
+        cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_ERROR)
         if not self._config.films:
             self._cameras = [NewestFrame(cv2, each, self._shape) for each in self._sources]
             return
@@ -131,6 +143,7 @@ class VideoCameras:
         row = reading.extended
         row["valid"] = [frame is not None for frame in frames]
         row["times"] = [0 if frame is None else frame[1] for frame in frames]
+        row["errors"] = [0 if frame is None else frame[2] for frame in frames]
         row["capture_time"] = row["times"].max()
         for into, frame in zip(row["images"], frames, strict=True):
             if frame is None:
@@ -138,13 +151,13 @@ class VideoCameras:
             else:
                 into.reshape(self._shape)[...] = frame[0][..., ::-1]  # blue first => red first
 
-    def _film_frames(self, reading: Reading) -> list[tuple[Image, int] | None]:
-        frames: list[tuple[Image, int] | None] = []
+    def _film_frames(self, reading: Reading) -> list[tuple[Image, int, int] | None]:
+        frames: list[tuple[Image, int, int] | None] = []
         for source, film in zip(self._sources, self._films, strict=True):
             read, frame = film.read()
             if read and frame.shape != self._shape:
                 reading.fault(f"the film {source} has frames of {frame.shape}, not {self._shape}")
-            frames.append((frame, max(1, reading.time)) if read else None)
+            frames.append((frame, max(1, reading.time), 0) if read else None)
         if all(frame is None for frame in frames):
             reading.finish()
         return frames

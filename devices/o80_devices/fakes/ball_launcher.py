@@ -1,10 +1,12 @@
 """A fake ball launcher: it speaks the protocol, with its delays, and with faults on request.
 
 python -m o80_devices.fakes.ball_launcher --magazine 20 --refuse 0.1
+python -m o80_devices.fakes.ball_launcher --tracking tcp://127.0.0.1:7660
 """
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import time
 from collections.abc import Callable
@@ -17,10 +19,17 @@ from o80_devices import zeromq
 from o80_devices.ball_launcher.launch_model import LAUNCH_MODEL, Launch, LaunchModel
 from o80_devices.ball_launcher.messages import Kind, Request, State
 from o80_devices.ball_launcher.wheel_speeds import actuation_of, speed_of
+from o80_devices.fakes import numbers
 
 SECOND = 1_000_000_000  # [ns]
 FREED_WITHIN = 2.0
 """How long an address may be in use when the launcher starts again [s]."""
+PLACE = (0.4, 2.95, 0.033)
+"""Beyond the far end of the table, with --tracking [m]."""
+YAW = -1.5708
+"""Towards smaller y [rad]."""
+TRACKING_NOISE = 0.003
+"""[m]"""
 LEAVES = 0.8
 """Share of the time of a launch after which the ball leaves."""
 
@@ -205,23 +214,52 @@ def main(arguments: list[str] | None = None) -> None:
         prog="python -m o80_devices.fakes.ball_launcher", description="A fake ball launcher."
     )
     parser.add_argument("--address", default="tcp://127.0.0.1:5555", help="where it listens")
-    parser.add_argument("--state-time", type=float, default=usual.state_time, help="[s]")
-    parser.add_argument("--launch-time", type=float, default=usual.launch_time, help="[s]")
-    parser.add_argument("--magazine", type=int, default=usual.magazine, help="balls in it")
-    parser.add_argument("--refuse", type=float, default=0.0, help="share of requests that fail")
-    parser.add_argument("--crash-at", type=int, default=0, help="dies in the middle of this launch")
+    parser.add_argument(
+        "--state-time", type=numbers.not_negative, default=usual.state_time, help="[s]"
+    )
+    parser.add_argument(
+        "--launch-time", type=numbers.not_negative, default=usual.launch_time, help="[s]"
+    )
+    parser.add_argument("--magazine", type=numbers.count, default=100, help="balls in it")
+    parser.add_argument(
+        "--refuse", type=numbers.share, default=0.0, help="share of requests that fail"
+    )
+    parser.add_argument(
+        "--crash-at", type=numbers.count, default=0, help="dies in the middle of this launch"
+    )
     parser.add_argument("--restart", type=float, default=-1.0, help="after a crash [s]; -1: never")
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--seed", type=numbers.count, default=0)
+    parser.add_argument(
+        "--tracking", default="", help="address at which the balls are published as tracked"
+    )
+    parser.add_argument(
+        "--place", type=numbers.vector, default=PLACE, help="of the launcher in the world [m]"
+    )
+    parser.add_argument("--yaw", type=float, default=YAW, help="of the launcher [rad]")
     given = vars(parser.parse_args(arguments))
-    address, restart = given.pop("address"), given.pop("restart")
-    fake = FakeLauncher(Behaviour(**given), say=lambda text: print(text, flush=True))
-    print(f"fake ball launcher at {address}; Ctrl-C ends it", flush=True)
-    try:
-        serve(fake, address, restart)
-    except KeyboardInterrupt:
-        pass
-    finally:
-        fake.close()
+    address, restart, tracking = given.pop("address"), given.pop("restart"), given.pop("tracking")
+    place, yaw = given.pop("place"), given.pop("yaw")
+    with contextlib.ExitStack() as stack:
+        on_launch = None
+        if tracking:
+            from o80_devices.fakes.launched_balls import LaunchedBalls, TrackedLauncher
+
+            balls = LaunchedBalls(place, yaw, noise=TRACKING_NOISE, seed=given["seed"])
+            try:
+                on_launch = stack.enter_context(TrackedLauncher(tracking, balls)).launched
+            except zeromq.required().ZMQError as error:
+                parser.error(f"the address {tracking} cannot be used: {error}")
+        fake = FakeLauncher(
+            Behaviour(**given), on_launch=on_launch, say=lambda text: print(text, flush=True)
+        )
+        stack.callback(fake.close)
+        print(f"fake ball launcher at {address}; Ctrl-C ends it", flush=True)
+        try:
+            serve(fake, address, restart)
+        except zeromq.required().ZMQError as error:
+            parser.error(f"the address {address} cannot be used: {error}")
+        except KeyboardInterrupt:
+            pass
 
 
 if __name__ == "__main__":

@@ -9,24 +9,45 @@ import argparse
 import contextlib
 import math
 import random
+import re
 import socket
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from threading import Event, Lock, Thread
 
+from o80_devices.fakes import numbers
 from o80_devices.motion_capture.qualisys_packets import (
     BODY,
+    EULER_BODY,
     GREETING,
+    MARKERS,
     PORT,
+    SIX_D_EULER,
     VERSION,
     Packets,
     Type,
+    components_packet,
     data_packet,
+    packet,
     words_of,
 )
 
 HIDDEN = BODY.pack(*[math.nan] * 13)
+HIDDEN_EULER = EULER_BODY.pack(*[math.nan] * 6)
+CONNECTED = b"\x01"
+"""The state of the server."""
+Pose = tuple[Sequence[float], Sequence[float]]
+"""Position [m], and the nine numbers of the rotation, row by row."""
+
+
+@dataclass(frozen=True)
+class Stream:
+    """How a client wants its frames."""
+
+    send: Callable[[bytes], object]
+    euler: bool = False
+    """With angles instead of matrices, as the package motioncapture asks for."""
 
 
 @dataclass
@@ -42,6 +63,7 @@ class Faults:
 class FakeQualisys:
     """Serves the RT protocol: bodies on circles of 0.1 m around (0, 0, number) [m], turning.
 
+    poses: where the bodies are instead, by name and time [ns, monotonic]; None: it is not seen.
     A context manager. `restart` closes all connections and begins frames and stamps anew.
     """
 
@@ -52,14 +74,17 @@ class FakeQualisys:
         frequency: float = 300.0,
         host: str = "127.0.0.1",
         port: int = 0,
+        poses: Callable[[str, int], Pose | None] | None = None,
     ) -> None:
         """port 0: a free one."""
         self.bodies = list(bodies)
         self.frequency = frequency
         self.faults = Faults()
         self.frames_sent = 0
+        self._poses = poses
         self._listener = socket.create_server((host, port))
         self._listener.settimeout(0.05)
+        self._datagrams = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.port: int = self._listener.getsockname()[1]
         self._connected: list[socket.socket] = []
         self._lock = Lock()
@@ -77,6 +102,7 @@ class FakeQualisys:
         for thread in self._threads:
             thread.join(2.0)
         self._listener.close()
+        self._datagrams.close()
 
     def restart(self) -> None:
         self._begin = time.monotonic()
@@ -106,76 +132,120 @@ class FakeQualisys:
 
     def _serve(self, connected: socket.socket) -> None:
         packets = Packets(connected)
-        streams = False
+        stream: Stream | None = None
         number = 0
         with connected, contextlib.suppress(OSError, ValueError):  # the client is gone
             if not self.faults.silent:
                 packets.send(Type.COMMAND, GREETING)
             while not self._stopping.is_set():
-                found = packets.receive(0.5 / self.frequency if streams else 0.05)
+                found = packets.receive(0.05 if stream is None else 0.5 / self.frequency)
                 if found is not None and not self.faults.silent:
-                    streams |= self._answer(packets, words_of(found[1]))
-                if streams:
-                    number = self._send_due(connected, number)
+                    command = words_of(found[1]).lower().strip()
+                    stream = self._begun(connected, command) or stream
+                    if stream is None or not command.startswith("streamframes"):
+                        self._answer(packets, connected, command)
+                if stream is not None:
+                    number = self._send_due(stream, number)
 
-    def _answer(self, packets: Packets, command: str) -> bool:
-        """Answers a command; True for one that begins to stream."""
-        command = command.lower()
+    def _begun(self, connected: socket.socket, command: str) -> Stream | None:
+        """The stream that a command begins, if it does."""
+        if command == "streamframes allframes 6dres":
+            return Stream(connected.sendall)
+        found = re.fullmatch(r"streamframes allframes udp:(\d+) 3dnolabels 6deuler", command)
+        if found is None:
+            return None
+        there = connected.getpeername()[0], int(found[1])
+        return Stream(lambda content: self._datagrams.sendto(content, there), euler=True)
+
+    def _answer(self, packets: Packets, connected: socket.socket, command: str) -> None:
         if command == f"version {VERSION}":
             packets.send(Type.COMMAND, f"Version set to {VERSION}")
+        elif command == "qtmversion":
+            packets.send(Type.COMMAND, "QTM Version is 2.17 (build 4000)")
+        elif command == "getstate":
+            connected.sendall(packet(Type.EVENT, CONNECTED))
         elif command.startswith("getparameters"):
             packets.send(Type.XML, self._settings())
-        elif command == "streamframes allframes 6dres":
-            return True
         else:
             packets.send(Type.ERROR, f"Parse error: {command}")
-        return False
 
     def _settings(self) -> str:
-        bodies = "".join(f"<Body><Name>{name}</Name></Body>" for name in self.bodies)
+        bodies = "".join(
+            f"<Body><Name>{name}</Name><RGBColor>255</RGBColor>"
+            "<Point><X>0</X><Y>0</Y><Z>0</Z></Point></Body>"
+            for name in self.bodies
+        )
+        angles = "<Euler><First>Roll</First><Second>Pitch</Second><Third>Yaw</Third></Euler>"
+        settings = f"<The_6D><Bodies>{len(self.bodies)}</Bodies>{bodies}{angles}</The_6D>"
         root = f"QTM_Parameters_Ver_{VERSION}"
-        return f"<{root}><The_6D><Bodies>{len(self.bodies)}</Bodies>{bodies}</The_6D></{root}>"
+        return f"<{root}>{settings}</{root}>"
 
-    def _send_due(self, connected: socket.socket, number: int) -> int:
+    def _send_due(self, stream: Stream, number: int) -> int:
         """Sends the frame of now if it was not sent; returns its number."""
         due = int((time.monotonic() - self._begin) * self.frequency)
         if due == number:
             return number
         faults = self.faults
         if not faults.silent and faults.draw.random() >= faults.lose:
-            connected.sendall(self._frame(due))
+            stream.send(self._frame(due, stream))
             self.frames_sent += 1
         return due
 
-    def _frame(self, number: int) -> bytes:
+    def _frame(self, number: int, stream: Stream) -> bytes:
         now = number / self.frequency
-        return data_packet(
-            round(now * 1e6),
-            number,
-            [
-                HIDDEN if name in self.faults.hidden else self._body(index, now)
-                for index, name in enumerate(self.bodies)
-            ],
-        )
+        poses = [
+            None if name in self.faults.hidden else self._pose(index, now)
+            for index, name in enumerate(self.bodies)
+        ]
+        stamp = round(now * 1e6)
+        if stream.euler:
+            bodies = [HIDDEN_EULER if pose is None else packed_euler(pose) for pose in poses]
+            return components_packet(stamp, number, {MARKERS: [], SIX_D_EULER: bodies})
+        bodies = [HIDDEN if pose is None else packed(pose) for pose in poses]
+        return data_packet(stamp, number, bodies)
 
-    def _body(self, index: int, now: float) -> bytes:
+    def _pose(self, index: int, now: float) -> Pose | None:
+        if self._poses is not None:
+            return self._poses(self.bodies[index], round((self._begin + now) * 1e9))
         c, s = math.cos(now), math.sin(now)
-        columns = (c, s, 0.0, -s, c, 0.0, 0.0, 0.0, 1.0)
-        return BODY.pack(100.0 * c, 100.0 * s, 1000.0 * index, *columns, 0.25)
+        return (0.1 * c, 0.1 * s, 1.0 * index), (c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0)
 
 
-def main() -> None:
+def packed(pose: Pose) -> bytes:
+    """A body as it is sent: in millimetres, the rotation column by column."""
+    (x, y, z), rows = pose
+    columns = [rows[3 * i + j] for j in range(3) for i in range(3)]
+    return BODY.pack(1000.0 * x, 1000.0 * y, 1000.0 * z, *columns, 0.25)
+
+
+def packed_euler(pose: Pose) -> bytes:
+    """The same with angles: the rotation is roll about x, then pitch and yaw about the new axes."""
+    (x, y, z), rows = pose
+    roll = math.atan2(-rows[5], rows[8])
+    pitch = math.asin(max(-1.0, min(1.0, rows[2])))
+    yaw = math.atan2(-rows[1], rows[0])
+    angles = (math.degrees(each) for each in (roll, pitch, yaw))
+    return EULER_BODY.pack(1000.0 * x, 1000.0 * y, 1000.0 * z, *angles)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="python -m o80_devices.fakes.qualisys")
     parser.add_argument("--bodies", default="racket,table", help="names, separated by commas")
-    parser.add_argument("--port", type=int, default=PORT)
-    parser.add_argument("--frequency", type=float, default=300.0, help="[Hz]")
-    parser.add_argument("--lose", type=float, default=0.0, help="share of the frames that are lost")
-    parser.add_argument("--silent-every", type=float, default=0.0, help="[s]: silent for 2 s")
-    parser.add_argument("--restart-every", type=float, default=0.0, help="[s]")
-    given = parser.parse_args()
-    with FakeQualisys(
-        given.bodies.split(","), frequency=given.frequency, port=given.port
-    ) as server:
+    parser.add_argument("--port", type=numbers.port, default=PORT)
+    parser.add_argument("--frequency", type=numbers.positive, default=300.0, help="[Hz]")
+    parser.add_argument(
+        "--lose", type=numbers.share, default=0.0, help="share of the frames that are lost"
+    )
+    parser.add_argument(
+        "--silent-every", type=numbers.not_negative, default=0.0, help="[s]: silent for 2 s"
+    )
+    parser.add_argument("--restart-every", type=numbers.not_negative, default=0.0, help="[s]")
+    given = parser.parse_args(arguments)
+    try:
+        made = FakeQualisys(given.bodies.split(","), frequency=given.frequency, port=given.port)
+    except OSError as error:
+        parser.error(f"port {given.port} cannot be used: {error.strerror}")
+    with made as server:
         server.faults.lose = given.lose
         print(f"serving {given.bodies} on port {server.port}; Ctrl-C ends it", flush=True)
         begin = time.monotonic()

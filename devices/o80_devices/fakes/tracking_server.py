@@ -19,6 +19,7 @@ from o80_devices.ball_tracking.rig import four_cameras
 from o80_devices.ball_tracking.robot_and_ball import RobotAndBall
 from o80_devices.ball_tracking.server_messages import Message
 from o80_devices.ball_tracking.throws import Throws
+from o80_devices.fakes import numbers
 
 SECOND = 1_000_000_000  # [ns]
 RATE = 180.0  # [1/s]
@@ -71,15 +72,24 @@ def main(arguments: list[str] | None = None) -> None:
     )
     parser.add_argument("--address", default="tcp://127.0.0.1:7660", help="where it publishes")
     parser.add_argument("--recording", type=Path, help="file of a robot and a ball to play")
-    parser.add_argument("--noise", type=float, default=0.003, help="of thrown balls [m]")
-    parser.add_argument("--lose", type=float, default=0.0, help="share of messages that are lost")
-    parser.add_argument("--clock", type=float, default=1e9, help="its clock at the start [s]")
+    parser.add_argument(
+        "--noise", type=numbers.not_negative, default=0.003, help="of thrown balls [m]"
+    )
+    parser.add_argument(
+        "--lose", type=numbers.share, default=0.0, help="share of messages that are lost"
+    )
+    parser.add_argument(
+        "--clock", type=numbers.not_negative, default=1e9, help="its clock at the start [s]"
+    )
     parser.add_argument("--pause-at", type=float, default=-1.0, help="when it makes a pause [s]")
-    parser.add_argument("--pause", type=float, default=2.0, help="for how long [s]")
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--pause", type=numbers.not_negative, default=2.0, help="for how long [s]")
+    parser.add_argument("--seed", type=numbers.count, default=0)
     given = parser.parse_args(arguments)
     messages = recorded(given.recording) if given.recording else thrown(given.seed, given.noise)
-    server = FakeTrackingServer(given.address)
+    try:
+        server = FakeTrackingServer(given.address)
+    except zeromq.required().ZMQError as error:
+        parser.error(f"the address {given.address} cannot be used: {error}")
     print(f"fake tracking server at {server.address}; Ctrl-C ends it", flush=True)
     rng, start = np.random.default_rng(given.seed), time.monotonic_ns()
     first: int | None = None

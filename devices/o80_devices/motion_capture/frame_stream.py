@@ -11,11 +11,13 @@ from typing import Protocol
 
 from o80_devices.motion_capture.frame import Frame
 from o80_devices.motion_capture.sensor import SECOND, Reason
+from o80_devices.trouble import Trouble
 
 MOST_WAITING = 4  # frames; older ones are dropped, because their time is over
 WAIT = 0.05  # for a frame, before the thread looks whether it is to stop [s]
 SILENCE = 1.0  # of a connection that is then given up: a pulled cable does not close it [s]
-RETRY = 0.2  # after a failure [s]
+RETRY = 0.2  # after a failure [s]; twice as long after each further one without a frame
+LONGEST_RETRY = 5.0  # [s]
 STOPPING = 2.0  # that a thread may take to end [s]
 
 
@@ -37,15 +39,22 @@ class FrameStream:
     Reader:  the loop of the driver, which never waits for the network.
     """
 
-    def __init__(self, connect: Callable[[], Connection]) -> None:
-        """connect: opens a connection within about a second, or raises OSError or ValueError."""
+    def __init__(
+        self, connect: Callable[[], Connection], device: str, longest_retry: float = RETRY
+    ) -> None:
+        """connect: opens a connection within about a second, or raises OSError or ValueError.
+
+        device: as the user knows it. longest_retry: to which the time between attempts grows [s].
+        """
         self._connect = connect
         self._frames: deque[Frame] = deque(maxlen=MOST_WAITING)
         self._arrived = Condition()
         self._stopping = Event()
         self._thread: Thread | None = None
         self.reason = Reason.CONNECTING
-        self.trouble = ""  #: text of the last failure
+        self.trouble = Trouble(device)
+        self._longest_retry = longest_retry
+        self._retry = RETRY  # [s]
         self.connections = 0
 
     def start(self) -> None:
@@ -85,9 +94,11 @@ class FrameStream:
                     connection.close()
             except Exception as error:
                 # whatever a damaged message causes: the next connection may be better
-                self.trouble = str(error) or type(error).__name__
+                if not self._stopping.is_set():
+                    self.trouble.tell(str(error) or type(error).__name__)
             self.reason = Reason.DISCONNECTED
-            self._stopping.wait(RETRY)
+            self._stopping.wait(self._retry)
+            self._retry = min(2 * self._retry, self._longest_retry)
 
     def _receive_from(self, connection: Connection) -> None:
         self.reason = Reason.SEEN
@@ -96,6 +107,8 @@ class FrameStream:
             frame = connection.receive(WAIT)
             if frame is not None:
                 last = time.monotonic()
+                self._retry = RETRY
+                self.trouble.is_over()
                 with self._arrived:
                     self._frames.append(replace(frame, connection=self.connections))
                     self._arrived.notify()

@@ -97,7 +97,7 @@ class QualisysFrames(FrameStream):
     tick = TICK
 
     def __init__(self, host: str, port: int) -> None:
-        super().__init__(self._opened)
+        super().__init__(self._opened, f"Qualisys at {host}:{port}")
         self._host = host
         self._port = port
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import socket
 import struct
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import IntEnum
 
 import numpy as np
@@ -23,7 +23,15 @@ HEADER = struct.Struct("<II")  # size with the header, type
 DATA = struct.Struct("<qII")  # time stamp [us], frame number, components
 COMPONENT = struct.Struct("<II")  # size with its header, type
 BODIES = struct.Struct("<Ihh")  # number, rates of dropped and out of sync frames
-BODY = struct.Struct("<3f9ff")  # position [mm], rotation by columns, residual [mm]
+# position [mm], rotation, residual [mm]. The rotation comes column by column: public clients map
+# it to a column-major matrix (qualisys_cpp_sdk's array of nine into an Eigen::Matrix3f)
+BODY = struct.Struct("<3f9ff")
+EULER_BODY = struct.Struct("<6f")  # position [mm], roll, pitch and yaw [degrees]
+MARKERS = 2  # without names
+MOST_COMPONENTS = 64
+MOST_BODIES = 1000
+NOT_ORTHOGONAL = 1e-2  # how far a rotation times its transpose may be from one
+SIX_D_EULER = 6
 SIX_D_WITH_RESIDUAL = 11
 
 
@@ -91,15 +99,24 @@ class Packets:
 
 def data_packet(stamp: int, number: int, bodies: Sequence[bytes]) -> bytes:
     """stamp: [us]. bodies: each packed by BODY."""
-    content = BODIES.pack(len(bodies), 0, 0) + b"".join(bodies)
-    component = COMPONENT.pack(COMPONENT.size + len(content), SIX_D_WITH_RESIDUAL) + content
-    return packet(Type.DATA, DATA.pack(stamp, number, 1) + component)
+    return components_packet(stamp, number, {SIX_D_WITH_RESIDUAL: bodies})
+
+
+def components_packet(stamp: int, number: int, components: Mapping[int, Sequence[bytes]]) -> bytes:
+    """stamp: [us]. components: what each type of component lists."""
+    parts = [DATA.pack(stamp, number, len(components))]
+    for kind, each in components.items():
+        content = BODIES.pack(len(each), 0, 0) + b"".join(each)
+        parts += [COMPONENT.pack(COMPONENT.size + len(content), kind), content]
+    return packet(Type.DATA, b"".join(parts))
 
 
 def parsed_data(content: bytes) -> tuple[int, int, list[Subject]]:
     """Time stamp [us], frame number and the bodies of a data packet. Raises ValueError."""
     try:
         stamp, number, components = DATA.unpack_from(content)
+        if components > MOST_COMPONENTS:
+            raise ValueError(f"a data packet of {components} components is damaged")
         place = DATA.size
         for _ in range(components):
             size, kind = COMPONENT.unpack_from(content, place)
@@ -113,14 +130,18 @@ def parsed_data(content: bytes) -> tuple[int, int, list[Subject]]:
 
 def _bodies(content: bytes, place: int) -> list[Subject]:
     count, _, _ = BODIES.unpack_from(content, place)
+    if count > MOST_BODIES:
+        raise ValueError(f"a frame of {count} bodies is damaged")
     place += BODIES.size
     bodies = []
     for _ in range(count):
         x, y, z, *numbers = BODY.unpack_from(content, place)
         place += BODY.size
         rotation = np.array(numbers[:9]).reshape(3, 3).T
-        if not (np.isfinite([x, y, z]).all() and np.isfinite(rotation).all()):
-            bodies.append(Subject(False))  # not seen: the server sends NaN
+        # not seen: the server sends NaN. What is no rotation is no pose either
+        turns = np.abs(rotation @ rotation.T - np.eye(3)).max() < NOT_ORTHOGONAL
+        if not (turns and np.isfinite([x, y, z]).all() and np.linalg.det(rotation) > 0):
+            bodies.append(Subject(False))
             continue
         position = (x * MILLIMETRE, y * MILLIMETRE, z * MILLIMETRE)
         residual = numbers[9] * MILLIMETRE

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
 import re
+import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,6 +23,7 @@ from o80_devices.motion_capture.frame_pace import FramePace
 from o80_devices.motion_capture.transform import Transform
 
 SECOND = 1_000_000_000  # [ns]
+FRAMES_UNTIL_TOLD = 50  # that a subject may be missing from before the user is told
 
 
 class Reason(IntEnum):
@@ -91,6 +94,8 @@ class Sensor:
         self._last_number: int | None = None
         self._lost = 0
         self._connection = 0
+        self._frames_told = 0
+        self._there: set[str] = set()
 
     @cached_property
     def subjects(self) -> dict[str, str]:
@@ -167,6 +172,7 @@ class Sensor:
                 return False
             capture_time, error, epoch = capture.time, capture.error, capture.epoch
         self._count_lost(frame.number)
+        self._look_for_unknown(frame)
         reading.extended = {
             "reason": Reason.SEEN,
             "capture_time": capture_time,
@@ -193,6 +199,17 @@ class Sensor:
         if self._last_number is not None and number > self._last_number:
             self._lost += number - self._last_number - 1
         self._last_number = number
+
+    def _look_for_unknown(self, frame: Frame) -> None:
+        """Tells once of subjects that no frame has: their names may be misspelled."""
+        if self._frames_told >= FRAMES_UNTIL_TOLD:
+            return
+        self._frames_told += 1
+        self._there |= frame.subjects.keys()
+        if self._frames_told < FRAMES_UNTIL_TOLD:
+            return
+        for name in self.subjects.keys() - self._there:
+            print(f"o80: {hint(name, sorted(self._there))}", file=sys.stderr, flush=True)
 
     def _why_none(self, now: int) -> Reason:
         reason = self._frames.reason
@@ -227,6 +244,14 @@ SUBJECT_FIELDS: dict[str, Any] = {
     "quality": float,
 }
 UNSEEN = (False, Subject(False).position, Subject(False).quaternion, float("nan"))
+
+
+def hint(name: str, there: Sequence[str]) -> str:
+    """What to tell of a subject that no frame has."""
+    near = difflib.get_close_matches(name, there, n=1)
+    listed = ", ".join(there[:5]) + (", ..." if len(there) > 5 else "")
+    known = f"did you mean '{near[0]}'?" if near else f"there are: {listed or 'none'}"
+    return f"no frame so far has the subject '{name}': it is covered, or misspelled; {known}"
 
 
 def field_name(subject: str) -> str:

@@ -24,9 +24,9 @@ from typing import Literal
 from o80.drivers import option
 from o80.errors import DriverError, InvalidArgument
 from o80_devices.motion_capture.frame import Frame, Subject
-from o80_devices.motion_capture.frame_stream import SILENCE, FrameStream
+from o80_devices.motion_capture.frame_stream import LONGEST_RETRY, SILENCE, FrameStream
 from o80_devices.motion_capture.sensor import Sensor, SensorConfig
-from o80_devices.motion_capture.watched_child import STARTED
+from o80_devices.motion_capture.watched_line import STARTED
 
 CHILD = "o80_devices.motion_capture.watched_child"
 STARTING = 60.0  # until the child has imported its modules; a busy machine is slow [s]
@@ -112,7 +112,9 @@ class WatchedFrames(FrameStream):
     tick = 1.0
 
     def __init__(self, system: str, host: str) -> None:
-        super().__init__(lambda: ChildConnection(system, host))
+        super().__init__(
+            lambda: ChildConnection(system, host), f"{system} at {host}", LONGEST_RETRY
+        )
         self._system = system
         self._host = host
 
@@ -144,7 +146,9 @@ class Watched(Sensor):
 
     @dataclass
     class Config(SensorConfig):
-        system: Literal["vicon", "optitrack", "vrpn", "mock"] = option("vicon", "its kind")
+        system: Literal["vicon", "optitrack", "vrpn", "qualisys", "mock"] = option(
+            "vicon", "its kind"
+        )
         host: str = option("127.0.0.1", "of the system")
 
     def __init__(self, config: Config) -> None:

@@ -11,9 +11,9 @@ import sys
 import time
 from typing import Any
 
+from o80_devices.motion_capture.watched_line import STARTED
+
 PR_SET_PDEATHSIG = 1
-STARTED = b"started"
-"""The first line: from now on the client connects."""
 
 
 def main() -> None:

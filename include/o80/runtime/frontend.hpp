@@ -205,6 +205,8 @@ class UntypedFrontend {
                              std::span<const std::uint64_t> mask) const;
   std::size_t size_of_state(std::uint32_t actuator) const;
   void refuse_twice(std::span<const std::uint32_t> actuators) const;
+  std::size_t size_of_rows(std::uint32_t actuator, std::uint32_t rows, std::size_t left,
+                           std::span<const std::uint32_t> actuators) const;
   CommandOptions checked_trajectory(std::uint32_t actuator, std::uint32_t rows,
                                     std::span<const std::byte> states,
                                     const CommandOptions& options,

@@ -1,9 +1,10 @@
-"""``o80 info``: describes a robot and its loop."""
+"""``o80 info``: describes a robot and its loop, or a recording."""
 
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Annotated, Any
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 
@@ -11,17 +12,25 @@ import o80
 from o80 import _core
 from o80.cli.attach import attach
 from o80.cli.condition import halt_text, pace_text, running_texts, watchdog_text
-from o80.cli.screen import Column, plain, print_json, print_table, style
-
-if TYPE_CHECKING:
-    from o80.provenance import Provenance
+from o80.cli.screen import Column, print_json, print_table, style
+from o80.cli.started_with import started_with
 
 
 def info(
-    segment: Annotated[str, typer.Argument(help="Name of a segment; see o80 list.")],
+    segment: Annotated[
+        str, typer.Argument(help="Name of a segment, see o80 list; or a recording (.mcap).")
+    ],
     as_json: Annotated[bool, typer.Option("--json", help="All of it, for tools.")] = False,
 ) -> None:
-    """Describe a robot: state of its loop, actuators, limits, sensor values, requests."""
+    """Describe a robot: state of its loop, actuators, limits, sensor values, requests.
+
+    Of a recording: its segments and runs, how many rows are missing, marks, options.
+    """
+    if segment.endswith(".mcap"):
+        from o80.cli.recording_info import recording_info
+
+        recording_info(Path(segment), as_json=as_json)
+        return
     with attach(segment) as frontend:
         schema = frontend.schema
         if as_json:
@@ -56,33 +65,13 @@ def info(
                 told = style(f"{request['help']}{served}", "dim")
                 print(f"  {request['name']}({fields})  {told}".rstrip())
         print(style("\nstarted with", "bold"))
-        for line in _started_with(frontend.provenance):
+        for line in started_with(frontend.provenance):
             print(f"  {line}")
 
 
 def _life(frontend: o80.Frontend) -> str:
     """As `o80 list` says it."""
     return "played" if frontend.played and frontend.alive else frontend.life
-
-
-def _started_with(provenance: Provenance) -> list[str]:
-    """Library, options and versions, in lines."""
-    lines = []
-    if provenance.library:
-        built = f"  {style(plain(provenance.built_with), 'dim')}" if provenance.built_with else ""
-        lines.append(f"library  {plain(provenance.library)}{built}")
-    if provenance.options:
-        lines.append(f"options  {_assignments(provenance.options)}")
-    lines.append(f"loop     {_assignments(provenance.run_options)}")
-    for file in provenance.files:
-        hashed = f"sha256 {file.sha256[:12]}" if file.sha256 else "not read"
-        lines.append(f"file     {plain(file.path)}  {style(hashed, 'dim')}")
-    version = f"{provenance.version}, sources {provenance.source_hash[:12]}"
-    return [*lines, f"o80      {plain(version)}"]
-
-
-def _assignments(options: dict[str, str]) -> str:
-    return ", ".join(f"{plain(name)}={plain(text)}" for name, text in options.items())
 
 
 def _print_actuators(schema: dict[str, Any]) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from o80.cli.screen import complain
+from o80.cli.screen import bytes_text, complain
 from o80.cli.stop_request import StopRequest
 
 if TYPE_CHECKING:
@@ -40,10 +40,6 @@ def _size(text: str | None) -> float | None:
             f"size must be a number of bytes such as 500M or 2G, got '{text}'", param_hint="--size"
         )
     return size
-
-
-def _bytes(size: float) -> str:
-    return f"{size / 1e6:.1f} MB" if size >= 1e5 else f"{size / 1e3:.1f} kB"
 
 
 def record(
@@ -127,7 +123,7 @@ class _Report:
             if not last:
                 line += f", {rate:.0f} a second, {behind} behind"
             line += f", {recorder.missed} missed" if recorder.missed else ""
-            line += f", {_bytes(recorder.size)} in {recorder.path}"
+            line += f", {bytes_text(recorder.size)} in {recorder.path}"
             begin = "\r\033[K" if self._terminal else ""
             print(f"{begin}{line}", end="\n" if last else "", file=sys.stderr, flush=True)
 

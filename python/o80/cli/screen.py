@@ -67,6 +67,11 @@ def plain(text: str) -> str:
     return "".join(c if c.isprintable() else "?" for c in text)
 
 
+def bytes_text(size: float) -> str:
+    """A number of bytes with its unit."""
+    return f"{size / 1e6:.1f} MB" if size >= 1e5 else f"{size / 1e3:.1f} kB"
+
+
 def complain(text: str) -> None:
     """Prints an error or a remark on stderr."""
     sys.stdout.flush()

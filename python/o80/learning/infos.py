@@ -6,27 +6,25 @@ The same as Gymnasium's `VectorEnv._add_info` makes of the infos of single envir
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from o80.learning.task import Index
+from o80.learning.task import EVERY, Index
 
 Info = dict[str, Any]
 
 
 def add(infos: Info, values: Mapping[str, Any], copies: Index, count: int) -> None:
     """Adds values (n, ...) of n of `count` copies to what is there of others."""
-    every = isinstance(copies, slice)
+    if not infos and isinstance(copies, slice):
+        # the usual case: it happens in every step
+        _add_all(infos, values, count)
+        return
     for name, value in values.items():
         there = infos.get(name)
-        # the usual case first: it happens for each entry in every step
-        if every and there is None and _is_plain(value, count):
-            infos[name], infos[f"_{name}"] = value.copy(), _all(count).copy()
-            continue
-        if isinstance(value, Mapping):
+        if type(value) is not np.ndarray and isinstance(value, Mapping):
             there = {} if there is None else there
             add(there, value, copies, count)
         else:
@@ -41,16 +39,56 @@ def add(infos: Info, values: Mapping[str, Any], copies: Index, count: int) -> No
         infos[name], infos[f"_{name}"] = there, mask
 
 
+def _add_all(infos: Info, values: Mapping[str, Any], count: int) -> None:
+    """The same of all copies, where nothing is there."""
+    masks = np.ones((len(values), count), np.bool_)
+    for mask, (name, value) in zip(masks, values.items(), strict=True):
+        if type(value) is np.ndarray and value.dtype.kind != "U" and value.shape[:1] == (count,):
+            infos[name] = value.copy()
+        elif isinstance(value, Mapping):
+            infos[name] = nested = Info()
+            add(nested, value, EVERY, count)
+        else:
+            array = _array(value)
+            infos[name] = there = _empty(array, count)
+            there[...] = array
+        infos[f"_{name}"] = mask
+
+
+def add_split(
+    among: Info, others: Info, values: Mapping[str, Any], chosen: NDArray[np.bool_]
+) -> None:
+    """Adds values (copies, ...) of all copies to two infos in which nothing is there: those of the
+    chosen copies to `among`, those of the others to `others`.
+    """
+    count, left = len(chosen), ~chosen
+    numbers = chosen.nonzero()[0]
+    for name, value in values.items():
+        if type(value) is not np.ndarray or value.dtype.kind == "U" or value.shape[:1] != (count,):
+            add(among, some({name: value}, chosen), numbers, count)
+            if numbers.size < count:
+                add(others, some({name: value}, left), left.nonzero()[0], count)
+            continue
+        there = _empty(value, count)
+        there[numbers] = value[numbers]
+        among[name], among[f"_{name}"] = there, chosen.copy()
+        if numbers.size < count:
+            remaining = value.copy()
+            remaining[numbers] = None if value.dtype == object else 0
+            others[name], others[f"_{name}"] = remaining, left.copy()
+
+
 def some(values: Mapping[str, Any], rows: NDArray[Any]) -> Info:
     """The values of some copies, by an index or a mask of the n that have values."""
-    return {
-        name: some(value, rows)
-        if isinstance(value, Mapping)
-        else _array(value)[rows]
-        if np.ndim(value)
-        else value
-        for name, value in values.items()
-    }
+    return {name: _some(value, rows) for name, value in values.items()}
+
+
+def _some(value: Any, rows: NDArray[Any]) -> Any:
+    if type(value) is np.ndarray:
+        return _array(value)[rows] if value.ndim else value
+    if isinstance(value, Mapping):
+        return some(value, rows)
+    return _array(value)[rows] if np.ndim(value) else value
 
 
 def of_one(values: Mapping[str, Any]) -> Info:
@@ -61,17 +99,8 @@ def of_one(values: Mapping[str, Any]) -> Info:
     }
 
 
-def _is_plain(value: Any, count: int) -> bool:
-    return type(value) is np.ndarray and value.dtype.kind != "U" and value.shape[:1] == (count,)
-
-
-@cache
-def _all(count: int) -> NDArray[np.bool_]:
-    return np.ones(count, np.bool_)
-
-
 def _array(value: Any) -> NDArray[Any]:
-    array = np.asarray(value)
+    array: NDArray[Any] = value if type(value) is np.ndarray else np.asarray(value)
     return array.astype(object) if array.dtype.kind == "U" else array
 
 

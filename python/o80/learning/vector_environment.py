@@ -140,17 +140,15 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]]):
         count = self.num_envs
         final_info: infos.Info = {}
         final_obs = np.full(count, None, object)
-        ended = np.flatnonzero(over)
-        for copy in ended.tolist():
+        for copy in over.nonzero()[0].tolist():
             final_obs[copy] = rows(stepped.observations, copy)
-        for chosen, where in ((over, final_info), (~over, info)):
-            copies = np.flatnonzero(chosen)
-            if copies.size:
-                infos.add(where, infos.some(stepped.info, copies), copies, count)
-            among = chosen[stepped.judged]
-            if among.any():
-                judged = infos.some(stepped.judged_info, among)
-                infos.add(where, judged, stepped.judged[among], count)
+        infos.add_split(final_info, info, stepped.info, over)
+        if stepped.judged_info:
+            for chosen, where in ((over, final_info), (~over, info)):
+                among = chosen[stepped.judged]
+                if among.any():
+                    judged = infos.some(stepped.judged_info, among)
+                    infos.add(where, judged, stepped.judged[among], count)
         info.update(final_obs=final_obs, _final_obs=over.copy())
         info.update(final_info=final_info, _final_info=over.copy())
 

@@ -55,10 +55,15 @@ class FileWriter:
     """Writes one file. Move-only: close it once; it is not finished unless `finish` was called."""
 
     def __init__(self, path: Path, *, compression: str = "zstd") -> None:
-        """Creates the file. Raises FileExistsError."""
+        """Creates the file. Raises OSError: no new file is left; FileExistsError."""
         self._open(path, compression, os.O_CREAT | os.O_EXCL)
         self._found = Scan()
-        self._append(_beginning())
+        try:
+            self._append(_beginning())
+        except BaseException:
+            path.unlink(missing_ok=True)
+            self._file.close()
+            raise
 
     @classmethod
     def continued(cls, path: Path, *, compression: str = "zstd") -> "FileWriter":

@@ -41,6 +41,11 @@ class RecordingFile:
         return all(found.finished for _, found in self._files)
 
     @property
+    def size(self) -> int:
+        """Of its files [bytes]."""
+        return sum(path.stat().st_size for path, _ in self._files)
+
+    @property
     def marks(self) -> list[Mark]:
         """The notes of the program that recorded, in their order. Raises RecordingError."""
         marks = []

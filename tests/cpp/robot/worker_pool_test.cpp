@@ -46,6 +46,25 @@ TEST(WorkerPoolTest, DoesShortCallsOneAfterTheOther) {
   EXPECT_EQ(sum, expected);
 }
 
+TEST(WorkerPoolTest, GivesATaskToTheSameThreadInEveryCall) {
+  // every task waits for all others, so no thread has time for the task of another one
+  WorkerPool pool(3);
+  std::vector<std::thread::id> first;
+  for (int call = 0; call < 100; ++call) {
+    std::atomic<int> arrived{0};
+    std::vector<std::thread::id> threads(4);
+    const auto task = [&](std::uint32_t i) {
+      threads[i] = std::this_thread::get_id();
+      ++arrived;
+      while (arrived < 4) std::this_thread::yield();
+    };
+    pool.run(4, task, kNothing);
+    if (first.empty()) first = threads;
+    ASSERT_EQ(threads, first) << "in call " << call;
+  }
+  EXPECT_EQ(first[0], std::this_thread::get_id());
+}
+
 TEST(WorkerPoolTest, RunsTasksInSeveralThreadsAtOnce) {
   // every task waits for all others
   WorkerPool pool(3);

@@ -33,9 +33,10 @@ class SampledFlight:
     @property
     def states(self) -> FloatArray:
         """(T, 9) positions, velocities and spins, a fresh array."""
-        spins = BALL_GUN_SPIN if self.spins is None else self.spins
-        shape = self.positions.shape
-        return np.hstack([self.positions, self.velocities, np.broadcast_to(spins, shape)])
+        spins = self.spins
+        if spins is None:
+            spins = np.broadcast_to(BALL_GUN_SPIN, self.positions.shape)
+        return np.concatenate((self.positions, self.velocities, spins), axis=1)
 
     @property
     def residual(self) -> float:

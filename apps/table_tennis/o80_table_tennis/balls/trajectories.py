@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..world.timing import PERIOD
 from .flight_fit import FlightFit, fit_flight
+from .replayed_flight import ReplayedFlights, replayed
 from .sampled_flight import SampledFlight
 
 FloatArray = NDArray[np.float64]
@@ -81,24 +82,13 @@ class BallTrajectory:
         require_enough_rows(self.name, len(self.stamps))
         return fit_flight(self.stamps, self.positions)
 
-    def _spins(self, times: FloatArray, velocities: FloatArray) -> FloatArray:
-        """Spins (T, 3) [rad/s] along the fitted flight."""
-        if self.spins is None:
-            return self.fit.spins(times, velocities)
-        # constant between bounces, but for a slow decay: of the nearest row of the same flight
-        flights = np.searchsorted(self.fit.bounce_times, self.stamps, side="right")
-        which = np.searchsorted(self.fit.bounce_times, times, side="right")
-        spins = np.empty((len(times), 3))
-        for flight in np.unique(which):
-            rows, mine = flights == flight, which == flight
-            for axis in range(3):
-                spins[mine, axis] = np.interp(
-                    times[mine], self.stamps[rows], self.spins[rows, axis]
-                )
-        return spins
+    @cached_property
+    def replayed(self) -> ReplayedFlights:
+        """The same flight by the law of the simulator."""
+        return replayed(self.fit, self.stamps, self.positions)
 
     def resample(self, period: float = PERIOD) -> SampledFlight:
-        """The fitted flight in steps of `period` [s], from the first row to the last one fitted.
+        """The replayed flight in steps of `period` [s], from the first row to the last one fitted.
 
         The velocities are derivatives of the fit: differences of neighbouring rows, and the
         recorded velocities, are off by 0.2 to 0.9 m/s. The fit is made once and kept.
@@ -108,13 +98,13 @@ class BallTrajectory:
         fit = self.fit
         count = int(np.floor((fit.end - fit.start) / period + 1e-6)) + 1
         times = fit.start + np.arange(count, dtype=np.float64) * period
-        positions, velocities = fit.at(times)
+        positions, velocities, spins = self.replayed.at(times)
         return SampledFlight(
             name=self.name,
             period=period,
             positions=positions,
             velocities=velocities,
             bounce_times=fit.bounce_times - fit.start,
-            residuals=fit.residuals,
-            spins=self._spins(times, velocities),
+            residuals=self.replayed.residuals,
+            spins=spins,
         )

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import torch
 from stable_baselines3 import PPO
+from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 from ..players.network import CLIP, Network
@@ -60,7 +61,7 @@ def _kind(settings: LearningSettings, environments: VecEnv) -> Callable[..., PPO
 def new_model(settings: LearningSettings, environments: VecNormalize) -> PPO:
     """A learner that knows nothing; the same seed gives the same one."""
     ppo = settings.ppo
-    return _kind(settings, environments)(
+    model: PPO = _kind(settings, environments)(
         "MlpPolicy",
         environments,
         n_steps=ppo.steps,
@@ -79,6 +80,8 @@ def new_model(settings: LearningSettings, environments: VecNormalize) -> PPO:
         seed=settings.seed,
         device="cpu",
     )
+    model.set_logger(Logger(None, []))  # the default one leaves a folder in /tmp
+    return model
 
 
 def begin_anew(model: PPO) -> None:

@@ -95,16 +95,16 @@ velocity."""
 def derivative(
     state: State[Number],
     turn: Turn[Number],
-    drag: Number,
+    drag: Number | float,
     gravity: float,
-    halved_at: float = 0.0,
+    halved_at: Number | float = 0.0,
 ) -> State[Number]:
     """Velocity [m/s] and acceleration [m/s^2] of the ball."""
     _, _, _, vx, vy, vz = state
     tx, ty, tz = turn
     speed = (vx * vx + vy * vy + vz * vz) ** 0.5
     slowing = drag * speed
-    if halved_at > 0.0:
+    if not isinstance(halved_at, float) or halved_at > 0.0:
         share = speed / (speed + halved_at)
         tx, ty, tz = share * tx, share * ty, share * tz
     return (
@@ -127,10 +127,10 @@ def moved(state: State[Number], rate: State[Number], dt: float) -> State[Number]
 def runge_kutta_step(
     state: State[Number],
     turn: Turn[Number],
-    drag: Number,
+    drag: Number | float,
     gravity: float,
     dt: float,
-    halved_at: float = 0.0,
+    halved_at: Number | float = 0.0,
 ) -> State[Number]:
     """The state `dt` [s] later, by the classical fourth-order rule with constant spin.
 

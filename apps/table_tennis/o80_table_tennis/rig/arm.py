@@ -45,6 +45,7 @@ class Arm:
         """Of the raw pressures."""
         self.late = False
         """The last step's pressures were taken later than at their iteration, or not yet."""
+        self._sent: o80.Batch | None = None
         self._burst = None
         if frontend.bursting:
             self._burst = frontend.prepared_burst(ITERATIONS, mode="overwrite")
@@ -82,6 +83,11 @@ class Arm:
         return self.frontend.published
 
     @property
+    def last_time(self) -> int:
+        """Of the last row [ns]."""
+        return int(self._rows["time"][-1])
+
+    @property
     def pressures(self) -> FloatArray:
         """Normalised pressures (8,) in the muscles in the last row, a fresh array."""
         return self.range.normalised(self._last_pressures)
@@ -113,7 +119,8 @@ class Arm:
         self.frontend.wait_for(last, timeout=TIMEOUT)
         rows = self.frontend.history(since=first, until=last).rows
         self._rows[: len(rows)] = rows
-        self.late = not self._sent.taken or self._sent.first_iteration > self._at
+        sent = self._sent
+        self.late = sent is not None and (not sent.taken or sent.first_iteration > self._at)
         return len(rows) == ITERATIONS
 
     def reset(self, seed: int) -> None:
@@ -122,18 +129,29 @@ class Arm:
 
     def go_back(self) -> None:
         """To the start by commands, as a real arm must."""
-        self.frontend.add_command(
-            None, self.start_pressures, duration=RETURN_SECONDS, mode="overwrite"
-        )
-        self.frontend.pulse_and_wait(timeout=RETURN_SECONDS + TIMEOUT)
+        self.begin_return().wait(timeout=RETURN_SECONDS + TIMEOUT)
         end = time.monotonic() + LONGEST_RETURN
         while time.monotonic() < end:
             newest = self.read_newest()
-            still = float(np.abs(self.dq[-1]).max()) < SETTLED_SPEED
-            back = float(np.abs(self.q[-1] - self.start_angles).max()) < SETTLED_ANGLE
-            if still and back:
+            if self.is_back:
                 break
             self.frontend.wait_for(newest + 10 * ITERATIONS, timeout=TIMEOUT)
+
+    def begin_return(self) -> o80.Batch:
+        """Sends the pressures back to those of the start, and does not wait."""
+        self.frontend.add_command(
+            None, self.start_pressures, duration=RETURN_SECONDS, mode="overwrite"
+        )
+        return self.frontend.pulse()
+
+    @property
+    def is_back(self) -> bool:
+        """In the last row that was read the arm stands where it started, and is asked to."""
+        asked = bool(np.array_equal(self._last_asked, self.start_pressures))
+        still = float(np.abs(self.dq[-1]).max()) < SETTLED_SPEED
+        return (
+            asked and still and float(np.abs(self.q[-1] - self.start_angles).max()) < SETTLED_ANGLE
+        )
 
     def read_newest(self) -> int:
         """Reads the last rows; returns the iteration of the newest one."""

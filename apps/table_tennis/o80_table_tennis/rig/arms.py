@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 import o80
 
+from ..world.arm import JOINTS
 from ..world.timing import ITERATIONS
 from .pressure_range import PressureRange
 from .row_words import words, words_of
@@ -31,6 +32,8 @@ class Arms:
         """Of the raw pressures."""
         self.burst = group.prepared_burst(ITERATIONS, mode="overwrite", delay=delay)
         """Of a step."""
+        self._reset = group.prepared_request("reset", seed=0)
+        self._reset_words = words_of(self._reset.rows)
         self._raw: FloatArray = self.burst.targets[:, 0]
         dtype = self.burst.rows.dtype
         row_words = words_of(self.burst.rows)
@@ -44,10 +47,9 @@ class Arms:
         self._last_pressures = numbers[:, -1, words(dtype, "observed")]
         self._last_asked = numbers[:, -1, words(dtype, "desired")]
 
-    @property
-    def pressures(self) -> FloatArray:
-        """Normalised pressures (N, 8) in the muscles in the last rows, a fresh array."""
-        return self.range.normalised(self._last_pressures)
+    def read_pressures(self, out: FloatArray) -> None:
+        """Fills in the normalised pressures (N, 8) in the muscles in the last rows."""
+        self.range.normalised(self._last_pressures, out=out)
 
     def asked(self, copies: Index) -> FloatArray:
         """Normalised pressures (n, 8) asked for in the last rows, a fresh array."""
@@ -60,7 +62,24 @@ class Arms:
         else:
             self._raw[copies] = self.range.raw(pressures)
 
+    def gather(self, low: NDArray[np.float32], high: NDArray[np.float32]) -> NDArray[np.float32]:
+        """(N, 16) angles and velocities of the joints, then normalised pressures, within bounds;
+        from now on each step and reset fills them in.
+        """
+        names = [actuator.name for actuator in self.group[0].actuators]
+        paths = [
+            *(f"extended.joint_positions[{joint}]" for joint in range(JOINTS)),
+            *(f"extended.joint_velocities[{joint}]" for joint in range(JOINTS)),
+            *(f"observed.{name}" for name in names),
+        ]
+        offsets = [*[0.0] * (2 * JOINTS), *self.range.least.tolist()]
+        scales = [*[1.0] * (2 * JOINTS), *self.range.scale.tolist()]
+        clips = zip(low.tolist(), high.tolist(), strict=True)
+        numbers = map(o80.Gathered, paths, offsets, scales, clips)
+        return self.group.gather(list(numbers)).observations
+
     def reset(self, copies: NDArray[np.intp], seeds: list[int]) -> None:
         """These to the start."""
-        self.group.request("reset", copies=copies, seed=seeds)
-        self._last_words[copies] = words_of(self.group.latest(copies))
+        self._reset.fields["seed"][copies] = seeds
+        self._reset.run(copies)
+        self._last_words[copies] = self._reset_words[copies]

@@ -6,7 +6,7 @@ No other module knows how the simulator names what happens to a ball.
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -130,34 +130,68 @@ class BallReader:
         )
 
 
+FLAGS = {
+    "touched": (TOUCHES, ">", 0),
+    "landed": (LANDED_AT, ">=", 0),
+    "met_net": (NET_TOUCHES, ">", 0),
+    "touched_floor": (FLOOR_TOUCHES, ">", 0),
+}
+"""What a group gathers of the first ball of each row."""
+
+
+def event_flags() -> dict[str, Any]:
+    """The flags of `BallRecords`, for `InlineGroup.gather`."""
+    first = f"{RECORDS[0]}.{RECORDS[1]}[0]"
+    return {
+        name: (f"{first}.{'.'.join(path)}", compare, value)
+        for name, (path, compare, value) in FLAGS.items()
+    }
+
+
 class BallRecords:
-    """Reads the records (N,) of N balls, an array that is filled anew for each reading."""
+    """The records (N,) of N balls, an array that is filled anew for each reading.
 
-    def __init__(self, records: NDArray[Any]) -> None:
-        self._at = {path: _values(records, path) for path in READ}
+    `flags` are those of `event_flags`, which are filled anew at the same time.
+    """
 
-    def read(self) -> BallRecord:
-        """What has happened to the balls; numbers and vectors are views of the array."""
-        at = self._at
-        landed_at, net_at = at[LANDED_AT], at[NET_AT]
-        landed, touched_net = landed_at >= 0, at[NET_TOUCHES] > 0
-        return BallRecord(
+    def __init__(self, records: NDArray[Any], flags: Mapping[str, NDArray[np.bool_]]) -> None:
+        at = {path: _values(records, path) for path in READ}
+        self._landed_at, self._net_at = at[LANDED_AT], at[NET_AT]
+        self._landed, self._met_net = flags["landed"], flags["met_net"]
+        self._nobody = np.zeros(len(records), np.bool_)
+        self._nobody.flags.writeable = False
+        self._record = BallRecord(
             at[SMALLEST_DISTANCE],
-            at[TOUCHES] > 0,
+            flags["touched"],
             at[VELOCITY_AFTER],
             at[LARGEST_SPEED],
-            landed,
+            flags["landed"],
             at[LANDING],
-            touched_net & ~(landed & (landed_at < net_at)),
-            at[FLOOR_TOUCHES] > 0,
+            self._nobody,
+            flags["touched_floor"],
             at[NET_POSITION],
             at[FLOOR_POSITION],
         )
 
+    def read(self) -> BallRecord:
+        """What has happened to the balls; all arrays but `touched_net` are views."""
+        record = self._record
+        if np.count_nonzero(self._met_net):
+            late = self._landed & (self._landed_at < self._net_at)
+            record.touched_net = self._met_net & ~late
+        else:
+            record.touched_net = self._nobody
+        return record
+
 
 def ball_records(records: NDArray[Any]) -> BallRecord:
     """What has happened to N balls, of their records (N,)."""
-    return BallRecords(records).read()
+    compare = {">": np.greater, ">=": np.greater_equal}
+    flags = {
+        name: compare[how](_values(records, path), value)
+        for name, (path, how, value) in FLAGS.items()
+    }
+    return BallRecords(records, flags).read()
 
 
 def _values(records: NDArray[Any], path: tuple[str, ...]) -> NDArray[Any]:

@@ -13,6 +13,7 @@ import o80
 
 from ..balls.sampled_flight import SampledFlight
 from ..settings import RigSettings
+from ..task.observations import BALL_POSITION, PRESSURES, SIZE
 from .arms import TIMEOUT, Arms, Index
 from .robot_options import arm_options, twin_options
 from .twins import Twins
@@ -66,6 +67,18 @@ class GroupRig:
         """These arms are asked for normalised pressures (n, 8); five rows of each."""
         self.arms.ask(pressures, copies)
         self._step.run(copies, timeout=TIMEOUT)
+
+    def gather(
+        self, low: NDArray[np.float32], high: NDArray[np.float32]
+    ) -> list[NDArray[np.float32]]:
+        """Parts (N, ...) of the observation of ball play, within its bounds (22,): C++ fills them
+        in in each step and reset.
+        """
+        arm, ball = slice(0, PRESSURES.stop), slice(BALL_POSITION.start, SIZE)
+        return [
+            self.arms.gather(low[arm], high[arm]),
+            self.twins.gather(low[ball], high[ball]),
+        ]
 
     def close(self) -> None:
         """Ends arms and twins; may be called twice."""

@@ -30,6 +30,8 @@ class PressureRange:
                 )
         self.least: FloatArray = np.array(least, dtype=np.float64)
         self._span: FloatArray = np.array(most, dtype=np.float64) - self.least
+        self.scale: FloatArray = 1.0 / self._span
+        """(8,) normalised pressures are (raw - least) * scale."""
 
     @classmethod
     def of(cls, frontend: o80.Frontend) -> PressureRange:
@@ -46,6 +48,7 @@ class PressureRange:
         """Whole raw pressures (..., 8) of normalised ones in [0, 1]; fresh, or `out`."""
         return np.rint(self.least + normalised * self._span, out)
 
-    def normalised(self, raw: FloatArray) -> FloatArray:
-        """Normalised pressures (..., 8) of raw ones, a fresh array; not clipped."""
-        return (raw - self.least) / self._span
+    def normalised(self, raw: FloatArray, *, out: FloatArray | None = None) -> FloatArray:
+        """Normalised pressures (..., 8) of raw ones; not clipped; fresh, or `out`."""
+        above = np.subtract(raw, self.least, out)
+        return np.multiply(above, self.scale, above)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from itertools import count
 from types import TracebackType
@@ -48,6 +48,10 @@ class Rig:
         """Iterations of arm and twins that were used last."""
         self.exact = True
         """In the last step the arm and the first twin made exactly five iterations."""
+        self.returns_at_reset = True
+        """By the clock `reset` first brings the arm back; False: the caller has done so."""
+        self.after_step: Callable[[], None] | None = None
+        """Called after each step of 10 ms, with the newest rows of arm and twins."""
         self._real_time = self.settings.pacing.real_time
         self._stack = ExitStack()
         try:
@@ -77,7 +81,10 @@ class Rig:
     ) -> None:
         """Arm and twins to the start; the balls of each twin fly from the next step on."""
         arm = self.arm
-        arm.go_back() if self._real_time else arm.reset(arm_seed)
+        if not self._real_time:
+            arm.reset(arm_seed)
+        elif self.returns_at_reset:
+            arm.go_back()
         for twin in self.twins:
             twin.reset(twin_seed)
         self.row = arm.read_newest()
@@ -115,6 +122,8 @@ class Rig:
             self._burst_twins(ITERATIONS)
         self.exact = self.exact and self.twins[0].iteration == self.twin_row + ITERATIONS
         self.twin_row = self.twins[0].iteration
+        if self.after_step is not None:
+            self.after_step()
 
     def _burst_twins(self, iterations: int) -> None:
         """All twins run at the same time."""
@@ -150,6 +159,8 @@ class Rig:
         return frontend
 
     def _open_twin(self, twin: int) -> o80.Frontend:
+        if twin == 0 and self.settings.twin_segment is not None:
+            return self._stack.enter_context(o80.Frontend(self.settings.twin_segment))
         return self._open("mujoco", None, False, twin_options(self.settings, twin))
 
     def _open(

@@ -42,11 +42,14 @@ def changed_pressures(
     action = np.asarray(action, dtype=np.float64)
     if action.shape != pressures.shape:
         raise ValueError(f"an action must have shape {pressures.shape}, got {action.shape}")
-    # 0 times infinity or NaN is NaN
-    zero = action.dot(_ZEROS)
-    if math.isnan(zero if action.ndim == 1 else zero.sum()):
+    # the square of a number that is not finite is not finite either; that of a large one neither
+    if not math.isfinite(np.vdot(action, action)) and not np.isfinite(action).all():
         raise ValueError(f"an action must be finite, got {action}")
-    clipped = np.minimum(np.maximum(action, _MINUS_ONES), _ONES)
-    changed = pressures + 0.5 * np.tanh(0.5 * factor * clipped)
-    result: FloatArray = np.minimum(np.maximum(changed, _ZEROS), _ONES)
-    return result
+    changed: FloatArray = np.minimum(np.maximum(action, _MINUS_ONES), _ONES)
+    changed *= 0.5 * factor
+    np.tanh(changed, out=changed)
+    changed *= 0.5
+    changed += pressures
+    np.maximum(changed, _ZEROS, out=changed)
+    np.minimum(changed, _ONES, out=changed)
+    return changed

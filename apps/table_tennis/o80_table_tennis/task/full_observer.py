@@ -91,7 +91,10 @@ class OneFullObserver(FullObserver):
         """The observation (M,) after a step, scaled."""
         self._remember(self._row, self._last, asked)
         self._last[...] = asked
-        self._filter.step(None if seen.missed else seen.ball.tolist())
+        if seen.first:
+            self._filter.begin(seen.ball.tolist())
+        else:
+            self._filter.step(None if seen.missed else seen.ball.tolist())
         return self._scaled(state, asked, seen)
 
     def _scaled(self, state: State, asked: FloatArray, seen: Perceived) -> FloatArray:

@@ -13,11 +13,12 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from .ball_play import ReturnTask
 from .box import Bounded, ObservationBox
 from .full_observation import FullObservation
 from .full_observer import ManyFullObserver, OneFullObserver
 from .noise import NO_NOISE, NoiseSettings
-from .perception import Perceived, Perception
+from .perception import Perceived, Perceiving, Perception
 from .state import State
 from .task import Task
 
@@ -48,7 +49,7 @@ class Observer:
     def __init__(self, task: Task, observing: Observing, count: int | None = None) -> None:
         self._task, self._count = task, count
         noise, full = observing.noise, observing.full
-        self._perception = (
+        self._perception: Perceiving | None = (
             Perception(noise, observing.interval, count) if noise.of_observations else None
         )
         observed: Bounded = task if full is None else _Bounds(full)
@@ -57,6 +58,16 @@ class Observer:
         """Of the observation of one episode."""
         self.size = int(observed.high.size)
         """M, the numbers of an observation."""
+        self.is_ball_play = (
+            full is None
+            and self._perception is None
+            and getattr(type(task), "observe", None) is ReturnTask.observe
+            and bool(np.all(observed.low < observed.high))
+        )
+        """Whether observations are the numbers of `observations`, in their bounds, and no more:
+        then `begin` and `observe` need not be called."""
+        self.low, self.high = observed.low, observed.high
+        """(M,) bounds of an observation."""
         self._full: OneFullObserver | ManyFullObserver | None = None
         if full is not None:
             interval, change = observing.interval, observing.largest_change
@@ -65,6 +76,10 @@ class Observer:
                 if count is None
                 else ManyFullObserver(full, noise, interval, change, count)
             )
+
+    def look_through(self, perception: Perceiving) -> None:
+        """From the next episode on, ball and pressures are what this one perceives."""
+        self._perception = perception
 
     def begin(
         self,

@@ -9,6 +9,7 @@ touches of the racket nor the bounces before the first one matter: a ball may be
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -69,14 +70,14 @@ def outcome(record: BallRecord, target: Any) -> dict[str, Any]:
 
     `landing` is where the ball touched the table after the touch, on whichever half; before that,
     landing and distance are infinite. Not NaN: Gymnasium's checks want equal infos to compare
-    equal. Of one ball: Python numbers; arrays are fresh.
+    equal. Of one ball: Python numbers; arrays may be views, or shared and read-only.
     """
     landed = record.landed
     if none(landed):
         shape = np.shape(landed)
-        nowhere = np.full((*shape, 3), np.inf)
-        is_returned: Any = np.zeros(shape, np.bool_) if shape else False
-        apart: Any = np.full(shape, np.inf) if shape else math.inf
+        is_returned, nowhere, apart = _unlanded(shape)
+        if not shape:
+            is_returned, nowhere, apart = False, nowhere.copy(), math.inf
     else:
         nowhere = np.where(np.asarray(landed)[..., np.newaxis], record.landing, np.inf)
         is_returned, apart = returned(record), distance(nowhere, target)
@@ -90,6 +91,16 @@ def outcome(record: BallRecord, target: Any) -> dict[str, Any]:
     }
 
 
+@cache
+def _unlanded(shape: tuple[int, ...]) -> tuple[Any, FloatArray, Any]:
+    """`returned`, `landing` and `distance` of balls that have not landed."""
+    nowhere = np.full((*shape, 3), np.inf)
+    returned, apart = np.zeros(shape, np.bool_), np.full(shape, np.inf)
+    for array in (nowhere, returned, apart):
+        array.flags.writeable = False
+    return returned, nowhere, apart
+
+
 def none(flags: Flags) -> bool:
     """Whether no flag is set; cheap, also for one."""
-    return not flags.any() if isinstance(flags, np.ndarray) else not flags
+    return not (np.count_nonzero(flags) if isinstance(flags, np.ndarray) else flags)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,22 @@ class Perceived:
     """(...) whether the ball was not seen"""
     pressures: FloatArray
     """(..., 8) normalised"""
+    first: bool = False
+    """The ball is seen for the first time in this episode: what was said before was a guess."""
+
+
+class Perceiving(Protocol):
+    """What gives observations their ball and pressures: noise, or a device."""
+
+    def begin(
+        self, state: State, generators: Sequence[np.random.Generator], which: IntArray
+    ) -> Perceived:
+        """Of new episodes."""
+        ...
+
+    def perceive(self, state: State, which: IntArray | slice = EVERY) -> Perceived:
+        """After a step."""
+        ...
 
 
 class Perception:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..world.scene import Vector
 from ..world.table import TARGET
 from .ball_record import Numbers
-from .outcome import distance, ended_at, returned
+from .outcome import distance, ended_at, none, returned
 from .state import State
 
 FloatArray = NDArray[np.float64]
@@ -96,6 +96,8 @@ class OrderedReward:
 
     def _ordered(self, state: State, *, smashed: bool) -> FloatArray:
         record = state.record
+        if none(record.touched):
+            return self._missed(state)
         apart = distance(ended_at(state), state.goal)
         accuracy = self.accuracy(apart)
         if smashed:

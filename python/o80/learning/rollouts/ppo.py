@@ -27,6 +27,7 @@ import torch  # noqa: E402
 from stable_baselines3 import PPO  # noqa: E402
 from stable_baselines3.common.buffers import RolloutBuffer  # noqa: E402
 from stable_baselines3.common.callbacks import BaseCallback  # noqa: E402
+from stable_baselines3.common.logger import Logger  # noqa: E402
 from stable_baselines3.common.vec_env import VecEnv  # noqa: E402
 
 Info = dict[str, Any]
@@ -97,6 +98,8 @@ class RolloutPPO(PPO):
         """
         self._visible = visible
         super().__init__(*arguments, **options)
+        if not self.verbose and self.tensorboard_log is None:
+            self.set_logger(Logger(None, []))  # the default one leaves a folder in /tmp
         normalisation = self._vec_normalize_env
         inner = normalisation.unwrapped if normalisation is not None else self.env
         if not isinstance(inner, WorkersEnv) or (normalisation and normalisation.norm_reward):

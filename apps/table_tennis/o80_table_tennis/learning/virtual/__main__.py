@@ -6,8 +6,10 @@ that several commands can share the work. Needs the extra `learn`.
 
 from __future__ import annotations
 
+import signal
 import sys
 from pathlib import Path
+from types import FrameType
 from typing import Annotated
 
 import typer
@@ -30,6 +32,7 @@ def main(
     plot_only: Annotated[bool, typer.Option(help="Draw the curves that are there.")] = False,
 ) -> None:
     """Learns to return balls in each way, and draws the curves."""
+    signal.signal(signal.SIGTERM, _end_in_order)
     console = Console()
     try:
         for module in ("torch", "stable_baselines3"):
@@ -44,6 +47,11 @@ def main(
     except (ValueError, o80.Error) as error:
         print(f"o80: {error}", file=sys.stderr)
         raise typer.Exit(1) from error
+
+
+def _end_in_order(number: int, _frame: FrameType | None) -> None:
+    """SIGTERM unwinds the stack, so that no segment remains."""
+    sys.exit(128 + number)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ import gymnasium
 import numpy as np
 import torch
 from gymnasium import spaces
-from stable_baselines3.common.logger import configure
+from stable_baselines3.common.logger import Logger
 
 from ...world.arm import MUSCLES
 from .buffer import MotionBuffer
@@ -52,7 +52,7 @@ class Learner:
             seed=seed,
             device="cpu",
         )
-        self._sac.set_logger(configure(None, []))
+        self._sac.set_logger(Logger(None, []))  # `configure` would leave a folder in /tmp
         self.buffer = MotionBuffer(settings.buffer, box, self._sac.action_space)
         self._sac.replay_buffer = self.buffer
 

@@ -1,0 +1,200 @@
+"""A recorded flight by the law of the simulator, so that nothing jumps at the hand-over.
+
+`flight_fit` finds the drag and the turn of each flight, whatever they are. Here position, velocity
+and spin are fitted again, with the drag and the lift of the simulator. What the rows leave open
+is drawn towards the spin of the fitted turn, and after a bounce towards the spin that the law of
+the bounce gives. From any row on, a simulated ball of that state flies on as the recorded one is
+replayed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..physics.aerodynamics import AERODYNAMICS, runge_kutta_step
+from ..physics.interpolation import along_path
+from .bounce_spin import spin_after
+from .flight_fit import ANCHOR_NOISE, FAR, POSITION_NOISE, FlightFit
+
+FloatArray = NDArray[np.float64]
+
+STEP = 0.02
+"""Step of the integration [s]."""
+SPIN_ERROR = 30.0
+"""Expected error of each number of the spin before the first bounce [rad/s]."""
+SHARE_ERROR = 0.3
+"""Expected error of a spin after a bounce, as a share of it; its axis is that of the law."""
+MOST_ERRORS = 2.5
+"""A spin is at most so many expected errors away: where lift saturates, flights say little."""
+SCALES = np.array([0.01] * 3 + [0.1] * 3 + [0.3] * 3)
+"""Typical changes of position [m], velocity [m/s] and spin [expected errors], for differences."""
+SLOPE_SHARE = 1e-3
+"""Change of an unknown for a difference, as a share of its scale."""
+CLOSE_ENOUGH = 1e-4
+"""The search ends when no unknown moves by more than this share of its scale."""
+MOST_ROUNDS = 12
+
+
+@dataclass(frozen=True, eq=False)
+class ReplayedFlight:
+    """A flight without bounce."""
+
+    origin: float
+    """Its first time [s]."""
+    state: FloatArray
+    """(6,) position [m] and velocity [m/s] at `origin`"""
+    spin: FloatArray
+    """(3,) [rad/s] at `origin`"""
+
+    def at(self, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Positions [m] and velocities [m/s], each (T, 3), at `times` (T,) [s]."""
+        states = np.concatenate([self.state, self.spin])[:, None]
+        positions, velocities = flown(states, times - self.origin)
+        return positions[..., 0], velocities[..., 0]
+
+    def spins(self, times: FloatArray) -> FloatArray:
+        """Spins (T, 3) [rad/s] at `times` (T,) [s]."""
+        spins: FloatArray = (
+            self.spin * np.exp(-AERODYNAMICS.spin_decay * (times - self.origin))[:, None]
+        )
+        return spins
+
+
+@dataclass(frozen=True, eq=False)
+class ReplayedFlights:
+    """Flights joined by bounces."""
+
+    flights: tuple[ReplayedFlight, ...]
+    bounce_times: FloatArray
+    """(flights - 1,) [s]"""
+    residuals: FloatArray
+    """(N,) distance of each row that the fit covers [m]"""
+
+    def at(self, times: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Positions [m], velocities [m/s] and spins [rad/s], each (T, 3), at `times` (T,) [s]."""
+        found = np.empty((3, len(times), 3))
+        which = np.searchsorted(self.bounce_times, times, side="right")
+        for index, flight in enumerate(self.flights):
+            mine = which == index
+            if mine.any():
+                found[0, mine], found[1, mine] = flight.at(times[mine])
+                found[2, mine] = flight.spins(times[mine])
+        return found[0], found[1], found[2]
+
+
+def replayed(fit: FlightFit, stamps: FloatArray, positions: FloatArray) -> ReplayedFlights:
+    """The flights by the law of the simulator behind `positions` (N, 3) [m].
+
+    `stamps` (N,) [s]; `fit` is that of the same rows.
+    """
+    inside = (stamps >= fit.start) & (stamps <= fit.end)
+    stamps, positions = stamps[inside], positions[inside]
+    edges = np.array([fit.start, *fit.bounce_times, fit.end])
+    points = fit.at(fit.bounce_times)[0]
+    which = np.searchsorted(fit.bounce_times, stamps, side="right")
+
+    flights: list[ReplayedFlight] = []
+    for index, origin in enumerate(edges[:-1].tolist()):
+        ends = slice(max(0, index - 1), index + 1)
+        state = np.concatenate(fit.flights[index].at(np.array([origin])), axis=None)
+        start = ReplayedFlight(origin, state, _spin(fit, edges, flights))
+        errors = SHARE_ERROR * start.spin[None] if flights else SPIN_ERROR * np.eye(3)
+        rows = which == index
+        times = np.concatenate([stamps[rows], fit.bounce_times[ends]])
+        seen = np.concatenate([positions[rows], points[ends]])
+        flights.append(_fitted(start, errors, times, seen, anchors=len(points[ends])))
+    found = ReplayedFlights(tuple(flights), fit.bounce_times, np.zeros(0))
+    return replace(found, residuals=np.linalg.norm(found.at(stamps)[0] - positions, axis=1))
+
+
+def _spin(fit: FlightFit, edges: FloatArray, before: list[ReplayedFlight]) -> FloatArray:
+    """Spin (3,) at the beginning of the next flight."""
+    if not before:
+        # with this spin the middle of the flight turns as it was fitted
+        middle = np.array([0.5 * (edges[0] + edges[1])])
+        spin = fit.spins(middle, fit.at(middle)[1])[0]
+        grown: FloatArray = spin * np.exp(AERODYNAMICS.spin_decay * (middle[0] - edges[0]))
+        return grown
+    bounce = edges[len(before), None]
+    last = before[-1]
+    return spin_after(last.at(bounce)[1], np.zeros(3), last.spins(bounce)[0])
+
+
+def _fitted(
+    start: ReplayedFlight,
+    spin_errors: FloatArray,
+    times: FloatArray,
+    positions: FloatArray,
+    *,
+    anchors: int,
+) -> ReplayedFlight:
+    """With the state and spin that fit best; the last `anchors` rows are points that it goes
+    through.
+
+    `spin_errors` (K, 3) [rad/s]: in these directions the spin may differ, about so far.
+    """
+    rows = len(times) - anchors
+    noise = np.full(len(times), POSITION_NOISE)
+    noise[rows:] = ANCHOR_NOISE
+    count = 6 + len(spin_errors)
+    scales = SCALES[:count]
+    beliefs = np.diag([0.0] * 6 + [1.0] * len(spin_errors))
+    unknowns = np.concatenate([start.state, np.zeros(len(spin_errors))])
+
+    def states(tried: FloatArray) -> FloatArray:
+        """(9, B)"""
+        return np.concatenate([tried[:6], start.spin[:, None] + spin_errors.T @ tried[6:]])
+
+    for _ in range(MOST_ROUNDS):
+        # the flight as it is and others with one unknown changed
+        change = SLOPE_SHARE * scales
+        tried = unknowns[:, None] + np.column_stack([np.zeros(count), np.diag(change)])
+        ways = flown(states(tried), times - start.origin)[0]
+        slopes = (ways[..., 1:] - ways[..., :1]) / change
+        misses = positions - ways[..., 0]
+
+        # far rows count less
+        distance = np.linalg.norm(misses, axis=1) / noise
+        usual = max(1.0, float(np.median(distance)))
+        weight = np.sqrt(np.minimum(1.0, FAR * usual / np.maximum(distance, 1e-9)))
+        weight[rows:] = 1.0
+        weight /= noise
+
+        # rows and beliefs => the step
+        matrix = np.vstack([(weight[:, None, None] * slopes).reshape(-1, count), beliefs])
+        right = np.concatenate([(weight[:, None] * misses).ravel(), -beliefs @ unknowns])
+        step = np.linalg.lstsq(matrix * scales, right, rcond=1e-10)[0]
+        step[6:] = np.clip(step[6:], -1.0, 1.0)  # the slopes of a spin hold nearby only
+        unknowns = unknowns + scales * step
+        unknowns[6:] = np.clip(unknowns[6:], -MOST_ERRORS, MOST_ERRORS)
+        if np.abs(step).max() < CLOSE_ENOUGH:
+            break
+    found = states(unknowns[:, None])[:, 0]
+    flight = replace(start, state=found[:6], spin=found[6:])
+    if not len(spin_errors):
+        return flight
+    # a spin that was held at its most has left position and velocity behind
+    return _fitted(flight, np.zeros((0, 3)), times, positions, anchors=anchors)
+
+
+def flown(states: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Positions and velocities (T, 3, B) of B balls after `times` (T,) [s].
+
+    `states` (9, B): position [m], velocity [m/s] and spin [rad/s].
+    """
+    air = AERODYNAMICS
+    state, spin = (*states[:6],), states[6:]
+    nodes = [states[:6]]
+    halfway = float(np.exp(-0.5 * air.spin_decay * STEP))
+    for _ in range(max(1, int(np.ceil(times.max(initial=0.0) / STEP)))):
+        # as the simulator: the spin of the middle of the step
+        spin = halfway * spin
+        turn = (*(air.magnus * spin),)
+        halved_at = air.lift_saturation * air.radius * np.linalg.norm(spin, axis=0)
+        state = runge_kutta_step(state, turn, air.drag, air.gravity, STEP, halved_at)
+        nodes.append(np.array(state))
+        spin = halfway * spin
+    return along_path(times, np.array(nodes), STEP * np.arange(len(nodes), dtype=np.float64))

@@ -1,0 +1,1 @@
+"""The laboratory: arm, world, launcher, cameras, tracker, motion capture, environment, together."""

@@ -1,0 +1,238 @@
+"""The process of the environment: it plays the balls that the launcher launches, in real time.
+
+Every 10 ms it publishes a row: by the clock of the arm while arm and world are there, else by its
+own. It waits for what it needs, and says in each row what is missing; a ball during which arm or
+world end is given up.
+"""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import time
+from collections.abc import Sequence
+from types import FrameType
+from typing import Any
+
+import numpy as np
+
+import o80
+
+from ..balls.launches import Launch
+from ..environment import TableTennisEnvironment
+from ..rig.arm import LONGEST_RETURN
+from .environment_row import EXTENDED, UNITS, WATCHED, Phase
+from .launching import Launching
+from .parts import ARM, ENVIRONMENT, RATES, WORLD, LabSettings
+from .player import home_of, opened, policy_of
+from .tracked_perception import TrackedPerception
+from .watched import Watched
+
+STEP = 1.0 / RATES[ENVIRONMENT]
+"""[s]"""
+OPENING = (o80.BackendGone, o80.TimeoutError, o80.SegmentError)
+"""What is raised while arm or world end, or are not there."""
+
+
+class EndRequestedError(Exception):
+    """Asked to end, by a signal or by `o80 stop`."""
+
+
+class EnvironmentProcess:
+    """Plays balls until so many were played (0: without end) or it is asked to end."""
+
+    def __init__(self, settings: LabSettings, backend: o80.Backend) -> None:
+        self._settings, self._backend = settings, backend
+        self._watched = {name: Watched(settings.segment(name)) for name in WATCHED}
+        self._launching = Launching(settings)
+        self._policy, self._home = policy_of(settings), home_of(settings)
+        self._environment: TableTennisEnvironment | None = None
+        self._perception: TrackedPerception | None = None
+        self._due = time.monotonic() + STEP
+        self.row: dict[str, Any] = {"phase": Phase.waiting, "arm_row": -1, "world_row": -1}
+        for name in EXTENDED:
+            if name.startswith("ball") or name in ("launch", "launches_failed"):
+                self.row[name] = 0
+        self.stopping = False
+
+    # ------------------------------------------------------------------ rows
+
+    def publish(self) -> None:
+        """A row, and the beginning of the next one. Raises EndRequestedError."""
+        row = self.row
+        row["missing"] = {name: watched.missing for name, watched in self._watched.items()}
+        self._backend.publish(extended=row)
+        if self._backend.step() is None or self.stopping:
+            raise EndRequestedError
+
+    def _after_step(self) -> None:
+        """A step of 10 ms of arm and world."""
+        assert self._environment is not None
+        rig, row = self._environment.rig, self.row
+        row["arm_row"], row["world_row"] = rig.row, rig.twin_row
+        row["arm_time"] = rig.arm.last_time
+        row["late"] = rig.lateness
+        row["true_ball"] = rig.twins[0].ball[:3]
+        self._tell_observed()
+        self.publish()
+
+    def _tell_observed(self) -> None:
+        """What the policy saw last, while it plays."""
+        row, seen = self.row, self._perception
+        time, at, ball = 0, 0, np.full(3, np.nan)
+        if row["phase"] is Phase.playing and seen is not None:
+            time, at, ball = seen.ball_time, seen.at, seen.ball[:3]
+        row["seen"], row["ball_time"], row["observed_at"] = time > 0, time, at
+        row["age"] = (at - time) * 1e-9 if time else np.nan
+        row["observed_ball"] = ball
+
+    def _by_own_clock(self) -> None:
+        """A row without arm and world, when it is due."""
+        now = time.monotonic()
+        self._due = max(self._due + STEP, now)
+        time.sleep(max(0.0, self._due - now))
+        self._tell_observed()
+        self.publish()
+
+    # ------------------------------------------------------------------ balls
+
+    def run(self) -> None:
+        """Until all balls were played."""
+        self._backend.publish(extended=self.row | {"missing": dict.fromkeys(WATCHED, True)})
+        self._backend.step()
+        try:
+            while not self._settings.balls or self.row["balls_played"] < self._settings.balls:
+                self._try_ball()
+            self._set(Phase.over)
+            self.publish()
+        except EndRequestedError:
+            pass
+        finally:
+            self._close_environment()
+
+    def _try_ball(self) -> None:
+        environment = self._environment
+        if environment is None:
+            self._open()
+            return
+        try:
+            self._return(environment)
+            launch = self._launch(environment)
+            if launch is not None:
+                self._play(environment, launch)
+        except OPENING:
+            if self.row["phase"] is Phase.playing:
+                self.row["balls_given_up"] += 1
+            self._close_environment()
+            self._set(Phase.waiting)
+
+    def _open(self) -> None:
+        """Opens the environment if arm and world are there; else a row says so."""
+        self._set(Phase.waiting)
+        self._by_own_clock()
+        if any(self._watched[name].frontend() is None for name in (ARM, WORLD)):
+            return
+        try:
+            self._environment = opened(self._settings, self._policy, self._home)
+        except OPENING:
+            return
+        self._perception = TrackedPerception(self._settings, self._environment.rig.arm)
+        self._environment.observer.look_through(self._perception)
+        rig = self._environment.rig
+        rig.after_step, rig.returns_at_reset = self._after_step, False
+        rig.begin()
+
+    def _close_environment(self) -> None:
+        if self._environment is not None:
+            self._environment.close()
+        self._environment = None
+
+    def _return(self, environment: TableTennisEnvironment) -> None:
+        """The arm goes back while the world goes on."""
+        self._set(Phase.returning)
+        rig = environment.rig
+        rig.begin()
+        rig.arm.begin_return()
+        end = time.monotonic() + LONGEST_RETURN
+        while True:
+            self._idle(environment)
+            if rig.arm.is_back or time.monotonic() > end:
+                return
+
+    def _launch(self, environment: TableTennisEnvironment) -> Launch | None:
+        """Asks for a ball until one has left the launcher; None: the launcher failed."""
+        self._set(Phase.launching)
+        self._launching.ask()
+        while True:
+            self._idle(environment)
+            launch = self._launching.came()
+            if launch is not None:
+                return launch
+            if self._launching.failed:
+                self.row["launches_failed"] += 1
+                return None
+
+    def _idle(self, environment: TableTennisEnvironment) -> None:
+        """A step in which nothing is asked."""
+        rig = environment.rig
+        if rig.lateness > self._settings.most_late:
+            rig.begin()
+        rig.step_arm()
+        rig.step_twins()
+
+    def _play(self, environment: TableTennisEnvironment, launch: Launch) -> None:
+        """One ball, from the launch on."""
+        flight = launch.flight(self._settings.rig.period)
+        seed = self._settings.seed if self.row["balls_played"] == 0 else None
+        observation, _ = environment.reset(seed=seed, options={"flight": flight})
+        self._policy.reset()
+        self._set(Phase.playing)
+        self.row["launch"] = self._launching.number
+        over = False
+        while not over:
+            observation, _, terminated, truncated, info = environment.step(
+                self._policy.act(observation)
+            )
+            over = terminated or truncated
+        self.row["launch"] = 0
+        self.row["balls_played"] += 1
+        self.row["balls_given_up"] += bool(info["stalled"])
+        self.row["balls_touched"] += bool(info["touched"])
+        self.row["balls_returned"] += bool(info["returned"])
+
+    def _set(self, phase: Phase) -> None:
+        self.row["phase"] = phase
+        self.row["ball"] = self.row["balls_played"] + (phase is not Phase.over)
+        if phase is not Phase.playing:
+            self.row["launch"] = 0
+
+
+def run(settings: LabSettings) -> None:
+    """Plays until the end, Ctrl-C or SIGTERM."""
+    with o80.Backend(
+        settings.segment(ENVIRONMENT), extended=EXTENDED, units=UNITS, frequency=RATES[ENVIRONMENT]
+    ) as backend:
+        process = EnvironmentProcess(settings, backend)
+
+        def end(_number: int, _frame: FrameType | None) -> None:
+            process.stopping = True
+
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, end)
+        process.run()
+        played, returned = process.row["balls_played"], process.row["balls_returned"]
+        print(f"{played} balls played, {returned} returned")
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    usual = LabSettings()
+    parser = argparse.ArgumentParser(prog="python -m o80_table_tennis.lab.environment_process")
+    parser.add_argument("--prefix", default=usual.prefix, help="of the names of all segments")
+    parser.add_argument("--balls", type=int, default=usual.balls, help="to play; 0: no end")
+    parser.add_argument("--seed", type=int, default=usual.seed)
+    parser.add_argument("--policy", choices=("learned", "scripted"), default=usual.policy)
+    run(LabSettings(**vars(parser.parse_args(arguments))))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,216 @@
+"""Kills each process of a running lab, and looks what the others say: see `kill_table`.
+
+python -m o80_table_tennis.lab.kills: prints the times, and writes kills.json.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+import o80
+
+from .kill_table import KILLS, SUPERVISOR, Kill, Mark
+from .parts import ENVIRONMENT, NINE, RATES, RECORDER, VIEW, LabSettings
+from .processes import PartEndedError
+from .real_time import Lab
+
+WITHIN = 60.0
+"""For what takes a fraction of a second on a quiet machine [s]."""
+SAYS_WITHIN = 0.2
+"""From the last row of the killed process to the first one that says that it is missing [s]."""
+ROWS_ON = 20
+"""That each process which goes on must still publish."""
+LOOK = 0.005
+"""[s]"""
+
+
+@dataclass
+class Said:
+    """How a part said that another one was missing."""
+
+    part: str
+    seconds: float
+    """From the last row of the killed process to the row that says so."""
+    rows: int
+    """Of that part in between."""
+
+    @property
+    def in_time(self) -> bool:
+        """Within 200 ms by its own rows: on a machine that is too slow fewer of them come."""
+        return self.rows <= SAYS_WITHIN * RATES.get(self.part, np.inf)
+
+
+@dataclass
+class Outcome:
+    """What was seen after a kill."""
+
+    killed: str
+    said: list[Said] = field(default_factory=list)
+    stood_still: list[str] = field(default_factory=list)
+    went_on: list[str] = field(default_factory=list)
+    joined: bool = False
+    """Started again, nobody misses it any more."""
+
+
+class Killer:
+    """Kills processes of a lab, one after the other."""
+
+    def __init__(self, lab: Lab) -> None:
+        self._lab = lab
+        self._segments = {
+            name: part.segment
+            for name, part in lab.processes.parts.items()
+            if part.segment is not None and name in NINE
+        }
+
+    def kill(self, name: str) -> Outcome:
+        """Kills a process, looks, starts it again and waits until it has joined.
+
+        Raises AssertionError, with what did not happen.
+        """
+        kill, outcome = KILLS[name], Outcome(name)
+        wait_until(lambda: self._nobody_misses(kill), f"{name} is there before it is killed")
+        observers = {
+            part: o80.Frontend(segment, timeout=WITHIN, read_only=True)
+            for part, segment in self._segments.items()
+        }
+        try:
+            last = self._kill(name, observers, outcome)
+            for mark in kill.marks:
+                if mark.part != SUPERVISOR:
+                    outcome.said.append(said(mark, observers[mark.part], last))
+            self._look_at_others(kill, observers, outcome)
+        finally:
+            for each in observers.values():
+                each.close()
+        self._start_again(kill, outcome)
+        return outcome
+
+    def _kill(self, name: str, observers: dict[str, o80.Frontend], outcome: Outcome) -> int:
+        """Time of the last row of the process, or of the kill if it has no rows by the clock."""
+        lab = self._lab
+        before = time.monotonic_ns()
+        ended: PartEndedError = lab.processes.kill(name)
+        lab.events.add(name, str(ended))
+        assert ended.code == -9, f"{name} ended before it was killed: {ended}"
+        outcome.said.append(Said(SUPERVISOR, (time.monotonic_ns() - before) * 1e-9, 0))
+        observer = observers.get(name)
+        if observer is None or observer.bursting:
+            return before
+        return int(observer.latest().time)
+
+    def _look_at_others(
+        self, kill: Kill, observers: dict[str, o80.Frontend], outcome: Outcome
+    ) -> None:
+        """Rows of those that go on come; none of those that stand still."""
+        still = {name: observers[name].published for name in kill.halts}
+        for name in kill.goes_on:
+            if name in observers:
+                observer = observers[name]
+                if not observer.bursting or ENVIRONMENT in kill.goes_on:
+                    observer.wait_for(observer.published + ROWS_ON, timeout=WITHIN)
+            else:
+                assert self._lab.processes.runs(name), f"{name} has ended with {kill.killed}"
+            outcome.went_on.append(name)
+        for name, rows in still.items():
+            assert observers[name].published == rows, f"{name} goes on without {kill.killed}"
+            outcome.stood_still.append(name)
+
+    def _start_again(self, kill: Kill, outcome: Outcome) -> None:
+        lab, name = self._lab, kill.killed
+        lab.processes.start((name,))
+        lab.processes.wait_until_running(WITHIN)
+        lab.events.add(name, "started again")
+        wait_until(lambda: self._nobody_misses(kill), f"{name} is missed no more")
+        outcome.joined = True
+
+    def _nobody_misses(self, kill: Kill) -> bool:
+        """The newest rows of those that would say so do not."""
+        for mark in kill.marks:
+            if mark.holds is None:
+                continue
+            with o80.Frontend(
+                self._segments[mark.part], timeout=WITHIN, read_only=True
+            ) as observer:
+                if bool(mark.holds(observer.history(1))[0]):
+                    return False
+        return all(self._lab.processes.runs(name) for name in (kill.killed, ENVIRONMENT))
+
+    def wait_for_a_ball(self) -> None:
+        """Until the environment has played another ball, from its launch to its end."""
+        segment = self._segments[ENVIRONMENT]
+        with o80.Frontend(segment, timeout=WITHIN, read_only=True) as environment:
+            played = environment.latest().extended.balls_played
+
+            def another() -> bool:
+                return bool(environment.latest().extended.balls_played > played)
+
+            wait_until(another, "a ball is played")
+
+
+def said(mark: Mark, observer: o80.Frontend, last: int) -> Said:
+    """The first row, or entry, after the time `last` [ns] that says so."""
+    found: list[int] = []
+
+    def look() -> bool:
+        found[:] = _first(mark, observer, last)
+        return bool(found)
+
+    wait_until(look, f"{mark.part} says: {mark.says}")
+    rows = observer.history().select(from_time=last, to_time=found[0])
+    return Said(mark.part, (found[0] - last) * 1e-9, len(rows))
+
+
+def _first(mark: Mark, observer: o80.Frontend, last: int) -> list[int]:
+    """Its time [ns]; empty: none yet."""
+    rows = observer.history()
+    if mark.holds is not None:
+        saying = mark.holds(rows) & (rows.time > last)
+        return [int(rows.time[saying.argmax()])] if saying.any() else []
+    for entry in observer.journal():
+        if entry.kind == mark.journal and entry.iteration in rows.iteration:
+            when = int(rows.at_iteration(entry.iteration).time)
+            if when > last:
+                return [when]
+    return []
+
+
+def wait_until(holds: object, what: str) -> None:
+    """Looks again and again. Raises AssertionError after a long time."""
+    assert callable(holds)
+    end = time.monotonic() + WITHIN
+    while not holds():
+        assert time.monotonic() < end, f"after {WITHIN:g} s this has not happened: {what}"
+        time.sleep(LOOK)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(prog="python -m o80_table_tennis.lab.kills")
+    parser.add_argument("--output", type=Path, default=LabSettings().folder)
+    parser.add_argument("--prefix", default=LabSettings().prefix)
+    given = parser.parse_args(arguments)
+    settings = LabSettings(balls=0, prefix=given.prefix, folder=given.output)
+    outcomes = []
+    with Lab(settings) as lab:
+        killer = Killer(lab)
+        killer.wait_for_a_ball()
+        for name in NINE:
+            outcome = killer.kill(name)
+            if name not in (RECORDER, VIEW):
+                killer.wait_for_a_ball()
+            outcomes.append(outcome)
+            for each in outcome.said:
+                print(f"{name:>14} killed: {each.part} says so after {1e3 * each.seconds:.0f} ms")
+    text = json.dumps([asdict(outcome) for outcome in outcomes], indent=2)
+    (settings.folder / "kills.json").write_text(text + "\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,95 @@
+"""The ball as the tracker sees it, instead of the true one: what the policy of the lab observes.
+
+The ball of the newest row of the tracker flies on, by the laws of flight and bounce, from the time
+of its images to that of the arm's last row. A row is used once; without a new one the ball counts
+as not seen, and the filter of the observation predicts it. Until the tracker has seen the ball of
+an episode, the mean launch is a guess in its place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o80_devices.ball_tracking.ball_row import Reason
+
+from ..balls.launches import WIDE
+from ..physics.tracked_ball import NUMBERS, Ball, advanced, rebounded_within
+from ..rig.arm import Arm
+from ..task.perception import EVERY, Perceived
+from ..task.state import State
+from ..world.table import TABLE
+from .parts import TRACKER, LabSettings
+from .watched import Watched
+
+FloatArray = NDArray[np.float64]
+STEP = 0.005
+"""Of the flight from image to row [s]."""
+OLDEST = 0.15
+"""Older than this a ball does not count as seen [s]."""
+
+
+class TrackedPerception:
+    """Of one episode after the other, in real time."""
+
+    def __init__(self, settings: LabSettings, arm: Arm) -> None:
+        self._tracker, self._arm = Watched(settings.segment(TRACKER)), arm
+        self._began = self._used = 0
+        self._seen_yet = False
+        self.ball: FloatArray = np.zeros(6)
+        """What was perceived last, also as a guess."""
+        self.at = 0
+        """Time of the row of the arm at which that was [ns]."""
+        self.ball_time = 0
+        """Of the images of the ball that was perceived last [ns]; 0: it was not seen."""
+
+    def begin(
+        self,
+        state: State,
+        _generators: Sequence[np.random.Generator],
+        _which: NDArray[np.int64],
+    ) -> Perceived:
+        """The ball has just begun to fly: no image shows it yet."""
+        self.at = self._arm.last_time
+        self._began, self._used, self._seen_yet = self.at, 0, False
+        self.ball, self.ball_time = np.array([*WIDE.position, *WIDE.velocity]), 0
+        return Perceived(self.ball, True, state.pressures)
+
+    def perceive(self, state: State, _which: object = EVERY) -> Perceived:
+        """The ball at the time of the arm's last row, if there is a new image of it."""
+        self.at, found = self._arm.last_time, self._newest()
+        if found is None:
+            self.ball_time = 0
+            return Perceived(self.ball, True, state.pressures)
+        self.ball_time, ball = found
+        self._used = self.ball_time
+        self.ball = np.array(flown(ball, (self.at - self.ball_time) * 1e-9)[:6])
+        first, self._seen_yet = not self._seen_yet, True
+        return Perceived(self.ball, False, state.pressures, first)
+
+    def _newest(self) -> tuple[int, Ball] | None:
+        """Time and numbers of a ball that was not used yet."""
+        tracker = self._tracker.frontend()
+        if tracker is None:
+            return None
+        row = tracker.latest().extended
+        time = int(row.capture_time)
+        newest = max(self._began, self._used, self.at - round(OLDEST * 1e9))
+        if row.reason != Reason.seen or time <= newest:
+            return None
+        numbers = (*row.position.tolist(), *row.velocity.tolist(), float(row.spin[0]))
+        return time, numbers
+
+
+def flown(ball: Ball, seconds: float) -> Ball:
+    """After a short time, with a touch of the table if it meets it."""
+    while seconds > 0:
+        step = min(STEP, seconds)
+        ball = advanced(ball, step, NUMBERS)
+        x, y, z, *_ = ball
+        if z < TABLE.bounce_height and ball[5] < 0 and TABLE.carries(x, y):
+            ball = rebounded_within(step, ball, NUMBERS)
+        seconds -= step
+    return ball

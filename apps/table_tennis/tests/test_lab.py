@@ -1,0 +1,94 @@
+"""The lab in real time: balls are played, and each process that is killed is missed and joins."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import o80
+from o80_table_tennis.lab.kill_table import KILLS, SUPERVISOR, as_markdown
+from o80_table_tennis.lab.kills import Killer
+from o80_table_tennis.lab.parts import (
+    ARM,
+    COUNTERPARTS,
+    ENVIRONMENT,
+    LAUNCHER,
+    NINE,
+    LabSettings,
+    lab_parts,
+)
+from o80_table_tennis.lab.picture import BOXES, drawn
+from o80_table_tennis.lab.real_time import Lab
+
+PAGE = Path(__file__).parents[3] / "docs" / "lab.md"
+LONGEST = 300.0
+"""A small lab on a busy machine [s]."""
+
+
+def settings(folder: Path, balls: int = 0) -> LabSettings:
+    return LabSettings(balls=balls, prefix=f"lab-test-{os.getpid()}", folder=folder, fifo=False)
+
+
+def test_the_lab_has_nine_processes_and_their_counterparts(tmp_path: Path) -> None:
+    parts = lab_parts(settings(tmp_path))
+    assert set(parts) == {*NINE, COUNTERPARTS}
+    assert set(KILLS) == set(NINE)
+    for part in parts.values():
+        assert set(part.needs) <= set(parts)
+        assert part.segment is None or part.says is None
+
+
+def test_the_page_shows_the_table_of_kills() -> None:
+    assert as_markdown() in PAGE.read_text()
+
+
+@pytest.mark.check
+def test_a_killed_process_is_missed_within_200_ms_and_joins_again(tmp_path: Path) -> None:
+    with Lab(settings(tmp_path)) as lab:
+        killer = Killer(lab)
+        for name in NINE:
+            outcome = killer.kill(name)
+            assert outcome.joined
+            assert [each.part for each in outcome.said if not each.in_time] == []
+            assert {each.part for each in outcome.said} == {m.part for m in KILLS[name].marks}
+            assert set(outcome.went_on) == set(KILLS[name].goes_on)
+            assert set(outcome.stood_still) == set(KILLS[name].halts)
+            if name in (LAUNCHER, ENVIRONMENT):  # a ball needs all that were killed before
+                killer.wait_for_a_ball()
+        recording = lab.settings.recording
+    with pytest.raises(o80.TimeoutError):
+        o80.Frontend(lab.settings.segment(ARM), timeout=0.0)
+    # the arm was started twice; its recorder was killed while the second one ran
+    runs = o80.open(recording)[lab.settings.segment(ARM)].epochs
+    assert [len(run.gaps) for run in runs] == [0, 0]
+
+
+@pytest.mark.check
+def test_balls_are_played_and_reported(tmp_path: Path) -> None:
+    words = ("-m", "o80_table_tennis.lab", "--count=2", "--no-fifo", "--no-cyclictest")
+    prefix = f"lab-test-{os.getpid()}"
+    done = subprocess.run(
+        [sys.executable, *words, f"--output={tmp_path}", f"--prefix={prefix}"],
+        capture_output=True,
+        text=True,
+        timeout=LONGEST,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    report = json.loads((tmp_path / "report.json").read_text())
+    assert report["balls"]["played"] == 2
+    assert report["launcher"]["completed"] >= 2
+    assert set(report["processes"]) == set(NINE) - {"recorder", "view"}
+    assert report["processes"][ARM]["scheduling"] == "other"
+    assert report["motion_capture_error_mm"]["50%"] < 5.0
+    assert report["tracking_error_mm"]["at the time of the images"]["50%"] < 5.0
+    assert SUPERVISOR in report["processor_percent"]
+    assert not [each.name for each in o80.segments() if each.name.startswith(prefix)]
+
+
+def test_the_page_shows_the_picture_that_the_command_draws() -> None:
+    assert (PAGE.parent / "lab.svg").read_text() == drawn()
+    assert set(BOXES) == {*NINE, COUNTERPARTS}

@@ -1,0 +1,131 @@
+"""The ball of another segment, a simulated world for example, at any time that its rows cover."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any
+
+import numpy as np
+
+import o80
+from o80_devices.ball_tracking.throws import FlyingBall
+
+RETRY = 50_000_000
+"""Between two attempts to attach [ns]."""
+KEPT = 32
+"""Pairs of a row and its time."""
+GAP = 3.0
+"""Of periods, between a time and the rows around it, above which the ball is unknown."""
+
+
+class Attached:
+    """An observer of a segment that may end and come back."""
+
+    def __init__(self, segment: str) -> None:
+        self._segment = segment
+        self._frontend: o80.Frontend | None = None
+        self._next_try: int | None = None
+
+    def frontend(self, now: int) -> tuple[o80.Frontend | None, bool]:
+        """Of the living backend, or None; and whether it is another one than at the last call."""
+        if self._frontend is not None and not self._frontend.alive:
+            self.close()
+        if self._frontend is not None:
+            return self._frontend, False
+        if self._next_try is not None and now < self._next_try:
+            return None, True
+        self._next_try = now + RETRY
+        try:
+            self._frontend = o80.Frontend(self._segment, timeout=0.0, read_only=True)
+        except o80.Error:
+            self.close()
+        return self._frontend, True
+
+    def close(self) -> None:
+        if self._frontend is not None:
+            self._frontend.close()
+        self._frontend = None
+
+
+class BallOfSegment:
+    """Reads the ball of a segment at given times, between two rows.
+
+    field: where the ball is, as "observed.balls": a record (of several, the first one) with
+        position and velocity.
+    times: a segment whose rows say when rows of the other one were: `world_row` (iteration) and
+        `arm_time` [ns]. Without it the times of the rows themselves count.
+    """
+
+    def __init__(self, segment: str, field: str, times: str) -> None:
+        self._ball = Attached(segment)
+        self._times = Attached(times) if times else None
+        self._path = field.split(".")
+        self._pairs: deque[tuple[int, int]] = deque(maxlen=KEPT)
+        self._read = -1
+        """Iteration of the last row with a pair."""
+
+    def at(self, time: int, now: int) -> FlyingBall | None:
+        """The ball at a time [ns]; None: no rows cover it. now: of the clock [ns]."""
+        frontend, is_new = self._ball.frontend(now)
+        if is_new:
+            self._pairs.clear()
+        if frontend is None:
+            return None
+        if self._times is None:
+            newest = frontend.latest()
+            period = round(frontend.period * 1e9)
+            return self._between(frontend, newest.iteration, newest.time, time, period)
+        self._read_pairs(now)
+        for row, when in self._pairs:
+            if when >= time:
+                return self._between(frontend, row, when, time, round(frontend.period * 1e9))
+        return None
+
+    def _read_pairs(self, now: int) -> None:
+        assert self._times is not None
+        frontend, is_new = self._times.frontend(now)
+        if is_new:
+            self._pairs.clear()
+            self._read = -1
+        if frontend is None or frontend.published == self._read:
+            return
+        rows = frontend.history(min(KEPT, frontend.published - self._read))
+        for i in np.flatnonzero(rows.iteration > self._read):
+            row, when = int(rows.extended.world_row[i]), int(rows.extended.arm_time[i])
+            if row >= 0 and (not self._pairs or when > self._pairs[-1][1]):
+                self._pairs.append((row, when))
+        self._read = int(rows.iteration[-1])
+
+    def _between(
+        self, frontend: o80.Frontend, row: int, when: int, time: int, period: int
+    ) -> FlyingBall | None:
+        """At a time before that of a row, from the rows around it."""
+        back, rest = divmod(when - time, period)
+        if not 0 <= back < KEPT * GAP:
+            return None
+        first = row - back - (1 if rest else 0)
+        try:
+            rows = frontend.history(since=first, until=row - back)
+        except o80.Error:
+            return None
+        if len(rows) == 0 or int(rows.iteration[0]) != first:
+            return None
+        balls = self._balls(rows)
+        share = 1.0 - rest / period if rest else 0.0
+        later = balls[-1]
+        position = (1 - share) * balls[0]["position"] + share * later["position"]
+        velocity = (1 - share) * balls[0]["velocity"] + share * later["velocity"]
+        spin = later["spin"] if "spin" in (later.dtype.names or ()) else np.zeros(3)
+        return FlyingBall(1, position, velocity, np.array(spin))
+
+    def _balls(self, rows: o80.History) -> Any:
+        """(rows,) records."""
+        values: Any = rows.rows
+        for name in self._path:
+            values = values[name]
+        return values.reshape(len(rows), -1)[:, 0]
+
+    def close(self) -> None:
+        self._ball.close()
+        if self._times is not None:
+            self._times.close()

@@ -1,0 +1,153 @@
+"""The lenses of several cameras, from pictures of a board, and the file that keeps them."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o80.errors import InvalidArgument, TimeoutError
+from o80_devices.ball_tracking.board import (
+    LEAST_PICTURES,
+    Board,
+    board_reprojection,
+    lens_of,
+    picture,
+)
+from o80_devices.ball_tracking.image_source import ImageSource
+from o80_devices.ball_tracking.rig import RigCamera
+
+FORMAT = "o80-ball-lenses-1"
+FloatArray = NDArray[np.float64]
+EVERY = 4
+"""Every fourth picture is held out."""
+LEAST_FOUND = 11
+"""Pictures in which the board is found: 8 to fit, and those that are held out."""
+NEW_PLACE = 0.015
+"""How far the corners have moved, as a share of the image, when a picture is counted again."""
+
+
+@dataclass(frozen=True)
+class Lens:
+    """A camera without its place, and how good it is."""
+
+    camera: RigCamera
+    fitted: float
+    """Root mean square in the pictures that it was fitted to [px]."""
+    held_out: float
+    """The same in those that it was not fitted to [px]."""
+    pictures: int
+    """In which the board was found."""
+
+
+def lens_from_boards(
+    name: str, size: tuple[int, int], boards: Sequence[FloatArray], board: Board, of: int
+) -> Lens:
+    """of: pictures that were looked at. Raises InvalidArgument."""
+    if len(boards) < LEAST_FOUND:
+        columns, rows = board.inner_corners
+        raise InvalidArgument(
+            f"the board of {columns} x {rows} inner corners was found in {len(boards)} of {of} "
+            f"pictures of {name}: {LEAST_FOUND} are needed ({LEAST_PICTURES} to fit the lens, "
+            "the others to test it). Count the inner corners, show the whole board, avoid blur"
+        )
+    fit = [each for i, each in enumerate(boards) if i % EVERY != EVERY - 1]
+    out = [each for i, each in enumerate(boards) if i % EVERY == EVERY - 1]
+    camera, residual = lens_of(name, size, fit, board)
+    return Lens(camera, residual, board_reprojection(camera, out, board), len(boards))
+
+
+def lens_from_files(name: str, files: Sequence[Path], board: Board) -> Lens:
+    """Raises InvalidArgument."""
+    boards, size = [], None
+    for file in files:
+        image = picture(file)
+        height, width = image.shape[:2]
+        if size is None:
+            size = (width, height)
+        if (width, height) != size:
+            raise InvalidArgument(
+                f"{file} has {width} x {height} pixels, the pictures before it have "
+                f"{size[0]} x {size[1]}: a lens is calibrated for one size of images"
+            )
+        found = board.found(image)
+        if found is not None:
+            boards.append(found)
+    assert size is not None
+    return lens_from_boards(name, size, boards, board, of=len(files))
+
+
+def boards_from_segments(
+    source: ImageSource,
+    cameras: Sequence[RigCamera],
+    board: Board,
+    count: int,
+    *,
+    patience: float = 60.0,
+    say: Callable[[str], None] = lambda text: None,
+) -> list[list[FloatArray]]:
+    """For each camera, boards at `count` different places.
+
+    patience: for the next one [s]. say: is told what has been found. Raises TimeoutError.
+    """
+    boards: list[list[FloatArray]] = [[] for _ in cameras]
+    last = time.monotonic()
+    while any(len(found) < count for found in boards):
+        source.wait(0.05)
+        images = source.read(time.monotonic())
+        for camera, found, image in zip(
+            cameras, boards, images.images if images else [None] * len(cameras), strict=True
+        ):
+            if image is None or len(found) >= count:
+                continue
+            corners = board.found(image)
+            if corners is not None and _is_new(corners, found, camera.size):
+                found.append(corners)
+                last = time.monotonic()
+                say(f"boards found: {' '.join(str(len(each)) for each in boards)} of {count}")
+        if time.monotonic() - last > patience:
+            few = min(zip(boards, cameras, strict=True), key=lambda pair: len(pair[0]))
+            raise TimeoutError(
+                f"for {patience:g} s no camera has seen the board at a new place, and "
+                f"{few[1].name} has seen it {len(few[0])} times of {count}: do the cameras run, "
+                "does the board fit into the image, and are its inner corners counted?"
+            )
+    return boards
+
+
+def _is_new(corners: FloatArray, before: Sequence[FloatArray], size: tuple[int, int]) -> bool:
+    return all(np.abs(corners - each).mean() > NEW_PLACE * max(size) for each in before)
+
+
+def save(lenses: Sequence[Lens], path: Path | str) -> None:
+    cameras = [asdict(lens.camera) for lens in lenses]
+    for camera in cameras:
+        del camera["rotation"], camera["translation"]
+    Path(path).write_text(json.dumps({"format": FORMAT, "cameras": cameras}, indent=1) + "\n")
+
+
+def load(path: Path | str) -> list[RigCamera]:
+    """Raises InvalidArgument."""
+    try:
+        content = json.loads(Path(path).read_text())
+        if not isinstance(content, dict) or content.get("format") != FORMAT:
+            raise InvalidArgument(f'"format" must be "{FORMAT}": make it with `calibrate lenses`')
+        cameras = [RigCamera(**_tuples(each)) for each in content["cameras"]]
+        for camera in cameras:
+            camera.model()
+        names = [camera.name for camera in cameras]
+        if len(set(names)) < len(names) or not names:
+            raise InvalidArgument("each camera must have a name of its own")
+    except (OSError, KeyError, TypeError, ValueError) as error:
+        raise InvalidArgument(f"the lenses {path} cannot be used: {error}") from error
+    return cameras
+
+
+def _tuples(fields: dict[str, Any]) -> dict[str, Any]:
+    return {k: tuple(v) if isinstance(v, list) else v for k, v in fields.items()}

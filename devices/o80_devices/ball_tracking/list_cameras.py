@@ -1,0 +1,19 @@
+"""Lists the GenICam cameras that answer: python -m o80_devices.ball_tracking.list_cameras"""
+
+from __future__ import annotations
+
+import sys
+
+import o80
+from o80_devices.ball_tracking import aravis
+
+
+def main() -> None:
+    try:
+        print("\n".join(aravis.found()) or "no camera answers")
+    except o80.Error as error:
+        sys.exit(f"o80: {error}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,102 @@
+"""Size, direction and origin of a rig, from points whose places in the world are known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o80.errors import InvalidArgument
+from o80_devices.ball_tracking.rig import RigCamera
+
+FloatArray = NDArray[np.float64]
+WORST_FIT = 0.02
+"""Distance of a point from where it is known to be, as a share of the size of all points."""
+FLAT = 1e-6
+"""Points that lie in a plane have a third extent below this share of the first."""
+
+
+@dataclass(frozen=True)
+class Similarity:
+    """p_world = scale rotation p + translation."""
+
+    scale: float
+    rotation: FloatArray
+    translation: FloatArray
+
+    @classmethod
+    def between(cls, seen: FloatArray, known: FloatArray) -> Similarity:
+        """The one that takes seen points (n, 3) to known ones best (Umeyama, 1991).
+
+        Raises InvalidArgument for points on a line.
+        """
+        seen_middle, known_middle = seen.mean(0), known.mean(0)
+        apart, wanted = seen - seen_middle, known - known_middle
+        left, sizes, right = np.linalg.svd(wanted.T @ apart)
+        if not sizes[1] > FLAT * sizes[0]:
+            raise InvalidArgument("the corners lie in one line: they give no frame of the world")
+        # a reflection would fit as well where the points lie in a plane
+        mirror = np.array([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
+        rotation = left @ np.diag(mirror) @ right
+        scale = float((sizes * mirror).sum() / (apart**2).sum())
+        return cls(scale, rotation, known_middle - scale * rotation @ seen_middle)
+
+    def of_points(self, points: FloatArray) -> FloatArray:
+        moved: FloatArray = self.scale * points @ self.rotation.T + self.translation
+        return moved
+
+    def of_camera(self, camera: RigCamera) -> RigCamera:
+        rotation = np.reshape(camera.rotation, (3, 3)) @ self.rotation.T
+        return camera.moved(rotation, -rotation @ self.of_points(camera.place))
+
+
+def in_world(
+    cameras: Sequence[RigCamera], seen: FloatArray, known: FloatArray
+) -> tuple[RigCamera, ...]:
+    """Cameras moved, turned and scaled so that seen points come to the known ones.
+
+    Raises InvalidArgument if the points do not fit, or if they are mirrored.
+    """
+    similarity = Similarity.between(seen, known)
+    away = np.linalg.norm(similarity.of_points(seen) - known, axis=1)
+    size = float(np.linalg.norm(np.ptp(known, axis=0)))
+    if not away.max() < WORST_FIT * size:
+        raise InvalidArgument(
+            f"the corners fit the table only within {1e3 * away.max():.0f} mm: check the order in "
+            "which they are marked (counter-clockwise seen from above, from the smallest x and y) "
+            "and the size of the table"
+        )
+    moved = tuple(similarity.of_camera(camera) for camera in cameras)
+    _check_not_mirrored(moved, known)
+    return moved
+
+
+def _check_not_mirrored(cameras: Sequence[RigCamera], known: FloatArray) -> None:
+    """Mirrored corners in a plane fit as well, by a rig that is turned upside down."""
+    _, sizes, axes = np.linalg.svd(known - known.mean(0))
+    if len(sizes) > 2 and sizes[2] > FLAT * sizes[0]:
+        return
+    upwards = axes[2] * np.sign(axes[2][2] or 1.0)
+    below = [camera.name for camera in cameras if (camera.place - known.mean(0)) @ upwards < 0]
+    if below:
+        raise InvalidArgument(
+            f"{below[0]} would be below the table: the corners are mirrored. Mark them "
+            "counter-clockwise seen from above, from the smallest x and y"
+        )
+
+
+def left_out_errors(seen: FloatArray, known: FloatArray) -> FloatArray:
+    """(n,) How far each point is off if the others alone give the frame [m]; four points at least.
+
+    Empty for fewer points.
+    """
+    if len(seen) < 4:
+        return np.empty(0)
+    errors = []
+    for i in range(len(seen)):
+        others = np.arange(len(seen)) != i
+        similarity = Similarity.between(seen[others], known[others])
+        errors.append(float(np.linalg.norm(similarity.of_points(seen[i]) - known[i])))
+    return np.array(errors)

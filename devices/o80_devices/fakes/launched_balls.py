@@ -1,0 +1,96 @@
+"""The balls of the fake launcher as a tracking server would publish them."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from threading import Event, Lock, Thread
+
+import numpy as np
+
+from o80_devices.ball_launcher.launch_model import Launch
+from o80_devices.ball_tracking.rig import Rig, Table
+from o80_devices.ball_tracking.server_messages import Message
+from o80_devices.fakes.tracking_server import RATE, FakeTrackingServer
+
+SECOND = 1_000_000_000  # [ns]
+SEEN_FOR = 3.0
+"""A ball that lies somewhere is not tracked any more [s]."""
+STEP = 0.01
+"""In which a flight is computed [s]."""
+
+
+class LaunchedBalls:
+    """Where the ball that was launched last is: it flies and bounces on the table."""
+
+    def __init__(
+        self,
+        position: tuple[float, float, float],
+        yaw: float,
+        *,
+        table: Table | None = None,
+        noise: float = 0.0,
+        seed: int = 0,
+    ) -> None:
+        """position, yaw: of the launcher in the world [m], [rad]. noise: of a place [m]."""
+        self._position, self._yaw = position, yaw
+        self._law = Rig(cameras=(), table=table or Table()).law()
+        self._noise, self._rng = noise, np.random.default_rng(seed)
+        self._ball: Launch | None = None
+        self._time = self._launched = 0  # [ns]
+
+    def launched(self, ball: Launch, now: int) -> None:
+        self._ball = ball.placed(self._position, self._yaw)
+        self._time = self._launched = now
+
+    def message(self, now: int) -> Message:
+        """What the tracker sees at a time [ns]; times do not go back."""
+        while self._ball is not None and self._time < now:
+            step = min(round(STEP * SECOND), now - self._time)
+            ball = self._ball
+            moved = self._law.advance(ball.position, ball.velocity, ball.spin, step / SECOND)
+            self._ball = replace(ball, position=moved[0], velocity=moved[1], spin=moved[2])
+            self._time += step
+            lies = self._ball.position[2] < 0 or now - self._launched > SEEN_FOR * SECOND
+            if lies:
+                self._ball = None
+        if self._ball is None:
+            return Message(now, None)
+        return Message(now, self._ball.position + self._noise * self._rng.standard_normal(3))
+
+
+class TrackedLauncher:
+    """Publishes the balls in a thread. A context manager."""
+
+    def __init__(self, address: str, balls: LaunchedBalls) -> None:
+        self._balls = balls
+        self._server = FakeTrackingServer(address)
+        self._lock = Lock()
+        self._stopping = Event()
+        self._thread = Thread(target=self._run, daemon=True)
+
+    @property
+    def address(self) -> str:
+        return self._server.address
+
+    def launched(self, ball: Launch) -> None:
+        with self._lock:
+            self._balls.launched(ball, time.monotonic_ns())
+
+    def __enter__(self) -> TrackedLauncher:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stopping.set()
+        self._thread.join()
+        self._server.close()
+
+    def _run(self) -> None:
+        due = time.monotonic()
+        while not self._stopping.is_set():
+            with self._lock:
+                message = self._balls.message(time.monotonic_ns())
+            self._server.publish(message)
+            due = max(due + 1 / RATE, time.monotonic())
+            self._stopping.wait(max(0.0, due - time.monotonic()))

@@ -1,0 +1,36 @@
+"""Tells the user, on the standard error, of a failure that a driver deals with by itself."""
+
+from __future__ import annotations
+
+import sys
+import time
+
+AGAIN = 60.0
+"""The same text is not printed again for so long [s]."""
+
+
+class Trouble:
+    """What is wrong with one device. A failure that repeats itself is told once a minute."""
+
+    def __init__(self, device: str) -> None:
+        self._device = device
+        self._told: dict[str, float] = {}
+        self.text = ""
+        """What is wrong; empty: nothing."""
+
+    def tell(self, text: str) -> None:
+        text = " ".join(text.split())
+        self.text = text
+        now = time.monotonic()
+        if now - self._told.get(text, -AGAIN) < AGAIN:
+            return
+        if len(self._told) > 100:  # texts that differ each time
+            self._told.clear()
+        self._told[text] = now
+        print(f"o80: {self._device}: {text}; tries again", file=sys.stderr, flush=True)
+
+    def is_over(self) -> None:
+        if self.text and self._told:
+            print(f"o80: {self._device}: works again", file=sys.stderr, flush=True)
+            self._told.clear()
+        self.text = ""

@@ -1,0 +1,115 @@
+"""``o80 info run.mcap``: describes a recording."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import o80
+from o80.cli.condition import age_text
+from o80.cli.screen import Column, bytes_text, plain, print_json, print_table, style
+from o80.cli.started_with import started_with
+
+if TYPE_CHECKING:
+    from o80.recording.reader import RecordingFile
+    from o80.recording.recorded_epoch import RecordedEpoch
+
+COLUMNS = (
+    Column("segment"),
+    Column("run", right=True),
+    Column("robot"),
+    Column("recorded at", spare=1),
+    Column("rows", right=True),
+    Column("length", right=True),
+    Column("missing", right=True),
+    Column("decisions", spare=2),
+)
+
+
+def recording_info(path: Path, *, as_json: bool = False) -> None:
+    """Prints what a recording holds. Raises RecordingError."""
+    recording = o80.open(path)
+    runs = [
+        (name, number, epoch)
+        for name in recording
+        for number, epoch in enumerate(recording[name].epochs)
+    ]
+    if as_json:
+        print_json([_fields(name, number, epoch) for name, number, epoch in runs])
+        return
+    print(_first_line(recording))
+    if runs:
+        print()
+        print_table(COLUMNS, [_row(name, number, epoch) for name, number, epoch in runs])
+    if marks := Counter(mark.name for mark in recording.marks):
+        counts = ", ".join(f"{plain(name)} ({count})" for name, count in marks.items())
+        print(f"\n{style('marks', 'bold')}  {counts}")
+    _print_starts(runs)
+
+
+def _print_starts(runs: list[tuple[str, int, RecordedEpoch]]) -> None:
+    """How the runs were started; those that were started alike together."""
+    starts: dict[tuple[str, ...], list[str]] = {}
+    for name, number, epoch in runs:
+        start = (name, *started_with(epoch.provenance))
+        starts.setdefault(start, []).append(str(number))
+    for (name, *lines), numbers in starts.items():
+        several = f"runs {', '.join(numbers)}" if len(numbers) > 1 else f"run {numbers[0]}"
+        print(style(f"\n{plain(name)}, {several}: started with", "bold"))
+        for line in lines:
+            print(f"  {line}")
+
+
+def _first_line(recording: RecordingFile) -> str:
+    state = "finished"
+    if not recording.finished:
+        state = (
+            f"read up to its last whole chunk: its recorder still runs, or was killed (then "
+            f"`o80 repair {recording.path}` completes it for other readers)"
+        )
+    count = len(recording)
+    segments = f"{count} segment{'' if count == 1 else 's'}"
+    name, size = style(plain(str(recording.path)), "bold"), bytes_text(recording.size)
+    return f"{name}: {segments}, {size}, {state}"
+
+
+def _row(name: str, number: int, epoch: RecordedEpoch) -> list[str]:
+    fields = _summary(name, number, epoch)
+    local = time.localtime(epoch.recorded_at * 1e-9)
+    return [
+        plain(name),
+        str(number),
+        plain(fields["robot"]),
+        time.strftime("%Y-%m-%d %H:%M:%S", local),
+        str(fields["rows"]),
+        age_text(fields["seconds"]) if epoch.rows else "-",
+        str(fields["missing"]),
+        "recorded" if epoch.has_journal else "none",
+    ]
+
+
+def _summary(name: str, number: int, epoch: RecordedEpoch) -> dict[str, Any]:
+    begin, end = epoch.time_range if epoch.rows else (0, 0)
+    return {
+        "segment": name,
+        "run": number,
+        "robot": epoch.schema["robot"],
+        "recorded_at": epoch.recorded_at,
+        "rows": epoch.rows,
+        "seconds": (end - begin) * 1e-9,
+        "missing": sum(last - first + 1 for first, last in epoch.gaps),
+        "decisions": epoch.has_journal,
+    }
+
+
+def _fields(name: str, number: int, epoch: RecordedEpoch) -> dict[str, Any]:
+    """For tools."""
+    return {
+        **_summary(name, number, epoch),
+        "gaps": epoch.gaps,
+        "schema": epoch.schema,
+        "provenance": asdict(epoch.provenance),
+    }
