@@ -27,8 +27,10 @@ need_packages() {
   fi
   say "installing ${missing[*]}"
   export DEBIAN_FRONTEND=noninteractive
-  apt-get install -y -qq --no-install-recommends "${missing[@]}" > build/apt.log 2>&1 ||
-    { apt-get update -qq && apt-get install -y -qq --no-install-recommends "${missing[@]}"; } \
+  # another process may be installing: wait for it
+  local apt=(apt-get -qq -o DPkg::Lock::Timeout=600) words=(-y --no-install-recommends)
+  "${apt[@]}" install "${words[@]}" "${missing[@]}" > build/apt.log 2>&1 ||
+    { "${apt[@]}" update && "${apt[@]}" install "${words[@]}" "${missing[@]}"; } \
       > build/apt.log 2>&1 || { tail -n 20 build/apt.log >&2; return 1; }
 }
 
