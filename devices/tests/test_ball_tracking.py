@@ -179,6 +179,21 @@ def test_a_hit_keeps_the_number_and_another_place_gets_another() -> None:
     assert all(36 <= i < 40 or 72 <= i < 76 for i in surprises)
 
 
+def test_after_forget_the_next_ball_is_another_one_at_once() -> None:
+    tracker, random = Tracker(RIG), np.random.default_rng(1)
+    throws = Throws(RIG, seed=1)
+    for time in frames(0.1, 0.2):
+        old = tracker.place(sightings(throws.at(time), random, 0.1), round(time * 1e9))
+    tracker.forget()
+    place = throws.at(0.3).position + np.array([0.0, -0.8, 0.2])
+    new = tracker.place(
+        sightings(FlyingBall(2, place, np.zeros(3), np.zeros(3)), random, 0.1), 300_000_000
+    )
+    assert new.seen
+    assert new.ball == old.ball + 1
+    np.testing.assert_allclose(new.position, place, atol=0.005)
+
+
 def test_a_ball_not_seen_has_no_stale_numbers_and_time_may_jump_back() -> None:
     tracker, random = Tracker(RIG), np.random.default_rng(1)
     ball = Throws(RIG, seed=1).at(0.3)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -21,11 +23,13 @@ MOST_AHEAD = 4  # periods by which images may come before they are due, in all
 class BallTracker:
     """Follows the ball that the cameras of a rig see: one row for each moment with images.
 
-    A row without a ball has capture_time 0, NaN for numbers, and the reason.
+    A row without a ball has capture_time 0, NaN for numbers, and the reason. After the request
+    `forget` the next ball is another one, as where a simulation puts its ball somewhere else.
     """
 
     extended = EXTENDED
     units = UNITS
+    requests: ClassVar[dict[str, dict[str, Any]]] = {"forget": {}}
 
     @dataclass
     class Config:
@@ -71,6 +75,9 @@ class BallTracker:
             return
         ball = self._tracker.track(images.images, images.time)
         fill(reading, ball, images.time, images.error)
+
+    def on_forget(self, _fields: Mapping[str, Any]) -> None:
+        self._tracker.forget()
 
     def stop(self) -> None:
         self._source.close()

@@ -76,7 +76,7 @@ class FlightTrack:
 
     def __init__(self, law: _vision.FlightLaw, forget: float) -> None:
         self._law = law
-        self._forget = forget
+        self._longest = forget
         self._filter = _vision.BallFilter(law)
         self._last: Point | None = None  # where the ball was seen last
         self._surprise: Point | None = None
@@ -86,6 +86,10 @@ class FlightTrack:
     @property
     def follows(self) -> bool:
         return self._last is not None
+
+    def forget(self) -> None:
+        """What is seen next is another ball."""
+        self._last = self._surprise = None
 
     def expected(self, time: int) -> tuple[FloatArray | None, float]:
         """Where the ball will be, and the standard deviation of that [m]. None: nowhere known."""
@@ -165,9 +169,9 @@ class FlightTrack:
     def _go_to(self, time: int) -> None:
         """Moves the filter to a time; a ball not seen for too long is given up."""
         last = self._last
-        gone = last is not None and not 0 <= (time - last.time) * NANOSECOND <= self._forget
+        gone = last is not None and not 0 <= (time - last.time) * NANOSECOND <= self._longest
         if gone:
-            self._last = self._surprise = None
+            self.forget()
         elif last is not None and time > self._time:
             self._filter.predict((time - self._time) * NANOSECOND)
         self._time = time

@@ -53,6 +53,10 @@ class Tracker:
         self.sightings: FloatArray = np.empty((0, 4))
         """Of the last images: camera, x and y [px], area [px^2]."""
 
+    def forget(self) -> None:
+        """What is seen next is another ball."""
+        self._track.forget()
+
     def track(self, images: Sequence[Image | None], time: int) -> Tracked:
         """The ball in images that were taken at one time [ns]; None: a camera has no image."""
         if len(images) != len(self.cameras):

@@ -1,4 +1,4 @@
-"""`python -m o80_table_tennis.lab`: the laboratory, in real time."""
+"""`python -m o80_table_tennis.lab`: the laboratory, in real time or in lock-step."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
+from rich.progress import Progress
 
 import o80
 
+from .comparison import WANTED, compare, write
 from .parts import LabSettings
 from .processes import PartEndedError
 from .real_time import play_in_real_time
@@ -25,15 +27,41 @@ def main(
     fifo: Annotated[bool, typer.Option(help="Real-time scheduling of the arm.")] = True,
     restart: Annotated[bool, typer.Option(help="Start again a process that has ended.")] = False,
     cyclictest: Annotated[bool, typer.Option(help="Run cyclictest beside it.")] = True,
+    bursting: Annotated[
+        bool,
+        typer.Option(
+            "--bursting",
+            help="In lock-step, in simulated time: tracked against true balls.",
+        ),
+    ] = False,
 ) -> None:
     """Plays balls with nine processes, and writes report.json."""
     settings = LabSettings(count, seed, policy, prefix, output, fifo)
     console = Console()
     try:
+        if bursting:
+            play_in_lock_step(settings, console)
+            return
         play_in_real_time(settings, console, restart=restart, cyclictest=cyclictest)
     except (o80.Error, PartEndedError) as error:
         console.print(str(error), markup=False, style="red")
         sys.exit(1)
+
+
+def play_in_lock_step(settings: LabSettings, console: Console) -> None:
+    """Plays the same balls as the tracker sees them and as they are, and adds to report.json."""
+    if settings.balls < 1:
+        raise o80.InvalidArgument("in lock-step, balls are counted: give --count 1 or more")
+    with Progress(console=console, transient=True) as bars:
+        bar = bars.add_task("balls", total=2 * settings.balls)
+        comparison = compare(settings, after_each=lambda _: bars.advance(bar))
+    found = comparison.as_json()
+    console.print(
+        f"{found['balls']} balls: {found['returned_tracked']} returned as the tracker sees them, "
+        f"{found['returned_true']} as they are: {found['share']:.2f} of these (wanted: {WANTED})",
+        highlight=False,
+    )
+    console.print(f"report: {write(comparison, settings.folder)}")
 
 
 if __name__ == "__main__":

@@ -23,7 +23,7 @@ from ..environment import TableTennisEnvironment
 from ..rig.arm import LONGEST_RETURN
 from .environment_row import EXTENDED, UNITS, WATCHED, Phase
 from .launching import Launching
-from .parts import ARM, ENVIRONMENT, RATES, WORLD, LabSettings
+from .parts import ARM, ENVIRONMENT, RATES, TRACKER, WORLD, LabSettings
 from .player import home_of, opened, policy_of
 from .tracked_perception import TrackedPerception
 from .watched import Watched
@@ -44,6 +44,7 @@ class EnvironmentProcess:
     def __init__(self, settings: LabSettings, backend: o80.Backend) -> None:
         self._settings, self._backend = settings, backend
         self._watched = {name: Watched(settings.segment(name)) for name in WATCHED}
+        self._tracker = Watched(settings.segment(TRACKER))
         self._launching = Launching(settings)
         self._policy, self._home = policy_of(settings), home_of(settings)
         self._environment: TableTennisEnvironment | None = None
@@ -136,7 +137,8 @@ class EnvironmentProcess:
             self._environment = opened(self._settings, self._policy, self._home)
         except OPENING:
             return
-        self._perception = TrackedPerception(self._settings, self._environment.rig.arm)
+        arm = self._environment.rig.arm
+        self._perception = TrackedPerception(self._tracker.frontend, lambda: arm.last_time)
         self._environment.observer.look_through(self._perception)
         rig = self._environment.rig
         rig.after_step, rig.returns_at_reset = self._after_step, False

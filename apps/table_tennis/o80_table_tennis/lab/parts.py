@@ -35,6 +35,8 @@ RATES = {ARM: 500.0, LAUNCHER: 50.0, CAMERAS: 180.0, TRACKER: 180.0, MOTION_CAPT
     ENVIRONMENT: 100.0
 }
 """Rows a second."""
+CAMERAS_ROBOT = "o80_devices.ball_tracking:SyntheticCameras"
+TRACKER_ROBOT = "o80_devices.ball_tracking:BallTracker"
 SUBJECTS = ("racket", "base", "table")
 """What the motion capture sees."""
 RECORDED = (ARM, WORLD, LAUNCHER, TRACKER, MOTION_CAPTURE, ENVIRONMENT)
@@ -111,7 +113,7 @@ def lab_parts(settings: LabSettings) -> dict[str, Part]:
         _robot(
             settings,
             TRACKER,
-            "o80_devices.ball_tracking:BallTracker",
+            TRACKER_ROBOT,
             {"frequency": RATES[TRACKER], "cameras": of(CAMERAS), "timeout": 60},
             needs=(CAMERAS,),
         ),
@@ -177,7 +179,7 @@ def _cameras(settings: LabSettings) -> tuple[str, dict[str, Any]]:
         "ball": settings.segment(WORLD),
         "times": settings.segment(ENVIRONMENT),
     }
-    return "o80_devices.ball_tracking:SyntheticCameras", options
+    return CAMERAS_ROBOT, options
 
 
 def _robot(

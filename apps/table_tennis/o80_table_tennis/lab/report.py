@@ -6,6 +6,7 @@ import json
 import os
 import time
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,10 @@ from .parts import (
 )
 
 IntArray = NDArray[np.int64]
+
+REPORT = "report.json"
+BURSTING = "bursting"
+"""Its entry about the lab in lock-step, see `comparison`."""
 
 MOST_MISSED = {ARM: 0.1} | dict.fromkeys((CAMERAS, TRACKER, MOTION_CAPTURE, ENVIRONMENT), 1.0)
 """Periods that may be missed on a quiet machine [%]."""
@@ -62,8 +67,19 @@ def write_report(
         "wall_clock": time.strftime("%Y-%m-%d %H:%M:%S"),
         "kernel": os.uname().version,
     }
-    (settings.folder / "report.json").write_text(json.dumps(report, indent=2) + "\n")
+    path = settings.folder / REPORT
+    if (bursting := _told_before(path)) is not None:
+        report[BURSTING] = bursting
+    path.write_text(json.dumps(report, indent=2) + "\n")
     return report
+
+
+def _told_before(path: Path) -> Any:
+    """What the lab in lock-step has written there."""
+    try:
+        return json.loads(path.read_text()).get(BURSTING)
+    except (FileNotFoundError, ValueError, AttributeError):
+        return None
 
 
 class _Rows:

@@ -8,34 +8,41 @@ an episode, the mean launch is a guess in its place.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+import o80
 from o80_devices.ball_tracking.ball_row import Reason
 
 from ..balls.launches import WIDE
 from ..physics.tracked_ball import NUMBERS, Ball, advanced, rebounded_within
-from ..rig.arm import Arm
 from ..task.perception import EVERY, Perceived
 from ..task.state import State
 from ..world.table import TABLE
-from .parts import TRACKER, LabSettings
-from .watched import Watched
 
 FloatArray = NDArray[np.float64]
 STEP = 0.005
 """Of the flight from image to row [s]."""
 OLDEST = 0.15
 """Older than this a ball does not count as seen [s]."""
+KNOWN_VELOCITY = 0.25
+"""Above this standard deviation the velocity of a ball is not known yet: the tracker has seen it
+once or twice [m/s]."""
 
 
 class TrackedPerception:
-    """Of one episode after the other, in real time."""
+    """Of one episode after the other.
 
-    def __init__(self, settings: LabSettings, arm: Arm) -> None:
-        self._tracker, self._arm = Watched(settings.segment(TRACKER)), arm
+    `tracker` is an observer of its segment, or None while there is none; `now` the time of the row
+    that is observed, on the clock of the images [ns].
+    """
+
+    def __init__(
+        self, tracker: Callable[[], o80.Frontend | None], now: Callable[[], int]
+    ) -> None:
+        self._tracker, self._now = tracker, now
         self._began = self._used = 0
         self._seen_yet = False
         self.ball: FloatArray = np.zeros(6)
@@ -52,14 +59,14 @@ class TrackedPerception:
         _which: NDArray[np.int64],
     ) -> Perceived:
         """The ball has just begun to fly: no image shows it yet."""
-        self.at = self._arm.last_time
+        self.at = self._now()
         self._began, self._used, self._seen_yet = self.at, 0, False
         self.ball, self.ball_time = np.array([*WIDE.position, *WIDE.velocity]), 0
         return Perceived(self.ball, True, state.pressures)
 
     def perceive(self, state: State, _which: object = EVERY) -> Perceived:
         """The ball at the time of the arm's last row, if there is a new image of it."""
-        self.at, found = self._arm.last_time, self._newest()
+        self.at, found = self._now(), self._newest()
         if found is None:
             self.ball_time = 0
             return Perceived(self.ball, True, state.pressures)
@@ -71,13 +78,15 @@ class TrackedPerception:
 
     def _newest(self) -> tuple[int, Ball] | None:
         """Time and numbers of a ball that was not used yet."""
-        tracker = self._tracker.frontend()
+        tracker = self._tracker()
         if tracker is None:
             return None
         row = tracker.latest().extended
         time = int(row.capture_time)
         newest = max(self._began, self._used, self.at - round(OLDEST * 1e9))
         if row.reason != Reason.seen or time <= newest:
+            return None
+        if np.max(np.diag(row.covariance)[3:6]) > KNOWN_VELOCITY**2:
             return None
         numbers = (*row.position.tolist(), *row.velocity.tolist(), float(row.spin[0]))
         return time, numbers
