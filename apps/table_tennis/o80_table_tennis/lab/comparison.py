@@ -22,6 +22,7 @@ from .report import BURSTING, REPORT, spread
 WANTED = 0.9
 """Of the returns on the true ball, on the tracked one."""
 
+
 @dataclass(frozen=True)
 class Comparison:
     """Both ways, ball by ball."""

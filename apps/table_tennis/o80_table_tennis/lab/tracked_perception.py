@@ -39,9 +39,7 @@ class TrackedPerception:
     that is observed, on the clock of the images [ns].
     """
 
-    def __init__(
-        self, tracker: Callable[[], o80.Frontend | None], now: Callable[[], int]
-    ) -> None:
+    def __init__(self, tracker: Callable[[], o80.Frontend | None], now: Callable[[], int]) -> None:
         self._tracker, self._now = tracker, now
         self._began = self._used = 0
         self._seen_yet = False
