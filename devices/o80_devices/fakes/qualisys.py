@@ -138,14 +138,15 @@ class FakeQualisys:
             if not self.faults.silent:
                 packets.send(Type.COMMAND, GREETING)
             while not self._stopping.is_set():
-                found = packets.receive(0.05 if stream is None else 0.5 / self.frequency)
+                if stream is not None:
+                    self._wait_for(number + 1)
+                    number = self._send_due(stream, number)
+                found = packets.receive(0.05 if stream is None else 0.0)
                 if found is not None and not self.faults.silent:
                     command = words_of(found[1]).lower().strip()
                     stream = self._begun(connected, command) or stream
                     if stream is None or not command.startswith("streamframes"):
                         self._answer(packets, connected, command)
-                if stream is not None:
-                    number = self._send_due(stream, number)
 
     def _begun(self, connected: socket.socket, command: str) -> Stream | None:
         """The stream that a command begins, if it does."""
@@ -179,6 +180,12 @@ class FakeQualisys:
         settings = f"<The_6D><Bodies>{len(self.bodies)}</Bodies>{bodies}{angles}</The_6D>"
         root = f"QTM_Parameters_Ver_{VERSION}"
         return f"<{root}>{settings}</{root}>"
+
+    def _wait_for(self, number: int) -> None:
+        """Until this frame is due; timeouts of sockets are too coarse for that."""
+        left = self._begin + number / self.frequency - time.monotonic()
+        if left > 0.0:
+            self._stopping.wait(min(left, 1.0 / self.frequency))
 
     def _send_due(self, stream: Stream, number: int) -> int:
         """Sends the frame of now if it was not sent; returns its number."""
