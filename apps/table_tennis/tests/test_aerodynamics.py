@@ -1,11 +1,12 @@
-"""Drag and Magnus force in one step of the motion."""
+"""The numbers of drag and Magnus force."""
 
 import math
 
 import numpy as np
 import pytest
 
-from o80_table_tennis.physics.aerodynamics import Aerodynamics, runge_kutta_step
+from o80_mujoco.balls import accelerations
+from o80_table_tennis.physics.aerodynamics import Aerodynamics
 
 
 def test_the_drag_is_the_published_formula() -> None:
@@ -16,18 +17,13 @@ def test_the_drag_is_the_published_formula() -> None:
     assert air.magnus == pytest.approx(0.5 * 1.18 * 1.47 * area * 0.02 / 0.0027)
 
 
-def test_many_balls_in_one_step_fly_like_each_alone() -> None:
-    turns, drags = np.linspace(-0.4, 0.4, 5), np.linspace(0.0, 0.2, 5)
-    start = (0.0, 0.0, 1.0, 0.5, -4.0, 2.0)
+def test_all_numbers_reach_the_law() -> None:
+    air = Aerodynamics(gravity=9.0)
+    velocity, spin = np.array([0.5, -4.0, 1.0]), np.array([80.0, -40.0, 30.0])
+    speed, turning = np.linalg.norm(velocity), air.halved_at(float(np.linalg.norm(spin)))
 
-    many = runge_kutta_step(
-        tuple(np.full(5, value) for value in start),  # type: ignore[arg-type]
-        (turns, 0 * turns, 0 * turns),
-        drags,
-        9.81,
-        0.01,
-    )
+    found = accelerations(np.concatenate([np.zeros(3), velocity, spin])[None], air.air)[0]
 
-    for ball in range(5):
-        alone = runge_kutta_step(start, (turns[ball], 0.0, 0.0), drags[ball], 9.81, 0.01)
-        np.testing.assert_allclose([value[ball] for value in many], alone, rtol=1e-14)
+    lift = air.magnus * speed / (speed + turning) * np.cross(spin, velocity)
+    expected = lift - air.drag * speed * velocity - [0.0, 0.0, 9.0]
+    np.testing.assert_allclose(found, expected, rtol=1e-12)

@@ -1,14 +1,17 @@
 """The filtered ball: nearer to the truth than what is measured, and alike for one and many."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from o80_table_tennis.balls.launches import WIDE
 from o80_table_tennis.balls.simulated_shots import SimulatedShots
-from o80_table_tennis.physics.ball_filter import ManyBallFilter, OneBallFilter
-from o80_table_tennis.physics.filter_gains import FilterSettings
+from o80_table_tennis.physics.ball_filter import ball_filter
+from o80_table_tennis.physics.filter_gains import PLACES, FilterSettings, gains
 from o80_table_tennis.physics.prediction import predict, predict_crossing
+from o80_table_tennis.world.table import TABLE
 
 FloatArray = NDArray[np.float64]
 SETTINGS = FilterSettings()
@@ -49,50 +52,50 @@ def test_one_ball_and_many_get_the_same_bits(seen: FloatArray) -> None:
     missed = np.random.default_rng(2).random((SHOTS, STEPS)) < 0.1
     seen = seen.copy()
     seen[:5, 40:, 4] *= -1  # the racket meets some balls
-    many = ManyBallFilter(SETTINGS, SHOTS)
-    many.begin(slice(None), seen[:, 0].T)
-    ones = [OneBallFilter(SETTINGS) for _ in range(SHOTS)]
+    many = ball_filter(SETTINGS, SHOTS)
+    many.begin(seen[:, 0])
+    ones = [ball_filter(SETTINGS, 1) for _ in range(SHOTS)]
     for one, rows in zip(ones, seen, strict=True):
-        one.begin(rows[0].tolist())
+        one.begin(rows[:1])
     for step in range(1, STEPS):
-        many.step(np.ascontiguousarray(seen[:, step].T), missed[:, step])
+        many.step(seen[:, step], missed[:, step])
         for number, one in enumerate(ones):
-            one.step(None if missed[number, step] else seen[number, step].tolist())
-        np.testing.assert_array_equal(many.balls.T, [one.ball for one in ones])
-        crossings = many.crossings(PLANE)
-        alone = np.array([one.crossing(PLANE) for one in ones])
-        assert np.ascontiguousarray(crossings.T).tobytes() == alone.tobytes()  # no -0 for a 0
+            one.step(seen[[number], step], missed[[number], step])
+        found = many.estimates(PLANE)
+        assert found.tobytes() == np.vstack([one.estimates(PLANE) for one in ones]).tobytes()
         some = np.array([3, 17])
-        np.testing.assert_array_equal(many.crossings(PLANE, some), crossings[:, some])
+        np.testing.assert_array_equal(many.estimates(PLANE, some), found[some])
 
 
 def test_a_new_flight_of_one_ball_leaves_the_others_alone(seen: FloatArray) -> None:
-    filters = [ManyBallFilter(SETTINGS, SHOTS) for _ in range(2)]
+    filters = [ball_filter(SETTINGS, SHOTS) for _ in range(2)]
     nothing = np.zeros(SHOTS, np.bool_)
     for each in filters:
-        each.begin(slice(None), seen[:, 0].T)
+        each.begin(seen[:, 0])
     for step in range(1, 70):
         if step == 30:
-            filters[1].begin(np.array([7]), seen[[7], 0].T)
+            filters[1].begin(seen[[7], 0], np.array([7]))
         for each in filters:
-            each.step(np.ascontiguousarray(seen[:, step].T), nothing)
+            each.step(seen[:, step], nothing)
     others = np.arange(SHOTS) != 7
-    np.testing.assert_array_equal(filters[0].balls[:, others], filters[1].balls[:, others])
-    assert not np.array_equal(filters[0].balls[:, 7], filters[1].balls[:, 7])
+    one, other = (each.estimates(PLANE) for each in filters)
+    np.testing.assert_array_equal(one[others], other[others])
+    assert not np.array_equal(one[7], other[7])
 
 
 def test_the_estimate_is_much_nearer_than_what_is_measured(
     flights: Flights, seen: FloatArray
 ) -> None:
-    many = ManyBallFilter(SETTINGS, SHOTS)
-    many.begin(slice(None), seen[:, 0].T)
+    many = ball_filter(SETTINGS, SHOTS)
+    many.begin(seen[:, 0])
     nothing = np.zeros(SHOTS, np.bool_)
     for step in range(1, 51):
-        many.step(np.ascontiguousarray(seen[:, step].T), nothing)
-    off = many.balls[:6].T - np.array(flights.states)[:, 50]
-    spins = many.balls[6] - np.array(flights.spins)[:, 50]
+        many.step(seen[:, step], nothing)
+    found = many.estimates(PLANE)
+    off = found[:, :6] - np.array(flights.states)[:, 50]
+    spins = found[:, 6] - np.array(flights.spins)[:, 50]
     times = np.array([0.0, 0.0, 0.5])
-    crossings = many.crossings(PLANE)[[0, 1, 5]].T + times - np.array(flights.crossings)
+    crossings = found[:, [7, 8, 12]] + times - np.array(flights.crossings)
 
     assert np.sqrt(np.mean(off[:, :3] ** 2)) < SETTINGS.position / 2
     assert np.sqrt(np.mean(off[:, 3:] ** 2)) < SETTINGS.velocity / 5
@@ -102,24 +105,49 @@ def test_the_estimate_is_much_nearer_than_what_is_measured(
 
 
 def test_a_velocity_that_no_flight_explains_begins_anew() -> None:
-    each = OneBallFilter(SETTINGS)
-    each.begin((0.5, 0.5, 1.1, 0.2, -3.0, 0.5))
-    hit = (0.5, 0.45, 1.1, 0.3, 4.0, 1.5)
-    each.step(hit)
-    assert each.ball[:6] == hit
-    assert each.crossing(PLANE) == (0.0,) * 6
+    each = ball_filter(SETTINGS, 1)
+    each.begin(np.array([[0.5, 0.5, 1.1, 0.2, -3.0, 0.5]]))
+    hit = np.array([[0.5, 0.45, 1.1, 0.3, 4.0, 1.5]])
+    each.step(hit, np.zeros(1, np.bool_))
+    found = each.estimates(PLANE)[0]
+    np.testing.assert_array_equal(found[:6], hit[0])
+    assert found[6] == SETTINGS.mean_spin
+    np.testing.assert_array_equal(found[7:], 0.0)
 
 
 def test_an_unseen_ball_flies_on_and_bounces_too() -> None:
     launch = SimulatedShots(WIDE).launch(4)
-    each = OneBallFilter(SETTINGS)
+    each = ball_filter(SETTINGS, 1)
     flight = predict(launch.position, launch.velocity, 0.7, spin=launch.spin)
     states = np.hstack([flight.positions, flight.velocities])
-    each.begin(states[0].tolist())
+    each.begin(states[:1])
     for row in states[1:50]:
-        each.step(row.tolist())
-    for _ in states[50:]:
-        each.step(None)
+        each.step(row[None], np.array([False]))
+    for row in states[50:]:
+        each.step(0 * row[None], np.array([True]))
     assert flight.bounce_times[0] > 0.5
-    np.testing.assert_allclose(each.ball[:3], states[-1, :3], atol=0.03)
-    np.testing.assert_allclose(each.ball[3:6], states[-1, 3:], atol=0.15)
+    found = each.estimates(PLANE)[0]
+    np.testing.assert_allclose(found[:3], states[-1, :3], atol=0.03)
+    np.testing.assert_allclose(found[3:6], states[-1, 3:], atol=0.15)
+
+
+def test_the_first_measurement_after_an_unseen_bounce_gets_the_first_gain() -> None:
+    falling = np.array([[0.5, 0.9, TABLE.bounce_height + 0.01, 0.2, -3.0, -3.0]])
+    higher = np.array([[0.0, 0.0, 0.01, 0.0, 0.0, 0.0]])
+    found = []
+    for seen_higher in (0.0, 1.0):
+        each = ball_filter(SETTINGS, 1)
+        each.begin(falling)
+        each.step(falling, np.array([True]))
+        assert each.estimates(PLANE)[0, 5] > 0.0
+        each.step(each.estimates(PLANE)[:, :6] + seen_higher * higher, np.array([False]))
+        found.append(each.estimates(PLANE)[0, 2])
+    gain = gains(SETTINGS).after[0][PLACES.index((2, 2))]
+    assert (found[1] - found[0]) / 0.01 == pytest.approx(gain, rel=1e-9)
+
+
+@pytest.mark.parametrize("spin", [-5000.0, 5000.0])
+def test_an_absurd_estimate_is_a_number_all_the_same(spin: float) -> None:
+    each = ball_filter(replace(SETTINGS, mean_spin=spin), 1)
+    each.begin(np.array([[0.4, 2.0, 2.5, 1.0, -25.0, 8.0]]))
+    assert np.isfinite(each.estimates(PLANE)).all()

@@ -74,7 +74,8 @@ def test_the_command_prints_a_row_for_each_set() -> None:
 
 def test_top_spin_carries_a_ball_on_and_backspin_holds_it() -> None:
     def kept(spin: float, table: Table = TABLE) -> float:
-        return bounced((0, 0, 0, 0, -4.0, -3.0), (spin, 0.0, 0.0), table)[0][4] / -4.0
+        after = bounced(np.array([0.0, -4.0, -3.0]), np.array([spin, 0.0, 0.0]), table)
+        return float(after.velocity[1]) / -4.0
 
     rough = replace(TABLE, friction=np.inf)
     assert kept(-150.0, rough) < kept(0.0, rough) < kept(100.0, rough) < kept(250.0, rough)
@@ -87,7 +88,7 @@ def test_top_spin_carries_a_ball_on_and_backspin_holds_it() -> None:
 
 
 def test_a_bounce_gives_to_the_spin_what_it_takes_from_the_velocity() -> None:
-    (*_, vx, vy, _), spin = bounced((0, 0, 0, 1.0, -4.0, -3.0), (20.0, -10.0, 5.0))
+    (vx, vy, _), spin = bounced(np.array([1.0, -4.0, -3.0]), np.array([20.0, -10.0, 5.0]))
 
     # about the point of contact: velocity x radius + 2/3 radius^2 x spin
     assert vy - 2 / 3 * BALL_RADIUS * spin[0] == pytest.approx(-4.0 - 2 / 3 * BALL_RADIUS * 20.0)
@@ -97,16 +98,17 @@ def test_a_bounce_gives_to_the_spin_what_it_takes_from_the_velocity() -> None:
 
 def test_a_racket_and_the_table_follow_the_same_law() -> None:
     table = replace(TABLE, friction=np.inf)
-    state, spin = bounced((0, 0, 0, 0.5, -4.0, -3.0), (60.0, 20.0, 10.0), table)
+    velocity, spin = np.array([0.5, -4.0, -3.0]), np.array([60.0, 20.0, 10.0])
+    expected = bounced(velocity, spin, table)
     after = leaving(
-        np.array([0.5, -4.0, -3.0]),
-        np.array([60.0, 20.0, 10.0]),
+        velocity,
+        spin,
         np.zeros(3),
         np.array([0.0, 0.0, 1.0]),
         Restitution(table.tangential_restitution, table.normal_restitution),
     )
-    np.testing.assert_allclose(after.velocity, state[3:], rtol=1e-12)
-    np.testing.assert_allclose(after.spin, spin, rtol=1e-12)
+    np.testing.assert_allclose(after.velocity, expected.velocity, rtol=1e-12)
+    np.testing.assert_allclose(after.spin, expected.spin, rtol=1e-12)
 
 
 def test_spins_are_found_from_turns_and_never_run_away() -> None:

@@ -1,10 +1,9 @@
-"""Flight, rebound and impact in Python are those of the twins in C++, number by number.
+"""Flight, rebound and impact of predictions are those of the twins, number by number.
 
-Python needs the laws for fits and predictions, the simulator for what happens. The numbers in them
-(air, restitutions, radius) are the application's and go to the twins as options.
+Both call the same law. Its numbers (air, restitutions, radius) are the application's: predictions
+get them in calls, the twins as options.
 """
 
-import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -12,10 +11,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from o80_mujoco.balls import path
 from o80_table_tennis.balls.sampled_flight import SampledFlight
 from o80_table_tennis.balls.simulated_shots import SimulatedShots
 from o80_table_tennis.environment import TableTennisEnvironment
-from o80_table_tennis.physics.aerodynamics import AERODYNAMICS, runge_kutta_step
+from o80_table_tennis.physics.aerodynamics import AERODYNAMICS
 from o80_table_tennis.physics.impact import bounced, leaving
 from o80_table_tennis.players.policies import default_policy
 from o80_table_tennis.rig.rig import Rig
@@ -55,20 +55,9 @@ def flown() -> Iterator[Numbers]:
 
 
 def later(row: Numbers, duration: float) -> Numbers:
-    """A row of a free flight, `duration` [s] later, with the spin of the middle."""
-    halfway = math.exp(-AERODYNAMICS.spin_decay * duration / 2)
-    x, y, z, vx, vy, vz, wx, wy, wz = row.tolist()
-    share = AERODYNAMICS.magnus * halfway
-    state = runge_kutta_step(
-        (x, y, z, vx, vy, vz),
-        (share * wx, share * wy, share * wz),
-        AERODYNAMICS.drag,
-        AERODYNAMICS.gravity,
-        duration,
-        AERODYNAMICS.halved_at(halfway * math.hypot(wx, wy, wz)),
-    )
-    decay = halfway * halfway
-    return np.array([*state, decay * wx, decay * wy, decay * wz])
+    """A row of a free flight, `duration` [s] later."""
+    row_later: Numbers = path(row[None], duration, 1, AERODYNAMICS.air)[1, 0]
+    return row_later
 
 
 def bounce_row(flown: Numbers) -> int:
@@ -90,9 +79,8 @@ def test_a_ball_leaves_the_table_alike(flown: Numbers) -> None:
     # within a step the twin takes the way to the table as straight
     share = (row[2] - TABLE.bounce_height) / (row[2] - end[2])
     touching = row + share * (end - row)
-    x, y, z, vx, vy, vz, wx, wy, wz = touching.tolist()
-    state, spin = bounced((x, y, z, vx, vy, vz), (wx, wy, wz))
-    after = np.array([*state, *spin])
+    velocity, spin = bounced(touching[3:6], touching[6:])
+    after = np.concatenate([touching[:3], velocity, spin])
     assert after[2] == pytest.approx(TABLE.bounce_height)
 
     rest = (1 - share) * PERIOD

@@ -7,24 +7,16 @@ import pytest
 from numpy.typing import NDArray
 from recorded_rows import DATA, ball_gun_shots
 
+from o80_mujoco.balls import accelerations
 from o80_table_tennis.balls.recordings import load_trajectories
 from o80_table_tennis.balls.sampled_flight import SampledFlight
 from o80_table_tennis.balls.simulated_shots import SimulatedShots
 from o80_table_tennis.balls.trajectories import BallTrajectory
-from o80_table_tennis.physics.aerodynamics import AERODYNAMICS, derivative
+from o80_table_tennis.physics.aerodynamics import AERODYNAMICS
 from o80_table_tennis.physics.prediction import predict
 
 FloatArray = NDArray[np.float64]
 SPIN_SETS = ("mn5008_no_spin.hdf5", "mn5008_topspin.hdf5")
-
-
-def acceleration(state: FloatArray) -> FloatArray:
-    """(3,) of a simulated ball: position, velocity and spin (9,)."""
-    air = AERODYNAMICS
-    x, y, z, vx, vy, vz, wx, wy, wz = state.tolist()
-    turn = (air.magnus * wx, air.magnus * wy, air.magnus * wz)
-    halved_at = air.halved_at(float(np.linalg.norm([wx, wy, wz])))
-    return np.array(derivative((x, y, z, vx, vy, vz), turn, air.drag, air.gravity, halved_at)[3:])
 
 
 def assert_nothing_jumps(flight: SampledFlight) -> None:
@@ -47,7 +39,7 @@ def assert_nothing_jumps(flight: SampledFlight) -> None:
             )
         # the replayed velocities change as the simulator changes them
         changes = (flight.velocities[rows[2:]] - flight.velocities[rows[:-2]]) / (2 * flight.period)
-        expected = np.array([acceleration(flight.states[row]) for row in rows[1:-1]])
+        expected = accelerations(flight.states[rows[1:-1]], AERODYNAMICS.air)
         np.testing.assert_allclose(changes, expected, rtol=0, atol=0.02)
 
 

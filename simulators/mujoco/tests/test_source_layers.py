@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 SOURCES = Path(__file__).resolve().parents[1] / "src"
-LAYERS = ("engine", "balls", "driver")
+LAYERS = ("engine", "balls", "estimates", "driver", "module")
 INCLUDE = re.compile(r'^#include "(\w+)/', re.MULTILINE)
 SPORTS = re.compile(r"tennis|racket|\bnet\b|\btable\b|landing|opponent", re.IGNORECASE)
 

@@ -95,10 +95,8 @@ class Law:
 
     def predicted(self, bounce: RecordedBounce) -> tuple[FloatArray, FloatArray]:
         """Velocity [m/s] and turn [1/s] after the bounce, each (3,)."""
-        vx, vy, vz = bounce.before.tolist()
-        wx, wy, wz = self.spin(bounce).tolist()
-        state, after = bounced((0.0, 0.0, 0.0, vx, vy, vz), (wx, wy, wz), self.table)
-        return np.array(state[3:]), self.air.turn(np.array(after), bounce.speed_after)
+        after = bounced(bounce.before, self.spin(bounce), self.table)
+        return after.velocity, self.air.turn(after.spin, bounce.speed_after)
 
 
 def errors(law: Law, bounces: Sequence[RecordedBounce]) -> FloatArray:

@@ -19,6 +19,4 @@ def spin_after(velocity: FloatArray, turn: FloatArray, spin: FloatArray | None) 
     """
     if spin is None:
         spin = AERODYNAMICS.spins(turn, np.linalg.norm(velocity, axis=1))[0]
-    vx, vy, vz = velocity[0].tolist()
-    wx, wy, wz = spin.tolist()
-    return np.array(bounced((0.0, 0.0, 0.0, vx, vy, vz), (wx, wy, wz))[1])
+    return bounced(velocity[0], spin).spin

@@ -17,7 +17,9 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from ..physics.aerodynamics import AERODYNAMICS, runge_kutta_step
+from o80_mujoco.balls import path
+
+from ..physics.aerodynamics import AERODYNAMICS
 from ..physics.interpolation import along_path
 from .bounce_spin import spin_after
 
@@ -49,6 +51,7 @@ SCALES = np.array([0.01] * 3 + [0.1] * 3 + [0.1 * AERODYNAMICS.drag] + [0.1] * 3
 """Typical sizes of the ten unknowns, for differences and damping."""
 BELIEFS = np.array([0.0] * 6 + [1 / (DRAG_BELIEF * AERODYNAMICS.drag)] + [1 / TURN_BELIEF] * 3)
 """How sure each unknown is known before [1 / its unit]."""
+_TURNING = replace(AERODYNAMICS, spin_decay=0.0, lift_saturation=0.0).air
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,18 +281,12 @@ def _guess(times: FloatArray, positions: FloatArray) -> FloatArray:
 
 def _fly(unknowns: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Positions and velocities (T, 3, B) of B flights, `unknowns` (10, B), at `times` (T,)."""
-    drag = unknowns[6]
-    turn = (unknowns[7], unknowns[8], unknowns[9])
-    start = (*unknowns[:6],)
-    forward, backward = [unknowns[:6]], []
-    state = start
-    for _ in range(max(1, int(np.ceil(times.max() / STEP)))):
-        state = runge_kutta_step(state, turn, drag, AERODYNAMICS.gravity, STEP)
-        forward.append(np.array(state))
-    state = start
-    for _ in range(int(np.ceil(-times.min() / STEP))):
-        state = runge_kutta_step(state, turn, drag, AERODYNAMICS.gravity, -STEP)
-        backward.append(np.array(state))
-    nodes = np.array(backward[::-1] + forward)
-    node_times = STEP * np.arange(-len(backward), len(forward), dtype=np.float64)
+    # a spin without saturation and decay turns the flight as its turn says
+    balls = np.ascontiguousarray(np.vstack([unknowns[:6], unknowns[7:] / AERODYNAMICS.magnus]).T)
+    forth, back = max(1, int(np.ceil(times.max() / STEP))), int(np.ceil(-times.min() / STEP))
+    drags = np.ascontiguousarray(unknowns[6])
+    forward = path(balls, STEP, forth, _TURNING, drags)
+    backward = path(balls, -STEP, max(0, back), _TURNING, drags)
+    nodes = np.concatenate([backward[:0:-1], forward])[..., :6].swapaxes(1, 2)
+    node_times = STEP * np.arange(1 - len(backward), len(forward), dtype=np.float64)
     return along_path(times, nodes, node_times)

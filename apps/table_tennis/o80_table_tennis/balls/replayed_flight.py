@@ -14,7 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..physics.aerodynamics import AERODYNAMICS, runge_kutta_step
+from o80_mujoco.balls import path
+
+from ..physics.aerodynamics import AERODYNAMICS
 from ..physics.interpolation import along_path
 from .bounce_spin import spin_after
 from .flight_fit import ANCHOR_NOISE, FAR, POSITION_NOISE, FlightFit
@@ -185,16 +187,7 @@ def flown(states: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray
 
     `states` (9, B): position [m], velocity [m/s] and spin [rad/s].
     """
-    air = AERODYNAMICS
-    state, spin = (*states[:6],), states[6:]
-    nodes = [states[:6]]
-    halfway = float(np.exp(-0.5 * air.spin_decay * STEP))
-    for _ in range(max(1, int(np.ceil(times.max(initial=0.0) / STEP)))):
-        # as the simulator: the spin of the middle of the step
-        spin = halfway * spin
-        turn = (*(air.magnus * spin),)
-        halved_at = air.lift_saturation * air.radius * np.linalg.norm(spin, axis=0)
-        state = runge_kutta_step(state, turn, air.drag, air.gravity, STEP, halved_at)
-        nodes.append(np.array(state))
-        spin = halfway * spin
-    return along_path(times, np.array(nodes), STEP * np.arange(len(nodes), dtype=np.float64))
+    steps = max(1, int(np.ceil(times.max(initial=0.0) / STEP)))
+    balls = path(np.ascontiguousarray(states.T), STEP, steps, AERODYNAMICS.air)
+    nodes = balls[..., :6].swapaxes(1, 2)
+    return along_path(times, nodes, STEP * np.arange(len(nodes), dtype=np.float64))

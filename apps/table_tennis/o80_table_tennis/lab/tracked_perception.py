@@ -17,10 +17,9 @@ import o80
 from o80_devices.ball_tracking.ball_row import Reason
 
 from ..balls.launches import WIDE
-from ..physics.tracked_ball import NUMBERS, Ball, advanced, rebounded_within
+from ..physics.prediction import STATE, flight_nodes
 from ..task.perception import EVERY, Perceived
 from ..task.state import State
-from ..world.table import TABLE
 
 FloatArray = NDArray[np.float64]
 STEP = 0.005
@@ -70,11 +69,11 @@ class TrackedPerception:
             return Perceived(self.ball, True, state.pressures)
         self.ball_time, ball = found
         self._used = self.ball_time
-        self.ball = np.array(flown(ball, (self.at - self.ball_time) * 1e-9)[:6])
+        self.ball = flown(ball, (self.at - self.ball_time) * 1e-9)
         first, self._seen_yet = not self._seen_yet, True
         return Perceived(self.ball, False, state.pressures, first)
 
-    def _newest(self) -> tuple[int, Ball] | None:
+    def _newest(self) -> tuple[int, FloatArray] | None:
         """Time and numbers of a ball that was not used yet."""
         tracker = self._tracker()
         if tracker is None:
@@ -86,17 +85,11 @@ class TrackedPerception:
             return None
         if np.max(np.diag(row.covariance)[3:6]) > KNOWN_VELOCITY**2:
             return None
-        numbers = (*row.position.tolist(), *row.velocity.tolist(), float(row.spin[0]))
-        return time, numbers
+        return time, np.concatenate([row.position, row.velocity, row.spin])
 
 
-def flown(ball: Ball, seconds: float) -> Ball:
-    """After a short time, with a touch of the table if it meets it."""
-    while seconds > 0:
-        step = min(STEP, seconds)
-        ball = advanced(ball, step, NUMBERS)
-        x, y, z, *_ = ball
-        if z < TABLE.bounce_height and ball[5] < 0 and TABLE.carries(x, y):
-            ball = rebounded_within(step, ball, NUMBERS)
-        seconds -= step
-    return ball
+def flown(ball: FloatArray, seconds: float) -> FloatArray:
+    """Position and velocity (6,) of a ball (9,) after a short time, also past the table."""
+    nodes = flight_nodes(ball[:3], ball[3:6], ball[6:], max(0.0, seconds), step=STEP)
+    state: FloatArray = nodes[-1, STATE]
+    return state

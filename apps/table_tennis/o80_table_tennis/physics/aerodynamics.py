@@ -1,25 +1,24 @@
-"""Drag, Magnus force and gravity on a flying ball, and one Runge-Kutta step of its motion.
+"""Drag, Magnus force and gravity on a flying ball.
 
     a = -1/2 rho Cd A/m |v| v + 1/2 rho Cl A r/m / (1 + s r |omega| / |v|) (omega x v) - g z
 
 rho is the density of air, A = pi r^2, m the mass. With s = 0 this is the law published for the
 ball of the experiment; the saturation s is what recorded shots of different spins show.
-The functions take floats (one ball, fast without NumPy) or arrays (many balls at once). The twins
-follow the same law in C++ (simulators/mujoco/src/balls/ball_flight.hpp); a test compares the two.
+The law itself is the simulator's, in C++ (`o80_mujoco.balls`); here are its numbers.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TypeVar
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..world.ball import BALL_MASS, BALL_RADIUS, GRAVITY
+from o80_mujoco.balls import Air
 
-Number = TypeVar("Number", float, NDArray[np.float64])
+from ..world.ball import BALL_MASS, BALL_RADIUS, GRAVITY
 
 
 @dataclass(frozen=True)
@@ -60,6 +59,11 @@ class Aerodynamics:
         """1/2 rho Cl A r/m []: the Magnus acceleration is magnus * (omega x v)."""
         return self.lift_coefficient * self.drag_per_coefficient * self.radius
 
+    @property
+    def air(self) -> Air:
+        """As predictions want it."""
+        return _air(self)
+
     def halved_at(self, spin: float) -> float:
         """The speed at which saturation halves the lift of a spin [rad/s], in [m/s]."""
         return self.lift_saturation * self.radius * spin
@@ -82,65 +86,16 @@ class Aerodynamics:
         return spins
 
 
-MOST_SATURATED = 10.0
-AERODYNAMICS = Aerodynamics()
-
-State = tuple[Number, Number, Number, Number, Number, Number]
-"""x, y, z [m], vx, vy, vz [m/s]."""
-Turn = tuple[Number, Number, Number]
-"""magnus * omega [1/s]: the Magnus acceleration, without saturation, is its cross product with the
-velocity."""
-
-
-def derivative(
-    state: State[Number],
-    turn: Turn[Number],
-    drag: Number | float,
-    gravity: float,
-    halved_at: Number | float = 0.0,
-) -> State[Number]:
-    """Velocity [m/s] and acceleration [m/s^2] of the ball."""
-    _, _, _, vx, vy, vz = state
-    tx, ty, tz = turn
-    speed = (vx * vx + vy * vy + vz * vz) ** 0.5
-    slowing = drag * speed
-    if not isinstance(halved_at, float) or halved_at > 0.0:
-        share = speed / (speed + halved_at)
-        tx, ty, tz = share * tx, share * ty, share * tz
-    return (
-        vx,
-        vy,
-        vz,
-        ty * vz - tz * vy - slowing * vx,
-        tz * vx - tx * vz - slowing * vy,
-        tx * vy - ty * vx - slowing * vz - gravity,
+@cache
+def _air(numbers: Aerodynamics) -> Air:
+    return Air(
+        drag=numbers.drag,
+        magnus=numbers.magnus,
+        spin_decay=numbers.spin_decay,
+        gravity=numbers.gravity,
+        saturation=numbers.lift_saturation * numbers.radius,
     )
 
 
-def moved(state: State[Number], rate: State[Number], dt: float) -> State[Number]:
-    """The state after going at `rate` for `dt` [s]."""
-    x, y, z, vx, vy, vz = state
-    dx, dy, dz, dvx, dvy, dvz = rate
-    return (x + dt * dx, y + dt * dy, z + dt * dz, vx + dt * dvx, vy + dt * dvy, vz + dt * dvz)
-
-
-def runge_kutta_step(
-    state: State[Number],
-    turn: Turn[Number],
-    drag: Number | float,
-    gravity: float,
-    dt: float,
-    halved_at: Number | float = 0.0,
-) -> State[Number]:
-    """The state `dt` [s] later, by the classical fourth-order rule with constant spin.
-
-    `halved_at` is the speed at which saturation halves the lift [m/s]; 0: there is none.
-    """
-    k1 = derivative(state, turn, drag, gravity, halved_at)
-    k2 = derivative(moved(state, k1, dt / 2), turn, drag, gravity, halved_at)
-    k3 = derivative(moved(state, k2, dt / 2), turn, drag, gravity, halved_at)
-    k4 = derivative(moved(state, k3, dt), turn, drag, gravity, halved_at)
-    state = moved(state, k1, dt / 6)
-    state = moved(state, k2, dt / 3)
-    state = moved(state, k3, dt / 3)
-    return moved(state, k4, dt / 6)
+MOST_SATURATED = 10.0
+AERODYNAMICS = Aerodynamics()

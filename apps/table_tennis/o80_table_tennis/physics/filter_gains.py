@@ -9,19 +9,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from o80_mujoco.balls import path, predicted_flight
+
 from ..world.table import TABLE
 from ..world.timing import STEP
-from .tracked_ball import NUMBERS, Ball, Maths, advanced, rebounded, rebounded_within
+from .aerodynamics import AERODYNAMICS
+from .impact import platform
 
 FloatArray = NDArray[np.float64]
 
-TYPICAL: Ball = (0.46, 2.95, 1.37, 0.24, -4.14, 2.28, 30.0)
-"""Launch of the recorded ball gun, with less spin."""
+TYPICAL = (0.46, 2.95, 1.37, 0.24, -4.14, 2.28, 30.0)
+"""Position, velocity and top spin of the launch of the recorded ball gun, with less spin."""
 STEPS_AFTER = 40
 """Measurements after the bounce for which there are gains of their own; then the last ones go on.
 """
@@ -77,16 +80,17 @@ def gains(settings: FilterSettings) -> Gains:
     moved[6, 6] = 1.0
     bounce = np.diag([1e-6] * 3 + [s.bounce_velocity**2] * 3 + [s.bounce_spin**2])
 
-    ball, covariance = TYPICAL, np.diag([*np.diag(measured), s.spin**2])
+    ball, covariance = np.array(TYPICAL), np.diag([*np.diag(measured), s.spin**2])
     before, bounced = [_gain(covariance, measured)], False
     after: list[FloatArray] = []
     while len(after) < STEPS_AFTER:
-        slope = _slopes(lambda ball, maths: advanced(ball, s.step, maths), ball)
-        ball, covariance = advanced(ball, s.step, NUMBERS), slope @ covariance @ slope.T + moved
+        slope = _slopes(partial(_flown, step=s.step), ball)
+        before_step, ball = ball, _flown(ball[None], step=s.step)[0]
+        covariance = slope @ covariance @ slope.T + moved
         if not bounced and ball[2] < TABLE.bounce_height:
             bounced = True
-            slope = _slopes(rebounded, ball)
-            ball = rebounded_within(s.step, ball, NUMBERS)
+            slope = _slopes(_bounced, ball)
+            ball = _past_table(before_step, step=s.step)
             covariance = slope @ covariance @ slope.T + bounce
         gain = _gain(covariance, measured)
         covariance = (np.eye(7) - gain @ np.eye(6, 7)) @ covariance
@@ -100,12 +104,33 @@ def _gain(covariance: FloatArray, measured: FloatArray) -> FloatArray:
     return gain
 
 
-def _slopes(move: Callable[[Ball, Maths], Ball], ball: Ball) -> FloatArray:
+def _slopes(move: Callable[[FloatArray], FloatArray], ball: FloatArray) -> FloatArray:
     """(7, 7) change of a moved ball with the ball."""
-    start, small = np.array(move(ball, NUMBERS)), 1e-5
-    changed = [move(tuple(ball + small * unit), NUMBERS) for unit in np.eye(7)]
-    slopes: FloatArray = (np.array(changed) - start).T / small
+    small = 1e-5
+    moved = move(ball + np.vstack([np.zeros(7), small * np.eye(7)]))
+    slopes: FloatArray = (moved[1:] - moved[0]).T / small
     return slopes
+
+
+def _flown(balls: FloatArray, *, step: float) -> FloatArray:
+    """Balls (n, 7) after a step [s] of free flight."""
+    return path(_whole(balls), step, 1, AERODYNAMICS.air)[1, :, :7]
+
+
+def _bounced(balls: FloatArray) -> FloatArray:
+    """Balls (n, 7) at the table after its touch."""
+    return platform(TABLE).bounced(_whole(balls))[:, :7]
+
+
+def _past_table(ball: FloatArray, *, step: float) -> FloatArray:
+    """A ball (7,) that touches the table within a step [s], after the step."""
+    whole = _whole(ball[None])[0]
+    return predicted_flight(whole, AERODYNAMICS.air, platform(TABLE), step, step)[-1, 1:8]
+
+
+def _whole(balls: FloatArray) -> FloatArray:
+    """Balls (n, 7) with top spin only, as (n, 9)."""
+    return np.hstack([balls, np.zeros((len(balls), 2))])
 
 
 def _table(rows: Sequence[FloatArray]) -> FloatArray:

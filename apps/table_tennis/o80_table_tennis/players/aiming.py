@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..physics.aerodynamics import Aerodynamics, State, runge_kutta_step
+from o80_mujoco.balls import path
+
+from ..physics.aerodynamics import Aerodynamics
 from ..world.scene import Vector
 
 FloatArray = NDArray[np.float64]
@@ -27,21 +29,12 @@ def velocity_to_land(
 
     Its `spin` (3,) [rad/s] is taken as constant.
     """
-    dt = duration / steps
-    turn = (
-        aerodynamics.magnus * spin[0],
-        aerodynamics.magnus * spin[1],
-        aerodynamics.magnus * spin[2],
-    )
-    halved_at = aerodynamics.halved_at(math.hypot(*(float(value) for value in spin)))
+    air = replace(aerodynamics, spin_decay=0.0).air
     # start with a flight without air, then add the miss that the air causes
     velocity = (target - position) / duration
     velocity[2] += 0.5 * aerodynamics.gravity * duration
     for _ in range(corrections):
-        state: State[float] = (*position.tolist(), *velocity.tolist())
-        for _ in range(steps):
-            state = runge_kutta_step(
-                state, turn, aerodynamics.drag, aerodynamics.gravity, dt, halved_at
-            )
-        velocity = velocity + (target - np.array(state[:3])) / duration
+        ball = np.concatenate([position, velocity, spin])[np.newaxis]
+        landing = path(ball, duration / steps, steps, air)[-1, 0, :3]
+        velocity = velocity + (target - landing) / duration
     return velocity

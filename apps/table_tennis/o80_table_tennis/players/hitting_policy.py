@@ -192,8 +192,8 @@ class HittingPolicy:
         low = position[2] < TABLE.bounce_height + LOW
         if self._seen is None or not (low and self._seen[5] < 0.0 < velocity[2]):
             return self._spin
-        x, y, z, vx, vy, vz = self._seen.tolist()
-        return bounced((x, y, z, vx, vy, vz), self._spin)[1]
+        wx, wy, wz = bounced(self._seen[3:], np.array(self._spin)).spin.tolist()
+        return wx, wy, wz
 
     def _wanted(self, after: float) -> JointMotion:
         """The planned motion of each joint, `after` [s] its dead time."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..physics.ball_filter import EVERY, ManyBallFilter, OneBallFilter
+from ..physics.ball_filter import ball_filter
 from ..physics.filter_gains import FilterSettings
 from ..world.arm import MUSCLES
 from .full_observation import FullObservation
@@ -16,6 +16,7 @@ from .state import State
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
+EVERY = slice(None)
 LEAST_POSITION_NOISE = 0.0005
 """With less noise the filter still expects so much: the laws are not quite exact [m]."""
 LEAST_VELOCITY_NOISE = 0.02
@@ -73,7 +74,7 @@ class OneFullObserver(FullObserver):
         self, full: FullObservation, noise: NoiseSettings, interval: float, largest_change: float
     ) -> None:
         super().__init__(full, noise, interval, largest_change)
-        self._filter = OneBallFilter(filter_settings(noise, interval))
+        self._filter = ball_filter(filter_settings(noise, interval), 1)
         self._row, self._last = np.zeros(len(self._centres)), np.zeros(MUSCLES)
 
     def begin(
@@ -82,7 +83,7 @@ class OneFullObserver(FullObserver):
         """The first observation (M,) of a new episode, scaled."""
         self._row[self._changes] = 0.0
         self._last[...] = asked
-        self._filter.begin(seen.ball.tolist())
+        self._filter.begin(seen.ball[None])
         return self._scaled(state, asked, seen)
 
     def observe(
@@ -92,16 +93,16 @@ class OneFullObserver(FullObserver):
         self._remember(self._row, self._last, asked)
         self._last[...] = asked
         if seen.first:
-            self._filter.begin(seen.ball.tolist())
+            self._filter.begin(seen.ball[None])
         else:
-            self._filter.step(None if seen.missed else seen.ball.tolist())
+            self._filter.step(seen.ball[None], np.array([seen.missed]))
         return self._scaled(state, asked, seen)
 
     def _scaled(self, state: State, asked: FloatArray, seen: Perceived) -> FloatArray:
         self._fill(self._row, state, asked, seen)
-        *crossing, time = self._filter.crossing(self._plane)
-        now = state.steps * self._interval
-        self._row[self._time :] = (now, *self._filter.ball, *crossing, time - self._latency)
+        self._row[self._time] = state.steps * self._interval
+        self._row[self._time + 1 :] = self._filter.estimates(self._plane)[0]
+        self._row[-1] -= self._latency
         return (self._row - self._centres) * self._per_scale
 
 
@@ -117,7 +118,8 @@ class ManyFullObserver(FullObserver):
         count: int,
     ) -> None:
         super().__init__(full, noise, interval, largest_change)
-        self._filter = ManyBallFilter(filter_settings(noise, interval), count)
+        self._filter = ball_filter(filter_settings(noise, interval), count)
+        self._every = np.arange(count)
         self._rows = np.zeros((count, len(self._centres)))
         self._last = np.zeros((count, MUSCLES))
 
@@ -127,7 +129,7 @@ class ManyFullObserver(FullObserver):
         """The first observations (n, M) of new episodes, scaled."""
         self._rows[which, self._changes] = 0.0
         self._last[which] = asked
-        self._filter.begin(which, seen.ball.T)
+        self._filter.begin(seen.ball, which)
         return self._scaled(self._rows[which], state, asked, seen, which)
 
     def observe(
@@ -137,7 +139,7 @@ class ManyFullObserver(FullObserver):
         rows = self._rows[which]
         self._remember(rows, self._last[which], asked)
         self._rows[which], self._last[which] = rows, asked
-        self._filter.step(np.ascontiguousarray(seen.ball.T), np.asarray(seen.missed), which)
+        self._filter.step(seen.ball, np.asarray(seen.missed), self._every[which])
         return self._scaled(rows, state, asked, seen, which)
 
     def _scaled(
@@ -151,8 +153,6 @@ class ManyFullObserver(FullObserver):
         self._fill(rows, state, asked, seen)
         time = self._time
         rows[:, time] = np.asarray(state.steps) * self._interval
-        rows[:, time + 1 : time + 8] = self._filter.balls[:, which].T
-        crossings = self._filter.crossings(self._plane, which)
-        crossings[5] -= self._latency
-        rows[:, time + 8 :] = crossings.T
+        rows[:, time + 1 :] = self._filter.estimates(self._plane, self._every[which])
+        rows[:, -1] -= self._latency
         return (rows - self._centres) * self._per_scale
