@@ -13,6 +13,7 @@ constexpr double kNear = 0.1;         // a ball that rises below this height has
 constexpr double kUnexplained = 2.0;  // a velocity farther off begins a new flight [m/s]
 constexpr double kSlowest = 0.5;      // that comes nearer and has a crossing [m/s]
 constexpr double kLongest = 2.0;      // flight that is predicted, however wrong an estimate is [s]
+constexpr double kMostLate = 0.3;     // correction of a predicted time, and longest way back [s]
 constexpr double kTiny = 1e-9;
 
 /// Spin about other axes than x, which a slanted bounce makes, is left out of estimates.
@@ -100,44 +101,46 @@ Ball BallFilter::bounced_within(const Ball& ball) const noexcept {
 
 /// A ball that comes down on the platform, after its touch, and the time until then [s].
 Ball BallFilter::after_touch(const Ball& ball, double& time) const noexcept {
+  const Air& air = settings_.air;
   const double height = settings_.platform.height;
-  const double gravity = -settings_.air.gravity.z;
   const double rise = ball.velocity.z;
   const double fall = std::max(ball.position.z - height, 0.0);
   // however wrong the estimate of the spin is, the ball falls
-  const double falling = std::max(-acceleration(settings_.air, ball.velocity, ball.spin).z, 1.0);
+  const double falling = std::max(-acceleration(air, ball.velocity, ball.spin).z, 1.0);
   time = std::min((rise + std::sqrt(rise * rise + 2 * falling * fall)) / falling, kLongest);
-  Ball touching = flown(ball, settings_.air, time);
+  Ball touching = flown(ball, air, time);
 
   // the forces have changed on the way
   const double above = touching.position.z - height;
   const double speed = std::max(-touching.velocity.z, kSlowest);
-  const double root = std::sqrt(std::max(speed * speed + 2 * gravity * above, 0.0));
-  const double late = 2 * above / (speed + root);
-  touching.position = touching.position + late * touching.velocity;
+  const double root = std::sqrt(std::max(speed * speed - 2 * air.gravity.z * above, 0.0));
+  const double late = std::clamp(2 * above / (speed + root), -kMostLate, kMostLate);
+  touching = flown(touching, air, late);
   touching.position.z = height;
-  touching.velocity = touching.velocity + late * settings_.air.gravity;
   time += late;
   return with_spin_about_x(bounced(touching, settings_.platform));
 }
 
 Crossing BallFilter::crossing(std::size_t number, double plane) const noexcept {
+  const Air& air = settings_.air;
   const Estimate& estimate = estimates_[number];
   if (estimate.ball.velocity.y > -kSlowest) return {};
   double before = 0;
   const Ball ball = estimate.bounced ? estimate.ball : after_touch(estimate.ball, before);
 
-  // by a parabola, then by a flight of so long, then straight on
+  // by a parabola, then by flights of so long
   const double way = ball.position.y - plane;
   const double speed = std::max(-ball.velocity.y, kSlowest);
-  const double slowing = acceleration(settings_.air, ball.velocity, ball.spin).y;
+  const double slowing = acceleration(air, ball.velocity, ball.spin).y;
   const double root = std::sqrt(std::max(speed * speed - 2 * slowing * way, 0.0));
-  const double time = std::clamp(2 * way / (speed + root), -kLongest, kLongest);
-  const Ball there = flown(ball, settings_.air, time);
-  const double late = (there.position.y - plane) / std::max(-there.velocity.y, kSlowest);
-  const Vector position = there.position + late * there.velocity;
-  const Vector velocity = there.velocity + late * settings_.air.gravity;
-  return {position.x, position.z, velocity.x, velocity.y, velocity.z, before + time + late};
+  const double time = std::clamp(2 * way / (speed + root), -kMostLate, kLongest);
+  Ball there = flown(ball, air, time);
+  const double late = std::clamp((there.position.y - plane) / std::max(-there.velocity.y, kSlowest),
+                                 -kMostLate, kMostLate);
+  there = flown(there, air, late);
+  const Vector& velocity = there.velocity;
+  return {there.position.x, there.position.z, velocity.x,
+          velocity.y,       velocity.z,       before + time + late};
 }
 
 }  // namespace o80::mujoco
