@@ -14,11 +14,17 @@ constexpr double kUnexplained = 2.0;  // a velocity farther off begins a new fli
 constexpr double kSlowest = 0.5;      // that comes nearer and has a crossing [m/s]
 constexpr double kLongest = 2.0;      // flight that is predicted, however wrong an estimate is [s]
 constexpr double kMostLate = 0.3;     // correction of a predicted time, and longest way back [s]
+constexpr int kPieces = 4;            // in which a long flight is computed
 constexpr double kTiny = 1e-9;
 
 /// Spin about other axes than x, which a slanted bounce makes, is left out of estimates.
 Ball with_spin_about_x(Ball ball) noexcept {
   ball.spin.y = ball.spin.z = 0;
+  return ball;
+}
+
+Ball flown_far(Ball ball, const Air& air, double duration) noexcept {
+  for (int i = 0; i < kPieces; ++i) ball = flown(ball, air, duration / kPieces);
   return ball;
 }
 
@@ -108,7 +114,7 @@ Ball BallFilter::after_touch(const Ball& ball, double& time) const noexcept {
   // however wrong the estimate of the spin is, the ball falls
   const double falling = std::max(-acceleration(air, ball.velocity, ball.spin).z, 1.0);
   time = std::min((rise + std::sqrt(rise * rise + 2 * falling * fall)) / falling, kLongest);
-  Ball touching = flown(ball, air, time);
+  Ball touching = flown_far(ball, air, time);
 
   // the forces have changed on the way
   const double above = touching.position.z - height;
@@ -134,13 +140,16 @@ Crossing BallFilter::crossing(std::size_t number, double plane) const noexcept {
   const double slowing = acceleration(air, ball.velocity, ball.spin).y;
   const double root = std::sqrt(std::max(speed * speed - 2 * slowing * way, 0.0));
   const double time = std::clamp(2 * way / (speed + root), -kMostLate, kLongest);
-  Ball there = flown(ball, air, time);
+  Ball there = flown_far(ball, air, time);
   const double late = std::clamp((there.position.y - plane) / std::max(-there.velocity.y, kSlowest),
                                  -kMostLate, kMostLate);
   there = flown(there, air, late);
   const Vector& velocity = there.velocity;
-  return {there.position.x, there.position.z, velocity.x,
-          velocity.y,       velocity.z,       before + time + late};
+  const Crossing found{there.position.x, there.position.z, velocity.x,
+                       velocity.y,       velocity.z,       before + time + late};
+  const bool known =
+      std::ranges::all_of(found, [](double number) { return std::isfinite(number); });
+  return known ? found : Crossing{};
 }
 
 }  // namespace o80::mujoco

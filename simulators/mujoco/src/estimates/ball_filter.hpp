@@ -45,7 +45,7 @@ class BallFilter {
   void begin(std::size_t number, const Seen& seen) noexcept;
   /// A step later; without a measurement `seen` is null.
   void step(std::size_t number, const Seen* seen) noexcept;
-  /// All 0 for a ball that does not come nearer to the plane from greater y.
+  /// All 0 for a ball that does not come nearer to the plane from greater y, or is too absurd.
   Crossing crossing(std::size_t number, double plane) const noexcept;
 
  private:
