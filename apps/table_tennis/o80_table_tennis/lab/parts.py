@@ -59,7 +59,7 @@ class LabSettings:
     """Of the names of all segments."""
     folder: Path = Path("build/lab")
     fifo: bool = True
-    """Ask for real-time scheduling of the arm."""
+    """Ask for real-time scheduling of the arm and of the motion capture."""
     most_late: int = 20
     """Rows of the arm by which the environment may lag behind between two balls."""
     parts: tuple[str, ...] = NINE
@@ -125,6 +125,7 @@ def lab_parts(settings: LabSettings) -> dict[str, Part]:
                 "frequency": RATES[MOTION_CAPTURE],
                 "port": qualisys,
                 "subjects": ",".join(SUBJECTS),
+                **({"policy": "fifo", "priority": 40} if settings.fifo else {}),
             },
             needs=(COUNTERPARTS,),
         ),
