@@ -24,7 +24,7 @@ def main(
     policy: Annotated[str, typer.Option(help="learned or scripted.")] = "learned",
     output: Annotated[Path, typer.Option(help="Folder that is written.")] = Path("build/lab"),
     prefix: Annotated[str, typer.Option(help="Of the names of all segments.")] = "lab",
-    fifo: Annotated[bool, typer.Option(help="Real-time scheduling of arm and motion capture.")] = True,
+    fifo: Annotated[bool, typer.Option(help="Real time for arm and motion capture.")] = True,
     restart: Annotated[bool, typer.Option(help="Start again a process that has ended.")] = False,
     cyclictest: Annotated[bool, typer.Option(help="Run cyclictest beside it.")] = True,
     bursting: Annotated[
