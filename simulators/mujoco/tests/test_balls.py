@@ -125,6 +125,8 @@ def test_wrong_arguments_are_refused() -> None:
         predicted_flight(BALL[:6], AIR, PLATFORM, 1.0, 0.02)
     with pytest.raises(ValueError, match="at most 1000000 steps"):
         predicted_flight(BALL, AIR, PLATFORM, 1.0, 0.0)
+    with pytest.raises(ValueError, match="more than a million"):
+        predicted_flight(np.eye(9)[2] + np.eye(9)[1], Air(), PLATFORM, 1e7, 1e3)
     with pytest.raises(ValueError, match="gains"):
         BallFilter(
             count=1,
