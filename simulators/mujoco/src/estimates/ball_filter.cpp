@@ -147,8 +147,7 @@ Crossing BallFilter::crossing(std::size_t number, double plane) const noexcept {
   const Vector& velocity = there.velocity;
   const Crossing found{there.position.x, there.position.z, velocity.x,
                        velocity.y,       velocity.z,       before + time + late};
-  const bool known =
-      std::ranges::all_of(found, [](double number) { return std::isfinite(number); });
+  const bool known = std::ranges::all_of(found, [](double each) { return std::isfinite(each); });
   return known ? found : Crossing{};
 }
 
