@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <limits>
 
 #include "o80/base/time.hpp"
 
@@ -75,7 +76,7 @@ class Spinner {
   std::int64_t patience() const noexcept {
     const bool hopeful = failures_.load(std::memory_order_relaxed) < kPatience;
     if (!hopeful || yield_holdoff_.load(std::memory_order_relaxed) > 0)
-      return 2 * kLongest;  // never
+      return std::numeric_limits<std::int64_t>::max();  // never
     return quiet_.load(std::memory_order_relaxed) < kQuiet ? 0 : kAlone;
   }
   /// Yields; returns the time after it.

@@ -92,13 +92,14 @@ class SpinnerAmongOthers : public testing::Test {
   ~SpinnerAmongOthers() override { others = nullptr; }
 
   /// Spins once, in vain; how often it let others run, and when first: after how long [ns], and
-  /// after how many looks.
+  /// after how many looks (all of them if it did not).
   struct Spun {
     int yields = 0;
     std::int64_t first = 0;
     int looks = 0;
   };
-  static Spun spin_in_vain(Spinner& spinner, std::int64_t others_take) {
+  static Spun spin_in_vain(Spinner& spinner, std::int64_t others_take,
+                           std::int64_t look_takes = 0) {
     Spun spun;
     const std::int64_t begin = monotonic_now();
     int looks = 0;
@@ -112,11 +113,19 @@ class SpinnerAmongOthers : public testing::Test {
     others = &run;
     EXPECT_FALSE(spinner.spin([&] {
       ++looks;
+      run_for(look_takes);
       return false;
     }));
     others = nullptr;
+    if (spun.yields == 0) spun.looks = looks;
     spinner.ended(true);  // so that it goes on spinning
     return spun;
+  }
+
+  /// Spins in vain until only probes spin, and waits until the next one is due.
+  void await_probe() {
+    for (std::uint32_t i = 0; i < Spinner::kPatience; ++i) spinner_.ended(false);
+    for (std::uint32_t i = 1; i < Spinner::kProbe; ++i) EXPECT_FALSE(spinner_.worth());
   }
 
   Spinner spinner_{2};
@@ -140,11 +149,17 @@ TEST_F(SpinnerAmongOthers, LetsThemRunAtOnceWhileSomebodyDoes) {
 }
 
 TEST_F(SpinnerAmongOthers, ProbesWithoutLettingThemRun) {
-  for (std::uint32_t i = 0; i < Spinner::kPatience; ++i) spinner_.ended(false);
-  for (std::uint32_t i = 1; i < Spinner::kProbe; ++i) EXPECT_FALSE(spinner_.worth());
+  await_probe();
   const std::int64_t begin = monotonic_now();
   EXPECT_EQ(spin_in_vain(spinner_, 0).yields, 0);
   EXPECT_GE(monotonic_now() - begin, Spinner::kLongest) << "it did probe";
+}
+
+TEST_F(SpinnerAmongOthers, ProbesWithoutLettingThemRunHoweverLongItWasKeptFromRunning) {
+  await_probe();
+  const Spun spun = spin_in_vain(spinner_, 0, 3 * Spinner::kLongest);
+  EXPECT_EQ(spun.yields, 0);
+  EXPECT_GT(spun.looks, 1) << "it did probe";
 }
 
 TEST_F(SpinnerAmongOthers, DoesNotForLongWhereOthersKeepTheProcessor) {
