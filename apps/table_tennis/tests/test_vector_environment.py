@@ -12,6 +12,8 @@ from gymnasium.vector import AutoresetMode
 from vector_equality import MODES, beside, both
 
 import o80_table_tennis
+from o80.chained_burst import ChainedBurst
+from o80.group_burst import GroupBurst
 from o80.learning import VectorEnvironment
 from o80_table_tennis.balls.simulated_shots import simulated_shot
 from o80_table_tennis.balls.sources import balls_from
@@ -165,6 +167,28 @@ def test_wrong_arguments_are_named() -> None:
         made(2, rig=wrong)
     with pytest.raises(ValueError, match="unknown render mode 'human'; there are: rgb_array"):
         made(2, render_mode="human")
+
+
+def test_waits_for_its_copies_however_long_the_process_stands_still(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A training that somebody stops (Ctrl-Z, a debugger) must go on when it is continued."""
+    timeouts = []
+
+    def noted(run: Any) -> Any:
+        def running(burst: Any, *arguments: Any, timeout: float | None = None) -> None:
+            timeouts.append(timeout)
+            run(burst, *arguments, timeout=timeout)
+
+        return running
+
+    for burst in (GroupBurst, ChainedBurst):
+        monkeypatch.setattr(burst, "run", noted(burst.run))
+    with made(2) as vector:
+        vector.reset(seed=1)
+        vector.step(np.zeros(vector.action_space.shape, np.float32))
+    assert timeouts
+    assert set(timeouts) == {None}
 
 
 @pytest.mark.check

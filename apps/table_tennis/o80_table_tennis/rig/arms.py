@@ -15,9 +15,6 @@ from .row_words import words, words_of
 FloatArray = NDArray[np.float64]
 Index = slice | NDArray[np.intp]
 
-TIMEOUT = 60.0
-"""Longest wait for a burst of all copies [s]."""
-
 
 class Arms:
     """A group of N arms, and the last five rows of each; what `Arm` is for one.

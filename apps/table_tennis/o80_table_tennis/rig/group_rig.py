@@ -14,7 +14,7 @@ import o80
 from ..balls.sampled_flight import SampledFlight
 from ..settings import RigSettings
 from ..task.observations import BALL_POSITION, PRESSURES, SIZE
-from .arms import TIMEOUT, Arms, Index
+from .arms import Arms, Index
 from .robot_options import arm_options, twin_options
 from .twins import Twins
 
@@ -66,7 +66,7 @@ class GroupRig:
     def step(self, pressures: FloatArray, copies: Index) -> None:
         """These arms are asked for normalised pressures (n, 8); five rows of each."""
         self.arms.ask(pressures, copies)
-        self._step.run(copies, timeout=TIMEOUT)
+        self._step.run(copies)
 
     def gather(
         self, low: NDArray[np.float32], high: NDArray[np.float32]

@@ -13,7 +13,6 @@ from ..balls.sampled_flight import SampledFlight
 from ..task.ball_record import BallRecord
 from ..world.arm import JOINT_NAMES, JOINTS
 from ..world.timing import ITERATIONS
-from .arms import TIMEOUT
 from .ball_records import RECORDS, BallRecords, event_flags, fly_out_fields
 from .row_words import WORD, words, words_of
 from .twin import BALL_STATE, SEEN_NUMBERS
@@ -112,7 +111,7 @@ class Twins:
         """One iteration, with the joints there."""
         burst.numbers[copies, 0:WORDS_OF_JOINTS:2] = angles
         burst.numbers[copies, 1:WORDS_OF_JOINTS:2] = velocities
-        burst.burst.run(copies, timeout=TIMEOUT)
+        burst.burst.run(copies)
         self._last_words[copies] = burst.words[copies, 0]
 
 
