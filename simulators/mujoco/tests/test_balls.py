@@ -1,5 +1,7 @@
 """The laws of balls for Python: those of the simulation, and estimates that rest on them."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -137,8 +139,49 @@ def test_wrong_arguments_are_refused() -> None:
             step=0.01,
             mean_spin=0.0,
         )
-    with pytest.raises(ValueError, match="radius"):
-        Platform(height=0.0, low=(0, 0), high=(1, 1), restitution=(1, 1, 1), radius=0.0)
+    with pytest.raises(ValueError, match="step must be a finite number"):
+        path(BALL[None], np.nan, 1, AIR)
+    with pytest.raises(ValueError, match="normal must have the length 1"):
+        bounced(BALL, (0, 0, 2), (0, 0, 0), (1, 1, 1), radius=0.02)
+
+
+@pytest.mark.parametrize("name", ["drag", "magnus", "spin_decay", "gravity", "saturation"])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_air_has_finite_numbers(name: str, value: float) -> None:
+    with pytest.raises(ValueError, match=f"{name} must be a finite number"):
+        Air(**{name: value})
+
+
+@pytest.mark.parametrize(
+    ("wrong", "text"),
+    [
+        ({"radius": 0.0}, "radius must be positive"),
+        ({"inertia": -1.0}, "inertia must be positive"),
+        ({"friction": np.nan}, "friction must be 0 or more"),
+        ({"restitution": (1, np.nan, 1)}, "restitution must be a finite number"),
+        ({"height": np.inf}, "height must be a finite number"),
+        ({"low": (0, 2)}, "low must lie below high"),
+    ],
+)
+def test_a_platform_that_no_ball_can_bounce_on_is_refused(wrong: dict[str, Any], text: str) -> None:
+    right = {"height": 0.0, "low": (0, 0), "high": (1, 1), "restitution": (1, 1, 1)}
+    with pytest.raises(ValueError, match=text):
+        Platform(**{**right, "radius": 0.02, **wrong})
+
+
+@pytest.mark.parametrize(
+    ("wrong", "text"),
+    [
+        ({"step": 0.0}, "step must be positive"),
+        ({"step": np.nan}, "step must be a finite number"),
+        ({"mean_spin": np.inf}, "mean_spin must be a finite number"),
+    ],
+)
+def test_a_filter_without_a_clock_is_refused(wrong: dict[str, Any], text: str) -> None:
+    gains = np.zeros((1, 24))
+    right = {"count": 1, "air": AIR, "platform": PLATFORM, "before": gains, "after": gains}
+    with pytest.raises(ValueError, match=text):
+        BallFilter(**{**right, "step": 0.01, "mean_spin": 0.0, **wrong})
 
 
 def test_an_estimate_without_measurements_flies_by_the_law() -> None:

@@ -7,8 +7,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "estimates/ball_filter.hpp"
@@ -57,17 +59,44 @@ double* put(double* to, const Ball& from) {
   return put(put(put(to, from.position), from.velocity), from.spin);
 }
 
+/// Raises ValueError with the name of the number that is wrong.
+double finite(double number, const char* name) {
+  if (std::isfinite(number)) return number;
+  throw nb::value_error((std::string(name) + " must be a finite number").c_str());
+}
+double positive(double number, const char* name) {
+  if (finite(number, name) > 0) return number;
+  throw nb::value_error((std::string(name) + " must be positive").c_str());
+}
+template <std::size_t N>
+const std::array<double, N>& finite(const std::array<double, N>& numbers, const char* name) {
+  for (const double each : numbers) finite(each, name);
+  return numbers;
+}
+double checked_friction(double friction) {
+  if (friction >= 0) return friction;
+  throw nb::value_error("friction must be 0 or more; inf: the ball never slides");
+}
+Sphere sphere(double radius, double inertia) {
+  return {positive(radius, "radius"), positive(inertia, "inertia")};
+}
+
 Air air(double drag, double magnus, double spin_decay, double gravity, double saturation) {
-  return {drag, magnus, spin_decay, {0, 0, -gravity}, saturation};
+  return {finite(drag, "drag"),
+          finite(magnus, "magnus"),
+          finite(spin_decay, "spin_decay"),
+          {0, 0, -finite(gravity, "gravity")},
+          finite(saturation, "saturation")};
 }
 
 Platform platform(double height, const std::array<double, 2>& low,
                   const std::array<double, 2>& high, const Three& restitution, double friction,
                   double radius, double inertia) {
-  if (!(radius > 0) || !(inertia > 0)) {
-    throw nb::value_error("radius and inertia of a ball must be positive");
+  if (!(low[0] < high[0]) || !(low[1] < high[1])) {
+    throw nb::value_error("low must lie below high, in x and in y");
   }
-  return {height, low, high, restitution, friction, {radius, inertia}};
+  return {finite(height, "height"),           finite(low, "low"),         finite(high, "high"),
+          finite(restitution, "restitution"), checked_friction(friction), sphere(radius, inertia)};
 }
 
 Doubles accelerations(const Rows<kNumbers>& balls, const Air& air) {
@@ -85,6 +114,7 @@ Doubles path(const Rows<kNumbers>& balls, double step, std::int64_t count, const
   if (count < 0 || static_cast<double>(count) > kMostSteps) {
     throw nb::value_error("count must be from 0 to 1000000");
   }
+  finite(step, "step");
   const std::size_t number = balls.shape(0);
   if (drags && drags->shape(0) != number) throw nb::value_error("drags: one for each ball");
   const auto rows = static_cast<std::size_t>(count) + 1;
@@ -132,12 +162,16 @@ Doubles bounces(const Rows<kNumbers>& balls, const Platform& platform) {
 Doubles bounce(const Numbers& ball, const Three& normal, const Three& velocity,
                const Three& restitution, double friction, double radius, double inertia) {
   if (ball.shape(0) != kNumbers) throw nb::value_error("a ball is 9 numbers");
+  if (std::abs(dot(vector(normal), vector(normal)) - 1) > 1e-6) {
+    throw nb::value_error("normal must have the length 1");
+  }
   const Directions along =
       Directions::of(vector(normal), {Vector{1, 0, 0}, Vector{0, 1, 0}, Vector{0, 0, 1}});
   double* values = nullptr;
   Doubles made = array({kNumbers}, values);
-  put(values, bounced(ball_at(ball.data()), vector(velocity), along, restitution, friction,
-                      {radius, inertia}));
+  put(values, bounced(ball_at(ball.data()), vector(finite(velocity, "velocity")), along,
+                      finite(restitution, "restitution"), checked_friction(friction),
+                      sphere(radius, inertia)));
   return made;
 }
 
@@ -267,8 +301,9 @@ void bind_filter(nb::module_& module) {
           "__init__",
           [](BallFilter* self, std::size_t count, const Air& air, const Platform& platform,
              const Rows<24>& before, const Rows<24>& after, double step, double mean_spin) {
-            new (self)
-                BallFilter({air, platform, step, mean_spin, gains(before), gains(after)}, count);
+            new (self) BallFilter({air, platform, positive(step, "step"),
+                                   finite(mean_spin, "mean_spin"), gains(before), gains(after)},
+                                  count);
           },
           nb::kw_only(), "count"_a, "air"_a, "platform"_a, "before"_a, "after"_a, "step"_a,
           "mean_spin"_a,
