@@ -61,7 +61,7 @@ class VirtualSettings:
 
     way: str = "none"
     seed: int = 1
-    motions: int = 600
+    motions: int = 1000
     """Of the arm, with random actions at first."""
     random_motions: int = 20
     """Nothing is learned before; the observations are scaled by what is seen in them."""
