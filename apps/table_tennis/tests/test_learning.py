@@ -53,6 +53,22 @@ def test_a_training_writes_a_row_for_each_update_a_policy_and_a_checkpoint(tmp_p
     assert loaded.act(observation).tobytes() == policy.act(observation).tobytes()
 
 
+@pytest.mark.parametrize("last", [None, -2.0])
+def test_exploration_falls_with_the_decisions_unless_it_is_learned(
+    last: float | None, tmp_path: Path
+) -> None:
+    settings = replace(SMALL, ppo=replace(SMALL.ppo, last_log_exploration=last), decisions=256)
+    with Training(replace(settings, decisions=128), tmp_path) as training:
+        training.run()
+    with Training(settings, tmp_path, resume=True) as training:
+        training.run()
+    explored = [point.exploration for point in curve.read(tmp_path / CURVE)]
+    # half of the first training had been made before its second rollout, and so on
+    expected = [np.exp(-0.5 + (last or 0.0) * share + 0.5 * share) for share in (0, 0.5, 0.5, 0.75)]
+    falls = np.allclose(explored, expected, rtol=1e-5)
+    assert falls == (last is not None)
+
+
 def test_a_training_leaves_no_temporary_files(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -263,8 +279,7 @@ def test_an_unknown_way_is_refused_with_those_there_are() -> None:
 
 @pytest.mark.check
 def test_a_short_training_learns_to_touch_the_ball(tmp_path: Path) -> None:
-    small = PpoSettings(epochs=5, hidden=64)  # a third of the time of the default ones
-    settings = LearningSettings(ppo=small, decisions=300_000, evaluate_every=300_000, evaluated=200)
+    settings = LearningSettings(decisions=300_000, evaluate_every=300_000, evaluated=200)
     with Training(settings, tmp_path) as training:
         training.run()
     last = curve.read(tmp_path / CURVE)[-1]

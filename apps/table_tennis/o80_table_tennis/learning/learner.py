@@ -93,6 +93,15 @@ def begin_anew(model: PPO) -> None:
     model.policy = policy.to(model.device)
 
 
+def set_exploration(model: PPO, settings: LearningSettings) -> None:
+    """That of the decisions made so far, unless it is learned; call it before each rollout."""
+    value = settings.ppo.log_exploration_at(model.num_timesteps / settings.decisions)
+    if value is not None:
+        policy: Any = model.policy
+        policy.log_std.requires_grad_(False)
+        policy.log_std.fill_(value)
+
+
 def seconds_in(environments: VecNormalize) -> float:
     """Processor time that the environments have taken [s]; NaN if actors step them."""
     wrapped: Any = environments

@@ -40,6 +40,13 @@ TRIALS: Mapping[str, Mapping[str, Any]] = {
     "shorter rollouts": {"steps": 32, "batch": 256},
     "10 epochs": {"epochs": 10},
     "hidden 128": {"hidden": 128},
+    "exploration by schedule": {"last_log_exploration": -1.2},
+    "hidden 384": {
+        "hidden": 384,
+        "epochs": 12,
+        "learning_rate": 5e-4,
+        "last_log_exploration": -1.2,
+    },
     "published observation": {"observation": "published"},
     "published reward": {"reward": "published"},
 }

@@ -34,6 +34,8 @@ class PpoSettings:
     """Units of each of two hidden layers, of the policy and of the value."""
     log_exploration: float = -0.5
     """Logarithm of the standard deviation of the actions at the start."""
+    last_log_exploration: float | None = None
+    """The same at the end; it falls linearly with the decisions. None: it is learned."""
 
     def __post_init__(self) -> None:
         for name in ("environments", "steps", "batch", "epochs", "hidden"):
@@ -42,6 +44,17 @@ class PpoSettings:
             value = getattr(self, name)
             if not 0 < value < math.inf:
                 raise ValueError(f"{name} must be a positive number, got {value}")
+        for name in ("log_exploration", "last_log_exploration"):
+            value = getattr(self, name)
+            if value is not None and not math.isfinite(value):
+                raise ValueError(f"{name} must be a finite number, got {value}")
+
+    def log_exploration_at(self, share: float) -> float | None:
+        """After a share of the training; None if it is learned."""
+        if self.last_log_exploration is None:
+            return None
+        first, last = self.log_exploration, self.last_log_exploration
+        return first + (last - first) * min(share, 1.0)
 
 
 @dataclass(frozen=True)
@@ -108,7 +121,12 @@ WAYS: Mapping[str, LearningSettings] = {
             ball_velocity_noise=0.0,
         ),
         ppo=PpoSettings(
-            discount=0.9999, trace=1.0, learning_rate=1.5e-4, clip=0.4, hidden=380, steps=160
+            discount=0.9999,
+            trace=1.0,
+            learning_rate=1.5e-4,
+            clip=0.4,
+            hidden=380,
+            steps=160,
         ),
         restart=RestartSettings(touched=0.0),
     ),

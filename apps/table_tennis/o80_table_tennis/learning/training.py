@@ -17,7 +17,14 @@ from . import checkpoint, curve
 from .checkpoint import Progress
 from .curve import CURVE, CurvePoint
 from .episodes import EpisodeCounter
-from .learner import begin_anew, network_of, new_model, seconds_in, training_environments
+from .learner import (
+    begin_anew,
+    network_of,
+    new_model,
+    seconds_in,
+    set_exploration,
+    training_environments,
+)
 from .restarts import stuck
 from .settings import LearningSettings
 from .validation import Validation
@@ -184,6 +191,7 @@ class _Updates(BaseCallback):
 
     def _on_rollout_start(self) -> None:
         self._training.replace_if_stuck()  # after the last update of the old network
+        set_exploration(self._training.model, self._training.settings)
 
     def _on_rollout_end(self) -> None:
         training = self._training
