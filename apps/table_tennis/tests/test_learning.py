@@ -18,9 +18,9 @@ import o80
 from o80_table_tennis import train
 from o80_table_tennis.learning import checkpoint, curve, seeds
 from o80_table_tennis.learning.curve import CURVE
-from o80_table_tennis.learning.environments import BALL_PARTS, generators_of
 from o80_table_tennis.learning.settings import WAYS, LearningSettings, PpoSettings
 from o80_table_tennis.learning.training import POLICY, Training
+from o80_table_tennis.learning.visible_numbers import BALL_PARTS
 from o80_table_tennis.players.learned_policy import LearnedPolicy
 from o80_table_tennis.task.full_observation import FullObservation
 
@@ -97,7 +97,7 @@ def test_the_policy_of_numpy_acts_as_the_one_that_was_trained(tmp_path: Path) ->
 
 
 def state_of(training: Training) -> list[bytes]:
-    """All that decides how a training goes on, except for the episodes under way."""
+    """All that decides how a training goes on, except for its episodes, which begin anew."""
     environments = training.model.get_vec_normalize_env()
     assert environments is not None
     statistics: Any = environments.obs_rms
@@ -109,7 +109,6 @@ def state_of(training: Training) -> list[bytes]:
         *(values.numpy().tobytes() for values in moments),
         *(values.tobytes() for values in (statistics.mean, statistics.var)),
         torch.get_rng_state().numpy().tobytes(),
-        *(repr(each.bit_generator.state).encode() for each in generators_of(environments)),
     ]
 
 

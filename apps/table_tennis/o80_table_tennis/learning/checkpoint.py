@@ -16,8 +16,6 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
-from .environments import generators_of
-
 FOLDER = "checkpoint"
 MODEL, NORMALISATION, GENERATORS, PROGRESS = (
     "model.zip",
@@ -53,7 +51,7 @@ def save(output: Path, model: PPO, progress: Progress) -> None:
     normalisation = model.get_vec_normalize_env()
     assert normalisation is not None
     normalisation.save(str(new / NORMALISATION))
-    (new / GENERATORS).write_bytes(pickle.dumps(_generators(normalisation)))
+    (new / GENERATORS).write_bytes(pickle.dumps(_generators()))
     (new / PROGRESS).write_text(json.dumps(asdict(progress)))
     current = output / FOLDER
     if current.exists():
@@ -72,29 +70,27 @@ def found(output: Path) -> Path | None:
 
 def load(folder: Path, model: PPO, normalisation: VecNormalize) -> Progress:
     """Puts a checkpoint into a new model and its environments: weights, optimiser, normalisation
-    and generators. Loads pickles: resume only trainings that you trust.
+    and generators. Episodes begin anew; their random numbers follow from the seed and from how far
+    the training has come. Loads pickles: resume only trainings that you trust.
     """
     model.set_parameters(str(folder / MODEL), exact_match=True, device="cpu")
     progress = Progress(**json.loads((folder / PROGRESS).read_text()))
     model.num_timesteps = progress.decisions
     saved = pickle.loads((folder / NORMALISATION).read_bytes())
     normalisation.obs_rms, normalisation.ret_rms = saved.obs_rms, saved.ret_rms
-    _restore(pickle.loads((folder / GENERATORS).read_bytes()), normalisation)
+    _restore(pickle.loads((folder / GENERATORS).read_bytes()))
     return progress
 
 
-def _generators(environments: VecNormalize) -> dict[str, Any]:
+def _generators() -> dict[str, Any]:
     return {
         "torch": torch.get_rng_state(),
         "numpy": np.random.get_state(),  # noqa: NPY002 - PPO draws its batches from it
         "python": random.getstate(),
-        "environments": [each.bit_generator.state for each in generators_of(environments)],
     }
 
 
-def _restore(saved: dict[str, Any], environments: VecNormalize) -> None:
+def _restore(saved: dict[str, Any]) -> None:
     torch.set_rng_state(saved["torch"])
     np.random.set_state(saved["numpy"])  # noqa: NPY002
     random.setstate(saved["python"])
-    for generator, state in zip(generators_of(environments), saved["environments"], strict=True):
-        generator.bit_generator.state = state

@@ -1,69 +1,52 @@
-"""Stable-Baselines3's PPO for this task, and the network of NumPy that its policy becomes."""
+"""Stable-Baselines3's PPO for this task, and the network of NumPy that its policy becomes.
+
+The decisions are collected by workers that play the policy with NumPy: in this process, or as
+actors of Ray. Values and probabilities are computed for a whole rollout at once.
+"""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.logger import Logger
-from stable_baselines3.common.vec_env import VecEnv, VecNormalize
+from stable_baselines3.common.vec_env import VecNormalize
+
+from o80.learning.rollouts.ppo import RolloutPPO, WorkersEnv
 
 from ..players.network import CLIP, Network
-from .environments import Float32Array, Masked, Timed, opened, visible_numbers
+from .copies import Stopwatch
 from .settings import LearningSettings
+from .visible_numbers import Float32Array, visible_numbers
+from .workers import training_workers
 
 
-def training_environments(settings: LearningSettings) -> VecNormalize:
-    """The environments of a training: masked if it is blind, then normalised."""
-    masked = _actors(settings) if settings.actors else _masked(settings)
+def training_environments(settings: LearningSettings, watch: Stopwatch) -> VecNormalize:
+    """The environments of a training, normalised; `watch` is told of those of this process."""
     return VecNormalize(
-        masked, norm_obs=True, norm_reward=False, clip_obs=CLIP, gamma=settings.ppo.discount
+        WorkersEnv(training_workers(settings, watch)),
+        norm_obs=True,
+        norm_reward=False,
+        clip_obs=CLIP,
+        gamma=settings.ppo.discount,
     )
 
 
-def _masked(settings: LearningSettings) -> VecEnv:
-    inner = Timed(
-        opened(
-            settings.conditions,
-            count=settings.ppo.environments,
-            seed=settings.seed,
-            ball_seed=settings.seed,
-        )
-    )
-    return Masked(inner, _visible(settings, inner)) if settings.blind else inner
-
-
-def _actors(settings: LearningSettings) -> VecEnv:
-    from .actors import actor_environments
-
-    return actor_environments(settings)
-
-
-def _visible(settings: LearningSettings, environments: VecEnv) -> Float32Array:
+def _visible(settings: LearningSettings, environments: VecNormalize) -> Float32Array:
     (size,) = environments.observation_space.shape or ()
     return visible_numbers(settings.conditions, size, blind=settings.blind)
-
-
-def _kind(settings: LearningSettings, environments: VecEnv) -> Callable[..., PPO]:
-    """PPO, or the one that learns from the rollouts of actors."""
-    if not settings.actors:
-        return PPO
-    from o80.learning.rollouts.ppo import RolloutPPO
-
-    return partial(RolloutPPO, visible=_visible(settings, environments))
 
 
 def new_model(settings: LearningSettings, environments: VecNormalize) -> PPO:
     """A learner that knows nothing; the same seed gives the same one."""
     ppo = settings.ppo
-    model: PPO = _kind(settings, environments)(
+    model = RolloutPPO(
         "MlpPolicy",
         environments,
+        visible=_visible(settings, environments),
         n_steps=ppo.steps,
         batch_size=ppo.batch,
         n_epochs=ppo.epochs,
@@ -102,15 +85,7 @@ def set_exploration(model: PPO, settings: LearningSettings) -> None:
         policy.log_std.fill_(value)
 
 
-def seconds_in(environments: VecNormalize) -> float:
-    """Processor time that the environments have taken [s]; NaN if actors step them."""
-    wrapped: Any = environments
-    while wrapped is not None and not isinstance(wrapped, Timed):
-        wrapped = getattr(wrapped, "venv", None)
-    return wrapped.seconds if wrapped is not None else math.nan
-
-
-def learning_rate(settings: LearningSettings) -> Any:
+def learning_rate(settings: LearningSettings) -> Callable[[float], float]:
     """Of the share of the training that is left."""
     first, last = settings.ppo.learning_rate, settings.ppo.last_rate
     return lambda left: first * (last + (1.0 - last) * max(float(left), 0.0))

@@ -15,13 +15,13 @@ import o80
 from ..players.learned_policy import LearnedPolicy
 from . import checkpoint, curve
 from .checkpoint import Progress
+from .copies import Stopwatch
 from .curve import CURVE, CurvePoint
 from .episodes import EpisodeCounter
 from .learner import (
     begin_anew,
     network_of,
     new_model,
-    seconds_in,
     set_exploration,
     training_environments,
 )
@@ -45,7 +45,8 @@ class Training:
         if resume and folder is None:
             raise o80.InvalidArgument(f"{output} has no checkpoint to resume: leave out --resume")
         output.mkdir(parents=True, exist_ok=True)
-        self._environments = training_environments(settings)
+        self._watch = Stopwatch()
+        self._environments = training_environments(settings, self._watch)
         self._validation = Validation(settings)
         self.model = new_model(settings, self._environments)
         if resume and folder is not None:
@@ -121,9 +122,10 @@ class Training:
         """The environments' share of the processor time since the start or the last resumption,
         without evaluations; NaN if they were not stepped in this process.
         """
+        if self.settings.actors:
+            return math.nan
         spent = time.process_time() - self._processor - self._evaluating
-        inside = seconds_in(self._environments)
-        return inside / spent if inside > 0 else math.nan
+        return self._watch.seconds / spent
 
     def judge(self) -> None:
         """Notes whether the network has got stuck."""

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import o80
+
 from ..players.network import Network
-from .environments import opened
+from .copies import training_copies
 from .episodes import EpisodeCounter, EpisodeOutcome, Shares, shares
 from .settings import LearningSettings
 
@@ -19,9 +21,8 @@ class Validation:
 
     def __init__(self, settings: LearningSettings) -> None:
         count = min(ENVIRONMENTS, settings.evaluated)
-        self._environments = opened(
-            settings.conditions, count=count, seed=BALL_SEED, ball_seed=BALL_SEED
-        )
+        copies = training_copies(settings.conditions, count=count, ball_seed=BALL_SEED)
+        self._environments = o80.learning.stable_baselines3(copies, infos="ends")
         self._each = -(-settings.evaluated // count)
 
     def play(self, network: Network) -> Shares:

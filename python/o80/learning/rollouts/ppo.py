@@ -36,9 +36,6 @@ Info = dict[str, Any]
 class WorkersEnv(VecEnv):
     """Stands for the copies of all workers in a RolloutPPO, which alone can step them."""
 
-    np_random: Sequence[np.random.Generator] = ()
-    """Random numbers follow from the seed of the workers and the iteration: nothing to keep."""
-
     def __init__(self, workers: Workers) -> None:
         self.workers = workers
         self.render_mode = None

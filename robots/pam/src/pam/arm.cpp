@@ -36,8 +36,10 @@ Link elliptic_plate(double mass, double centre, double half_width, double half_l
   return {mass, centre, {mass * (y + z), mass * (x + z), mass * (x + y)}};
 }
 
+}  // namespace
+
 // The arm in axes that turn with joint 1: all links lie in the plane of x and z.
-struct Plane {
+struct Arm::Plane {
   explicit Plane(const Joints& q)
       : c1(std::cos(q[0])),
         s1(std::sin(q[0])),
@@ -55,6 +57,8 @@ struct Plane {
   Vector upper, fore;  // directions of the upper arm and the forearm
   double c4, s4;
 };
+
+namespace {
 
 // A vector into the axes of a link (x lies in the plane, z along the link), and back.
 Vector into(const Vector& along, const Vector& v) {
@@ -113,33 +117,60 @@ JointMatrix responses(const JointMatrix& lower) {
   return response;
 }
 
-// The impulses with which dry friction of at most `friction` [Nm] brings the joints nearest to
-// rest.
-void rub(const Joints& friction, const JointMatrix& lower, double duration, Joints& dq) {
-  bool any = false;
-  for (std::size_t j = 0; j < kJoints; ++j) any = any || friction[j] > 0.0;
-  if (!any) return;
+// How dry friction holds back each joint: 1 or -1 for one that slides towards larger or smaller
+// angles, 0 for one that sticks.
+using Sliding = std::array<int, kJoints>;
 
-  // projected Gauss-Seidel on the impulses
-  const JointMatrix response = responses(lower);
-  Joints impulse{};
-  bool settled = false;
-  for (int sweep = 0; sweep < 20 && !settled; ++sweep) {
-    settled = true;
-    for (std::size_t j = 0; j < kJoints; ++j) {
-      const double most = duration * friction[j];
-      const double next = std::clamp(impulse[j] - dq[j] / response[j][j], -most, most);
-      const double change = next - impulse[j];
-      if (change == 0.0) continue;
-      settled = false;
-      impulse[j] = next;
-      for (std::size_t i = 0; i < kJoints; ++i) dq[i] += response[j][i] * change;
+// The speeds after a step in which `sliding` is assumed, and whether they bear it out; else the
+// first joint that does not is changed in it. `most` is the largest impulse of friction [Nm s].
+bool slides_so(const JointMatrix& mass, const Joints& momentum, const Joints& most,
+               Sliding& sliding, Joints& dq) {
+  // a joint that sticks gets an equation of its own: speed = 0
+  JointMatrix moving = mass;
+  Joints pushed{};
+  for (std::size_t j = 0; j < kJoints; ++j) {
+    if (sliding[j] != 0 || most[j] == 0.0) {
+      pushed[j] = momentum[j] - sliding[j] * most[j];
+      continue;
     }
+    for (std::size_t i = 0; i < kJoints; ++i) moving[i][j] = moving[j][i] = 0.0;
+    moving[j][j] = 1.0;
   }
+  dq = solve(factor(moving), pushed);
+
+  for (std::size_t j = 0; j < kJoints; ++j) {
+    if (most[j] == 0.0) continue;
+    if (sliding[j] != 0) {
+      if (sliding[j] * dq[j] >= 0.0) continue;
+      sliding[j] = 0;
+      return false;
+    }
+    double needed = -momentum[j];  // impulse
+    for (std::size_t i = 0; i < kJoints; ++i) needed += mass[j][i] * dq[i];
+    if (std::abs(needed) <= most[j]) continue;
+    sliding[j] = needed > 0.0 ? -1 : 1;
+    return false;
+  }
+  return true;
+}
+
+// The speeds that dry friction brings nearest to rest: mass * dq = momentum + impulses of at most
+// `most`. A linear complementarity problem with bounds; changing the first joint that does not fit
+// never comes back to an assumption (Murty's least-index rule), of which there are 3^4.
+Joints rubbed(const JointMatrix& mass, const Joints& momentum, const Joints& most,
+              const Joints& before) {
+  Sliding sliding{};
+  for (std::size_t j = 0; j < kJoints; ++j) {
+    if (most[j] > 0.0) sliding[j] = (before[j] > 0.0) - (before[j] < 0.0);
+  }
+  Joints dq{};
+  for (int round = 0; round < 81 && !slides_so(mass, momentum, most, sliding, dq); ++round) {
+  }
+  return dq;
 }
 
 // The smallest impulses that keep every joint within its stops for `duration`.
-void stop_at_limits(const Joints& q, const JointMatrix& lower, double duration, Joints& dq) {
+void stop_at_limits(const Joints& q, const JointMatrix& mass, double duration, Joints& dq) {
   const auto passes = [&](std::size_t j) {
     return std::abs(q[j] + duration * dq[j]) > kJointLimit;
   };
@@ -148,7 +179,7 @@ void stop_at_limits(const Joints& q, const JointMatrix& lower, double duration, 
   if (!any) return;
 
   // projected Gauss-Seidel on the impulses; at most one of the two stops of a joint is near
-  const JointMatrix response = responses(lower);
+  const JointMatrix response = responses(factor(mass));
   Joints impulse{};
   bool settled = false;
   for (int sweep = 0; sweep < 20 && !settled; ++sweep) {
@@ -198,8 +229,9 @@ Links published_links() noexcept {
   return {shoulder, upper_arm, elbow, joined(published_forearm(), published_racket())};
 }
 
-JointMatrix Arm::mass_matrix(const Joints& q) const noexcept {
-  const Plane plane(q);
+JointMatrix Arm::mass_matrix(const Joints& q) const noexcept { return mass_matrix(Plane(q)); }
+
+JointMatrix Arm::mass_matrix(const Plane& plane) const noexcept {
   const auto& [shoulder, upper, elbow, fore] = links_;
   const double u = upper.centre, f = fore.centre, l = kUpperArmLength;
   const double su = plane.upper[0], sf = plane.fore[0], cf = plane.fore[2];
@@ -228,8 +260,9 @@ JointMatrix Arm::mass_matrix(const Joints& q) const noexcept {
   return m;
 }
 
-Joints Arm::bias(const Joints& q, const Joints& dq) const noexcept {
-  const Plane plane(q);
+Joints Arm::bias(const Joints& q, const Joints& dq) const noexcept { return bias(Plane(q), dq); }
+
+Joints Arm::bias(const Plane& plane, const Joints& dq) const noexcept {
   const auto& [shoulder, upper, elbow, fore] = links_;
   const Vector& zu = plane.upper;
   const Vector& zf = plane.fore;
@@ -293,20 +326,24 @@ double Arm::energy(const Motion& motion) const noexcept {
 }
 
 void Arm::advance(Motion& motion, const Joints& torque, double duration) const noexcept {
-  // (M + h D) dq' = M dq + h (torque - bias)
-  JointMatrix m = mass_matrix(motion.q);
-  const Joints bias_torque = bias(motion.q, motion.dq);
+  // (M + h D) dq' = M dq + h (torque - bias) + friction
+  const Plane plane(motion.q);
+  JointMatrix m = mass_matrix(plane);
+  const Joints bias_torque = bias(plane, motion.dq);
   Joints momentum{};
   for (std::size_t i = 0; i < kJoints; ++i) {
     momentum[i] = duration * (torque[i] - bias_torque[i]);
     for (std::size_t j = 0; j < kJoints; ++j) momentum[i] += m[i][j] * motion.dq[j];
   }
   for (std::size_t i = 0; i < kJoints; ++i) m[i][i] += duration * config_.damping[i];
-  const JointMatrix lower = factor(m);
-  motion.dq = solve(lower, momentum);
-
-  rub(config_.friction, lower, duration, motion.dq);
-  stop_at_limits(motion.q, lower, duration, motion.dq);
+  if (config_.friction == Joints{}) {
+    motion.dq = solve(factor(m), momentum);
+  } else {
+    Joints most{};
+    for (std::size_t i = 0; i < kJoints; ++i) most[i] = duration * config_.friction[i];
+    motion.dq = rubbed(m, momentum, most, motion.dq);
+  }
+  stop_at_limits(motion.q, m, duration, motion.dq);
   for (std::size_t i = 0; i < kJoints; ++i) {
     motion.q[i] = std::clamp(motion.q[i] + duration * motion.dq[i], -kJointLimit, kJointLimit);
   }

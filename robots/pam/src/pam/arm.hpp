@@ -97,6 +97,11 @@ class Arm {
   std::optional<Joints> posture_reaching(const Vector& point, double wrist) const noexcept;
 
  private:
+  struct Plane;
+
+  JointMatrix mass_matrix(const Plane& plane) const noexcept;
+  Joints bias(const Plane& plane, const Joints& dq) const noexcept;
+
   Config config_;
   Links links_;
 };

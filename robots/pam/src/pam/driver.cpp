@@ -97,9 +97,7 @@ void PamDriver::begin() noexcept {
 void PamDriver::write(const Desired<PamDriver>& desired) {
   now_.desired = desired.states;
   Pressures asked{};
-  for (std::size_t m = 0; m < kMuscles; ++m) {
-    asked[m] = static_cast<std::int32_t>(std::lround(desired[m]));
-  }
+  for (std::size_t m = 0; m < kMuscles; ++m) asked[m] = rounded(desired[m]);
   now_.clipped = plant_.advance(asked);
   for (std::size_t m = 0; m < kMuscles; ++m) {
     now_.observed[m] = plant_.config().ranges[m].pressure(plant_.state().activation[m]);

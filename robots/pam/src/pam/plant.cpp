@@ -176,8 +176,7 @@ void Plant::integrate(const std::array<double, kMuscles>& target, const Joints& 
 Pressures Plant::pressures() const noexcept {
   Pressures raw{};
   for (std::size_t m = 0; m < kMuscles; ++m) {
-    raw[m] =
-        static_cast<std::int32_t>(std::lround(config_.ranges[m].pressure(state_.activation[m])));
+    raw[m] = rounded(config_.ranges[m].pressure(state_.activation[m]));
   }
   return raw;
 }

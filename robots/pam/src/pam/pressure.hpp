@@ -25,6 +25,13 @@ constexpr Pressures equal_pressures(std::int32_t raw) noexcept {
   return {raw, raw, raw, raw, raw, raw, raw, raw};
 }
 
+/// The nearest integer, halves away from zero: std::lround without a call.
+constexpr std::int32_t rounded(double raw) noexcept {
+  const auto whole = static_cast<std::int32_t>(raw);
+  const double rest = raw - whole;
+  return whole + (rest >= 0.5) - (rest <= -0.5);
+}
+
 /// Pressure above the atmosphere [bar]; 18000 is 1.81 bar.
 constexpr double to_bar(double raw) noexcept { return 0.0002 * raw - 1.7888; }
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -66,6 +67,48 @@ TEST(Arm, HasTheKinematicsThatMujocoComputesFromTheModel) {
     expect_near(racket.velocity, row.racket.velocity, 1e-11, "velocity");
     expect_near(racket.angular_velocity, row.racket.angular_velocity, 1e-11, "angular velocity");
   }
+}
+
+// Dry friction brings every joint as near to rest as its largest impulse allows: a joint that
+// moves gets all of it against its motion, one that sticks gets no more.
+TEST(Arm, DryFrictionHoldsOrOpposesEveryJoint) {
+  constexpr double kDuration = 0.001;
+  std::mt19937 random(1);
+  const auto uniform = [&](double most) {
+    return std::uniform_real_distribution<double>(-most, most)(random);
+  };
+  int sticking = 0, sliding = 0;
+  for (int i = 0; i < 20'000; ++i) {
+    Arm::Config config;
+    Motion motion;
+    Joints torque{};
+    for (std::size_t j = 0; j < kJoints; ++j) {
+      config.friction[j] = random() % 4 == 0 ? 0.0 : std::abs(uniform(2.0));
+      motion.q[j] = uniform(1.5);
+      motion.dq[j] = random() % 2 == 0 ? 0.0 : uniform(random() % 2 == 0 ? 0.01 : 5.0);
+      torque[j] = uniform(random() % 2 == 0 ? 1.0 : 20.0);
+    }
+    const Arm arm(config);
+    const JointMatrix mass = arm.mass_matrix(motion.q);
+    const Joints bias = arm.bias(motion.q, motion.dq);
+    Motion after = motion;
+    arm.advance(after, torque, kDuration);
+    for (std::size_t j = 0; j < kJoints; ++j) {
+      // (M + h D) dq' = M dq + h (torque - bias) + impulse
+      double impulse = kDuration * config.damping[j] * after.dq[j];
+      for (std::size_t k = 0; k < kJoints; ++k)
+        impulse += mass[j][k] * (after.dq[k] - motion.dq[k]);
+      impulse -= kDuration * (torque[j] - bias[j]);
+      const double most = kDuration * config.friction[j];
+      ASSERT_LE(std::abs(impulse), most + 1e-13) << "joint " << j << " of arm " << i;
+      if (most == 0.0) continue;
+      ++(after.dq[j] == 0.0 ? sticking : sliding);
+      if (after.dq[j] == 0.0) continue;
+      ASSERT_NEAR(impulse, after.dq[j] > 0.0 ? -most : most, 1e-13) << "joint " << j << " of " << i;
+    }
+  }
+  EXPECT_GT(sticking, 1000);
+  EXPECT_GT(sliding, 1000);
 }
 
 TEST(Arm, HasTheDynamicsThatMujocoComputesFromTheModel) {

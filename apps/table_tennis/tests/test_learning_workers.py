@@ -1,6 +1,5 @@
-"""A training whose rollouts are collected by workers."""
+"""A training whose rollouts are collected by several workers."""
 
-import functools
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +14,7 @@ from typer.testing import CliRunner
 
 from o80.learning.rollouts import LocalWorkers
 from o80_table_tennis import train
-from o80_table_tennis.learning import actors, curve
+from o80_table_tennis.learning import curve, workers
 from o80_table_tennis.learning.curve import CURVE
 from o80_table_tennis.learning.settings import LearningSettings, PpoSettings
 from o80_table_tennis.learning.training import POLICY, Training
@@ -37,8 +36,7 @@ def one_thread() -> None:
 @pytest.fixture
 def local(monkeypatch: pytest.MonkeyPatch) -> None:
     """Workers of this process instead of Ray's, whose rollouts are the same."""
-    made = functools.partial(actors.actor_environments, workers=LocalWorkers)
-    monkeypatch.setattr(actors, "actor_environments", made)
+    monkeypatch.setattr(workers, "RayWorkers", LocalWorkers)
 
 
 def trained(settings: LearningSettings, folder: Path, *, resume: bool = False) -> bytes:
@@ -101,6 +99,5 @@ def test_a_training_by_actors_of_ray_is_that_by_workers_of_this_process(
     cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     by_actors = trained(SMALL, tmp_path / "actors")
-    made = functools.partial(actors.actor_environments, workers=LocalWorkers)
-    monkeypatch.setattr(actors, "actor_environments", made)
+    monkeypatch.setattr(workers, "RayWorkers", LocalWorkers)
     assert trained(SMALL, tmp_path / "local") == by_actors
