@@ -81,38 +81,42 @@ struct Turned {
   double xx, yy, xy, zz;
 };
 
-// lower triangle of the Cholesky factor of a positive definite matrix
+// A positive definite matrix as L D L^T: below the diagonal L, on it the inverse of D. Divisions
+// are slow, so there is one for each row.
 JointMatrix factor(JointMatrix m) {
   for (std::size_t j = 0; j < kJoints; ++j) {
-    for (std::size_t k = 0; k < j; ++k) m[j][j] -= m[j][k] * m[j][k];
-    m[j][j] = std::sqrt(m[j][j]);
+    Joints scaled{};  // row j of L D
+    for (std::size_t k = 0; k < j; ++k) {
+      scaled[k] = m[j][k];
+      m[j][k] *= m[k][k];
+      m[j][j] -= m[j][k] * scaled[k];
+    }
+    m[j][j] = 1.0 / m[j][j];
     for (std::size_t i = j + 1; i < kJoints; ++i) {
       for (std::size_t k = 0; k < j; ++k) m[i][j] -= m[i][k] * m[j][k];
-      m[i][j] /= m[j][j];
     }
   }
   return m;
 }
 
-Joints solve(const JointMatrix& lower, Joints b) {
+Joints solve(const JointMatrix& factors, Joints b) {
   for (std::size_t i = 0; i < kJoints; ++i) {
-    for (std::size_t k = 0; k < i; ++k) b[i] -= lower[i][k] * b[k];
-    b[i] /= lower[i][i];
+    for (std::size_t k = 0; k < i; ++k) b[i] -= factors[i][k] * b[k];
   }
+  for (std::size_t i = 0; i < kJoints; ++i) b[i] *= factors[i][i];
   for (std::size_t i = kJoints; i-- > 0;) {
-    for (std::size_t k = i + 1; k < kJoints; ++k) b[i] -= lower[k][i] * b[k];
-    b[i] /= lower[i][i];
+    for (std::size_t k = i + 1; k < kJoints; ++k) b[i] -= factors[k][i] * b[k];
   }
   return b;
 }
 
 // Effect of a unit impulse on each joint.
-JointMatrix responses(const JointMatrix& lower) {
+JointMatrix responses(const JointMatrix& factors) {
   JointMatrix response;
   for (std::size_t j = 0; j < kJoints; ++j) {
     Joints unit{};
     unit[j] = 1.0;
-    response[j] = solve(lower, unit);
+    response[j] = solve(factors, unit);
   }
   return response;
 }

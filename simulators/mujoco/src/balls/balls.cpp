@@ -102,11 +102,10 @@ void Balls::move_surfaces(const mjData& data, std::uint32_t steps) noexcept {
   for (std::size_t i = 0; i < surfaces_.size(); ++i) {
     if (followers_[i].still) continue;
     const Pose to = pose(data, followers_[i]);
-    Pose& from = now_.poses[i];
-    surfaces_[i].motion = teleported(from, to, step, teleport_distance_ / steps)
-                              ? arriving_at(to, step)
-                              : Motion(from, to);
-    from = to;
+    Motion& motion = surfaces_[i].motion;
+    motion = Motion(now_.poses[i], to);
+    if (teleported(motion, step, teleport_distance_ / steps)) motion = arriving_at(to, step);
+    now_.poses[i] = to;
   }
 }
 

@@ -13,7 +13,7 @@ inline constexpr int kMostBounces = 8;  // in one step
 
 /// Flies a ball from the share `begin` of a step [s] to its end, with all bounces on the way.
 /// `bounced_off(contact, before, after)` is told of each bounce, `passed(surface, gap)` of the
-/// smallest gap to each surface.
+/// smallest gap to each watched surface.
 template <class BouncedOff, class Passed>
 Ball flown_among(std::span<const Surface> surfaces, Ball ball, const Air& air, const Sphere& sphere,
                  double step, double begin, BouncedOff&& bounced_off, Passed&& passed) noexcept {

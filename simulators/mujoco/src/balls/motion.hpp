@@ -20,6 +20,8 @@ class Motion {
   Motion(const Pose& from, const Pose& to) noexcept
       : from_(from), to_(to), turn_(turn_between(from.rotation, to.rotation)) {}
 
+  const Pose& from() const noexcept { return from_; }
+  const Pose& to() const noexcept { return to_; }
   Vector position(double share) const noexcept {
     return between(from_.position, to_.position, share);
   }
@@ -28,9 +30,11 @@ class Motion {
   Vector travel() const noexcept { return to_.position - from_.position; }
   /// A point of the world in the frame of the body.
   Vector inside(const Vector& point, double share) const noexcept {
+    if (share == 1) return to_.rotation.in(point - to_.position);
     const Vector relative = point - position(share);
-    return from_.rotation.in(turn_.angle == 0 ? relative
-                                              : turned(relative, turn_.axis, -share * turn_.angle));
+    return from_.rotation.in(turn_.angle == 0 || share == 0
+                                 ? relative
+                                 : turned(relative, turn_.axis, -share * turn_.angle));
   }
   /// A direction of the body in the frame of the world.
   Vector outside(const Vector& direction, double share) const noexcept {
@@ -52,12 +56,13 @@ class Motion {
 /// A body that turns in a step by this much more than its spin explains was teleported [rad].
 inline constexpr double kTeleportAngle = 0.5;
 
-/// True if the velocities do not explain the way between two poses, `step` [s] apart.
-inline bool teleported(const Pose& from, const Pose& to, double step, double distance) noexcept {
+/// True if the velocities at both ends of a motion of `step` [s] do not explain its way.
+inline bool teleported(const Motion& motion, double step, double distance) noexcept {
+  const Pose& from = motion.from();
+  const Pose& to = motion.to();
   const Vector predicted = from.position + (0.5 * step) * (from.velocity + to.velocity);
   if (length(to.position - predicted) > distance) return true;
-  const double turned = turn_between(from.rotation, to.rotation).angle;
-  return turned > 0.5 * step * (length(from.spin) + length(to.spin)) + kTeleportAngle;
+  return motion.angle() > 0.5 * step * (length(from.spin) + length(to.spin)) + kTeleportAngle;
 }
 
 /// The motion into a pose after a teleport: as the velocity there says.

@@ -36,7 +36,7 @@ struct Contact {
 /// The result of a sweep.
 struct Swept {
   std::optional<Contact> contact;
-  double smallest = std::numeric_limits<double>::infinity();  // gap on the path [m]
+  double smallest = std::numeric_limits<double>::infinity();  // gap on the path [m], if watched
 };
 
 inline constexpr double kTouching = 1e-9;     // a smaller gap is a contact [m]
@@ -61,11 +61,13 @@ class Sweep {
   /// Bound of the relative speed of the ball's centre and the surface [m/step].
   double speed_bound() const noexcept {
     const Motion& motion = surface_.motion;
+    const double straight =
+        length((1 / (1 - path_.begin)) * (path_.to - path_.from) - motion.travel());
+    if (motion.angle() == 0) return straight;
     const double lever =
         std::max(length(path_.position(path_.begin) - motion.position(path_.begin)),
                  length(path_.to - motion.position(1)));
-    return length((1 / (1 - path_.begin)) * (path_.to - path_.from) - motion.travel()) +
-           motion.angle() * lever;
+    return straight + motion.angle() * lever;
   }
   /// The share at which the gap closes, between one where it is open and one where it is not.
   double closing(double open, double closed) const noexcept {
@@ -122,19 +124,19 @@ inline Swept Sweep::run() const noexcept {
     if (now > speed * (1 - share)) break;  // out of reach
     share = std::min(1.0, share + std::max(now, kFinestStep) / speed);
   }
-  passed_at(gap(look(1)));
+  if (surface_.watched) passed_at(gap(look(1)));
   return result;
 }
 
 /// The first contact of a ball with any of the surfaces. `passed(surface, gap)` is told the
-/// smallest gap to each surface.
+/// smallest gap to each watched surface.
 template <class Passed>
 std::optional<Contact> first_contact(std::span<const Surface> surfaces, const Path& path,
                                      double radius, Passed&& passed) noexcept {
   std::optional<Contact> first;
   for (const Surface& surface : surfaces) {
     const Swept swept = Sweep(surface, path, radius).run();
-    passed(surface, swept.smallest);
+    if (surface.watched) passed(surface, swept.smallest);
     if (swept.contact && (!first || swept.contact->share < first->share)) first = swept.contact;
   }
   return first;
