@@ -33,7 +33,8 @@ class GroupRig:
         self, copies: int, settings: RigSettings, *, delay: int, threads: int | None = None
     ) -> None:
         """delay: iterations from the beginning of a step until its pressures act."""
-        common: dict[str, Any] = {"frequency": settings.frequency}
+        # nobody takes snapshots of the copies: their memory would be most of a copy's
+        common: dict[str, Any] = {"frequency": settings.frequency, "slots": 0}
         with ExitStack() as stack:
             arms = o80.robots.load("pam").inline(
                 copies=copies, threads=threads, **common, **arm_options(settings)

@@ -35,7 +35,16 @@ void check_numbers(const BallOptions& options) {
   }
 }
 
-BallPlace ball_in(mjModel& model, const std::string& name) {
+/// Of all balls, extra ones last.
+std::vector<std::string> ball_names(const BallOptions& options) {
+  std::vector<std::string> names = entries_of(options.balls);
+  for (std::uint32_t copy = 1; copy <= options.extra_balls; ++copy) {
+    names.push_back(names.front() + copy_suffix(copy));
+  }
+  return names;
+}
+
+BallPlace ball_in(const mjModel& model, const std::string& name) {
   const int body = find(model, mjOBJ_BODY, name, "body");
   const int joint = model.body_jntadr[body];
   if (model.body_jntnum[body] != 1 || model.jnt_type[joint] != mjJNT_FREE) {
@@ -45,8 +54,6 @@ BallPlace ball_in(mjModel& model, const std::string& name) {
   for (int i = 0; i < model.body_geomnum[body]; ++i) {
     const int geom = model.body_geomadr[body] + i;
     if (model.geom_type[geom] == mjGEOM_SPHERE) radius = model.geom_size[3 * geom];
-    model.geom_contype[geom] = 0;
-    model.geom_conaffinity[geom] = 0;
   }
   if (radius <= 0) throw DriverError("body '" + name + "' is not a ball: it has no sphere");
   // moment of inertia as a share of that of a ring: 2/3 of a hollow ball, 2/5 of a solid one
@@ -106,14 +113,20 @@ void add_extra_balls(mjSpec& spec, const BallOptions& options) {
   }
 }
 
-std::vector<BallPlace> balls_in(mjModel& model, const BallOptions& options) {
-  std::vector<BallPlace> balls;
-  const std::vector<std::string> names = entries_of(options.balls);
-  balls.reserve(names.size() + options.extra_balls);
-  for (const std::string& name : names) balls.push_back(ball_in(model, name));
-  for (std::uint32_t copy = 1; copy <= options.extra_balls; ++copy) {
-    balls.push_back(ball_in(model, names.front() + copy_suffix(copy)));
+void switch_off_contacts(mjModel& model, const BallOptions& options) {
+  for (const std::string& name : ball_names(options)) {
+    const int body = find(model, mjOBJ_BODY, name, "body");
+    for (int i = 0; i < model.body_geomnum[body]; ++i) {
+      const int geom = model.body_geomadr[body] + i;
+      model.geom_contype[geom] = 0;
+      model.geom_conaffinity[geom] = 0;
+    }
   }
+}
+
+std::vector<BallPlace> balls_in(const mjModel& model, const BallOptions& options) {
+  std::vector<BallPlace> balls;
+  for (const std::string& name : ball_names(options)) balls.push_back(ball_in(model, name));
   return balls;
 }
 

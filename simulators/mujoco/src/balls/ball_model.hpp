@@ -42,9 +42,11 @@ bool has_balls(const BallOptions& options);
 /// Adds copies of the first ball to a model that is not compiled yet. Throws DriverError.
 void add_extra_balls(mjSpec& spec, const BallOptions& options);
 
-/// The balls that the options name. Their contacts in the engine are switched off: `Balls` computes
-/// them. Throws DriverError.
-std::vector<BallPlace> balls_in(mjModel& model, const BallOptions& options);
+/// Switches the contacts of the balls in the engine off: `Balls` computes them. Throws DriverError.
+void switch_off_contacts(mjModel& model, const BallOptions& options);
+
+/// The balls that the options name. Throws DriverError.
+std::vector<BallPlace> balls_in(const mjModel& model, const BallOptions& options);
 
 /// The surfaces that the options name, in their order. Throws DriverError.
 std::vector<SurfacePlace> surfaces_in(const mjModel& model, const BallOptions& options);

@@ -4,7 +4,7 @@
 
 namespace o80::mujoco {
 
-Balls::Balls(mjModel& model, const BallOptions& options)
+Balls::Balls(const mjModel& model, const BallOptions& options)
     : model_(model),
       teleport_distance_(options.teleport_distance),
       spin_(vector(options.spin)),

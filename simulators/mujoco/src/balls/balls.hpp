@@ -54,7 +54,7 @@ class Balls {
 
   /// Throws DriverError. Switches off the contacts of the balls in `model`, which must outlive
   /// this.
-  Balls(mjModel& model, const BallOptions& options);
+  Balls(const mjModel& model, const BallOptions& options);
 
   std::size_t size() const noexcept { return places_.size(); }
   /// Of the model, which the engine need not integrate.

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <utility>
 
 #include "engine/names.hpp"
 #include "engine/version.hpp"
@@ -105,20 +106,23 @@ std::vector<ControlPlace> controls_in(const mjModel& model) {
 
 }  // namespace
 
-Model::Model(const Config& config, const std::function<void(mjSpec&)>& edit) {
+Model::Model(const Config& config, const std::function<void(mjSpec&)>& edit,
+             const std::function<void(mjModel&)>& finish) {
   check_version(mj_version(), mj_versionString());
   const SpecPointer spec = parsed(config.model);
   edit(*spec);
-  model = compiled(config.model, *spec);
+  ModelPointer own = compiled(config.model, *spec);
   mjcf = text_of(*spec);
   file = absolute(config.model);
   if (!(config.timestep >= 0 && std::isfinite(config.timestep))) {
     throw DriverError("timestep must be finite and positive [s], or 0 for the model's, got " +
                       std::to_string(config.timestep));
   }
-  if (config.timestep > 0) model->opt.timestep = config.timestep;
+  if (config.timestep > 0) own->opt.timestep = config.timestep;
   // a simulation that diverges is a fault, not a silent restart
-  model->opt.disableflags |= mjDSBL_AUTORESET;
+  own->opt.disableflags |= mjDSBL_AUTORESET;
+  finish(*own);
+  model = shared(std::move(own));
   if (!config.keyframe.empty()) keyframe = find(*model, mjOBJ_KEY, config.keyframe, "keyframe");
   joints = joints_in(*model, entries_of(config.joints));
   sensors = sensors_in(*model);

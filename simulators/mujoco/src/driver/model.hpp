@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "driver/config.hpp"
-#include "engine/pointers.hpp"
+#include "engine/shared_models.hpp"
 
 namespace o80::mujoco {
 
@@ -35,10 +35,11 @@ struct ControlPlace {
 ///
 /// Move-only.
 struct Model {
-  /// `edit` may change the model before it is compiled. Throws DriverError.
-  Model(const Config& config, const std::function<void(mjSpec&)>& edit);
+  /// `edit` may change the model before it is compiled, `finish` after that. Throws DriverError.
+  Model(const Config& config, const std::function<void(mjSpec&)>& edit,
+        const std::function<void(mjModel&)>& finish);
 
-  ModelPointer model;
+  SharedModel model;
   std::string mjcf;  // the compiled model as text, for viewers; empty if it is too large
   std::string file;  // absolute path of the model
   int keyframe = -1;

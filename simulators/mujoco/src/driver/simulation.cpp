@@ -16,7 +16,9 @@ double interpolated(double from, double to, double share) noexcept {
 
 Simulation::Simulation(const Config& config)
     : steps_(std::max(1U, config.steps)),
-      model_(config, [&](mjSpec& spec) { add_extra_balls(spec, config.ball_options); }) {
+      model_(
+          config, [&](mjSpec& spec) { add_extra_balls(spec, config.ball_options); },
+          [&](mjModel& model) { switch_off_contacts(model, config.ball_options); }) {
   if (has_balls(config.ball_options)) balls_.emplace(*model_.model, config.ball_options);
   now_.targets.joints.resize(model_.controls.empty() ? model_.joints.size() : 0);
   now_.targets.controls.resize(model_.controls.size());

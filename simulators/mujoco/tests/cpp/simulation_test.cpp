@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <memory>
+
 #include "count_allocations.hpp"
 #include "scenes.hpp"
 
@@ -40,6 +42,31 @@ TEST(Simulation, LeavesTheEngineOutWhereItHasNothingToIntegrate) {
   EXPECT_FALSE(Simulation(config_of(court())).integrates());
   EXPECT_TRUE(Simulation(config_of(court({{"joints", "joint_1"}}))).integrates());
   EXPECT_TRUE(Simulation(config_of(pendulum())).integrates());
+}
+
+TEST(Simulation, SharesItsModelWithEqualOnesOnly) {
+  const auto model_of = [](const Simulation& simulation) { return simulation.model().model.get(); };
+  const Simulation one(config_of(court()));
+  const Simulation copy(config_of(court()));
+  const Simulation slower(config_of(court({{"timestep", "0.004"}})));
+  const Simulation more(config_of(court({{"extra_balls", "1"}})));
+  EXPECT_EQ(model_of(copy), model_of(one));
+  EXPECT_NE(model_of(slower), model_of(one));
+  EXPECT_NE(model_of(more), model_of(one));
+  EXPECT_EQ(slower.timestep(), 0.004);
+}
+
+TEST(Simulation, DeletesAModelWithItsLastUser) {
+  std::weak_ptr<const mjModel> model;
+  {
+    const Simulation one(config_of(court()));
+    {
+      const Simulation copy(config_of(court()));
+      model = copy.model().model;
+    }
+    EXPECT_FALSE(model.expired());
+  }
+  EXPECT_TRUE(model.expired());
 }
 
 }  // namespace
