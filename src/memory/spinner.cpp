@@ -21,6 +21,8 @@ const int kProcessors = count_processors();
 
 Spinner::Spinner() noexcept : Spinner(kProcessors) {}
 
+Spinner Spinner::lasting(std::int64_t longest) noexcept { return Spinner(kProcessors, longest); }
+
 bool Spinner::worth() noexcept {
   const auto relaxed = std::memory_order_relaxed;
   const std::uint32_t refused = refused_.load(relaxed);

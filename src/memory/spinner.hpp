@@ -28,10 +28,10 @@ inline void pause_processor() noexcept {
 /// - A probe does not yield. After a yield of more than 1 ms the next 1024 waits do not yield.
 ///
 /// Writer / Readers: any threads of one process; races between them are harmless.
-/// Realtime: yes; a spin takes up to `kLongest`.
+/// Realtime: yes; a spin takes up to `longest`.
 class Spinner {
  public:
-  static constexpr std::int64_t kLongest = 50'000;      // longest spin [ns]
+  static constexpr std::int64_t kLongest = 50'000;      // longest spin, unless it is given [ns]
   static constexpr std::uint32_t kPatience = 8;         // failed spins before only probes spin
   static constexpr std::uint32_t kProbe = 64;           // waits from one probe to the next
   static constexpr std::int64_t kAlone = 4'000;         // spin before the first yield [ns]
@@ -41,14 +41,17 @@ class Spinner {
   static constexpr std::uint32_t kYieldHoldoff = 1024;  // waits without a yield after that
 
   Spinner() noexcept;
+  /// One whose spins last up to `longest` [ns].
+  static Spinner lasting(std::int64_t longest) noexcept;
   /// With a given number of processors, for tests.
-  explicit Spinner(int processors) noexcept : processors_(processors) {}
+  explicit Spinner(int processors, std::int64_t longest = kLongest) noexcept
+      : processors_(processors), longest_(longest) {}
 
   /// Whether this wait should spin.
   bool worth() noexcept;
   void ended(bool success) noexcept;
 
-  /// Spins until done() is true, at most `kLongest`; true if done. Calls done() at least once.
+  /// Spins until done() is true, at most `longest`; true if done. Calls done() at least once.
   template <class Done>
   bool spin(Done&& done) noexcept {
     if (done()) return true;
@@ -65,7 +68,7 @@ class Spinner {
       }
       now = monotonic_now();
       if (now - begin >= patience()) now = let_others_run(now);
-    } while (now - begin < kLongest);
+    } while (now - begin < longest_);
     const bool success = done();
     ended(success);
     return success;
@@ -83,6 +86,7 @@ class Spinner {
   std::int64_t let_others_run(std::int64_t now) noexcept;
 
   int processors_;
+  std::int64_t longest_;                         // [ns]
   std::atomic<std::uint32_t> quiet_{kQuiet};     // yields without effect in a row
   std::atomic<std::uint32_t> yield_holdoff_{0};  // remaining waits without a yield
   std::atomic<std::uint32_t> failures_{0};

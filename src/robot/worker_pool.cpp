@@ -11,6 +11,14 @@
 
 namespace o80 {
 
+namespace {
+
+/// A program that steps copies comes back soon: after judging them, in Python. A thread that sleeps
+/// meanwhile takes 30 us to wake up, and finds its caches cold. [ns]
+constexpr std::int64_t kSpin = 300'000;
+
+}  // namespace
+
 WorkerPool::WorkerPool(std::size_t workers) : shares_(workers + 1) {
   sigset_t every, before;
   sigfillset(&every);
@@ -98,7 +106,7 @@ void WorkerPool::work(std::size_t own) noexcept {
   // set from inside: set by another thread, the name would create an entry below /proc that the
   // kernel has to remove when the thread ends
   pthread_setname_np(pthread_self(), "o80-group");
-  Spinner spin;
+  Spinner spin = Spinner::lasting(kSpin);
   std::uint32_t round = 0;
   while (true) {
     const auto called = [&] {

@@ -13,11 +13,11 @@ namespace o80 {
 
 /// Threads that share the tasks of one call with the calling thread.
 ///
-/// Between two calls the workers sleep on a futex (after a spin of at most 50 us, as every wait of
-/// o80). They block all signals, which belong to the threads of the program. Each thread has a
-/// share of the tasks, the same one in every call of as many tasks, so that what a task works on
-/// stays in the caches of one processor. A thread that is done takes tasks from the shares of the
-/// others, so a slow task delays only its own thread.
+/// Between two calls the workers sleep on a futex (after a spin of at most 0.3 ms, because the
+/// caller soon comes back). They block all signals, which belong to the threads of the program.
+/// Each thread has a share of the tasks, the same one in every call of as many tasks, so that what
+/// a task works on stays in the caches of one processor. A thread that is done takes tasks from the
+/// shares of the others, so a slow task delays only its own thread.
 ///
 /// Writer:   one thread at a time calls run().
 /// Realtime: no; run() allocates nothing.

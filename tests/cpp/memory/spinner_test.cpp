@@ -87,6 +87,14 @@ TEST(Spinner, EndsAfterABoundedMoment) {
   EXPECT_GE(monotonic_now() - begin, Spinner::kLongest);
 }
 
+TEST(Spinner, SpinsAsLongAsItIsAllowedTo) {
+  constexpr std::int64_t kLonger = 10 * Spinner::kLongest;
+  Spinner spinner(2, kLonger);
+  const std::int64_t begin = monotonic_now();
+  EXPECT_FALSE(spinner.spin([] { return false; }));
+  EXPECT_GE(monotonic_now() - begin, kLonger);
+}
+
 class SpinnerAmongOthers : public testing::Test {
  protected:
   ~SpinnerAmongOthers() override { others = nullptr; }
