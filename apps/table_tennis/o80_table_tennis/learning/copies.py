@@ -8,6 +8,8 @@ from typing import Any
 
 from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
 
+from o80.learning import VectorEnvironment
+
 from ..entry_points import vector_environment
 from ..players.conditions import Conditions
 
@@ -45,15 +47,19 @@ class Timed(VectorWrapper):
             return self.env.step(actions)
 
 
-def training_copies(
-    conditions: Conditions, *, count: int, ball_seed: int, watch: Stopwatch | None = None
-) -> VectorEnv[Any, Any, Any]:
-    """Copies that play the shots of `ball_seed`, on one thread; `watch` measures their time."""
-    copies = vector_environment(
+def training_copies(conditions: Conditions, *, count: int, ball_seed: int) -> VectorEnvironment:
+    """Copies that play the shots of `ball_seed`, on one thread."""
+    return vector_environment(
         num_envs=count,
         rig=replace(conditions.rig(), history=HISTORY),
         task=conditions.task(ball_seed=ball_seed),
         threads=1,
         autoreset_mode=AutoresetMode.SAME_STEP,
     )
-    return copies if watch is None else Timed(copies, watch)
+
+
+def timed_copies(
+    conditions: Conditions, *, count: int, ball_seed: int, watch: Stopwatch
+) -> VectorEnv[Any, Any, Any]:
+    """The same, measured."""
+    return Timed(training_copies(conditions, count=count, ball_seed=ball_seed), watch)

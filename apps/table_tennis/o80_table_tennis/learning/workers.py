@@ -6,7 +6,7 @@ from functools import partial
 
 from o80.learning.rollouts import LocalWorkers, RayWorkers, Workers
 
-from .copies import Stopwatch, training_copies
+from .copies import Stopwatch, timed_copies, training_copies
 from .settings import LearningSettings
 
 INFOS = ("touched", "returned")
@@ -15,13 +15,12 @@ INFOS = ("touched", "returned")
 
 def training_workers(settings: LearningSettings, watch: Stopwatch) -> Workers:
     """Each has an equal share of the environments; `watch` is told of those of this process."""
-    count = max(1, settings.actors)
-    make = partial(
-        training_copies,
-        settings.conditions,
-        count=settings.ppo.environments // count,
-        ball_seed=settings.seed,
-    )
+    workers = max(1, settings.actors)
+    count, ball_seed = settings.ppo.environments // workers, settings.seed
     if settings.actors:
-        return RayWorkers(make, workers=count, seed=settings.seed, infos=INFOS)
-    return LocalWorkers(partial(make, watch=watch), workers=count, seed=settings.seed, infos=INFOS)
+        make = partial(training_copies, settings.conditions, count=count, ball_seed=ball_seed)
+        return RayWorkers(make, workers=workers, seed=settings.seed, infos=INFOS)
+    timed = partial(
+        timed_copies, settings.conditions, count=count, ball_seed=ball_seed, watch=watch
+    )
+    return LocalWorkers(timed, workers=workers, seed=settings.seed, infos=INFOS)
