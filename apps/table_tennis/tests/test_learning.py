@@ -129,6 +129,16 @@ def test_a_resumed_training_has_weights_optimiser_normalisation_and_generators(
     assert [point.decisions for point in curve.read(tmp_path / CURVE)] == [64, 128, 192]
 
 
+def test_a_training_that_has_nothing_left_to_do_tells_no_share_of_the_environments(
+    tmp_path: Path,
+) -> None:
+    with Training(SMALL, tmp_path) as training:
+        training.run()
+    with Training(SMALL, tmp_path, resume=True) as training:
+        training.run()
+        assert math.isnan(training.environment_share)
+
+
 def test_rows_after_the_checkpoint_are_dropped_when_a_training_resumes(tmp_path: Path) -> None:
     with Training(SMALL, tmp_path) as training:
         training.run()
@@ -146,6 +156,14 @@ def test_a_training_that_is_stopped_leaves_a_checkpoint(tmp_path: Path) -> None:
         training.run(stop)
     with Training(SMALL, tmp_path, resume=True) as resumed:
         assert resumed.progress.decisions == 64
+
+
+def test_a_training_resumes_that_was_stopped_before_its_first_update(tmp_path: Path) -> None:
+    with Training(SMALL, tmp_path) as training:
+        training.save()
+    with Training(SMALL, tmp_path, resume=True) as resumed:
+        resumed.run()
+    assert [point.decisions for point in curve.read(tmp_path / CURVE)] == [64, 128]
 
 
 def test_a_checkpoint_is_replaced_as_a_whole(tmp_path: Path) -> None:

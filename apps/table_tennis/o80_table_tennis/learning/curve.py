@@ -80,6 +80,8 @@ def read(path: Path) -> list[CurvePoint]:
 
 def cut(path: Path, decisions: int) -> None:
     """Drops the rows after so many decisions: a training resumes there."""
+    if not path.exists():
+        return  # it was stopped before its first update
     points = [point for point in read(path) if point.decisions <= decisions]
     path.unlink()
     for point in points:

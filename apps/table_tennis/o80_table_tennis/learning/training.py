@@ -110,6 +110,7 @@ class Training:
         """
         left = self.settings.decisions - self.model.num_timesteps
         self._clock, self._processor = time.monotonic(), time.process_time()
+        self._evaluating = self._watch.seconds = 0.0
         try:
             if left > 0:
                 self.model.learn(left, callback=_Updates(self, told), reset_num_timesteps=False)
@@ -120,9 +121,9 @@ class Training:
     @property
     def environment_share(self) -> float:
         """The environments' share of the processor time since the start or the last resumption,
-        without evaluations; NaN if they were not stepped in this process.
+        without evaluations; NaN if they were not stepped in this process, or not at all.
         """
-        if self.settings.actors:
+        if self._watch.seconds <= 0:
             return math.nan
         spent = time.process_time() - self._processor - self._evaluating
         return self._watch.seconds / spent

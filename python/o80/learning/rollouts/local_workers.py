@@ -12,7 +12,7 @@ from o80.learning.rollouts.workers import Workers
 class LocalWorkers(Workers):
     """Workers in this process, one after the other.
 
-    For debugging, for tests, and to repeat what RayWorkers did.
+    For a training on one processor, for debugging, and to repeat what RayWorkers did.
     """
 
     def __init__(self, make: Make, **options: Any) -> None:
