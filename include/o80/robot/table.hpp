@@ -5,6 +5,7 @@
 
 #include "o80/describe/hooks.hpp"
 #include "o80/describe/rows.hpp"
+#include "o80/describe/shown_model.hpp"
 
 // Interface between a robot library and o80: plain structs and functions. Functions do not throw
 // and pass no C++ class. o80 compares versions and sizes before it uses a library. See

@@ -37,7 +37,8 @@ void Balls::add_surfaces() {
       if (!belongs(place)) continue;
       surfaces_.push_back(
           {place.shape, place.restitution, place.friction, place.watched, record, {}});
-      followers_.push_back({place.geom, place.still});
+      followers_.push_back(
+          {place.geom, place.still, joints_under(model_, model_.geom_bodyid[place.geom])});
     }
   };
   add_those([](const SurfacePlace& place) { return place.watched; });
@@ -198,10 +199,9 @@ Pose Balls::pose(const mjData& data, const Follower& follower) const noexcept {
   pose.position = {position[0], position[1], position[2]};
   std::copy_n(matrix, 9, pose.rotation.m.begin());
   if (!follower.still) {
-    mjtNum velocity[6];
-    mj_objectVelocity(&model_, &data, mjOBJ_GEOM, follower.geom, velocity, 0);
-    pose.spin = {velocity[0], velocity[1], velocity[2]};
-    pose.velocity = {velocity[3], velocity[4], velocity[5]};
+    const Carried carried = carried_by(follower.joints, model_, data, pose.position);
+    pose.velocity = carried.velocity;
+    pose.spin = carried.spin;
   }
   return pose;
 }

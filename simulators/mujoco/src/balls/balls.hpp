@@ -10,6 +10,7 @@
 
 #include "balls/ball_model.hpp"
 #include "balls/bouncing_flight.hpp"
+#include "balls/carried.hpp"
 #include "balls/contact_record.hpp"
 #include "balls/fly_out.hpp"
 
@@ -97,6 +98,7 @@ class Balls {
   struct Follower {
     int geom;
     bool still;
+    std::vector<int> joints;  // that carry it
   };
 
   void add_surfaces();

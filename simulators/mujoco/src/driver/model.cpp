@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "engine/drawings.hpp"
 #include "engine/names.hpp"
 #include "engine/version.hpp"
 #include "o80/base/error.hpp"
@@ -113,6 +114,7 @@ Model::Model(const Config& config, const std::function<void(mjSpec&)>& edit,
   edit(*spec);
   ModelPointer own = compiled(config.model, *spec);
   mjcf = text_of(*spec);
+  own = without_drawings(*spec, std::move(own));
   file = absolute(config.model);
   if (!(config.timestep >= 0 && std::isfinite(config.timestep))) {
     throw DriverError("timestep must be finite and positive [s], or 0 for the model's, got " +

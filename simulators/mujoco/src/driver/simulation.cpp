@@ -113,8 +113,6 @@ void Simulation::impose_joints(std::uint32_t number) noexcept {
         last ? to.velocity : interpolated(from.velocity, to.velocity, share);
   }
   mj_kinematics(model_.model.get(), data_.get());
-  mj_comPos(model_.model.get(), data_.get());
-  mj_comVel(model_.model.get(), data_.get());
 }
 
 /// Sensors show the state that is published.
