@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from o80_table_tennis.balls import playable
 from o80_table_tennis.balls.launches import (
     NARROW,
     WIDE,
@@ -86,6 +87,26 @@ def test_the_verdict_is_that_of_the_predicted_flight() -> None:
         near = [replace(launch, position=launch.position + np.array([0, y, 0])) for y in TINY]
         assert found in map(found_by_prediction, near), launch
     assert seen == set(Verdict)
+
+
+def test_it_does_not_matter_how_much_of_a_flight_is_seen_first(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rng = np.random.default_rng(4)
+    launches = [
+        Launch(
+            rng.normal(WIDE.position, 0.2),
+            rng.normal(WIDE.velocity, (0.5, 2.0, 2.0)),
+            rng.normal((64.0, 0.0, 0.0), 60.0),
+        )
+        for _ in range(300)
+    ]
+    verdicts = []
+    for usual in (0.02, 0.35, playable.USUAL, playable.DURATION):
+        monkeypatch.setattr(playable, "USUAL", usual)
+        verdicts.append([verdict(launch) for launch in launches])
+    assert set(verdicts[0]) == set(Verdict)
+    assert all(each == verdicts[0] for each in verdicts)
 
 
 @BOTH

@@ -6,17 +6,24 @@ from collections.abc import Sequence
 from enum import Enum
 from itertools import pairwise
 
-from ..physics.prediction import BOUNCED, STATE, TIME, flight_nodes
+import numpy as np
+from numpy.typing import NDArray
+
+from ..physics.prediction import BOUNCED, STATE, STEP, TIME, flight_nodes
 from ..world.arm import FOREARM, SHOULDER, UPPER_ARM
 from ..world.ball import BALL_RADIUS
 from ..world.table import NET_HEIGHT, TABLE
 from .launches import Launch
+
+FloatArray = NDArray[np.float64]
 
 REACH = UPPER_ARM + FOREARM + 0.063
 """How near to the shoulder a ball must come [m]: the recorded shots of the ball gun, which can all
 be returned, come to 0.51 to 0.79 m; the blade reaches 0.094 m beyond its centre."""
 DURATION = 2.0
 """A flight that has not come within reach after this time does not [s]."""
+USUAL = 1.0
+"""Most flights are decided by then [s]: the rest is computed for the others only."""
 PASSED = -0.8
 """A ball that is nearer to the wall behind the arm than this has passed it [m]."""
 
@@ -38,25 +45,39 @@ class Verdict(Enum):
 
 def verdict(launch: Launch) -> Verdict:
     """Of a shot, by its predicted flight until it comes within reach."""
-    nodes = flight_nodes(launch.position, launch.velocity, launch.spin, DURATION).tolist()
-    bounces = 0
-    for before, after in pairwise(nodes):
+    usual = flight_nodes(launch.position, launch.velocity, launch.spin, USUAL)
+    # but for its last step, which may be shorter, this is how the whole flight begins
+    decided = _decided(usual[usual[:, TIME] <= USUAL - STEP])
+    if decided is not None:
+        return decided
+    whole = flight_nodes(launch.position, launch.velocity, launch.spin, DURATION)
+    return _decided(whole) or _out_of_reach(bool(whole[:, BOUNCED].any()))
+
+
+def _decided(nodes: FloatArray) -> Verdict | None:
+    """By the beginning of a flight, unless it has to be seen further."""
+    bounced = False
+    for before, after in pairwise(nodes.tolist()):
         if after[BOUNCED]:
-            bounces += 1
-            if bounces > 1:
+            if bounced:
                 return Verdict.TWO_BOUNCES
             if after[_Y] >= _NET_Y:
                 return Verdict.NO_BOUNCE
+            bounced = True
             continue
-        if bounces and _passes(before, after):
+        if bounced and _passes(before, after):
             return Verdict.PLAYABLE
         if before[_Y] >= _NET_Y > after[_Y] and _height_at_net(before, after) < _NET_TOP:
             return Verdict.NET
-        if not bounces and after[_Z] < _LOWEST:
+        if not bounced and after[_Z] < _LOWEST:
             return Verdict.NO_BOUNCE
         if after[_Y] < PASSED:
-            break
-    return Verdict.OUT_OF_REACH if bounces else Verdict.NO_BOUNCE
+            return _out_of_reach(bounced)
+    return None
+
+
+def _out_of_reach(bounced: bool) -> Verdict:
+    return Verdict.OUT_OF_REACH if bounced else Verdict.NO_BOUNCE
 
 
 def _height_at_net(before: Sequence[float], after: Sequence[float]) -> float:
