@@ -37,12 +37,6 @@ void NumberLimiter::restart(double position) noexcept {
   stopped_ = 0;
 }
 
-/// Rounding of the sums of a motion.
-double NumberLimiter::rounding() const noexcept {
-  return 8.0 * std::numeric_limits<double>::epsilon() *
-         std::max({scale_, std::abs(position_), std::abs(wanted_)});
-}
-
 double NumberLimiter::tolerance_of(const Rates& rates) noexcept {
   const double finest = std::min({rates.speed, rates.acceleration, rates.jerk});
   return std::isfinite(finest) ? kLimitRounding * finest : 0.0;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -22,7 +23,12 @@ enum class Limit : std::uint8_t { none, minimum, maximum, speed, acceleration, j
 class NumberLimiter {
  public:
   NumberLimiter(double minimum, double maximum, const Rates& rates) noexcept
-      : minimum_(minimum), maximum_(maximum), rates_(rates), tolerance_(tolerance_of(rates)) {}
+      : minimum_(minimum),
+        maximum_(maximum),
+        rates_(rates),
+        unlimited_(minimum <= -kHuge && maximum >= kHuge && !std::isfinite(rates.speed) &&
+                   !std::isfinite(rates.acceleration) && !std::isfinite(rates.jerk)),
+        tolerance_(tolerance_of(rates)) {}
 
   const Rates& rates() const noexcept { return rates_; }
   double minimum() const noexcept { return minimum_; }
@@ -51,6 +57,9 @@ class NumberLimiter {
     const double step = wanted - wanted_;
     const double lag = position_ - wanted_;
     wanted_ = wanted;
+    if (unlimited_ && std::abs(wanted) < kHuge && std::abs(position_) < kHuge) {
+      return follow_freely();
+    }
     if (!std::isfinite(rates_.acceleration) && !std::isfinite(rates_.jerk)) return follow_at_once();
     return std::isfinite(rates_.jerk) ? follow_with_jerk(step, lag, most)
                                       : follow_with_acceleration(step, lag, most);
@@ -61,6 +70,19 @@ class NumberLimiter {
  private:
   struct Candidate;
 
+  // two numbers below it are not too far apart for a double
+  static constexpr double kHuge = 0.25 * std::numeric_limits<double>::max();
+
+  /// What follow_at_once() does with a number that has a rest value only.
+  Limit follow_freely() noexcept {
+    const double speed = wanted_ - position_;
+    scale_ = std::max(scale_, std::abs(position_ + speed));
+    position_ = wanted_;
+    acceleration_ = speed - speed_;
+    speed_ = speed;
+    if (std::abs(speed_) <= slack() / 100.0 + 2.0 * rounding()) speed_ = acceleration_ = 0.0;
+    return Limit::none;
+  }
   Limit follow_at_once() noexcept;
   Limit follow_with_acceleration(double step, double lag, double most) noexcept;
   Limit follow_with_jerk(double step, double lag, double most) noexcept;
@@ -73,12 +95,17 @@ class NumberLimiter {
   void forget_rounding() noexcept;
   static double tolerance_of(const Rates& rates) noexcept;
   double inside(double position, double before) const noexcept;
-  double rounding() const noexcept;
+  /// Rounding of the sums of a motion.
+  double rounding() const noexcept {
+    return 8.0 * std::numeric_limits<double>::epsilon() *
+           std::max({scale_, std::abs(position_), std::abs(wanted_)});
+  }
   double slack() const noexcept { return rounding() + tolerance_; }
 
   double minimum_;
   double maximum_;
   Rates rates_;
+  bool unlimited_;    // within the range of its kind
   double tolerance_;  // of the finest rate
   double position_ = 0.0;
   double speed_ = 0.0;

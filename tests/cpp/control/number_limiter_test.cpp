@@ -83,6 +83,41 @@ TEST_F(NumberLimiterTest, WithoutAnAccelerationLimitMovesBitForBitAsWithAnEnormo
   }
 }
 
+TEST_F(NumberLimiterTest, WithoutAnyLimitMovesBitForBitAsWithEnormousBounds) {
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  constexpr double kMost = std::numeric_limits<double>::max();
+  int stops = 0;
+  for (int round = 0; round < 2000; ++round) {
+    NumberLimiter limiter(-kMost, kMost, {kNone, kNone, kNone});
+    NumberLimiter general(-1e307, 1e307, {kNone, kNone, kNone});
+    const double start = real(-2, 2);
+    limiter.restart(start);
+    general.restart(start);
+    double wanted = start;
+    for (int i = 0; i < 50; ++i) {
+      if (one_in(10)) limiter.begin(), general.begin();
+      if (one_in(10)) limiter.brake(), general.brake();
+      if (!one_in(4)) wanted = one_in(3) ? real(-2, 2) : wanted + real(-1, 1) * magnitude(-17, 0);
+      if (one_in(100)) wanted = real(-9e306, 9e306);
+      ASSERT_EQ(limiter.follow(wanted), general.follow(wanted)) << round;
+      ASSERT_EQ(limiter.position(), general.position()) << round;
+      ASSERT_EQ(limiter.speed(), general.speed()) << round;
+      ASSERT_EQ(limiter.acceleration(), general.acceleration()) << round;
+      stops += limiter.speed() == 0.0 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(stops, 100);
+}
+
+TEST_F(NumberLimiterTest, WithoutAnyLimitGoesWithinTheRangeOfADouble) {
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  constexpr double kMost = std::numeric_limits<double>::max();
+  NumberLimiter limiter(-kMost, kMost, {kNone, kNone, kNone});
+  limiter.restart(-kMost);
+  for (int i = 0; i < 3; ++i) limiter.follow(kMost);
+  EXPECT_TRUE(std::isfinite(limiter.position()));
+}
+
 TEST_F(NumberLimiterTest, KeepsItsLimitsWhateverItIsAskedToFollow) {
   for (int round = 0; round < 3000; ++round) {
     const double minimum = one_in(4) ? -std::numeric_limits<double>::infinity() : real(-1, 0);
