@@ -80,7 +80,7 @@ class LearningSettings:
     ppo: PpoSettings = field(default_factory=PpoSettings)
     restart: RestartSettings = field(default_factory=RestartSettings)
     seed: int = 1
-    decisions: int = 3_000_000
+    decisions: int = 4_000_000
     """After which the training ends."""
     minutes: float = math.inf
     """After which it ends at the latest [min]."""

@@ -49,7 +49,11 @@ void Simulation::add_slots(std::uint32_t count) {
 void Simulation::reset() noexcept {
   now_.clock = 0;
   mj_resetDataKeyframe(model_.model.get(), data_.get(), model_.keyframe);
-  mj_forward(model_.model.get(), data_.get());
+  if (integrates_ || !model_.sensors.empty()) {
+    mj_forward(model_.model.get(), data_.get());
+  } else {
+    mj_kinematics(model_.model.get(), data_.get());  // all that anybody looks at
+  }
   for (std::size_t i = 0; i < now_.joints.size(); ++i) {
     now_.joints[i] = now_.targets.joints[i] = joint(i);
   }
