@@ -35,6 +35,16 @@ TEST(Drawings, AreLeftOutOfTheModel) {
   EXPECT_EQ(left_of("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>"), 1);
 }
 
+TEST(Drawings, AreLeftOutInFramesReplicasAndMeshesToo) {
+  EXPECT_EQ(left_of(hanging("<replicate count='5' offset='0 0 0.1'><geom class='drawn'/>"
+                            "</replicate><frame pos='1 0 0'><geom class='drawn'/></frame>")),
+            2);
+  std::string meshes = hanging("<geom class='drawn' type='mesh' mesh='wedge'/>");
+  meshes.insert(meshes.find("<worldbody>"),
+                "<asset><mesh name='wedge' vertex='0 0 0  1 0 0  0 1 0  0 0 1'/></asset>");
+  EXPECT_EQ(left_of(meshes), 2);
+}
+
 TEST(Drawings, AreNoGeomsThatAreNamedOrTouchOrWeighOrFeelAnything) {
   for (const char* geom :
        {"<geom class='drawn' name='marker'/>", "<geom class='drawn' contype='1'/>",
