@@ -8,7 +8,7 @@ demo:
 	@tools/setup.sh demo
 	@.venv/bin/python -m o80_table_tennis.demo $(ARGS)
 
-# one seed of table tennis from scratch, 30 minutes on one processor: build/learn/report.json
+# one seed of table tennis from scratch, about ten minutes on one processor: build/learn/report.json
 learn:
 	@tools/setup.sh learn
 	@.venv/bin/python -m o80_table_tennis.train --blind-share 0.3 $(ARGS)

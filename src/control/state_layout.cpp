@@ -64,7 +64,12 @@ void StateLayout::copy(std::byte* to, const std::byte* from,
 
 void StateLayout::copy_finite(std::byte* to, const std::byte* from,
                               const std::uint64_t* mask) const noexcept {
-  if (plain_ && mask == nullptr && finite(from)) return copy(to, from);
+  if (plain_ && mask == nullptr) {
+    for (std::uint32_t at = 0; at < size_; at += sizeof(double)) {
+      if (std::isfinite(load<double>(from + at))) std::memcpy(to + at, from + at, sizeof(double));
+    }
+    return;
+  }
   for (std::size_t i = 0; i < numbers_.size(); ++i) {
     if (!masked(mask, i) || !finite_number(i, from)) continue;
     copy_number(to + numbers_[i].offset, from + numbers_[i].offset, numbers_[i].size);
@@ -125,11 +130,11 @@ bool StateLayout::proper(const std::byte* state, const std::uint64_t* mask) cons
 
 bool StateLayout::finite(const std::byte* state, const std::uint64_t* mask) const noexcept {
   if (plain_ && mask == nullptr) {
-    std::uint32_t wrong = 0;  // counted: no branch for each number
+    bool all = true;
     for (std::uint32_t at = 0; at < size_; at += sizeof(double)) {
-      wrong += std::isfinite(load<double>(state + at)) ? 0 : 1;
+      all = all && std::isfinite(load<double>(state + at));
     }
-    return wrong == 0;
+    return all;
   }
   for (std::size_t i = 0; i < numbers_.size(); ++i) {
     if (!masked(mask, i)) continue;

@@ -44,12 +44,15 @@ class StateLayout {
 
   /// Copies the numbers, not the padding.
   void copy(std::byte* to, const std::byte* from) const noexcept {
-    if (size_ == sizeof(double) && !padded_) {  // most states: no call
-      std::memcpy(to, from, sizeof(double));
-    } else if (!padded_) {
-      std::memcpy(to, from, size_);
-    } else {
+    constexpr std::size_t kOne = sizeof(double), kTwo = 2 * sizeof(double);
+    if (padded_) {
       copy_numbers(to, from);
+    } else if (size_ == kOne) {  // most states, or those of position and velocity: no call
+      std::memcpy(to, from, kOne);
+    } else if (size_ == kTwo) {
+      std::memcpy(to, from, kTwo);
+    } else {
+      std::memcpy(to, from, size_);
     }
   }
   /// Copies the numbers whose bits are set.

@@ -87,7 +87,8 @@ class Perception:
             self._missed[copy, 0] = False  # an episode begins with a ball that is seen
         self._at[which] = 0
         balls = state.ball.reshape(-1, BALL)
-        self._delay.begin(balls, which)
+        if self._delay:
+            self._delay.begin(balls, which)
         if self._one:
             return self._look_at_one(state)
         return self._look(state, balls if not self._delay else self._delay.delayed(which), which)
