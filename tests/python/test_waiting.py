@@ -19,8 +19,8 @@ def test_an_inline_burst_that_was_interrupted_is_not_gone_on_with(arm: o80.Front
 
     before = signal.signal(signal.SIGALRM, interrupt)
     try:
-        signal.setitimer(signal.ITIMER_REAL, 0.001)
         with pytest.raises(InterruptedError):
+            signal.setitimer(signal.ITIMER_REAL, 0.001)
             arm.burst(10**12)
     finally:
         signal.signal(signal.SIGALRM, before)

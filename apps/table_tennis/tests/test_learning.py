@@ -295,6 +295,7 @@ def test_an_unknown_way_is_refused_with_those_there_are() -> None:
 
 
 @pytest.mark.check
+@pytest.mark.timeout(600)
 def test_a_short_training_learns_to_touch_the_ball(tmp_path: Path) -> None:
     settings = LearningSettings(decisions=300_000, evaluate_every=300_000, evaluated=200)
     with Training(settings, tmp_path) as training:
