@@ -14,6 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from alarm import alarm_in
 from blocking import CALLS
 
 import o80
@@ -164,8 +165,7 @@ def test_a_handler_that_raises_ends_the_wait_with_that(process: o80.robots.Proce
                 lambda: process.wait(WAIT),
                 lambda: o80.Frontend("nobody-has-this-name", WAIT),
             ):
-                with pytest.raises(EnoughError):
-                    signal.setitimer(signal.ITIMER_REAL, 0.01)
+                with pytest.raises(EnoughError), alarm_in(0.01):
                     wait()
             arm.wait_for(arm.published + 2, WAIT)
     finally:
@@ -272,10 +272,8 @@ def test_ctrl_c_while_control_is_awaited_gives_it_back(segment: str) -> None:
         with o80.Frontend(segment) as one, o80.Frontend(segment) as other:
             before = signal.signal(signal.SIGALRM, interrupt)
             try:
-                with pytest.raises(KeyboardInterrupt):
-                    signal.setitimer(signal.ITIMER_REAL, 0.01)
-                    with one.control(WAIT):
-                        pass
+                with pytest.raises(KeyboardInterrupt), alarm_in(0.01), one.control(WAIT):
+                    pass
             finally:
                 signal.signal(signal.SIGALRM, before)
             other.add_command(0, 1.0)

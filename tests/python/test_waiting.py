@@ -7,6 +7,7 @@ import time
 from pathlib import Path
 
 import pytest
+from alarm import alarm_in
 
 import o80
 
@@ -19,8 +20,7 @@ def test_an_inline_burst_that_was_interrupted_is_not_gone_on_with(arm: o80.Front
 
     before = signal.signal(signal.SIGALRM, interrupt)
     try:
-        with pytest.raises(InterruptedError):
-            signal.setitimer(signal.ITIMER_REAL, 0.001)
+        with pytest.raises(InterruptedError), alarm_in(0.001):
             arm.burst(10**12)
     finally:
         signal.signal(signal.SIGALRM, before)
