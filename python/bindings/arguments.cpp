@@ -88,7 +88,7 @@ o80::PaceSpec pace_of(nb::handle duration, nb::handle speed, nb::handle until,
   if (given > 1) {
     throw InvalidArgument(
         "a command has one pace: give one of duration, speed, until, iterations and fastest (or "
-        "none, to be there in one iteration)");
+        "none for a set-point, which goes as fast as the limits allow)");
   }
   return pace;
 }

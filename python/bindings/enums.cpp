@@ -55,17 +55,12 @@ o80::Mode mode_of(nb::handle word) {
 
 o80::Profile profile_of(nb::handle word) {
   using enum o80::Profile;
-  return parse(word, std::array{linear, minimum_jerk}, "profile");
+  return parse(word, std::array{linear, minimum_jerk, as_sent}, "profile");
 }
 
 o80::Start start_of(nb::handle word) {
   using enum o80::Start;
   return parse(word, std::array{desired, observed}, "start");
-}
-
-o80::OnLimit on_limit_of(nb::handle word) {
-  using enum o80::OnLimit;
-  return parse(word, std::array{end, go_on}, "on_limit");
 }
 
 nb::object python_word(o80::Status status) { return member<o80::kStatuses>(status, "Status"); }

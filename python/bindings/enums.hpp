@@ -10,7 +10,6 @@
 o80::Mode mode_of(nanobind::handle word);
 o80::Profile profile_of(nanobind::handle word);
 o80::Start start_of(nanobind::handle word);
-o80::OnLimit on_limit_of(nanobind::handle word);
 
 /// Members of o80.Status and o80.Reason.
 nanobind::object python_word(o80::Status status);

@@ -2,6 +2,7 @@
 
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
 #include <nanobind/stl/string_view.h>
 #include <nanobind/stl/vector.h>
 
@@ -25,14 +26,30 @@ using o80::UntypedFrontend;
 
 namespace {
 
+/// `every`: time between the set-points of a stream, seconds, or iterations if it is an integer.
+void set_every(o80::PaceSpec& pace, nb::handle every, std::int64_t period) {
+  if (pace.pace != o80::Pace::direct) {
+    throw o80::InvalidArgument(
+        "every is for set-points, which have no pace: leave out every, or the pace");
+  }
+  const bool counts = PyIndex_Check(every.ptr()) != 0;
+  const std::chrono::nanoseconds time =
+      counts ? std::chrono::nanoseconds(count_of(every, "every") * period)
+             : nanoseconds_of(every, "every");
+  if (time.count() <= 0) {
+    throw o80::InvalidArgument("every must be positive, got " + nb::cast<std::string>(nb::repr(every)));
+  }
+  pace = o80::direct(time);
+}
+
 void add_command(const Frontend& self, nb::handle actuator, nb::handle target, nb::handle duration,
                  nb::handle speed, nb::handle until, nb::handle iterations, nb::handle fastest,
-                 nb::handle mode, nb::handle profile, nb::handle start, nb::handle on_limit) {
+                 nb::handle mode, nb::handle profile, nb::handle start, nb::handle every) {
   const bool is_fastest = truth_of(fastest, "fastest");
   o80::CommandOptions options{.pace = pace_of(duration, speed, until, iterations, is_fastest),
                               .mode = mode_of(mode),
-                              .start = start_of(start),
-                              .on_limit = on_limit_of(on_limit)};
+                              .start = start_of(start)};
+  if (!every.is_none()) set_every(options.pace, every, self.shared()->schema().head.period);
   if (!profile.is_none()) options.profile = profile_of(profile);
   const bool several = actuator.is_none() || (PySequence_Check(actuator.ptr()) != 0 &&
                                               PyUnicode_Check(actuator.ptr()) == 0);
@@ -213,7 +230,7 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
            "target"_a.none(), nb::kw_only(), "duration"_a = nb::none(), "speed"_a = nb::none(),
            "until"_a = nb::none(), "iterations"_a = nb::none(), "fastest"_a.none() = false,
            "mode"_a.none() = "queue", "profile"_a = nb::none(), "start"_a.none() = "desired",
-           "on_limit"_a.none() = "end");
+           "every"_a = nb::none());
   def_verb(frontend, "add_request", verbs::add_request, &add_request, "name"_a.none(), "fields"_a);
   def_verb(
       frontend, "add_purge", verbs::add_purge,

@@ -38,7 +38,11 @@ class PreparedBurst {
     const o80::PulseOptions options = pulse_options(at, late);
     const o80::Timeout patience = timeout_of(timeout);
     const auto frontend = self.shared();
-    frontend->add_trajectories(actuators_, steps_, targets_.span(), options_);
+    if (is_each_iteration(options_.pace)) {
+      frontend->add_set_points(actuators_, steps_, targets_.span(), options_.mode);
+    } else {
+      frontend->add_trajectories(actuators_, steps_, targets_.span(), options_);
+    }
     const Waiting waiting;
     return frontend->burst_rows(rows_.writable(), patience, Waiting::keep_waiting, options);
   }

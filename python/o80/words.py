@@ -19,6 +19,7 @@ class Profile(StrEnum):
 
     LINEAR = "linear"
     MINIMUM_JERK = "minimum_jerk"
+    AS_SENT = "as_sent"  #: no interpolation: each target in its iteration, where limits allow
 
 
 class Start(StrEnum):
@@ -35,7 +36,7 @@ class Status(StrEnum):
     QUEUED = "queued"
     ACTIVE = "active"
     COMPLETED = "completed"
-    LIMITED = "limited"  #: completed, but clamped at its last iteration
+    LIMITED = "limited"  #: only in recordings of earlier versions: did not reach its target
     OVERWRITTEN = "overwritten"
     PURGED = "purged"
     INTERRUPTED = "interrupted"
@@ -62,9 +63,8 @@ class Reason(StrEnum):
 
 
 ModeWord: TypeAlias = Mode | Literal["queue", "overwrite"]
-ProfileWord: TypeAlias = Profile | Literal["linear", "minimum_jerk"]
+ProfileWord: TypeAlias = Profile | Literal["linear", "minimum_jerk", "as_sent"]
 StartWord: TypeAlias = Start | Literal["desired", "observed"]
-OnLimitWord: TypeAlias = Literal["end", "go_on"]
 LateWord: TypeAlias = Literal["reject", "now"]
 OnErrorWord: TypeAlias = Literal["purge", "continue"]
 StaleWord: TypeAlias = Literal["hold", "purge", "halt", "stop"]

@@ -2,18 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
+#include "control/limits.hpp"
 #include "control/record_check.hpp"
 
 namespace o80 {
 namespace {
 
-constexpr double kNoSpeed = std::numeric_limits<double>::infinity();
 // most waypoints of a trajectory that are skipped in one iteration, because they end before it
 constexpr int kMostPassed = 256;
-// most waypoints of an overwritten trajectory that are read
-constexpr std::uint32_t kMostAhead = 64;
+// waypoints of a trajectory that are read ahead in one iteration, for its span. A motion that speeds
+// up and stops in i iterations each needs the span of i waypoints in iteration i.
+constexpr std::uint32_t kReadAhead = 16;
 
 }  // namespace
 
@@ -24,132 +26,177 @@ ActuatorQueue::ActuatorQueue(const Schema& schema, const ActuatorRow& row,
       pool_(&pool),
       ledger_(&ledger),
       desired_(desired),
-      motion_(layout),
-      limiter_(schema, row, layout),
+      motion_(schema, row, layout),
       carry_(schema.head.period),
       period_(static_cast<double>(schema.head.period) / 1e9),
+      usual_profile_(usual_profile(schema, row)),
       when_idle_(row.when_idle),
       queue_(pool, lanes),
       mask_(mask_words(static_cast<std::uint32_t>(layout.numbers().size()))),
-      scratch_((layout.size() + 7) / 8),
-      spare_((layout.size() + 7) / 8) {}
+      next_mask_(mask_.size()),
+      scratch_((layout.size() + 7) / 8) {}
 
 void ActuatorQueue::drop(Status status, Reason reason, Iteration iteration) noexcept {
-  if (status != Status::overwritten) {
-    end_motion();
-  } else if (running_) {
-    keep_moving();
-    limiter_.keep_lagging(motion_, desired_);
+  const bool in_force = in_force_ && status == Status::overwritten;
+  if (alone_ != kNoBlock) {
+    pool_->head(alone_).own[Own::kNext] = kNoBlock;
+    ledger_->drop(std::exchange(alone_, kNoBlock), status, reason, iteration);
   }
-  carry_.reset();
-  running_ = false;
-  limiter_.release();
+  // the motion of an overwritten command goes on until its successor begins
+  if (status == Status::overwritten) {
+    running_ = planned_ = false;
+    carry_.reset();
+  } else {
+    end_motion();
+  }
+  in_force_ = in_force;
+  motion_.release();
   while (!queue_.empty()) ledger_->drop(queue_.take_any(), status, reason, iteration);
 }
 
-/// Stores the running motion for the command that overwrites it. The overwritten velocity fades
-/// within the span of the further waypoints of the trajectory.
-void ActuatorQueue::keep_moving() noexcept {
-  auto* ahead = reinterpret_cast<std::byte*>(scratch_.data());
-  layout_->copy(ahead, motion_.to());
-  const std::uint32_t rows = std::min(rows_left_, kMostAhead);
-  Cursor cursor = rows_;
-  auto* row = reinterpret_cast<std::byte*>(spare_.data());
-  for (std::uint32_t i = 0; i < rows; ++i) cursor.read(row, layout_->size());
-  if (rows > 0) layout_->copy(ahead, row, mask());
-  motion_.keep_moving(ahead, rows);
-}
-
 void ActuatorQueue::end_motion() noexcept {
-  motion_.rest();
+  motion_.end();
   carry_.reset();
-  running_ = false;
+  running_ = planned_ = in_force_ = given_ = false;
 }
 
 void ActuatorQueue::drop_lane(std::uint32_t lane, Status status, Reason reason,
                               Iteration iteration) noexcept {
-  if (running_ && queue_.front_lane() == lane) end_motion();
-  if (holder_ == lane) limiter_.release();
+  if (alone_ != kNoBlock) {
+    if (ledger_->lane_of(alone_) == lane) {
+      pool_->head(alone_).own[Own::kNext] = kNoBlock;
+      ledger_->drop(std::exchange(alone_, kNoBlock), status, reason, iteration);
+      end_motion();
+    }
+  } else if (running_ && !given_ && queue_.front_lane() == lane) {
+    end_motion();
+  }
+  if (holder_ == lane) motion_.release();
   ledger_->drop(queue_.take(lane), status, reason, iteration);
-  if (queue_.empty()) end_motion();
+  if (empty()) end_motion();
 }
 
 void ActuatorQueue::restart(const std::byte* state) noexcept {
   layout_->copy_finite(desired_, state);
-  limiter_.restart(desired_);
-  streams_ = false;
+  motion_.restart(desired_);
+  in_force_ = false;
 }
 
 bool ActuatorQueue::follow(const std::byte* observed) noexcept {
   layout_->copy_finite(desired_, observed);
-  return limiter_.brake_resting(desired_);
+  in_force_ = false;
+  return motion_.brake_resting(desired_);
 }
 
 ActuatorQueue::Moved ActuatorQueue::step(Iteration iteration, const std::byte* observed,
                                          std::uint32_t& late_budget) noexcept {
+  if (!planned_ && may_give_way() && end_late(iteration, late_budget)) {
+    const RecordHead& next = pool_->head(queue_.front());
+    const bool may_begin = !is_member(next) || ledger_->groups().is_complete(next, iteration);
+    if (may_begin && gives_way_to(next)) give_way(iteration);
+  }
   if (running_) {
-    if (planned_ || iteration > motion_.last()) begin_row(iteration, observed);
+    const bool row_is_over = pace_ == Pace::direct || iteration > motion_.last();
+    const bool next_row = planned_ || (row_is_over && rows_left_ > 0);
+    if (next_row && !begin_row(iteration)) return step(iteration, observed, late_budget);
   } else if (!begin_next(iteration, observed, late_budget)) {
     return come_to_rest(observed);
   }
-  limited_ = move(iteration);
-  if (iteration >= motion_.last() && rows_left_ == 0) end_running(iteration);
-  return limited_.limit == Limit::none ? Moved::active : Moved::clamped;
+  if (ahead_left_ > 0) look_ahead();
+  const Limited limited = motion_.step(iteration, desired_);
+  if (limited.limit != Limit::none && late_ == 0) reason_ = limited;
+  if (iteration >= motion_.last() && rows_left_ == 0) {
+    if (motion_.arrived()) {
+      end_running(iteration);
+    } else if (is_trajectory_ && alone_ == kNoBlock) {
+      take_out();
+    }
+  }
+  return limited.limit == Limit::none ? Moved::active : Moved::clamped;
 }
 
 void ActuatorQueue::begin_given(Mode mode) noexcept {
   if (mode == Mode::overwrite) carry_.reset();
-  motion_.rest();
-  limiter_.release();
-  limiter_.begin();
-  streams_ = false;
+  motion_.release();
 }
 
-ActuatorQueue::Moved ActuatorQueue::go_to(const std::byte* target) noexcept {
-  layout_->copy(desired_, target);
-  return limiter_.follow(desired_).limit == Limit::none ? Moved::active : Moved::clamped;
+ActuatorQueue::Moved ActuatorQueue::go_to(Iteration iteration, const std::byte* target) noexcept {
+  const SetPoint set_point{usual_profile_};
+  const bool same = in_force_ && set_point_ == set_point &&
+                    layout_->same(target, motion_.target(), nullptr);
+  if (!same) {
+    motion_.begin(nullptr);
+    layout_->copy(motion_.target(), target);
+    motion_.settle(iteration, motion_.propose({.profile = usual_profile_}, desired_));
+  }
+  set_point_ = set_point;
+  pace_ = Pace::direct;
+  masked_ = is_trajectory_ = planned_ = false;
+  rows_left_ = ahead_left_ = 0;
+  in_force_ = given_ = running_ = true;
+  const Limited limited = motion_.step(iteration, desired_);
+  if (iteration >= motion_.last() && motion_.arrived()) end_running(iteration);
+  return limited.limit == Limit::none ? Moved::active : Moved::clamped;
 }
 
-Limited ActuatorQueue::move(Iteration iteration) noexcept {
-  motion_.state(iteration, desired_);
-  if (!limiter_.any()) return {};
-  if (pace_ == Pace::fastest) return limiter_.follow_fastest(desired_);
-  return limiter_.follow(motion_, desired_, mask(), first_number_, most_);
+/// The running command leaves the queue; it ends when it has arrived, or gives way to the next one.
+void ActuatorQueue::take_out() noexcept {
+  alone_ = queue_.front();
+  queue_.pop();
+}
+
+/// A set-point gives way to the next direct command. A trajectory whose rows have ended gives way
+/// to any.
+bool ActuatorQueue::gives_way_to(const RecordHead& next) const noexcept {
+  return pace_ != Pace::direct || next.pace == Pace::direct;
+}
+
+void ActuatorQueue::give_way(Iteration iteration) noexcept {
+  running_ = false;
+  if (alone_ == kNoBlock) return;
+  ledger_->end(std::exchange(alone_, kNoBlock), Status::overwritten, Reason::none, 0, iteration);
 }
 
 void ActuatorQueue::end_running(Iteration iteration) noexcept {
-  const BlockIndex record = queue_.front();
-  streams_ = pace_ == Pace::direct;
-  if (streams_) limiter_.hold(mask());
-  holder_ = queue_.front_lane();
   running_ = false;
-  queue_.pop();
-  if (limited_.limit == Limit::none) {
-    ledger_->end(record, Status::completed, Reason::none, 0, iteration);
+  const bool is_set_point = pace_ == Pace::direct;
+  in_force_ = is_set_point;
+  if (is_set_point) motion_.hold();
+  late_ += iteration - motion_.last();
+  motion_.complete();
+  if (std::exchange(given_, false)) return;
+  if (late_ > 0) carry_.reset();
+  const BlockIndex record = running_record();
+  holder_ = ledger_->lane_of(record);
+  if (std::exchange(alone_, kNoBlock) == kNoBlock) queue_.pop();
+  if (late_ > 0 && asked_ > 0) {
+    ledger_->end(record, Status::completed, Reason::limits, reason_.packed(), iteration);
   } else {
-    ledger_->end(record, Status::limited, Reason::limits, limited_.packed(), iteration);
+    ledger_->end(record, Status::completed, Reason::none, 0, iteration);
   }
 }
 
 /// Without a command: the motion brakes within its limits, and fields with a rest value go to it.
 ActuatorQueue::Moved ActuatorQueue::come_to_rest(const std::byte* observed) noexcept {
-  streams_ = false;
-  if (empty()) end_motion();
-  const bool moves = follows() ? follow(observed) : limiter_.any() && limiter_.brake(desired_);
+  motion_.end();
+  given_ = false;
+  carry_.reset();
+  const bool moves = follows() ? follow(observed) : motion_.brake(desired_);
   return moves ? Moved::braking : Moved::idle;
 }
 
 bool ActuatorQueue::begin_next(Iteration iteration, const std::byte* observed,
                                std::uint32_t& late_budget) noexcept {
-  if (!end_late(iteration, late_budget)) return false;
-  const RecordHead& head = pool_->head(queue_.front());
-  if (is_member(head) && !ledger_->groups().is_complete(head, iteration)) {
-    end_motion();  // it brakes while it waits, so the group command starts from rest
-    return false;
+  while (end_late(iteration, late_budget)) {
+    const RecordHead& head = pool_->head(queue_.front());
+    // while it waits for the others of a group it brakes
+    if (is_member(head) && !ledger_->groups().is_complete(head, iteration)) return false;
+    begin_command(observed);
+    if (begin_row(iteration)) return true;
+    if (late_budget == 0) return false;
+    --late_budget;
   }
-  begin_command(iteration);
-  begin_row(iteration, observed);
-  return true;
+  return false;
 }
 
 /// Rejects commands whose `until` has passed; false if no command is left to begin.
@@ -167,13 +214,36 @@ bool ActuatorQueue::end_late(Iteration iteration, std::uint32_t& late_budget) no
   return !queue_.empty();
 }
 
-void ActuatorQueue::begin_command(Iteration iteration) noexcept {
+/// True for a direct command that is equal to the set-point in force.
+bool ActuatorQueue::is_in_force(const RecordHead& head, BlockIndex record) noexcept {
+  const SetPoint next{head.profile, head.start, head.amount, head.masked != 0};
+  if (!in_force_ || head.pace != Pace::direct || !(next == set_point_)) return false;
+  Cursor cursor(*pool_, record, sizeof(RecordHead), head.payload_bytes);
+  if (next.masked) {
+    cursor.read(next_mask_.data(), next_mask_.size() * sizeof next_mask_.front());
+    if (next_mask_ != mask_) return false;
+  }
+  auto* row = reinterpret_cast<std::byte*>(scratch_.data());
+  cursor.read(row, layout_->size());
+  return layout_->same(row, motion_.target(), next.masked ? mask_.data() : nullptr);
+}
+
+void ActuatorQueue::begin_command(const std::byte* observed) noexcept {
   // head => mask, times, rows
   const BlockIndex record = queue_.front();
   const RecordHead& head = pool_->head(record);
+  keeps_plan_ = is_in_force(head, record);
   rows_ = Cursor(*pool_, record, sizeof(RecordHead), head.payload_bytes);
+  bool same_mask = masked_ == (head.masked != 0);
   masked_ = head.masked != 0;
-  if (masked_) rows_.read(mask_.data(), mask_.size() * sizeof mask_.front());
+  if (masked_) {
+    rows_.read(next_mask_.data(), next_mask_.size() * sizeof next_mask_.front());
+    same_mask = same_mask && mask_ == next_mask_;
+    mask_.swap(next_mask_);
+  }
+  // targets of a generator are one motion
+  const bool streams = same_mask && in_force_ && set_point_.profile == Profile::as_sent &&
+                       head.profile == Profile::as_sent;
   timed_ = head.pace == Pace::duration && head.rows > 1;
   time_ = 0;
   if (timed_) {
@@ -181,108 +251,185 @@ void ActuatorQueue::begin_command(Iteration iteration) noexcept {
     times_ = rows_;
     rows_ = rows_of_timed(*pool_, head, layout_->size());
   }
-  limiter_.release();
   pace_ = head.pace;
-  first_number_ = layout_->first_commanded(mask());
-  most_ = pace_ == Pace::speed ? head.speed * period_ : kNoSpeed;
   rows_left_ = head.rows;
-  first_row_ = true;
+  is_trajectory_ = head.rows > 1;
+  ahead_ = rows_;
+  ahead_left_ = 0;
   running_ = true;
-  // consecutive direct commands are one motion
-  if (pace_ != Pace::direct || !streams_) limiter_.begin();
-  streams_ = false;
-  if (is_member(head) && pace_ == Pace::duration) carry_.carry(ledger_->groups().agreed(head));
-  ledger_->activate(record, iteration);
+  given_ = begun_ = false;
+  late_ = 0;
+  reason_ = {};
+  in_force_ = pace_ == Pace::direct;
+  set_point_ = {head.profile, head.start, head.amount, masked_};
+  motion_.release();
+  if (keeps_plan_ || streams) return;
+  motion_.begin(mask());
+  if (head.start == Start::observed) motion_.start_at(observed);
 }
 
 void ActuatorQueue::arrive(Iteration iteration, std::uint32_t& late_budget) noexcept {
-  if (running_ || !end_late(iteration, late_budget)) return;
+  if (running_ && !may_give_way()) return;
+  if (!end_late(iteration, late_budget)) return;
   const RecordHead& head = pool_->head(queue_.front());
-  if (!is_member(head)) return;
+  // a running set-point counts as having reached a direct command
+  if (!is_member(head) || (running_ && !gives_way_to(head))) return;
   ledger_->groups().arrive(head, iteration);
   // all members use the largest rounding carry
   if (head.pace == Pace::duration) {
-    ledger_->groups().offer(head, iteration, carry_.carried());
+    ledger_->groups().offer(head, CommandGroups::Offer::carry, iteration, carry_.carried());
+  }
+}
+
+void ActuatorQueue::agree_on_carry(Iteration iteration) noexcept {
+  if (running_ || queue_.empty()) return;
+  const RecordHead& head = pool_->head(queue_.front());
+  if (!is_member(head) || head.pace != Pace::duration) return;
+  if (ledger_->groups().is_complete(head, iteration)) {
+    carry_.carry(ledger_->groups().agreed(head));
   }
 }
 
 void ActuatorQueue::plan_with_others(Iteration iteration, const std::byte* observed) noexcept {
   if (queue_.empty()) return;
   const RecordHead& head = pool_->head(queue_.front());
-  if (!is_member(head) || !CommandGroups::agrees_on_rows(head)) return;
-  if (running_ && iteration <= motion_.last()) return;
-  if (!running_) {
+  if (!is_member(head)) return;
+  // set-points of each iteration go each by itself
+  if (head.pace == Pace::direct && head.rows > 1) return;
+  if (running_ && !may_give_way()) {
+    if (iteration <= motion_.last() || rows_left_ == 0) return;
+  } else {
+    if (running_ && !gives_way_to(head)) return;
     if (!ledger_->groups().is_complete(head, iteration)) return;
-    begin_command(iteration);
+    if (running_) give_way(iteration);
+    begin_command(observed);
   }
-  plan_row(iteration, observed);
-  ledger_->groups().offer(head, iteration, row_iterations_);
+  plan_row(iteration);
+  ledger_->groups().offer(head, CommandGroups::Offer::iterations, iteration, row_iterations_);
   planned_ = true;
 }
 
-/// The next row of the command => to; false if there is none.
-bool ActuatorQueue::read_row() noexcept {
+/// The next row of the command => target.
+void ActuatorQueue::read_row() noexcept {
+  auto* row = reinterpret_cast<std::byte*>(scratch_.data());
+  rows_.read(masked_ ? row : motion_.target(), layout_->size());
   if (masked_) {
-    auto* row = reinterpret_cast<std::byte*>(scratch_.data());
-    rows_.read(row, layout_->size());
-    layout_->copy(motion_.to(), motion_.from());
-    layout_->copy(motion_.to(), row, mask_.data());
-  } else {
-    rows_.read(motion_.to(), layout_->size());
+    layout_->copy(motion_.target(), desired_);
+    layout_->copy(motion_.target(), row, mask_.data());
   }
   --rows_left_;
+}
+
+/// A set-point of a row of them: it replaces the one before, or is equal to it.
+void ActuatorQueue::next_set_point() noexcept {
+  auto* row = reinterpret_cast<std::byte*>(scratch_.data());
+  Cursor next = rows_;
+  next.read(row, layout_->size());
+  keeps_plan_ = layout_->same(row, motion_.target(), mask());
+  if (!keeps_plan_) motion_.begin(mask());
+}
+
+/// Begins the planned row; false if the command would take too long and is rejected.
+bool ActuatorQueue::begin_row(Iteration iteration) noexcept {
+  const BlockIndex record = queue_.front();
+  const RecordHead& head = pool_->head(record);
+  if (std::exchange(planned_, false)) {
+    row_iterations_ = ledger_->groups().agreed(head);
+  } else {
+    plan_row(iteration);
+  }
+  const bool is_asked = pace_ != Pace::speed && row_iterations_ <= asked_;
+  if (row_iterations_ > kLongestPlan && !is_asked) {
+    end_motion();
+    queue_.pop();
+    ledger_->end(record, Status::rejected, Reason::invalid, reason_.packed(), iteration);
+    return false;
+  }
+  if (keeps_plan_) {
+    motion_.extend(iteration + row_iterations_ - 1);
+  } else if (pace_ == Pace::direct && set_point_.profile == Profile::as_sent) {
+    motion_.follow_as_sent(iteration);
+  } else {
+    motion_.settle(iteration, row_iterations_);
+  }
+  if (asked_ > 0 && row_iterations_ > asked_) {
+    if (late_ == 0) reason_ = motion_.slowest();
+    late_ += row_iterations_ - asked_;
+    carry_.reset();
+  }
+  if (!std::exchange(begun_, true)) {
+    const bool is_late = late_ > 0;
+    ledger_->activate(record, iteration, is_late ? Reason::limits : Reason::none,
+                      is_late ? reason_.packed() : std::uint8_t{0});
+    if (is_trajectory_ && motion_.follows_rows()) ahead_left_ = head.rows;
+  }
+  if (pace_ == Pace::direct && rows_left_ == 0) take_out();
   return true;
 }
 
-void ActuatorQueue::begin_row(Iteration iteration, const std::byte* observed) noexcept {
-  const RecordHead& head = pool_->head(queue_.front());
-  if (std::exchange(planned_, false)) {
-    row_iterations_ = ledger_->groups().agreed(head);
-    if (pace_ == Pace::fastest) limiter_.stretch_fastest(row_iterations_);
-  } else {
-    plan_row(iteration, observed);
+/// Reads the next waypoint: its target and number of iterations.
+void ActuatorQueue::plan_row(Iteration iteration) noexcept {
+  if (begun_ && pace_ == Pace::direct) {
+    next_set_point();
+  } else if (begun_) {
+    motion_.next_row();
   }
-  motion_.begin(iteration, row_iterations_, head.profile, head.pace);
-  first_row_ = false;
-}
-
-/// Reads the next waypoint: start, target, and its own number of iterations.
-void ActuatorQueue::plan_row(Iteration iteration, const std::byte* observed) noexcept {
-  const RecordHead& head = pool_->head(queue_.front());
-
-  // desired, observed or the waypoint before => from
-  if (!first_row_) {
-    layout_->copy(motion_.from(), motion_.to());
-  } else {
-    layout_->copy(motion_.from(), desired_);
-    limiter_.hand_over(motion_, desired_);
-    if (head.start == Start::observed) {
-      layout_->copy_finite(motion_.from(), observed, mask());
-      motion_.start_at_from();
-    }
+  if (keeps_plan_) {
+    rows_.read(scratch_.data(), layout_->size());
+    --rows_left_;
+    asked_ = 0;
+    row_iterations_ = std::max<std::int64_t>(1, motion_.last() - iteration + 1);
+    return;
   }
   read_row();
-  if (masked_) motion_.leave_out(mask());
-  row_iterations_ = iterations(head, iteration);
+  const RecordHead& head = pool_->head(queue_.front());
+  const Motion::Course next = course(head, iteration);
+  const bool is_as_sent = head.profile == Profile::as_sent;
+  row_iterations_ = is_as_sent ? 1 : motion_.propose(next, desired_);
+  asked_ = next.asked;
+  // of several actuators, others may be slower
+  if (head.pace == Pace::speed && !is_member(head)) asked_ = motion_.asked_by_speed();
 }
 
-std::int64_t ActuatorQueue::iterations(const RecordHead& head, Iteration iteration) noexcept {
+/// Rows of a trajectory widen the span in which the limiter follows it.
+void ActuatorQueue::look_ahead() noexcept {
+  auto* row = reinterpret_cast<std::byte*>(scratch_.data());
+  for (std::uint32_t i = 0; i < kReadAhead && ahead_left_ > 0; ++i, --ahead_left_) {
+    ahead_.read(row, layout_->size());
+    motion_.widen(row);
+  }
+}
+
+Motion::Course ActuatorQueue::course(const RecordHead& head, Iteration iteration) noexcept {
+  Motion::Course next;
+  next.profile = head.profile;
+  next.first = layout_->first_commanded(mask());
+  next.is_row = is_trajectory_ && head.profile == Profile::linear && head.pace != Pace::fastest &&
+                head.pace != Pace::direct;
   switch (head.pace) {
     case Pace::direct:
-      return 1;
+      if (head.amount > 0 && motion_.accelerates()) {
+        next.asked = std::max<std::int64_t>(1, std::llround(2e-9 * static_cast<double>(head.amount) / period_));
+      }
+      break;
     case Pace::fastest:
-      return limiter_.plan_fastest(motion_.to(), mask());
+      next.profile = Profile::linear;
+      break;
     case Pace::iterations:
-      return std::max<std::int64_t>(1, head.amount);
+      next.asked = std::max<std::int64_t>(1, head.amount);
+      break;
     case Pace::until:
       carry_.reset();
-      return head.amount - iteration + 1;
+      next.asked = head.amount - iteration + 1;
+      break;
     case Pace::speed:
-      return iterations_at(most_, head.profile);
+      next.cruise = head.speed * period_;
+      break;
     case Pace::duration:
-      return timed_ ? row_of_own_time() : carry_.iterations(head.amount);
+      next.asked = timed_ ? row_of_own_time() : carry_.iterations(head.amount);
+      break;
   }
-  return 1;
+  return next;
 }
 
 /// Skips waypoints that end before the next iteration; the iterations of the first that does not.
@@ -298,12 +445,6 @@ std::int64_t ActuatorQueue::row_of_own_time() noexcept {
     duration = next();
   }
   return carry_.iterations(duration);
-}
-
-std::int64_t ActuatorQueue::iterations_at(double speed, Profile profile) noexcept {
-  if (first_number_ == StateLayout::kNoNumber) return 1;
-  if (profile == Profile::minimum_jerk) return motion_.iterations_at(first_number_, speed);
-  return linear_iterations(motion_.distance(first_number_), speed);
 }
 
 }  // namespace o80

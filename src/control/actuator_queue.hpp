@@ -2,13 +2,11 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <vector>
 
 #include "control/duration.hpp"
 #include "control/lane_lists.hpp"
 #include "control/ledger.hpp"
-#include "control/limiter.hpp"
 #include "control/motion.hpp"
 #include "control/pool.hpp"
 #include "control/state_layout.hpp"
@@ -43,25 +41,30 @@ class ActuatorQueue {
   /// For commands of several actuators (ARCHITECTURE.md, Commands of several actuators); called for
   /// all queues before any step(). Reports that the next command is a member of a group.
   void arrive(Iteration iteration, std::uint32_t& late_budget) noexcept;
+  /// Then, if all members have arrived: takes the largest carry of durations.
+  void agree_on_carry(Iteration iteration) noexcept;
   /// Then, if all members have arrived: proposes its number of iterations. The largest is used.
   void plan_with_others(Iteration iteration, const std::byte* observed) noexcept;
   /// `late_budget`: number of late commands that may still be rejected in this iteration.
   Moved step(Iteration iteration, const std::byte* observed, std::uint32_t& late_budget) noexcept;
-  bool empty() const noexcept { return queue_.empty(); }
-  bool has_no_command() const noexcept { return queue_.empty() && !running_; }
+  /// True if no command or given target is running or queued.
+  bool empty() const noexcept { return queue_.empty() && !running_; }
+  bool has_no_command() const noexcept { return queue_.empty() && (!running_ || is_given()); }
   /// For targets that are given without a command, to a queue that has none: begins a row of them.
   void begin_given(Mode mode) noexcept;
-  /// Then, in each iteration: goes to the next one, as a command of one iteration would.
-  Moved go_to(const std::byte* target) noexcept;
+  /// Then, in each iteration: goes to the next one, as a direct command would. The last one stays in
+  /// force.
+  Moved go_to(Iteration iteration, const std::byte* target) noexcept;
   /// True if a direct value keeps a number away from its rest value.
-  bool holds() const noexcept { return limiter_.holds(); }
+  bool holds() const noexcept { return motion_.holds(); }
   /// True if an iteration without a command would change nothing.
-  bool at_rest() const noexcept {
-    return follows() ? limiter_.resting_at_rest() : limiter_.at_rest();
-  }
+  bool at_rest() const noexcept { return follows() ? motion_.resting_at_rest() : motion_.at_rest(); }
+  /// True if it would move nothing.
+  bool stays() const noexcept { return follows() ? motion_.resting_at_rest() : motion_.stays(); }
   /// True if a command of this lane is queued or running, or its direct value is still held.
   bool acts(std::uint32_t lane) const noexcept {
-    return queue_.has(lane) || (holder_ == lane && holds());
+    return queue_.has(lane) || (alone_ != kNoBlock && ledger_->lane_of(alone_) == lane) ||
+           (holder_ == lane && holds());
   }
 
   /// Sets the desired state, at rest. Numbers that are not finite keep their last desired value.
@@ -72,20 +75,35 @@ class ActuatorQueue {
   bool follows() const noexcept { return when_idle_ == WhenIdle::follow; }
 
  private:
+  /// What a direct command, or a given target, is: an equal one behind it changes nothing.
+  struct SetPoint {
+    Profile profile = Profile::linear;
+    Start start = Start::desired;
+    std::int64_t every = 0;  // [ns]
+    bool masked = false;
+    bool operator==(const SetPoint&) const = default;
+  };
+
   bool begin_next(Iteration iteration, const std::byte* observed,
                   std::uint32_t& late_budget) noexcept;
   bool end_late(Iteration iteration, std::uint32_t& late_budget) noexcept;
-  void begin_command(Iteration iteration) noexcept;
-  void begin_row(Iteration iteration, const std::byte* observed) noexcept;
-  void plan_row(Iteration iteration, const std::byte* observed) noexcept;
-  bool read_row() noexcept;
-  std::int64_t iterations(const RecordHead& head, Iteration iteration) noexcept;
-  std::int64_t iterations_at(double speed, Profile profile) noexcept;
+  bool may_give_way() const noexcept { return running_ && (alone_ != kNoBlock || given_); }
+  bool gives_way_to(const RecordHead& next) const noexcept;
+  void give_way(Iteration iteration) noexcept;
+  bool is_in_force(const RecordHead& head, BlockIndex record) noexcept;
+  void begin_command(const std::byte* observed) noexcept;
+  bool begin_row(Iteration iteration) noexcept;
+  void plan_row(Iteration iteration) noexcept;
+  void read_row() noexcept;
+  void next_set_point() noexcept;
+  void look_ahead() noexcept;
+  Motion::Course course(const RecordHead& head, Iteration iteration) noexcept;
   std::int64_t row_of_own_time() noexcept;
-  Limited move(Iteration iteration) noexcept;
   void end_running(Iteration iteration) noexcept;
+  void take_out() noexcept;
+  BlockIndex running_record() const noexcept { return alone_ != kNoBlock ? alone_ : queue_.front(); }
+  bool is_given() const noexcept { return running_ && given_; }
   Moved come_to_rest(const std::byte* observed) noexcept;
-  void keep_moving() noexcept;
   void end_motion() noexcept;
   const std::uint64_t* mask() const noexcept { return masked_ ? mask_.data() : nullptr; }
 
@@ -94,34 +112,43 @@ class ActuatorQueue {
   Ledger* ledger_;
   std::byte* desired_;
   Motion motion_;
-  Limiter limiter_;
   DurationCarry carry_;
   double period_;  // [s]
+  Profile usual_profile_;
   WhenIdle when_idle_;
 
-  LaneLists queue_;  // the front is the running command, if `running_`
+  LaneLists queue_;  // the front is the running command, if `running_` and not `alone_` or `given_`
   bool running_ = false;
-  Limited limited_;           // in the last iteration
+  // the running command that may give way to its successor: taken out of the queue
+  BlockIndex alone_ = kNoBlock;
+  bool given_ = false;        // a given target is in force, without a record
   std::uint32_t holder_ = 0;  // lane that gave the direct value that stays
-  bool streams_ = false;      // the iteration before was a direct command's
+
+  // the set-point in force: of the running command, or of the last one if nothing came after it
+  bool in_force_ = false;
+  SetPoint set_point_;
 
   // the running command
   Pace pace_ = Pace::direct;
-  double most_ =
-      std::numeric_limits<double>::infinity();  // speed of its first number [1/iteration]
-  std::uint32_t first_number_ = 0;              // its first commanded number
   std::uint32_t rows_left_ = 0;
   bool masked_ = false;
   bool timed_ = false;
-  bool first_row_ = false;
+  bool is_trajectory_ = false;
+  bool keeps_plan_ = false;          // a set-point equal to the one in force
+  bool begun_ = false;               // reported as active
   bool planned_ = false;             // plan_with_others() has planned its next waypoint
   std::int64_t row_iterations_ = 1;  // iterations of the planned waypoint
+  std::int64_t asked_ = 0;           // of these, those that were asked for; 0: none
+  std::int64_t late_ = 0;            // iterations more than asked
+  Limited reason_;                   // for these
   std::int64_t time_ = 0;            // end time of the last waypoint [ns]
   Cursor times_;
   Cursor rows_;
+  Cursor ahead_;  // next row of a trajectory whose span is not known yet
+  std::uint32_t ahead_left_ = 0;
   std::vector<std::uint64_t> mask_;
+  std::vector<std::uint64_t> next_mask_;
   std::vector<std::uint64_t> scratch_;  // space for a state
-  std::vector<std::uint64_t> spare_;    // space for a state
 };
 
 }  // namespace o80

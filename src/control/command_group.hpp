@@ -25,7 +25,8 @@ struct CommandGroup {
   Reason reason = Reason::none;
   std::uint8_t detail = 0;
   std::uint8_t active : 1 = 0;   // reported as active
-  std::uint8_t offered : 1 = 0;  // kOffers is valid
+  std::uint8_t offered : 2 = 0;  // a CommandGroups::Offer
+  std::uint8_t decided : 1 = 0;  // its members have nothing left to agree on
 };
 static_assert(sizeof(CommandGroup) == kBlockBytes - sizeof(RecordHead));
 
@@ -36,11 +37,8 @@ class CommandGroups {
  public:
   explicit CommandGroups(BlockPool& pool) : pool_(&pool) {}
 
-  /// True for the paces (speed, fastest) whose members must agree on the iterations of every
-  /// waypoint.
-  static bool agrees_on_rows(const RecordHead& head) noexcept {
-    return head.pace == Pace::speed || head.pace == Pace::fastest;
-  }
+  /// What members agree on: the largest offer of an iteration.
+  enum class Offer : std::uint8_t { none, carry, iterations };
   static BlockIndex head_of(const RecordHead& member) noexcept {
     return static_cast<BlockIndex>(member.id & ~kMemberMark);
   }
@@ -65,14 +63,16 @@ class CommandGroups {
            (stamp(head, kArrivals) == low(iteration) && group.arrived == group.open);
   }
 
-  /// Proposes a number; agreed() is the largest one of an iteration.
-  void offer(const RecordHead& member, Iteration iteration, std::int64_t number) noexcept {
+  /// Proposes a number; agreed() is the largest one of this kind and iteration.
+  void offer(const RecordHead& member, Offer kind, Iteration iteration,
+             std::int64_t number) noexcept {
     const BlockIndex head = head_of(member);
     CommandGroup& group = at(head);
     std::int64_t& largest = pool_->head(head).amount;
-    const bool is_first = group.offered == 0 || stamp(head, kOffers) != low(iteration);
+    const bool is_first = static_cast<Offer>(group.offered) != kind ||
+                          stamp(head, kOffers) != low(iteration);
     largest = is_first ? number : std::max(largest, number);
-    group.offered = 1;
+    group.offered = static_cast<std::uint8_t>(kind) & 3U;
     stamp(head, kOffers) = low(iteration);
   }
   std::int64_t agreed(const RecordHead& member) const noexcept {

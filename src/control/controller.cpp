@@ -82,6 +82,7 @@ void Controller::step_groups(Iteration iteration, const std::byte* observed,
     }
   };
   each_busy([&](std::uint32_t i) { actuators_[i].arrive(iteration, late_budget); });
+  each_busy([&](std::uint32_t i) { actuators_[i].agree_on_carry(iteration); });
   each_busy([&](std::uint32_t i) { actuators_[i].plan_with_others(iteration, of(i, observed)); });
 }
 
@@ -107,7 +108,7 @@ void Controller::step(Iteration iteration, const std::byte* observed) noexcept {
       switch (queue.step(iteration, of(i, observed), late_budget)) {
         case ActuatorQueue::Moved::idle:
           // the queue is not empty if late commands have used up their budget
-          if (queue.empty()) busy_[word] &= ~bit;
+          if (queue.empty() && queue.at_rest()) busy_[word] &= ~bit;
           break;
         case ActuatorQueue::Moved::braking:
           braking |= bit;
@@ -146,7 +147,7 @@ void Controller::step_given(Iteration iteration) noexcept {
     const std::uint64_t bit = std::uint64_t{1} << (i % 64);
     if ((dropped_[i / 64] & bit) != 0) continue;
     if (first) actuators_[i].begin_given(given_.mode);
-    const bool clamped = actuators_[i].go_to(target) == ActuatorQueue::Moved::clamped;
+    const bool clamped = actuators_[i].go_to(iteration, target) == ActuatorQueue::Moved::clamped;
     stepped_[i / 64] |= bit;
     busy_[i / 64] |= bit;
     clamped_mask_[i / 64] = clamped ? clamped_mask_[i / 64] | bit : clamped_mask_[i / 64] & ~bit;
@@ -209,7 +210,7 @@ bool Controller::braking() const noexcept {
   // in the last step; or in the next one, for an actuator that has just lost its command
   return std::ranges::any_of(braking_mask_, [](std::uint64_t word) { return word != 0; }) ||
          std::ranges::any_of(actuators_, [](const ActuatorQueue& queue) {
-           return queue.empty() && !queue.at_rest();
+           return queue.empty() && !queue.stays();
          });
 }
 

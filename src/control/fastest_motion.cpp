@@ -172,11 +172,14 @@ void FastestMotion::settle() noexcept {
 void FastestMotion::stretch(std::int64_t iterations) noexcept {
   if (iterations <= iterations_ || before_ == 0) return;
   const FastestMotion shortest = *this;
+  // a mean of two motions that happens to have the right length still needs its own cruising speed
+  bool exact = !mixed_;
   mixed_ = false;
   nearer_ = {};
   cruises_ = true;
   settle();
-  for (int i = 0; i < kMostCorrections && iterations_ != iterations; ++i) {
+  for (int i = 0; i < kMostCorrections && (iterations_ != iterations || !exact); ++i) {
+    exact = true;
     before_ += iterations - iterations_;
     if (before_ < 0) break;
     cruise_ = cruise_for(static_cast<double>(before_), 0.0, cruise_);

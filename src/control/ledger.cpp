@@ -88,7 +88,8 @@ void Ledger::reject(std::uint32_t lane, BlockIndex block, Reason reason, std::ui
   close(block, iteration);
 }
 
-void Ledger::activate(BlockIndex record, Iteration iteration) noexcept {
+void Ledger::activate(BlockIndex record, Iteration iteration, Reason reason,
+                      std::uint8_t detail) noexcept {
   const RecordHead& head = pool_.head(record);
   CommandId id = head.id;
   if (is_member(head)) {
@@ -96,9 +97,12 @@ void Ledger::activate(BlockIndex record, Iteration iteration) noexcept {
     if (groups_.at(group).active != 0) return;
     groups_.at(group).active = 1;
     id = pool_.head(group).id;
-    if (!CommandGroups::agrees_on_rows(pool_.head(group))) --undecided_groups_;
+    if (head.rows == 1) {
+      groups_.at(group).decided = 1;
+      --undecided_groups_;
+    }
   }
-  sink_.changed({lane_of(record), id, Status::active, Reason::none, 0, iteration});
+  sink_.changed({lane_of(record), id, Status::active, reason, detail, iteration});
 }
 
 void Ledger::end(BlockIndex record, Status status, Reason reason, std::uint8_t detail,
@@ -126,10 +130,16 @@ void Ledger::member_ended(BlockIndex record, Status status, Reason reason, std::
     group.reason = reason;
     group.detail = detail;
   }
+  // longer than asked: keep which limit it was, if a member knows
+  if (status == Status::completed && reason == Reason::limits && group.end == Status::none &&
+      (group.detail & 7U) == 0) {
+    group.reason = reason;
+    group.detail = detail;
+  }
   if (--group.open > 0) return;
   --open_groups_;
   const CommandGroup of = group;
-  if (of.active == 0 || CommandGroups::agrees_on_rows(pool_.head(record))) --undecided_groups_;
+  if (of.decided == 0) --undecided_groups_;
   end(record, of.end == Status::none ? Status::completed : of.end, of.reason, of.detail,
       of.last_end);
 }

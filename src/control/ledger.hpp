@@ -31,7 +31,7 @@ class Ledger {
 
   /// Number of commands of several actuators that were taken and have not ended.
   std::uint32_t open_groups() const noexcept { return open_groups_; }
-  /// Number of those whose members still have to agree on their begin, or on the iterations of each
+  /// Number of those whose members still have to agree on their begin, or on the iterations of a
   /// waypoint.
   std::uint32_t undecided_groups() const noexcept { return undecided_groups_; }
   CommandGroups& groups() noexcept { return groups_; }
@@ -49,8 +49,9 @@ class Ledger {
   void reject(std::uint32_t lane, BlockIndex batch, Reason reason, std::uint8_t detail,
               Iteration iteration, Status status = Status::rejected) noexcept;
 
-  /// A command, or a member of a group, has begun.
-  void activate(BlockIndex record, Iteration iteration) noexcept;
+  /// A command, or a member of a group, has begun. Reason::limits: it takes longer than asked.
+  void activate(BlockIndex record, Iteration iteration, Reason reason = Reason::none,
+                std::uint8_t detail = 0) noexcept;
   /// A record has ended; reported at once. A group is reported when its last member has ended, with
   /// the first end status that is not completed.
   void end(BlockIndex record, Status status, Reason reason, std::uint8_t detail,

@@ -78,6 +78,15 @@ std::string labels_of(const Schema& schema, const FieldRow& field) {
 
 }  // namespace
 
+Profile usual_profile(const Schema& schema, const ActuatorRow& actuator) noexcept {
+  for (std::uint32_t i = 0; i < actuator.limits; ++i) {
+    if (std::isfinite(schema.limits[actuator.first_limit + i].acceleration)) {
+      return Profile::minimum_jerk;
+    }
+  }
+  return Profile::linear;
+}
+
 CommandCheck::CommandCheck(const Schema& schema) : schema_(schema), layouts_(schema.types.size()) {
   for (const ActuatorRow& actuator : schema.actuators) {
     auto& layout = layouts_.at(actuator.type);
@@ -260,16 +269,6 @@ void CommandCheck::fastest(std::uint32_t index, std::span<const std::uint64_t> m
                           " is unknown: its driver sets no limits of speed and acceleration. Give "
                           "a duration or a speed instead, or leave that field out.");
   }
-}
-
-Profile CommandCheck::profile(std::uint32_t index) const {
-  const ActuatorRow& row = schema_.actuators[actuator(std::int64_t{index})];
-  for (std::uint32_t i = 0; i < row.limits; ++i) {
-    if (std::isfinite(schema_.limits[row.first_limit + i].acceleration)) {
-      return Profile::minimum_jerk;
-    }
-  }
-  return Profile::linear;
 }
 
 void CommandCheck::request(std::uint32_t index, std::span<const std::byte> payload) const {

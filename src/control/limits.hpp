@@ -13,6 +13,9 @@
 
 namespace o80 {
 
+/// Profile of a command that names none: minimum_jerk for an actuator with acceleration limits.
+Profile usual_profile(const Schema& schema, const ActuatorRow& actuator) noexcept;
+
 /// Checks a command when it is added to a batch.
 ///
 /// Each function throws InvalidArgument with the actuator, the field, the value and the allowed
@@ -43,8 +46,9 @@ class CommandCheck {
   void speed(std::uint32_t actuator, double speed, std::span<const std::uint64_t> mask = {}) const;
   /// Checks that all commanded numbers have limits of speed and acceleration.
   void fastest(std::uint32_t actuator, std::span<const std::uint64_t> mask = {}) const;
-  /// Default profile of a command.
-  Profile profile(std::uint32_t actuator) const;
+  Profile usual_profile(std::uint32_t actuator) const {
+    return o80::usual_profile(schema_, schema_.actuators[actuator]);
+  }
   /// Checks the struct of a request: booleans are 0 or 1, enumerations have a label.
   void request(std::uint32_t index, std::span<const std::byte> payload) const;
 

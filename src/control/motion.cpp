@@ -1,27 +1,15 @@
 #include "control/motion.hpp"
 
-#include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <type_traits>
+#include <utility>
 
 #include "describe/visit_number.hpp"
 
 namespace o80 {
 namespace {
-
-/// The fraction `share` between `from` and `to`, never outside, despite rounding and overflow.
-double between(double from, double to, double distance, double share) noexcept {
-  const double value = from + distance * share;
-  const double low = std::min(from, to);
-  const double high = std::max(from, to);
-  if (value >= low && value <= high) return value;
-  if (value < low && std::isfinite(distance)) return low;
-  if (value > high && std::isfinite(distance)) return high;
-  // the distance has overflowed, or `from` is not finite
-  const double weighed = from * (1.0 - share) + to * share;
-  return std::isfinite(weighed) ? weighed : to;
-}
 
 template <class T>
 void store(std::byte* out, T value) noexcept {
@@ -48,230 +36,286 @@ T moved_wide(T from, T to, double share) noexcept {
   return to_integer<T>(start + (target - start) * static_cast<long double>(share));
 }
 
+/// Range of the values of a kind. It also bounds the motion to rest.
+std::pair<double, double> range_of(Kind kind) noexcept {
+  return visit_number(kind, []<class T>(T) {
+    using Range = std::numeric_limits<T>;
+    return std::pair(static_cast<double>(Range::lowest()), static_cast<double>(Range::max()));
+  });
+}
+
+/// The nearest float from `low` to `high`.
+float nearest_float(double value, double low, double high) noexcept {
+  auto narrow = static_cast<float>(value);
+  if (narrow > high) narrow = std::nextafter(narrow, -HUGE_VALF);
+  if (narrow < low) narrow = std::nextafter(narrow, HUGE_VALF);
+  return narrow;
+}
+
+double nearest_whole(double value, double low, double high) noexcept {
+  double whole = std::round(value);
+  if (whole > high) whole = std::floor(value);
+  if (whole < low) whole = std::ceil(value);
+  return whole;
+}
+
 }  // namespace
 
-Motion::Motion(const StateLayout& layout)
+Motion::Motion(const Schema& schema, const ActuatorRow& actuator, const StateLayout& layout)
     : layout_(layout),
       stride_((layout.size() + 15) / 16 * 16),
-      ends_(3 * stride_ / sizeof(std::uint64_t)),
-      exact_(layout.numbers().size(), std::numeric_limits<double>::quiet_NaN()),
-      starts_(layout.numbers().size()),
-      targets_(layout.numbers().size()),
-      values_(layout.numbers().size()),
-      ways_(layout.numbers().size()),
-      kept_(layout.numbers().size()) {}
+      ends_(3 * stride_ / sizeof(std::uint64_t)) {
+  constexpr double kUnlimited = std::numeric_limits<double>::infinity();
+  const double period = static_cast<double>(schema.head.period) / 1e9;
+  for (std::uint32_t i = 0; i < layout.numbers().size(); ++i) {
+    const NumberPlace& place = layout.numbers()[i];
+    if (layout.hooks().blend != nullptr) continue;
+    if (!place.moves()) {
+      switches_.push_back(i);
+      continue;
+    }
+    const LimitRow& row = schema.limits.at(actuator.first_limit + i);
+    const Rates rates{row.speed * period, row.acceleration * period * period,
+                      row.jerk * period * period * period};
+    const bool limited =
+        row.minimum > -kUnlimited || row.maximum < kUnlimited || rates.speed < kUnlimited;
+    const auto [lowest, highest] = range_of(place.kind);
+    const NumberLimiter guard(std::max(row.minimum, lowest), std::min(row.maximum, highest), rates);
+    numbers_.push_back({i, place.offset, lowest, highest, place.kind, limited || row.resting != 0,
+                        NumberMotion(guard, row.resting != 0 ? std::optional(row.rest)
+                                                             : std::nullopt)});
+  }
+}
 
-void Motion::begin(Iteration first, std::int64_t iterations, Profile profile, Pace pace) noexcept {
+void Motion::restart(const std::byte* state) noexcept {
+  for (Number& each : numbers_) each.motion.restart(layout_.number(each.number, state));
+}
+
+void Motion::begin(const std::uint64_t* mask) noexcept {
+  begun_ = true;
+  observed_ = nullptr;
+  follows_rows_ = false;
+  for (Number& each : numbers_) {
+    each.is_commanded = masked(mask, each.number);
+    each.motion.begin();
+  }
+}
+
+bool Motion::accelerates() const noexcept {
+  return std::ranges::any_of(numbers_, [](const Number& each) {
+    return each.is_commanded && each.motion.accelerates();
+  });
+}
+
+/// Iterations of a row, or of a type that blends by itself, at the speed asked for.
+std::int64_t Motion::iterations_at(const Course& course) const noexcept {
+  if (course.first == StateLayout::kNoNumber) return 1;
+  constexpr double kPeakFromRest = 1.875;  // of a minimum-jerk motion, to its mean speed
+  const double distance =
+      layout_.number(course.first, target()) - layout_.number(course.first, from());
+  const bool is_smooth = course.profile == Profile::minimum_jerk;
+  return iterations_of(is_smooth ? kPeakFromRest * distance : distance, course.cruise);
+}
+
+std::int64_t Motion::propose(const Course& course, const std::byte* desired) noexcept {
+  profile_ = course.profile;
+  is_row_ = course.is_row;
+  const bool first_row = std::exchange(begun_, false);
+  // a row begins at the row before it
+  if (first_row || !is_row_) layout_.copy(from(), desired);
+  const std::byte* observed = first_row ? std::exchange(observed_, nullptr) : nullptr;
+  if (observed != nullptr) layout_.copy_finite(from(), observed);
+
+  std::int64_t longest = std::max<std::int64_t>(1, course.asked);
+  slowest_ = {};
+  if ((is_row_ || numbers_.empty()) && std::isfinite(course.cruise)) {
+    longest = iterations_at(course);
+  }
+  asked_by_speed_ = longest;
+  for (Number& each : numbers_) {
+    if (!each.is_commanded) continue;
+    NumberMotion::Asked asked;
+    asked.target = layout_.number(each.number, target());
+    const bool at_published = observed != nullptr || !each.is_limited || !(first_row || !is_row_);
+    asked.line_start =
+        at_published ? layout_.number(each.number, from()) : each.motion.position();
+    if (is_row_) {
+      follows_rows_ = follows_rows_ || each.motion.has_rates();
+      each.motion.line(asked.line_start, asked.target);
+      continue;
+    }
+    if (!first_row) each.motion.begin();
+    if (observed != nullptr) asked.start = asked.line_start;
+    asked.iterations = course.asked;
+    asked.profile = course.profile;
+    if (each.number == course.first) asked.cruise = course.cruise;
+    const std::int64_t fewest = each.motion.propose(asked);
+    if (each.number == course.first) asked_by_speed_ = fewest;
+    if (fewest <= longest) continue;
+    longest = fewest;
+    slowest_ = {each.motion.plan().slowest(), each.number};
+  }
+  return longest;
+}
+
+void Motion::settle(Iteration first, std::int64_t iterations) noexcept {
   first_ = first;
   last_ = first + (iterations - 1);
   iterations_ = static_cast<double>(iterations);
-  profile_ = profile;
-  pace_ = pace;
-  continues_ = moving_ && profile == Profile::minimum_jerk && pace != Pace::fastest;
-  moving_ = false;
-  measured_ = false;
-  if (iterations > 1) measure();  // else there is nothing to interpolate
-  start_at_from();
-}
-
-void Motion::start_at_from() noexcept {
-  std::fill(exact_.begin(), exact_.end(), std::numeric_limits<double>::quiet_NaN());
-}
-
-double Motion::distance(std::size_t number) const noexcept {
-  return target_of(number) - start_of(number);
-}
-
-double Motion::target_of(std::size_t number) const noexcept {
-  const auto* from = reinterpret_cast<const std::byte*>(ends_.data());
-  return layout_.number(number, from + stride_);
-}
-
-double Motion::start_of(std::size_t number) const noexcept {
-  const auto* from = reinterpret_cast<const std::byte*>(ends_.data());
-  return std::isnan(exact_[number]) ? layout_.number(number, from) : exact_[number];
-}
-
-/// Computes start, target and way of each number. Not called before they are needed: most commands
-/// of one iteration do not need them.
-void Motion::measure() noexcept {
-  measured_ = true;
-  const auto& numbers = layout_.numbers();
-  for (std::size_t i = 0; i < numbers.size(); ++i) {
-    if (!numbers[i].moves()) continue;
-    starts_[i] = start_of(i);
-    targets_[i] = target_of(i);
-    if (continues_) ways_[i] = way(i, iterations_);
-  }
-}
-
-/// The overwritten motion fades to rest within the time that it had left, inside the span of its
-/// present position, stopping position and target, and the new target.
-Motion::Way Motion::way(std::size_t number, double iterations) const noexcept {
-  const Kept& kept = kept_[number];
-  const double start = start_of(number);
-  const double target = target_of(number);
-  Way way;
-  way.low = std::min({start, target, kept.stop, kept.target});
-  way.high = std::max({start, target, kept.stop, kept.target});
-  way.fading =
-      Fading::of(kept.moment, std::min(left_, iterations), way.high - start, start - way.low);
-  return way;
-}
-
-void Motion::state(Iteration iteration, std::byte* out) noexcept {
-  now_ = iteration;
-  if (iteration >= last_) {
-    layout_.copy(out, to());
-    return;
-  }
-  const double time = static_cast<double>(iteration - first_ + 1) / iterations_;
-  if (layout_.hooks().blend != nullptr) {
-    std::byte* blended = to() + stride_;
-    layout_.hooks().blend(blended, from(), to(), share_of(time));
-    // a blend() that divides by zero gives an invalid state: keep the last one
-    if (layout_.finite(blended)) layout_.copy(out, blended);
-  } else if (layout_.plain() && !continues_) {
-    plain_state(share_of(time), out);
-  } else {
-    mixed_state(time, out);
-  }
-}
-
-double Motion::number(std::size_t number) const noexcept {
-  return arrived() ? target_of(number) : values_[number];
-}
-
-void Motion::plain_state(double share, std::byte* out) noexcept {
-  for (std::size_t i = 0; i < starts_.size(); ++i) {
-    values_[i] = between(starts_[i], targets_[i], targets_[i] - starts_[i], share);
-    store(out + i * sizeof(double), values_[i]);
-  }
-}
-
-double Motion::moved(std::size_t number, double time) const noexcept {
-  const double start = starts_[number];
-  const double distance = targets_[number] - start;
-  if (continues_) {
-    const Way& way = ways_[number];
-    const double value = start + way.fading.position(time * iterations_) +
-                         (distance - way.fading.distance()) * minimum_jerk(time);
-    if (std::isfinite(value)) return std::clamp(value, way.low, way.high);
-  }
-  return between(start, targets_[number], distance, share_of(time));
-}
-
-void Motion::mixed_state(double time, std::byte* out) noexcept {
-  const std::byte* begins = reinterpret_cast<const std::byte*>(ends_.data());
-  const std::byte* ends = begins + stride_;
-  const auto& numbers = layout_.numbers();
-  for (std::size_t i = 0; i < numbers.size(); ++i) {
-    const std::uint32_t offset = numbers[i].offset;
-    std::byte* at = out + offset;
-    if (!numbers[i].moves()) {  // booleans and enumerations switch at the start
-      std::memcpy(at, ends + offset, numbers[i].size);
-      continue;
-    }
-    values_[i] = moved(i, time);
-    visit_number(numbers[i].kind, [&]<class T>(T) {
-      if constexpr (std::is_floating_point_v<T>) {
-        store(at, static_cast<T>(values_[i]));
-      } else if (sizeof(T) < 8) {
-        store(at, to_integer<T>(values_[i]));
-      } else if (continues_) {
-        store(at, to_integer<T>(static_cast<long double>(values_[i])));
-      } else {
-        store(at, moved_wide(load<T>(begins + offset), load<T>(ends + offset), share_of(time)));
-      }
-    });
-  }
-}
-
-void Motion::keep_moving(const std::byte* ahead, std::int64_t rows) noexcept {
-  moving_ = pace_ != Pace::direct && layout_.hooks().blend == nullptr;
-  if (!moving_) return;
-  if (!measured_) measure();
-  const double done = std::min(iterations_, static_cast<double>(now_ - first_ + 1));
-  left_ = iterations_ - done + static_cast<double>(rows) * iterations_;
-  const double time = done / iterations_;
-  for (std::size_t i = 0; i < kept_.size(); ++i) {
-    Kept& kept = kept_[i];
-    if (!layout_.numbers()[i].moves()) {
-      kept = {};
-      continue;
-    }
-    kept = {{}, 0.0, targets_[i], layout_.number(i, ahead)};
-    double distance = targets_[i] - starts_[i];
-    if (profile_ == Profile::linear) {
-      kept.moment.velocity = left_ > 0.0 ? distance / iterations_ : 0.0;
+  for (Number& each : numbers_) {
+    if (!each.is_commanded) continue;
+    if (is_row_) {
+      each.motion.line_for(iterations);
     } else {
-      if (continues_) {
-        kept.moment = ways_[i].fading.at(done);
-        distance -= ways_[i].fading.distance();
-        kept.stop = starts_[i] + ways_[i].fading.distance();
-      } else {
-        kept.stop = starts_[i];
-      }
-      kept.moment.velocity += distance * minimum_jerk_slope(time) / iterations_;
-      kept.moment.acceleration +=
-          distance * minimum_jerk_curvature(time) / (iterations_ * iterations_);
+      each.motion.settle(iterations);
     }
-    kept.step = moved(i, time) - moved(i, std::max(0.0, done - 1.0) / iterations_);
-    const bool usable =
-        std::isfinite(kept.moment.velocity) && std::isfinite(kept.moment.acceleration);
-    if (!usable) kept.moment = {};
   }
 }
 
-void Motion::keep_moving(const std::byte* state, std::size_t number, const Moment& moment,
-                         double stop, std::int64_t iterations) noexcept {
-  if (!moving_) {
-    if (moment.velocity == 0.0 && moment.acceleration == 0.0) return;
-    for (std::size_t i = 0; i < kept_.size(); ++i) {
-      const double here = layout_.numbers()[i].moves() ? layout_.number(i, state) : 0.0;
-      kept_[i] = {{}, 0.0, here, here};
+void Motion::follow_as_sent(Iteration first) noexcept {
+  first_ = last_ = first;
+  iterations_ = 1.0;
+  begun_ = is_row_ = false;
+  for (Number& each : numbers_) {
+    if (each.is_commanded) each.motion.follow_as_sent(layout_.number(each.number, target()));
+  }
+}
+
+void Motion::widen(const std::byte* row) noexcept {
+  for (Number& each : numbers_) {
+    if (each.is_commanded) each.motion.widen(layout_.number(each.number, row));
+  }
+}
+
+/// Types that blend by themselves: by the share of the time, from rest to rest.
+void Motion::blend(std::byte* state) noexcept {
+  if (now_ >= last_) return layout_.copy(state, target());
+  const auto i = static_cast<double>(now_ - first_ + 1);
+  const double share = profile_ == Profile::minimum_jerk
+                           ? SmoothMotion({}, 1.0, static_cast<std::int64_t>(iterations_)).position(i)
+                           : i / iterations_;
+  std::byte* blended = target() + stride_;
+  layout_.hooks().blend(blended, from(), target(), share);
+  // a blend() that divides by zero gives an invalid state: keep the last one
+  if (layout_.finite(blended)) layout_.copy(state, blended);
+}
+
+Limited Motion::step(Iteration now, std::byte* state) noexcept {
+  now_ = now;
+  Limited result;
+  if (layout_.hooks().blend != nullptr) {
+    blend(state);
+    return result;
+  }
+  for (const std::uint32_t i : switches_) {
+    const NumberPlace& place = layout_.numbers()[i];
+    std::memcpy(state + place.offset, target() + place.offset, place.size);
+  }
+  const bool over = now >= last_;
+  for (Number& each : numbers_) {
+    if (!each.is_commanded) {
+      each.motion.brake();
+      if (each.is_limited) publish(each, state);
+      continue;
     }
-    left_ = 0.0;
-    moving_ = true;
+    const Limit limit = each.motion.step(each.lowest, each.highest);
+    if (limit != Limit::none && result.limit == Limit::none) result = {limit, each.number};
+    if (over && each.motion.arrived()) {
+      std::memcpy(state + each.offset, target() + each.offset, layout_.numbers()[each.number].size);
+    } else if (each.kind == Kind::float64) {
+      store(state + each.offset, each.motion.position());
+    } else if (each.is_limited) {
+      publish(each, state);
+    } else {
+      publish_exact(each, state);
+    }
   }
-  kept_[number] = {moment, moment.velocity, stop, stop};
-  left_ = std::max(left_, static_cast<double>(iterations));
+  return result;
 }
 
-void Motion::leave_out(const std::uint64_t* mask) noexcept {
-  for (std::size_t i = 0; moving_ && i < kept_.size(); ++i) {
-    if (!masked(mask, i)) kept_[i].moment = {};
+/// Writes one number to the state, rounded to its kind, inward at its bounds.
+void Motion::publish(const Number& number, std::byte* state) const noexcept {
+  std::byte* at = state + number.offset;
+  const double value = number.motion.position();
+  // a number outside its bounds may stay there
+  const double low = std::min(number.motion.guard().minimum(), value);
+  const double high = std::max(number.motion.guard().maximum(), value);
+  visit_number(number.kind, [&]<class T>(T) {
+    if constexpr (std::is_integral_v<T>) {
+      store(at, to_integer<T>(nearest_whole(value, low, high)));
+    } else {
+      store(at, static_cast<T>(sizeof(T) < 8 ? nearest_float(value, low, high) : value));
+    }
+  });
+}
+
+/// The same for a number without limits; integers that a double cannot hold stay exact on a line.
+void Motion::publish_exact(const Number& number, std::byte* state) const noexcept {
+  std::byte* at = state + number.offset;
+  const double value = number.motion.position();
+  visit_number(number.kind, [&]<class T>(T) {
+    if constexpr (std::is_floating_point_v<T>) {
+      store(at, static_cast<T>(value));
+    } else if (sizeof(T) < 8) {
+      store(at, to_integer<T>(value));
+    } else if (!number.motion.plan().is_line()) {
+      store(at, to_integer<T>(static_cast<long double>(value)));
+    } else {
+      store(at, moved_wide(load<T>(from() + number.offset), load<T>(target() + number.offset),
+                           number.motion.plan().share()));
+    }
+  });
+}
+
+void Motion::end() noexcept {
+  for (Number& each : numbers_) each.motion.end();
+}
+
+void Motion::complete() noexcept {
+  for (Number& each : numbers_) {
+    if (each.is_commanded) {
+      each.motion.complete();
+    } else {
+      each.motion.end();
+    }
   }
 }
 
-std::int64_t Motion::iterations_at(std::size_t number, double speed) noexcept {
-  const double start = start_of(number);
-  const double target = target_of(number);
-  if (!moving_) return minimum_jerk_iterations(target - start, speed);
+bool Motion::brake(std::byte* state) noexcept {
+  bool moves = false;
+  for (Number& each : numbers_) {
+    const double before = each.motion.position();
+    moves = each.motion.brake() || moves;
+    if (each.motion.position() != before) publish(each, state);
+  }
+  return moves;
+}
 
-  // drop an acceleration that would raise the speed further
-  Kept& kept = kept_[number];
-  Moment& moment = kept.moment;
-  if (moment.velocity * moment.acceleration > 0.0 && std::abs(moment.velocity) > speed) {
-    const double size = std::min(std::abs(moment.velocity), std::max(speed, std::abs(kept.step)));
-    moment = {std::copysign(size, moment.velocity), 0.0};
-  } else if (moment.velocity * moment.acceleration > 0.0) {
-    moment.acceleration = 0.0;
+bool Motion::brake_resting(std::byte* state) noexcept {
+  bool moves = false;
+  for (Number& each : numbers_) {
+    if (each.motion.has_rest()) {
+      moves = each.motion.brake() || moves;
+      publish(each, state);
+    } else {
+      each.motion.restart(layout_.number(each.number, state));
+    }
   }
-  const double most = std::max(speed, std::abs(moment.velocity)) * (1.0 + 1e-12);
-  const auto fits = [&](std::int64_t n) {
-    const auto count = static_cast<double>(n);
-    const double rest = target - start - way(number, count).fading.distance();
-    return highest_speed(moment.velocity, rest, count) <= most;
-  };
-  std::int64_t enough = 1;
-  while (!fits(enough) && enough < kMostIterations / 2) enough *= 2;
-  std::int64_t few = enough / 2;
-  while (enough - few > 1) {
-    const std::int64_t middle = few + (enough - few) / 2;
-    (fits(middle) ? enough : few) = middle;
+  return moves;
+}
+
+void Motion::hold() noexcept {
+  for (Number& each : numbers_) {
+    if (each.is_commanded) {
+      each.motion.hold();
+    } else {
+      each.motion.release();
+    }
   }
-  return enough;
+}
+
+void Motion::release() noexcept {
+  for (Number& each : numbers_) each.motion.release();
 }
 
 }  // namespace o80

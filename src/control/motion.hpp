@@ -1,108 +1,154 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
+#include <optional>
 #include <vector>
 
-#include "control/interpolation.hpp"
+#include "control/number_motion.hpp"
 #include "control/record.hpp"
 #include "control/state_layout.hpp"
 
 namespace o80 {
 
-/// Interpolates the state of one actuator from one state to the next.
+/// A limit of one number of a state.
+struct Limited {
+  Limit limit = Limit::none;
+  std::uint32_t number = 0;
+
+  /// As the detail of a status: the limit in 3 bits, the number (at most 31) above.
+  std::uint8_t packed() const noexcept {
+    return static_cast<std::uint8_t>(static_cast<std::uint32_t>(limit) | (number < 31 ? number : 31)
+                                                                             << 3);
+  }
+};
+
+/// The motion of one actuator: computes its desired state in each iteration, within its limits.
+///
+/// For each number it keeps position and differences as double. The published state is their
+/// rounding, inward at the bounds.
 ///
 /// Realtime: everything but construction.
 class Motion {
  public:
-  explicit Motion(const StateLayout& layout);
+  Motion(const Schema& schema, const ActuatorRow& actuator, const StateLayout& layout);
 
-  /// Start and target. Fill both before begin().
-  std::byte* from() noexcept { return reinterpret_cast<std::byte*>(ends_.data()); }
-  std::byte* to() noexcept { return from() + stride_; }
+  /// How a command gets to its target, or to the next row of a trajectory.
+  struct Course {
+    Profile profile = Profile::linear;
+    std::int64_t asked = 0;   // iterations; 0: as few as the limits allow
+    double cruise = std::numeric_limits<double>::infinity();  // of `first` [1/iteration]
+    std::uint32_t first = 0;  // the number that the cruising speed is for
+    bool is_row = false;      // of a trajectory in straight lines: it has `asked` iterations
+  };
 
-  /// Sets the exact start of one number, which `from` holds rounded to its kind. Call it before
-  /// begin().
-  void start_at(std::size_t number, double value) noexcept { exact_[number] = value; }
-  /// Discards exact starts: all numbers start at `from`.
-  void start_at_from() noexcept;
-  /// Distance of one number from start to target.
-  double distance(std::size_t number) const noexcept;
-  /// Begins at iteration `first` for `iterations`. A minimum-jerk motion continues the motion
-  /// stored by keep_moving().
-  void begin(Iteration first, std::int64_t iterations, Profile profile, Pace pace) noexcept;
-  /// Writes the state at an iteration; from the last iteration on the exact target.
-  void state(Iteration iteration, std::byte* out) noexcept;
-  /// One number of the last state(), not rounded to its kind.
-  double number(std::size_t number) const noexcept;
+  /// The target of the next plan(); fill it before. Numbers of `mask` (null: all) move to it.
+  std::byte* target() noexcept { return from() + stride_; }
+  /// A command begins.
+  void begin(const std::uint64_t* mask) noexcept;
+  /// The last target is where the next row begins.
+  void next_row() noexcept { layout_.copy(from(), target()); }
+  /// The next plan starts at rest at these values, not where the actuator is.
+  void start_at(const std::byte* observed) noexcept { observed_ = observed; }
+  /// Proposes the number of iterations to the target, from `desired` or from the last target.
+  std::int64_t propose(const Course& course, const std::byte* desired) noexcept;
+  /// The part of it that the cruising speed needs.
+  std::int64_t asked_by_speed() const noexcept { return asked_by_speed_; }
+  /// Then plans for so many iterations, at least those.
+  void settle(Iteration first, std::int64_t iterations) noexcept;
+  /// A set-point of a generator at the rate of the loop: no plan, only limits.
+  void follow_as_sent(Iteration first) noexcept;
+  /// The plan goes on until this iteration or later.
+  void extend(Iteration last) noexcept { last_ = std::max(last_, last); }
+  /// What is followed reaches to this state, too.
+  void widen(const std::byte* row) noexcept;
+  /// True if a limit can keep the actuator from a row.
+  bool follows_rows() const noexcept { return follows_rows_; }
+  /// True if a commanded number has a limit of acceleration.
+  bool accelerates() const noexcept;
+
+  /// One iteration of the motion; the limit that changed it, if any.
+  Limited step(Iteration now, std::byte* state) noexcept;
   Iteration last() const noexcept { return last_; }
-  /// True if the last state() was the target.
-  bool arrived() const noexcept { return now_ >= last_; }
+  /// True if the state of the last step() was the target: nothing is left to follow.
+  bool arrived() const noexcept {
+    return std::ranges::all_of(numbers_,
+                               [](const Number& each) { return each.motion.arrived(); });
+  }
+  /// The limit because of which plan() took more iterations than asked.
+  Limited slowest() const noexcept { return slowest_; }
+  /// The command has ended, at its target if it is complete().
+  void end() noexcept;
+  void complete() noexcept;
 
-  /// Stores velocity and acceleration at the last state(), for the command that overwrites this
-  /// one. `rows`: further waypoints of the overwritten trajectory; `ahead`: the last of them, or
-  /// its target.
-  void keep_moving(const std::byte* ahead, std::int64_t rows) noexcept;
-  /// The same for one number of `state` that has left its motion because of a limit: its velocity
-  /// and acceleration, and the position at which it would stop after `iterations`.
-  void keep_moving(const std::byte* state, std::size_t number, const Moment& moment, double stop,
-                   std::int64_t iterations) noexcept;
-  /// Step of one number in the last iteration before keep_moving().
-  double kept_step(std::size_t number) const noexcept { return moving_ ? kept_[number].step : 0.0; }
-  /// Discards the stored motion of the numbers whose bits are not set.
-  void leave_out(const std::uint64_t* mask) noexcept;
-  /// Discards the stored motion: the next one starts at rest.
-  void rest() noexcept { moving_ = false; }
-
-  /// Iterations of a minimum-jerk motion of `number` that continues its stored motion and is never
-  /// faster than `speed` [1/iteration], or than the stored motion if that is faster.
-  std::int64_t iterations_at(std::size_t number, double speed) noexcept;
+  /// Sets all numbers to this state, at rest.
+  void restart(const std::byte* state) noexcept;
+  /// One iteration of braking. Numbers with a rest value go to it, unless they are held. True while
+  /// a number moves.
+  bool brake(std::byte* state) noexcept;
+  /// The same, but only for numbers with a rest value; the others are at `state`, the observed one.
+  bool brake_resting(std::byte* state) noexcept;
+  /// Holds the commanded numbers that have a rest value where they are, until release().
+  void hold() noexcept;
+  void release() noexcept;
+  /// True if a number is held away from its rest value.
+  bool holds() const noexcept {
+    return std::ranges::any_of(numbers_,
+                               [](const Number& each) { return each.motion.is_held_away(); });
+  }
+  /// True if braking would change nothing.
+  bool at_rest() const noexcept {
+    return std::ranges::all_of(numbers_, [](const Number& each) { return each.motion.at_rest(); });
+  }
+  /// True if braking would move nothing.
+  bool stays() const noexcept {
+    return std::ranges::all_of(numbers_, [](const Number& each) { return each.motion.stays(); });
+  }
+  /// The same as at_rest(), for numbers with a rest value.
+  bool resting_at_rest() const noexcept {
+    return std::ranges::all_of(numbers_, [](const Number& each) {
+      return !each.motion.has_rest() || each.motion.at_rest();
+    });
+  }
 
  private:
-  /// The motion of one number when it was overwritten.
-  struct Kept {
-    Moment moment;
-    double step = 0.0;    // step in the last iteration
-    double stop = 0.0;    // its stopping position
-    double target = 0.0;  // its last target
-  };
-  /// A fading motion plus a minimum-jerk motion over the remaining distance.
-  struct Way {
-    Fading fading;
-    double low = 0.0;  // the sum is clamped to low .. high
-    double high = 0.0;
+  struct Number {
+    std::uint32_t number;
+    std::uint32_t offset;  // in the state [bytes]
+    double lowest;         // range of its kind
+    double highest;
+    Kind kind;
+    bool is_limited;  // its published value is that of its guard
+    NumberMotion motion;
+    bool is_commanded = true;
   };
 
-  void measure() noexcept;
-  double start_of(std::size_t number) const noexcept;
-  double target_of(std::size_t number) const noexcept;
-  Way way(std::size_t number, double iterations) const noexcept;
-  double moved(std::size_t number, double time) const noexcept;
-  void plain_state(double share, std::byte* out) noexcept;
-  void mixed_state(double time, std::byte* out) noexcept;
-  double share_of(double time) const noexcept {
-    return profile_ == Profile::linear ? time : minimum_jerk(time);
-  }
+  std::byte* from() noexcept { return reinterpret_cast<std::byte*>(ends_.data()); }
+  const std::byte* from() const noexcept { return reinterpret_cast<const std::byte*>(ends_.data()); }
+  const std::byte* target() const noexcept { return from() + stride_; }
+  std::int64_t iterations_at(const Course& course) const noexcept;
+  void blend(std::byte* state) noexcept;
+  void publish(const Number& number, std::byte* state) const noexcept;
+  void publish_exact(const Number& number, std::byte* state) const noexcept;
 
   const StateLayout& layout_;
   std::size_t stride_;               // [bytes]
-  std::vector<std::uint64_t> ends_;  // from, to, and a state to blend into
-  std::vector<double> exact_;        // exact start of each number, or NaN
-  std::vector<double> starts_;
-  std::vector<double> targets_;
-  std::vector<double> values_;  // numbers of the last state()
-  std::vector<Way> ways_;       // valid if `continues_`
-  std::vector<Kept> kept_;
-  double left_ = 0.0;  // iterations that the overwritten motion had left
+  std::vector<std::uint64_t> ends_;  // from, target, and a state to blend into
+  std::vector<Number> numbers_;      // those that move; none of a type that blends by itself
+  std::vector<std::uint32_t> switches_;  // numbers that switch at the start
   Iteration first_ = 0;
   Iteration last_ = 0;
   Iteration now_ = 0;
   double iterations_ = 1.0;
   Profile profile_ = Profile::linear;
-  Pace pace_ = Pace::direct;
-  bool continues_ = false;  // starts with the velocities of `kept_`
-  bool moving_ = false;     // `kept_` is valid
-  bool measured_ = false;   // `starts_` and `targets_` are valid
+  const std::byte* observed_ = nullptr;
+  bool is_row_ = false;
+  bool begun_ = false;  // the next row begins a command
+  bool follows_rows_ = false;
+  std::int64_t asked_by_speed_ = 1;
+  Limited slowest_;
 };
 
 }  // namespace o80

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace o80 {
 namespace {
@@ -30,11 +31,54 @@ struct NumberLimiter::Candidate {
 };
 
 void NumberLimiter::restart(double position) noexcept {
-  position_ = wanted_ = position;
+  position_ = position;
   begin();
-  speed_ = acceleration_ = peak_ = 0.0;
+  speed_ = acceleration_ = 0.0;
   stop_ = {};
   stopped_ = 0;
+  stop_known_ = true;
+}
+
+void NumberLimiter::begin(const Span& span) noexcept {
+  wanted_ = position_;
+  scale_ = std::abs(position_);
+  low_ = std::max(minimum_, span.low);
+  high_ = std::min(maximum_, span.high);
+}
+
+bool NumberLimiter::stays() const noexcept {
+  if (!std::isfinite(rates_.acceleration)) return true;
+  const double tolerance = slack();
+  if (std::abs(speed_) > rates_.acceleration + tolerance) return false;
+  return std::abs(speed_) <= rates_.jerk + tolerance &&
+         std::abs(speed_ + acceleration_) <= rates_.jerk + tolerance;
+}
+
+NumberLimiter::Span NumberLimiter::stop() noexcept {
+  if (stays()) return {position_, position_};
+  const VelocityChange stop(-speed_, acceleration_, rates_);
+  const double end = position_ + stop.displacement();
+  const double turn = position_ + stop.run_before_turn(speed_);
+  return {std::min({position_, turn, end}), std::max({position_, turn, end})};
+}
+
+bool NumberLimiter::stops_inside() noexcept {
+  const Span visited = stop();
+  return visited.low >= minimum_ - rounding() && visited.high <= maximum_ + rounding();
+}
+
+bool NumberLimiter::keeps_limits(double next) noexcept {
+  const double speed = next - position_;
+  const double acceleration = speed - speed_;
+  scale_ = std::max({scale_, std::abs(position_), std::abs(next)});
+  const double room = rounding();
+  const auto within = [&](double value, double limit) {
+    return std::abs(value) <= limit * (1.0 + kLimitRounding) + room;
+  };
+  return within(speed, rates_.speed) && within(acceleration, rates_.acceleration) &&
+         within(acceleration - acceleration_, rates_.jerk) &&
+         next <= std::max(maximum_, position_) + room &&
+         next >= std::min(minimum_, position_) - room;
 }
 
 double NumberLimiter::tolerance_of(const Rates& rates) noexcept {
@@ -44,7 +88,7 @@ double NumberLimiter::tolerance_of(const Rates& rates) noexcept {
 
 /// Within the bounds, or no further outside than `before`.
 double NumberLimiter::inside(double position, double before) const noexcept {
-  return std::clamp(position, std::min(minimum_, before), std::max(maximum_, before));
+  return std::clamp(position, std::min(low_, before), std::max(high_, before));
 }
 
 void NumberLimiter::move(double speed) noexcept {
@@ -59,9 +103,10 @@ void NumberLimiter::forget_rounding() noexcept {
   const double nothing = slack() / 100.0 + 2.0 * rounding();
   const bool steady = !std::isfinite(rates_.jerk) || std::abs(acceleration_) <= nothing;
   if (steady && std::abs(speed_) <= nothing) {
-    speed_ = acceleration_ = peak_ = 0.0;
+    speed_ = acceleration_ = 0.0;
     stop_ = {};
     stopped_ = 0;
+    stop_known_ = true;
   }
 }
 
@@ -71,8 +116,8 @@ void NumberLimiter::forget_rounding() noexcept {
 Limit NumberLimiter::follow_at_once() noexcept {
   const double before = position_;
   const double speed = wanted_ - before;
-  const double up = std::max(0.0, maximum_ - before);
-  const double down = std::max(0.0, before - minimum_);
+  const double up = std::max(0.0, high_ - before);
+  const double down = std::max(0.0, before - low_);
   const double highest = std::min(rates_.speed, up);
   const double lowest = std::max(-rates_.speed, -down);
   const bool is_inside = speed <= highest && speed >= lowest;  // mostly, so no slack is needed
@@ -89,21 +134,17 @@ Limit NumberLimiter::follow_at_once() noexcept {
   return Limit::speed;
 }
 
-Limit NumberLimiter::follow_with_acceleration(double step, double lag, double most) noexcept {
+Limit NumberLimiter::follow_with_acceleration(double step, double lag) noexcept {
   // the wanted speed: reach the wanted position, or, from farther away, approach it at the highest
   // speed from which it can stop there
   const double closing = speed_for(std::abs(lag), rates_.acceleration);
   const bool within_reach = closing >= std::abs(lag);
-  double speed = within_reach ? wanted_ - position_ : step - std::copysign(closing, lag);
-  // without an acceleration limit it never lags, so `most` does not apply
-  const double fastest =
-      std::isfinite(rates_.acceleration) ? std::max(most, std::abs(speed_)) : rates_.acceleration;
-  const bool exact = within_reach && std::abs(speed) <= fastest + slack();
-  if (!exact) speed = std::clamp(speed, -fastest, fastest);
+  const double speed = within_reach ? wanted_ - position_ : step - std::copysign(closing, lag);
+  const bool exact = within_reach;
 
   // the allowed speeds
-  const double up = speed_for(std::max(0.0, maximum_ - position_), rates_.acceleration);
-  const double down = speed_for(std::max(0.0, position_ - minimum_), rates_.acceleration);
+  const double up = speed_for(std::max(0.0, high_ - position_), rates_.acceleration);
+  const double down = speed_for(std::max(0.0, position_ - low_), rates_.acceleration);
   const double highest = std::min({speed_ + rates_.acceleration, rates_.speed, up});
   const double lowest = std::max({speed_ - rates_.acceleration, -rates_.speed, -down});
   if (speed <= highest + slack() && speed >= lowest - slack()) {
@@ -126,22 +167,22 @@ NumberLimiter::Candidate NumberLimiter::candidate(double acceleration) const noe
 }
 
 /// The limit that a candidate or its stop violates.
-Limit NumberLimiter::violated(const Candidate& next, double most) const noexcept {
+Limit NumberLimiter::violated(const Candidate& next) const noexcept {
   const double tolerance = slack();
   const double fastest = std::max(std::abs(next.speed), std::abs(next.speed + next.stop.detour()));
-  if (fastest > most + tolerance) return Limit::speed;
+  if (fastest > rates_.speed + tolerance) return Limit::speed;
   const double end = next.position + next.stop.displacement();
   const double turn = next.position + next.stop.run_before_turn(next.speed);
   const double rounding = this->rounding();
   // outside the bounds it must not turn outward again
-  const double highest = std::max(maximum_, std::min(next.position, turn));
-  const double lowest = std::min(minimum_, std::max(next.position, turn));
-  if (next.position > std::max(maximum_, position_) + rounding ||
+  const double highest = std::max(high_, std::min(next.position, turn));
+  const double lowest = std::min(low_, std::max(next.position, turn));
+  if (next.position > std::max(high_, position_) + rounding ||
       std::max(end, turn) > std::max(highest, next.position) + rounding ||
       (end > turn && end > highest + rounding)) {
     return Limit::maximum;
   }
-  if (next.position < std::min(minimum_, position_) - rounding ||
+  if (next.position < std::min(low_, position_) - rounding ||
       std::min(end, turn) < std::min(lowest, next.position) - rounding ||
       (end < turn && end < lowest - rounding)) {
     return Limit::minimum;
@@ -170,15 +211,22 @@ void NumberLimiter::accept(const Candidate& next) noexcept {
   acceleration_ = next.acceleration;
   stop_ = next.stop;
   stopped_ = 0;
-  peak_ = std::max(std::abs(next.speed), std::abs(next.speed + next.stop.detour()));
+  stop_known_ = true;
 }
 
-Limit NumberLimiter::follow_with_jerk(double step, double lag, double most) noexcept {
+/// The shortest stop from the present state => stop_.
+void NumberLimiter::know_stop() noexcept {
+  if (std::exchange(stop_known_, true)) return;
+  stop_ = std::isfinite(rates_.jerk) ? VelocityChange(-speed_, acceleration_, rates_)
+                                     : VelocityChange();
+  stopped_ = 0;
+}
+
+Limit NumberLimiter::follow_with_jerk(double step, double lag) noexcept {
+  know_stop();
   const double tolerance = slack();
   const double low = std::max(acceleration_ - rates_.jerk, -rates_.acceleration);
   const double high = std::min(acceleration_ + rates_.jerk, rates_.acceleration);
-  // a number that is already faster may use the peak speed of its present stop
-  const double fastest = std::min(rates_.speed, std::max(most, peak_));
 
   // reach the wanted position exactly, if it can stay there
   const double wanted = wanted_ - position_ - speed_;
@@ -188,7 +236,7 @@ Limit NumberLimiter::follow_with_jerk(double step, double lag, double most) noex
       tracked || (std::abs(relative) <= rates_.jerk && std::abs(relative + wanted) <= rates_.jerk);
   if (stays && wanted >= low - tolerance && wanted <= high + tolerance) {
     const Candidate exact = candidate(wanted);
-    if (violated(exact, fastest) == Limit::none) {
+    if (violated(exact) == Limit::none) {
       const double before = position_;
       accept(exact);
       position_ = inside(wanted_, before);
@@ -200,7 +248,7 @@ Limit NumberLimiter::follow_with_jerk(double step, double lag, double most) noex
   // else come as near as the limits allow; the stop from the last state is always possible
   const double best = tracked ? std::clamp(wanted, low, high) : goal(step, lag, low, high);
   Candidate next = candidate(best);
-  Limit reason = violated(next, fastest);
+  Limit reason = violated(next);
   if (reason == Limit::none) {
     accept(next);
     return std::abs(best) == rates_.acceleration ? Limit::acceleration : Limit::jerk;
@@ -211,7 +259,7 @@ Limit NumberLimiter::follow_with_jerk(double step, double lag, double most) noex
   for (int i = 0; i < kHalvings; ++i) {
     const double middle = allowed + (refused - allowed) / 2.0;
     const Candidate tried = candidate(middle);
-    if (const Limit why = violated(tried, fastest); why != Limit::none) {
+    if (const Limit why = violated(tried); why != Limit::none) {
       refused = middle;
       reason = why;
     } else {
@@ -229,7 +277,15 @@ Limit NumberLimiter::follow_with_jerk(double step, double lag, double most) noex
 }
 
 void NumberLimiter::brake() noexcept {
-  slow_down();
+  if (!std::isfinite(rates_.acceleration)) {
+    rest();
+  } else if (stays()) {
+    acceleration_ = -speed_;
+    speed_ = 0.0;
+    stop_known_ = false;
+  } else {
+    slow_down();
+  }
   wanted_ = position_;
 }
 
@@ -241,15 +297,13 @@ void NumberLimiter::slow_down() noexcept {
     if (speed_ == 0.0) speed_ = acceleration_ = 0.0;
     return;
   }
+  know_stop();
   ++stopped_;
   const bool last = stopped_ >= stop_.steps();
   const double acceleration = last ? 0.0 : stop_.acceleration(stopped_);
   move(last ? 0.0 : speed_ + acceleration);
   acceleration_ = acceleration;
-  if (last) {
-    stop_ = {};
-    peak_ = 0.0;
-  }
+  if (last) stop_ = {};
 }
 
 }  // namespace o80

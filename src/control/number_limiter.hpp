@@ -5,19 +5,18 @@
 #include <cstdint>
 #include <limits>
 
+#include "control/number_plan.hpp"
 #include "control/velocity_change.hpp"
 
 namespace o80 {
 
-/// The limit that kept a number from its wanted position.
-enum class Limit : std::uint8_t { none, minimum, maximum, speed, acceleration, jerk };
-
-/// Keeps one number within its limits while it follows a wanted position.
+/// Keeps one number within its limits.
 ///
-/// It keeps position, speed and acceleration, per iteration. It admits only states from which it
-/// can stop between minimum and maximum, so a next state always exists. A position outside the
-/// bounds may stay or move inward, never outward. If it lags behind, it catches up as fast as the
-/// limits allow, without overshoot.
+/// It keeps position, speed and acceleration, per iteration. A planned position passes unchanged if
+/// it keeps all limits. A wanted position that is not planned is followed: as fast as the limits
+/// allow, without overshoot, and only through states from which it can stop between minimum and
+/// maximum and inside the span of what it follows, so a next state always exists. A position outside
+/// the bounds may stay or move inward, never outward.
 ///
 /// Realtime: yes, bounded time.
 class NumberLimiter {
@@ -25,6 +24,8 @@ class NumberLimiter {
   NumberLimiter(double minimum, double maximum, const Rates& rates) noexcept
       : minimum_(minimum),
         maximum_(maximum),
+        low_(minimum),
+        high_(maximum),
         rates_(rates),
         unlimited_(minimum <= -kHuge && maximum >= kHuge && !std::isfinite(rates.speed) &&
                    !std::isfinite(rates.acceleration) && !std::isfinite(rates.jerk)),
@@ -34,26 +35,56 @@ class NumberLimiter {
   double minimum() const noexcept { return minimum_; }
   double maximum() const noexcept { return maximum_; }
   double position() const noexcept { return position_; }
-  double speed() const noexcept { return speed_; }
-  double acceleration() const noexcept { return acceleration_; }
-  /// True if braking would not move it. Without an acceleration limit it stops at once.
-  bool at_rest() const noexcept {
-    return (speed_ == 0.0 && acceleration_ == 0.0) || !std::isfinite(rates_.acceleration);
-  }
-  /// True if it is at the position wanted last.
-  bool tracks() const noexcept { return position_ == wanted_; }
+  Moment moment() const noexcept { return {position_, speed_, acceleration_}; }
+  /// True if braking would change nothing.
+  bool at_rest() const noexcept { return speed_ == 0.0 && acceleration_ == 0.0; }
+  /// True if braking would not move it: it may stop at once.
+  bool stays() const noexcept;
+  /// Positions that the shortest stop visits.
+  struct Span {
+    double low;
+    double high;
+  };
+  Span stop() noexcept;
+  /// True if these lie between minimum and maximum.
+  bool stops_inside() noexcept;
 
   /// Sets the position, at rest; it may be outside the bounds.
   void restart(double position) noexcept;
-  /// A motion begins at the present position.
-  void begin() noexcept {
-    wanted_ = position_;
-    scale_ = std::abs(position_);
+  /// It does not move any more.
+  void rest() noexcept {
+    speed_ = acceleration_ = 0.0;
+    stop_known_ = false;
+  }
+  /// A motion begins at the present position. Whatever it follows, it stays inside `span`.
+  void begin(const Span& span) noexcept;
+  /// The same, inside the bounds only.
+  void begin() noexcept { begin({minimum_, maximum_}); }
+  /// From now on it stays inside the bounds only.
+  void follow_within_bounds() noexcept {
+    low_ = minimum_;
+    high_ = maximum_;
+  }
+  /// What it follows reaches further than begin() knew.
+  void widen(double position) noexcept {
+    low_ = std::max(minimum_, std::min(low_, position));
+    high_ = std::min(maximum_, std::max(high_, position));
   }
 
-  /// One iteration towards `wanted`; returns the limit that kept it from there. It catches up at
-  /// most at `most`, or at its present speed if that is higher.
-  Limit follow(double wanted, double most = std::numeric_limits<double>::infinity()) noexcept {
+  /// One iteration of a plan: to `next`, if all limits allow it; else false, and nothing changes.
+  bool pass(double next) noexcept {
+    if (!unlimited_ && !keeps_limits(next)) return false;
+    // rounding of a plan may lie beyond the bounds
+    if (!unlimited_) next = std::clamp(next, std::min(minimum_, position_), std::max(maximum_, position_));
+    const double speed = next - position_;
+    acceleration_ = speed - speed_;
+    speed_ = speed;
+    position_ = wanted_ = next;
+    stop_known_ = false;
+    return true;
+  }
+  /// One iteration towards `wanted`; returns the limit that kept it from there.
+  Limit follow(double wanted) noexcept {
     const double step = wanted - wanted_;
     const double lag = position_ - wanted_;
     wanted_ = wanted;
@@ -61,8 +92,8 @@ class NumberLimiter {
       return follow_freely();
     }
     if (!std::isfinite(rates_.acceleration) && !std::isfinite(rates_.jerk)) return follow_at_once();
-    return std::isfinite(rates_.jerk) ? follow_with_jerk(step, lag, most)
-                                      : follow_with_acceleration(step, lag, most);
+    return std::isfinite(rates_.jerk) ? follow_with_jerk(step, lag)
+                                      : follow_with_acceleration(step, lag);
   }
   /// One iteration of braking, as fast as the limits allow.
   void brake() noexcept;
@@ -83,14 +114,16 @@ class NumberLimiter {
     if (std::abs(speed_) <= slack() / 100.0 + 2.0 * rounding()) speed_ = acceleration_ = 0.0;
     return Limit::none;
   }
+  bool keeps_limits(double next) noexcept;
   Limit follow_at_once() noexcept;
-  Limit follow_with_acceleration(double step, double lag, double most) noexcept;
-  Limit follow_with_jerk(double step, double lag, double most) noexcept;
+  Limit follow_with_acceleration(double step, double lag) noexcept;
+  Limit follow_with_jerk(double step, double lag) noexcept;
   Candidate candidate(double acceleration) const noexcept;
-  Limit violated(const Candidate& next, double most) const noexcept;
+  Limit violated(const Candidate& next) const noexcept;
   double goal(double step, double lag, double low, double high) const noexcept;
   void accept(const Candidate& next) noexcept;
   void move(double speed) noexcept;
+  void know_stop() noexcept;
   void slow_down() noexcept;
   void forget_rounding() noexcept;
   static double tolerance_of(const Rates& rates) noexcept;
@@ -104,6 +137,8 @@ class NumberLimiter {
 
   double minimum_;
   double maximum_;
+  double low_;  // the bounds while it follows: also those of what it follows
+  double high_;
   Rates rates_;
   bool unlimited_;    // within the range of its kind
   double tolerance_;  // of the finest rate
@@ -112,9 +147,9 @@ class NumberLimiter {
   double acceleration_ = 0.0;
   double wanted_ = 0.0;       // position wanted last
   double scale_ = 0.0;        // largest |position| since the motion began
+  bool stop_known_ = true;    // `stop_` begins at the present state
   VelocityChange stop_;       // with a jerk limit: the stop from the last accepted state
   std::int64_t stopped_ = 0;  // iterations of `stop_` that are done
-  double peak_ = 0.0;         // highest speed of `stop_`
 };
 
 }  // namespace o80

@@ -67,7 +67,8 @@ struct RecordHead {
   std::uint32_t payload_bytes = 0;
   std::uint32_t rows = 1;  // group: number of members
   union {
-    std::int64_t amount = 0;  // duration [ns], last iteration of until, number of iterations
+    // duration [ns], last iteration of until, number of iterations, time between set-points [ns]
+    std::int64_t amount = 0;
     double speed;             // speed of the first commanded number [1/s]
   };
   std::array<std::uint32_t, 4> own{};  // for the backend; values from a frontend are ignored

@@ -9,13 +9,13 @@ namespace {
 
 bool known_enums(const RecordHead& head) noexcept {
   return head.mode <= Mode::overwrite && head.pace <= Pace::fastest &&
-         head.profile <= Profile::minimum_jerk && head.start <= Start::observed && head.masked <= 1;
+         head.profile <= Profile::as_sent && head.start <= Start::observed && head.masked <= 1;
 }
 
 bool sane_pace(const RecordHead& head) noexcept {
   switch (head.pace) {
     case Pace::direct:
-      return true;
+      return head.amount >= 0 && head.amount <= kLongestDuration;
     case Pace::fastest:
       return true;
     case Pace::duration:
@@ -50,11 +50,16 @@ RecordCheck::RecordCheck(const Schema& schema, Layouts layouts) : layouts_(std::
     actuator_types_.push_back(actuator.type);
     first_limits_.push_back(static_cast<std::uint32_t>(has_acceleration_.size()));
     const StateLayout& layout = *layouts_[actuator.type];
+    bool is_bounded = false;
     for (std::uint32_t i = 0; i < actuator.limits; ++i) {
       const bool moves = layout.numbers()[i].moves();
-      has_acceleration_.push_back(
-          !moves || std::isfinite(schema.limits.at(actuator.first_limit + i).acceleration));
+      const LimitRow& limit = schema.limits.at(actuator.first_limit + i);
+      has_acceleration_.push_back(!moves || std::isfinite(limit.acceleration));
+      minima_.push_back(limit.minimum);
+      maxima_.push_back(limit.maximum);
+      is_bounded = is_bounded || std::isfinite(limit.minimum) || std::isfinite(limit.maximum);
     }
+    is_bounded_.push_back(is_bounded ? 1 : 0);
   }
   for (const RequestRow& request : schema.requests) request_types_.push_back(request.type);
   for (const StateLayout* layout : layouts_) {
@@ -96,6 +101,9 @@ RecordCheck::Verdict RecordCheck::begin_command(const RecordHead& head,
                                                 Progress& progress) noexcept {
   if (head.actuator >= actuator_types_.size() || head.rows == 0 || !known_enums(head) ||
       !sane_pace(head)) {
+    return Verdict::invalid;
+  }
+  if (head.profile == Profile::as_sent && (head.pace != Pace::direct || head.rows > 1)) {
     return Verdict::invalid;
   }
   const StateLayout& layout = *layouts_[actuator_types_[head.actuator]];
@@ -151,12 +159,26 @@ RecordCheck::Verdict RecordCheck::go_on(const BlockPool& pool, BlockIndex block,
   auto* state = reinterpret_cast<std::byte*>(state_.data());
   for (; progress.rows_left > 0 && bytes_left > 0; --progress.rows_left) {
     progress.payload.read(state, layout.size());
-    if (!layout.finite(state, mask)) return Verdict::invalid;
+    if (!layout.finite(state, mask) || !within_bounds(head, state, mask)) return Verdict::invalid;
     bytes_left -= layout.size();
   }
   budget = std::min(
       budget, static_cast<std::uint32_t>(std::max<std::int64_t>(bytes_left, 0) / kBlockBytes));
   return progress.rows_left > 0 ? Verdict::unfinished : Verdict::valid;
+}
+
+/// A target beyond the bounds would never be reached.
+bool RecordCheck::within_bounds(const RecordHead& head, const std::byte* state,
+                                const std::uint64_t* mask) const noexcept {
+  if (is_bounded_[head.actuator] == 0) return true;
+  const StateLayout& layout = *layouts_[actuator_types_[head.actuator]];
+  const std::uint32_t first = first_limits_[head.actuator];
+  for (std::uint32_t i = 0; i < layout.numbers().size(); ++i) {
+    if (!masked(mask, i) || !layout.numbers()[i].moves()) continue;
+    const double value = layout.number(i, state);
+    if (value < minima_[first + i] || value > maxima_[first + i]) return false;
+  }
+  return true;
 }
 
 RecordCheck::Verdict RecordCheck::check_request(const RecordHead& head, Cursor& payload) noexcept {

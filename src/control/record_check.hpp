@@ -48,12 +48,17 @@ class RecordCheck {
 
  private:
   Verdict begin_command(const RecordHead& head, Progress& progress) noexcept;
+  bool within_bounds(const RecordHead& head, const std::byte* state,
+                     const std::uint64_t* mask) const noexcept;
   Verdict check_request(const RecordHead& head, Cursor& payload) noexcept;
 
   Layouts layouts_;
   std::vector<std::uint32_t> actuator_types_;
   std::vector<std::uint32_t> first_limits_;     // for each actuator its index in the next vector
   std::vector<std::uint8_t> has_acceleration_;  // for each number; 1 also if not interpolated
+  std::vector<double> minima_;                  // for each number
+  std::vector<double> maxima_;
+  std::vector<std::uint8_t> is_bounded_;  // for each actuator: a number has a bound
   std::vector<std::uint32_t> request_types_;
   std::vector<std::uint64_t> state_;
   std::vector<std::uint64_t> mask_;

@@ -62,6 +62,19 @@ void StateLayout::copy(std::byte* to, const std::byte* from,
   }
 }
 
+bool StateLayout::same(const std::byte* one, const std::byte* other,
+                       const std::uint64_t* mask) const noexcept {
+  if (mask == nullptr && !padded_) return std::memcmp(one, other, size_) == 0;
+  for (std::size_t i = 0; i < numbers_.size(); ++i) {
+    const NumberPlace& place = numbers_[i];
+    if (masked(mask, i) &&
+        std::memcmp(one + place.offset, other + place.offset, place.size) != 0) {
+      return false;
+    }
+  }
+  return true;
+}
+
 void StateLayout::copy_finite(std::byte* to, const std::byte* from,
                               const std::uint64_t* mask) const noexcept {
   if (plain_ && mask == nullptr) {

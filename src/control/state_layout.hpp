@@ -58,6 +58,9 @@ class StateLayout {
   /// Copies the numbers whose bits are set.
   void copy(std::byte* to, const std::byte* from, const std::uint64_t* mask) const noexcept;
 
+  /// True if the numbers whose bits are set have the same bytes.
+  bool same(const std::byte* one, const std::byte* other, const std::uint64_t* mask) const noexcept;
+
   /// Copies the numbers whose bits are set and that are finite.
   void copy_finite(std::byte* to, const std::byte* from,
                    const std::uint64_t* mask = nullptr) const noexcept;

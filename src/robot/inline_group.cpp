@@ -397,7 +397,11 @@ void InlineGroup::burst_copy(const BurstPlan& plan, bool may_be_direct, std::uin
   const std::span<std::byte> own = plan.rows.subspan(i * rows, rows);
   if (!may_be_direct || !burst_directly(copy, plan, to, own)) {
     if (!plan.actuators.empty()) {
-      copy.frontend.add_trajectories(plan.actuators, plan.steps, to, plan.command);
+      if (is_each_iteration(plan.command.pace)) {
+        copy.frontend.add_set_points(plan.actuators, plan.steps, to, plan.command.mode);
+      } else {
+        copy.frontend.add_trajectories(plan.actuators, plan.steps, to, plan.command);
+      }
     }
     PulseOptions pulse;
     if (plan.delay > 0) pulse.at = copy.frontend.published() + 1 + plan.delay;
@@ -428,14 +432,12 @@ void InlineGroup::follow(const BurstPlan& plan, const Following& then, bool may_
 
 /// True if the targets of each actuator are for consecutive iterations of the burst.
 bool InlineGroup::may_be_direct(const BurstPlan& plan) const {
-  const PaceSpec& pace = plan.command.pace;
   const std::size_t actuators = description().schema.actuators.size();
   for (auto each = plan.actuators.begin(); each != plan.actuators.end(); ++each) {
     const bool again = std::find(plan.actuators.begin(), each, *each) != each;
     if (*each >= actuators || again) return false;  // the batch says what is wrong
   }
-  return pace.pace == Pace::iterations && pace.amount == 1 &&
-         plan.command.on_limit != OnLimit::go_on && plan.steps > 0 &&
+  return is_each_iteration(plan.command.pace) && plan.steps > 0 &&
          static_cast<std::int64_t>(plan.steps) <= plan.iterations - plan.delay;
 }
 

@@ -31,9 +31,12 @@ RecordHead head_of(std::uint32_t actuator, const CommandOptions& options, Profil
 void check_pace(const PaceSpec& pace, std::uint32_t rows) {
   const auto refuse = [](const std::string& why) { throw InvalidArgument("the pace " + why); };
   switch (pace.pace) {
-    case Pace::direct:
     case Pace::speed:
     case Pace::fastest:
+      return;
+    case Pace::direct:
+      if (pace.amount < 0) refuse("has a negative time between set-points");
+      if (pace.amount > kLongestDuration) refuse("has too long a time between set-points");
       return;
     case Pace::duration:
       if (pace.amount < 0) refuse("is a negative duration");
@@ -50,16 +53,16 @@ void check_pace(const PaceSpec& pace, std::uint32_t rows) {
   }
 }
 
-/// Refuses options that have no effect or contradict each other.
+/// Refuses options that contradict each other.
 void check_options(const CommandOptions& options) {
-  const bool goes_on = options.on_limit == OnLimit::go_on;
-  if (goes_on && options.pace.pace != Pace::direct) {
-    throw InvalidArgument(
-        "on_limit 'go_on' is for commands without a pace: leave out the pace, or on_limit");
-  }
-  if (options.profile && (goes_on || options.pace.pace == Pace::fastest)) {
+  if (options.profile && options.pace.pace == Pace::fastest) {
     throw InvalidArgument(
         "a command that goes as fast as its limits allow has no profile: leave out profile");
+  }
+  if (options.profile == Profile::as_sent &&
+      (options.pace.pace != Pace::direct || options.pace.amount != 0)) {
+    throw InvalidArgument(
+        "the profile as_sent is for commands without a pace: leave out the pace, or profile");
   }
 }
 
@@ -90,14 +93,12 @@ RecordHead UntypedFrontend::checked_command(std::uint32_t actuator,
   const std::uint32_t index = link_->command_check.actuator(std::int64_t{actuator});
   link_->command_check.targets(index, state, mask);
   check_options(options);
-  CommandOptions paced = options;
-  if (paced.pace.pace == Pace::direct && paced.on_limit == OnLimit::go_on) paced.pace = fastest();
-  check_pace(paced.pace, 1);
-  if (paced.pace.pace == Pace::speed)
-    link_->command_check.speed(index, paced.pace.per_second, mask);
-  if (paced.pace.pace == Pace::fastest) link_->command_check.fastest(index, mask);
-  if (paced.pace.pace == Pace::direct) link_->command_check.direct(index, state, mask);
-  return head_of(index, paced, link_->command_check.profile(index));
+  const PaceSpec& pace = options.pace;
+  check_pace(pace, 1);
+  if (pace.pace == Pace::speed) link_->command_check.speed(index, pace.per_second, mask);
+  if (pace.pace == Pace::fastest) link_->command_check.fastest(index, mask);
+  if (pace.pace == Pace::direct) link_->command_check.direct(index, state, mask);
+  return head_of(index, options, link_->command_check.usual_profile(index));
 }
 
 std::uint32_t UntypedFrontend::add_command(std::uint32_t actuator, std::span<const std::byte> state,
@@ -170,6 +171,7 @@ CommandOptions UntypedFrontend::checked_trajectory(std::uint32_t actuator, std::
                                                    std::span<const std::int64_t> times) const {
   const std::uint32_t index = link_->command_check.actuator(std::int64_t{actuator});
   if (rows == 0) throw InvalidArgument("the trajectory has no row");
+  check_options(options);
   link_->command_check.targets(index, states);
   CommandOptions paced = options;
   // a trajectory always has a pace
@@ -235,6 +237,30 @@ std::uint32_t UntypedFrontend::add_trajectories(std::span<const std::uint32_t> a
     at += size;
   }
   return link_->builder.group(link_->members, ends, rows);
+}
+
+void UntypedFrontend::add_set_points(std::span<const std::uint32_t> actuators, std::uint32_t rows,
+                                     std::span<const std::byte> states, Mode mode) {
+  refuse_twice(actuators);
+  const auto each = [&](auto&& visit) {
+    std::size_t at = 0;
+    for (const std::uint32_t actuator : actuators) {
+      const std::size_t size = size_of_rows(actuator, rows, states.size() - at, actuators);
+      visit(link_->command_check.actuator(std::int64_t{actuator}), states.subspan(at, size));
+      at += size;
+    }
+  };
+  each([&](std::uint32_t actuator, std::span<const std::byte> targets) {
+    link_->command_check.targets(actuator, targets);
+  });
+  const auto lock = link_->lock_to_add();
+  each([&](std::uint32_t actuator, std::span<const std::byte> targets) {
+    RecordHead head;
+    head.actuator = static_cast<std::uint16_t>(actuator);
+    head.mode = mode;
+    head.profile = link_->command_check.usual_profile(actuator);
+    link_->builder.command(head, {}, {}, rows, targets);
+  });
 }
 
 std::uint32_t UntypedFrontend::add_purge(std::uint32_t actuator) {

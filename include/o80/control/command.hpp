@@ -14,7 +14,7 @@ inline constexpr Iteration kNow = -1;
 
 enum class Mode : std::uint8_t { queue, overwrite };
 enum class Pace : std::uint8_t { direct, duration, speed, until, iterations, fastest };
-enum class Profile : std::uint8_t { linear, minimum_jerk };
+enum class Profile : std::uint8_t { linear, minimum_jerk, as_sent };
 /// Which state a command starts from.
 enum class Start : std::uint8_t { desired, observed };
 
@@ -31,8 +31,12 @@ struct PaceSpec {
   double per_second = 0;
 };
 
-/// Reaches the target in one iteration (a jump).
-constexpr PaceSpec direct() { return {}; }
+/// A set-point: goes to the target as fast as the limits allow (without limits: in one iteration)
+/// and gives way to the next direct command. `every`: time between the set-points of a stream; where
+/// there is an acceleration limit, the motion then takes twice that, or longer.
+constexpr PaceSpec direct(std::chrono::nanoseconds every = std::chrono::nanoseconds(0)) {
+  return {Pace::direct, every.count(), 0};
+}
 constexpr PaceSpec duration(std::chrono::nanoseconds time) {
   return {Pace::duration, time.count(), 0};
 }
@@ -43,26 +47,23 @@ constexpr PaceSpec until(Iteration iteration) { return {Pace::until, iteration, 
 /// Reaches the target in `count` iterations (a trajectory: each of its waypoints).
 constexpr PaceSpec iterations(std::int64_t count) { return {Pace::iterations, count, 0}; }
 
+/// True for targets of consecutive iterations: those of a burst are set-points.
+constexpr bool is_each_iteration(const PaceSpec& pace) {
+  return pace.pace == Pace::iterations && pace.amount == 1;
+}
+
 /// As fast as the limits allow, at rest at the end. Every commanded number needs a speed limit and
 /// an acceleration limit.
 constexpr PaceSpec fastest() { return {Pace::fastest, 0, 0}; }
-
-/// What happens to a direct command whose target the limits do not allow in one iteration.
-enum class OnLimit : std::uint8_t {
-  end,   // the command ends as limited, and its actuator brakes
-  go_on  // the command continues to its target, as fast as the limits allow
-};
-
-constexpr std::string_view to_text(OnLimit what) { return what == OnLimit::end ? "end" : "go_on"; }
 
 /// Options of a command, besides its actuator and its target.
 struct CommandOptions {
   PaceSpec pace = {};
   Mode mode = Mode::queue;
-  /// Default: minimum_jerk for an actuator with acceleration limits, else linear.
+  /// Default: minimum_jerk for an actuator with acceleration limits, else linear. as_sent: for
+  /// direct commands of a generator at the rate of the loop, shown as they are where limits allow.
   std::optional<Profile> profile = {};
   Start start = Start::desired;
-  OnLimit on_limit = OnLimit::end;
 };
 
 /// The iteration at which a batch acts, and what happens if that iteration has begun.

@@ -11,7 +11,7 @@ from o80.errors import BackendHalted, InvalidArgument, RequestRejected, TimeoutE
 from o80.frontend.observing import Observing
 from o80.running_request import RunningRequest
 from o80.trajectory import states_of, times_of
-from o80.words import LateWord, ModeWord, OnLimitWord, ProfileWord, StartWord, Status
+from o80.words import LateWord, ModeWord, ProfileWord, StartWord, Status
 
 
 class Commanding(Observing):
@@ -32,7 +32,7 @@ class Commanding(Observing):
             mode: ModeWord = "queue",
             profile: ProfileWord | None = None,
             start: StartWord = "desired",
-            on_limit: OnLimitWord = "end",
+            every: float | int | None = None,
         ) -> None:
             """Adds a command to the next pulse.
 
@@ -47,14 +47,19 @@ class Commanding(Observing):
             until: the iteration in which the target is reached.
             iterations: number of iterations of the motion.
             fastest: as fast as the limits of speed, acceleration and jerk allow, at rest at the
-                end. Give one of these five, or none to reach the target in one iteration.
+                end. Give one of these five, or none for a set-point: it goes to its target as fast
+                as the limits allow (without limits: in one iteration) and gives way to the next one.
             mode: "queue" (after the queued commands) or "overwrite" (instead of them).
-            profile: "linear" or "minimum_jerk" (None: linear, or minimum_jerk for actuators with
-                acceleration limits).
+            profile: "linear", "minimum_jerk" (None: linear, or minimum_jerk for actuators with
+                acceleration limits), or, for a set-point, "as_sent": for a generator at the rate
+                of the loop, whose targets are shown as they are where the limits allow.
             start: "desired" or "observed", the state to start from.
-            on_limit: for a command without a pace, if the limits keep it from its target in its
-                iteration: "end" (it ends as limited and the actuator comes to rest) or "go_on" (it
-                continues to the target, as fast as the limits allow).
+            every: for a set-point of a stream, the time to the next one [s], or as an integer the
+                number of iterations. On actuators with acceleration limits the motion then takes
+                twice that, or longer, so that a stream moves smoothly.
+
+            Every command ends at its target. One that the limits make longer than asked comes later:
+            it is completed with the reason "limits".
 
             Raises InvalidArgument for a command that the robot cannot follow.
             """

@@ -168,15 +168,20 @@ TEST(CommandGroup, DoesNotWaitForAMemberThatWasDropped) {
   EXPECT_TRUE(rig.all_blocks_back());
 }
 
-TEST(CommandGroup, IsLimitedWhenOneMemberIs) {
+TEST(CommandGroup, TakesAsLongAsTheLimitsOfItsSlowestMember) {
   Schema schema = plain_robot(2);
   schema.actuator(1).limits({.speed = 100.0});
   Rig rig(schema);
   add_group(rig, {0, 1}, over(2), {1.0, 1.0});
   const CommandId batch = rig.pulse();
-  rig.run(3);
+  rig.run(5);
+  EXPECT_EQ(rig.desired(0), 0.5);
+  EXPECT_EQ(rig.desired(1), 0.5);
+  rig.run(5);
   EXPECT_EQ(rig.desired(0), 1.0);
-  EXPECT_EQ(rig.witness.status(record_id(batch, 0)), Status::limited);
+  EXPECT_EQ(rig.desired(1), 1.0);
+  EXPECT_EQ(rig.witness.status(record_id(batch, 0)), Status::completed);
+  EXPECT_EQ(rig.witness.last(record_id(batch, 0)).iteration, 10);
   EXPECT_EQ(rig.witness.last(record_id(batch, 0)).reason, Reason::limits);
 }
 

@@ -208,43 +208,37 @@ TEST(ControllerProperty, ALinearMotionNeverLeavesTheSpanOfItsEndsNorTurnsBack) {
   }
 }
 
-// largest second and third difference of a motion over n iterations and distance 1
-struct Roughness {
-  double acceleration = 0.0;
-  double jerk = 0.0;
-};
-
-Roughness roughness(const std::vector<double>& positions) {
-  Roughness found;
-  for (std::size_t i = 3; i < positions.size(); ++i) {
-    const double first = positions[i - 2] - positions[i - 3];
-    const double second = positions[i - 1] - positions[i - 2];
-    const double third = positions[i] - positions[i - 1];
-    found.acceleration = std::max(found.acceleration, std::abs(third - second));
-    found.jerk = std::max(found.jerk, std::abs(third - 2.0 * second + first));
+/// Largest third difference of rows.
+double roughness(const std::vector<double>& rows) {
+  double found = 0.0;
+  for (std::size_t i = 3; i < rows.size(); ++i) {
+    found = std::max(found, std::abs(rows[i] - 3.0 * (rows[i - 1] - rows[i - 2]) - rows[i - 3]));
   }
   return found;
 }
 
-TEST(ControllerProperty, MinimumJerkNeverJumpsInVelocityOrAcceleration) {
+// without limits of acceleration a motion that would leave its span stops first, in half of its
+// time, a quarter, ... or at once; its velocity is continuous unless it stops at once
+TEST(ControllerProperty, MinimumJerkContinuesItsVelocity) {
+  int smooth = 0;
   for (std::uint64_t seed = 0; seed < 500; ++seed) {
     Dice dice(seed);
     Rig rig(plain_robot(1));
-    std::vector<double> positions(3, 0.0);
-    // distances of at most 2, times of at least 400, overwritten anywhere on the way
-    for (int motion = 0; motion < 5; ++motion) {
-      rig.add(0, overwriting(smoothly(over(dice.whole(400, 800)))), {dice.real(-1.0, 1.0)});
-      rig.pulse();
-      const auto desired = rig.run(static_cast<int>(dice.whole(1, 900)));
-      positions.insert(positions.end(), desired.begin(), desired.end());
-    }
-    const Roughness found = roughness(positions);
-    // with velocities up to 1.875 * 2 / 400 and accelerations up to 5.8 * 2 / 400^2 at their
-    // starts, quintics reach a few times those of a motion from rest; a jump would show as 1e-2
-    // in the velocity, and as 1e-4 in the acceleration
-    ASSERT_LT(found.acceleration, 8e-4) << seed;
-    ASSERT_LT(found.jerk, 3e-5) << seed;
+    std::vector<double> rows(3, 0.0);
+    const std::int64_t n = dice.whole(400, 800);
+    rig.add(0, smoothly(over(n)), {1.0});
+    rig.pulse();
+    const auto before = rig.run(static_cast<int>(dice.whole(1, n - 1)));
+    rig.add(0, overwriting(smoothly(over(dice.whole(400, 800)))), {dice.real(-1.0, 1.0)});
+    rig.pulse();
+    rows.insert(rows.end(), before.begin(), before.end());
+    const auto after = rig.run(900);
+    rows.insert(rows.end(), after.begin(), after.end());
+    ASSERT_LE(*std::max_element(rows.begin(), rows.end()), 1.0 + 1e-12) << "the former target";
+    // 60 / 400^3 from rest; a stop in an eighth of the time makes it some hundred times that
+    smooth += roughness(rows) < 3e-4 ? 1 : 0;
   }
+  EXPECT_GT(smooth, 400);
 }
 
 TEST(ControllerProperty, ASpeedIsNeverExceeded) {

@@ -73,8 +73,8 @@ TEST_F(NumberLimiterTest, WithoutAnAccelerationLimitMovesBitForBitAsWithAnEnormo
       const Limit limit = limiter.follow(wanted);
       ASSERT_EQ(limit, general.follow(wanted)) << round;
       ASSERT_EQ(limiter.position(), general.position()) << round;
-      ASSERT_EQ(limiter.speed(), general.speed()) << round;
-      ASSERT_EQ(limiter.acceleration(), general.acceleration()) << round;
+      ASSERT_EQ(limiter.moment().speed, general.moment().speed) << round;
+      ASSERT_EQ(limiter.moment().acceleration, general.moment().acceleration) << round;
       ++limits[static_cast<std::size_t>(limit)];
     }
   }
@@ -101,9 +101,9 @@ TEST_F(NumberLimiterTest, WithoutAnyLimitMovesBitForBitAsWithEnormousBounds) {
       if (one_in(100)) wanted = real(-9e306, 9e306);
       ASSERT_EQ(limiter.follow(wanted), general.follow(wanted)) << round;
       ASSERT_EQ(limiter.position(), general.position()) << round;
-      ASSERT_EQ(limiter.speed(), general.speed()) << round;
-      ASSERT_EQ(limiter.acceleration(), general.acceleration()) << round;
-      stops += limiter.speed() == 0.0 ? 1 : 0;
+      ASSERT_EQ(limiter.moment().speed, general.moment().speed) << round;
+      ASSERT_EQ(limiter.moment().acceleration, general.moment().acceleration) << round;
+      stops += limiter.moment().speed == 0.0 ? 1 : 0;
     }
   }
   EXPECT_GT(stops, 100);
@@ -140,7 +140,7 @@ TEST_F(NumberLimiterTest, KeepsItsLimitsWhateverItIsAskedToFollow) {
         } else if (kind == 2) {
           limiter.follow(start + (target - start) * share * share * (3 - 2 * share));
         } else if (kind == 3) {
-          limiter.follow(real(-1, 1), magnitude(-3, 0));
+          limiter.follow(real(-1, 1));
         } else {
           limiter.brake();
         }

@@ -74,7 +74,9 @@ TEST(RecordCheck, EveryFieldOutOfItsRangeIsRefused) {
   EXPECT_TRUE(refused(direct(), [](RecordHead& h, double*) { h.mode = static_cast<Mode>(2); }));
   EXPECT_TRUE(refused(direct(), [](RecordHead& h, double*) { h.pace = static_cast<Pace>(5); }));
   EXPECT_TRUE(
-      refused(direct(), [](RecordHead& h, double*) { h.profile = static_cast<Profile>(2); }));
+      refused(direct(), [](RecordHead& h, double*) { h.profile = static_cast<Profile>(3); }));
+  EXPECT_TRUE(refused(over(3), [](RecordHead& h, double*) { h.profile = Profile::as_sent; }));
+  EXPECT_TRUE(refused(direct(), [](RecordHead& h, double*) { h.amount = -1; }));
   EXPECT_TRUE(refused(direct(), [](RecordHead& h, double*) { h.start = static_cast<Start>(2); }));
   EXPECT_TRUE(refused(direct(), [](RecordHead& h, double*) { h.masked = 1; }));
   EXPECT_TRUE(refused(direct(), [](RecordHead& h, double*) { h.masked = 2; }));

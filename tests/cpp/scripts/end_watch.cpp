@@ -22,7 +22,9 @@ std::string positions(long double is, long double expected) {
 
 std::optional<Failure> EndWatch::step(const ScriptWorld& world) const {
   for (const SentCommand* command : world.ended) {
-    if (auto failure = says_whether_limited(world, *command)) return failure;
+    if (command->status == Status::limited) {
+      return Failure{"arrival", "a command ended as limited: it goes on until it has arrived"};
+    }
     if (command->status != Status::completed) continue;
     if (command->ended_at != world.iteration) {
       return Failure{"completion", "a command completed at another iteration than the present"};
@@ -31,23 +33,30 @@ std::optional<Failure> EndWatch::step(const ScriptWorld& world) const {
   }
   for (std::size_t a = 0; a < world.actuators.size(); ++a) {
     if (auto failure = masks(world, a)) return failure;
+    if (auto failure = says_clamped(world, a)) return failure;
     if (world.actuators[a].driver != nullptr) continue;
     if (auto failure = idle(world, a)) return failure;
   }
   return std::nullopt;
 }
 
-/// `limited` if and only if a limit changed the last row, and the row says so.
-std::optional<Failure> EndWatch::says_whether_limited(const ScriptWorld& world,
-                                                      const SentCommand& command) const {
-  if (command.status != Status::completed && command.status != Status::limited) {
-    return std::nullopt;
-  }
-  const std::size_t actuator = world.step_of(command).actuator;
-  const bool limited = command.status == Status::limited;
-  if (world.actuators[actuator].clamped == limited) return std::nullopt;
-  return Failure{"clamped", world.where(actuator, 0) +
-                                (limited ? "limited, but not clamped" : "completed, but clamped")};
+/// A plan keeps the limits: only what is followed can be changed by them. That is rows, a start at
+/// the observed state, targets as they were sent, and a start that is outside the bounds or cannot
+/// stop inside them.
+std::optional<Failure> EndWatch::says_clamped(const ScriptWorld& world,
+                                              std::size_t actuator) const {
+  const ActuatorTrack& track = world.actuators[actuator];
+  if (!track.clamped || track.driver == nullptr) return std::nullopt;
+  const ScriptStep& step = world.step_of(*track.driver);
+  const auto& numbers = world.script.actuators[actuator].numbers;
+  const bool is_followed = (world.rows_of(*track.driver) > 1 && step.head.pace != Pace::direct) ||
+                           step.head.start == Start::observed ||
+                           step.head.profile == Profile::as_sent ||
+                           std::ranges::any_of(numbers, [](const NumberSpec& number) {
+                             return number.bounded() || !number.is_float();  // as its kind is
+                           });
+  if (is_followed) return std::nullopt;
+  return Failure{"plan", world.where(actuator, 0) + "a planned command was clamped"};
 }
 
 std::optional<Failure> EndWatch::on_target(const ScriptWorld& world,
@@ -115,11 +124,10 @@ std::optional<Failure> EndWatch::idle(const ScriptWorld& world, std::size_t actu
       std::array<std::byte, 8> bytes{};
       store_as(number.kind, number.rest, bytes.data());
       const long double rest = load_as(number.kind, bytes.data());
-      // the rules do not say whether a direct command that was limited, or an interrupt after its
-      // end, leaves the field where it is
-      const bool unsaid =
-          world.step_of(*track.last).head.pace == Pace::direct &&
-          (track.last->status == Status::limited || track.maybe_dropped_at > track.last->ended_at);
+      // the rules do not say whether an interrupt after the end of a direct command leaves the field
+      // where it is
+      const bool unsaid = world.step_of(*track.last).head.pace == Pace::direct &&
+                          track.maybe_dropped_at > track.last->ended_at;
       if (place.now != rest && !unsaid) {
         return Failure{"resting",
                        world.where(actuator, n) + "it rests at " + positions(place.now, rest)};

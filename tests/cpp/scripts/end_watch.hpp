@@ -15,8 +15,7 @@ class EndWatch {
   std::optional<Failure> step(const ScriptWorld& world) const;
 
  private:
-  std::optional<Failure> says_whether_limited(const ScriptWorld& world,
-                                              const SentCommand& command) const;
+  std::optional<Failure> says_clamped(const ScriptWorld& world, std::size_t actuator) const;
   std::optional<Failure> on_target(const ScriptWorld& world, const SentCommand& command) const;
   std::optional<Failure> masks(const ScriptWorld& world, std::size_t actuator) const;
   std::optional<Failure> idle(const ScriptWorld& world, std::size_t actuator) const;

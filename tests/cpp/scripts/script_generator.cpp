@@ -243,7 +243,7 @@ void Generator::add_chain() {
     add_command(actuator, 0);
     RecordHead& head = script_.steps.back().head;
     head.mode = Mode::overwrite;
-    if (smooth) head.profile = Profile::minimum_jerk;
+    if (smooth && head.profile == Profile::linear) head.profile = Profile::minimum_jerk;
     pulse(0);
     run(dice_.whole(0, longest));
   }
@@ -290,7 +290,8 @@ void Generator::add_groups() {
   std::uint32_t groups = 0;
   std::swap(dice_, *grouping_);
   for (ScriptStep& step : steps) {
-    const bool is_first = step.action == Action::command && dice_.one_in(2);
+    const bool is_first = step.action == Action::command &&
+                          step.head.profile != Profile::as_sent && dice_.one_in(2);
     if (is_first) step.group = ++groups;
     script_.steps.push_back(step);
     if (!is_first) continue;
@@ -339,13 +340,23 @@ double Generator::any_target(std::uint16_t actuator, std::size_t number) {
   const NumberSpec& spec = script_.actuators[actuator].numbers[number];
   const Range& range = ranges_[actuator][number];
   double value = dice_.real(range.low, range.high);
-  // mostly within the limits, now and then on them
-  if (!dice_.one_in(12)) {
-    value = std::clamp(value, std::max(range.low, spec.limits.minimum),
-                       std::min(range.high, spec.limits.maximum));
-  }
   if (dice_.one_in(6)) value = dice_.one_in(2) ? 0.0 : spec.rest;
-  return spec.is_float() ? value : std::round(value);
+  // targets outside the bounds are refused; now and then they lie on them
+  double low = std::max(range.low, spec.limits.minimum);
+  double high = std::min(range.high, spec.limits.maximum);
+  if (!spec.is_float()) {
+    low = std::ceil(low);
+    high = std::floor(high);
+    value = std::round(value);
+  }
+  value = std::clamp(value, low, std::max(low, high));
+  if (spec.kind == Kind::float32) {
+    auto narrow = static_cast<float>(value);
+    if (narrow > high) narrow = std::nextafter(narrow, -HUGE_VALF);
+    if (narrow < low) narrow = std::nextafter(narrow, HUGE_VALF);
+    value = narrow;
+  }
+  return value;
 }
 
 void Generator::add_targets(ScriptStep& step, std::size_t rows) {
@@ -368,6 +379,7 @@ RecordHead Generator::any_head(std::uint16_t actuator) {
   switch (dice_.whole(0, 7)) {
     case 0:
       head.pace = Pace::direct;
+      if (!linear_ && dice_.one_in(3)) head.amount = dice_.whole(1, 40) * 1'000'000;
       break;
     case 1:
     case 2:
@@ -396,6 +408,7 @@ RecordHead Generator::any_head(std::uint16_t actuator) {
       head.amount = static_cast<std::int64_t>(dice_.magnitude(1.0, 200.0)) - 1;
   }
   if (!linear_ && dice_.one_in(2)) head.profile = Profile::minimum_jerk;
+  if (!linear_ && head.pace == Pace::direct && dice_.one_in(4)) head.profile = Profile::as_sent;
   if (dice_.one_in(3)) head.mode = Mode::overwrite;
   if (dice_.one_in(8)) head.start = Start::observed;
   return head;
@@ -415,6 +428,8 @@ void Generator::add_trajectory(std::uint16_t actuator, std::uint32_t lane) {
   RecordHead head = any_head(actuator);
   const auto rows = static_cast<std::size_t>(dice_.magnitude(2.0, 40.0));
   if (head.pace == Pace::until || head.pace == Pace::fastest) head.pace = Pace::duration;
+  if (head.pace == Pace::duration) head.amount = 0;
+  if (head.profile == Profile::as_sent) head.profile = Profile::linear;
   if (head.pace == Pace::iterations) head.amount = dice_.whole(0, 9);
   ScriptStep& step = add(Action::command);
   step.actuator = actuator;

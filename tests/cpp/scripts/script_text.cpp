@@ -103,7 +103,8 @@ void print_command(std::ostringstream& out, const ScriptStep& step) {
   } else if (head.pace != Pace::direct && head.pace != Pace::fastest) {
     out << ' ' << head.amount;
   }
-  if (head.profile == Profile::minimum_jerk) out << " minimum_jerk";
+  if (head.pace == Pace::direct && head.amount != 0) out << " every " << head.amount;
+  if (head.profile != Profile::linear) out << ' ' << to_text(head.profile);
   if (head.mode == Mode::overwrite) out << " overwrite";
   if (head.start == Start::observed) out << " observed";
   if (step.mask != 0) out << " mask " << step.mask;
@@ -208,6 +209,10 @@ void parse_command(Line& line, ScriptStep& step) {
   for (std::string word = line.word(); word != "to"; word = line.word()) {
     if (word == "minimum_jerk") {
       step.head.profile = Profile::minimum_jerk;
+    } else if (word == "as_sent") {
+      step.head.profile = Profile::as_sent;
+    } else if (word == "every") {
+      step.head.amount = line.whole();
     } else if (word == "overwrite") {
       step.head.mode = Mode::overwrite;
     } else if (word == "observed") {

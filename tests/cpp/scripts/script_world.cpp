@@ -268,20 +268,16 @@ std::optional<Failure> ScriptWorld::hear_end(SentCommand& command, const StatusC
   command.told = {change.status, change.iteration};
   if (command.is_member && command.active_since != kNever) {
     const auto first = first_ends_.find({command.lane, command.id});
-    const bool expected = first != first_ends_.end() ? change.status == first->second
-                                                     : change.status == Status::completed ||
-                                                           change.status == Status::limited;
+    // a member that gives way to its successor ends as overwritten
+    const bool gave_way = change.status == Status::overwritten;
+    const bool unknown = may_arrive_before_others(command);
+    const bool expected =
+        gave_way || unknown || change.status == (first != first_ends_.end() ? first->second : Status::completed);
     if (!expected) return Failure{"end of several", "not the first end of its members is told"};
   }
   if (command.ended_at != kNever) return std::nullopt;  // a member that has left
   command.status = change.status;
-  if (command.is_member && command.active_since != kNever) {
-    const bool limited = actuators[step_of(command).actuator].clamped;
-    if (change.status == Status::completed && limited) {
-      return Failure{"end of several", "completed, though a member is limited"};
-    }
-    command.status = limited ? Status::limited : Status::completed;
-  }
+  if (command.is_member && command.active_since != kNever) command.status = Status::completed;
   command.ended_at = change.iteration;
   ended.push_back(&command);
   std::erase(members, &command);
@@ -293,18 +289,53 @@ std::optional<Failure> ScriptWorld::find_drivers() {
     ActuatorTrack& actuator = actuators[a];
     actuator.previous = actuator.driver;
     actuator.driver = nullptr;
-    for (const SentCommand* command : running_[a]) {
+    for (SentCommand* command : running_[a]) {
       if (!command->drove(iteration)) continue;
-      if (actuator.driver != nullptr) {
+      if (actuator.driver != nullptr && gives_way(*actuator.driver, *command)) {
+        actuator.driver->status = Status::overwritten;
+        actuator.driver->ended_at = iteration;
+        std::erase(members, actuator.driver);
+      } else if (actuator.driver != nullptr) {
         return Failure{"one driver",
                        "two commands gave one desired state of actuator " + std::to_string(a)};
       }
       actuator.driver = command;
     }
+    if (actuator.driver != nullptr && actuator.driver->is_member &&
+        (!actuator.active || actuator.braking)) {
+      // it follows, and has arrived before the others of its group
+      SentCommand& member = *std::exchange(actuator.driver, nullptr);
+      member.status = Status::completed;
+      member.ended_at = iteration - 1;
+      std::erase(members, &member);
+      std::erase(ended, &member);
+      for (std::size_t n = 0; n < actuator.numbers.size(); ++n) {
+        if (member.told.status == Status::rejected) break;
+        const bool rests = script.actuators[a].numbers[n].resting;
+        if (!names(member, n) || rests ||
+            actuator.numbers[n].before == target(member, rows_of(member) - 1, n)) {
+          continue;
+        }
+        return Failure{"target", where(a, n) + "a member left its group before it arrived"};
+      }
+    }
     std::erase_if(running_[a], [](const SentCommand* each) { return each->ended_at != kNever; });
     if (actuator.driver != nullptr) actuator.last = actuator.driver;
   }
   return std::nullopt;
+}
+
+/// Rows and starts elsewhere are followed: members may arrive one after the other.
+bool ScriptWorld::may_arrive_before_others(const SentCommand& command) const {
+  return rows_of(command) > 1 || step_of(command).head.start == Start::observed;
+}
+
+/// A member of a group, of which nothing is told: a set-point before a direct command, a trajectory
+/// behind its rows, or one that follows and has arrived before the others.
+bool ScriptWorld::gives_way(const SentCommand& command, const SentCommand& next) const {
+  if (!command.is_member || next.active_since != iteration) return false;
+  if (may_arrive_before_others(command)) return true;
+  return step_of(command).head.pace == Pace::direct && step_of(next).head.pace == Pace::direct;
 }
 
 std::size_t ScriptWorld::rows_of(const SentCommand& command) const {

@@ -38,8 +38,7 @@ struct SentCommand {
   bool drove(Iteration iteration) const {
     if (active_since == kNever || active_since > iteration) return false;
     if (ended_at == kNever) return true;
-    const bool until_its_end =
-        status == Status::completed || status == Status::limited || status == Status::interrupted;
+    const bool until_its_end = status == Status::completed || status == Status::interrupted;
     return until_its_end ? iteration <= ended_at : iteration < ended_at;
   }
 };
@@ -54,9 +53,9 @@ struct NumberTrack {
 
 struct ActuatorTrack {
   std::vector<NumberTrack> numbers;
-  const SentCommand* driver = nullptr;    // gave the desired state of this iteration
-  const SentCommand* previous = nullptr;  // of the iteration before
-  const SentCommand* last = nullptr;      // the last that did, since the last fresh start
+  SentCommand* driver = nullptr;          // gave the desired state of this iteration
+  SentCommand* previous = nullptr;        // of the iteration before
+  SentCommand* last = nullptr;            // the last that did, since the last fresh start
   Iteration dropped_at = kNever;          // all its commands were dropped before this iteration
   Iteration maybe_dropped_at = kNever;    // some of them, or none
   bool active = false;
@@ -126,12 +125,14 @@ class ScriptWorld {
   std::optional<Failure> hear();
   std::optional<Failure> hear_end(SentCommand& command, const StatusChange& change);
   std::optional<Failure> find_drivers();
+  bool may_arrive_before_others(const SentCommand& command) const;
+  bool gives_way(const SentCommand& command, const SentCommand& next) const;
 
   std::map<std::uint32_t, LaneBatch> batches_;
   std::deque<SentCommand> commands_;
   std::map<std::pair<std::uint32_t, CommandId>, std::vector<SentCommand*>> records_;
   std::map<std::pair<std::uint32_t, CommandId>, Status> first_ends_;  // of groups, if not completed
-  std::vector<std::vector<const SentCommand*>> running_;              // of each actuator
+  std::vector<std::vector<SentCommand*>> running_;                    // of each actuator
   std::size_t heard_ = 0;
 };
 

@@ -153,7 +153,9 @@ std::optional<Failure> SpanWatch::check(const ScriptWorld& world, std::size_t ac
     }
   }
   const long double covered = std::fabs(track.now - track.before);
-  if (number.fastest > 0.0L && !world.script.actuators[actuator].blend &&
+  // rows are followed, and a start elsewhere is caught up with, as fast as the limits allow
+  const bool is_followed = spec.limited() && world.rows_of(*world.actuators[actuator].driver) > 1;
+  if (number.fastest > 0.0L && !is_followed && !world.script.actuators[actuator].blend &&
       covered > number.fastest * (1.0L + 1e-8L) + 2.0L * rounding) {
     std::snprintf(text.data(), text.size(), "a step of %.12Lg where its pace allows %.12Lg",
                   covered, number.fastest);

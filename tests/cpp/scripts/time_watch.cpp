@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <string>
 
@@ -71,7 +72,7 @@ void TimeWatch::begin(const ScriptWorld& world, std::size_t actuator) {
   const SentCommand* previous = world.actuators[actuator].previous;
   const bool unbroken =
       previous != nullptr && previous->ended_at == world.iteration - 1 &&
-      (previous->status == Status::completed || previous->status == Status::limited) &&
+      previous->status == Status::completed &&
       world.actuators[actuator].dropped_at != world.iteration &&
       world.step_of(*world.actuators[actuator].driver).head.mode == Mode::queue;
   if (!unbroken) clocks_[actuator] = {(world.iteration - 1) * kPeriodNs, true};
@@ -80,14 +81,25 @@ void TimeWatch::begin(const ScriptWorld& world, std::size_t actuator) {
   }
 }
 
+/// Limits can make a command longer than asked, of several actuators those of any.
+bool TimeWatch::may_be_late(const ScriptWorld& world, const SentCommand& command) {
+  const auto has_rates = [](const ActuatorSpec& actuator) {
+    return std::ranges::any_of(actuator.numbers, [](const NumberSpec& number) {
+      return std::isfinite(number.limits.speed);
+    });
+  };
+  const auto& all = world.script.actuators;
+  return command.is_member ? std::ranges::any_of(all, has_rates)
+                           : has_rates(all[world.step_of(command).actuator]);
+}
+
 std::optional<Failure> TimeWatch::end(const ScriptWorld& world, std::size_t actuator) {
   const SentCommand& command = *world.actuators[actuator].driver;
   const ScriptStep& step = world.step_of(command);
   Clock& clock = clocks_[actuator];
   const Iteration took = command.ended_at - command.active_since + 1;
   const auto rows = static_cast<std::int64_t>(world.rows_of(command));
-  const bool whole = command.status == Status::completed || command.status == Status::limited;
-  if (!whole) return std::nullopt;
+  if (command.status != Status::completed) return std::nullopt;
 
   Iteration expected = command.ended_at;
   Iteration tolerance = 0;
@@ -114,7 +126,13 @@ std::optional<Failure> TimeWatch::end(const ScriptWorld& world, std::size_t actu
     default:
       clock.exact += took * kPeriodNs;
   }
-  if (command.ended_at < expected - tolerance || command.ended_at > expected + tolerance) {
+  const bool is_late = command.ended_at > expected + tolerance && may_be_late(world, command);
+  if (command.ended_at > expected && may_be_late(world, command)) {
+    // the exact time starts anew, but not if rounding made it late
+    clock = {command.ended_at * kPeriodNs, is_late};
+  }
+  if (command.ended_at < expected - tolerance ||
+      (command.ended_at > expected + tolerance && !is_late)) {
     std::array<char, 160> text{};
     std::snprintf(text.data(), text.size(), "a command of %lld rows ended at %lld, not at %lld",
                   static_cast<long long>(rows), static_cast<long long>(command.ended_at),

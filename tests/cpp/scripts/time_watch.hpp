@@ -29,6 +29,7 @@ class TimeWatch {
   static bool begins(const ScriptWorld& world, std::size_t actuator);
   void begin(const ScriptWorld& world, std::size_t actuator);
   void begin_together(const ScriptWorld& world, std::size_t actuator);
+  static bool may_be_late(const ScriptWorld& world, const SentCommand& command);
   std::optional<Failure> end(const ScriptWorld& world, std::size_t actuator);
 
   std::vector<Clock> clocks_;

@@ -1,0 +1,111 @@
+#include "control/number_motion.hpp"
+
+#include <algorithm>
+
+namespace o80 {
+
+void NumberMotion::restart(double position) noexcept {
+  guard_.restart(position);
+  planned_ = follows_ = held_ = leaves_ = false;
+}
+
+void NumberMotion::begin() noexcept {
+  former_target_ = planned_ ? plan_.target() : guard_.position();
+  end();
+}
+
+/// If the shortest stop would leave the bounds, the plan goes on until it stays inside.
+void NumberMotion::end() noexcept {
+  if (planned_ && !follows_ && !guard_.stops_inside()) {
+    former_ = plan_;
+    leaves_ = true;
+  }
+  planned_ = follows_ = false;
+  guard_.follow_within_bounds();
+}
+
+std::int64_t NumberMotion::propose(const Asked& asked) noexcept {
+  const NumberLimiter::Span stop = guard_.stop();
+  NumberLimiter::Span span = stop;
+  span.low = std::min(span.low, asked.target);
+  span.high = std::max(span.high, asked.target);
+  const double from = asked.start.value_or(guard_.position());
+  span.low = std::min(span.low, from);
+  span.high = std::max(span.high, from);
+  guard_.begin(span);
+
+  PlanTask task;
+  task.start = asked.start ? Moment{*asked.start, 0.0, 0.0} : guard_.moment();
+  task.line_start = asked.line_start;
+  task.target = asked.target;
+  task.low = span.low;
+  task.high = span.high;
+  if (!accelerates()) {
+    task.low = std::min(task.low, former_target_);
+    task.high = std::max(task.high, former_target_);
+  }
+  task.rates = guard_.rates();
+  task.cruise = asked.cruise;
+  task.profile = asked.profile;
+  task.stays = asked.start || guard_.stays();
+  planned_ = true;
+  // without limits it jumps to where it starts, which is no speed
+  jumps_ = asked.start && !has_rates() && from >= guard_.minimum() && from <= guard_.maximum();
+  start_ = from;
+  const bool starts_elsewhere =
+      asked.start && !jumps_ && (from != guard_.position() || !guard_.at_rest());
+  follows_ = leaves_ || starts_elsewhere || guard_.position() < guard_.minimum() || guard_.position() > guard_.maximum();
+  return plan_.propose(task, asked.iterations);
+}
+
+void NumberMotion::settle(std::int64_t iterations) noexcept {
+  if (jumps_) guard_.restart(start_);
+  plan_.settle(iterations);
+}
+
+void NumberMotion::line(double start, double target) noexcept {
+  if (!planned_) {
+    const NumberLimiter::Span stop = guard_.stop();
+    guard_.begin({std::min(stop.low, start), std::max(stop.high, start)});
+    planned_ = true;
+    follows_ = true;
+  }
+  guard_.widen(target);
+  plan_.line(start, target);
+}
+
+void NumberMotion::follow_as_sent(double target) noexcept {
+  if (!planned_) guard_.begin();
+  planned_ = true;
+  follows_ = true;
+  plan_.line(target, target);
+}
+
+/// One iteration of the former plan, if a stop would leave the bounds.
+bool NumberMotion::leave() noexcept {
+  if (!leaves_) return false;
+  leaves_ = !guard_.stops_inside();
+  return leaves_ && guard_.pass(former_.next());
+}
+
+Limit NumberMotion::step(double low, double high) noexcept {
+  const double wanted = std::clamp(plan_.next(), low, high);
+  if (!follows_ && guard_.pass(wanted)) return Limit::none;
+  follows_ = true;
+  if (leave()) return Limit::acceleration;
+  return guard_.follow(wanted);
+}
+
+bool NumberMotion::brake() noexcept {
+  const double before = guard_.position();
+  const bool was_away = is_away();
+  if (was_away) {
+    guard_.widen(*rest_);
+    guard_.follow(*rest_);
+  } else if (!leave()) {
+    guard_.brake();
+  }
+  return was_away || guard_.position() != before || !stays();
+}
+
+}  // namespace o80

@@ -1,0 +1,104 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "control/number_limiter.hpp"
+#include "control/number_plan.hpp"
+
+namespace o80 {
+
+/// The motion of one number of a state: a plan, and the guard of its limits behind it.
+///
+/// Realtime: yes.
+class NumberMotion {
+ public:
+  /// `rest`: the value that it goes to without a command, if it has one.
+  NumberMotion(const NumberLimiter& guard, std::optional<double> rest) noexcept
+      : guard_(guard), rest_(rest) {}
+
+  const NumberLimiter& guard() const noexcept { return guard_; }
+  double position() const noexcept { return guard_.position(); }
+  const NumberPlan& plan() const noexcept { return plan_; }
+  /// True if it has a limit of speed or acceleration: rows are followed, not shown.
+  bool has_rates() const noexcept {
+    return std::isfinite(guard_.rates().speed) || std::isfinite(guard_.rates().acceleration);
+  }
+  bool accelerates() const noexcept { return std::isfinite(guard_.rates().acceleration); }
+
+  /// Sets the position, at rest.
+  void restart(double position) noexcept;
+  /// A command begins: notes from which motion.
+  void begin() noexcept;
+
+  /// How a command asks for its target.
+  struct Asked {
+    double target = 0.0;
+    double line_start = 0.0;             // where a straight line begins
+    std::optional<double> start;         // a place to start from at rest, instead of its own
+    std::int64_t iterations = 0;         // 0: as few as the limits allow
+    double cruise = std::numeric_limits<double>::infinity();  // speed asked for [1/iteration]
+    Profile profile = Profile::linear;
+  };
+  /// Proposes a number of iterations for a plan to rest at the target.
+  std::int64_t propose(const Asked& asked) noexcept;
+  /// Then plans it for `iterations`, at least those.
+  void settle(std::int64_t iterations) noexcept;
+  /// A straight line to the next row of a trajectory, which is followed; line_for() sets its length.
+  void line(double start, double target) noexcept;
+  void line_for(std::int64_t iterations) noexcept { plan_.line_for(iterations); }
+  /// Goes to the target within the limits, whatever they keep it from (Profile::as_sent).
+  void follow_as_sent(double target) noexcept;
+  /// The span of what is followed reaches to here.
+  void widen(double position) noexcept {
+    if (follows_) guard_.widen(position);
+  }
+
+  /// One iteration of the plan; returns the limit that changed it. `low`, `high`: range of its kind.
+  Limit step(double low, double high) noexcept;
+  /// True if nothing of the plan, which is over, is left to follow.
+  bool arrived() const noexcept {
+    return !follows_ || (!leaves_ && guard_.position() == plan_.target());
+  }
+  bool follows() const noexcept { return follows_; }
+  /// The plan ends before its target: what follows is another command, or none.
+  void end() noexcept;
+  /// The plan ends at its target.
+  void complete() noexcept {
+    end();
+    // a jump is no speed
+    if (!accelerates()) guard_.rest();
+  }
+  /// One iteration without a command: towards rest, as fast as the limits allow. True while it
+  /// moves.
+  bool brake() noexcept;
+
+  bool has_rest() const noexcept { return rest_.has_value(); }
+  /// Stays where it is, away from its rest value, until release().
+  void hold() noexcept { held_ = rest_.has_value(); }
+  void release() noexcept { held_ = false; }
+  bool is_held_away() const noexcept { return held_ && guard_.position() != *rest_; }
+  /// True if braking would change nothing.
+  bool at_rest() const noexcept { return guard_.at_rest() && !is_away(); }
+  /// True if braking would not move it.
+  bool stays() const noexcept { return guard_.stays() && !is_away() && !leaves_; }
+
+ private:
+  bool is_away() const noexcept { return rest_ && !held_ && guard_.position() != *rest_; }
+  bool leave() noexcept;
+
+  NumberLimiter guard_;
+  std::optional<double> rest_;
+  NumberPlan plan_;
+  bool planned_ = false;  // a command moves it by `plan_`
+  bool follows_ = false;  // `plan_` may break limits
+  bool held_ = false;
+  bool jumps_ = false;  // the plan begins at `start_`
+  double start_ = 0.0;
+  // a stop from where it was would leave the bounds: goes on with the former plan until it would not
+  bool leaves_ = false;
+  NumberPlan former_;
+  double former_target_ = 0.0;
+};
+
+}  // namespace o80

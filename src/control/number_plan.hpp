@@ -1,0 +1,87 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+
+#include "control/fastest_motion.hpp"
+#include "control/smooth_motion.hpp"
+#include "o80/control/command.hpp"
+
+namespace o80 {
+
+/// The limit that kept a number from its wanted position, or that makes a motion long.
+enum class Limit : std::uint8_t { none, minimum, maximum, speed, acceleration, jerk };
+
+/// The longest plan [iterations]. A command that needs more is rejected.
+inline constexpr std::int64_t kLongestPlan = std::int64_t{1} << 31;
+
+/// The iterations of a distance at a speed [1/iteration], at least 1. Rounding adds none.
+std::int64_t iterations_of(double distance, double speed) noexcept;
+
+/// What a plan is for: one number, from its present motion to rest at a target.
+struct PlanTask {
+  Moment start;
+  double line_start = 0.0;  // where a straight line begins
+  double target = 0.0;
+  // a smooth motion stays between these: position, shortest stop (without a limit of acceleration:
+  // former target), and target
+  double low = 0.0;
+  double high = 0.0;
+  Rates rates{};
+  double cruise = std::numeric_limits<double>::infinity();  // speed asked for [1/iteration]
+  Profile profile = Profile::linear;
+  bool stays = true;  // it may stop at once
+};
+
+/// The way of one number to its target: a position for each iteration, within its limits of speed,
+/// acceleration and jerk, and at rest at the target in the last one (docs/commands.md).
+///
+/// Realtime: yes, bounded time.
+class NumberPlan {
+ public:
+  /// Returns the number of iterations that it takes: `asked` (0: none), or the fewest that the
+  /// limits allow. More than kLongestPlan: it cannot be planned.
+  std::int64_t propose(const PlanTask& task, std::int64_t asked) noexcept;
+  /// Plans the motion for `iterations`, at least those of propose().
+  void settle(std::int64_t iterations) noexcept;
+  /// A straight line that no limit changes; line_for() sets its length.
+  void line(double start, double target) noexcept;
+  void line_for(std::int64_t iterations) noexcept {
+    iterations_ = iterations;
+    done_ = 0;
+  }
+
+  /// The position in the next iteration; from the last one on the exact target.
+  double next() noexcept;
+  double target() const noexcept { return task_.target; }
+  /// For a straight line: the share of the way that is done.
+  double share() const noexcept {
+    return static_cast<double>(done_) / static_cast<double>(iterations_);
+  }
+  bool is_line() const noexcept { return shape_ == Shape::line; }
+  /// The limit that makes the motion long.
+  Limit slowest() const noexcept;
+
+ private:
+  enum class Shape : std::uint8_t { line, smooth, stop_first, fastest };
+
+  std::int64_t fewest() noexcept;
+  std::int64_t fewest_smooth(std::int64_t least) noexcept;
+  bool smooth(std::int64_t iterations) noexcept;
+  bool fits(const SmoothMotion& motion) const noexcept;
+  bool fits_after_stop(const SmoothMotion& motion) const noexcept;
+  bool stop_then_smooth(std::int64_t iterations) noexcept;
+
+  PlanTask task_;
+  Shape shape_ = Shape::line;
+  bool has_fastest_ = false;  // `fastest_` is the motion of task_
+  std::int64_t iterations_ = 1;
+  std::int64_t done_ = 0;
+  std::int64_t stop_ = 0;  // iterations of `to_stop_`
+  std::int64_t smooth_for_ = 0;  // iterations of `smooth_`
+  SmoothMotion to_stop_;
+  SmoothMotion smooth_;
+  FastestMotion fastest_;
+};
+
+}  // namespace o80

@@ -1,0 +1,86 @@
+#include "control/smooth_motion.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace o80 {
+
+SmoothMotion::SmoothMotion(const Moment& start, double target, std::int64_t iterations) noexcept
+    : last_(static_cast<double>(iterations)), target_(target) {
+  const double n = last_;
+  const double d = start.position - target;
+  const double v = start.speed;
+  const double a = start.acceleration;
+  // Newton's form through iterations 0, -1, -2. The differences are written out, because subtracting
+  // the values would cancel.
+  const double three = n * (n + 1.0) * (n + 2.0);
+  c0_ = -d / three;
+  c1_ = -(3.0 * d + n * v) / (three * (n + 3.0));
+  c2_ = -(6.0 * d + 3.0 * n * v + n * (n + 1.0) / 2.0 * a) / (three * (n + 3.0) * (n + 4.0));
+}
+
+double SmoothMotion::position(double i) const noexcept {
+  const double left = last_ - i;
+  return target_ - left * (left + 1.0) * (left + 2.0) * (c0_ + i * (c1_ + (i + 1.0) * c2_));
+}
+
+template <class Visit>
+void SmoothMotion::Quadratic::near_roots(double last, Visit&& visit) const noexcept {
+  const auto around = [&](double root) {
+    // a root may be huge, infinite or NaN
+    if (!(root > 0.0 && root < last + 1.0)) return;
+    const double below = std::floor(root);
+    if (below >= 1.0) visit(below);
+    if (below + 1.0 <= last) visit(below + 1.0);
+  };
+  const double discriminant = c[1] * c[1] - 4.0 * c[2] * c[0];
+  if (!(discriminant >= 0.0)) return;
+  const double q = -0.5 * (c[1] + std::copysign(std::sqrt(discriminant), c[1]));
+  around(q / c[2]);
+  around(c[0] / q);
+}
+
+/// The differences are, like the position, a product of known factors and a quadratic, whose roots
+/// are the extremes of the difference below it.
+SmoothMotion::Extremes SmoothMotion::extremes() const noexcept {
+  const double n = last_;
+  // v(i) = (n - i + 1)(n - i + 2) u(i); a(i) = (n - i + 2) h(i); j(i) = k(i)
+  const Quadratic u{{3.0 * c0_ - (n + 3.0) * c1_, 4.0 * c1_ - (2.0 * n + 3.0) * c2_, 5.0 * c2_}};
+  const auto [C, B, A] = u.c;
+  const Quadratic h{{(n + 3.0) * (B - A) - 2.0 * C, A * (2.0 * n + 7.0) - 3.0 * B, -4.0 * A}};
+  const auto [F, E, D] = h.c;
+  const Quadratic k{{(n + 3.0) * (E - D) - F, D * (2.0 * n + 7.0) - 2.0 * E, -3.0 * D}};
+
+  Extremes all{target_, target_, 0.0, 0.0, 0.0};
+  const auto place = [&](double i) {
+    const double at = position(i);
+    all.low = std::min(all.low, at);
+    all.high = std::max(all.high, at);
+  };
+  const auto speed = [&](double i) {
+    all.speed = std::max(all.speed, std::abs((n - i + 1.0) * (n - i + 2.0) * u.at(i)));
+  };
+  const auto acceleration = [&](double i) {
+    all.acceleration = std::max(all.acceleration, std::abs((n - i + 2.0) * h.at(i)));
+  };
+  const auto jerk = [&](double i) { all.jerk = std::max(all.jerk, std::abs(k.at(i))); };
+
+  place(1.0);
+  u.near_roots(n, place);
+  speed(1.0);
+  speed(n);
+  h.near_roots(n, speed);
+  acceleration(1.0);
+  acceleration(n + 1.0);
+  k.near_roots(n + 1.0, acceleration);
+  jerk(1.0);
+  jerk(n + 2.0);
+  const double vertex = std::floor(-0.5 * k.c[1] / k.c[2]);
+  if (vertex >= 1.0 && vertex <= n + 1.0) {
+    jerk(vertex);
+    jerk(vertex + 1.0);
+  }
+  return all;
+}
+
+}  // namespace o80
