@@ -170,7 +170,7 @@ void ActuatorQueue::end_running(Iteration iteration) noexcept {
   holder_ = ledger_->lane_of(record);
   if (std::exchange(alone_, kNoBlock) == kNoBlock) queue_.pop();
   if (late_ > 0 && asked_ > 0) {
-    ledger_->end(record, Status::completed, Reason::limits, reason_.packed(), iteration);
+    ledger_->end(record, Status::completed, Reason::limits, reason_.packed(), iteration, late_);
   } else {
     ledger_->end(record, Status::completed, Reason::none, 0, iteration);
   }
@@ -342,7 +342,8 @@ bool ActuatorQueue::begin_row(Iteration iteration) noexcept {
   if (row_iterations_ > kLongestPlan && !is_asked) {
     end_motion();
     queue_.pop();
-    ledger_->end(record, Status::rejected, Reason::invalid, reason_.packed(), iteration);
+    ledger_->end(record, Status::rejected, Reason::invalid,
+                 Limited{Limit::speed, 0}.packed(), iteration);
     return false;
   }
   if (keeps_plan_) {
@@ -360,7 +361,7 @@ bool ActuatorQueue::begin_row(Iteration iteration) noexcept {
   if (!std::exchange(begun_, true)) {
     const bool is_late = late_ > 0;
     ledger_->activate(record, iteration, is_late ? Reason::limits : Reason::none,
-                      is_late ? reason_.packed() : std::uint8_t{0});
+                      is_late ? reason_.packed() : std::uint8_t{0}, late_);
     if (is_trajectory_ && motion_.follows_rows()) ahead_left_ = head.rows;
   }
   if (pace_ == Pace::direct && rows_left_ == 0) take_out();

@@ -24,6 +24,15 @@ struct Ledger::TakenBatch {
   Status told_as = Status::rejected;  // end status of the records without blocks
 };
 
+namespace {
+
+/// As much of a delay as a status can tell.
+std::uint16_t told(std::int64_t late) noexcept {
+  return static_cast<std::uint16_t>(std::min<std::int64_t>(late, 0xFFFF));
+}
+
+}  // namespace
+
 Ledger::TakenBatch& Ledger::batch(BlockIndex block) noexcept {
   static_assert(sizeof(TakenBatch) <= kBlockBytes);
   return *std::launder(reinterpret_cast<TakenBatch*>(pool_.bytes(block)));
@@ -89,7 +98,7 @@ void Ledger::reject(std::uint32_t lane, BlockIndex block, Reason reason, std::ui
 }
 
 void Ledger::activate(BlockIndex record, Iteration iteration, Reason reason,
-                      std::uint8_t detail) noexcept {
+                      std::uint8_t detail, std::int64_t late) noexcept {
   const RecordHead& head = pool_.head(record);
   CommandId id = head.id;
   if (is_member(head)) {
@@ -102,11 +111,12 @@ void Ledger::activate(BlockIndex record, Iteration iteration, Reason reason,
       --undecided_groups_;
     }
   }
-  sink_.changed({lane_of(record), id, Status::active, reason, detail, iteration});
+  sink_.changed({lane_of(record), id, Status::active, reason, detail, iteration,
+                 StatusChange::Of::record, told(late)});
 }
 
 void Ledger::end(BlockIndex record, Status status, Reason reason, std::uint8_t detail,
-                 Iteration iteration) noexcept {
+                 Iteration iteration, std::int64_t late) noexcept {
   const RecordHead& head = pool_.head(record);
   const CommandId id = head.id;
   const bool of_group = is_member(head);
@@ -114,15 +124,18 @@ void Ledger::end(BlockIndex record, Status status, Reason reason, std::uint8_t d
   const BlockIndex block = head.own[Own::kBatch];
   const auto blocks = static_cast<std::uint32_t>(blocks_of(head.payload_bytes));
   const std::uint32_t lane = batch(block).lane;
-  if (!of_group) sink_.changed({lane, id, status, reason, detail, iteration});
+  if (!of_group) {
+    sink_.changed(
+        {lane, id, status, reason, detail, iteration, StatusChange::Of::record, told(late)});
+  }
   pool_.release(record, head.own[Own::kLast], blocks);
   sink_.freed(lane, blocks);
-  if (of_group) return member_ended(group, status, reason, detail, iteration);
+  if (of_group) return member_ended(group, status, reason, detail, iteration, late);
   ended(block, iteration);
 }
 
 void Ledger::member_ended(BlockIndex record, Status status, Reason reason, std::uint8_t detail,
-                          Iteration iteration) noexcept {
+                          Iteration iteration, std::int64_t late) noexcept {
   CommandGroup& group = groups_.at(record);
   group.last_end = std::max(group.last_end, iteration);
   if (status != Status::completed && group.end == Status::none) {
@@ -136,12 +149,13 @@ void Ledger::member_ended(BlockIndex record, Status status, Reason reason, std::
     group.reason = reason;
     group.detail = detail;
   }
+  groups_.note_late(record, late);
   if (--group.open > 0) return;
   --open_groups_;
   const CommandGroup of = group;
   if (of.decided == 0) --undecided_groups_;
   end(record, of.end == Status::none ? Status::completed : of.end, of.reason, of.detail,
-      of.last_end);
+      of.last_end, groups_.late(record));
 }
 
 void Ledger::ended(BlockIndex block, Iteration iteration) noexcept {

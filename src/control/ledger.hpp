@@ -51,11 +51,11 @@ class Ledger {
 
   /// A command, or a member of a group, has begun. Reason::limits: it takes longer than asked.
   void activate(BlockIndex record, Iteration iteration, Reason reason = Reason::none,
-                std::uint8_t detail = 0) noexcept;
+                std::uint8_t detail = 0, std::int64_t late = 0) noexcept;
   /// A record has ended; reported at once. A group is reported when its last member has ended, with
   /// the first end status that is not completed.
   void end(BlockIndex record, Status status, Reason reason, std::uint8_t detail,
-           Iteration iteration) noexcept;
+           Iteration iteration, std::int64_t late = 0) noexcept;
   /// A list of records has ended; reported by report_ends().
   void drop(BlockIndex first, Status status, Reason reason, Iteration iteration) noexcept;
 
@@ -80,7 +80,7 @@ class Ledger {
   void append(BlockIndex group) noexcept;
   BlockIndex& link(BlockIndex group) noexcept;
   void member_ended(BlockIndex group, Status status, Reason reason, std::uint8_t detail,
-                    Iteration iteration) noexcept;
+                    Iteration iteration, std::int64_t late) noexcept;
   bool tell_rejected(BlockIndex batch, std::uint32_t& budget) noexcept;
 
   BlockPool& pool_;

@@ -19,6 +19,7 @@ struct StatusChange {
   std::uint8_t detail = 0;  // for `exclusive`: the lane that has control
   Iteration iteration = 0;
   Of of = Of::record;
+  std::uint16_t late = 0;  // for `limits`: iterations more than asked, at most 65535
 };
 
 /// Receives status changes from the controller.

@@ -69,15 +69,19 @@ void LaneReceiver::free(std::uint32_t blocks) noexcept {
   has_news_ = true;
 }
 
-void LaneReceiver::set_status_word(std::uint64_t id, std::uint64_t word) noexcept {
+void LaneReceiver::set_status_word(std::uint64_t id, std::uint64_t word,
+                                   std::uint16_t late) noexcept {
   StatusSlot& slot = statuses_[id & (2 * (mask_ + 1) - 1)];
-  const std::uint64_t owner = slot.id.load(std::memory_order_relaxed);
+  const std::uint64_t owner = StatusWord::announcing(slot.id.load(std::memory_order_relaxed));
   if (owner > id) return;  // the slot belongs to a later id: this one is forgotten
   if (owner != id) {
     // announce the new id first: a reader never sees the new id with the old status
     slot.word.store(StatusWord::announcing(id), std::memory_order_relaxed);
     O80_CRASH_POINT("status.before_id");
     slot.id.store(id, std::memory_order_release);  // sync status_id
+  }
+  if (late != 0) {
+    slot.id.store(id | static_cast<std::uint64_t>(late) << 48, std::memory_order_relaxed);
   }
   O80_CRASH_POINT("status.before_word");
   slot.word.store(word, std::memory_order_release);  // sync status

@@ -64,7 +64,8 @@ class LaneReceiver {
     set_status_word(id, word.packed());
   }
   /// The same for a packed StatusWord.
-  void set_status_word(std::uint64_t id, std::uint64_t word) noexcept;
+  /// `late`: a further number of the status, in the bits of the slot that ids do not need.
+  void set_status_word(std::uint64_t id, std::uint64_t word, std::uint16_t late = 0) noexcept;
   /// Stores a text for an id, cut to 247 bytes. Call it before the set_status() that it explains.
   void set_message(std::uint64_t id, std::string_view text) noexcept;
   /// True if a batch may have this id: ids grow by limited steps. Otherwise one owner could use up

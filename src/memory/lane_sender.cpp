@@ -203,17 +203,20 @@ LaneSender::StatusAnswer LaneSender::status(std::uint64_t id) const noexcept {
   const StatusSlot& slot = statuses_[id & (statuses() - 1)];
   for (int i = 0; i < kTries; ++i) {
     const std::uint64_t word = slot.word.load(std::memory_order_acquire);  // sync status
-    const std::uint64_t owner = slot.id.load(std::memory_order_acquire);   // sync status_id
-    if (owner > id) return {Known::forgotten, {}};
-    if (owner < id) return {Known::not_yet, {}};
+    const std::uint64_t slot_id = slot.id.load(std::memory_order_acquire);  // sync status_id
+    const std::uint64_t owner = StatusWord::announcing(slot_id);
+    if (owner > id) return {Known::forgotten, {}, 0};
+    if (owner < id) return {Known::not_yet, {}, 0};
     const StatusWord known = StatusWord::unpack(word);
     if (known.status == 0) {
-      if (word > StatusWord::announcing(id)) return {Known::forgotten, {}};
+      if (word > StatusWord::announcing(id)) return {Known::forgotten, {}, 0};
       continue;
     }
-    if (slot.word.load(std::memory_order_relaxed) == word) return {Known::yes, known};
+    if (slot.word.load(std::memory_order_relaxed) == word) {
+      return {Known::yes, known, static_cast<std::uint16_t>(slot_id >> 48)};
+    }
   }
-  return {Known::not_yet, {}};
+  return {Known::not_yet, {}, 0};
 }
 
 std::optional<std::string> LaneSender::message(std::uint64_t id) const {

@@ -36,6 +36,7 @@ class LaneSender {
   struct StatusAnswer {
     Known known;
     StatusWord word;  // valid if known == yes
+    std::uint16_t late = 0;
   };
   struct BurstAnswer {
     Known known;

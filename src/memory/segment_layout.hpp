@@ -187,7 +187,7 @@ struct MessageSlot {
 static_assert(sizeof(MessageSlot) == 256);
 
 struct StatusSlot {
-  std::atomic<std::uint64_t> id;
+  std::atomic<std::uint64_t> id;    // in 48 bits; above: StatusAnswer::late
   std::atomic<std::uint64_t> word;  // a StatusWord (status_word.hpp)
 };
 static_assert(sizeof(StatusSlot) == 16);

@@ -27,6 +27,7 @@ struct StatusWord {
   }
   /// The word of a slot between its new id and the first status of that id. If the backend crashes
   /// in between, the former id of the slot reads as forgotten (ARCHITECTURE.md, Statuses and ids).
+  /// It is the 48 bits that an id has.
   static constexpr std::uint64_t announcing(std::uint64_t id) noexcept {
     return id & 0xffff'ffff'ffffULL;
   }

@@ -41,15 +41,16 @@ bool is_rejected(const LaneSender& lane, CommandId batch) noexcept {
          static_cast<Status>(answer.word.status) == Status::rejected;
 }
 
-/// Describes the limit that kept a command from its target; `packed` as in Limited::packed().
-std::string limited_by(std::uint8_t packed) {
+/// Describes why a command takes longer than asked; `packed` as in Limited::packed().
+std::string limited_by(std::uint8_t packed, std::int64_t late) {
   constexpr const char* kLimits[] = {
       "a limit",       "its minimum", "its maximum", "its speed limit", "its acceleration limit",
       "its jerk limit"};
   const std::size_t limit = packed & 7U;
   const unsigned number = packed >> 3U;
   const std::string text = kLimits[limit < std::size(kLimits) ? limit : 0];
-  return text + " kept it from its target" +
+  return std::to_string(late) + (late == 1 ? " iteration" : " iterations") +
+         " later than asked, because of " + text +
          (number == 0 ? "" : " (number " + std::to_string(number) + " of its state)");
 }
 
@@ -60,10 +61,12 @@ std::string words_for(const Link& link, const Handle& handle, std::uint8_t detai
     case Reason::exclusive:
       return owner_of(link, detail) + " has exclusive control";
     case Reason::invalid:
-      return "the record was invalid: it was built by another version of o80, or the lane was "
-             "corrupted";
+      return (detail & 7U) != 0
+                 ? "its target is so far away that it would take more than 2^31 iterations"
+                 : "the record was invalid: it was built by another version of o80, or the lane "
+                   "was corrupted";
     case Reason::limits:
-      return limited_by(detail);
+      return limited_by(detail, handle.late);
     case Reason::fresh_start:
       return "the robot made a fresh start (reset, restore or resume)";
     case Reason::dead_frontend:
@@ -106,6 +109,7 @@ Handle Batch::ask(CommandId id) const {
   handle.status = static_cast<Status>(answer.word.status);
   handle.reason = static_cast<Reason>(answer.word.reason);
   handle.iteration = answer.word.iteration;
+  handle.late = answer.late;
   if (!is_end(handle.status)) {
     if (const auto running = running_request(link_->segment.view(), lane_->lane(), id)) {
       handle.progress = printable(running->progress_text());

@@ -7,7 +7,8 @@ namespace o80 {
 void StatusOutbox::put(const StatusChange& change) noexcept {
   const StatusWord word{static_cast<std::uint8_t>(change.status),
                         static_cast<std::uint8_t>(change.reason), change.detail, change.iteration};
-  const Run now{change.id, word.packed(), 1, change.lane, change.of == StatusChange::Of::record};
+  const Run now{change.id,   word.packed(), 1, change.lane,
+                change.late, change.of == StatusChange::Of::record};
   const bool ends = is_end(change.status);
   if (!stepping_) return report_now(now, ends);
   if (ends && waiting_.size() < waiting_.capacity()) {
@@ -24,7 +25,7 @@ void StatusOutbox::wait(const Run& end) noexcept {
   if (!waiting_.empty()) {
     Run& last = waiting_.back();
     if (end.first_id == last.first_id + last.count && end.word == last.word &&
-        end.lane == last.lane && end.of_records == last.of_records) {
+        end.lane == last.lane && end.late == last.late && end.of_records == last.of_records) {
       ++last.count;
       return;
     }
@@ -54,7 +55,7 @@ void StatusOutbox::report_no_row() noexcept {
   for (Run& end : waiting_) {
     StatusWord word = StatusWord::unpack(end.word);
     const auto status = static_cast<Status>(word.status);
-    if (status != Status::completed && status != Status::limited) continue;
+    if (status != Status::completed) continue;
     word.status = static_cast<std::uint8_t>(Status::purged);
     word.reason = static_cast<std::uint8_t>(Reason::stopped);
     end.word = word.packed();
@@ -67,7 +68,7 @@ void StatusOutbox::tell(const Run& run, bool ends) noexcept {
   LaneReceiver& lane = lanes_[run.lane];
   for (std::uint32_t i = 0; i < run.count; ++i) {
     O80_COUNT(status_told);
-    lane.set_status_word(run.first_id + i, run.word);
+    lane.set_status_word(run.first_id + i, run.word, run.late);
   }
   if (ends) lane.flag();
 }

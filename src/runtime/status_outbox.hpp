@@ -44,6 +44,7 @@ class StatusOutbox {
     std::uint64_t word = 0;  // a packed StatusWord
     std::uint32_t count = 0;
     std::uint32_t lane = 0;
+    std::uint16_t late = 0;   // StatusChange::late
     bool of_records = false;  // the journal has the others in the entries of their batch
   };
 

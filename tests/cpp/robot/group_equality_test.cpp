@@ -135,9 +135,12 @@ class Singles final : public Side {
       Bytes rows(static_cast<std::size_t>(kIterations) * frontends_[copy]->layout().size);
       const bool done = collect(copy, [&] {
         const std::vector<std::uint32_t> actuators{0, 1};
-        frontends_[copy]->add_trajectories(
-            actuators, kSteps, std::as_bytes(std::span(targets).subspan(copy * own, own)),
-            manner.command);
+        const auto states = std::as_bytes(std::span(targets).subspan(copy * own, own));
+        if (is_each_iteration(manner.command.pace)) {
+          frontends_[copy]->add_set_points(actuators, kSteps, states, manner.command.mode);
+        } else {
+          frontends_[copy]->add_trajectories(actuators, kSteps, states, manner.command);
+        }
         PulseOptions pulse;
         if (manner.delay > 0) pulse.at = frontends_[copy]->published() + 1 + manner.delay;
         frontends_[copy]->burst_rows(rows, kPatience, {}, pulse);

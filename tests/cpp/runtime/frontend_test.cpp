@@ -92,12 +92,12 @@ TEST_F(FrontendTest, RefusesOptionsThatContradictEachOther) {
   const auto refusal = [&](const CommandOptions& options) {
     return message_of<InvalidArgument>([&] { add(frontend, 0, 1.0, options); });
   };
-  EXPECT_THAT(refusal({.pace = iterations(5), .on_limit = OnLimit::go_on}),
+  EXPECT_THAT(refusal({.pace = iterations(5), .profile = Profile::as_sent}),
               HasSubstr("without a pace"));
   EXPECT_THAT(refusal({.pace = fastest(), .profile = Profile::linear}),
               HasSubstr("has no profile"));
-  EXPECT_THAT(refusal({.profile = Profile::linear, .on_limit = OnLimit::go_on}),
-              HasSubstr("has no profile"));
+  EXPECT_THAT(refusal({.pace = direct(std::chrono::milliseconds(20)), .profile = Profile::as_sent}),
+              HasSubstr("without every"));
   EXPECT_EQ(frontend.added(), 0U);
 }
 
