@@ -19,6 +19,7 @@ from o80.provenance import Provenance
 from o80.recording.journal_channel import Entries
 from o80.recording.recorder import Recorder
 from o80.replaying.motion_rules import MotionRules
+from o80.words import ProfileWord
 
 WAIT = 60.0  # [s] longer than any command should take
 NEWER = _core.JOURNAL_CODEC + 1
@@ -189,15 +190,15 @@ def test_what_a_newer_o80_recorded_is_listed_and_ends_a_replay(
 # ---------------------------------------------------------------------------- motion rules
 
 
-def record_limited(path: Path, segment: str) -> Path:
-    """A command of an actuator without a limit of acceleration in row 1, of one with it in 11."""
-    limits = {"lift": (-1.0, 1.0, 2.0, 20.0)}
+def record_limited(path: Path, segment: str, profile: ProfileWord = "linear") -> Path:
+    """A command of an actuator without a limit of speed in row 1, of one with it in 11."""
+    limits = {"lift": (-1.0, 1.0, 2.0)}
     with o80.Backend(segment, ["free", "lift"], limits=limits) as backend:
         backend.publish([0.0, 0.0])
         with o80.Frontend(segment) as arm, o80.Recording(path, arm) as recording:
             recording.flush()
             for name in ("free", "lift"):
-                arm.add_command(name, 0.1, iterations=8)
+                arm.add_command(name, 0.1, iterations=8, profile=profile)
                 arm.pulse()
                 for _ in range(10):
                     backend.publish(backend.step())
@@ -239,13 +240,14 @@ def test_under_other_rules_rows_are_compared_up_to_the_first_command_that_they_c
     assert run.difference is None
     assert not run.identical
     assert run.rows == 11  # up to row 10
-    assert "a command of row 11 moves lift, which has an acceleration limit" in run.gap
+    now = _core.MOTION_RULES
+    assert f"row 11 begins a command of lift, which motion rules {now} may move otherwise" in (
+        run.gap
+    )
     code, said = o80_command("replay", path)
     assert code == 2
-    assert "11 rows, identical up to row 10; then a command of row 11 moves lift" in said
-    assert f"it moved by motion rules {other}, this o80 has motion rules {_core.MOTION_RULES}" in (
-        said
-    )
+    assert "11 rows, identical up to row 10; then row 11 begins a command of lift" in said
+    assert f"note: it moved by motion rules {other}, this o80 has motion rules {now}" in said
 
 
 def test_rules_that_change_no_command_of_the_run_are_noted(
@@ -266,14 +268,15 @@ def test_rules_that_change_no_command_of_the_run_are_noted(
 
 
 def test_the_first_command_is_found_whatever_the_rules_are(segment: str, tmp_path: Path) -> None:
-    path = record_limited(tmp_path / "run.mcap", segment)
-    (epoch,) = o80.open(path)[segment].epochs
-    entries = list(epoch.native_journal())
-
-    for recorded, now, expected in ((1, 1, []), (2, 2, []), (1, 2, [11]), (3, 2, [11])):
-        rules = MotionRules.of(epoch.schema, recorded, now)
-        moved = [entry.iteration for entry in entries if rules.moved_otherwise(entry)]
-        assert moved == expected, (recorded, now)
+    profiles: list[tuple[ProfileWord, list[int]]] = [("linear", [11]), ("minimum_jerk", [1, 11])]
+    for profile, changed in profiles:
+        path = record_limited(tmp_path / f"{profile}.mcap", segment, profile)
+        (epoch,) = o80.open(path)[segment].epochs
+        entries = list(epoch.native_journal())
+        for recorded, now in ((1, 1), (2, 2), (1, 2), (3, 2)):
+            rules = MotionRules.of(epoch.schema, recorded, now)
+            moved = [entry.iteration for entry in entries if rules.moved_otherwise(entry)]
+            assert moved == (changed if recorded != now else []), (profile, recorded, now)
 
 
 @pytest.mark.parametrize("rules", ['"one"', "null", "[]", "1.5", "-1", "9" * 30])

@@ -42,8 +42,8 @@ class EntryFeed:
             elif moved := self._rules.moved_otherwise(entry):
                 self.until = entry.iteration - 1
                 self.gap = (
-                    f"a command of row {entry.iteration} moves {moved}, which has an acceleration "
-                    f"limit: {self._rules}"
+                    f"row {entry.iteration} begins a command of {moved}, which motion rules "
+                    f"{self._rules.now} may move otherwise"
                 )
             elif entry.unknown and entry.kind != "scheduled":
                 self.until = entry.iteration - 1

@@ -13,21 +13,25 @@ if TYPE_CHECKING:
 class MotionRules:
     """The rules of a recorded run and of this o80.
 
-    Under other rules, commands of actuators with an acceleration limit may move otherwise.
+    Under other rules a command may move otherwise if its motion is not a straight line: where there
+    is a limit of speed (one of acceleration needs it) or a value at rest, or with another profile.
     """
 
     recorded: int
     now: int
-    limited: dict[int, str]  #: actuators with an acceleration limit: names by number
+    names: tuple[str, ...]  #: of all actuators
+    limited: frozenset[int]  #: the actuators with such limits
 
     @classmethod
     def of(cls, schema: dict[str, Any], recorded: int, now: int) -> MotionRules:
-        limited = {
-            number: actuator["name"] or f"actuator {number}"
-            for number, actuator in enumerate(schema["actuators"])
-            if any(limit["acceleration"] is not None for limit in actuator["limits"])
-        }
-        return cls(recorded, now, limited)
+        actuators = list(enumerate(schema["actuators"]))
+        limited = (
+            number
+            for number, actuator in actuators
+            if any(each["speed"] is not None or "rest" in each for each in actuator["limits"])
+        )
+        names = (actuator["name"] or f"actuator {number}" for number, actuator in actuators)
+        return cls(recorded, now, tuple(names), frozenset(limited))
 
     @property
     def differ(self) -> bool:
@@ -39,8 +43,8 @@ class MotionRules:
             return ""
         for record in entry.records:
             for target in record.targets:
-                if target.actuator in self.limited:
-                    return self.limited[target.actuator]
+                if target.actuator in self.limited or record.profile != "linear":
+                    return self.names[target.actuator]
         return ""
 
     def __str__(self) -> str:

@@ -202,8 +202,8 @@ class _RunReplay:
         rules = MotionRules.of(self._run.schema, recorded, _core.MOTION_RULES)
         if rules.differ:
             self._notes.append(
-                f"{rules}: rows are compared up to the first command of an actuator with an "
-                f"acceleration limit"
+                f"{rules}: rows are compared up to the first command that is not linear, or is of "
+                f"an actuator with a limit of speed"
             )
         return rules
 
