@@ -38,6 +38,8 @@ std::string word_of(o80::JournalRecord::Kind kind) {
       return "release_control";
     case resume:
       return "resume";
+    case unknown:
+      return "unknown";
   }
   return "command";
 }
@@ -77,13 +79,14 @@ nb::tuple read_raw(o80::RawJournal& journal, std::size_t most) {
   return nb::make_tuple(bytes_of(entries.bytes), entries.first, entries.next, entries.more);
 }
 
-std::vector<o80::JournalEntry> decoded(o80::RecordedJournal& journal, const nb::bytes& bytes) {
+std::vector<o80::JournalEntry> decoded(o80::RecordedJournal& journal, const nb::bytes& bytes,
+                                       std::int64_t codec) {
   std::vector<o80::JournalEntry> entries;
-  journal.decode({reinterpret_cast<const std::byte*>(bytes.c_str()), bytes.size()}, entries);
+  journal.decode({reinterpret_cast<const std::byte*>(bytes.c_str()), bytes.size()}, entries, codec);
   return entries;
 }
 
-/// Journals as they are in a segment and in a file.
+/// Journals in the format of files.
 void bind_raw(nb::module_& m) {
   nb::class_<o80::RawJournal>(m, "RawJournal")
       .def(
@@ -98,7 +101,8 @@ void bind_raw(nb::module_& m) {
   nb::class_<o80::RecordedJournal>(m, "RecordedJournal")
       .def(nb::init<std::shared_ptr<const o80::Description>, std::uint64_t>(), "description"_a,
            "first"_a)
-      .def("decode", &decoded, "entries"_a);
+      .def("decode", &decoded, "entries"_a, "codec"_a);
+  m.attr("JOURNAL_CODEC") = o80::kJournalCodec;
 }
 
 void bind_record(nb::module_& m) {
@@ -125,7 +129,8 @@ void bind_record(nb::module_& m) {
       .def_ro("only_own", &JournalRecord::only_own)
       .def_ro("request", &JournalRecord::request)
       .def_prop_ro("payload", [](const JournalRecord& self) { return bytes_of(self.payload); })
-      .def_ro("halt", &JournalRecord::halt);
+      .def_ro("halt", &JournalRecord::halt)
+      .def_ro("unknown", &JournalRecord::unknown);
 }
 
 }  // namespace
@@ -159,6 +164,7 @@ void bind_journal(nb::module_& m) {
       .def_prop_ro("cause", word(&JournalEntry::cause))
       .def_ro("cut", &JournalEntry::cut)
       .def_ro("text", &JournalEntry::text)
+      .def_ro("unknown", &JournalEntry::unknown)
       .def_ro("actuator", &JournalEntry::actuator)
       .def_ro("slot", &JournalEntry::slot)
       .def_prop_ro("kept", [](const JournalEntry& self) { return bytes_of(self.kept); });

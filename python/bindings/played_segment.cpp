@@ -48,6 +48,7 @@ o80::Provenance provenance_in(nb::handle object) {
         {text_in(file, "option"), text_in(file, "path"), text_in(file, "sha256")});
   provenance.version = text_in(object, "version");
   provenance.source_hash = text_in(object, "source_hash");
+  provenance.motion_rules = nb::cast<std::int64_t>(object.attr("motion_rules"));
   provenance.wall_clock_offset = nb::cast<std::int64_t>(object.attr("wall_clock_offset"));
   return provenance;
 }
@@ -105,11 +106,11 @@ void bind_played_segment(nb::module_& m) {
       .def("serve", &serve, "rows"_a, "The same, as frontends request iterations.")
       .def(
           "add_journal",
-          [](PlayedSegment& self, nb::bytes entries) {
+          [](PlayedSegment& self, nb::bytes entries, std::int64_t codec) {
             return self.add_journal(
-                {reinterpret_cast<const std::byte*>(entries.c_str()), entries.size()});
+                {reinterpret_cast<const std::byte*>(entries.c_str()), entries.size()}, codec);
           },
-          "entries"_a, "Returns the iteration of the last entry.")
+          "entries"_a, "codec"_a, "Returns the iteration of the last entry.")
       .def("end", &PlayedSegment::end)
       .def("ask_to_stop", &PlayedSegment::ask_to_stop);
 }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "bindings.hpp"
+#include "control/motion_rules.hpp"
 #include "frontend.hpp"
 
 namespace nb = nanobind;
@@ -44,12 +45,14 @@ nb::dict fields_of(const Frontend& frontend) {
   fields["version"] = text_of(provenance.version);
   fields["source_hash"] = text_of(provenance.source_hash);
   fields["wall_clock_offset"] = provenance.wall_clock_offset;
+  fields["motion_rules"] = provenance.motion_rules;
   return fields;
 }
 
 }  // namespace
 
 void bind_provenance(nb::module_& m) {
+  m.attr("MOTION_RULES") = o80::kMotionRules;
   m.def("provenance_fields", &fields_of, "frontend"_a,
         nb::sig("def provenance_fields(frontend: Frontend) -> dict[str, typing.Any]"),
         "How the backend of a frontend was started.");

@@ -22,7 +22,7 @@ _NEVER = 2**62  # a number that no entry reaches
 class JournalCommand:
     """A command, a request or an order of a batch, as its frontend sent it."""
 
-    kind: str  #: command, purge, request, take_control, release_control or resume
+    kind: str  #: command, purge, request, take_control, release_control, resume or unknown
     id: int  #: the id that its `status` entries have
     actuators: tuple[str, ...] = ()  #: of a command or a purge; of a purge of all: none
     #: For each actuator its target: a number, or a dictionary of the fields that were given. For a
@@ -38,6 +38,7 @@ class JournalCommand:
     request: str = ""  #: the name of the request
     fields: dict[str, Any] | None = None  #: its values
     halt: int | None = None  #: of a resume
+    unknown: str = ""  #: of kind unknown: what a newer o80 has recorded, such as "record kind 10"
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,9 @@ class JournalEntry:
     text: str = ""  #: the reason of a halt, or of the end of the backend
     actuator: str = ""  #: that the driver interrupted
     slot: int | None = None  #: in which the driver keeps a snapshot
+    #: What this o80 does not know of the entry or its commands, such as "entry kind 30" (the kind
+    #: is "none" then): a newer one has recorded it.
+    unknown: str = ""
 
 
 class Journal:
@@ -139,6 +143,7 @@ class EntryDecoder:
             text=native.text,
             actuator=self._name(native.actuator) if kind == "interrupted" else "",
             slot=native.slot if kind == "snapshot" else None,
+            unknown=native.unknown,
         )
 
     def _name(self, index: int) -> str:
@@ -169,7 +174,7 @@ class EntryDecoder:
             payload = np.frombuffer(native.payload, dtype_of_type(described["type"]), 1)[0]
             fields = {name: payload[name].tolist() for name in payload.dtype.names or ()}
             return JournalCommand(kind, native.id, request=described["name"], fields=fields)
-        return JournalCommand(kind, native.id, halt=native.halt or None)
+        return JournalCommand(kind, native.id, halt=native.halt or None, unknown=native.unknown)
 
     def _target(self, native: _core.JournalTarget, rows: int) -> Any:
         """The rows of one actuator; of a struct the fields that were given."""

@@ -36,6 +36,9 @@ class Provenance:
     library_sha256: str = ""  #: of its content
     built_with: str = ""  #: versions of what the robot was built with
     files: tuple[ProvenanceFile, ...] = ()  #: that the robot's options name
+    #: Version of the rules that make desired states of commands; see `o80 replay`. Recordings that
+    #: do not say it were made under version 1.
+    motion_rules: int = 1
 
     def as_json(self) -> str:
         """As one line of JSON, which `from_json` reads. Pure ASCII."""
@@ -63,8 +66,11 @@ class Provenance:
         ]
         if not all(isinstance(text, str) for text in texts):
             raise ValueError("a value is no text")
-        if not isinstance(provenance.wall_clock_offset, int):
-            raise ValueError("the offset to the wall clock is no whole number")
+        for number in (provenance.wall_clock_offset, provenance.motion_rules):
+            if not isinstance(number, int):
+                raise ValueError("a value is no whole number")
+        if not 0 <= provenance.motion_rules < 2**31:
+            raise ValueError("the version of the motion rules is out of range")
         return provenance
 
     @classmethod

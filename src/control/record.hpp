@@ -36,6 +36,12 @@ enum class RecordKind : std::uint8_t {
   overwriter_purged
 };
 
+/// True for the kinds that a lane may hold, and for those of the backend.
+constexpr bool is_known(RecordKind kind) noexcept {
+  return (kind >= RecordKind::batch && kind <= RecordKind::member) ||
+         (kind >= RecordKind::overwritten_list && kind <= RecordKind::overwriter_purged);
+}
+
 /// Longest pace [iterations]: a status stores 48 bits of an iteration.
 inline constexpr std::int64_t kMostIterations = std::int64_t{1} << 47;
 /// The longest duration [ns].

@@ -39,8 +39,7 @@ struct JournalHead {
   }
   /// The numbers that the entry takes.
   constexpr std::uint64_t numbers() const noexcept {
-    const bool is_many = kind == JournalKind::statuses || kind == JournalKind::status;
-    return is_many && what > 0 ? what : 1;
+    return kind == JournalKind::statuses && what > 0 ? what : 1;
   }
   /// Packs a status, a reason and its detail into `what`.
   static constexpr std::uint32_t how(std::uint8_t status, std::uint8_t reason = 0,

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "base/crash_point.hpp"
+#include "control/motion_rules.hpp"
 #include "control/number_name.hpp"
 #include "describe/table.hpp"
 #include "o80/base/version.hpp"
@@ -129,6 +130,7 @@ Provenance provenance_of(const Schema& schema, const BackendOptions& options) {
     provenance.run_options.push_back(std::move(option));
   provenance.version = version();
   provenance.source_hash = source_hash();
+  provenance.motion_rules = kMotionRules;
   provenance.wall_clock_offset = wall_clock_offset(schema);
   return provenance;
 }

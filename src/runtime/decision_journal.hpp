@@ -35,12 +35,6 @@ static_assert(sizeof(JournalHalt) == 320);
 
 /// Payload of `owner`: its process, as text.
 using JournalOwner = std::array<std::uint64_t, 8>;
-/// Payload of `status`, which recordings of the first format have: statuses of one lane.
-struct JournalStatus {
-  std::uint64_t id = 0;
-  std::uint64_t word = 0;  // a StatusWord
-};
-static_assert(sizeof(JournalStatus) == 16);
 /// Payload of `statuses`: runs of consecutive ids of one lane with the same status.
 struct JournalStatusRun {
   std::uint64_t first_id = 0;

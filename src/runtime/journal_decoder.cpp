@@ -34,15 +34,6 @@ Enum enum_of(std::uint64_t value, std::size_t count) {
   return static_cast<Enum>(value < count ? value : 0);
 }
 
-/// A word of the payload of an entry; 0 if the payload is shorter, as in recordings of the first
-/// format.
-std::uint64_t word_of(const JournalItem& item, std::size_t index) {
-  std::uint64_t word = 0;
-  if (item.payload.size() >= (index + 1) * sizeof word)
-    std::memcpy(&word, item.payload.data() + index * sizeof word, sizeof word);
-  return word;
-}
-
 /// The burst that a batch asks for; -1 until it has ended, 0: none.
 std::int64_t burst_of(const std::vector<std::byte>& blocks) {
   BatchRecord batch;
@@ -80,7 +71,6 @@ void JournalDecoder::take() {
     case JournalKind::owner:
       keep_name();
       break;
-    case JournalKind::status:
     case JournalKind::statuses:
       keep_statuses();
       entries_ = statuses_.size();
@@ -95,7 +85,7 @@ void JournalDecoder::take() {
 bool JournalDecoder::next(JournalEntry& entry) {
   if (returned_ == entries_) return false;
   entry = {};
-  if (item_.head.kind == JournalKind::status || item_.head.kind == JournalKind::statuses) {
+  if (item_.head.kind == JournalKind::statuses) {
     fill_status(entry);
   } else {
     ++returned_;
@@ -110,26 +100,17 @@ bool JournalDecoder::next(JournalEntry& entry) {
 void JournalDecoder::keep_statuses() {
   statuses_.clear();
   const std::size_t most = std::min(item_.head.what, kMostStatuses);
-  const auto each = [&]<class Payload>(Payload payload, auto&& add) {
-    for (std::size_t at = 0; at + sizeof payload <= item_.payload.size(); at += sizeof payload) {
-      std::memcpy(&payload, item_.payload.data() + at, sizeof payload);
-      add(payload);
-    }
-  };
-  const auto keep = [&](const JournalStatus& status) {
-    if (statuses_.size() < most) statuses_.push_back(status);
-    return statuses_.size() < most;
-  };
-  if (item_.head.kind == JournalKind::status) return each(JournalStatus{}, keep);
-  each(JournalStatusRun{}, [&](const JournalStatusRun& run) {
-    for (std::uint64_t i = 0; i < run.count; ++i)
-      if (!keep({run.first_id + i, run.word})) return;
-  });
+  JournalStatusRun run;
+  for (std::size_t at = 0; at + sizeof run <= item_.payload.size(); at += sizeof run) {
+    std::memcpy(&run, item_.payload.data() + at, sizeof run);
+    for (std::uint64_t i = 0; i < run.count && statuses_.size() < most; ++i)
+      statuses_.push_back({run.first_id + i, run.word});
+  }
 }
 
 /// The next status in item_.
 void JournalDecoder::fill_status(JournalEntry& entry) {
-  const JournalStatus& status = statuses_[returned_];
+  const OneStatus& status = statuses_[returned_];
   const StatusWord word = StatusWord::unpack(status.word);
   entry.kind = JournalKind::status;
   entry.number = item_.head.number + returned_++;
@@ -173,7 +154,9 @@ void JournalDecoder::keep_name() {
 
 void JournalDecoder::fill(JournalEntry& entry) {
   const JournalHead& head = item_.head;
-  entry.kind = enum_of<JournalKind>(static_cast<std::uint64_t>(head.kind), kJournalKinds);
+  const auto kind = static_cast<std::uint64_t>(head.kind);
+  entry.kind = enum_of<JournalKind>(kind, kJournalKinds);
+  if (entry.kind == JournalKind::none) entry.unknown = "entry kind " + std::to_string(kind);
   entry.number = head.number;
   entry.iteration = head.iteration;
   entry.id = head.id;
@@ -199,14 +182,16 @@ void JournalDecoder::fill(JournalEntry& entry) {
     }
     case JournalKind::resume:
       entry.halt = head.id;
-      name(entry, word_of(item_, 0));
+      name(entry, unpacked<JournalSender>(item_).sender);
       break;
-    case JournalKind::burst:
-      entry.burst = static_cast<std::int64_t>(word_of(item_, 0));
-      name(entry, word_of(item_, 1));
+    case JournalKind::burst: {
+      const auto burst = unpacked<JournalBurst>(item_);
+      entry.burst = burst.iterations;
+      name(entry, burst.sender);
       break;
+    }
     case JournalKind::burst_ended:
-      name(entry, word_of(item_, 0));
+      name(entry, unpacked<JournalSender>(item_).sender);
       entry.cut = head.what == static_cast<std::uint32_t>(BurstEnd::cut);
       break;
     case JournalKind::control_taken:
@@ -257,6 +242,8 @@ void JournalDecoder::fill_batch(JournalEntry& entry) {
   Kept& kept = found->second;
   entry.burst = burst_of(kept.blocks);
   entry.records = records_of(description_->schema, kept.blocks);
+  for (const JournalRecord& record : entry.records)
+    if (entry.unknown.empty()) entry.unknown = record.unknown;
   entry.blocks = kept.blocks;
   // a scheduled batch is decided on once more
   if (entry.kind != JournalKind::scheduled || kept.scheduled) return drop(found);

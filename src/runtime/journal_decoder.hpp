@@ -43,6 +43,10 @@ class JournalDecoder {
     std::vector<std::byte> blocks;
     bool scheduled = false;
   };
+  struct OneStatus {
+    CommandId id = 0;
+    std::uint64_t word = 0;  // a StatusWord
+  };
   using Batches = std::map<BatchKey, Kept>;
 
   void keep_blocks();
@@ -58,7 +62,7 @@ class JournalDecoder {
   std::uint64_t most_kept_;
   JournalItem item_;
   std::size_t entries_ = 0;  // in item_: one, or its statuses
-  std::vector<JournalStatus> statuses_;
+  std::vector<OneStatus> statuses_;
   std::size_t returned_ = 0;  // of them
   std::uint64_t first_ = 0;   // number of the first entry to return
   std::uint64_t missed_ = 0;  // entries missed since the last one returned

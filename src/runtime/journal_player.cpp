@@ -2,57 +2,34 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
-#include "base/printable.hpp"
-#include "o80/base/error.hpp"
 #include "runtime/decision_journal.hpp"
 
 namespace o80 {
 
-namespace {
-
-JournalHead head_at(std::span<const std::byte> entries) {
-  JournalHead head;
-  if (entries.size() < sizeof head)
-    throw InvalidArgument("the recorded journal is damaged: an entry is cut off");
-  std::memcpy(&head, entries.data(), sizeof head);
-  const std::size_t length = std::size_t{head.words} * 8;
-  if (length < sizeof head || length > entries.size())
-    throw InvalidArgument("the recorded journal is damaged: an entry has an invalid length");
-  return head;
-}
-
-}  // namespace
-
-Iteration JournalPlayer::add(std::span<const std::byte> entries) {
+Iteration JournalPlayer::add(std::span<const std::byte> entries, std::int64_t codec) {
   Iteration last = -1;
-  for (std::span<const std::byte> rest = entries; !rest.empty();) {
-    const JournalHead head = head_at(rest);
-    last = head.iteration;
-    rest = rest.subspan(std::size_t{head.words} * 8);
-  }
-  added_.erase(added_.begin(), added_.begin() + static_cast<std::ptrdiff_t>(written_));
-  written_ = 0;
-  added_.insert(added_.end(), entries.begin(), entries.end());
+  file_.decode(codec, entries, [&](JournalItem& item) {
+    last = item.head.iteration;
+    added_.push_back(std::move(item));
+  });
   return last;
 }
 
 void JournalPlayer::write_until(Iteration k) {
-  while (written_ < added_.size()) {
-    const std::span<const std::byte> rest = std::span(added_).subspan(written_);
-    const JournalHead head = head_at(rest);
-    if (head.iteration > k) return;
-    const std::size_t length = std::size_t{head.words} * 8;
-    const std::span<const std::byte> payload = rest.first(length).subspan(sizeof head);
-    writer_.skip_to(head.number);
-    writer_.write(head, payload.data(), payload.size());
-    note(head, payload);
-    written_ += length;
+  for (; !added_.empty() && added_.front().head.iteration <= k; added_.pop_front()) {
+    const JournalItem& item = added_.front();
+    writer_.skip_to(item.head.number);
+    writer_.write(item.head, item.payload.data(), item.payload.size());
+    note(item);
   }
 }
 
 /// Notes what the segment shows beside its rows.
-void JournalPlayer::note(const JournalHead& head, std::span<const std::byte> payload) {
+void JournalPlayer::note(const JournalItem& item) {
+  const JournalHead& head = item.head;
+  const std::span<const std::byte> payload = item.payload;
   const bool is_halt = head.kind == JournalKind::halt || head.kind == JournalKind::halt_reason;
   if (is_halt && payload.size() >= sizeof(JournalHalt)) {
     JournalHalt halt;

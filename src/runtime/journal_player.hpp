@@ -2,14 +2,15 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <optional>
 #include <span>
 #include <string>
-#include <vector>
 
 #include "memory/journal.hpp"
 #include "o80/memory/halt.hpp"
 #include "o80/memory/life.hpp"
+#include "runtime/journal_codec.hpp"
 
 namespace o80 {
 
@@ -27,9 +28,9 @@ class JournalPlayer {
 
   explicit JournalPlayer(const SegmentView& view) : writer_(view) {}
 
-  /// Adds consecutive entries, as they were in the recorded segment; returns the iteration of the
-  /// last one. Throws InvalidArgument if they are damaged.
-  Iteration add(std::span<const std::byte> entries);
+  /// Adds consecutive entries of a recording, in this version of its format; returns the iteration
+  /// of the last one. Throws InvalidArgument if they are damaged, or of a newer version.
+  Iteration add(std::span<const std::byte> entries, std::int64_t codec);
   /// Writes the added entries up to this iteration.
   void write_until(Iteration k);
   /// The newest halt among the written entries; its number is 0 if there is none.
@@ -38,11 +39,11 @@ class JournalPlayer {
   const std::optional<End>& end() const noexcept { return end_; }
 
  private:
-  void note(const JournalHead& head, std::span<const std::byte> payload);
+  void note(const JournalItem& item);
 
   JournalWriter writer_;
-  std::vector<std::byte> added_;
-  std::size_t written_ = 0;  // bytes of added_
+  JournalFileDecoder file_;
+  std::deque<JournalItem> added_;  // and not written
   Halt halt_;
   std::optional<End> end_;
 };

@@ -2,6 +2,9 @@
 
 #include <cstring>
 #include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
 
 #include "control/record.hpp"
 
@@ -62,7 +65,32 @@ bool add_target(const Schema& schema, const Piece& piece, JournalRecord& record)
   return true;
 }
 
+/// The enumeration of a command whose value this o80 does not know; else empty.
+std::string unknown_in(const RecordHead& head) {
+  const auto check = [](std::string_view name, auto value) -> std::string {
+    if (to_text(value) != "unknown") return {};
+    return std::string(name) + " " + std::to_string(static_cast<int>(value));
+  };
+  for (std::string found : {check("mode", head.mode), check("pace", head.pace),
+                            check("profile", head.profile), check("start", head.start)})
+    if (!found.empty()) return found;
+  return {};
+}
+
+JournalRecord unknown_record(std::string what) {
+  JournalRecord record;
+  record.kind = JournalRecord::Kind::unknown;
+  record.unknown = std::move(what);
+  return record;
+}
+
+std::string unknown_kind(RecordKind kind) {
+  return "record kind " + std::to_string(static_cast<int>(kind));
+}
+
 JournalRecord command_of(const RecordHead& head) {
+  if (std::string unknown = unknown_in(head); !unknown.empty())
+    return unknown_record(std::move(unknown));
   JournalRecord record;
   record.pace = pace_of(head);
   record.mode = head.mode;
@@ -78,7 +106,10 @@ std::optional<JournalRecord> take_group(const Schema& schema, const RecordHead& 
   JournalRecord record = command_of(head);
   for (std::uint32_t i = 0; i < head.rows; ++i) {
     const std::optional<Piece> member = take_piece(blocks);
-    if (!member || member->head.kind != RecordKind::member) return std::nullopt;
+    if (!member) return std::nullopt;
+    if (!is_known(member->head.kind)) record = unknown_record(unknown_kind(member->head.kind));
+    if (!record.unknown.empty()) continue;
+    if (member->head.kind != RecordKind::member) return std::nullopt;
     record.rows = member->head.rows;
     if (!add_target(schema, *member, record)) return std::nullopt;
   }
@@ -94,7 +125,7 @@ std::optional<JournalRecord> take_record(const Schema& schema, std::span<const s
   switch (head.kind) {
     case RecordKind::command:
       record = command_of(head);
-      if (!add_target(schema, *piece, record)) return std::nullopt;
+      if (record.kind != Kind::unknown && !add_target(schema, *piece, record)) return std::nullopt;
       break;
     case RecordKind::group: {
       std::optional<JournalRecord> group = take_group(schema, head, blocks);
@@ -124,7 +155,8 @@ std::optional<JournalRecord> take_record(const Schema& schema, std::span<const s
       record.halt = static_cast<std::uint64_t>(head.amount);
       break;
     default:
-      return std::nullopt;
+      if (is_known(head.kind)) return std::nullopt;
+      return unknown_record(unknown_kind(head.kind));
   }
   record.id = head.id;
   return record;

@@ -10,7 +10,7 @@
 namespace o80 {
 
 /// The records of a batch, from its blocks as they came from a lane. A record that is invalid ends
-/// the list: the backend has rejected it.
+/// the list: the backend has rejected it. One that this o80 does not know is listed as unknown.
 std::vector<JournalRecord> records_of(const Schema& schema, std::span<const std::byte> blocks);
 
 }  // namespace o80

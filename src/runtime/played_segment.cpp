@@ -83,8 +83,8 @@ PlayedSegment::~PlayedSegment() {
   segment_.end_and_remove();
 }
 
-Iteration PlayedSegment::add_journal(std::span<const std::byte> entries) {
-  return journal_.add(entries);
+Iteration PlayedSegment::add_journal(std::span<const std::byte> entries, std::int64_t codec) {
+  return journal_.add(entries, codec);
 }
 
 std::size_t PlayedSegment::count(std::span<const std::byte> rows) const {

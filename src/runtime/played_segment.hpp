@@ -55,8 +55,9 @@ class PlayedSegment {
 
   std::size_t row_bytes() const noexcept { return layout_.size; }
   /// Adds entries of the recorded journal, which are written before the rows of their iterations;
-  /// returns the iteration of the last one. Throws InvalidArgument if they are damaged.
-  Iteration add_journal(std::span<const std::byte> entries);
+  /// returns the iteration of the last one. `codec`: version of their format. Throws
+  /// InvalidArgument if it is newer than this o80, or if they are damaged.
+  Iteration add_journal(std::span<const std::byte> entries, std::int64_t codec);
   /// Publishes rows, each when the monotonic clock reaches its `due` [ns] (late ones at once; no
   /// `due`: all at once), and returns their number: fewer after ask_to_stop() or if `keep_waiting`
   /// returned false. Iterations must grow; those between are shown as missing.

@@ -26,6 +26,7 @@ void each_part(ProvenanceLike& provenance, Visit&& visit) {
   visit(provenance.files);
   visit(provenance.version);
   visit(provenance.source_hash);
+  visit(provenance.motion_rules);
 }
 
 class Writer {

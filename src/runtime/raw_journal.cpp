@@ -15,16 +15,16 @@ RawJournal::Entries RawJournal::read(std::size_t most) {
   while (entries.bytes.size() < most && (holds_ || reader_.next(item_))) {
     holds_ = true;
     const JournalHead& head = item_.head;
-    if (head.number >= first_) {
-      const bool begins = entries.bytes.empty();
-      if (!begins && head.number != entries.next) break;  // entries were missed
-      if (begins) entries.first = head.number;
-      entries.next = head.number + head.numbers();
-      const auto* bytes = reinterpret_cast<const std::byte*>(&head);
-      entries.bytes.insert(entries.bytes.end(), bytes, bytes + sizeof head);
-      entries.bytes.insert(entries.bytes.end(), item_.payload.begin(), item_.payload.end());
-    }
+    const bool begins = entries.bytes.empty();
+    if (!begins && head.number != entries.next) break;  // entries were missed
+    encoder_.encode(head, item_.payload, entries.bytes);
     holds_ = false;
+    if (head.number < first_) {  // the encoder needs it: a batch may begin in it
+      entries.bytes.clear();
+      continue;
+    }
+    if (begins) entries.first = head.number;
+    entries.next = head.number + head.numbers();
   }
   entries.more = holds_ || entries.bytes.size() >= most;
   return entries;

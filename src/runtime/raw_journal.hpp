@@ -6,19 +6,20 @@
 #include <vector>
 
 #include "memory/journal.hpp"
+#include "runtime/journal_codec.hpp"
 #include "runtime/link.hpp"
 
 namespace o80 {
 
 class UntypedFrontend;
 
-/// Reads the entries of a journal as they are in the ring of the segment, without decoding them.
-/// `decode_journal` decodes them.
+/// Reads the entries of a journal in the format of files: see journal_format.hpp. RecordedJournal
+/// decodes them.
 ///
 /// Writer / Readers: one thread.
 class RawJournal {
  public:
-  /// Consecutive entries: heads and payloads.
+  /// Consecutive entries.
   struct Entries {
     std::vector<std::byte> bytes;
     std::uint64_t first = 0;  // number of the first entry
@@ -41,6 +42,7 @@ class RawJournal {
   JournalReader reader_;
   std::uint64_t first_;
   JournalItem item_;
+  JournalFileEncoder encoder_;
   bool holds_ = false;  // item_ is an entry that was not returned yet
 };
 

@@ -6,11 +6,12 @@
 #include <span>
 #include <vector>
 
+#include "runtime/journal_codec.hpp"
 #include "runtime/journal_decoder.hpp"
 
 namespace o80 {
 
-/// Decodes bytes that a RawJournal read from a segment, for example those in a recording.
+/// Decodes the entries of a journal in a recording, of any version of its format.
 class RecordedJournal {
  public:
   /// `first`: number of the first entry to return.
@@ -19,13 +20,15 @@ class RecordedJournal {
     decoder_.start_at(first);
   }
 
-  /// Appends the entries in `bytes`, which follow those of the last call. Throws InvalidArgument if
-  /// the bytes are damaged.
-  void decode(std::span<const std::byte> bytes, std::vector<JournalEntry>& entries);
+  /// Appends the entries in `bytes`, which follow those of the last call. `codec`: version of their
+  /// format. Throws InvalidArgument if it is newer than this o80, or if the bytes are damaged.
+  void decode(std::span<const std::byte> bytes, std::vector<JournalEntry>& entries,
+              std::int64_t codec = kJournalCodec);
 
  private:
-  std::size_t take_item(std::span<const std::byte> bytes);
+  void take(JournalItem& item, std::vector<JournalEntry>& entries);
 
+  JournalFileDecoder file_;
   JournalDecoder decoder_;
   std::uint64_t expected_ = 0;  // number of the next entry
 };

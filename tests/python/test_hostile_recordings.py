@@ -6,6 +6,8 @@ import struct
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +22,8 @@ from o80.recording.epoch import EpochNote
 from o80.recording.marks import Mark
 from o80.replaying.recorded_run import FileRun, runs_in
 
-RECORDING = Path(__file__).resolve().parents[1] / "data" / "recordings" / "format_1.mcap"
+RECORDINGS = Path(__file__).resolve().parents[1] / "data" / "recordings"
+RECORDING = RECORDINGS / "codec_1.mcap"
 WAIT = 60.0  # [s] longer than any command should take
 
 
@@ -136,29 +139,49 @@ def test_texts_of_a_recording_do_not_control_the_terminal(
 # ---------------------------------------------------------------------------- random damage
 
 
-def changed(journal: bytes, choose: random.Random) -> bytes:
+@dataclass(frozen=True)
+class Format:
+    """Where the parts of an entry lie in a version of the format of journals."""
+
+    codec: int
+    length: str  # of an entry
+    unit: int  # of that length [bytes]
+    kind: int
+    others: tuple[int, ...]  # lane, what, iteration, id
+    head: int
+
+
+FORMATS = {
+    "format_1": Format(0, "<H", 8, 2, (3, 4, 16, 24), 32),
+    "codec_0": Format(0, "<H", 8, 2, (3, 4, 16, 24), 32),
+    "codec_1": Format(1, "<I", 1, 4, (5, 6, 18, 26), 34),
+}
+
+
+def changed(journal: bytes, form: Format, choose: random.Random) -> bytes:
     """A journal some of whose entries say something else."""
     places = []
     at = 0
     while at < len(journal):
-        length = 8 * struct.unpack_from("<H", journal, at)[0]
+        length = form.unit * struct.unpack_from(form.length, journal, at)[0]
         places.append((at, length))
         at += length
     damaged = bytearray(journal)
     for _ in range(choose.randrange(1, 6)):
         at, length = choose.choice(places)
         how = choose.randrange(4)
+        payload = length - form.head
         if how == 0:
-            damaged[at + 2] = choose.randrange(25)  # another kind
-        elif how == 1 and length > 32:
-            damaged[at + 32 + choose.randrange(length - 32)] = choose.randrange(256)
-        elif how == 2 and length > 32:
+            damaged[at + form.kind] = choose.randrange(25)  # another kind
+        elif how == 1 and payload > 0:
+            damaged[at + form.head + choose.randrange(payload)] = choose.randrange(256)
+        elif how == 2 and payload >= 8:
             word = choose.choice([-1, 2**63 - 1, -(2**63), 2**31, 0xFFFF, choose.randrange(64)])
             struct.pack_into(
-                "<q", damaged, at + 32 + 8 * choose.randrange((length - 32) // 8), word
+                "<q", damaged, at + form.head + 8 * choose.randrange(payload // 8), word
             )
         else:
-            damaged[at + choose.choice([2, 3, 4, 16, 24])] = choose.randrange(256)
+            damaged[at + choose.choice([form.kind, *form.others])] = choose.randrange(256)
     return bytes(damaged)
 
 
@@ -167,9 +190,14 @@ def replay_of(run: FileRun, name: str) -> Callable[[], Any]:
     return lambda: _core.DriverlessReplay(run.description, name, loop, run.schema["period"])
 
 
-def test_a_replay_of_a_damaged_journal_ends_in_order() -> None:
-    run = runs_in(o80.open(RECORDING))[0]
-    journal = b"".join(run.epoch.journal_parts())
+@pytest.mark.parametrize(
+    ("name", "segment"),
+    [("format_1", "joints"), *product(["codec_0", "codec_1"], ["joints", "bench"])],
+)
+def test_a_replay_of_a_damaged_journal_ends_in_order(name: str, segment: str) -> None:
+    form = FORMATS[name]
+    (run, *_) = runs_in(o80.open(RECORDINGS / f"{name}.mcap"), segment)
+    journal = b"".join(entries.content for entries in run.epoch.journal_parts())
     rows = b"".join(np.ascontiguousarray(block.rows).tobytes() for block in run.blocks())
     size = next(run.blocks()).rows.itemsize
     told = 0
@@ -183,7 +211,9 @@ def test_a_replay_of_a_damaged_journal_ends_in_order() -> None:
         name = _core.unused_segment_name("replay")
         replay = replay_of(run, name)()
         try:
-            replay.add(_core.RecordedJournal(run.description, 0).decode(changed(journal, choose)))
+            damaged_journal = changed(journal, form, choose)
+            decoder = _core.RecordedJournal(run.description, 0)
+            replay.add(decoder.decode(damaged_journal, form.codec))
             replay.run(bytes(damaged))
         except o80.Error:
             told += 1

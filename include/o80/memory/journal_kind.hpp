@@ -15,7 +15,7 @@ enum class JournalKind : std::uint8_t {
   taken,             // a batch was taken
   scheduled,         // a batch waits for the iteration it was sent for
   rejected,          // a batch was rejected
-  status,            // a command or request has begun or ended; in memory, see `statuses`
+  status,            // a command or request has begun or ended; written as `statuses`
   halt,              // a halt is in force
   halt_reason,       // the reason of that halt, written after it began
   resume,            // the halt was cleared

@@ -19,7 +19,15 @@ class UntypedFrontend;
 
 /// A command, a request or an order of a batch in the journal.
 struct JournalRecord {
-  enum class Kind : std::uint8_t { command, purge, request, take_control, release_control, resume };
+  enum class Kind : std::uint8_t {
+    command,
+    purge,
+    request,
+    take_control,
+    release_control,
+    resume,
+    unknown
+  };
   /// What a command asks of one actuator.
   struct Target {
     std::uint16_t actuator = 0;
@@ -45,6 +53,8 @@ struct JournalRecord {
   std::vector<std::byte> payload;
   // of a resume
   std::uint64_t halt = 0;
+  // what this o80 does not know, "record kind 10" or "pace 7": a newer one has recorded it
+  std::string unknown{};
 };
 
 /// One decision of a backend. Which members are set depends on `kind`.
@@ -79,6 +89,9 @@ struct JournalEntry {
   std::uint16_t actuator = 0;                  // interrupted
   bool before_step = false;                    // interrupted before the step of the iteration
   BackendState state = BackendState::running;  // ended
+  /// What this o80 does not know of it, "entry kind 30", or of its records: a newer o80 has
+  /// recorded it. Empty: nothing.
+  std::string unknown;
   // snapshot: what the driver keeps in a slot
   std::uint32_t slot = 0;
   std::vector<std::byte> kept;

@@ -33,6 +33,8 @@ struct Provenance {
   /// A row's time plus this is wall-clock time, in ns since 1970. As of the start: the clocks may
   /// drift apart, or be set, while the backend runs.
   std::int64_t wall_clock_offset = 0;
+  /// Version of the rules that make desired states of commands. It changes when o80 changes them.
+  std::int64_t motion_rules = 1;
 
   bool operator==(const Provenance&) const = default;
 };

@@ -91,6 +91,8 @@ class _Lines:
             return self._batch(entry)
         if entry.kind == "status":
             return self._status(entry)
+        if entry.kind == "none":
+            return f"something of a newer o80 ({entry.unknown})"
         who = f"{_sender(entry)}: "
         if entry.kind in ("halt", "halt_reason"):
             by = f" by {entry.sender}" if entry.sender else ""
@@ -159,6 +161,8 @@ def command_text(command: JournalCommand) -> str:
         return f"{command.request}({fields})"
     if command.kind == "resume":
         return f"resume halt {command.halt}"
+    if command.kind == "unknown":
+        return f"something of a newer o80 ({command.unknown})"
     if command.kind != "command":
         return command.kind.replace("_", " ")
     parts = [

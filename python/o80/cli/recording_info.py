@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import o80
+from o80 import _core
 from o80.cli.condition import age_text
 from o80.cli.screen import Column, bytes_text, plain, print_json, print_table, style
 from o80.cli.started_with import started_with
@@ -87,8 +88,14 @@ def _row(name: str, number: int, epoch: RecordedEpoch) -> list[str]:
         str(fields["rows"]),
         age_text(fields["seconds"]) if epoch.rows else "-",
         str(fields["missing"]),
-        "recorded" if epoch.has_journal else "none",
+        _decisions(epoch.journal_codec),
     ]
+
+
+def _decisions(codec: int | None) -> str:
+    if codec is None:
+        return "none"
+    return "recorded" if codec <= _core.JOURNAL_CODEC else f"for a newer o80 (format {codec})"
 
 
 def _summary(name: str, number: int, epoch: RecordedEpoch) -> dict[str, Any]:
@@ -102,6 +109,7 @@ def _summary(name: str, number: int, epoch: RecordedEpoch) -> dict[str, Any]:
         "seconds": (end - begin) * 1e-9,
         "missing": sum(last - first + 1 for first, last in epoch.gaps),
         "decisions": epoch.has_journal,
+        "journal_codec": epoch.journal_codec,
     }
 
 

@@ -62,8 +62,9 @@ def replay(
 ) -> None:
     """Start recorded robots again, let them do what they did, and compare every row bit for bit.
 
-    Exit code 0: all rows are identical. 1: a row differs, and the first one is printed. 2: rows or
-    decisions are missing from the recording, and those before them are identical.
+    Exit code 0: all rows are identical. 1: a row differs, and the first one is printed. 2: not all
+    rows could be compared (rows or decisions are missing, or this o80 moves by other rules), and
+    those that were are identical.
     """
     from o80.replaying.replay import replay as replay_all
 

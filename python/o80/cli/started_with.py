@@ -22,7 +22,10 @@ def started_with(provenance: Provenance) -> list[str]:
     for file in provenance.files:
         hashed = f"sha256 {file.sha256[:12]}" if file.sha256 else "not read"
         lines.append(f"file     {plain(file.path)}  {style(hashed, 'dim')}")
-    version = f"{provenance.version}, sources {provenance.source_hash[:12]}"
+    version = (
+        f"{provenance.version}, sources {provenance.source_hash[:12]}, "
+        f"motion rules {provenance.motion_rules}"
+    )
     return [*lines, f"o80      {plain(version)}"]
 
 

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o80 import _core
-from o80.errors import RecordingError
+from o80.errors import InvalidArgument, RecordingError
 from o80.playing.track import Part, Track
 from o80.provenance import Provenance
+from o80.recording.journal_channel import Entries
 
 KEPT = 64 << 20  # most bytes of the rows that a segment keeps by default
 END = 2**62  # an iteration later than any
@@ -48,7 +49,7 @@ class Player:
         self._stopped = False
         self._run = 0
         self._segment: _core.PlayedSegment | None = None
-        self._journal: Iterator[bytes] = iter(())
+        self._journal: Iterator[Entries] = iter(())
         self._journal_until = END  # iteration of the last entry that was added
         self.begin(0)
 
@@ -123,8 +124,18 @@ class Player:
         last = int(part.rows["iteration"][-1]) + 1
         while self._segment is not None and self._journal_until <= last:
             entries = next(self._journal, None)
-            self._journal_until = END if entries is None else self._segment.add_journal(entries)
+            self._journal_until = END if entries is None else self._add(entries)
         return self._segment
+
+    def _add(self, entries: Entries) -> int:
+        """Returns the iteration of the last one. Raises RecordingError."""
+        assert self._segment is not None
+        try:
+            return self._segment.add_journal(entries.content, entries.codec)
+        except InvalidArgument as error:
+            raise RecordingError(
+                f"the journal of '{self.name}' cannot be played: {error}"
+            ) from error
 
     def _provenance(self, run: int) -> Provenance:
         """That of the recorded robot, with the clock of the rows as they are played."""

@@ -1,7 +1,7 @@
 """The journal of a backend in a recording: a channel whose messages hold its entries as bytes.
 
-The bytes are those of the segment (ARCHITECTURE.md, The journal), so nothing is lost, and they cost
-a recorder one copy. `_core.RecordedJournal` decodes them.
+The metadata of the channel say in which version of the format they are (ARCHITECTURE.md, The
+journal in files). `_core.RawJournal` encodes them, `_core.RecordedJournal` decodes them.
 """
 
 import struct
@@ -24,11 +24,12 @@ TYPE = "o80/msg/Journal"
 DEFINITION = """\
 uint64 first  # number of the first entry
 uint64 next  # number after the last entry
-uint8[] entries  # as in the journal of the segment; o80.open decodes them
+uint8[] entries  # o80.open decodes them
 """
 CONTENT = "journal"
 """What the metadata of the channel call it."""
-FORMAT = "1"  # of the entries
+CODEC = "codec"
+"""What the metadata call the version of the format; files without it are of version 0."""
 GAP = "o80.journal_gap"
 """Name of the metadata record of entries that were overwritten before they were read."""
 MOST = 4 << 20  # bytes that are read at once
@@ -42,6 +43,7 @@ class Entries:
     first: int  #: number of the first entry
     next: int  #: number after the last one
     content: bytes
+    codec: int = _core.JOURNAL_CODEC  #: version of the format of `content`
 
     def message(self) -> bytes:
         """In CDR."""
@@ -49,13 +51,13 @@ class Entries:
         return head + self.content
 
     @classmethod
-    def of(cls, message: bytes) -> "Entries":
+    def of(cls, message: bytes, codec: int) -> "Entries":
         """Raises ValueError if it is damaged."""
         content = message[_HEAD.size :]
         if len(message) >= _HEAD.size:
             _, first, end, length = _HEAD.unpack_from(message)
             if len(content) == length:
-                return cls(first, end, content)
+                return cls(first, end, content, codec)
         raise ValueError("a message of the journal is damaged")
 
 
@@ -84,7 +86,9 @@ class JournalWriter:
         """Adds a channel to a file, in which the next entries are written."""
         schema = file.add_schema(TYPE, DEFINITION)
         self.channel = file.add_channel(
-            topic_of(note.segment), schema, note.channel_texts(CONTENT) | {"format": FORMAT}
+            topic_of(note.segment),
+            schema,
+            note.channel_texts(CONTENT) | {CODEC: str(_core.JOURNAL_CODEC)},
         )
 
     def read(self, log_time: int) -> tuple[SingleMessage | None, tuple[int, int] | None]:
@@ -103,18 +107,27 @@ class JournalWriter:
         return SingleMessage(self.channel, log_time, message), gap
 
 
+def codec_of(found: Scan, channel: int) -> int:
+    """The version of the format of a journal in a file. Raises ValueError if it is damaged."""
+    codec = int(found.channels[channel].metadata.get(CODEC, "0"))
+    if not 0 <= codec < 2**31:
+        raise ValueError(f"the version of the journal's format is damaged: {codec}")
+    return codec
+
+
 def entries_in(file: IO[bytes], found: Scan, channel: int) -> "Iterator[Entries]":
     """All parts of a journal, in their order. Raises ValueError if one is damaged."""
+    codec = codec_of(found, channel)
     for chunk in found.chunks:
         if channel in chunk.message_index_offsets:
             for message in messages_of(file, chunk, channel):
-                yield Entries.of(message)
+                yield Entries.of(message, codec)
 
 
 def last_entry_in(file: IO[bytes], found: Scan, channel: int) -> int:
     """The number after the last entry of a journal in a file; 0: none."""
     for chunk in reversed(found.chunks):
         if channel in chunk.message_index_offsets:
-            parts = [Entries.of(message) for message in messages_of(file, chunk, channel)]
-            return parts[-1].next
+            *_, last = messages_of(file, chunk, channel)
+            return Entries.of(last, 0).next
     return 0

@@ -21,7 +21,7 @@ from o80.provenance import Provenance
 from o80.recording.blocks import messages_in
 from o80.recording.epoch import GAP, EpochNote
 from o80.recording.journal_channel import GAP as JOURNAL_GAP
-from o80.recording.journal_channel import entries_in
+from o80.recording.journal_channel import Entries, codec_of, entries_in
 from o80.recording.message_plan import MessagePlan
 from o80.recording.message_types import row_type
 from o80.recording.scan import Scan, attachment_of, content_of, index_of
@@ -292,8 +292,8 @@ class RecordedEpoch:
         """The same before their conversion to Python, read as they are needed: for a replay."""
         native = _core.RecordedJournal(self.description, whole(since, "since", 0))
         try:
-            for content in self.journal_parts():
-                yield from native.decode(content)
+            for entries in self.journal_parts():
+                yield from native.decode(entries.content, entries.codec)
         except (InvalidArgument, ValueError, LookupError) as error:
             raise RecordingError(f"{self._parts[0].path}: {error}") from error
 
@@ -302,16 +302,28 @@ class RecordedEpoch:
         """Its backend had a journal, and its recorder wrote it."""
         return any(part.journal is not None for part in self._parts)
 
-    def journal_parts(self) -> Iterator[bytes]:
-        """The entries of the journal as they were in the segment, for `_core.RecordedJournal`.
+    @property
+    def journal_codec(self) -> int | None:
+        """Version of the format of the journal, the newest of its files; None: no journal.
+
+        Raises RecordingError.
+        """
+        codecs = []
+        for part in self._parts:
+            if part.journal is not None:
+                with part.reading():
+                    codecs.append(codec_of(part.found, part.journal))
+        return max(codecs, default=None)
+
+    def journal_parts(self) -> Iterator[Entries]:
+        """The entries of the journal as the files hold them, for `_core.RecordedJournal`.
 
         Raises RecordingError if the file is damaged there.
         """
         for part in self._parts:
             if part.journal is not None:
                 with part.reading() as file:
-                    for entries in entries_in(file, part.found, part.journal):
-                        yield entries.content
+                    yield from entries_in(file, part.found, part.journal)
 
     def __repr__(self) -> str:
         return f"<epoch of {self._note.segment}: {self.rows} rows>"

@@ -4,14 +4,15 @@ import time
 from collections.abc import Mapping
 from dataclasses import replace
 
-from o80.errors import BackendGone, SegmentError, TimeoutError
+from o80 import _core
+from o80.errors import BackendGone, RecordingError, SegmentError, TimeoutError
 from o80.frontend import Frontend
 from o80.recording.blocks import Block, SingleMessage
 from o80.recording.epoch import GAP, RowWriter, note_of
 from o80.recording.file_writer import FileWriter, MessageBlock
 from o80.recording.joint_states import JointWriter
 from o80.recording.journal_channel import GAP as JOURNAL_GAP
-from o80.recording.journal_channel import JournalWriter
+from o80.recording.journal_channel import JournalWriter, codec_of
 from o80.recording.output import Written
 
 LARGEST_BLOCK = 4 << 20  # of the rows read at once [bytes]
@@ -122,10 +123,22 @@ class Source:
             layout = frontend._layout
             joints = JointWriter.added_to(self._file, layout, note, known.joints)
             self._writer = RowWriter(layout, note, known.channel, joints)
+        self._refuse_other_format(known)
         journal = JournalWriter(frontend, known.journal, known.journal_next)
         self._journal = journal if journal.exists else None
         if self._journal is not None and known.journal is None:
             self._journal.add_channel(self._file, note)
+
+    def _refuse_other_format(self, known: Written) -> None:
+        """A journal is continued in the format in which it was begun."""
+        if known.journal is None:
+            return
+        codec = codec_of(self._file.found, known.journal)
+        if codec != _core.JOURNAL_CODEC:
+            raise RecordingError(
+                f"{self._file.path}: another o80 has begun the journal of '{self.name}' (format "
+                f"{codec}, this o80 writes {_core.JOURNAL_CODEC}): record to another file"
+            )
 
     def go_on_in(self, file: FileWriter) -> None:
         """Writes what follows into another file."""

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from o80 import _core
+from o80.replaying.motion_rules import MotionRules
 from o80.replaying.start import SlotsKept, Start
 
 
@@ -10,11 +11,16 @@ class EntryFeed:
     """Reads a journal in step with the rows of its run."""
 
     def __init__(
-        self, entries: Iterator[_core.JournalEntry], start: Start, slots: SlotsKept
+        self,
+        entries: Iterator[_core.JournalEntry],
+        start: Start,
+        slots: SlotsKept,
+        rules: MotionRules,
     ) -> None:
         self._entries = (entry for entry in entries if entry.number >= start.entry)
         self._begins = start.entry
         self._slots = slots
+        self._rules = rules
         self._pending: _core.JournalEntry | None = None
         self._known = -1  # all decisions up to this iteration were read
         self.gap = ""  #: why the decisions after `until` are not known
@@ -33,6 +39,18 @@ class EntryFeed:
                 )
             elif self._lacks(entry) or entry.records_lost:
                 self._end_at(entry)
+            elif moved := self._rules.moved_otherwise(entry):
+                self.until = entry.iteration - 1
+                self.gap = (
+                    f"row {entry.iteration} begins a command of {moved}, which motion rules "
+                    f"{self._rules.now} may move otherwise"
+                )
+            elif entry.unknown and entry.kind != "scheduled":
+                self.until = entry.iteration - 1
+                self.gap = (
+                    f"entry {entry.number} of the journal holds what this o80 does not know "
+                    f"({entry.unknown}): replay it with the o80 that recorded it, or a newer one"
+                )
             elif entry.kind == "ended" or entry.iteration > last:
                 self._pending = entry
                 break

@@ -111,7 +111,7 @@ class LiveRun:
             )
         native = _core.RecordedJournal(self.frontend._description, 0)
         while content := journal.read(_BYTES_AT_ONCE)[0]:
-            yield from native.decode(content)
+            yield from native.decode(content, _core.JOURNAL_CODEC)
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from o80 import _core
 from o80.columns import columns_of
 from o80.difference import Difference, first_difference
 from o80.errors import DriverError, InvalidArgument
@@ -26,6 +27,7 @@ from o80.replaying.conditions import (
     reads_the_world,
 )
 from o80.replaying.entry_feed import EntryFeed
+from o80.replaying.motion_rules import MotionRules
 from o80.replaying.recorded_run import ROWS_AT_ONCE, LiveRun, RecordedRun, runs_in
 from o80.replaying.report import ReplayReport, RunReport
 from o80.replaying.runner import Runner, with_driver, without_driver
@@ -174,7 +176,9 @@ class _RunReplay:
             self._notes.append(f"the replay begins with the {start.request} of row {start.row}")
         # without a driver, a restored snapshot is read as any other row
         known = Start() if self._no_driver else start
-        feed = EntryFeed(self._run.entries(), start, SlotsKept(Requests(self._run.schema), known))
+        rules = self._motion_rules()
+        slots = SlotsKept(Requests(self._run.schema), known)
+        feed = EntryFeed(self._run.entries(), start, slots, rules)
         blocks = self._whole(self._run.blocks())
         first = next(blocks, None)
         if first is None:
@@ -192,6 +196,16 @@ class _RunReplay:
                 if difference is not None or self._gap:
                     return difference
         return None
+
+    def _motion_rules(self) -> MotionRules:
+        recorded = self._run.provenance.motion_rules
+        rules = MotionRules.of(self._run.schema, recorded, _core.MOTION_RULES)
+        if rules.differ:
+            self._notes.append(
+                f"{rules}: rows are compared up to the first command that is not linear, or is of "
+                f"an actuator with a limit of speed"
+            )
+        return rules
 
     def _found_start(self) -> Start | None:
         """Where to begin; None if nowhere: `_gap` says why."""

@@ -3,6 +3,7 @@
 #include <fstream>
 #include <random>
 
+#include "control/motion_rules.hpp"
 #include "memory/segment_name.hpp"
 #include "o80/base/version.hpp"
 #include "runtime/provenance_bytes.hpp"
@@ -44,7 +45,8 @@ class Draw {
                      .files = {},
                      .version = text(),
                      .source_hash = text(),
-                     .wall_clock_offset = static_cast<std::int64_t>(random_())};
+                     .wall_clock_offset = static_cast<std::int64_t>(random_()),
+                     .motion_rules = static_cast<std::int64_t>(random_())};
     for (std::size_t i = random_() % 4; i > 0; --i)
       drawn.files.push_back({.option = text(), .path = text(), .sha256 = text()});
     return drawn;
@@ -107,6 +109,7 @@ TEST_F(ProvenanceTest, IsReadByFrontends) {
   EXPECT_EQ(found.version, version());
   EXPECT_EQ(found.source_hash, source_hash());
   EXPECT_EQ(found.source_hash.size(), 64U);
+  EXPECT_EQ(found.motion_rules, kMotionRules);
 }
 
 TEST_F(ProvenanceTest, HasTheEffectiveValuesOfOptionsThatWereNotGiven) {

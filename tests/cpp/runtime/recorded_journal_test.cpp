@@ -109,6 +109,26 @@ TEST_F(RecordedJournalTest, ASuccessorGoesOnWhereTheLastReadEnded) {
   EXPECT_EQ(facts_of(entries), facts_of(entries_of(Journal(*observer))));
 }
 
+TEST_F(RecordedJournalTest, ASuccessorGoesOnWithinALargeBatch) {
+  for (int i = 0; i < 3000; ++i) add(*commander, 0, 0.001 * i);
+  commander->pulse();
+  station.run(30);
+  RawJournal raw(*observer, 0);
+  std::vector<RawJournal::Entries> parts;
+  for (RawJournal::Entries part; (part = raw.read(1)).next != part.first;) parts.push_back(part);
+  const std::vector<JournalEntry> there = entries_of(Journal(*observer));
+  ASSERT_FALSE(there.empty());
+  ASSERT_EQ(there.front().records.size(), 3000U);
+  ASSERT_GT(parts.size(), 4U) << "its blocks are several entries";
+  for (std::size_t i = 1; i < 4; ++i) {
+    RecordedJournal journal(description());
+    std::vector<JournalEntry> entries;
+    for (std::size_t k = 0; k < i; ++k) journal.decode(parts[k].bytes, entries);
+    journal.decode(RawJournal(*observer, parts[i].first).read(kMuch).bytes, entries);
+    EXPECT_EQ(facts_of(entries), facts_of(there)) << i;
+  }
+}
+
 TEST_F(RecordedJournalTest, EntriesBeforeTheFirstAreNotReturned) {
   play(20);
   RawJournal raw(*observer, 0);

@@ -1,24 +1,36 @@
-"""Makes format_1.mcap: `python tests/data/recordings/make.py`, after a change of the format.
+"""Makes a recording of the present format: `python tests/data/recordings/make.py codec_1`.
 
-The file stays as it is when o80 changes, so that later versions must read what this one wrote. A
-change of the format gets a file of its own. format_1.json says what must be found in it.
+The files stay as they are when o80 changes, so that later versions must read what this one wrote. A
+change of the format gets a file of its own. The JSON beside a file says what must be found in it.
+
+format_1.mcap: journal in version 0, by one of the first recorders
+codec_0.mcap: journal in version 0, by the last one
+codec_1.mcap: journal in version 1
 """
 
+import dataclasses
+import hashlib
 import json
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 import o80
 from o80.recording.recorder import Recorder
 
 HERE = Path(__file__).parent
-FORMAT = "format_1"
-SEGMENT = "joints"
+SEGMENT, BENCH = "joints", "bench"
+MOST_NUMBERS = 16
+
+# ---------------------------------------------------------------------------- what is played
 
 
 def play(arm: o80.Frontend, recorder: Recorder, seed: int) -> None:
-    """A little of everything that a journal tells."""
+    """A little of everything that a simulation does in bursts."""
     arm.request("reset", seed=seed)
     recorder.catch_up()
     arm.add_command(["shoulder", "elbow"], [0.5, -0.25], iterations=20, profile="minimum_jerk")
@@ -38,53 +50,252 @@ def play(arm: o80.Frontend, recorder: Recorder, seed: int) -> None:
     arm.burst(3)
 
 
-def found_in(path: Path) -> dict[str, Any]:
-    """What every later version must find."""
-    recording = o80.open(path)
-    return {
-        "marks": [{"name": mark.name, "values": dict(mark.values)} for mark in recording.marks],
-        "epochs": [facts(epoch) for epoch in recording[SEGMENT].epochs],
-    }
-
-
-def facts(epoch: Any) -> dict[str, Any]:
-    history = epoch.history()
-    return {
-        "iteration": history.iteration.tolist(),
-        "time": history.time.tolist(),
-        "desired": history.desired.tolist(),
-        "observed": history.observed.tolist(),
-        "effort": history.extended.effort.tolist(),
-        "halted": history.halted.tolist(),
-        "options": epoch.provenance.options,
-        "journal": [
-            [entry.number, entry.kind, entry.iteration, len(entry.commands), entry.text]
-            for entry in epoch.journal()
-        ],
-    }
-
-
-def main() -> None:
-    path = HERE / f"{FORMAT}.mcap"
-    path.unlink(missing_ok=True)
-    # no path of the machine on which the file was made
-    told: Any = o80.Frontend.provenance
-    library = "/usr/lib/o80/robots/two_joints.so"
-    o80.Frontend.provenance = property(  # type: ignore[assignment,method-assign]
-        lambda self: replace(told.fget(self), library=library)
-    )
-    recorder = Recorder(path, [SEGMENT])
+def play_two_runs(recorder: Recorder) -> None:
     for seed in (3, 5):
         with o80.robots.load("two_joints").inline(SEGMENT, gain=10.0 + seed) as arm:
             while recorder.sources[SEGMENT].newest != 0:
                 recorder.catch_up()
             recorder.mark("episode", number=seed)
             play(arm, recorder, seed)
+            if seed == 3:
+                arm.request("snapshot", slot=2)
             recorder.catch_up()
         recorder.catch_up()
+
+
+class Bench:
+    """A backend in this program that is stepped by hand."""
+
+    def __init__(self, recorder: Recorder) -> None:
+        self.recorder = recorder
+        self.backend = o80.Backend(
+            BENCH,
+            {
+                "joint": ({"position": float, "velocity": float}, ["shoulder", "elbow"]),
+                "finger": float,
+                "grip": bool,
+            },
+            limits={
+                "shoulder": {"position": (-1.0, 1.0, 2.0, 20.0, 400.0)},
+                "elbow": {"position": (-1.0, 1.0, 2.0, 20.0, 400.0)},
+                "finger": (-1.0, 1.0, 50.0),
+            },
+            requests={"home": {"speed": float, "axis": int}, "refuse": None},
+            frequency=500.0,
+            silence=60,
+            stale="purge",
+        )
+        self.backend.on("home", lambda _: None)
+        self.backend.on("refuse", self.refuse)
+        self.publish()
+        while recorder.sources[BENCH].newest != 0:
+            recorder.catch_up()
+
+    @staticmethod
+    def refuse(_: Any) -> None:
+        raise o80.RequestRejected("an example")
+
+    def publish(self) -> None:
+        self.backend.publish()
+        self.recorder.catch_up()
+
+    def run(self, iterations: int) -> None:
+        for _ in range(iterations):
+            desired = self.backend.step()
+            assert desired is not None
+            self.backend.publish({name: desired[name] for name in ("joint", "finger", "grip")})
+        self.recorder.catch_up()
+
+    def run_until(self, kind: str) -> None:
+        """Until the journal has an entry of this kind."""
+        with o80.Frontend(BENCH, read_only=True) as observer:
+            for _ in range(10_000):
+                self.run(1)
+                if any(entry.kind == kind for entry in observer.journal()):
+                    return
+        raise RuntimeError(f"the journal has no '{kind}'")
+
+
+def play_bench(recorder: Recorder) -> None:
+    """Every pace, profile, mode and start, and what else a journal tells."""
+    bench = Bench(recorder)
+    with o80.Frontend(BENCH) as arm, o80.Frontend(BENCH) as other:
+        # commands
+        arm.add_command("finger", 0.0625)
+        arm.add_command("shoulder", {"position": 0.25}, duration=0.05)
+        arm.add_command("elbow", {"position": 0.25}, fastest=True)
+        arm.add_command("grip", True)
+        arm.pulse()
+        bench.run(40)
+        arm.add_command("shoulder", {"velocity": 0.5}, iterations=7, profile="linear")
+        arm.add_command("elbow", {"position": 0.0, "velocity": 0.0}, speed=1.0, start="observed")
+        arm.add_command("finger", -0.5, until=arm.published + 20, profile="minimum_jerk")
+        arm.pulse()
+        bench.run(5)
+        arm.add_command("finger", 0.75, iterations=3, mode="overwrite")
+        arm.add_command(
+            ["shoulder", "elbow"], [{"position": 0.5}, {"position": -0.5}], duration=0.1
+        )
+        arm.pulse()
+        bench.run(60)
+        arm.add_command("finger", -1.0)  # too far for its iteration
+        arm.pulse()
+        bench.run(3)
+        # trajectories: the last one is copied over several iterations
+        arm.add_trajectory([0.1, 0.2, 0.0], "finger", times=[0.01, 0.01, 0.03])
+        arm.add_trajectory([True, False], "grip", iterations=2)
+        arm.pulse()
+        bench.run(20)
+        ramp = np.linspace(0.0, 0.1, 3000)
+        rows = {"position": np.stack([ramp, -ramp], 1), "velocity": np.zeros((3000, 2))}
+        arm.add_trajectory(rows, ["shoulder", "elbow"], times=np.arange(3000) * 1e-5)
+        arm.pulse()
+        bench.run(40)
+        # purges, requests, interrupts
+        arm.add_command("finger", 0.5, iterations=30)
+        arm.add_command("finger", 0.6, iterations=30)
+        arm.pulse()
+        bench.run(3)
+        arm.purge("finger")
+        arm._purge_own()
+        arm.add_purge()
+        arm.add_request("home", speed=0.5, axis=2)
+        arm.add_request("refuse")
+        arm.pulse()
+        bench.run(2)
+        arm.add_command("finger", 0.9, iterations=30)
+        arm.pulse()
+        bench.run(2)
+        bench.backend.interrupt("finger")
+        bench.run(2)
+        # batches for later, too late, and under the control of another one
+        arm.add_command("finger", 0.3, iterations=2)
+        arm.pulse(at=arm.published + 5)
+        arm.add_command("finger", 0.4, iterations=2)
+        arm.pulse(at=1)
+        arm.add_command("finger", 0.5, iterations=2)
+        arm.pulse(at=1, late="now")
+        arm.add_command("finger", 0.5, until=2)
+        arm.pulse()
+        bench.run(8)
+        arm._take_control()
+        bench.run(1)
+        other.add_command("finger", 0.1, iterations=2)
+        other.pulse()
+        bench.run(2)
+        arm._release_control()
+        arm.pulse()
+        bench.run(2)
+        # a commander that gives no sign of life, and loses control with it
+        other._take_control()
+        other.add_command("finger", -0.9, iterations=500)
+        other.pulse()
+        bench.run_until("silent")
+        # a halt, while something moves
+        arm.add_command("shoulder", {"position": -0.5}, duration=0.2)
+        arm.pulse()
+        bench.run(20)
+        bench.backend.halt("a switch")
+        bench.run(30)
+        arm.add_command("finger", 0.0)
+        arm.pulse()
+        bench.run(2)
+    # a commander that dies
+    child = subprocess.Popen(
+        [sys.executable, "-c", DIES], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    assert child.stdout is not None
+    assert child.stdout.readline() == "sent\n"
+    bench.run(1)
+    child.kill()
+    child.wait()
+    bench.run_until("died")
+    bench.backend.close("the cable is broken")
+    recorder.catch_up()
+
+
+DIES = f"""
+import o80
+arm = o80.Frontend({BENCH!r})
+arm._take_control()
+print('sent', flush=True)
+input()
+"""
+
+# ---------------------------------------------------------------------------- what must be found
+
+
+def journal_facts(value: Any) -> Any:
+    """An entry of a journal for JSON: what differs from the defaults of its fields."""
+    if dataclasses.is_dataclass(value):
+        return {
+            field.name: journal_facts(getattr(value, field.name))
+            for field in dataclasses.fields(value)
+            if not _is_default(getattr(value, field.name), field.default)
+        }
+    if isinstance(value, dict):
+        return {name: journal_facts(each) for name, each in value.items()}
+    if isinstance(value, tuple):
+        return [journal_facts(each) for each in value]
+    if isinstance(value, np.ndarray) and value.size > MOST_NUMBERS:
+        return [str(value.dtype), list(value.shape), hashlib.sha256(value.tobytes()).hexdigest()]
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+
+
+def _is_default(found: Any, default: Any) -> bool:
+    return found is default or (isinstance(default, (str, int, tuple)) and found == default)
+
+
+def found_in(path: Path) -> dict[str, Any]:
+    """What every later version must find."""
+    recording = o80.open(path)
+    assert recording.finished
+    return {
+        "marks": [{"name": mark.name, "values": dict(mark.values)} for mark in recording.marks],
+        "segments": {
+            name: [facts(epoch) for epoch in segment.epochs]
+            for name, segment in recording.segments.items()
+        },
+    }
+
+
+def facts(epoch: Any) -> dict[str, Any]:
+    history = epoch.history()
+    return {
+        "rows": len(history),
+        "first": int(history.iteration[0]),
+        "sha256": {
+            name: hashlib.sha256(_text_of(history.rows[name]).encode()).hexdigest()
+            for name in history.rows.dtype.names
+        },
+        "gaps": [*epoch.gaps, *epoch.journal_gaps],
+        "options": epoch.provenance.options,
+        "journal": [journal_facts(entry) for entry in epoch.journal()],
+    }
+
+
+def _text_of(values: Any) -> str:
+    return json.dumps(values.tolist(), default=lambda nested: nested.tolist())
+
+
+def main() -> None:
+    path = HERE / f"{sys.argv[1]}.mcap"
+    # no path of the machine on which the file was made
+    told: Any = o80.Frontend.provenance
+    library = "/usr/lib/o80/robots/two_joints.so"
+    o80.Frontend.provenance = property(  # type: ignore[assignment,method-assign]
+        lambda self: replace(told.fget(self), library=library if self.segment == SEGMENT else "")
+    )
+    recorder = Recorder(path, [SEGMENT, BENCH])
+    play_two_runs(recorder)
+    play_bench(recorder)
     recorder.finish()
+    write_facts(path)
+
+
+def write_facts(path: Path) -> None:
     text = json.dumps(found_in(path))
-    (HERE / f"{FORMAT}.json").write_text(text + "\n")
+    path.with_suffix(".json").write_text(text + "\n")
     print(f"{path.stat().st_size} bytes, {len(text)} bytes of JSON")
 
 

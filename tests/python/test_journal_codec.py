@@ -1,0 +1,295 @@
+"""Recordings of a newer o80, or under other motion rules: what is read, and where a replay stops.
+
+The newer o80 is this one, which forges what it writes into the file.
+"""
+
+import json
+import math
+import struct
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import o80
+from o80 import _core
+from o80.provenance import Provenance
+from o80.recording.journal_channel import Entries
+from o80.recording.recorder import Recorder
+from o80.replaying.motion_rules import MotionRules
+from o80.words import ProfileWord
+
+WAIT = 60.0  # [s] longer than any command should take
+NEWER = _core.JOURNAL_CODEC + 1
+RECORDS = 1  # kind of an entry
+COMMAND, LATER = 2, 99  # kinds of a record
+
+
+def o80_command(*words: str | Path) -> tuple[int, str]:
+    program = Path(sys.executable).parent / "o80"
+    done = subprocess.run([program, *words], capture_output=True, text=True, timeout=WAIT)
+    return done.returncode, " ".join((done.stdout + done.stderr).split())
+
+
+def record(path: Path, segment: str) -> Path:
+    """Two commands: one in row 1, one in row 11."""
+    with o80.robots.load("two_joints").inline(segment) as arm, o80.Recording(path, arm):
+        for target in (0.5, 1.0):
+            arm.add_command("elbow", target, iterations=5)
+            arm.burst(10)
+    return path
+
+
+# ---------------------------------------------------------------------------- a newer version
+
+
+@pytest.fixture
+def newer(segment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A recording whose journal is in a newer version of the format."""
+    with monkeypatch.context() as forged:
+        forged.setattr(_core, "JOURNAL_CODEC", NEWER)
+        return record(tmp_path / "run.mcap", segment)
+
+
+SAID = (
+    rf"written in version {NEWER} of the format, and this o80 reads versions 0 to "
+    rf"{_core.JOURNAL_CODEC}: read it with a newer o80"
+)
+
+
+def test_a_newer_version_is_refused_with_a_message(newer: Path, segment: str) -> None:
+    (epoch,) = o80.open(newer)[segment].epochs
+
+    with pytest.raises(o80.RecordingError, match=SAID):
+        epoch.journal()
+    with pytest.raises(o80.RecordingError, match=SAID):
+        o80.replay(newer)
+    with (
+        pytest.raises(o80.RecordingError, match=SAID),
+        o80.play(newer, prefix="old-", speed=math.inf) as playback,
+    ):
+        playback.wait(WAIT)
+    assert epoch.history().iteration.tolist() == list(range(21))  # rows are readable all the same
+
+
+@pytest.mark.parametrize("words", [["replay"], ["echo", "--commands"]])
+def test_commands_refuse_a_newer_version(words: list[str], newer: Path) -> None:
+    code, said = o80_command(*words, newer)
+
+    assert code == 1
+    assert f"version {NEWER} of the format" in said
+    assert "Traceback" not in said
+
+
+def test_info_tells_a_newer_version(newer: Path) -> None:
+    assert f"for a newer o80 (format {NEWER})" in o80_command("info", newer)[1]
+    _, text = o80_command("info", newer, "--json")
+    assert json.loads(text)[0]["journal_codec"] == NEWER
+
+
+def test_a_journal_of_another_version_is_not_continued(
+    segment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "run.mcap"
+    with o80.robots.load("two_joints").inline(segment) as arm:
+        with monkeypatch.context() as forged:
+            forged.setattr(_core, "JOURNAL_CODEC", NEWER)
+            with o80.Recording(path, arm):
+                arm.burst(5)
+        with pytest.raises(o80.RecordingError, match="another o80 has begun the journal"):
+            Recorder(path, [segment], proceed=True)
+    # another run of the robot has a journal of its own
+    with (
+        o80.robots.load("two_joints").inline(segment) as arm,
+        o80.Recording(path, arm, proceed=True),
+    ):
+        arm.burst(5)
+    assert [epoch.journal_codec for epoch in o80.open(path)[segment].epochs] == [
+        NEWER,
+        _core.JOURNAL_CODEC,
+    ]
+
+
+@pytest.mark.parametrize("codec", ["", "one", "-1", "1e3", "9" * 30])
+def test_a_damaged_version_is_told(
+    codec: str, segment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as forged:
+        forged.setattr(_core, "JOURNAL_CODEC", codec)
+        path = record(tmp_path / "run.mcap", segment)
+    with pytest.raises(o80.RecordingError):
+        o80.open(path)[segment].epochs[0].journal()
+    code, said = o80_command("info", path)
+    assert (code, "Traceback" in said) == (1, False)
+
+
+# ---------------------------------------------------------------------------- unknown kinds
+
+
+def entries_in(content: bytes) -> Iterator[tuple[int, int, int]]:
+    """Where each entry begins, its length and its kind."""
+    at = 0
+    while at < len(content):
+        length, kind = struct.unpack_from("<IB", content, at)
+        yield at, length, kind
+        at += length
+
+
+def with_later_kind(content: bytes, nth: int, entry: bool) -> bytes:
+    """The nth command gets a kind that this o80 does not know, or the nth entry of records."""
+    forged = bytearray(content)
+    found = [at for at, _, kind in entries_in(content) if kind == RECORDS]
+    if entry:
+        forged[found[nth] + 4] = LATER
+        return bytes(forged)
+    commands = []
+    for at, length, kind in entries_in(content):
+        record = at + 34
+        while kind == RECORDS and record < at + length:
+            kind_of_record, fields, _, here = struct.unpack_from("<HHII", content, record)
+            commands += [record] if kind_of_record == COMMAND else []
+            record += 12 + fields + here
+    struct.pack_into("<H", forged, commands[nth], LATER)
+    return bytes(forged)
+
+
+@pytest.mark.parametrize(("entry", "what"), [(False, "record"), (True, "entry")])
+def test_what_a_newer_o80_recorded_is_listed_and_ends_a_replay(
+    entry: bool, what: str, segment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    honest = Entries.message
+
+    def forged(self: Entries) -> bytes:
+        changed = with_later_kind(self.content, 1, entry)
+        return honest(Entries(self.first, self.next, changed))
+
+    with monkeypatch.context() as forging:
+        forging.setattr(Entries, "message", forged)
+        path = record(tmp_path / "run.mcap", segment)
+    entries = o80.open(path)[segment].epochs[0].journal()
+    (unknown,) = (each for each in entries if each.unknown)
+
+    assert unknown.unknown == f"{what} kind {LATER}"
+    assert unknown.iteration == 11
+    code, said = o80_command("replay", path)
+    assert code == 2
+    assert "11 rows, identical up to row 10; then entry" in said
+    assert f"does not know ({what} kind {LATER})" in said
+    assert "Traceback" not in said
+    _, said = o80_command("echo", "--commands", path)
+    assert f"something of a newer o80 ({what} kind {LATER})" in said
+    played = f"{segment}-again"
+    with o80.play(path, names={segment: played}, speed=math.inf) as playback:
+        assert playback.wait(WAIT)
+        with o80.Frontend(played) as arm:
+            assert repr(arm.journal()) == repr(entries)
+
+
+# ---------------------------------------------------------------------------- motion rules
+
+
+def record_limited(path: Path, segment: str, profile: ProfileWord = "linear") -> Path:
+    """A command of an actuator without a limit of speed in row 1, of one with it in 11."""
+    limits = {"lift": (-1.0, 1.0, 2.0)}
+    with o80.Backend(segment, ["free", "lift"], limits=limits) as backend:
+        backend.publish([0.0, 0.0])
+        with o80.Frontend(segment) as arm, o80.Recording(path, arm) as recording:
+            recording.flush()
+            for name in ("free", "lift"):
+                arm.add_command(name, 0.1, iterations=8, profile=profile)
+                arm.pulse()
+                for _ in range(10):
+                    backend.publish(backend.step())
+    return path
+
+
+def rules_of(path: Path, rules: int, monkeypatch: pytest.MonkeyPatch, segment: str) -> Path:
+    """A recording by an o80 with these rules."""
+    honest = Provenance.as_json
+    with monkeypatch.context() as forged:
+        forged.setattr(
+            Provenance,
+            "as_json",
+            lambda self: json.dumps(json.loads(honest(self)) | {"motion_rules": rules}),
+        )
+        return record_limited(path, segment)
+
+
+def test_a_recording_says_under_which_motion_rules_it_was_made(
+    segment: str, tmp_path: Path
+) -> None:
+    path = record_limited(tmp_path / "run.mcap", segment)
+
+    (epoch,) = o80.open(path)[segment].epochs
+    assert epoch.provenance.motion_rules == _core.MOTION_RULES
+    assert f"motion rules {_core.MOTION_RULES}" in o80_command("info", path)[1]
+    code, said = o80_command("replay", path)
+    assert (code, "21 rows, identical" in said) == (0, True)
+    assert "motion rules" not in said
+
+
+@pytest.mark.parametrize("other", [_core.MOTION_RULES - 1, _core.MOTION_RULES + 1])
+def test_under_other_rules_rows_are_compared_up_to_the_first_command_that_they_change(
+    other: int, segment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = rules_of(tmp_path / "run.mcap", other, monkeypatch, segment)
+    (run,) = o80.replay(path)
+
+    assert run.difference is None
+    assert not run.identical
+    assert run.rows == 11  # up to row 10
+    now = _core.MOTION_RULES
+    assert f"row 11 begins a command of lift, which motion rules {now} may move otherwise" in (
+        run.gap
+    )
+    code, said = o80_command("replay", path)
+    assert code == 2
+    assert "11 rows, identical up to row 10; then row 11 begins a command of lift" in said
+    assert f"note: it moved by motion rules {other}, this o80 has motion rules {now}" in said
+
+
+def test_rules_that_change_no_command_of_the_run_are_noted(
+    segment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    honest = Provenance.as_json
+    with monkeypatch.context() as forged:
+        forged.setattr(
+            Provenance,
+            "as_json",
+            lambda self: json.dumps(json.loads(honest(self)) | {"motion_rules": 77}),
+        )
+        path = record(tmp_path / "run.mcap", segment)
+    (run,) = o80.replay(path)
+
+    assert run.identical, run
+    assert any("it moved by motion rules 77" in note for note in run.notes)
+
+
+def test_the_first_command_is_found_whatever_the_rules_are(segment: str, tmp_path: Path) -> None:
+    profiles: list[tuple[ProfileWord, list[int]]] = [("linear", [11]), ("minimum_jerk", [1, 11])]
+    for profile, changed in profiles:
+        path = record_limited(tmp_path / f"{profile}.mcap", segment, profile)
+        (epoch,) = o80.open(path)[segment].epochs
+        entries = list(epoch.native_journal())
+        for recorded, now in ((1, 1), (2, 2), (1, 2), (3, 2)):
+            rules = MotionRules.of(epoch.schema, recorded, now)
+            moved = [entry.iteration for entry in entries if rules.moved_otherwise(entry)]
+            assert moved == (changed if recorded != now else []), (profile, recorded, now)
+
+
+@pytest.mark.parametrize("rules", ['"one"', "null", "[]", "1.5", "-1", "9" * 30])
+def test_damaged_rules_are_told(
+    rules: str, segment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    honest = Provenance.as_json
+    with monkeypatch.context() as forged:
+        forged.setattr(
+            Provenance,
+            "as_json",
+            lambda self: json.dumps(json.loads(honest(self)) | {"motion_rules": json.loads(rules)}),
+        )
+        path = record_limited(tmp_path / "run.mcap", segment)
+    with pytest.raises(o80.RecordingError, match="provenance is damaged"):
+        o80.replay(path)
