@@ -200,8 +200,7 @@ class RandomCommanders {
         options.pace = iterations(1 + below(9));
         break;
       default:
-        options.pace = direct(std::chrono::milliseconds(below(4)));
-        if (options.pace.amount == 0 && below(3) == 0) options.profile = Profile::as_sent;
+        options.pace = direct(std::chrono::milliseconds(2));
     }
     options.mode = below(3) == 0 ? Mode::overwrite : Mode::queue;
     options.start = below(6) == 0 ? Start::observed : Start::desired;
