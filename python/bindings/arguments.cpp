@@ -102,8 +102,8 @@ o80::CommandOptions command_options(const o80::PaceSpec& pace, nb::handle mode, 
 }
 
 bool names_several(nb::handle actuators) {
-  return actuators.is_none() || (PySequence_Check(actuators.ptr()) != 0 &&
-                                 PyUnicode_Check(actuators.ptr()) == 0);
+  return actuators.is_none() ||
+         (PySequence_Check(actuators.ptr()) != 0 && PyUnicode_Check(actuators.ptr()) == 0);
 }
 
 namespace {

@@ -83,9 +83,9 @@ Move start_move(const Frontend& self, nb::handle actuators, nb::handle targets,
                           pace_of(duration, speed, until, iterations, truth_of(fastest, "fastest")),
                           mode, profile, start)};
   const bool several = names_several(actuators);
-  const Targets chosen =
-      several ? self.targets_of(actuators, targets)
-              : self.targets_of(nb::make_tuple(actuators), nb::make_tuple(targets));
+  const Targets chosen = several
+                             ? self.targets_of(actuators, targets)
+                             : self.targets_of(nb::make_tuple(actuators), nb::make_tuple(targets));
   set_tolerances(self.decoder()->description->schema, tolerance, chosen, options);
   const Waiting waiting;
   return frontend->start_move(chosen.actuators, chosen.states, options, chosen.masks);
@@ -118,8 +118,9 @@ Observation move_to(const Frontend& self, nb::handle actuators, nb::handle targe
 }  // namespace
 
 void bind_moving(nb::module_& m, nb::class_<Frontend>& frontend) {
-  nb::class_<Move>(m, "Move", "A motion that was sent.")
-      .def_prop_ro("batch", [](const Move& self) { return self.batch(); });
+  nb::class_<Move>(m, "Move", "A motion that was sent.").def_prop_ro("batch", [](const Move& self) {
+    return self.batch();
+  });
   def_verb(frontend, "move_to", verbs::move_to, &move_to, "actuators"_a.none(), "targets"_a.none(),
            nb::kw_only(), "tolerance"_a.none(), "timeout"_a = nb::none(), "duration"_a = nb::none(),
            "speed"_a = nb::none(), "until"_a = nb::none(), "iterations"_a = nb::none(),

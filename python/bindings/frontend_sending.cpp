@@ -90,8 +90,8 @@ Observation wait_for_end(const Frontend& self, const Batch& batch, nb::handle ti
   });
 }
 
-Observation pulse_and_wait(const Frontend& self, nb::handle timeout, nb::handle at,
-                           nb::handle late, nb::handle check) {
+Observation pulse_and_wait(const Frontend& self, nb::handle timeout, nb::handle at, nb::handle late,
+                           nb::handle check) {
   // refused before anything is sent
   timeout_of(timeout);
   truth_of(check, "check");
@@ -235,8 +235,8 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
   def_verb(frontend, "pulse", verbs::pulse, &pulse, nb::kw_only(), "at"_a = nb::none(),
            "late"_a.none() = "reject");
   def_verb(frontend, "pulse_and_wait", verbs::pulse_and_wait, &pulse_and_wait,
-           "timeout"_a = nb::none(), nb::kw_only(), "at"_a = nb::none(),
-           "late"_a.none() = "reject", "check"_a.none() = true);
+           "timeout"_a = nb::none(), nb::kw_only(), "at"_a = nb::none(), "late"_a.none() = "reject",
+           "check"_a.none() = true);
 
   frontend
       .def("_add_trajectories", &add_trajectories, "actuators"_a, "rows"_a, "states"_a,

@@ -57,10 +57,9 @@ std::string end_text(const Schema& schema, std::span<const SentCommand> command,
 
 std::string not_completed_text(const std::string& segment, const std::vector<std::string>& ends,
                                std::size_t records) {
-  std::string text = records == 1
-                         ? "the command sent to '" + segment + "' did not complete: "
-                         : std::to_string(ends.size()) + " of " + std::to_string(records) +
-                               " commands sent to '" + segment + "' did not complete: ";
+  std::string text = records == 1 ? "the command sent to '" + segment + "' did not complete: "
+                                  : std::to_string(ends.size()) + " of " + std::to_string(records) +
+                                        " commands sent to '" + segment + "' did not complete: ";
   for (std::size_t i = 0; i < ends.size() && i < nearest::kListed; ++i) {
     text += (i == 0 ? "" : "; ") + ends[i];
   }

@@ -38,8 +38,8 @@ void throw_if_halted(const Link& link) {
   const std::optional<Halt> halt = link.halt();
   if (!halt) return;
   const std::string text = link.halt_text(std::numeric_limits<Iteration>::max());
-  throw BackendHalted("'" + link.segment.name() + "' did not get to its targets: " +
-                      (text.empty() ? "it is halted" : text));
+  throw BackendHalted("'" + link.segment.name() +
+                      "' did not get to its targets: " + (text.empty() ? "it is halted" : text));
 }
 
 }  // namespace

@@ -27,8 +27,9 @@ std::vector<std::pair<std::string, std::string>> numbers_of(const Schema& schema
 }
 
 [[noreturn]] void refuse_tolerance(const Miss& miss, const char* why) {
-  throw InvalidArgument("the tolerance of " + (miss.field.empty() ? "" : "'" + miss.field + "' of ") +
-                        "actuator '" + miss.actuator + "' " + why);
+  throw InvalidArgument("the tolerance of " +
+                        (miss.field.empty() ? "" : "'" + miss.field + "' of ") + "actuator '" +
+                        miss.actuator + "' " + why);
 }
 
 std::string text_of(double value, const std::string& unit) {
@@ -103,8 +104,8 @@ std::string not_reached_text(const std::string& segment, const std::vector<Miss>
     text += (i == 0 ? "" : "; ") + (miss.field.empty() ? "" : miss.field + " of ") + "'" +
             miss.actuator + "' is observed at " + text_of(miss.observed, miss.unit) + ", " +
             text_of(miss.distance, miss.unit) + " from its target of " +
-            text_of(miss.target, miss.unit) + " (tolerance " +
-            text_of(miss.tolerance, miss.unit) + ")";
+            text_of(miss.target, miss.unit) + " (tolerance " + text_of(miss.tolerance, miss.unit) +
+            ")";
   }
   if (misses.size() > nearest::kListed) {
     text += "; and " + std::to_string(misses.size() - nearest::kListed) + " more";

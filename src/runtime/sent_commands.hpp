@@ -25,8 +25,8 @@ struct SentCommand {
 static_assert(sizeof(SentCommand) == 8);
 
 /// The newest commands that a frontend has sent to each actuator. An overwritten command that is
-/// older than one of them, and gives way to it, was overwritten by its own frontend. So was one that
-/// ended while an own batch waited for its iteration (`at`), whichever was sent first.
+/// older than one of them, and gives way to it, was overwritten by its own frontend. So was one
+/// that ended while an own batch waited for its iteration (`at`), whichever was sent first.
 ///
 /// A backend does not say who overwrote a command. If this frontend and another one both overwrote
 /// it, this frontend counts.

@@ -148,8 +148,9 @@ TEST_F(NotCompletedTest, SoIsARequestThatIsRejected) {
   add_request(one_, Refuse{});
   const Batch mine = one_.pulse();
   station_.run(1);
-  EXPECT_THAT(told(mine), AllOf(HasSubstr("1 of 2 commands"), HasSubstr("request 'refuse' was "
-                                                                        "rejected"),
+  EXPECT_THAT(told(mine), AllOf(HasSubstr("1 of 2 commands"),
+                                HasSubstr("request 'refuse' was "
+                                          "rejected"),
                                 HasSubstr("it does not want to")));
 }
 
