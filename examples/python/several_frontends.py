@@ -37,8 +37,10 @@ def main(report: str = "/dev/null") -> None:
             with upper.control():
                 lower.add_command("elbow", 0.0)
                 refused = lower.pulse()
-                refused.wait(10.0)
-                print(f"without control: {refused.handles[0].status.name}")
+                try:
+                    refused.wait(10.0)
+                except o80.NotCompleted as error:
+                    print(f"without control: {error.ends[0].status.name}")
         logger.join()
 
 

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "control/record.hpp"
+#include "enums.hpp"
 #include "o80/base/error.hpp"
 #include "waiting.hpp"
 
@@ -91,6 +92,18 @@ o80::PaceSpec pace_of(nb::handle duration, nb::handle speed, nb::handle until,
         "none for a set-point, which goes as fast as the limits allow)");
   }
   return pace;
+}
+
+o80::CommandOptions command_options(const o80::PaceSpec& pace, nb::handle mode, nb::handle profile,
+                                    nb::handle start) {
+  o80::CommandOptions options{.pace = pace, .mode = mode_of(mode), .start = start_of(start)};
+  if (!profile.is_none()) options.profile = profile_of(profile);
+  return options;
+}
+
+bool names_several(nb::handle actuators) {
+  return actuators.is_none() ||
+         (PySequence_Check(actuators.ptr()) != 0 && PyUnicode_Check(actuators.ptr()) == 0);
 }
 
 namespace {

@@ -22,5 +22,11 @@ std::chrono::nanoseconds nanoseconds_of(nanobind::handle value, const char* name
 o80::PaceSpec pace_of(nanobind::handle duration, nanobind::handle speed, nanobind::handle until,
                       nanobind::handle iterations, bool fastest = false);
 
+/// The options of a command; a profile of None is the default one.
+o80::CommandOptions command_options(const o80::PaceSpec& pace, nanobind::handle mode,
+                                    nanobind::handle profile, nanobind::handle start);
+/// True for a list of actuators, or None (all); false for one index or name.
+bool names_several(nanobind::handle actuators);
+
 /// `at`: an iteration or None; `late`: "reject" or "now".
 o80::PulseOptions pulse_options(nanobind::handle at, nanobind::handle late);

@@ -6,6 +6,7 @@
 
 #include <optional>
 
+#include "arguments.hpp"
 #include "bindings.hpp"
 #include "enums.hpp"
 #include "o80/base/error.hpp"
@@ -121,21 +122,26 @@ void bind_batch(nb::module_& m) {
           "ended; see `ended` and `wait`.")
       .def(
           "wait",
-          [](const Batch& self, nb::handle timeout) {
+          [](const Batch& self, nb::handle timeout, nb::handle check) {
             const o80::Timeout patience = timeout_of(timeout);
+            const o80::WaitOptions options{.check = truth_of(check, "check")};
             carrying(self, [&] {
               const Waiting waiting;
-              self.wait(patience, Waiting::keep_waiting);
+              self.wait(patience, Waiting::keep_waiting, options);
             });
           },
-          "timeout"_a = nb::none(),
+          "timeout"_a = nb::none(), nb::kw_only(), "check"_a.none() = true,
+          nb::sig("def wait(self, timeout: float | None = None, *, check: bool = True) -> None"),
           R"(Waits until every command, request and purge of it has ended.
 
-In bursting mode a frontend must request the iterations for that. Raises TimeoutError after
-`timeout` [s], with this batch as its member, and BackendGone.)")
+In bursting mode a frontend must request the iterations for that. Raises NotCompleted if one of them
+ended otherwise than completed (overwritten by a later command of the same frontend is no error),
+BackendHalted if a halt ended one, TimeoutError after `timeout` [s], with this batch as its member,
+and BackendGone. With `check=False` their ends raise nothing.)")
       .def("__await__", &awaited,
            nb::sig("def __await__(self) -> collections.abc.Generator[typing.Any, None, Batch]"),
-           "Waits in asyncio: `await arm.pulse()` returns the batch when it has ended.")
+           "Waits in asyncio: `await arm.pulse()` returns the batch when it has ended. Raises as "
+           "`wait`.")
       .def("__repr__", [](const Batch& self) {
         const std::string what = "<o80.Batch of " + std::to_string(self.size());
         try {

@@ -7,6 +7,7 @@
 #include "errors.hpp"
 #include "interpreter.hpp"
 #include "o80/runtime/batch.hpp"
+#include "o80/runtime/move.hpp"
 #include "observation.hpp"
 
 /// A requested burst, and the decoder of its row.
@@ -15,11 +16,13 @@ struct PendingBurst {
   std::shared_ptr<const Decoder> decoder;
 };
 
-/// Calls `wait`; an o80.TimeoutError gets the batch as its member.
+/// Calls `wait`; an o80.TimeoutError gets the batch as its member (a NotReached has it already).
 template <class Wait>
 auto carrying(const o80::Batch& batch, Wait&& wait) {
   try {
     return wait();
+  } catch (const o80::NotReached&) {
+    throw;
   } catch (const o80::TimeoutError& error) {
     call_python([&] {
       const nanobind::object type = python_error("TimeoutError");

@@ -1,10 +1,16 @@
 #include <nanobind/nanobind.h>
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
 
 #include <cstring>
 
 #include "bindings.hpp"
 #include "errors.hpp"
 #include "o80/base/error.hpp"
+#include "o80/runtime/move.hpp"
+#include "o80/runtime/not_completed.hpp"
+#include "observation.hpp"
 #include "robot/inline_group.hpp"
 
 namespace nb = nanobind;
@@ -39,6 +45,41 @@ void set_copy_failed(const o80::CopyFailed& failed) {
   PyErr_SetObject(reinterpret_cast<PyObject*>(Py_TYPE(error.ptr())), error.ptr());
 }
 
+/// A row as Python sees it.
+nb::object observation_of(const o80::UntypedObservation& row) {
+  auto description =
+      std::make_shared<o80::Description>(o80::Description{row.schema(), row.layout()});
+  nb::object layout = nb::module_::import_("o80.layout").attr("Layout")(nb::cast(description));
+  auto decoder = std::make_shared<const Decoder>(std::move(description), std::move(layout));
+  return nb::cast(Observation(std::move(decoder), o80::UntypedObservation(row)));
+}
+
+void set_not_completed(const o80::NotCompleted& error) {
+  nb::list handles;
+  nb::list actuators;
+  for (const o80::NotCompleted::End& end : error.ends()) {
+    handles.append(nb::cast(end.handle));
+    actuators.append(nb::tuple(nb::cast(end.actuators)));
+  }
+  const nb::object type = python_error("NotCompleted");
+  const nb::object raised =
+      type(error.what(), handles, actuators, observation_of(error.observation()));
+  PyErr_SetObject(type.ptr(), raised.ptr());
+}
+
+void set_not_reached(const o80::NotReached& error) {
+  const nb::object miss = python_error("Miss");
+  nb::list misses;
+  for (const o80::Miss& each : error.misses()) {
+    misses.append(miss(each.actuator, each.field, each.target, each.observed, each.distance,
+                       each.tolerance, each.unit));
+  }
+  const nb::object type = python_error("NotReached");
+  const nb::object raised = type(error.what(), nb::cast(error.batch()), nb::list(), misses,
+                                 observation_of(error.observation()));
+  PyErr_SetObject(type.ptr(), raised.ptr());
+}
+
 /// Raises the class of o80.errors with the name of the C++ class.
 void translate(const std::exception_ptr& thrown, void*) {
 #define O80_TRANSLATE(Name)                       \
@@ -49,6 +90,10 @@ void translate(const std::exception_ptr& thrown, void*) {
     std::rethrow_exception(thrown);
   } catch (const o80::CopyFailed& failed) {
     set_copy_failed(failed);
+  } catch (const o80::NotCompleted& error) {
+    set_not_completed(error);
+  } catch (const o80::NotReached& error) {
+    set_not_reached(error);
   }
   O80_TRANSLATE(InvalidArgument)
   O80_TRANSLATE(TimeoutError)

@@ -101,7 +101,12 @@ std::vector<std::uint32_t> Frontend::actuators(nb::handle named) const {
 void Frontend::add_commands(nb::handle named, nb::handle targets,
                             const o80::CommandOptions& options) const {
   const std::shared_ptr<UntypedFrontend> frontend = untyped_;
-  const std::vector<std::uint32_t> chosen = actuators(named);
+  const auto [chosen, states, masks] = targets_of(named, targets);
+  frontend->add_commands(chosen, states, options, masks);
+}
+
+Targets Frontend::targets_of(nb::handle named, nb::handle targets) const {
+  std::vector<std::uint32_t> chosen = actuators(named);
   const o80::Schema& schema = decoder_->description->schema;
   if (length_of(targets) != static_cast<Py_ssize_t>(chosen.size())) {
     throw InvalidArgument("a command for " + std::to_string(chosen.size()) +
@@ -130,7 +135,8 @@ void Frontend::add_commands(nb::handle named, nb::handle targets,
     masks.insert(masks.end(), state.mask.begin(), state.mask.end());
     whole = whole && state.whole;
   }
-  frontend->add_commands(chosen, states, options, whole ? std::span<const std::uint64_t>{} : masks);
+  if (whole) masks.clear();
+  return {std::move(chosen), std::move(states), std::move(masks)};
 }
 
 std::vector<std::byte> Frontend::request_bytes(std::uint32_t index, nb::handle fields) const {
@@ -203,6 +209,7 @@ void bind_frontend(nb::module_& m) {
   nb::class_<Frontend> frontend(m, "Frontend", "The compiled half of o80.Frontend.");
   frontend.def(nb::init<const Attachment&, std::shared_ptr<Decoder>>());
   bind_sending(m, frontend);
+  bind_moving(m, frontend);
   bind_reading(m, frontend);
   bind_halting(m, frontend);
   def_noun(frontend, "segment", verbs::segment,

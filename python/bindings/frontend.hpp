@@ -19,6 +19,14 @@ struct Attachment {
   std::shared_ptr<o80::InlineRobot> robot;
 };
 
+/// Targets of one command: the actuators, their states one after the other, and a mask for each
+/// (none if all numbers are given).
+struct Targets {
+  std::vector<std::uint32_t> actuators;
+  std::vector<std::byte> states;
+  std::vector<std::uint64_t> masks;
+};
+
 /// The compiled half of o80.Frontend.
 ///
 /// Its own members are guarded by the GIL. Another thread may `reattach`, which replaces the core's
@@ -39,6 +47,8 @@ class Frontend {
   /// Adds one command for several actuators (None: all), with a target for each.
   void add_commands(nanobind::handle named, nanobind::handle targets,
                     const o80::CommandOptions& options) const;
+  /// The targets of one command for several actuators (None: all).
+  Targets targets_of(nanobind::handle named, nanobind::handle targets) const;
   std::vector<std::byte> request_bytes(std::uint32_t index, nanobind::handle fields) const;
   Observation blank() const { return Observation(decoder_); }
 
@@ -65,6 +75,7 @@ using HaltFields = std::tuple<std::uint64_t, std::string, std::int64_t, std::str
 std::optional<HaltFields> halt_fields(const std::optional<o80::Halt>& halt);
 
 // what each file adds to the class
+void bind_moving(nanobind::module_& m, nanobind::class_<Frontend>& frontend);
 void bind_sending(nanobind::module_& m, nanobind::class_<Frontend>& frontend);
 void bind_halting(nanobind::module_& m, nanobind::class_<Frontend>& frontend);
 void bind_reading(nanobind::module_& m, nanobind::class_<Frontend>& frontend);

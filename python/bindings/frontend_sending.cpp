@@ -46,14 +46,10 @@ void add_command(const Frontend& self, nb::handle actuator, nb::handle target, n
                  nb::handle speed, nb::handle until, nb::handle iterations, nb::handle fastest,
                  nb::handle mode, nb::handle profile, nb::handle start, nb::handle every) {
   const bool is_fastest = truth_of(fastest, "fastest");
-  o80::CommandOptions options{.pace = pace_of(duration, speed, until, iterations, is_fastest),
-                              .mode = mode_of(mode),
-                              .start = start_of(start)};
+  o80::CommandOptions options = command_options(
+      pace_of(duration, speed, until, iterations, is_fastest), mode, profile, start);
   if (!every.is_none()) set_every(options.pace, every, self.shared()->schema().head.period);
-  if (!profile.is_none()) options.profile = profile_of(profile);
-  const bool several = actuator.is_none() || (PySequence_Check(actuator.ptr()) != 0 &&
-                                              PyUnicode_Check(actuator.ptr()) == 0);
-  if (several) {
+  if (names_several(actuator)) {
     self.add_commands(actuator, target, options);
   } else {
     self.add_command(actuator, target, options);
@@ -96,23 +92,27 @@ Batch pulse_to_end(const Frontend& self, nb::handle at, nb::handle late) {
   return frontend->pulse_to_end(options);
 }
 
-Observation wait_for_end(const Frontend& self, const Batch& batch, nb::handle timeout) {
+Observation wait_for_end(const Frontend& self, const Batch& batch, nb::handle timeout,
+                         nb::handle check) {
   const o80::Timeout patience = timeout_of(timeout);
+  const o80::WaitOptions options{.check = truth_of(check, "check")};
   const auto frontend = self.shared();
   const auto decoder = self.decoder();
   return carrying(batch, [&] {
     o80::UntypedObservation row = [&] {
       const Waiting waiting;
-      return frontend->wait_for_end(batch, patience, Waiting::keep_waiting);
+      return frontend->wait_for_end(batch, patience, Waiting::keep_waiting, options);
     }();
     return Observation(decoder, std::move(row));
   });
 }
 
-Observation pulse_and_wait(const Frontend& self, nb::handle timeout, nb::handle at,
-                           nb::handle late) {
-  timeout_of(timeout);  // refused before anything is sent
-  return wait_for_end(self, pulse_to_end(self, at, late), timeout);
+Observation pulse_and_wait(const Frontend& self, nb::handle timeout, nb::handle at, nb::handle late,
+                           nb::handle check) {
+  // refused before anything is sent
+  timeout_of(timeout);
+  truth_of(check, "check");
+  return wait_for_end(self, pulse_to_end(self, at, late), timeout, check);
 }
 
 /// The number of iterations of a burst: any whole number.
@@ -252,8 +252,8 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
   def_verb(frontend, "pulse", verbs::pulse, &pulse, nb::kw_only(), "at"_a = nb::none(),
            "late"_a.none() = "reject");
   def_verb(frontend, "pulse_and_wait", verbs::pulse_and_wait, &pulse_and_wait,
-           "timeout"_a = nb::none(), nb::kw_only(), "at"_a = nb::none(),
-           "late"_a.none() = "reject");
+           "timeout"_a = nb::none(), nb::kw_only(), "at"_a = nb::none(), "late"_a.none() = "reject",
+           "check"_a.none() = true);
 
   frontend
       .def("_add_trajectories", &add_trajectories, "actuators"_a, "rows"_a, "states"_a,
@@ -277,8 +277,9 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
       .def("_wait_until_ended", &wait_until_ended, "batch"_a, "timeout"_a.none())
       .def("_pulse_to_end", &pulse_to_end, "at"_a.none(), "late"_a.none(),
            nb::sig("def _pulse_to_end(self, at: int | None, late: str) -> Batch"))
-      .def("_wait_for_end", &wait_for_end, "batch"_a, "timeout"_a.none(),
-           nb::sig("def _wait_for_end(self, batch: Batch, timeout: float | None) -> Observation"))
+      .def("_wait_for_end", &wait_for_end, "batch"_a, "timeout"_a.none(), "check"_a.none(),
+           nb::sig("def _wait_for_end(self, batch: Batch, timeout: float | None, check: bool) -> "
+                   "Observation"))
       .def("_burst", &burst, "iterations"_a.none(), "timeout"_a.none(), "at"_a.none(),
            "late"_a.none(),
            nb::sig("def _burst(self, iterations: int, timeout: float | None, at: int | None, "

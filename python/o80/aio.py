@@ -1,13 +1,15 @@
 """The waits of a frontend, for programs on asyncio."""
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, SupportsIndex
 
 from o80 import _core
 from o80.awaiting import in_thread
-from o80.words import LateWord
+from o80.words import LateWord, ModeWord, ProfileWord, StartWord
 
 if TYPE_CHECKING:
     from o80.frontend import Frontend
+    from o80.frontend.moving import Tolerance
 
 
 class Waits:
@@ -39,14 +41,57 @@ class Waits:
         return frontend.wait_for_next(timeout)
 
     async def pulse_and_wait(
-        self, timeout: float | None = None, *, at: int | None = None, late: LateWord = "reject"
+        self,
+        timeout: float | None = None,
+        *,
+        at: int | None = None,
+        late: LateWord = "reject",
+        check: bool = True,
     ) -> _core.Observation:
         """Sends what was added and waits until it has ended; see `Frontend.pulse_and_wait`."""
         frontend = self._frontend
         if frontend._is_inline:  # iterations of an inline robot run in the calling thread
-            return await in_thread(lambda: frontend.pulse_and_wait(timeout, at=at, late=late))
+            return await in_thread(
+                lambda: frontend.pulse_and_wait(timeout, at=at, late=late, check=check)
+            )
         batch = frontend._pulse_to_end(at, late)
-        return await in_thread(lambda: frontend._wait_for_end(batch, timeout))
+        return await in_thread(lambda: frontend._wait_for_end(batch, timeout, check))
+
+    async def move_to(
+        self,
+        actuators: SupportsIndex | str | Sequence[SupportsIndex | str] | None,
+        targets: Any,
+        *,
+        tolerance: "Tolerance",
+        timeout: float | None = None,
+        duration: float | None = None,
+        speed: float | None = None,
+        until: int | None = None,
+        iterations: int | None = None,
+        fastest: bool = False,
+        mode: ModeWord = "queue",
+        profile: ProfileWord | None = None,
+        start: StartWord = "desired",
+    ) -> _core.Observation:
+        """Sends the robot to targets and waits until it is there; see `Frontend.move_to`."""
+        frontend = self._frontend
+        options: dict[str, Any] = {
+            "tolerance": tolerance,
+            "duration": duration,
+            "speed": speed,
+            "until": until,
+            "iterations": iterations,
+            "fastest": fastest,
+            "mode": mode,
+            "profile": profile,
+            "start": start,
+        }
+        if frontend._is_inline:
+            return await in_thread(
+                lambda: frontend.move_to(actuators, targets, timeout=timeout, **options)
+            )
+        move = frontend._start_move(actuators, targets, **options)
+        return await in_thread(lambda: frontend._wait_for_move(move, timeout))
 
     async def burst(
         self,

@@ -66,7 +66,10 @@ async def end_of(sent: _core.Batch) -> _core.Batch: ...
 @overload
 async def end_of(sent: _core.Burst) -> _core.Observation: ...
 async def end_of(sent: _core.Batch | _core.Burst) -> _core.Batch | _core.Observation:
-    """Waits for a batch and returns it, or for a burst and returns its last observation."""
+    """Waits for a batch and returns it, or for a burst and returns its last observation.
+
+    Raises as their `wait`: NotCompleted if a command of the batch did not complete.
+    """
     if isinstance(sent, _core.Burst):
         return await in_thread(sent.wait)
     await in_thread(sent.wait)

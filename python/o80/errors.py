@@ -1,12 +1,13 @@
 """Exceptions of o80: one class for each cause. The text says what to do."""
 
 import builtins
-from typing import TYPE_CHECKING, Any, Optional
+from typing import TYPE_CHECKING, Any, NamedTuple, Optional
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from o80._core import Batch, Handle
+    from o80._core import Batch, Handle, Observation
+    from o80.command_ends import CommandEnd
 
 
 class Error(Exception):
@@ -38,6 +39,77 @@ class TimeoutError(Error, builtins.TimeoutError):
     def __reduce__(self) -> tuple[Any, ...]:
         # another process cannot wait for the batch: keep its statuses
         return type(self), (str(self), None, self.handles)
+
+
+class NotCompleted(Error):
+    """Commands or requests of a batch ended otherwise than completed, or all of it was rejected.
+
+    A command that a later command of the same frontend has overwritten is not among them.
+
+    handles: of those that did not complete, with their statuses.
+    observation: the row of the last iteration of the batch (the newest row if that one is gone).
+    """
+
+    def __init__(
+        self,
+        text: str,
+        handles: "Sequence[Handle]",
+        actuators: "Sequence[tuple[str, ...]]",
+        observation: "Observation",
+    ) -> None:
+        super().__init__(text)
+        self.handles = list(handles)
+        self._actuators = list(actuators)
+        self.observation = observation
+
+    @property
+    def ends(self) -> "list[CommandEnd]":
+        """For each handle: iteration, status, actuators, reason and text."""
+        from o80.command_ends import CommandEnd
+
+        return [
+            CommandEnd(handle.iteration or 0, handle.status, names, handle.reason, handle.text)
+            for handle, names in zip(self.handles, self._actuators, strict=True)
+        ]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (str(self), self.handles, self._actuators, self.observation)
+
+
+class Miss(NamedTuple):
+    """A number that was observed too far from its target; of a NotReached."""
+
+    actuator: str
+    field: str  #: empty if the state is a number
+    target: float
+    observed: float
+    distance: float  #: NaN if `observed` is
+    tolerance: float
+    unit: str  #: of the four numbers
+
+
+class NotReached(TimeoutError):
+    """The robot was not observed within the tolerance of its targets in time.
+
+    misses: the numbers that were too far away; empty if only the commands had not ended.
+    observation: the row in which they were observed.
+    batch: the commands, those that have not ended continue; `handles` are theirs.
+    """
+
+    def __init__(
+        self,
+        text: str,
+        batch: Optional["Batch"],
+        handles: "Sequence[Handle]",
+        misses: "Sequence[Miss]",
+        observation: "Observation",
+    ) -> None:
+        super().__init__(text, batch, handles)
+        self.misses = list(misses)
+        self.observation = observation
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (str(self), None, self.handles, self.misses, self.observation)
 
 
 class MissingExtra(Error, ImportError):

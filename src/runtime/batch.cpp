@@ -7,15 +7,19 @@
 #include "memory/atomic_words.hpp"
 #include "memory/running_slot.hpp"
 #include "o80/base/error.hpp"
+#include "o80/runtime/not_completed.hpp"
+#include "runtime/ends_text.hpp"
 #include "runtime/link.hpp"
 #include "runtime/sent.hpp"
 
 namespace o80 {
 
-/// End statuses that were read once; kept because the segment reuses their slots.
+/// What copies of a batch share.
 struct Batch::Kept {
   std::mutex mutex;
+  /// End statuses that were read once; kept because the segment reuses their slots.
   std::unordered_map<CommandId, Handle> ended;
+  std::vector<SentCommand> commands;  // constant
 };
 
 Batch::Batch(std::shared_ptr<Link> link, Sent sent)
@@ -23,7 +27,9 @@ Batch::Batch(std::shared_ptr<Link> link, Sent sent)
       lane_(std::move(sent.lane)),
       id_(sent.id),
       records_(sent.records),
-      kept_(std::make_shared<Kept>()) {}
+      kept_(std::make_shared<Kept>()) {
+  kept_->commands = std::move(sent.commands);
+}
 
 namespace {
 
@@ -164,9 +170,14 @@ std::string Batch::rejection() const {
   return handle.status == Status::rejected ? handle.text : "";
 }
 
-void Batch::wait(Timeout timeout, const KeepWaiting& keep_waiting) const {
+void Batch::wait(Timeout timeout, const KeepWaiting& keep_waiting,
+                 const WaitOptions& options) const {
   if (id_ == 0) return;  // an empty batch was never sent
-  const Deadline deadline(timeout);
+  wait_for_row(Deadline(timeout), keep_waiting);
+  if (options.check) throw_unless_completed();
+}
+
+void Batch::wait_for_row(const Deadline& deadline, const KeepWaiting& keep_waiting) const {
   const KeepWaiting guarded = link_->guarded(keep_waiting);
   const auto ended = [&] { return is_end(ask(id_ + 1).status); };
   if (lane_->wait_until(ended, deadline, guarded) == Waited::timed_out) {
@@ -226,16 +237,6 @@ Iteration wait_for_burst(const Link& link, LaneSender& lane, CommandId id, Timeo
   return answer.row;
 }
 
-void throw_if_halted(const Link& link, const Batch& batch) {
-  // skip the handles if the backend was never halted
-  if (link.segment.view().counters().halt.number.load(std::memory_order_relaxed) == 0) return;
-  for (const Handle& handle : batch.handles()) {
-    if (handle.status != Status::halted) continue;
-    throw BackendHalted("a command sent to '" + link.segment.name() +
-                        "' ended as halted: " + handle.text);
-  }
-}
-
 namespace {
 /// Throws why the backend ended. It rejects batches shortly before it shows that it has ended.
 [[noreturn]] void throw_ended(Link& link) {
@@ -252,6 +253,47 @@ void throw_rejected(Link& link, const char* what, const Batch& batch) {
                            "' was rejected: " + batch.rejection();
   if (batch.rejected_by() == Reason::halted) throw BackendHalted(text);
   throw Error(text);
+}
+
+/// Throws if a record of this batch, which has ended, did not complete.
+void Batch::throw_unless_completed() const {
+  std::vector<NotCompleted::End> ends;
+  std::vector<std::string> texts;
+  const Schema& schema = link_->description->schema;
+  for (std::uint32_t place = 0; place < records_; ++place) {
+    const CommandId id = record_id(id_, place);
+    const LaneSender::StatusAnswer answer = lane_->status(id);
+    const bool is_known = answer.known == LaneSender::Known::yes;
+    if (is_known && is_success(static_cast<Status>(answer.word.status))) continue;
+    const Handle handle = ask(id);
+    if (is_success(handle.status) || handle.status == Status::forgotten) continue;
+    const std::span<const SentCommand> command =
+        std::ranges::equal_range(kept_->commands, place, {}, &SentCommand::place);
+    const bool is_overwritten = handle.status == Status::overwritten;
+    if (is_overwritten && link_->has_replaced(id, handle.iteration, command)) continue;
+    ends.push_back({handle, names_of(schema, command)});
+    texts.push_back(end_text(schema, command, handle));
+  }
+  if (ends.empty()) return;
+
+  const std::string& segment = link_->segment.name();
+  const bool is_rejected = rejected_by() != Reason::none;
+  for (const auto& [handle, actuators] : ends) {
+    if (handle.reason == Reason::stopped) throw_ended(*link_);
+    if (is_rejected || (handle.status != Status::halted && handle.reason != Reason::halted)) {
+      continue;
+    }
+    throw BackendHalted("a command sent to '" + segment + "' ended as " +
+                        std::string(to_text(handle.status)) + ": " + handle.text);
+  }
+  if (rejected_by() == Reason::halted) throw_rejected(*link_, "batch", *this);
+  UntypedObservation row(link_->description);
+  const Iteration last = last_iteration();
+  if (last < 0 || !link_->history.read(last, row.bytes())) link_->history.latest(row.bytes());
+  throw NotCompleted(is_rejected
+                         ? "the batch sent to '" + segment + "' was rejected: " + rejection()
+                         : not_completed_text(segment, texts, records_),
+                     std::move(ends), std::move(row));
 }
 
 Iteration Burst::wait_done(Timeout timeout, const KeepWaiting& keep_waiting) const {

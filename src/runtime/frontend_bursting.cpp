@@ -31,16 +31,19 @@ class CancelUnlessDone {
 }  // namespace
 
 UntypedObservation UntypedFrontend::pulse_and_wait(Timeout timeout, const PulseOptions& options,
-                                                   const KeepWaiting& keep_waiting) {
-  return wait_for_end(pulse_to_end(options), timeout, keep_waiting);
+                                                   const KeepWaiting& keep_waiting,
+                                                   const WaitOptions& wait) {
+  return wait_for_end(pulse_to_end(options), timeout, keep_waiting, wait);
 }
 
 UntypedObservation UntypedFrontend::wait_for_end(const Batch& batch, Timeout timeout,
-                                                 const KeepWaiting& keep_waiting) const {
+                                                 const KeepWaiting& keep_waiting,
+                                                 const WaitOptions& options) const {
   UntypedObservation observation(link_->description);
   const Iteration last = wait_until_ended(batch, timeout, keep_waiting);
-  if (!batch.rejection().empty()) throw_rejected(*link_, "batch", batch);
-  throw_if_halted(*link_, batch);
+  if (batch.id() == 0) link_->segment.throw_if_gone();  // its newest row would look like an answer
+  if (batch.id() != 0 && options.check) batch.throw_unless_completed();
+  if (last < 0 && batch.rejected_by() == Reason::stopped) throw_rejected(*link_, "batch", batch);
   if (last < 0 || !link_->history.read(last, observation.bytes())) latest(observation.bytes());
   return observation;
 }
@@ -48,7 +51,7 @@ UntypedObservation UntypedFrontend::wait_for_end(const Batch& batch, Timeout tim
 Iteration UntypedFrontend::wait_until_ended(const Batch& batch, Timeout timeout,
                                             const KeepWaiting& keep_waiting) const {
   if (batch.id() == 0 || !bursting()) {
-    batch.wait(timeout, keep_waiting);
+    batch.wait(timeout, keep_waiting, {.check = false});
     return batch.last_iteration();
   }
   CancelUnlessDone rest(batch.lane_.get(), batch.id());
@@ -72,22 +75,29 @@ void UntypedFrontend::refuse_burst(std::int64_t iterations) const {
   }
 }
 
-Sent UntypedFrontend::send_burst(std::int64_t iterations, const PulseOptions& options) {
+Sent UntypedFrontend::send_burst(BatchBuilder& builder, std::int64_t iterations,
+                                 const PulseOptions& options, Asked asked) {
   refuse_burst(iterations);
   BatchRecord record = batch_of(options);
   record.burst = iterations;
-  return send(link_->builder, record);
+  return send(builder, record, asked);
 }
 
 Burst UntypedFrontend::start_burst(std::int64_t iterations, const PulseOptions& options) {
-  return {link_, Batch(link_, send_burst(iterations, options))};
+  return {link_, Batch(link_, send_burst(link_->builder, iterations, options, Asked::yes))};
 }
 
 UntypedObservation UntypedFrontend::burst(std::int64_t iterations, Timeout timeout,
                                           const KeepWaiting& keep_waiting,
                                           const PulseOptions& options) {
+  return burst(link_->builder, iterations, timeout, keep_waiting, options);
+}
+
+UntypedObservation UntypedFrontend::burst(BatchBuilder& builder, std::int64_t iterations,
+                                          Timeout timeout, const KeepWaiting& keep_waiting,
+                                          const PulseOptions& options) {
   // start_burst(iterations).wait(timeout, keep_waiting) without the allocations of a Burst
-  const Sent sent = send_burst(iterations, options);
+  const Sent sent = send_burst(builder, iterations, options, Asked::no);
   CancelUnlessDone rest(sent.lane.get(), sent.id);
   UntypedObservation observation(link_->description);  // made while the backend works
   const Iteration row =
@@ -108,7 +118,8 @@ Iteration UntypedFrontend::burst_rows(std::span<std::byte> rows, Timeout timeout
                           "' do not fit into its history of " +
                           std::to_string(link_->history.rows()));
   }
-  const Sent sent = send_burst(static_cast<std::int64_t>(count), options);
+  const Sent sent =
+      send_burst(link_->builder, static_cast<std::int64_t>(count), options, Asked::no);
   CancelUnlessDone rest(sent.lane.get(), sent.id);
   const Iteration last =
       wait_for_burst(*link_, *sent.lane, sent.id, timeout, keep_waiting, sent.events_before_send);

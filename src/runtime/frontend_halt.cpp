@@ -52,7 +52,7 @@ void UntypedFrontend::resume(std::uint64_t number, Timeout timeout,
     BatchBuilder builder;
     builder.resume(number);
     const Batch batch = pulse(builder);
-    batch.wait(left_of(deadline, timeout), keep_waiting);
+    batch.wait(left_of(deadline, timeout), keep_waiting, {.check = false});
     const Handle handle = batch.handle(0);
     if (handle.status == Status::completed) return;
     // at rest, the backend may still have scheduled batches to end

@@ -127,6 +127,15 @@ std::uint32_t UntypedFrontend::add_commands(std::span<const std::uint32_t> actua
                                             std::span<const std::byte> states,
                                             const CommandOptions& options,
                                             std::span<const std::uint64_t> masks) {
+  const auto lock = link_->lock_to_add();
+  return add_commands_to(link_->builder, actuators, states, options, masks);
+}
+
+std::uint32_t UntypedFrontend::add_commands_to(BatchBuilder& builder,
+                                               std::span<const std::uint32_t> actuators,
+                                               std::span<const std::byte> states,
+                                               const CommandOptions& options,
+                                               std::span<const std::uint64_t> masks) {
   std::size_t bytes = 0;
   std::size_t words = 0;
   for (const std::uint32_t actuator : actuators) {
@@ -144,7 +153,6 @@ std::uint32_t UntypedFrontend::add_commands(std::span<const std::uint32_t> actua
   refuse_size("states", states.size(), bytes, "bytes");
   if (!masks.empty()) refuse_size("masks", masks.size(), words, "words");
 
-  const auto lock = link_->lock_to_add();
   link_->members.clear();
   Profile profile = Profile::linear;
   for (const std::uint32_t actuator : actuators) {
@@ -160,9 +168,9 @@ std::uint32_t UntypedFrontend::add_commands(std::span<const std::uint32_t> actua
   for (BatchBuilder::Member& member : link_->members) member.head.profile = profile;
   if (link_->members.size() == 1) {
     const BatchBuilder::Member& only = link_->members.front();
-    return link_->builder.command(only.head, only.mask, {}, 1, only.states);
+    return builder.command(only.head, only.mask, {}, 1, only.states);
   }
-  return link_->builder.group(link_->members);
+  return builder.group(link_->members);
 }
 
 /// Checks a trajectory; returns its options with the pace that follows from its times.
@@ -406,7 +414,7 @@ CommandId UntypedFrontend::draw_ids(LaneSender& lane, std::uint64_t n, bool stay
 }
 
 /// Seals a batch, sends it, and lets an inline robot take it.
-Sent UntypedFrontend::send(BatchBuilder& builder, const BatchRecord& wanted) {
+Sent UntypedFrontend::send(BatchBuilder& builder, const BatchRecord& wanted, Asked asked) {
   Sent sent;
   std::shared_ptr<InlineRunner> runner;
   {
@@ -424,7 +432,9 @@ Sent UntypedFrontend::send(BatchBuilder& builder, const BatchRecord& wanted) {
     const std::uint32_t records = builder.records();
     sent.events_before_send = lane->events();
     record.id = draw_ids(*lane, std::uint64_t{records} + 2, does_stay(builder, wanted));
-    lane->send(std::as_bytes(builder.seal(record)), offsetof(BatchRecord, ticket));
+    const std::span<const Block> blocks = builder.seal(record);
+    link_->sent_commands.note(blocks, asked == Asked::yes ? &sent.commands : nullptr);
+    lane->send(std::as_bytes(blocks), offsetof(BatchRecord, ticket));
     builder.clear();
     if (records > 0) link_->ids.sent(record.id, std::uint64_t{records} + 2);
     if (record.at != kNow) link_->scheduled.push_back({record.at, record.id});

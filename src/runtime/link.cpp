@@ -38,7 +38,8 @@ Link::Link(AttachedSegment attached, std::shared_ptr<InlineRunner> inline_runner
       runner(std::move(inline_runner)),
       // two status slots for each block; commands leave the same share of both free
       ids(2 * std::uint64_t{segment.view().shape.lane_blocks},
-          2 * std::uint64_t{kept_free(segment.view().shape.lane_blocks)}) {}
+          2 * std::uint64_t{kept_free(segment.view().shape.lane_blocks)}),
+      sent_commands(description->schema.actuators.size()) {}
 
 std::shared_ptr<LaneSender> Link::lane() {
   check_usable();
@@ -76,6 +77,14 @@ std::unique_lock<std::mutex> Link::lock_to_send() const {
 std::unique_lock<std::mutex> Link::lock_to_add() const {
   refuse_if_played(segment);
   return lock_to_send();
+}
+
+bool Link::has_replaced(CommandId id, Iteration iteration,
+                        std::span<const SentCommand> command) const {
+  const std::scoped_lock lock(sending);
+  return std::ranges::any_of(command, [&](const SentCommand& each) {
+    return sent_commands.has_replaced(id, iteration, each);
+  });
 }
 
 std::optional<Halt> Link::halt() const {

@@ -19,6 +19,7 @@
 #include "o80/runtime/observation.hpp"
 #include "runtime/ids_in_flight.hpp"
 #include "runtime/inline_runner.hpp"
+#include "runtime/sent_commands.hpp"
 
 namespace o80 {
 
@@ -52,6 +53,9 @@ struct Link {
   std::unique_lock<std::mutex> lock_to_send() const;
   /// The same, to add a record. Throws ReadOnly if the segment is played from a recording.
   std::unique_lock<std::mutex> lock_to_add() const;
+  /// True if a command of this frontend may have ended the command `id` as overwritten in
+  /// `iteration`.
+  bool has_replaced(CommandId id, Iteration iteration, std::span<const SentCommand> command) const;
   /// The halt in force. A frontend with write access also sees a halt that was requested and is not
   /// yet in force.
   std::optional<Halt> halt() const;
@@ -71,6 +75,7 @@ struct Link {
   BatchBuilder builder;                       // records for the next pulse; guarded by `sending`
   std::vector<BatchBuilder::Member> members;  // of the group being added; guarded by `sending`
   IdsInFlight ids;                            // guarded by `sending`
+  SentCommands sent_commands;                 // guarded by `sending`
   /// A batch sent for a later iteration.
   struct Scheduled {
     Iteration at;

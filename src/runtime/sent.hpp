@@ -3,10 +3,12 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "memory/lane_sender.hpp"
 #include "o80/runtime/batch.hpp"
 #include "runtime/link.hpp"
+#include "runtime/sent_commands.hpp"
 
 namespace o80 {
 
@@ -16,6 +18,7 @@ struct Sent {
   CommandId id = 0;
   std::uint32_t records = 0;
   std::uint32_t events_before_send = 0;  // event count of the lane before the batch was sent
+  std::vector<SentCommand> commands;     // empty for a burst whose batch nobody gets
 };
 
 /// Waits until burst `id` is done; returns its last row, or -1 if its batch was rejected.
@@ -24,8 +27,6 @@ struct Sent {
 Iteration wait_for_burst(const Link& link, LaneSender& lane, CommandId id, Timeout timeout,
                          const KeepWaiting& keep_waiting,
                          std::optional<std::uint32_t> events_before_send = {});
-/// Throws BackendHalted if a halt ended a command of this batch, which must have ended.
-void throw_if_halted(const Link& link, const Batch& batch);
 /// Throws Error, BackendHalted or BackendGone, with the reason why a batch was rejected.
 [[noreturn]] void throw_rejected(Link& link, const char* what, const Batch& batch);
 /// Copies the row that wait_for_burst returned. Throws RowOverwritten.

@@ -39,6 +39,10 @@ CALLS = {
     "Frontend.pulse_and_wait, bursting": Call(
         "(standing.add_command(0, 1.0), standing.pulse_and_wait())", "standing.close()"
     ),
+    "Frontend.move_to": Call("silent.move_to(0, 1.0, tolerance=0.1)", "silent.close()"),
+    "Frontend.move_to, bursting": Call(
+        "standing.move_to(0, 1.0, tolerance=0.1)", "standing.close()"
+    ),
     "Frontend.request": Call("silent.request('home')", "silent.close()"),
     "Frontend.resume": Call("(silent.halt(), silent.resume(timeout=None))", "silent.close()"),
     "halt": Call("o80.halt(late, timeout=None)", "begin(late)", ""),

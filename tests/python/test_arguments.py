@@ -22,12 +22,17 @@ import o80
         (lambda arm: arm.add_trajectory([[0, 0]], times="abc"), "times .* not 'abc'"),
         (lambda arm: arm.add_command(0, 0.1, mode=None), "mode must be one of .*, got None"),
         (lambda arm: arm.add_command(0, 0.1, start=None), "start must be one of .*, got None"),
-        (lambda arm: arm.add_command(0, 0.1, on_limit=None), "on_limit must be one of"),
+        (lambda arm: arm.add_command(0, 0.1, every=0), "every must be positive, got 0"),
+        (lambda arm: arm.add_command(0, 0.1, every="x"), "every .*'x'"),
         (lambda arm: arm.add_command(0, 0.1, fastest=1), "fastest must be True or False, got 1"),
         (lambda arm: arm.add_command(True, 0.1), "index or its name, got True"),
         (
-            lambda arm: arm.add_command(0, 0.1, on_limit="go_on", duration=1.0),
-            "on_limit .* without a pace",
+            lambda arm: arm.add_command(0, 0.1, every=0.02, duration=1.0),
+            "every is for set-points",
+        ),
+        (
+            lambda arm: arm.add_command(0, 0.1, profile="as_sent", duration=1.0),
+            "as_sent is for set-points",
         ),
         (
             lambda arm: arm.add_command(0, 0.1, fastest=True, profile="linear"),

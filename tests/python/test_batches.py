@@ -124,7 +124,7 @@ def test_a_wait_that_times_out_carries_the_batch(process: o80.robots.Process) ->
             batch.wait(0.0)
         assert again.value.batch is not None
         arm.purge()
-        batch.wait(WAIT)
+        batch.wait(WAIT, check=False)
         assert batch.statuses == [o80.Status.PURGED]
 
 
@@ -134,7 +134,8 @@ def test_a_purge_ends_the_wait_for_a_batch(process: o80.robots.Process) -> None:
         batch = arm.pulse()
         other.purge()
 
-        batch.wait(WAIT)
+        with pytest.raises(o80.NotCompleted, match="'shoulder' was purged"):
+            batch.wait(WAIT)
 
         assert batch.ended
 
@@ -147,18 +148,6 @@ def test_pulse_and_wait_waits_for_every_actuator(process: o80.robots.Process) ->
         observation = arm.pulse_and_wait(timeout=WAIT)
 
         assert observation.desired.tolist() == [0.5, -0.5]
-
-
-def test_nobody_raises_for_what_was_rejected(process: o80.robots.Process) -> None:
-    with process.frontend() as arm:
-        arm.wait_for(5, timeout=WAIT)
-        arm.add_command(0, 0.5, until=3)
-        arm.pulse_and_wait(timeout=WAIT)
-        arm.add_command(0, 0.5, until=3)
-        batch = arm.pulse()
-        batch.wait(WAIT)
-
-        assert batch.statuses == [o80.Status.REJECTED]
 
 
 def test_a_command_clamped_at_its_end_is_limited(segment: str) -> None:

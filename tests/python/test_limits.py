@@ -97,21 +97,32 @@ def test_with_acceleration_limits_a_motion_is_smooth_by_default(loop: Loop) -> N
     assert not history.clamped.any()
 
 
-def test_a_direct_command_out_of_reach_is_limited_or_goes_on(loop: Loop) -> None:
+def test_a_set_point_goes_on_until_it_has_arrived(loop: Loop) -> None:
     loop.frontend.add_command("joint", {"position": 0.5})
     batch = loop.frontend.pulse()
-    loop.run(100)
-    handle = batch.handles[0]
-    assert handle.status == o80.Status.LIMITED
-    assert "jerk limit" in handle.text
-    assert loop.frontend.latest().desired["position"][0] < 0.01
 
-    loop.frontend.add_command("joint", {"position": 0.5}, on_limit="go_on")
-    batch = loop.frontend.pulse()
-    loop.run(600)
+    history = loop.run(600)
 
     assert batch.statuses == [o80.Status.COMPLETED]
-    assert loop.frontend.latest().desired["position"][0] == 0.5
+    position = history.desired["position"][:, 0]
+    assert position[-1] == 0.5
+    assert position.max() == 0.5
+    assert not history.clamped.any()
+
+
+def test_a_command_that_takes_longer_than_asked_says_by_how_much_and_why(loop: Loop) -> None:
+    loop.frontend.add_command("joint", {"position": 0.5}, iterations=100)
+    batch = loop.frontend.pulse()
+    loop.run(1)
+
+    begun = batch.handles[0]
+    assert (begun.status, begun.reason) == (o80.Status.ACTIVE, o80.Reason.LIMITS)
+    loop.run(600)
+    ended = batch.handles[0]
+
+    assert (ended.status, ended.reason) == (o80.Status.COMPLETED, o80.Reason.LIMITS)
+    assert ended.late == ended.iteration - begun.iteration + 1 - 100
+    assert ended.text.startswith(f"{ended.late} iterations later than asked, because of its")
 
 
 def test_a_velocity_rests_when_its_motion_is_over(loop: Loop) -> None:

@@ -239,7 +239,8 @@ def test_a_timeout_says_that_it_goes_on(process: o80.robots.Process) -> None:
         assert batch is not None
         assert not batch.ended
         arm.request("reset")
-        batch.wait(WAIT)
+        with pytest.raises(o80.NotCompleted, match="request 'home' was rejected"):
+            batch.wait(WAIT)
         assert "a reset or a restore has ended it" in batch.handles[0].text
 
 

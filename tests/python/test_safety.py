@@ -319,7 +319,8 @@ def test_a_halt_is_shown_refuses_and_is_resumed(process: o80.robots.Process) -> 
         until(lambda: arm.latest().active[0])
         number = other.halt("the ball is on the floor")
         assert arm.halted is not None
-        batch.wait(WAIT)
+        with pytest.raises(o80.BackendHalted, match="the ball is on the floor"):
+            batch.wait(WAIT)
         assert batch.handles[0].status == o80.Status.HALTED
         halt = arm.halted
         assert (halt.number, halt.cause) == (number, "frontend")
@@ -327,7 +328,8 @@ def test_a_halt_is_shown_refuses_and_is_resumed(process: o80.robots.Process) -> 
         assert f"pid {os.getpid()}" in halt.who
         arm.add_command(0, 1.0)
         refused = arm.pulse()
-        refused.wait(WAIT)
+        with pytest.raises(o80.BackendHalted, match="the ball is on the floor"):
+            refused.wait(WAIT)
         assert refused.handles[0].status == o80.Status.REJECTED
         assert "the ball is on the floor" in refused.handles[0].text
         with pytest.raises(o80.BackendHalted, match="no halt"):

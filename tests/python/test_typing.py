@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 def use(arm: o80.Frontend) -> float:
     arm.add_command("elbow", 0.5, duration=2.0, mode="overwrite", profile=o80.Profile.MINIMUM_JERK)
-    arm.add_command(["shoulder", "elbow"], [0.1, 0.2], start="observed", on_limit="go_on")
+    arm.add_command(["shoulder", "elbow"], [0.1, 0.2], start="observed", every=0.02)
     arm.add_trajectory(np.zeros((5, 2)), mode=o80.Mode.QUEUE, profile="linear")
     assert_type(arm.pulse(at=7, late="now"), o80.Batch)
     observation = arm.pulse_and_wait(timeout=5.0)
@@ -64,7 +64,7 @@ BAD = [
     ("arm.add_command(0, 0.5, mode='overwritten')", "overwritten"),
     ("arm.add_command(0, 0.5, profile='cubic')", "cubic"),
     ("arm.add_command(0, 0.5, start='now')", "start"),
-    ("arm.add_command(0, 0.5, on_limit='stop')", "on_limit"),
+    ("arm.add_command(0, 0.5, every='often')", "every"),
     ("arm.add_command(0, 0.5, 2.0)", "Too many positional arguments"),
     ("arm.add_command(0, 0.5, seconds=2.0)", 'Unexpected keyword argument "seconds"'),
     ("arm.pulse(late='never')", "late"),

@@ -29,6 +29,10 @@ struct Handle {
   std::string progress;      // of a running request: the driver's text
 };
 
+struct WaitOptions {
+  bool check = true;  // throw NotCompleted if a command ended otherwise than completed
+};
+
 /// The commands, requests and purges that one pulse sent: wait for their end, or read their
 /// statuses.
 ///
@@ -55,14 +59,18 @@ class Batch {
   Reason rejected_by() const;
   /// Waits until every record has an end status and, in real time, the row of that iteration is
   /// published. (A bursting backend may need another burst to publish it.)
-  /// Throws TimeoutError, BackendGone, Cancelled.
-  void wait(Timeout timeout, const KeepWaiting& keep_waiting = {}) const;
+  /// Throws NotCompleted, BackendHalted if a halt ended a record, TimeoutError, BackendGone,
+  /// Cancelled. A record whose status is forgotten counts as completed.
+  void wait(Timeout timeout, const KeepWaiting& keep_waiting = {},
+            const WaitOptions& options = {}) const;
 
  private:
   friend class Burst;
   friend class UntypedFrontend;
   struct Kept;
   Handle ask(CommandId id) const;
+  void wait_for_row(const Deadline& deadline, const KeepWaiting& keep_waiting) const;
+  void throw_unless_completed() const;
 
   std::shared_ptr<Link> link_;
   std::shared_ptr<LaneSender> lane_;

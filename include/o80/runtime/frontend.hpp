@@ -19,6 +19,8 @@
 #include "o80/memory/halt.hpp"
 #include "o80/memory/life.hpp"
 #include "o80/runtime/batch.hpp"
+#include "o80/runtime/move.hpp"
+#include "o80/runtime/not_completed.hpp"
 #include "o80/runtime/observation.hpp"
 #include "o80/runtime/provenance.hpp"
 
@@ -131,16 +133,38 @@ class UntypedFrontend {
   Batch pulse_to_end(const PulseOptions& options = {});
   /// The same for the records of `batch`; added records stay added.
   Batch pulse_to_end(BatchBuilder& batch);
-  /// Waits for the end of a batch of pulse_to_end and returns the row of its last iteration. Throws
-  /// Error if the batch was rejected, BackendHalted if a halt ended a command of it.
+  /// Waits for the end of a batch of pulse_to_end and returns the row of its last iteration (of an
+  /// empty batch: the newest row). Throws as Batch::wait; BackendGone also for an empty batch.
   UntypedObservation wait_for_end(const Batch& batch, Timeout timeout,
-                                  const KeepWaiting& keep_waiting = {}) const;
-  /// Waits for that end and returns its iteration, or -1 if the batch was rejected.
+                                  const KeepWaiting& keep_waiting = {},
+                                  const WaitOptions& options = {}) const;
+  /// Waits for that end, whatever it is, and returns its iteration, or -1 if the batch was
+  /// rejected.
   Iteration wait_until_ended(const Batch& batch, Timeout timeout,
                              const KeepWaiting& keep_waiting = {}) const;
   /// pulse_to_end and wait_for_end.
   UntypedObservation pulse_and_wait(Timeout timeout, const PulseOptions& options = {},
-                                    const KeepWaiting& keep_waiting = {});
+                                    const KeepWaiting& keep_waiting = {},
+                                    const WaitOptions& wait = {});
+
+  /// Sends one command for these actuators at once, waits for its end, and waits until they are
+  /// observed within the tolerance of their targets; returns the row in which they were. Needs no
+  /// pulse: added records stay added. `states` and `masks` as in add_commands. A bursting backend
+  /// runs until then, and `timeout` is robot time (iterations x period), so that a script always
+  /// ends alike; each iteration may take as long on the clock.
+  /// Throws NotReached after the timeout, NotCompleted if the command ended otherwise than
+  /// completed, BackendHalted, InvalidArgument, and the exceptions of pulse.
+  UntypedObservation move_to(std::span<const std::uint32_t> actuators,
+                             std::span<const std::byte> states, const MoveOptions& options,
+                             Timeout timeout, std::span<const std::uint64_t> masks = {},
+                             const KeepWaiting& keep_waiting = {});
+  /// The first part of move_to: sends the command.
+  Move start_move(std::span<const std::uint32_t> actuators, std::span<const std::byte> states,
+                  const MoveOptions& options, std::span<const std::uint64_t> masks = {});
+  /// The second part.
+  UntypedObservation wait_for_move(const Move& move, Timeout timeout,
+                                   const KeepWaiting& keep_waiting = {});
+
   /// Sends the added records and requests n iterations. The burst starts now, even if the batch is
   /// scheduled (`at`) for a later iteration of it.
   Burst start_burst(std::int64_t iterations, const PulseOptions& options = {});
@@ -218,9 +242,20 @@ class UntypedFrontend {
   Batch pulse(const PulseOptions& options, std::uint16_t flags);
   void wait_for_rest(std::uint64_t number, const Deadline& deadline,
                      const KeepWaiting& keep_waiting);
-  Sent send(BatchBuilder& builder, const BatchRecord& record);
+  /// Whether somebody will ask for the statuses of a batch.
+  enum class Asked : std::uint8_t { yes, no };
+  Sent send(BatchBuilder& builder, const BatchRecord& record, Asked asked = Asked::yes);
   static BatchRecord batch_of(const PulseOptions& options);
-  Sent send_burst(std::int64_t iterations, const PulseOptions& options);
+  Sent send_burst(BatchBuilder& builder, std::int64_t iterations, const PulseOptions& options,
+                  Asked asked);
+  UntypedObservation burst(BatchBuilder& builder, std::int64_t iterations, Timeout timeout,
+                           const KeepWaiting& keep_waiting, const PulseOptions& options);
+  std::uint32_t add_commands_to(BatchBuilder& builder, std::span<const std::uint32_t> actuators,
+                                std::span<const std::byte> states, const CommandOptions& options,
+                                std::span<const std::uint64_t> masks);
+  UntypedObservation first_row_of(const Move& move, const Deadline& deadline,
+                                  const KeepWaiting& keep_waiting) const;
+  UntypedObservation burst_to(const Move& move, Timeout timeout, const KeepWaiting& keep_waiting);
   friend std::vector<Burst> start_bursts(std::span<const BurstMember> group);
   void refuse_burst(std::int64_t iterations) const;
   void refuse_unless_ready(std::int64_t iterations);

@@ -52,13 +52,7 @@ class Frontend : public UntypedFrontend {
   template <Shareable State>
   std::uint32_t add_commands(std::span<const std::string_view> names,
                              std::span<const State> targets, const CommandOptions& options = {}) {
-    std::vector<std::uint32_t> indices;
-    for (const std::string_view name : names)
-      check_state<State>(indices.emplace_back(actuator(name)));
-    std::vector<std::byte> bytes(targets.size() * sizeof(State));
-    for (std::size_t i = 0; i < targets.size(); ++i) {
-      pack(targets[i], bytes.data() + i * sizeof(State));
-    }
+    const auto [indices, bytes] = packed(names, targets);
     return UntypedFrontend::add_commands(indices, bytes, options);
   }
   template <Shareable State>
@@ -78,6 +72,27 @@ class Frontend : public UntypedFrontend {
     return UntypedFrontend::add_trajectory(actuator(name), static_cast<std::uint32_t>(rows.size()),
                                            bytes, options);
   }
+  using UntypedFrontend::move_to;
+  /// Sends one actuator to a target and waits until it is observed there.
+  template <Shareable State>
+  Observation<R> move_to(std::string_view name, const State& target, const MoveOptions& options,
+                         Timeout timeout = std::nullopt) {
+    return move_to(std::span(&name, 1), std::span(&target, 1), options, timeout);
+  }
+  /// The same for several actuators of one state type, a target for each.
+  template <Shareable State>
+  Observation<R> move_to(std::span<const std::string_view> names, std::span<const State> targets,
+                         const MoveOptions& options, Timeout timeout = std::nullopt) {
+    const auto [indices, bytes] = packed(names, targets);
+    return Observation<R>(UntypedFrontend::move_to(indices, bytes, options, timeout));
+  }
+  template <Shareable State>
+  Observation<R> move_to(std::initializer_list<std::string_view> names,
+                         std::initializer_list<State> targets, const MoveOptions& options,
+                         Timeout timeout = std::nullopt) {
+    return move_to(std::span(names.begin(), names.size()),
+                   std::span<const State>(targets.begin(), targets.size()), options, timeout);
+  }
   template <Shareable Request>
   std::uint32_t add_request(const Request& request) {
     std::array<std::byte, sizeof(Request)> bytes{};
@@ -89,8 +104,9 @@ class Frontend : public UntypedFrontend {
   Observation<R> wait_for(Iteration k, Timeout timeout = std::chrono::seconds(5)) const {
     return Observation<R>(UntypedFrontend::wait_for(k, timeout));
   }
-  Observation<R> pulse_and_wait(Timeout timeout = std::nullopt, const PulseOptions& options = {}) {
-    return Observation<R>(UntypedFrontend::pulse_and_wait(timeout, options));
+  Observation<R> pulse_and_wait(Timeout timeout = std::nullopt, const PulseOptions& options = {},
+                                const WaitOptions& wait = {}) {
+    return Observation<R>(UntypedFrontend::pulse_and_wait(timeout, options, {}, wait));
   }
   Observation<R> burst(std::int64_t count, Timeout timeout = std::chrono::seconds(5),
                        const PulseOptions& options = {}) {
@@ -105,6 +121,19 @@ class Frontend : public UntypedFrontend {
       check_types(expected, schema(), segment());
       for (const ActuatorRow& row : expected.actuators) states_.push_back(expected.keys[row.type]);
     }
+  }
+  /// Indices of the actuators, and the bytes of their targets.
+  template <class State>
+  std::pair<std::vector<std::uint32_t>, std::vector<std::byte>> packed(
+      std::span<const std::string_view> names, std::span<const State> targets) const {
+    std::vector<std::uint32_t> indices;
+    for (const std::string_view name : names)
+      check_state<State>(indices.emplace_back(actuator(name)));
+    std::vector<std::byte> bytes(targets.size() * sizeof(State));
+    for (std::size_t i = 0; i < targets.size(); ++i) {
+      pack(targets[i], bytes.data() + i * sizeof(State));
+    }
+    return {std::move(indices), std::move(bytes)};
   }
   /// Throws InvalidArgument if State is not the state type of the actuator.
   template <class State>

@@ -7,13 +7,13 @@ import numpy as np
 
 from o80 import _core
 from o80.errors import NotBursting
-from o80.frontend.commanding import Commanding
+from o80.frontend.moving import Moving
 from o80.prepared_burst import PreparedBurst, checked_count
 from o80.trajectory import common_type
 from o80.words import LateWord, ModeWord, ProfileWord, StartWord
 
 
-class Bursting(Commanding):
+class Bursting(Moving):
     """The part of o80.Frontend that bursts."""
 
     @overload

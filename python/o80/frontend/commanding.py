@@ -97,15 +97,21 @@ class Commanding(Observing):
             *,
             at: int | None = None,
             late: LateWord = "reject",
+            check: bool = True,
         ) -> _core.Observation:
             """Sends all that was added and waits until every command of it has ended.
 
-            A bursting backend runs until then. Returns the observation of the last iteration.
-            Commands that are limited, purged, overwritten or rejected one by one raise nothing: to
-            see them, use `pulse` and the `statuses` of its batch.
+            A bursting backend runs until then. Returns the observation of the last iteration (if
+            nothing was added: the newest one).
 
-            Raises Error if the whole batch was rejected, BackendHalted if a halt ended a command or
-            the batch, TimeoutError after `timeout` [s] with the `batch`, and the exceptions of
+            timeout: how long to wait [s].
+            at, late: as in pulse.
+            check: False only waits, whatever ends the commands have.
+
+            Raises NotCompleted if a command or request ended otherwise than completed, or the whole
+            batch was rejected; overwritten by a later command of this frontend is no error. Raises
+            BackendHalted if a halt ended a command or the batch, BackendGone if the backend ends
+            or has ended, TimeoutError after the timeout with the `batch`, and the exceptions of
             pulse.
             """
 

@@ -29,7 +29,7 @@ class Controlling(Bursting):
             batch = self._take_control()
             self._control_blocks += 1
         try:
-            batch.wait(timeout)
+            batch.wait(timeout, check=False)  # ControlTaken says more
         except BaseException:
             # control may still be given later: release it
             with contextlib.suppress(Error):
@@ -45,7 +45,7 @@ class Controlling(Bursting):
         finally:
             with contextlib.suppress(BackendGone, Closed):
                 if (released := self._leave_control()) is not None:
-                    released.wait(timeout)
+                    released.wait(timeout, check=False)
 
     def _leave_control(self) -> _core.Batch | None:
         """Ends a block; the last one releases control."""

@@ -42,7 +42,8 @@ TEST_F(BatchTest, FollowsEachCommandFromQueuedToItsEnd) {
   EXPECT_NE(batch.handle(3).text, "");
   EXPECT_TRUE(batch.ended());
   EXPECT_EQ(batch.handles().size(), 4U);
-  batch.wait(kAtOnce);
+  EXPECT_THROW(batch.wait(kAtOnce), NotCompleted);
+  batch.wait(kAtOnce, {}, {.check = false});
   EXPECT_THROW(static_cast<void>(batch.handle(4)), InvalidArgument);
 }
 

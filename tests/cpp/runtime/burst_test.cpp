@@ -154,8 +154,14 @@ TEST_F(BurstTest, AMovementThatIsInterruptedEndsItsBurstInThatRow) {
   };
   station.drive();
   EXPECT_EQ(batch.handle(0).status, Status::interrupted);
-  const UntypedObservation row = frontend.wait_for_end(batch, kAtOnce);
-  EXPECT_EQ(row.iteration(), 4);
+  try {
+    frontend.wait_for_end(batch, kAtOnce);
+    FAIL() << "it was interrupted";
+  } catch (const NotCompleted& error) {
+    EXPECT_THAT(error.what(), HasSubstr("'shoulder' was interrupted by the driver in iteration 4"));
+    EXPECT_EQ(error.observation().iteration(), 4);
+  }
+  EXPECT_EQ(frontend.wait_for_end(batch, kAtOnce, {}, {.check = false}).iteration(), 4);
   EXPECT_EQ(frontend.published(), 4);
 }
 

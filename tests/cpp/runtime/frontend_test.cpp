@@ -289,13 +289,13 @@ TEST_F(FrontendTest, APurgeDropsWithoutASuccessorAndLeavesNobodyWaiting) {
   one.pulse();
   station.run(1);
   EXPECT_EQ(mine.handle(0).status, Status::purged);
-  mine.wait(kAtOnce);
+  EXPECT_THROW(mine.wait(kAtOnce), NotCompleted);
   EXPECT_EQ(theirs.handle(0).status, Status::active);
   one.add_purge(0);
   one.pulse();
   station.run(2);
   EXPECT_EQ(theirs.handle(0).status, Status::purged);
-  theirs.wait(kAtOnce);
+  EXPECT_THROW(theirs.wait(kAtOnce), NotCompleted);
   EXPECT_FALSE(one.latest().active(0));
 }
 

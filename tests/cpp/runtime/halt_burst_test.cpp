@@ -63,7 +63,7 @@ TEST_F(HaltBurstTest, AHaltIsSeenByABackendThatStandsStill) {
   frontend.burst(2, kPatience);
   const Batch waiting = send(frontend, 0, 3.0);
   frontend.halt("");
-  waiting.wait(kPatience);
+  EXPECT_THROW(waiting.wait(kPatience), BackendHalted);
   EXPECT_EQ(waiting.handle(0).status, Status::halted);
 }
 

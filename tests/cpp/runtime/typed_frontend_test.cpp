@@ -76,6 +76,31 @@ TEST_F(TypedTest, CommandsSeveralActuatorsOfOneTypeAtOnce) {
   EXPECT_EQ(desired->joints[0].position, 1);
 }
 
+TEST_F(TypedTest, MovesToTargetsAndWaitsUntilTheyAreObserved) {
+  Backend<MixedRobot> backend({.segment = "mixed", .bursting = true});
+  backend.publish({});
+  std::thread runner([&] {
+    while (const auto desired = backend.step()) backend.publish(*desired);
+  });
+  Frontend<MixedRobot> frontend("mixed");
+  const MoveOptions options{.command = {.pace = iterations(2)}, .tolerance = 0.1};
+  const auto one = frontend.move_to("joints_3", Joint{.position = 1}, options, kPatience);
+  EXPECT_EQ(one.observed().joints[3].position, 1);
+  const auto two = frontend.move_to(
+      {"joints_3", "joints_0"}, {Joint{.position = 2}, Joint{.position = 3}}, options, kPatience);
+  EXPECT_EQ(two.observed().joints[3].position, 2);
+  EXPECT_EQ(two.observed().joints[0].position, 3);
+  EXPECT_EQ(frontend.move_to("gripper", Gripper{.closed = true}, options).observed().gripper.closed,
+            true);
+  EXPECT_THROW(frontend.move_to("gripper", 1.0, options), InvalidArgument);
+  frontend.add_command("joints_0", Joint{}, {.pace = until(1)});
+  EXPECT_THROW(frontend.pulse_and_wait(kPatience), NotCompleted);
+  frontend.add_command("joints_0", Joint{}, {.pace = until(1)});
+  frontend.pulse_and_wait(kPatience, {}, {.check = false});
+  backend.untyped().ask_to_stop();
+  runner.join();
+}
+
 TEST_F(TypedTest, RefusesAStateOfAnotherTypeEvenIfItHasTheSameSize) {
   Backend<MixedRobot> backend({.segment = "mixed"});
   backend.publish({});

@@ -297,7 +297,7 @@ def command(actor: Actor, robot: o80.Frontend, generation: int) -> None:
             timeout = actor.timeout()
             try:
                 with actor.timed("batch.wait in Python", timeout):
-                    batch.wait(timeout)
+                    batch.wait(timeout, check=False)
             except o80.TimeoutError:
                 actor.count("timeouts")
             if actor.chance.random() < 0.03:

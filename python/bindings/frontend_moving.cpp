@@ -1,0 +1,136 @@
+// How a frontend moves a robot and waits until it is observed there.
+
+#include <nanobind/stl/string.h>
+
+#include <cstring>
+#include <limits>
+#include <utility>
+
+#include "arguments.hpp"
+#include "batch.hpp"
+#include "control/record.hpp"
+#include "control/state_layout.hpp"
+#include "frontend.hpp"
+#include "states.hpp"
+#include "verb.hpp"
+#include "waiting.hpp"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+using o80::Move;
+using o80::MoveOptions;
+
+namespace {
+
+constexpr double kNotJudged = std::numeric_limits<double>::infinity();
+
+bool is_mapping(nb::handle value) { return nb::hasattr(value, "keys"); }
+bool is_number(nb::handle value) {
+  return nb::hasattr(value, "__float__") && !nb::hasattr(value, "__len__");
+}
+
+/// Appends the tolerances of all numbers of an actuator: from a number for those with a target, or
+/// from a mapping.
+void append_tolerances(const o80::Schema& schema, const o80::ActuatorRow& actuator,
+                       nb::handle given, const std::uint64_t* mask, std::vector<double>& all) {
+  const o80::StateLayout layout(schema, actuator.type);
+  if (!is_mapping(given)) {
+    const double tolerance = number_of(given, "tolerance");
+    for (std::size_t i = 0; i < layout.numbers().size(); ++i) {
+      all.push_back(o80::masked(mask, i) ? tolerance : kNotJudged);
+    }
+    return;
+  }
+  const StateBytes state(schema, actuator.type, given,
+                         "the tolerance of actuator '" + actuator.name.str() + "'");
+  for (std::size_t i = 0; i < layout.numbers().size(); ++i) {
+    const bool is_given = o80::masked(state.mask.data(), i);
+    all.push_back(is_given ? layout.number(i, state.bytes.data()) : kNotJudged);
+  }
+}
+
+/// Reads tolerances: a number for all numbers, a mapping from the fields of each state to numbers,
+/// or a sequence with one of these for each actuator.
+void set_tolerances(const o80::Schema& schema, nb::handle given, const Targets& targets,
+                    MoveOptions& options) {
+  if (is_number(given)) {
+    options.tolerance = number_of(given, "tolerance");
+    return;
+  }
+  const bool is_one = is_mapping(given);
+  if (!is_one && (PySequence_Check(given.ptr()) == 0 || PyUnicode_Check(given.ptr()) != 0 ||
+                  nb::len(given) != targets.actuators.size())) {
+    throw o80::InvalidArgument(
+        "tolerance must be a number, a mapping from fields to numbers, or one of these for each "
+        "actuator, got " +
+        nb::cast<std::string>(nb::repr(given)));
+  }
+  const std::uint64_t* mask = targets.masks.empty() ? nullptr : targets.masks.data();
+  for (std::size_t i = 0; i < targets.actuators.size(); ++i) {
+    const o80::ActuatorRow& actuator = schema.actuators[targets.actuators[i]];
+    const nb::object one = is_one ? nb::borrow(given) : nb::object(given[i]);
+    append_tolerances(schema, actuator, one, mask, options.tolerances);
+    if (mask != nullptr) mask += o80::mask_words(schema.scalar_count(actuator.type));
+  }
+}
+
+Move start_move(const Frontend& self, nb::handle actuators, nb::handle targets,
+                nb::handle tolerance, nb::handle duration, nb::handle speed, nb::handle until,
+                nb::handle iterations, nb::handle fastest, nb::handle mode, nb::handle profile,
+                nb::handle start) {
+  const auto frontend = self.shared();
+  MoveOptions options{.command = command_options(
+                          pace_of(duration, speed, until, iterations, truth_of(fastest, "fastest")),
+                          mode, profile, start)};
+  const bool several = names_several(actuators);
+  const Targets chosen = several
+                             ? self.targets_of(actuators, targets)
+                             : self.targets_of(nb::make_tuple(actuators), nb::make_tuple(targets));
+  set_tolerances(self.decoder()->description->schema, tolerance, chosen, options);
+  const Waiting waiting;
+  return frontend->start_move(chosen.actuators, chosen.states, options, chosen.masks);
+}
+
+Observation wait_for_move(const Frontend& self, const Move& move, nb::handle timeout) {
+  const o80::Timeout patience = timeout_of(timeout);
+  const auto frontend = self.shared();
+  const auto decoder = self.decoder();
+  return carrying(move.batch(), [&] {
+    o80::UntypedObservation row = [&] {
+      const Waiting waiting;
+      return frontend->wait_for_move(move, patience, Waiting::keep_waiting);
+    }();
+    return Observation(decoder, std::move(row));
+  });
+}
+
+Observation move_to(const Frontend& self, nb::handle actuators, nb::handle targets,
+                    nb::handle tolerance, nb::handle timeout, nb::handle duration, nb::handle speed,
+                    nb::handle until, nb::handle iterations, nb::handle fastest, nb::handle mode,
+                    nb::handle profile, nb::handle start) {
+  timeout_of(timeout);  // refused before anything is sent
+  return wait_for_move(self,
+                       start_move(self, actuators, targets, tolerance, duration, speed, until,
+                                  iterations, fastest, mode, profile, start),
+                       timeout);
+}
+
+}  // namespace
+
+void bind_moving(nb::module_& m, nb::class_<Frontend>& frontend) {
+  nb::class_<Move>(m, "Move", "A motion that was sent.").def_prop_ro("batch", [](const Move& self) {
+    return self.batch();
+  });
+  def_verb(frontend, "move_to", verbs::move_to, &move_to, "actuators"_a.none(), "targets"_a.none(),
+           nb::kw_only(), "tolerance"_a.none(), "timeout"_a = nb::none(), "duration"_a = nb::none(),
+           "speed"_a = nb::none(), "until"_a = nb::none(), "iterations"_a = nb::none(),
+           "fastest"_a.none() = false, "mode"_a.none() = "queue", "profile"_a = nb::none(),
+           "start"_a.none() = "desired");
+  frontend
+      .def("_start_move", &start_move, "actuators"_a.none(), "targets"_a.none(), nb::kw_only(),
+           "tolerance"_a.none(), "duration"_a.none(), "speed"_a.none(), "until"_a.none(),
+           "iterations"_a.none(), "fastest"_a.none(), "mode"_a.none(), "profile"_a.none(),
+           "start"_a.none())
+      .def("_wait_for_move", &wait_for_move, "move"_a, "timeout"_a.none(),
+           nb::sig("def _wait_for_move(self, move: Move, timeout: float | None) -> Observation"));
+}

@@ -1,0 +1,150 @@
+#include "o80/runtime/move.hpp"
+
+#include <cmath>
+#include <limits>
+#include <memory>
+
+#include "runtime/station.hpp"
+
+namespace o80::test {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+constexpr std::array<std::uint32_t, 1> kShoulder{0};
+constexpr std::array<std::uint32_t, 2> kBoth{0, 1};
+
+template <std::size_t count>
+std::span<const std::byte> bytes(const std::array<double, count>& states) {
+  return std::as_bytes(std::span(states));
+}
+
+class MoveTest : public StationTest {};
+
+/// The plant of a bursting station follows what is desired with a lag: a half of the way in each
+/// iteration.
+void lag(Station& station) {
+  auto place = std::make_shared<std::array<double, 2>>();
+  station.before_publish = [&station, place] {
+    for (std::size_t i = 0; i < 2; ++i) {
+      (*place)[i] += 0.5 * (station.now[i] - (*place)[i]);
+      station.now[i] = (*place)[i];
+    }
+  };
+}
+
+TEST_F(MoveTest, WaitsUntilTheRobotIsObservedAtItsTarget) {
+  BurstingStation bursting("pair", lag);
+  UntypedFrontend frontend("pair");
+  const UntypedObservation row =
+      frontend.move_to(kShoulder, bytes(std::array{1.0}),
+                       {.command = {.pace = iterations(2)}, .tolerance = 0.1}, kPatience);
+  EXPECT_EQ(desired(row), 1.0);
+  EXPECT_LE(std::abs(observed(row) - 1.0), 0.1);
+  const UntypedObservation before = frontend.wait_for(row.iteration() - 1, kAtOnce);
+  EXPECT_GT(std::abs(observed(before) - 1.0), 0.1) << "it returns the first row that is there";
+}
+
+TEST_F(MoveTest, LeavesWhatWasAddedAndNotPulsed) {
+  BurstingStation bursting;
+  UntypedFrontend frontend("pair");
+  add(frontend, 1, 5.0);
+  const UntypedObservation row =
+      frontend.move_to(kShoulder, bytes(std::array{1.0}), {.tolerance = 0.0}, kPatience);
+  EXPECT_EQ(frontend.added(), 1U);
+  EXPECT_EQ(desired(row, 1), 0.0);
+}
+
+TEST_F(MoveTest, SaysWhereTheRobotIsIfItIsNotThereInTime) {
+  Station station({.segment = "pair", .period = 1'000'000, .bursting = true});
+  station.before_publish = [&] { station.now[1] = 0.25; };  // it is stuck
+  station.start();
+  std::thread runner([&] { station.serve_bursts(); });
+  UntypedFrontend frontend("pair");
+  try {
+    frontend.move_to(kBoth, bytes(std::array{1.0, 2.0}), {.tolerance = 0.5},
+                     std::chrono::milliseconds(20));
+    ADD_FAILURE() << "it is stuck";
+  } catch (const NotReached& error) {
+    EXPECT_THAT(error.what(),
+                AllOf(HasSubstr("'pair' was not at its targets within 0.02 s"),
+                      HasSubstr("'elbow' is observed at 0.25, 1.75 from its target of 2 "
+                                "(tolerance 0.5)"),
+                      HasSubstr("has completed")));
+    ASSERT_EQ(error.misses().size(), 1U);
+    EXPECT_EQ(error.misses()[0].actuator, "elbow");
+    EXPECT_EQ(error.misses()[0].target, 2.0);
+    EXPECT_EQ(error.misses()[0].observed, 0.25);
+    EXPECT_EQ(error.misses()[0].distance, 1.75);
+    EXPECT_EQ(error.misses()[0].tolerance, 0.5);
+    EXPECT_EQ(error.observation().iteration(), 20) << "of the time of the robot";
+    EXPECT_TRUE(error.batch().ended());
+  }
+  frontend.move_to(kBoth, bytes(std::array{1.0, 2.0}),
+                   {.tolerances = {0.5, std::numeric_limits<double>::infinity()}}, kPatience);
+  station.backend.ask_to_stop();
+  runner.join();
+}
+
+TEST_F(MoveTest, ThrowsIfItsCommandDoesNotComplete) {
+  BurstingStation bursting("pair", [](Station& station) {
+    station.before_publish = [&station] {
+      if (station.backend.iteration() == 4) station.backend.interrupt(0);
+    };
+  });
+  UntypedFrontend frontend("pair");
+  EXPECT_THAT(message_of<NotCompleted>([&] {
+                frontend.move_to(kShoulder, bytes(std::array{1.0}),
+                                 {.command = {.pace = iterations(9)}, .tolerance = 9.0}, kPatience);
+              }),
+              HasSubstr("interrupted"));
+}
+
+TEST_F(MoveTest, InRealTimeItWaitsForTheRowsAsTheyCome) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  station.before_publish = [&] {
+    if (station.backend.iteration() < 50) station.now[0] = 0;  // it begins to move late
+  };
+  const Move move = frontend.start_move(kShoulder, bytes(std::array{1.0}), {.tolerance = 0.1});
+  EXPECT_THAT(message_of<NotReached>([&] { frontend.wait_for_move(move, kAtOnce); }),
+              HasSubstr("has not ended and continues"));
+  std::thread runner([&] { station.run(100); });
+  const UntypedObservation row = frontend.wait_for_move(move, kPatience);
+  EXPECT_EQ(row.iteration(), 50);
+  runner.join();
+}
+
+TEST_F(MoveTest, AHaltWhileItSettlesEndsIt) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  station.before_publish = [&] { station.now[0] = 0; };  // it is stuck
+  const Move move = frontend.start_move(kShoulder, bytes(std::array{1.0}), {.tolerance = 0.1});
+  station.run(3);
+  ASSERT_EQ(move.batch().handle(0).status, Status::completed);
+  station.backend.halt(HaltCause::driver, "it is hot");
+  station.run(1);
+  EXPECT_THAT(message_of<BackendHalted>([&] { frontend.wait_for_move(move, kPatience); }),
+              HasSubstr("it is hot"));
+}
+
+TEST_F(MoveTest, RefusesTolerancesThatDoNotFit) {
+  Station station;
+  station.start();
+  UntypedFrontend frontend("pair");
+  const auto told = [&](const MoveOptions& options) {
+    return message_of<InvalidArgument>(
+        [&] { frontend.start_move(kBoth, bytes(std::array{1.0, 2.0}), options); });
+  };
+  EXPECT_THAT(told({}), HasSubstr("must be given"));
+  EXPECT_THAT(told({.tolerance = -1.0}), HasSubstr("not negative"));
+  EXPECT_THAT(told({.tolerances = {1.0}}), HasSubstr("'elbow' is missing"));
+  EXPECT_THAT(told({.tolerances = {1.0, 1.0, 1.0}}), HasSubstr("3 tolerances for 2 numbers"));
+  EXPECT_EQ(frontend.added(), 0U);
+}
+
+}  // namespace
+}  // namespace o80::test

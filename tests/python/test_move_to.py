@@ -1,0 +1,226 @@
+"""move_to waits until the robot is observed at its targets, and says where it is if it is not."""
+
+import asyncio
+import math
+import pickle
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+import o80
+
+WAIT = 30.0  # [s] longer than any wait should take
+
+STATE = {"position": float, "velocity": float, "held": bool}
+UNITS = {"position": "rad", "velocity": "rad/s"}
+
+
+class Plant:
+    """A bursting robot, stepped by a thread: observed follows desired by half the way each time."""
+
+    def __init__(self, segment: str) -> None:
+        self.stuck = False
+        self.backend = o80.Backend(
+            segment, {"joints": (STATE, 2)}, units=UNITS, bursting=True, frequency=1000.0
+        )
+        self.backend.publish({"joints": [(0.0, 0.0, False)] * 2})
+        self._thread = threading.Thread(target=self._run)
+        self._thread.start()
+
+    def _run(self) -> None:
+        places = [0.0, 0.0]
+        while (desired := self.backend.step()) is not None:
+            joints = desired.joints
+            if not self.stuck:
+                places = [
+                    place + 0.5 * (float(goal) - place)
+                    for place, goal in zip(places, joints["position"], strict=True)
+                ]
+            held = [bool(each) for each in joints["held"]]
+            self.backend.publish({"joints": [(places[0], 7.0, held[0]), (places[1], 7.0, held[1])]})
+
+    def close(self) -> None:
+        self.backend.stop()
+        self._thread.join(WAIT)
+        self.backend.close()
+
+
+@pytest.fixture
+def plant(segment: str) -> Iterator[Plant]:
+    made = Plant(segment)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def joints(plant: Plant, segment: str) -> Iterator[o80.Frontend]:
+    with o80.Frontend(segment) as frontend:
+        yield frontend
+
+
+def test_returns_the_first_observation_within_the_tolerance(joints: o80.Frontend) -> None:
+    observation = joints.move_to(
+        "joints_0", {"position": 1.0}, tolerance=0.01, timeout=WAIT, iterations=5
+    )
+
+    positions = joints.history().observed.joints["position"][:, 0]
+    assert abs(positions[-1] - 1.0) <= 0.01
+    assert abs(positions[-2] - 1.0) > 0.01
+    assert observation.iteration == joints.published
+    assert observation.desired.joints["position"][0] == 1.0
+
+
+def test_leaves_what_was_added_and_not_pulsed(joints: o80.Frontend) -> None:
+    joints.add_command("joints_1", {"position": 0.5})
+    observation = joints.move_to("joints_0", 1.0, tolerance=0.1, timeout=WAIT)
+    assert joints.added == 1
+    assert observation.desired.joints["position"][1] == 0.0
+    joints.forget_added()
+
+
+def test_says_where_the_robot_is(plant: Plant, joints: o80.Frontend, segment: str) -> None:
+    plant.stuck = True
+    with pytest.raises(o80.NotReached) as raised:
+        joints.move_to(
+            ["joints_0", "joints_1"], [0.5, {"position": 0.005}], tolerance=0.01, timeout=0.02
+        )
+
+    error = raised.value
+    (miss,) = error.misses
+    assert miss == ("joints_0", "position", 0.5, 0.0, 0.5, 0.01, "rad")
+    assert error.observation.iteration == 20  # of the time of the robot
+    assert isinstance(error, TimeoutError)
+    assert error.batch is not None
+    assert error.batch.statuses == [o80.Status.COMPLETED]
+    assert str(error).startswith(
+        f"'{segment}' was not at its targets within 0.02 s: position of 'joints_0' is observed at "
+        "0 rad, 0.5 rad from its target of 0.5 rad (tolerance 0.01 rad). Its command has completed"
+    )
+
+
+def test_a_script_ends_alike_however_slow_the_machine_is(
+    plant: Plant, joints: o80.Frontend
+) -> None:
+    plant.stuck = True
+    ends = []
+    for _ in range(3):
+        began = joints.published
+        with pytest.raises(o80.NotReached) as raised:
+            joints.move_to(0, 1.0, tolerance=0.1, timeout=0.05)
+        ends.append(raised.value.observation.iteration - began)
+    assert ends == [50, 50, 50]
+
+
+def test_judges_the_given_fields_only(joints: o80.Frontend) -> None:
+    joints.move_to(0, {"position": 0.5}, tolerance=0.01, timeout=WAIT)  # its velocity is 7
+    with pytest.raises(o80.NotReached, match="velocity of 'joints_0' is observed at 7 rad/s"):
+        joints.move_to(0, {"position": 0.5, "velocity": 0.0}, tolerance=0.01, timeout=0.02)
+
+
+def test_a_tolerance_may_be_given_for_each_field_and_actuator(joints: o80.Frontend) -> None:
+    both = {"position": 0.5, "velocity": 0.0}
+    joints.move_to(0, both, tolerance={"position": 0.01}, timeout=WAIT)
+    joints.move_to(0, both, tolerance={"position": 0.01, "velocity": 8.0}, timeout=WAIT)
+    joints.move_to([0, 1], [both, both], tolerance={"position": 0.01}, timeout=WAIT)
+    joints.move_to([0, 1], [both, 0.5], tolerance=[{"position": 0.01}, 0.1], timeout=WAIT)
+    with pytest.raises(o80.NotReached, match="velocity of 'joints_1'"):
+        joints.move_to(
+            None, [both, both], tolerance=[{"position": 0.01}, {"velocity": 1.0}], timeout=0.02
+        )
+
+
+def test_a_boolean_must_be_equal(joints: o80.Frontend) -> None:
+    observation = joints.move_to(0, {"held": True}, tolerance=5.0, timeout=WAIT)
+    assert observation.observed.joints["held"].tolist() == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "said"),
+    [
+        (-0.1, "must be given, finite and not negative"),
+        (math.inf, "must be given, finite and not negative"),
+        (math.nan, "tolerance must be a number"),
+        ("near", "tolerance must be a number, a mapping"),
+        ([0.1, 0.1], "tolerance must be a number, a mapping"),
+        ({"velocity": 0.1}, "'velocity' of actuator 'joints_0' is given, but no target"),
+        ({"positon": 0.1}, "position"),
+    ],
+)
+def test_refuses_a_tolerance_that_does_not_fit(
+    joints: o80.Frontend, tolerance: object, said: str
+) -> None:
+    before = joints.published
+    with pytest.raises(o80.InvalidArgument, match=said):
+        joints.move_to(0, 1.0, tolerance=tolerance, timeout=WAIT)  # type: ignore[arg-type]
+    assert joints.published == before
+    assert joints.burst(1).active.tolist() == [False, False]
+
+
+def test_a_tolerance_must_be_given(joints: o80.Frontend) -> None:
+    with pytest.raises(TypeError, match="tolerance"):
+        joints.move_to(0, 1.0)  # type: ignore[call-arg]
+
+
+def test_takes_the_paces_of_a_command(arm: o80.Frontend) -> None:
+    assert arm.move_to("elbow", 0.5, tolerance=3.0, iterations=20).iteration == 20
+    assert arm.move_to("elbow", 0.0, tolerance=3.0, until=30).iteration == 30
+    with pytest.raises(o80.InvalidArgument, match="one pace"):
+        arm.move_to("elbow", 0.5, tolerance=3.0, iterations=20, speed=1.0)
+    with pytest.raises(o80.InvalidArgument, match="outside its limits"):
+        arm.move_to("elbow", 50.0, tolerance=3.0)
+
+
+def test_raises_if_its_command_did_not_complete(process: o80.robots.Process) -> None:
+    with process.frontend() as arm:
+        arm.wait_for(5, WAIT)
+        with pytest.raises(o80.NotCompleted, match="'elbow' was rejected"):
+            arm.move_to("elbow", 0.5, tolerance=0.1, timeout=WAIT, until=3)
+
+
+def test_in_real_time_a_command_that_has_not_ended_goes_on(process: o80.robots.Process) -> None:
+    with process.frontend() as arm:
+        with pytest.raises(o80.NotReached, match="has not ended and continues") as raised:
+            arm.move_to("elbow", 1.0, tolerance=1e-9, timeout=0.01, duration=1000.0)
+        assert [handle.ended for handle in raised.value.handles] == [False]
+        observation = arm.move_to(
+            "elbow", 0.01, tolerance=1e-3, timeout=WAIT, iterations=20, mode="overwrite"
+        )
+        assert abs(observation.observed[1] - 0.01) <= 1e-3
+
+
+def test_a_halt_ends_it(process: o80.robots.Process) -> None:
+    with process.frontend() as arm, process.frontend() as other:
+        halts = threading.Timer(0, lambda: (arm.wait_for(20, WAIT), other.halt("it is hot")))
+        halts.start()
+        with pytest.raises(o80.BackendHalted, match="it is hot"):
+            arm.move_to("elbow", 1.0, tolerance=1e-9, timeout=WAIT, duration=1000.0)
+        halts.join()
+
+
+def test_is_awaited(process: o80.robots.Process, segment: str) -> None:
+    async def move(arm: o80.Frontend) -> o80.Observation:
+        with pytest.raises(o80.NotReached):
+            await arm.aio.move_to("elbow", 1.0, tolerance=0.0, timeout=0.01, duration=1000.0)
+        return await arm.aio.move_to(
+            "elbow", 0.1, tolerance=1e-3, timeout=WAIT, iterations=10, mode="overwrite"
+        )
+
+    with process.frontend() as arm:
+        assert abs(asyncio.run(move(arm)).observed[1] - 0.1) <= 1e-3
+    with o80.robots.load("two_joints").inline() as inline:
+        assert abs(asyncio.run(move(inline)).observed[1] - 0.1) <= 1e-3
+
+
+def test_the_error_is_data(plant: Plant, joints: o80.Frontend) -> None:
+    plant.stuck = True
+    with pytest.raises(o80.NotReached) as raised:
+        joints.move_to(0, 1.0, tolerance=0.1, timeout=0.01)
+
+    error = pickle.loads(pickle.dumps(raised.value))
+    assert str(error) == str(raised.value)
+    assert error.misses == raised.value.misses
+    assert isinstance(error.misses[0], o80.Miss)
+    assert error.observation.iteration == raised.value.observation.iteration
+    assert error.batch is None
+    assert [handle.status for handle in error.handles] == [o80.Status.COMPLETED]
