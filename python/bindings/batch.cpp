@@ -38,11 +38,12 @@ o80::Iteration reached(o80::Iteration iteration, const char* not_yet) {
 
 /// Makes a handle from its pickled values.
 Handle* handle_of(o80::CommandId id, int status, int reason, o80::Iteration iteration,
-                  std::string text, std::string progress) {
+                  std::int64_t late, std::string text, std::string progress) {
   return new Handle{id,
                     static_cast<o80::Status>(status),
                     static_cast<o80::Reason>(reason),
                     iteration,
+                    late,
                     std::move(text),
                     std::move(progress)};
 }
@@ -68,8 +69,8 @@ nb::list statuses_of(const Batch& batch) {
 
 void bind_batch(nb::module_& m) {
   nb::class_<Handle>(m, "Handle", "Status of one command or request, when it was read.")
-      .def(nb::new_(&handle_of), "id"_a, "status"_a, "reason"_a, "iteration"_a, "text"_a,
-           "progress"_a)
+      .def(nb::new_(&handle_of), "id"_a, "status"_a, "reason"_a, "iteration"_a, "late"_a,
+           "text"_a, "progress"_a)
       .def(
           "__reduce__",
           [](nb::handle self) {
@@ -77,7 +78,7 @@ void bind_batch(nb::module_& m) {
             return nb::make_tuple(
                 self.type(), nb::make_tuple(handle->id, static_cast<int>(handle->status),
                                             static_cast<int>(handle->reason), handle->iteration,
-                                            handle->text, handle->progress));
+                                            handle->late, handle->text, handle->progress));
           },
           nb::sig("def __reduce__(self) -> tuple[typing.Any, ...]"))
       .def_ro("id", &Handle::id, "Its id, unique within its frontend.")
@@ -90,6 +91,8 @@ void bind_batch(nb::module_& m) {
       .def_prop_ro(
           "iteration", [](const Handle& self) { return known(self.iteration); },
           "The iteration in which the status changed; None while it is queued.")
+      .def_ro("late", &Handle::late,
+              "With the reason limits: by how many iterations it takes longer than asked.")
       .def_ro("text", &Handle::text, "The reason in words.")
       .def_ro("progress", &Handle::progress, "The driver's text about a running request.")
       .def_prop_ro(
