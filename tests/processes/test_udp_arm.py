@@ -134,7 +134,8 @@ def test_a_restart_of_the_arm_halts_the_robot_and_resume_goes_on(
         assert "the arm" in halt.text
         arm.add_command("joint1", 0.1, duration=0.1)
         batch = arm.pulse()
-        batch.wait(WAIT)
+        with pytest.raises(o80.BackendHalted, match="the arm"):
+            batch.wait(WAIT)
         assert batch.statuses == [o80.Status.REJECTED]
         resumed(arm)
         moved(arm)

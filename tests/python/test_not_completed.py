@@ -18,8 +18,8 @@ def by_pulse_and_wait(arm: o80.Frontend) -> object:
     return arm.pulse_and_wait(WAIT)
 
 
-def by_batch(arm: o80.Frontend) -> object:
-    return arm.pulse().wait(WAIT)
+def by_batch(arm: o80.Frontend) -> None:
+    arm.pulse().wait(WAIT)
 
 
 def by_await(arm: o80.Frontend) -> object:
@@ -158,7 +158,7 @@ def test_a_batch_that_is_rejected_as_a_whole_raises(process: o80.robots.Process)
             lambda: arm.pulse(at=3).wait(WAIT),
         ):
             arm.add_command("elbow", 0.5)
-            with pytest.raises(o80.NotCompleted, match="batch sent to .* was rejected: it came"):
+            with pytest.raises(o80.NotCompleted, match=r"batch sent to .* was rejected: it came"):
                 wait()
 
 
