@@ -69,8 +69,8 @@ nb::list statuses_of(const Batch& batch) {
 
 void bind_batch(nb::module_& m) {
   nb::class_<Handle>(m, "Handle", "Status of one command or request, when it was read.")
-      .def(nb::new_(&handle_of), "id"_a, "status"_a, "reason"_a, "iteration"_a, "late"_a,
-           "text"_a, "progress"_a)
+      .def(nb::new_(&handle_of), "id"_a, "status"_a, "reason"_a, "iteration"_a, "late"_a, "text"_a,
+           "progress"_a)
       .def(
           "__reduce__",
           [](nb::handle self) {

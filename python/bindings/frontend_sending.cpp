@@ -37,7 +37,8 @@ void set_every(o80::PaceSpec& pace, nb::handle every, std::int64_t period) {
       counts ? std::chrono::nanoseconds(count_of(every, "every") * period)
              : nanoseconds_of(every, "every");
   if (time.count() <= 0) {
-    throw o80::InvalidArgument("every must be positive, got " + nb::cast<std::string>(nb::repr(every)));
+    throw o80::InvalidArgument("every must be positive, got " +
+                               nb::cast<std::string>(nb::repr(every)));
   }
   pace = o80::direct(time);
 }

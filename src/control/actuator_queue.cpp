@@ -13,8 +13,8 @@ namespace {
 
 // most waypoints of a trajectory that are skipped in one iteration, because they end before it
 constexpr int kMostPassed = 256;
-// waypoints of a trajectory that are read ahead in one iteration, for its span. A motion that speeds
-// up and stops in i iterations each needs the span of i waypoints in iteration i.
+// waypoints of a trajectory that are read ahead in one iteration, for its span. A motion that
+// speeds up and stops in i iterations each needs the span of i waypoints in iteration i.
 constexpr std::uint32_t kReadAhead = 16;
 
 }  // namespace
@@ -122,8 +122,8 @@ void ActuatorQueue::begin_given(Mode mode) noexcept {
 
 ActuatorQueue::Moved ActuatorQueue::go_to(Iteration iteration, const std::byte* target) noexcept {
   const SetPoint set_point{usual_profile_};
-  const bool same = in_force_ && set_point_ == set_point &&
-                    layout_->same(target, motion_.target(), nullptr);
+  const bool same =
+      in_force_ && set_point_ == set_point && layout_->same(target, motion_.target(), nullptr);
   if (!same) {
     motion_.begin(nullptr);
     layout_->copy(motion_.target(), target);
@@ -342,8 +342,8 @@ bool ActuatorQueue::begin_row(Iteration iteration) noexcept {
   if (row_iterations_ > kLongestPlan && !is_asked) {
     end_motion();
     queue_.pop();
-    ledger_->end(record, Status::rejected, Reason::invalid,
-                 Limited{Limit::speed, 0}.packed(), iteration);
+    ledger_->end(record, Status::rejected, Reason::invalid, Limited{Limit::speed, 0}.packed(),
+                 iteration);
     return false;
   }
   if (keeps_plan_) {
@@ -410,7 +410,8 @@ Motion::Course ActuatorQueue::course(const RecordHead& head, Iteration iteration
   switch (head.pace) {
     case Pace::direct:
       if (head.amount > 0 && motion_.accelerates()) {
-        next.asked = std::max<std::int64_t>(1, std::llround(2e-9 * static_cast<double>(head.amount) / period_));
+        next.asked = std::max<std::int64_t>(
+            1, std::llround(2e-9 * static_cast<double>(head.amount) / period_));
       }
       break;
     case Pace::fastest:

@@ -52,13 +52,15 @@ class ActuatorQueue {
   bool has_no_command() const noexcept { return queue_.empty() && (!running_ || is_given()); }
   /// For targets that are given without a command, to a queue that has none: begins a row of them.
   void begin_given(Mode mode) noexcept;
-  /// Then, in each iteration: goes to the next one, as a direct command would. The last one stays in
-  /// force.
+  /// Then, in each iteration: goes to the next one, as a direct command would. The last one stays
+  /// in force.
   Moved go_to(Iteration iteration, const std::byte* target) noexcept;
   /// True if a direct value keeps a number away from its rest value.
   bool holds() const noexcept { return motion_.holds(); }
   /// True if an iteration without a command would change nothing.
-  bool at_rest() const noexcept { return follows() ? motion_.resting_at_rest() : motion_.at_rest(); }
+  bool at_rest() const noexcept {
+    return follows() ? motion_.resting_at_rest() : motion_.at_rest();
+  }
   /// True if it would move nothing.
   bool stays() const noexcept { return follows() ? motion_.resting_at_rest() : motion_.stays(); }
   /// True if a command of this lane is queued or running, or its direct value is still held.
@@ -101,7 +103,9 @@ class ActuatorQueue {
   std::int64_t row_of_own_time() noexcept;
   void end_running(Iteration iteration) noexcept;
   void take_out() noexcept;
-  BlockIndex running_record() const noexcept { return alone_ != kNoBlock ? alone_ : queue_.front(); }
+  BlockIndex running_record() const noexcept {
+    return alone_ != kNoBlock ? alone_ : queue_.front();
+  }
   bool is_given() const noexcept { return running_ && given_; }
   Moved come_to_rest(const std::byte* observed) noexcept;
   void end_motion() noexcept;

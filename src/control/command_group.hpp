@@ -24,9 +24,9 @@ struct CommandGroup {
   Status end = Status::none;  // the first end status of a member that is not completed
   Reason reason = Reason::none;
   std::uint8_t detail = 0;
-  std::uint8_t active : 1 = 0;   // reported as active
-  std::uint8_t offered : 2 = 0;  // a CommandGroups::Offer
-  std::uint8_t decided : 1 = 0;  // its members have nothing left to agree on
+  std::uint8_t active : 1 = 0;    // reported as active
+  std::uint8_t offered : 2 = 0;   // a CommandGroups::Offer
+  std::uint8_t decided : 1 = 0;   // its members have nothing left to agree on
   std::uint8_t was_late : 1 = 0;  // kOffers is the delay of the latest member that has ended
 };
 static_assert(sizeof(CommandGroup) == kBlockBytes - sizeof(RecordHead));
@@ -70,8 +70,8 @@ class CommandGroups {
     const BlockIndex head = head_of(member);
     CommandGroup& group = at(head);
     std::int64_t& largest = pool_->head(head).amount;
-    const bool is_first = static_cast<Offer>(group.offered) != kind ||
-                          stamp(head, kOffers) != low(iteration);
+    const bool is_first =
+        static_cast<Offer>(group.offered) != kind || stamp(head, kOffers) != low(iteration);
     largest = is_first ? number : std::max(largest, number);
     group.offered = static_cast<std::uint8_t>(kind) & 3U;
     stamp(head, kOffers) = low(iteration);
@@ -82,8 +82,8 @@ class CommandGroups {
     if (late <= 0 || group.decided == 0) return;
     const std::uint32_t known = group.was_late != 0 ? stamp(head, kOffers) : 0;
     group.was_late = 1;
-    stamp(head, kOffers) = static_cast<std::uint32_t>(std::max<std::int64_t>(
-        known, std::min<std::int64_t>(late, 0xFFFF)));
+    stamp(head, kOffers) = static_cast<std::uint32_t>(
+        std::max<std::int64_t>(known, std::min<std::int64_t>(late, 0xFFFF)));
   }
   std::int64_t late(BlockIndex head) noexcept {
     return at(head).was_late != 0 ? stamp(head, kOffers) : 0;

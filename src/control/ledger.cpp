@@ -97,8 +97,8 @@ void Ledger::reject(std::uint32_t lane, BlockIndex block, Reason reason, std::ui
   close(block, iteration);
 }
 
-void Ledger::activate(BlockIndex record, Iteration iteration, Reason reason,
-                      std::uint8_t detail, std::int64_t late) noexcept {
+void Ledger::activate(BlockIndex record, Iteration iteration, Reason reason, std::uint8_t detail,
+                      std::int64_t late) noexcept {
   const RecordHead& head = pool_.head(record);
   CommandId id = head.id;
   if (is_member(head)) {

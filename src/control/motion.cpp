@@ -81,9 +81,9 @@ Motion::Motion(const Schema& schema, const ActuatorRow& actuator, const StateLay
         row.minimum > -kUnlimited || row.maximum < kUnlimited || rates.speed < kUnlimited;
     const auto [lowest, highest] = range_of(place.kind);
     const NumberLimiter guard(std::max(row.minimum, lowest), std::min(row.maximum, highest), rates);
-    numbers_.push_back({i, place.offset, lowest, highest, place.kind, limited || row.resting != 0,
-                        NumberMotion(guard, row.resting != 0 ? std::optional(row.rest)
-                                                             : std::nullopt)});
+    numbers_.push_back(
+        {i, place.offset, lowest, highest, place.kind, limited || row.resting != 0,
+         NumberMotion(guard, row.resting != 0 ? std::optional(row.rest) : std::nullopt)});
   }
 }
 
@@ -102,9 +102,8 @@ void Motion::begin(const std::uint64_t* mask) noexcept {
 }
 
 bool Motion::accelerates() const noexcept {
-  return std::ranges::any_of(numbers_, [](const Number& each) {
-    return each.is_commanded && each.motion.accelerates();
-  });
+  return std::ranges::any_of(
+      numbers_, [](const Number& each) { return each.is_commanded && each.motion.accelerates(); });
 }
 
 /// Iterations of a row, or of a type that blends by itself, at the speed asked for.
@@ -137,8 +136,7 @@ std::int64_t Motion::propose(const Course& course, const std::byte* desired) noe
     NumberMotion::Asked asked;
     asked.target = layout_.number(each.number, target());
     const bool at_published = observed != nullptr || !each.is_limited || !(first_row || !is_row_);
-    asked.line_start =
-        at_published ? layout_.number(each.number, from()) : each.motion.position();
+    asked.line_start = at_published ? layout_.number(each.number, from()) : each.motion.position();
     if (is_row_) {
       follows_rows_ = follows_rows_ || each.motion.has_rates();
       each.motion.line(asked.line_start, asked.target);
@@ -191,9 +189,10 @@ void Motion::widen(const std::byte* row) noexcept {
 void Motion::blend(std::byte* state) noexcept {
   if (now_ >= last_) return layout_.copy(state, target());
   const auto i = static_cast<double>(now_ - first_ + 1);
-  const double share = profile_ == Profile::minimum_jerk
-                           ? SmoothMotion({}, 1.0, static_cast<std::int64_t>(iterations_)).position(i)
-                           : i / iterations_;
+  const double share =
+      profile_ == Profile::minimum_jerk
+          ? SmoothMotion({}, 1.0, static_cast<std::int64_t>(iterations_)).position(i)
+          : i / iterations_;
   std::byte* blended = target() + stride_;
   layout_.hooks().blend(blended, from(), target(), share);
   // a blend() that divides by zero gives an invalid state: keep the last one

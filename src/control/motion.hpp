@@ -38,7 +38,7 @@ class Motion {
   /// How a command gets to its target, or to the next row of a trajectory.
   struct Course {
     Profile profile = Profile::linear;
-    std::int64_t asked = 0;   // iterations; 0: as few as the limits allow
+    std::int64_t asked = 0;  // iterations; 0: as few as the limits allow
     double cruise = std::numeric_limits<double>::infinity();  // of `first` [1/iteration]
     std::uint32_t first = 0;  // the number that the cruising speed is for
     bool is_row = false;      // of a trajectory in straight lines: it has `asked` iterations
@@ -74,8 +74,7 @@ class Motion {
   Iteration last() const noexcept { return last_; }
   /// True if the state of the last step() was the target: nothing is left to follow.
   bool arrived() const noexcept {
-    return std::ranges::all_of(numbers_,
-                               [](const Number& each) { return each.motion.arrived(); });
+    return std::ranges::all_of(numbers_, [](const Number& each) { return each.motion.arrived(); });
   }
   /// The limit because of which plan() took more iterations than asked.
   Limited slowest() const noexcept { return slowest_; }
@@ -126,7 +125,9 @@ class Motion {
   };
 
   std::byte* from() noexcept { return reinterpret_cast<std::byte*>(ends_.data()); }
-  const std::byte* from() const noexcept { return reinterpret_cast<const std::byte*>(ends_.data()); }
+  const std::byte* from() const noexcept {
+    return reinterpret_cast<const std::byte*>(ends_.data());
+  }
   const std::byte* target() const noexcept { return from() + stride_; }
   std::int64_t iterations_at(const Course& course) const noexcept;
   void blend(std::byte* state) noexcept;
@@ -134,9 +135,9 @@ class Motion {
   void publish_exact(const Number& number, std::byte* state) const noexcept;
 
   const StateLayout& layout_;
-  std::size_t stride_;               // [bytes]
-  std::vector<std::uint64_t> ends_;  // from, target, and a state to blend into
-  std::vector<Number> numbers_;      // those that move; none of a type that blends by itself
+  std::size_t stride_;                   // [bytes]
+  std::vector<std::uint64_t> ends_;      // from, target, and a state to blend into
+  std::vector<Number> numbers_;          // those that move; none of a type that blends by itself
   std::vector<std::uint32_t> switches_;  // numbers that switch at the start
   Iteration first_ = 0;
   Iteration last_ = 0;

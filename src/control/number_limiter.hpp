@@ -15,8 +15,8 @@ namespace o80 {
 /// It keeps position, speed and acceleration, per iteration. A planned position passes unchanged if
 /// it keeps all limits. A wanted position that is not planned is followed: as fast as the limits
 /// allow, without overshoot, and only through states from which it can stop between minimum and
-/// maximum and inside the span of what it follows, so a next state always exists. A position outside
-/// the bounds may stay or move inward, never outward.
+/// maximum and inside the span of what it follows, so a next state always exists. A position
+/// outside the bounds may stay or move inward, never outward.
 ///
 /// Realtime: yes, bounded time.
 class NumberLimiter {
@@ -75,7 +75,8 @@ class NumberLimiter {
   bool pass(double next) noexcept {
     if (!unlimited_ && !keeps_limits(next)) return false;
     // rounding of a plan may lie beyond the bounds
-    if (!unlimited_) next = std::clamp(next, std::min(minimum_, position_), std::max(maximum_, position_));
+    if (!unlimited_)
+      next = std::clamp(next, std::min(minimum_, position_), std::max(maximum_, position_));
     const double speed = next - position_;
     acceleration_ = speed - speed_;
     speed_ = speed;

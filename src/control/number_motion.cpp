@@ -54,7 +54,8 @@ std::int64_t NumberMotion::propose(const Asked& asked) noexcept {
   start_ = from;
   const bool starts_elsewhere =
       asked.start && !jumps_ && (from != guard_.position() || !guard_.at_rest());
-  follows_ = leaves_ || starts_elsewhere || guard_.position() < guard_.minimum() || guard_.position() > guard_.maximum();
+  follows_ = leaves_ || starts_elsewhere || guard_.position() < guard_.minimum() ||
+             guard_.position() > guard_.maximum();
   return plan_.propose(task, asked.iterations);
 }
 

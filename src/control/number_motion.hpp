@@ -34,9 +34,9 @@ class NumberMotion {
   /// How a command asks for its target.
   struct Asked {
     double target = 0.0;
-    double line_start = 0.0;             // where a straight line begins
-    std::optional<double> start;         // a place to start from at rest, instead of its own
-    std::int64_t iterations = 0;         // 0: as few as the limits allow
+    double line_start = 0.0;      // where a straight line begins
+    std::optional<double> start;  // a place to start from at rest, instead of its own
+    std::int64_t iterations = 0;  // 0: as few as the limits allow
     double cruise = std::numeric_limits<double>::infinity();  // speed asked for [1/iteration]
     Profile profile = Profile::linear;
   };
@@ -44,7 +44,8 @@ class NumberMotion {
   std::int64_t propose(const Asked& asked) noexcept;
   /// Then plans it for `iterations`, at least those.
   void settle(std::int64_t iterations) noexcept;
-  /// A straight line to the next row of a trajectory, which is followed; line_for() sets its length.
+  /// A straight line to the next row of a trajectory, which is followed; line_for() sets its
+  /// length.
   void line(double start, double target) noexcept;
   void line_for(std::int64_t iterations) noexcept { plan_.line_for(iterations); }
   /// Goes to the target within the limits, whatever they keep it from (Profile::as_sent).
@@ -54,7 +55,8 @@ class NumberMotion {
     if (follows_) guard_.widen(position);
   }
 
-  /// One iteration of the plan; returns the limit that changed it. `low`, `high`: range of its kind.
+  /// One iteration of the plan; returns the limit that changed it. `low`, `high`: range of its
+  /// kind.
   Limit step(double low, double high) noexcept;
   /// True if nothing of the plan, which is over, is left to follow.
   bool arrived() const noexcept {
@@ -95,7 +97,8 @@ class NumberMotion {
   bool held_ = false;
   bool jumps_ = false;  // the plan begins at `start_`
   double start_ = 0.0;
-  // a stop from where it was would leave the bounds: goes on with the former plan until it would not
+  // a stop from where it was would leave the bounds: goes on with the former plan until it would
+  // not
   bool leaves_ = false;
   NumberPlan former_;
   double former_target_ = 0.0;

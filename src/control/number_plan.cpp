@@ -66,10 +66,10 @@ std::int64_t NumberPlan::fewest() noexcept {
     return iterations_of(task_.target - task_.line_start, rates.speed);
   }
   // no motion is shorter; beyond the range of the plan nothing is computed
-  const double least = std::max({distance / rates.speed, std::sqrt(distance / rates.acceleration),
-                                 std::cbrt(distance / rates.jerk),
-                                 std::abs(task_.start.speed) / rates.acceleration,
-                                 rates.acceleration / rates.jerk / 2.0});
+  const double least =
+      std::max({distance / rates.speed, std::sqrt(distance / rates.acceleration),
+                std::cbrt(distance / rates.jerk), std::abs(task_.start.speed) / rates.acceleration,
+                rates.acceleration / rates.jerk / 2.0});
   if (!(least <= static_cast<double>(kLongestPlan))) return kLongestPlan + 1;
   fastest_ = FastestMotion(task_.start.position, task_.start.speed, task_.start.acceleration,
                            task_.target, rates);
@@ -127,7 +127,8 @@ bool NumberPlan::smooth(std::int64_t iterations) noexcept {
   smooth_ = SmoothMotion(task_.start, task_.target, iterations);
   if (fits(smooth_)) return true;
   const bool moves = task_.start.speed != 0.0 || task_.start.acceleration != 0.0;
-  if (!std::isfinite(task_.rates.acceleration) && moves && stop_then_smooth(iterations)) return true;
+  if (!std::isfinite(task_.rates.acceleration) && moves && stop_then_smooth(iterations))
+    return true;
   if (!task_.stays || !moves) return false;
   smooth_ = SmoothMotion({task_.start.position, 0.0, 0.0}, task_.target, iterations);
   return fits_after_stop(smooth_);

@@ -77,7 +77,7 @@ class NumberPlan {
   bool has_fastest_ = false;  // `fastest_` is the motion of task_
   std::int64_t iterations_ = 1;
   std::int64_t done_ = 0;
-  std::int64_t stop_ = 0;  // iterations of `to_stop_`
+  std::int64_t stop_ = 0;        // iterations of `to_stop_`
   std::int64_t smooth_for_ = 0;  // iterations of `smooth_`
   SmoothMotion to_stop_;
   SmoothMotion smooth_;

@@ -75,7 +75,7 @@ struct RecordHead {
   union {
     // duration [ns], last iteration of until, number of iterations, time between set-points [ns]
     std::int64_t amount = 0;
-    double speed;             // speed of the first commanded number [1/s]
+    double speed;  // speed of the first commanded number [1/s]
   };
   std::array<std::uint32_t, 4> own{};  // for the backend; values from a frontend are ignored
 };

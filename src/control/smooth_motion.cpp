@@ -11,8 +11,8 @@ SmoothMotion::SmoothMotion(const Moment& start, double target, std::int64_t iter
   const double d = start.position - target;
   const double v = start.speed;
   const double a = start.acceleration;
-  // Newton's form through iterations 0, -1, -2. The differences are written out, because subtracting
-  // the values would cancel.
+  // Newton's form through iterations 0, -1, -2. The differences are written out, because
+  // subtracting the values would cancel.
   const double three = n * (n + 1.0) * (n + 2.0);
   c0_ = -d / three;
   c1_ = -(3.0 * d + n * v) / (three * (n + 3.0));

@@ -67,8 +67,7 @@ bool StateLayout::same(const std::byte* one, const std::byte* other,
   if (mask == nullptr && !padded_) return std::memcmp(one, other, size_) == 0;
   for (std::size_t i = 0; i < numbers_.size(); ++i) {
     const NumberPlace& place = numbers_[i];
-    if (masked(mask, i) &&
-        std::memcmp(one + place.offset, other + place.offset, place.size) != 0) {
+    if (masked(mask, i) && std::memcmp(one + place.offset, other + place.offset, place.size) != 0) {
       return false;
     }
   }

@@ -202,7 +202,7 @@ void LaneSender::cancel_burst(std::uint64_t id) noexcept {
 LaneSender::StatusAnswer LaneSender::status(std::uint64_t id) const noexcept {
   const StatusSlot& slot = statuses_[id & (statuses() - 1)];
   for (int i = 0; i < kTries; ++i) {
-    const std::uint64_t word = slot.word.load(std::memory_order_acquire);  // sync status
+    const std::uint64_t word = slot.word.load(std::memory_order_acquire);   // sync status
     const std::uint64_t slot_id = slot.id.load(std::memory_order_acquire);  // sync status_id
     const std::uint64_t owner = StatusWord::announcing(slot_id);
     if (owner > id) return {Known::forgotten, {}, 0};

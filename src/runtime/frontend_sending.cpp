@@ -62,7 +62,8 @@ void check_options(const CommandOptions& options) {
   if (options.profile == Profile::as_sent &&
       (options.pace.pace != Pace::direct || options.pace.amount != 0)) {
     throw InvalidArgument(
-        "the profile as_sent is for set-points without a pace and without every: leave these out, or "
+        "the profile as_sent is for set-points without a pace and without every: leave these out, "
+        "or "
         "profile");
   }
 }

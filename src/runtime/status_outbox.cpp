@@ -7,8 +7,8 @@ namespace o80 {
 void StatusOutbox::put(const StatusChange& change) noexcept {
   const StatusWord word{static_cast<std::uint8_t>(change.status),
                         static_cast<std::uint8_t>(change.reason), change.detail, change.iteration};
-  const Run now{change.id,   word.packed(), 1, change.lane,
-                change.late, change.of == StatusChange::Of::record};
+  const Run now{change.id,   word.packed(), 1,
+                change.lane, change.late,   change.of == StatusChange::Of::record};
   const bool ends = is_end(change.status);
   if (!stepping_) return report_now(now, ends);
   if (ends && waiting_.size() < waiting_.capacity()) {

@@ -37,7 +37,7 @@ SAYS = {
     "paces": [
         "in 0.25 s:            250",
         "at 10 rad/s:          100",
-        "smoothly at 10 rad/s: 188",
+        "smoothly at 10 rad/s: 186",
     ],
     "exporting": ["episode 4: 5 steps", "swings/meta/info.json"],
     "playing": ["the elbow was at 0.353", "201 rows of two_joints, played: True"],

@@ -32,8 +32,8 @@ struct PaceSpec {
 };
 
 /// A set-point: goes to the target as fast as the limits allow (without limits: in one iteration)
-/// and gives way to the next direct command. `every`: time between the set-points of a stream; where
-/// there is an acceleration limit, the motion then takes twice that, or longer.
+/// and gives way to the next direct command. `every`: time between the set-points of a stream;
+/// where there is an acceleration limit, the motion then takes twice that, or longer.
 constexpr PaceSpec direct(std::chrono::nanoseconds every = std::chrono::nanoseconds(0)) {
   return {Pace::direct, every.count(), 0};
 }

@@ -25,8 +25,8 @@ struct Handle {
   Iteration iteration = -1;  // at which the status changed; -1 while it is queued
   /// With Reason::limits: by how many iterations it takes longer than asked, at most 65535.
   std::int64_t late = 0;
-  std::string text;          // the reason in words
-  std::string progress;      // of a running request: the driver's text
+  std::string text;      // the reason in words
+  std::string progress;  // of a running request: the driver's text
 };
 
 struct WaitOptions {

@@ -110,8 +110,8 @@ class UntypedFrontend {
                                  std::span<const std::byte> states,
                                  const CommandOptions& options = {.pace = iterations(1)},
                                  std::span<const std::int64_t> times = {});
-  /// Adds a row of set-points for each of several actuators, one an iteration; the last one stays in
-  /// force. `states` as in add_trajectories().
+  /// Adds a row of set-points for each of several actuators, one an iteration; the last one stays
+  /// in force. `states` as in add_trajectories().
   void add_set_points(std::span<const std::uint32_t> actuators, std::uint32_t rows,
                       std::span<const std::byte> states, Mode mode = Mode::queue);
   std::uint32_t add_purge(std::uint32_t actuator = kEveryActuator);

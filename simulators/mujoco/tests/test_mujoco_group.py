@@ -59,7 +59,8 @@ def test_a_burst_sends_targets_to_joints_and_to_a_ball_at_once() -> None:
         burst.run()
         for copy, single in enumerate(singles):
             for name in names:
-                single.add_trajectory(burst.targets[name][copy], name)
+                for target in burst.targets[name][copy]:
+                    single.add_command(name, target)
             single.burst(6)
             assert burst.rows[copy].tobytes() == single.history(6).rows.tobytes()
         again = burst.targets.copy()

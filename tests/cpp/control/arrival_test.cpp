@@ -76,7 +76,8 @@ struct Asked {
   Iteration takes;
 };
 
-/// Whatever is asked of an actuator with limits of acceleration goes to its target, and rests there.
+/// Whatever is asked of an actuator with limits of acceleration goes to its target, and rests
+/// there.
 TEST(Arrival, CommandsRestAtTheirTargets) {
   const Limits arm{.speed = 2.0, .acceleration = 15.0, .jerk = 500.0};
   const Limits franka{.speed = 2.6, .acceleration = 10.0, .jerk = 5000.0};
@@ -340,8 +341,8 @@ double play(const Stream& stream, std::uint64_t seed) {
   for (std::int64_t lag = 0; lag < stream.frequency / 2; ++lag) {
     double sum = 0.0;
     for (std::int64_t i = stream.frequency; i < end; ++i) {
-      const double error = found[static_cast<std::size_t>(i)] -
-                           wanted(static_cast<double>(i - lag) / frequency);
+      const double error =
+          found[static_cast<std::size_t>(i)] - wanted(static_cast<double>(i - lag) / frequency);
       sum += error * error;
     }
     if (sum < least) {

@@ -37,8 +37,8 @@ TEST_F(FastestMotionTest, IsFollowedByALimiterThatNeverHoldsItBackFromWhereverIt
     for (int part = 0; part < 4; ++part) {
       const double target =
           real(0, 1) < 0.1 ? limiter.position() : real(-1, 1) * magnitude(-3, 0.5);
-      FastestMotion motion(limiter.position(), limiter.moment().speed, limiter.moment().acceleration, target,
-                           rates);
+      FastestMotion motion(limiter.position(), limiter.moment().speed,
+                           limiter.moment().acceleration, target, rates);
       limiter.begin();
       const auto n = motion.iterations();
       longest = std::max(longest, n);
@@ -84,8 +84,8 @@ TEST_F(FastestMotionTest, LetsGoOfTheBrakeForATargetJustBeyondTheWayToRest) {
   limiter.begin();
   for (int i = 0; i < 49; ++i) limiter.follow(first.next());
 
-  FastestMotion second(limiter.position(), limiter.moment().speed, limiter.moment().acceleration, 0.136052,
-                       rates);
+  FastestMotion second(limiter.position(), limiter.moment().speed, limiter.moment().acceleration,
+                       0.136052, rates);
 
   EXPECT_LE(second.iterations(), 38);
   limiter.begin();
@@ -107,8 +107,8 @@ TEST_F(FastestMotionTest, StretchesToEndWithASlowerOne) {
          i > 0; --i)
       limiter.follow(first.next());
     const double target = real(-1, 1);
-    FastestMotion motion(limiter.position(), limiter.moment().speed, limiter.moment().acceleration, target,
-                         rates);
+    FastestMotion motion(limiter.position(), limiter.moment().speed, limiter.moment().acceleration,
+                         target, rates);
     const auto n =
         static_cast<std::int64_t>(static_cast<double>(motion.iterations()) * real(1, 3)) + 1;
     motion.stretch(n);

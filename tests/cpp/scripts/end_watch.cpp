@@ -124,8 +124,8 @@ std::optional<Failure> EndWatch::idle(const ScriptWorld& world, std::size_t actu
       std::array<std::byte, 8> bytes{};
       store_as(number.kind, number.rest, bytes.data());
       const long double rest = load_as(number.kind, bytes.data());
-      // the rules do not say whether an interrupt after the end of a direct command leaves the field
-      // where it is
+      // the rules do not say whether an interrupt after the end of a direct command leaves the
+      // field where it is
       const bool unsaid = world.step_of(*track.last).head.pace == Pace::direct &&
                           track.maybe_dropped_at > track.last->ended_at;
       if (place.now != rest && !unsaid) {

@@ -290,8 +290,8 @@ void Generator::add_groups() {
   std::uint32_t groups = 0;
   std::swap(dice_, *grouping_);
   for (ScriptStep& step : steps) {
-    const bool is_first = step.action == Action::command &&
-                          step.head.profile != Profile::as_sent && dice_.one_in(2);
+    const bool is_first =
+        step.action == Action::command && step.head.profile != Profile::as_sent && dice_.one_in(2);
     if (is_first) step.group = ++groups;
     script_.steps.push_back(step);
     if (!is_first) continue;

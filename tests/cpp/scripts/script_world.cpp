@@ -272,7 +272,8 @@ std::optional<Failure> ScriptWorld::hear_end(SentCommand& command, const StatusC
     const bool gave_way = change.status == Status::overwritten;
     const bool unknown = may_arrive_before_others(command);
     const bool expected =
-        gave_way || unknown || change.status == (first != first_ends_.end() ? first->second : Status::completed);
+        gave_way || unknown ||
+        change.status == (first != first_ends_.end() ? first->second : Status::completed);
     if (!expected) return Failure{"end of several", "not the first end of its members is told"};
   }
   if (command.ended_at != kNever) return std::nullopt;  // a member that has left

@@ -53,11 +53,11 @@ struct NumberTrack {
 
 struct ActuatorTrack {
   std::vector<NumberTrack> numbers;
-  SentCommand* driver = nullptr;          // gave the desired state of this iteration
-  SentCommand* previous = nullptr;        // of the iteration before
-  SentCommand* last = nullptr;            // the last that did, since the last fresh start
-  Iteration dropped_at = kNever;          // all its commands were dropped before this iteration
-  Iteration maybe_dropped_at = kNever;    // some of them, or none
+  SentCommand* driver = nullptr;        // gave the desired state of this iteration
+  SentCommand* previous = nullptr;      // of the iteration before
+  SentCommand* last = nullptr;          // the last that did, since the last fresh start
+  Iteration dropped_at = kNever;        // all its commands were dropped before this iteration
+  Iteration maybe_dropped_at = kNever;  // some of them, or none
   bool active = false;
   bool clamped = false;
   bool braking = false;

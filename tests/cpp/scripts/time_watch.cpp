@@ -70,11 +70,10 @@ void TimeWatch::begin_together(const ScriptWorld& world, std::size_t actuator) {
 
 void TimeWatch::begin(const ScriptWorld& world, std::size_t actuator) {
   const SentCommand* previous = world.actuators[actuator].previous;
-  const bool unbroken =
-      previous != nullptr && previous->ended_at == world.iteration - 1 &&
-      previous->status == Status::completed &&
-      world.actuators[actuator].dropped_at != world.iteration &&
-      world.step_of(*world.actuators[actuator].driver).head.mode == Mode::queue;
+  const bool unbroken = previous != nullptr && previous->ended_at == world.iteration - 1 &&
+                        previous->status == Status::completed &&
+                        world.actuators[actuator].dropped_at != world.iteration &&
+                        world.step_of(*world.actuators[actuator].driver).head.mode == Mode::queue;
   if (!unbroken) clocks_[actuator] = {(world.iteration - 1) * kPeriodNs, true};
   if (world.actuators[actuator].maybe_dropped_at == world.iteration) {
     clocks_[actuator].known = false;
