@@ -233,6 +233,71 @@ TEST(Arrival, VelocitiesAreReachedAndHeld) {
   EXPECT_NEAR(way, 0.9645, 0.01 * 0.9645);
 }
 
+TEST(Arrival, TheSameMoveTakesTheSameTimeAgainAndAgain) {
+  for (const std::int64_t every : {0, 20}) {
+    Rig rig(limited_robot(500, {.speed = 2.0, .acceleration = 15.0, .jerk = 500.0}));
+    std::vector<Iteration> took;
+    for (int i = 0; i < 20; ++i) {
+      rig.add(0, smoothly(paced(Pace::direct, every * kMillisecond)), {i % 2 == 0 ? 0.1 : 0.0});
+      const CommandId command = rig.pulse() + 2;
+      const Iteration first = rig.next;
+      while (!is_end(rig.witness.status(command))) rig.run(1);
+      took.push_back(rig.next - first);
+      rig.run(i % 4);
+    }
+    for (const Iteration each : took) EXPECT_EQ(each, 99) << every;
+  }
+}
+
+/// A learner that queues targets for each step of a simulation is never further behind.
+TEST(Arrival, ThousandsOfQueuedRowsOfSetPointsDoNotLagMoreAndMore) {
+  Rig rig(limited_robot(500, {.speed = 2.0, .acceleration = 15.0, .jerk = 500.0}));
+  std::vector<double> rows;
+  for (int burst = 0; burst < 10'000; ++burst) {
+    const double target = 0.2 * std::sin(0.05 * burst);
+    rig.add_rows(0, smoothly(direct()), 5, std::vector<double>(5, target));
+    rig.pulse();
+    rig.run(5);
+    rows.push_back(std::abs(rig.desired() - target));
+    ASSERT_GT(rig.pool.available(), rig.pool.size() - 8) << "one batch at a time";
+  }
+  const auto worst_of = [&](std::size_t first) {
+    return *std::max_element(rows.begin() + static_cast<std::ptrdiff_t>(first),
+                             rows.begin() + static_cast<std::ptrdiff_t>(first) + 1000);
+  };
+  EXPECT_LE(worst_of(9000), worst_of(1000) * 1.01);
+}
+
+/// A motion whose target lies on a bound is halted in any iteration: it stays inside, within its
+/// limits, and comes to rest no later than it would have.
+TEST(Arrival, AHaltBesideABoundStaysInsideWithinTheLimits) {
+  for (const double jerk : {500.0, 5000.0, kNone}) {
+    for (const std::int64_t n : {60, 130, 250}) {
+      const Limits limits{.maximum = 0.1, .speed = 2.0, .acceleration = 15.0, .jerk = jerk};
+      for (int halted = 1; halted < n; ++halted) {
+        Rig rig(limited_robot(500, limits));
+        Rows rows(rates_of(rig.schema));
+        rig.add(0, smoothly(over(n)), {0.1});
+        const CommandId command = rig.pulse() + 2;
+        for (int i = 0; i < halted && !is_end(rig.witness.status(command)); ++i) {
+          rig.run(1);
+          rows.add(rig.desired());
+        }
+        rig.controller.halt(rig.next);
+        int braked = 0;
+        while (rig.controller.braking() && braked < 1000) {
+          rig.run(1);
+          rows.add(rig.desired());
+          ASSERT_LE(rig.desired(), 0.1);
+          ++braked;
+        }
+        ASSERT_LE(braked, std::max<std::int64_t>(n, 99) - halted + 40) << n << ' ' << halted;
+        ASSERT_FALSE(HasFailure()) << "over " << n << " halted in " << halted;
+      }
+    }
+  }
+}
+
 TEST(Arrival, TargetsAsSentAreShownAsTheyAre) {
   Rig rig(limited_robot(500, {.speed = 2.0, .acceleration = 15.0, .jerk = 500.0}));
   RecordHead head = paced(Pace::direct, 0);
