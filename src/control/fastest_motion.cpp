@@ -10,10 +10,12 @@ namespace {
 // rounding must not add an iteration
 constexpr double kTimeRounding = 1e-12;
 constexpr int kMostTries = 60;
+constexpr double kRootForTime = 1e-6;
+constexpr double kBracket = 1e-3;
 constexpr int kMostCorrections = 8;
 
 /// The root of an increasing function between `low` and `high`, up to a function value of
-/// `tolerance`; by the Illinois method, with a bisection in every fourth step.
+/// `tolerance`; by the Illinois method, with a bisection in every eighth step.
 template <class Function>
 double root(Function&& function, double low, double high, double tolerance) noexcept {
   double at_low = function(low);
@@ -24,7 +26,7 @@ double root(Function&& function, double low, double high, double tolerance) noex
   for (int i = 0; i < kMostTries; ++i) {
     const double width = high - low;
     if (!(width > 1e-15 * std::abs(high))) break;
-    double tried = i % 4 == 3 ? low + width / 2.0 : high - at_high * width / (at_high - at_low);
+    double tried = i % 8 == 7 ? low + width / 2.0 : high - at_high * width / (at_high - at_low);
     if (!(tried > low && tried < high)) tried = low + width / 2.0;
     const double value = function(tried);
     if (std::abs(value) <= tolerance) return tried;
@@ -87,15 +89,20 @@ FastestMotion::FastestMotion(double position, double speed, double acceleration,
   } else {
     // the target is nearer: reduce the cruising speed until there is no time to cruise
     const auto beyond_at = [&](double cruise) {
-      return distance(cruise, time_to(cruise)) - distance_;
+      const VelocityChange to_cruise(cruise - start_speed_, start_acceleration_, rates_);
+      const VelocityChange to_rest(-cruise, 0.0, rates_);
+      return to_cruise.displacement() + to_cruise.time() * cruise + to_rest.displacement() -
+             distance_;
     };
-    cruise_ = root(beyond_at, lowest, rates_.speed, 1e-13 * distance_);
+    // for the number of iterations; the speed that fits them is found below, a little beyond it
+    cruise_ = root(beyond_at, lowest, rates_.speed, kRootForTime * distance_);
     before_ = static_cast<std::int64_t>(std::ceil(time_to(cruise_) * (1.0 - kTimeRounding)));
   }
   if (distance(lowest, static_cast<double>(before_)) > distance_) {
     mix(lowest);
   } else {
-    cruise_ = cruise_for(static_cast<double>(before_), lowest, cruise_);
+    const double highest = std::min(rates_.speed, cruise_ * (1.0 + kBracket));
+    cruise_ = cruise_for(static_cast<double>(before_), lowest, highest);
   }
   settle();
 }

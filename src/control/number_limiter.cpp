@@ -67,18 +67,21 @@ bool NumberLimiter::stops_inside() noexcept {
   return visited.low >= minimum_ - rounding() && visited.high <= maximum_ + rounding();
 }
 
-bool NumberLimiter::keeps_limits(double next) noexcept {
+/// Limits and bounds may be exceeded by rounding.
+bool NumberLimiter::pass_rounded(double next) noexcept {
   const double speed = next - position_;
   const double acceleration = speed - speed_;
-  scale_ = std::max({scale_, std::abs(position_), std::abs(next)});
   const double room = rounding();
   const auto within = [&](double value, double limit) {
     return std::abs(value) <= limit * (1.0 + kLimitRounding) + room;
   };
-  return within(speed, rates_.speed) && within(acceleration, rates_.acceleration) &&
-         within(acceleration - acceleration_, rates_.jerk) &&
-         next <= std::max(maximum_, position_) + room &&
-         next >= std::min(minimum_, position_) - room;
+  const double highest = std::max(maximum_, position_);
+  const double lowest = std::min(minimum_, position_);
+  const bool keeps = within(speed, rates_.speed) && within(acceleration, rates_.acceleration) &&
+                     within(acceleration - acceleration_, rates_.jerk) && next <= highest + room &&
+                     next >= lowest - room;
+  if (keeps) accept(std::clamp(next, lowest, highest));
+  return keeps;
 }
 
 double NumberLimiter::tolerance_of(const Rates& rates) noexcept {

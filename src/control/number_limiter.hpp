@@ -73,15 +73,14 @@ class NumberLimiter {
 
   /// One iteration of a plan: to `next`, if all limits allow it; else false, and nothing changes.
   bool pass(double next) noexcept {
-    if (!unlimited_ && !keeps_limits(next)) return false;
-    // rounding of a plan may lie beyond the bounds
-    if (!unlimited_)
-      next = std::clamp(next, std::min(minimum_, position_), std::max(maximum_, position_));
     const double speed = next - position_;
-    acceleration_ = speed - speed_;
-    speed_ = speed;
-    position_ = wanted_ = next;
-    stop_known_ = false;
+    const double acceleration = speed - speed_;
+    const bool keeps = next <= maximum_ && next >= minimum_ && std::abs(speed) <= rates_.speed &&
+                       std::abs(acceleration) <= rates_.acceleration &&
+                       std::abs(acceleration - acceleration_) <= rates_.jerk;
+    scale_ = std::max(scale_, std::abs(next));
+    if (!keeps) return pass_rounded(next);
+    accept(next);
     return true;
   }
   /// One iteration towards `wanted`; returns the limit that kept it from there.
@@ -115,7 +114,14 @@ class NumberLimiter {
     if (std::abs(speed_) <= slack() / 100.0 + 2.0 * rounding()) speed_ = acceleration_ = 0.0;
     return Limit::none;
   }
-  bool keeps_limits(double next) noexcept;
+  bool pass_rounded(double next) noexcept;
+  void accept(double next) noexcept {
+    const double speed = next - position_;
+    acceleration_ = speed - speed_;
+    speed_ = speed;
+    position_ = wanted_ = next;
+    stop_known_ = false;
+  }
   Limit follow_at_once() noexcept;
   Limit follow_with_acceleration(double step, double lag) noexcept;
   Limit follow_with_jerk(double step, double lag) noexcept;

@@ -1,6 +1,8 @@
 #include "control/number_motion.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <utility>
 
 namespace o80 {
 
@@ -25,6 +27,15 @@ void NumberMotion::end() noexcept {
 }
 
 std::int64_t NumberMotion::propose(const Asked& asked) noexcept {
+  // mostly nothing limits a set-point: it needs no plan
+  jumps_at_once_ =
+      !has_rates() && asked.iterations <= 1 && !asked.start && !std::isfinite(asked.cruise);
+  if (!jumps_at_once_) return plan_for(asked);
+  asked_ = asked;
+  return 1;
+}
+
+std::int64_t NumberMotion::plan_for(const Asked& asked) noexcept {
   const NumberLimiter::Span stop = guard_.stop();
   NumberLimiter::Span span = stop;
   span.low = std::min(span.low, asked.target);
@@ -60,6 +71,14 @@ std::int64_t NumberMotion::propose(const Asked& asked) noexcept {
 }
 
 void NumberMotion::settle(std::int64_t iterations) noexcept {
+  if (std::exchange(jumps_at_once_, false)) {
+    if (iterations == 1) {
+      planned_ = true;
+      follows_ = guard_.position() < guard_.minimum() || guard_.position() > guard_.maximum();
+      return plan_.line(asked_.target, asked_.target);
+    }
+    plan_for(asked_);
+  }
   if (jumps_) guard_.restart(start_);
   plan_.settle(iterations);
 }

@@ -88,6 +88,7 @@ class NumberMotion {
  private:
   bool is_away() const noexcept { return rest_ && !held_ && guard_.position() != *rest_; }
   bool leave() noexcept;
+  std::int64_t plan_for(const Asked& asked) noexcept;
 
   NumberLimiter guard_;
   std::optional<double> rest_;
@@ -95,7 +96,9 @@ class NumberMotion {
   bool planned_ = false;  // a command moves it by `plan_`
   bool follows_ = false;  // `plan_` may break limits
   bool held_ = false;
-  bool jumps_ = false;  // the plan begins at `start_`
+  bool jumps_at_once_ = false;  // propose() needed no plan
+  Asked asked_;                 // then
+  bool jumps_ = false;          // the plan begins at `start_`
   double start_ = 0.0;
   // a stop from where it was would leave the bounds: goes on with the former plan until it would
   // not
