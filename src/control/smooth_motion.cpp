@@ -46,10 +46,10 @@ SmoothMotion::Extremes SmoothMotion::extremes() const noexcept {
   const double n = last_;
   // v(i) = (n - i + 1)(n - i + 2) u(i); a(i) = (n - i + 2) h(i); j(i) = k(i)
   const Quadratic u{{3.0 * c0_ - (n + 3.0) * c1_, 4.0 * c1_ - (2.0 * n + 3.0) * c2_, 5.0 * c2_}};
-  const auto [C, B, A] = u.c;
-  const Quadratic h{{(n + 3.0) * (B - A) - 2.0 * C, A * (2.0 * n + 7.0) - 3.0 * B, -4.0 * A}};
-  const auto [F, E, D] = h.c;
-  const Quadratic k{{(n + 3.0) * (E - D) - F, D * (2.0 * n + 7.0) - 2.0 * E, -3.0 * D}};
+  const auto [u0, u1, u2] = u.c;
+  const Quadratic h{{(n + 3.0) * (u1 - u2) - 2.0 * u0, u2 * (2.0 * n + 7.0) - 3.0 * u1, -4.0 * u2}};
+  const auto [h0, h1, h2] = h.c;
+  const Quadratic k{{(n + 3.0) * (h1 - h2) - h0, h2 * (2.0 * n + 7.0) - 2.0 * h1, -3.0 * h2}};
 
   Extremes all{target_, target_, 0.0, 0.0, 0.0};
   const auto place = [&](double i) {

@@ -80,10 +80,10 @@ UntypedObservation UntypedFrontend::wait_for_move(const Move& move, Timeout time
                                                   const KeepWaiting& keep_waiting) {
   if (bursting()) return burst_to(move, timeout, keep_waiting);
   const Deadline deadline(timeout);
-  const auto give_up = [&](UntypedObservation row) {
-    std::vector<Miss> misses = move.goal_->misses(row);
+  const auto give_up = [&](const UntypedObservation& last) {
+    std::vector<Miss> misses = move.goal_->misses(last);
     const std::string text = not_reached_text(segment(), misses, move.batch_, timeout);
-    throw NotReached(text, move.batch_, std::move(misses), std::move(row));
+    throw NotReached(text, move.batch_, std::move(misses), last);
   };
   UntypedObservation row(link_->description);
   try {
@@ -94,13 +94,13 @@ UntypedObservation UntypedFrontend::wait_for_move(const Move& move, Timeout time
   const KeepWaiting guarded = link_->guarded(keep_waiting);
   LookAround look_around(*link_, guarded);
   while (!move.goal_->misses(row).empty()) {
-    if (deadline.over()) give_up(std::move(row));
+    if (deadline.over()) give_up(row);
     throw_if_halted(*link_);
     keep_alive();
     look_around();
     const Iteration next = row.iteration() + 1;
     if (link_->rows.wait_for_row(next, deadline, guarded) == Waited::timed_out) {
-      give_up(std::move(row));
+      give_up(row);
     }
     if (!link_->history.read(next, row.bytes())) latest(row.bytes());
   }
