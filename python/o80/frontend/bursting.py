@@ -80,7 +80,7 @@ class Bursting(Moving):
         iterations: number of iterations of each burst.
         actuators: indices or names of the actuators that get targets (None: all).
         steps: number of targets of each actuator in a burst.
-        each: 1: each target is a set-point for its iteration, and the last one stays in force; more:
+        each: 1: each target is a set-point for its iteration, the last one stays in force; more:
             rows of a trajectory, one every so many iterations.
         mode, profile, start: as in add_command.
 
