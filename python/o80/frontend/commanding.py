@@ -48,7 +48,7 @@ class Commanding(Observing):
             iterations: number of iterations of the motion.
             fastest: as fast as the limits of speed, acceleration and jerk allow, at rest at the
                 end. Give one of these five, or none for a set-point: it goes to its target as fast
-                as the limits allow (without limits: in one iteration) and gives way to the next one.
+                as the limits allow (without limits: in one iteration), and gives way to the next.
             mode: "queue" (after the queued commands) or "overwrite" (instead of them).
             profile: "linear", "minimum_jerk" (None: linear, or minimum_jerk for actuators with
                 acceleration limits), or, for a set-point, "as_sent": for a generator at the rate
@@ -58,8 +58,8 @@ class Commanding(Observing):
                 number of iterations. On actuators with acceleration limits the motion then takes
                 twice that, or longer, so that a stream moves smoothly.
 
-            Every command ends at its target. One that the limits make longer than asked comes later:
-            it is completed with the reason "limits".
+            Every command ends at its target. One that the limits make longer than asked comes
+            later: it is completed with the reason "limits".
 
             Raises InvalidArgument for a command that the robot cannot follow.
             """
