@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 import o80
 from chromium import Chromium
+from motion_pictures import draw_paces, draw_streaming
 from o80.command_ends import command_ends
 from o80.plot import plot
 from o80_table_tennis.players.policies import default_policy
@@ -125,3 +126,5 @@ if __name__ == "__main__":
     draw_first_minute(FOLDER / "first_minute.png")
     draw_recording(FOLDER / "recording.png")
     draw_view(FOLDER / "view.png")
+    draw_paces(FOLDER / "paces.png")
+    draw_streaming(FOLDER / "streaming.png")

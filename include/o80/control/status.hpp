@@ -16,7 +16,7 @@ enum class Status : std::uint8_t {
   queued,
   active,
   completed,
-  limited,  // ended, but a limit kept it from its target
+  limited,  // only in recordings of earlier versions: a limit kept it from its target
   overwritten,
   purged,
   interrupted,

@@ -80,7 +80,8 @@ class Bursting(Moving):
         iterations: number of iterations of each burst.
         actuators: indices or names of the actuators that get targets (None: all).
         steps: number of targets of each actuator in a burst.
-        each: iterations to reach each target.
+        each: 1: each target is a set-point for its iteration, the last one stays in force; more:
+            rows of a trajectory, one every so many iterations.
         mode, profile, start: as in add_command.
 
         Raises NotBursting, InvalidArgument.

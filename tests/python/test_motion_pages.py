@@ -1,0 +1,27 @@
+"""The programs of docs/commands.md (its first one) and of docs/streaming.md run."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+
+
+def programs(page: str) -> list[str]:
+    text = (DOCS / page).read_text()
+    return re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+
+
+def test_the_first_program_about_commands_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    exec(compile(programs("commands.md")[0], "commands.md", "exec"), {})
+
+    assert capsys.readouterr().out == "COMPLETED 0 [0.  0.5]\n"
+
+
+def test_the_programs_about_streaming_run(capsys: pytest.CaptureFixture[str]) -> None:
+    names: dict[str, object] = {"__name__": "streaming"}
+    for program in programs("streaming.md"):
+        exec(compile(program, "streaming.md", "exec"), names)
+
+    assert capsys.readouterr().out.splitlines() == ["0.0", "True"]
