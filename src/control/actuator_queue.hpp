@@ -61,8 +61,8 @@ class ActuatorQueue {
   bool at_rest() const noexcept {
     return follows() ? motion_.resting_at_rest() : motion_.at_rest();
   }
-  /// True if it would move nothing.
-  bool stays() const noexcept { return follows() ? motion_.resting_at_rest() : motion_.stays(); }
+  /// True if nothing moves.
+  bool rests() const noexcept { return follows() ? motion_.resting_at_rest() : motion_.rests(); }
   /// True if a command of this lane is queued or running, or its direct value is still held.
   bool acts(std::uint32_t lane) const noexcept {
     return queue_.has(lane) || (alone_ != kNoBlock && ledger_->lane_of(alone_) == lane) ||

@@ -210,7 +210,7 @@ bool Controller::braking() const noexcept {
   // in the last step; or in the next one, for an actuator that has just lost its command
   return std::ranges::any_of(braking_mask_, [](std::uint64_t word) { return word != 0; }) ||
          std::ranges::any_of(actuators_, [](const ActuatorQueue& queue) {
-           return queue.empty() && !queue.stays();
+           return queue.empty() && !queue.rests();
          });
 }
 

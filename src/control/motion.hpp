@@ -101,9 +101,9 @@ class Motion {
   bool at_rest() const noexcept {
     return std::ranges::all_of(numbers_, [](const Number& each) { return each.motion.at_rest(); });
   }
-  /// True if braking would move nothing.
-  bool stays() const noexcept {
-    return std::ranges::all_of(numbers_, [](const Number& each) { return each.motion.stays(); });
+  /// True if nothing moves, as far as limits of acceleration tell.
+  bool rests() const noexcept {
+    return std::ranges::all_of(numbers_, [](const Number& each) { return each.motion.rests(); });
   }
   /// The same as at_rest(), for numbers with a rest value.
   bool resting_at_rest() const noexcept {

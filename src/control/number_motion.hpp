@@ -84,6 +84,8 @@ class NumberMotion {
   bool at_rest() const noexcept { return guard_.at_rest() && !is_away(); }
   /// True if braking would not move it.
   bool stays() const noexcept { return guard_.stays() && !is_away() && !leaves_; }
+  /// True if it rests, or has no limit of acceleration and can rest at once.
+  bool rests() const noexcept { return stays() && (guard_.at_rest() || !accelerates()); }
 
  private:
   bool is_away() const noexcept { return rest_ && !held_ && guard_.position() != *rest_; }

@@ -209,7 +209,8 @@ class Judge {
         return add(
             Fault::falsely_told, slot, batch, group,
             name + (done.empty() ? "never done" : "done at " + std::to_string(done[0].iteration)));
-      if (!done.empty() && done[0].iteration > at)
+      // a smooth successor may stop where a straight line would have ended (judge_end)
+      if (!done.empty() && done[0].iteration > at + (status == Status::overwritten ? 1 : 0))
         return add(Fault::falsely_told, slot, batch, group,
                    name + "done at " + std::to_string(done[0].iteration) + ", after the end");
       if (status == Status::limited && round_.lives[batch.generation].limited == 0)
@@ -266,7 +267,9 @@ class Judge {
       if (done.empty())
         return add(Fault::falsely_told, slot, batch, command,
                    "never done; the driver saw " +
-                       std::to_string(round_.lives[batch.generation].rows) + " rows");
+                       std::to_string(round_.lives[batch.generation].rows) + " rows" +
+                       around(round_.lives[batch.generation], {0, at, command.actuator}) +
+                       told_of(slot, batch));
       if (command.kind == SentKind::command && done[0].iteration != at)
         add(Fault::falsely_told, slot, batch, command,
             "done at " + std::to_string(done[0].iteration));
@@ -274,11 +277,16 @@ class Judge {
     }
     if (status == Status::limited && !is_limited(batch, command))
       return add(Fault::falsely_told, slot, batch, command, "no target was outside of the limits");
-    // within limits of acceleration a motion may rest on its target before its last iteration
-    const bool early = command.arrives_early != 0 || is_limited(batch, command);
+    // within limits of acceleration a motion may rest on its target before its last iteration; a
+    // smooth motion that overwrites a straight line in its last but one iteration stops where that
+    // would have ended
+    const bool stops_there = status == Status::overwritten && !done.empty() &&
+                             (done[0].iteration == at || done[0].iteration == at + 1);
+    const bool early = command.arrives_early != 0 || is_limited(batch, command) || stops_there;
     if (!done.empty() && !early && status != Status::limited)
       add(Fault::falsely_told, slot, batch, command,
-          "done at " + std::to_string(done[0].iteration) + " all the same");
+          "done at " + std::to_string(done[0].iteration) + " all the same" +
+              around(round_.lives[batch.generation], done[0]) + told_of(slot, batch));
   }
 
   /// What one sender sent for one actuator is done in the order in which it was sent.

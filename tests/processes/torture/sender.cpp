@@ -102,7 +102,7 @@ void Sender::add_group() {
   }
   if (chance.percent(20)) options.mode = o80::Mode::overwrite;
   if (chance.percent(20)) options.profile = o80::Profile::minimum_jerk;
-  if (chance.percent(20)) options.start = o80::Start::observed;
+  // all members arrive together: none starts where it is not, which the limiter would follow
   SentCommand& sent = note(SentKind::group, 0, 0);
   sent.targets = std::bit_cast<std::array<std::uint64_t, kActuators>>(targets);
   sent.arrives_early = 1;
