@@ -14,6 +14,9 @@ namespace {
 
 using o80::Status;
 
+/// A straight line takes up to 20 iterations.
+constexpr std::int64_t kLongestStop = 40;
+
 struct Done {
   std::uint64_t value;
   std::int64_t iteration;
@@ -210,7 +213,8 @@ class Judge {
             Fault::falsely_told, slot, batch, group,
             name + (done.empty() ? "never done" : "done at " + std::to_string(done[0].iteration)));
       // a smooth successor may stop where a straight line would have ended (judge_end)
-      if (!done.empty() && done[0].iteration > at + (status == Status::overwritten ? 1 : 0))
+      if (!done.empty() &&
+          done[0].iteration > at + (status == Status::overwritten ? kLongestStop : 0))
         return add(Fault::falsely_told, slot, batch, group,
                    name + "done at " + std::to_string(done[0].iteration) + ", after the end");
       if (status == Status::limited && round_.lives[batch.generation].limited == 0)
@@ -278,10 +282,10 @@ class Judge {
     if (status == Status::limited && !is_limited(batch, command))
       return add(Fault::falsely_told, slot, batch, command, "no target was outside of the limits");
     // within limits of acceleration a motion may rest on its target before its last iteration; a
-    // smooth motion that overwrites a straight line in its last but one iteration stops where that
-    // would have ended
-    const bool stops_there = status == Status::overwritten && !done.empty() &&
-                             (done[0].iteration == at || done[0].iteration == at + 1);
+    // smooth motion that overwrites a straight line may stop where that would have ended: in twice
+    // as many iterations as it had left
+    const bool stops_there =
+        status == Status::overwritten && !done.empty() && done[0].iteration < at + kLongestStop;
     const bool early = command.arrives_early != 0 || is_limited(batch, command) || stops_there;
     if (!done.empty() && !early && status != Status::limited)
       add(Fault::falsely_told, slot, batch, command,
