@@ -121,7 +121,8 @@ def test_a_command_that_takes_longer_than_asked_says_by_how_much_and_why(loop: L
     ended = batch.handles[0]
 
     assert (ended.status, ended.reason) == (o80.Status.COMPLETED, o80.Reason.LIMITS)
-    assert begun.iteration is not None and ended.iteration is not None
+    assert begun.iteration is not None
+    assert ended.iteration is not None
     assert ended.late == ended.iteration - begun.iteration + 1 - 100
     assert ended.text.startswith(f"{ended.late} iterations later than asked, because of its")
 
