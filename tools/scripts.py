@@ -19,7 +19,7 @@ def start(
 ) -> "subprocess.Popen[bytes]":
     """The test program with variables in its environment."""
     environment = {**os.environ, **{name: str(value) for name, value in variables.items()}}
-    command = [PROGRAMS / program, f"--gtest_filter={test}", "--gtest_brief=1"]
+    command = [str(PROGRAMS / program), f"--gtest_filter={test}", "--gtest_brief=1"]
     return subprocess.Popen(command, env=environment)
 
 
