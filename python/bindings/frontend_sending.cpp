@@ -33,6 +33,10 @@ void set_every(o80::PaceSpec& pace, nb::handle every, std::int64_t period) {
         "every is for set-points, which have no pace: leave out every, or the pace");
   }
   const bool counts = PyIndex_Check(every.ptr()) != 0;
+  if (PyBool_Check(every.ptr()) != 0 || (counts && count_of(every, "every") > INT64_MAX / period)) {
+    throw o80::InvalidArgument("every must be seconds or a number of iterations, got " +
+                               nb::cast<std::string>(nb::repr(every)));
+  }
   const std::chrono::nanoseconds time =
       counts ? std::chrono::nanoseconds(count_of(every, "every") * period)
              : nanoseconds_of(every, "every");

@@ -24,6 +24,8 @@ import o80
         (lambda arm: arm.add_command(0, 0.1, start=None), "start must be one of .*, got None"),
         (lambda arm: arm.add_command(0, 0.1, every=0), "every must be positive, got 0"),
         (lambda arm: arm.add_command(0, 0.1, every="x"), "every .*'x'"),
+        (lambda arm: arm.add_command(0, 0.1, every=True), "every .* got True"),
+        (lambda arm: arm.add_command(0, 0.1, every=2**62), "every must be seconds or a number"),
         (lambda arm: arm.add_command(0, 0.1, fastest=1), "fastest must be True or False, got 1"),
         (lambda arm: arm.add_command(True, 0.1), "index or its name, got True"),
         (
