@@ -14,8 +14,8 @@
 //   - slot.word.store(word, std::memory_order_release);
 //   + slot.word.store(word, std::memory_order_relaxed);
 // mutant word_looked_at_once: src/memory/lane_sender.cpp
-//   - slot.word.load(std::memory_order_relaxed) == word) return
-//   + true) return
+//   - slot.word.load(std::memory_order_relaxed) == word) {
+//   + true) {
 // mutant burst_not_taken_back: src/memory/lane_receiver.cpp
 //   - slot.id.store(0, std::memory_order_relaxed); O80_CRASH_POINT("burst.before_row");
 //   +
