@@ -89,11 +89,23 @@ struct PythonDriver {
     extended = std::make_unique<Bytes>(adapter.attr("extended_block"), PyBUF_WRITABLE);
     fresh = std::make_unique<Bytes>(adapter.attr("fresh_block"), PyBUF_WRITABLE);
     active = std::make_unique<Bytes>(adapter.attr("active_words"), PyBUF_WRITABLE);
+    adapter.attr("give_differences")(
+        nb::cpp_function([this](const std::vector<std::uint32_t>& offsets, std::uint32_t order) {
+          if (now == nullptr) {
+            throw o80::InvalidArgument("rate() and rate2() have values in write() only");
+          }
+          std::vector<double> differences;
+          for (const std::uint32_t offset : offsets) {
+            differences.push_back(now->difference(now->context, offset, order));
+          }
+          return differences;
+        }));
   }
 
   nb::object adapter;
   std::unique_ptr<Bytes> desired, observed, extended, fresh, active;
   std::size_t requests = 0;
+  const o80::DesiredView* now = nullptr;  // during write()
 };
 
 PythonDriver& driver(void* robot) { return *static_cast<PythonDriver*>(robot); }
@@ -156,6 +168,7 @@ int describe(void* robot, std::int64_t period, void* context,
                               schema.groups.data(),
                               schema.actuators.data(),
                               schema.limits.data(),
+                              schema.integrals.data(),
                               schema.requests.data(),
                               schema.defaults.data(),
                               schema.shown.values.data(),
@@ -167,6 +180,7 @@ int describe(void* robot, std::int64_t period, void* context,
                               count(schema.groups),
                               count(schema.actuators),
                               count(schema.limits),
+                              count(schema.integrals),
                               count(schema.requests),
                               count(schema.defaults),
                               count(schema.shown.values)};
@@ -195,13 +209,16 @@ void copy(Bytes& to, const void* from) {
 }
 
 int write(void* robot, const o80::DesiredView* desired, FaultText* fault) {
-  return guarded<int>(fault, 1, [&] {
-    PythonDriver& self = driver(robot);
+  PythonDriver& self = driver(robot);
+  self.now = desired;
+  const int failed = guarded<int>(fault, 1, [&] {
     copy(*self.desired, desired->states);
     copy(*self.active, desired->active);
     self.adapter.attr("write")(desired->iteration, desired->time, desired->period);
     return 0;
   });
+  self.now = nullptr;
+  return failed;
 }
 
 /// What the adapter reports of a reading: see `Adapter.read`.

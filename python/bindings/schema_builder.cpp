@@ -84,7 +84,8 @@ void bind_schema_builder(nb::module_& m) {
            "while_halted"_a)
       .def("name_actuator", &SchemaBuilder::name_actuator, "actuator"_a, "name"_a)
       .def("set_follow", &SchemaBuilder::set_follow, "actuator"_a)
-      .def("set_limits", &SchemaBuilder::set_limits, "actuator"_a, "field"_a, "limits"_a)
+      .def("set_limits", &SchemaBuilder::set_limits, "actuator"_a, "field"_a, "limits"_a,
+           "integral"_a, "bounds"_a)
       .def("rests_at", &SchemaBuilder::rests_at, "actuator"_a, "field"_a, "value"_a)
       .def("of_the_world", &SchemaBuilder::of_the_world)
       .def("description", &SchemaBuilder::description)

@@ -46,15 +46,14 @@ struct SchemaBuilder {
     return names;
   }
 
-  /// Sets the limits of a field (empty: the first number), in the order of o80::Limits.
+  /// Sets the limits of a field (empty: the first number), in the order of o80::Limits, and of its
+  /// integral (empty: none), in the order of o80::IntegralBounds.
   void set_limits(std::uint32_t actuator, const std::string& field,
-                  const std::array<double, 6>& given) {
-    const o80::Limits limits{given[0], given[1], given[2], given[3], given[4], given[5]};
-    if (field.empty()) {
-      schema.actuator(actuator).limits(limits);
-    } else {
-      schema.actuator(actuator).limits(field, limits);
-    }
+                  const std::array<double, 6>& given, const std::string& integral,
+                  const std::array<double, 3>& bounds) {
+    o80::Limits limits{given[0], given[1], given[2], given[3], given[4], given[5]};
+    if (!integral.empty()) limits.integral = {integral, bounds[0], bounds[1], bounds[2]};
+    schema.actuator(actuator).limits(field, limits);
   }
 
   void rests_at(std::uint32_t actuator, const std::string& field, double value) {

@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     from o80.joining.align import Aligned, AlignedHistory, align
     from o80.joining.latency import Latency, latency
     from o80.journal import Journal, JournalCommand, JournalEntry
-    from o80.limits import Limits
+    from o80.limits import IntegralBounds, Limits
     from o80.playing.playback import Playback, play
     from o80.prepared_burst import PreparedBurst
     from o80.provenance import Provenance, ProvenanceFile
@@ -103,6 +103,7 @@ _LAZY = {
     "Journal": "o80.journal",
     "JournalCommand": "o80.journal",
     "JournalEntry": "o80.journal",
+    "IntegralBounds": "o80.limits",
     "Limits": "o80.limits",
     "Playback": "o80.playing.playback",
     "play": "o80.playing.playback",
@@ -178,6 +179,7 @@ __all__ = [
     "Handle",
     "History",
     "InlineGroup",
+    "IntegralBounds",
     "InvalidArgument",
     "Journal",
     "JournalCommand",

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from dataclasses import fields as fields_of
 from typing import Any
 
-from o80.limits import Limits
+from o80.limits import IntegralBounds, Limits
 
-LIMITS = tuple(field.name for field in fields_of(Limits))
+LIMITS = tuple(field.name for field in fields_of(Limits) if field.name != "integral")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,22 +85,31 @@ def names_of(described: dict[str, Any], path: str = "") -> Iterator[tuple[str, s
                 yield here, field["unit"], field["help"]
 
 
+def _limits(described: dict[str, Any], paths: list[str]) -> Limits:
+    """The limits of one number. paths: names of all numbers of the state."""
+    given = {key: described[key] for key in LIMITS if described[key] is not None}
+    if integral := described.get("integral"):
+        known = {key: value for key, value in integral.items() if value is not None}
+        given["integral"] = IntegralBounds(paths[known.pop("number")], **known)
+    return Limits(**given)
+
+
 def actuators_of(schema: dict[str, Any]) -> list[Actuator]:
     """The actuators of a schema."""
     actuators = []
     for index, row in enumerate(schema["actuators"]):
         group = schema["groups"][row["group"]]
+        names = [*names_of(group["type"])]
+        paths = [name for name, _, _ in names]
         numbers = tuple(
             Number(
                 name=name,
                 unit=unit,
                 help=text,
-                limits=Limits(**{key: limit[key] for key in LIMITS if limit[key] is not None}),
+                limits=_limits(limit, paths),
                 rest=limit.get("rest"),
             )
-            for (name, unit, text), limit in zip(
-                names_of(group["type"]), row["limits"], strict=True
-            )
+            for (name, unit, text), limit in zip(names, row["limits"], strict=True)
         )
         actuators.append(
             Actuator(

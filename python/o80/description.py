@@ -85,7 +85,17 @@ class SchemaWriter:
         for named, given in limits.items():
             actuator = self._index(named)
             for field, limit in given.items() if isinstance(given, Mapping) else [("", given)]:
-                self.builder.set_limits(actuator, field, list(Limits.of(limit).numbers()))
+                given_limits = Limits.of(limit)
+                integral = given_limits.integral
+                self.builder.set_limits(
+                    actuator,
+                    field,
+                    list(given_limits.numbers()),
+                    integral.field if integral else "",
+                    [integral.minimum, integral.maximum, integral.reaction]
+                    if integral
+                    else [0] * 3,
+                )
 
     def set_rests(self, rests: Mapping[Any, Mapping[str, float]]) -> None:
         """Sets the values to which fields of actuators go without a command."""

@@ -7,6 +7,20 @@ from dataclasses import astuple, dataclass
 from o80.errors import InvalidArgument
 
 
+@dataclass(frozen=True)
+class IntegralBounds:
+    """Bounds of what a number moves: a velocity moves the observed position of its actuator.
+
+    o80 brakes the velocity in time, and lets it move inward only where the position is outside. The
+    velocity rests at 0 and has no limit of jerk.
+    """
+
+    field: str  #: of the observed state; of an array, the element of the same index
+    minimum: float = -math.inf
+    maximum: float = math.inf
+    reaction: float = 0.0  #: time from the desired velocity to the observed one [s]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Limits:
     """Limits of one number, in the unit of its field; the default is no limit.
@@ -20,6 +34,7 @@ class Limits:
     acceleration: float = math.inf  #: [unit/s^2]
     jerk: float = math.inf  #: [unit/s^3]
     error: float = math.inf  #: a larger difference of desired and observed halts the backend
+    integral: IntegralBounds | None = None  #: what the number moves, if it is a velocity
 
     @classmethod
     def of(cls, given: "Limits | Sequence[float | None]") -> "Limits":
@@ -35,5 +50,5 @@ class Limits:
         return cls(**{name: value for name, value in pairs if value is not None})
 
     def numbers(self) -> tuple[float, ...]:
-        """All limits, in the order of the fields."""
-        return astuple(self)
+        """All limits but those of the integral, in the order of the fields."""
+        return astuple(self)[:6]

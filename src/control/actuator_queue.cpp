@@ -90,6 +90,7 @@ bool ActuatorQueue::follow(const std::byte* observed) noexcept {
 
 ActuatorQueue::Moved ActuatorQueue::step(Iteration iteration, const std::byte* observed,
                                          std::uint32_t& late_budget) noexcept {
+  motion_.observe(observed);
   if (!planned_ && may_give_way() && end_late(iteration, late_budget)) {
     const RecordHead& next = pool_->head(queue_.front());
     const bool may_begin = !is_member(next) || ledger_->groups().is_complete(next, iteration);
@@ -106,7 +107,9 @@ ActuatorQueue::Moved ActuatorQueue::step(Iteration iteration, const std::byte* o
   const Limited limited = motion_.step(iteration, desired_);
   if (limited.limit != Limit::none && late_ == 0) reason_ = limited;
   if (iteration >= motion_.last() && rows_left_ == 0) {
-    if (motion_.arrived()) {
+    if (motion_.stands()) {
+      end_held_back(iteration, limited);
+    } else if (motion_.arrived()) {
       end_running(iteration);
     } else if (is_trajectory_ && alone_ == kNoBlock) {
       take_out();
@@ -120,10 +123,12 @@ void ActuatorQueue::begin_given(Mode mode) noexcept {
   motion_.release();
 }
 
-ActuatorQueue::Moved ActuatorQueue::go_to(Iteration iteration, const std::byte* target) noexcept {
+ActuatorQueue::Moved ActuatorQueue::go_to(Iteration iteration, const std::byte* observed,
+                                          const std::byte* target) noexcept {
+  motion_.observe(observed);
   const SetPoint set_point{usual_profile_};
-  const bool same =
-      in_force_ && set_point_ == set_point && layout_->same(target, motion_.target(), nullptr);
+  const bool same = in_force_ && !motion_.was_held_back() && set_point_ == set_point &&
+                    layout_->same(target, motion_.target(), nullptr);
   if (!same) {
     motion_.begin(nullptr);
     layout_->copy(motion_.target(), target);
@@ -135,7 +140,11 @@ ActuatorQueue::Moved ActuatorQueue::go_to(Iteration iteration, const std::byte* 
   rows_left_ = ahead_left_ = 0;
   in_force_ = given_ = running_ = true;
   const Limited limited = motion_.step(iteration, desired_);
-  if (iteration >= motion_.last() && motion_.arrived()) end_running(iteration);
+  if (iteration >= motion_.last() && motion_.stands()) {
+    end_held_back(iteration, limited);
+  } else if (iteration >= motion_.last() && motion_.arrived()) {
+    end_running(iteration);
+  }
   return limited.limit == Limit::none ? Moved::active : Moved::clamped;
 }
 
@@ -174,6 +183,16 @@ void ActuatorQueue::end_running(Iteration iteration) noexcept {
   } else {
     ledger_->end(record, Status::completed, Reason::none, 0, iteration);
   }
+}
+
+/// Bounds of an integral hold the running command back, and it stands: it ends where it is.
+void ActuatorQueue::end_held_back(Iteration iteration, const Limited& bound) noexcept {
+  const bool given = given_;
+  const BlockIndex record = given ? kNoBlock : running_record();
+  end_motion();
+  if (given) return;
+  if (std::exchange(alone_, kNoBlock) == kNoBlock) queue_.pop();
+  ledger_->end(record, Status::interrupted, Reason::limits, bound.packed(), iteration);
 }
 
 /// Without a command: the motion brakes within its limits, and fields with a rest value go to it.
@@ -217,7 +236,8 @@ bool ActuatorQueue::end_late(Iteration iteration, std::uint32_t& late_budget) no
 /// True for a direct command that is equal to the set-point in force.
 bool ActuatorQueue::is_in_force(const RecordHead& head, BlockIndex record) noexcept {
   const SetPoint next{head.profile, head.start, head.amount, head.masked != 0};
-  if (!in_force_ || head.pace != Pace::direct || !(next == set_point_)) return false;
+  if (!in_force_ || motion_.was_held_back() || head.pace != Pace::direct || !(next == set_point_))
+    return false;
   Cursor cursor(*pool_, record, sizeof(RecordHead), head.payload_bytes);
   if (next.masked) {
     cursor.read(next_mask_.data(), next_mask_.size() * sizeof next_mask_.front());

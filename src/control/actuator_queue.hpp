@@ -54,7 +54,7 @@ class ActuatorQueue {
   void begin_given(Mode mode) noexcept;
   /// Then, in each iteration: goes to the next one, as a direct command would. The last one stays
   /// in force.
-  Moved go_to(Iteration iteration, const std::byte* target) noexcept;
+  Moved go_to(Iteration iteration, const std::byte* observed, const std::byte* target) noexcept;
   /// True if a direct value keeps a number away from its rest value.
   bool holds() const noexcept { return motion_.holds(); }
   /// True if an iteration without a command would change nothing.
@@ -75,6 +75,10 @@ class ActuatorQueue {
   /// numbers with a rest value, which go to it. True while one of these moves.
   bool follow(const std::byte* observed) noexcept;
   bool follows() const noexcept { return when_idle_ == WhenIdle::follow; }
+  /// As Motion::difference().
+  double difference(std::uint32_t offset, std::uint32_t order) const noexcept {
+    return motion_.difference(offset, order);
+  }
 
  private:
   /// What a direct command, or a given target, is: an equal one behind it changes nothing.
@@ -102,6 +106,7 @@ class ActuatorQueue {
   Motion::Course course(const RecordHead& head, Iteration iteration) noexcept;
   std::int64_t row_of_own_time() noexcept;
   void end_running(Iteration iteration) noexcept;
+  void end_held_back(Iteration iteration, const Limited& bound) noexcept;
   void take_out() noexcept;
   BlockIndex running_record() const noexcept {
     return alone_ != kNoBlock ? alone_ : queue_.front();

@@ -91,7 +91,7 @@ void Controller::step(Iteration iteration, const std::byte* observed) noexcept {
   told_ = 0;
   if (ledger_.open_groups() > 0) step_groups(iteration, observed, late_budget);
   const bool gives = given_.acts(iteration);
-  if (gives) step_given(iteration);
+  if (gives) step_given(iteration, observed);
   for (std::size_t word = 0; word < busy_.size(); ++word) {
     const auto base = static_cast<std::uint32_t>(word * 64);
     const std::uint64_t stepped = gives ? stepped_[word] : 0;
@@ -134,7 +134,7 @@ bool Controller::has_no_command(std::span<const std::uint32_t> actuators) const 
 }
 
 /// The targets of this iteration => desired.
-void Controller::step_given(Iteration iteration) noexcept {
+void Controller::step_given(Iteration iteration, const std::byte* observed) noexcept {
   const bool first = !std::exchange(was_given_, true);
   if (first) std::ranges::fill(dropped_, 0);
   std::ranges::fill(stepped_, 0);
@@ -147,7 +147,8 @@ void Controller::step_given(Iteration iteration) noexcept {
     const std::uint64_t bit = std::uint64_t{1} << (i % 64);
     if ((dropped_[i / 64] & bit) != 0) continue;
     if (first) actuators_[i].begin_given(given_.mode);
-    const bool clamped = actuators_[i].go_to(iteration, target) == ActuatorQueue::Moved::clamped;
+    const bool clamped =
+        actuators_[i].go_to(iteration, of(i, observed), target) == ActuatorQueue::Moved::clamped;
     stepped_[i / 64] |= bit;
     busy_[i / 64] |= bit;
     clamped_mask_[i / 64] = clamped ? clamped_mask_[i / 64] | bit : clamped_mask_[i / 64] & ~bit;
@@ -168,6 +169,14 @@ bool Controller::finish_all_pending() noexcept {
 bool Controller::acts(std::uint32_t lane) const noexcept {
   return std::ranges::any_of(actuators_,
                              [&](const ActuatorQueue& queue) { return queue.acts(lane); });
+}
+
+double Controller::difference(std::uint32_t offset, std::uint32_t order) const noexcept {
+  const auto behind = std::ranges::upper_bound(offsets_, offset);
+  if (behind == offsets_.begin()) return 0.0;
+  const auto i = static_cast<std::size_t>(behind - offsets_.begin()) - 1;
+  if ((active_mask_[i / 64] >> (i % 64) & 1) == 0) return 0.0;
+  return actuators_[i].difference(offset - offsets_[i], order);
 }
 
 std::optional<NotFinite> Controller::not_finite(const std::byte* block) const noexcept {

@@ -114,6 +114,9 @@ class Controller {
   const std::uint64_t* braking_mask() const noexcept { return braking_mask_.data(); }
   /// True if an actuator without a command is not at rest; O(actuators).
   bool braking() const noexcept;
+  /// First (order 1) or second difference, to the iteration before, of the number at this offset
+  /// of the desired block; 0 for an actuator that was not active, and for what does not move.
+  double difference(std::uint32_t offset, std::uint32_t order) const noexcept;
   /// Number of 64-bit words of a mask.
   std::uint32_t words() const noexcept { return static_cast<std::uint32_t>(active_mask_.size()); }
 
@@ -141,7 +144,7 @@ class Controller {
   void step_groups(Iteration iteration, const std::byte* observed,
                    std::uint32_t& late_budget) noexcept;
   bool finish_all_pending() noexcept;
-  void step_given(Iteration iteration) noexcept;
+  void step_given(Iteration iteration, const std::byte* observed) noexcept;
   void forget_given(std::uint32_t actuator) noexcept;
   const std::byte* of(std::uint32_t actuator, const std::byte* block) const noexcept {
     return block + offsets_[actuator];

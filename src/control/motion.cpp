@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <memory>
 #include <type_traits>
 #include <utility>
 
@@ -84,6 +85,12 @@ Motion::Motion(const Schema& schema, const ActuatorRow& actuator, const StateLay
     numbers_.push_back(
         {i, place.offset, lowest, highest, place.kind, limited || row.resting != 0,
          NumberMotion(guard, row.resting != 0 ? std::optional(row.rest) : std::nullopt)});
+    for (const IntegralRow& integral : schema.integrals) {
+      if (integral.limit != actuator.first_limit + i) continue;
+      numbers_.back().motion.bound_integral(
+          std::make_unique<IntegralBound>(integral, rates, period));
+      has_integrals_ = true;
+    }
   }
 }
 
@@ -218,7 +225,8 @@ Limited Motion::step(Iteration now, std::byte* state) noexcept {
       continue;
     }
     const Limit limit = each.motion.step(each.lowest, each.highest);
-    if (limit != Limit::none && result.limit == Limit::none) result = {limit, each.number};
+    const bool first = limit != Limit::none && result.limit == Limit::none;
+    if (first || limit >= Limit::below_integral) result = {limit, each.number};
     if (over && each.motion.arrived()) {
       std::memcpy(state + each.offset, target() + each.offset, layout_.numbers()[each.number].size);
     } else if (each.kind == Kind::float64) {

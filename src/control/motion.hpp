@@ -69,12 +69,41 @@ class Motion {
   /// True if a commanded number has a limit of acceleration.
   bool accelerates() const noexcept;
 
+  /// Where the robot is: before step() or brake().
+  void observe(const std::byte* observed) noexcept {
+    if (!has_integrals_) return;
+    for (Number& each : numbers_) {
+      if (const IntegralBound* moved = each.motion.integral()) {
+        each.motion.observe(layout_.number(moved->number(), observed));
+      }
+    }
+  }
   /// One iteration of the motion; the limit that changed it, if any.
   Limited step(Iteration now, std::byte* state) noexcept;
   Iteration last() const noexcept { return last_; }
   /// True if the state of the last step() was the target: nothing is left to follow.
   bool arrived() const noexcept {
     return std::ranges::all_of(numbers_, [](const Number& each) { return each.motion.arrived(); });
+  }
+  /// True if bounds of an integral hold a number back, which stands, and the others have arrived.
+  bool stands() const noexcept {
+    return has_integrals_ &&
+           std::ranges::all_of(
+               numbers_,
+               [](const Number& each) { return each.motion.stands() || each.motion.arrived(); }) &&
+           std::ranges::any_of(numbers_, [](const Number& each) { return each.motion.stands(); });
+  }
+  /// True if such bounds have changed the motion since begin().
+  bool was_held_back() const noexcept {
+    return has_integrals_ && std::ranges::any_of(numbers_, [](const Number& each) {
+             return each.motion.was_held_back();
+           });
+  }
+  /// Difference of the number at this offset to the iteration before: first (order 1) or second; 0
+  /// for what does not move.
+  double difference(std::uint32_t offset, std::uint32_t order) const noexcept {
+    const auto found = std::ranges::find(numbers_, offset, &Number::offset);
+    return found == numbers_.end() ? 0.0 : found->motion.difference(order);
   }
   /// The limit because of which plan() took more iterations than asked.
   Limited slowest() const noexcept { return slowest_; }
@@ -145,6 +174,7 @@ class Motion {
   double iterations_ = 1.0;
   Profile profile_ = Profile::linear;
   const std::byte* observed_ = nullptr;
+  bool has_integrals_ = false;
   bool is_row_ = false;
   bool begun_ = false;  // the next row begins a command
   bool follows_rows_ = false;

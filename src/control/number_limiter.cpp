@@ -248,8 +248,14 @@ Limit NumberLimiter::follow_with_jerk(double step, double lag) noexcept {
     }
   }
 
-  // else come as near as the limits allow; the stop from the last state is always possible
-  const double best = tracked ? std::clamp(wanted, low, high) : goal(step, lag, low, high);
+  // else come as near as the limits allow
+  return accelerate(tracked ? std::clamp(wanted, low, high) : goal(step, lag, low, high));
+}
+
+/// Takes the acceleration nearest to `best` that the limits allow; the stop from the last state is
+/// always possible.
+Limit NumberLimiter::accelerate(double best) noexcept {
+  know_stop();
   Candidate next = candidate(best);
   Limit reason = violated(next);
   if (reason == Limit::none) {
@@ -277,6 +283,30 @@ Limit NumberLimiter::follow_with_jerk(double step, double lag) noexcept {
     slow_down();
   }
   return reason;
+}
+
+void NumberLimiter::place(const Moment& now) noexcept {
+  position_ = wanted_ = now.position;
+  speed_ = now.speed;
+  acceleration_ = now.acceleration;
+  scale_ = std::abs(position_);
+  stop_known_ = false;
+}
+
+Limit NumberLimiter::nearest_speed(double wanted) noexcept {
+  if (std::isfinite(rates_.jerk)) {
+    const double low = std::max(acceleration_ - rates_.jerk, -rates_.acceleration);
+    const double high = std::min(acceleration_ + rates_.jerk, rates_.acceleration);
+    const Limit reason = accelerate(std::clamp(wanted - speed_, low, high));
+    return reason == Limit::minimum || reason == Limit::maximum ? reason : Limit::none;
+  }
+  const double up = speed_for(std::max(0.0, high_ - position_), rates_.acceleration);
+  const double down = speed_for(std::max(0.0, position_ - low_), rates_.acceleration);
+  const double highest = std::max(up, speed_ - rates_.acceleration);
+  const double lowest = std::min(-down, speed_ + rates_.acceleration);
+  move(std::clamp(wanted, lowest, highest));
+  if (wanted > highest + slack()) return Limit::maximum;
+  return wanted < lowest - slack() ? Limit::minimum : Limit::none;
 }
 
 void NumberLimiter::brake() noexcept {

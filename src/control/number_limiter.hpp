@@ -98,6 +98,12 @@ class NumberLimiter {
   /// One iteration of braking, as fast as the limits allow.
   void brake() noexcept;
 
+  /// For a motion that something else keeps: it is here now, wherever the last iteration led.
+  void place(const Moment& now) noexcept;
+  /// Then one iteration at the speed nearest to `wanted` from which it stops inside the bounds;
+  /// returns the bound that kept it from `wanted`.
+  Limit nearest_speed(double wanted) noexcept;
+
  private:
   struct Candidate;
 
@@ -125,6 +131,7 @@ class NumberLimiter {
   Limit follow_at_once() noexcept;
   Limit follow_with_acceleration(double step, double lag) noexcept;
   Limit follow_with_jerk(double step, double lag) noexcept;
+  Limit accelerate(double wanted) noexcept;
   Candidate candidate(double acceleration) const noexcept;
   Limit violated(const Candidate& next) const noexcept;
   double goal(double step, double lag, double low, double high) const noexcept;

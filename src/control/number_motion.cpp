@@ -8,11 +8,13 @@ namespace o80 {
 
 void NumberMotion::restart(double position) noexcept {
   guard_.restart(position);
-  planned_ = follows_ = held_ = leaves_ = false;
+  planned_ = follows_ = held_ = leaves_ = held_back_ = stands_ = false;
+  difference_ = former_difference_ = 0.0;
 }
 
 void NumberMotion::begin() noexcept {
   former_target_ = planned_ ? plan_.target() : guard_.position();
+  held_back_ = false;
   end();
 }
 
@@ -108,7 +110,40 @@ bool NumberMotion::leave() noexcept {
   return leaves_ && guard_.pass(former_.next());
 }
 
+/// One iteration by `move`, as far as the bounds of the integral allow; returns the one that does
+/// not.
+template <class Move>
+Limit NumberMotion::move(Move&& move) noexcept {
+  const double before = guard_.position();
+  Limit bound = Limit::none;
+  stands_ = false;
+  if (!integral_) {
+    move();
+  } else {
+    const NumberLimiter guard = guard_;
+    move();
+    const auto admitted = integral_->admit(guard.moment(), guard_.position());
+    bound = admitted.bound;
+    if (bound != Limit::none) {
+      guard_ = guard;
+      guard_.follow_within_bounds();
+      if (!guard_.pass(admitted.velocity)) guard_.follow(admitted.velocity);
+      follows_ = planned_;
+      held_back_ = true;
+      stands_ = integral_->stands();
+    }
+  }
+  former_difference_ = std::exchange(difference_, guard_.position() - before);
+  return bound;
+}
+
 Limit NumberMotion::step(double low, double high) noexcept {
+  Limit limit = Limit::none;
+  const Limit bound = move([&] { limit = step_freely(low, high); });
+  return bound != Limit::none ? bound : limit;
+}
+
+Limit NumberMotion::step_freely(double low, double high) noexcept {
   const double wanted = std::clamp(plan_.next(), low, high);
   if (!follows_ && guard_.pass(wanted)) return Limit::none;
   follows_ = true;
@@ -117,6 +152,14 @@ Limit NumberMotion::step(double low, double high) noexcept {
 }
 
 bool NumberMotion::brake() noexcept {
+  bool moves = false;
+  const Limit bound = move([&] { moves = brake_freely(); });
+  // what stands at a bound is no longer held away from rest
+  if (stands_) held_ = false;
+  return moves || bound != Limit::none;
+}
+
+bool NumberMotion::brake_freely() noexcept {
   const double before = guard_.position();
   const bool was_away = is_away();
   if (was_away) {

@@ -1,8 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
+#include <utility>
 
+#include "control/integral_bound.hpp"
 #include "control/number_limiter.hpp"
 #include "control/number_plan.hpp"
 
@@ -16,6 +19,23 @@ class NumberMotion {
   /// `rest`: the value that it goes to without a command, if it has one.
   NumberMotion(const NumberLimiter& guard, std::optional<double> rest) noexcept
       : guard_(guard), rest_(rest) {}
+
+  /// Bounds of what it moves.
+  void bound_integral(std::unique_ptr<IntegralBound> bound) noexcept {
+    integral_ = std::move(bound);
+  }
+  /// The number of the observed state that it moves, if that has bounds.
+  const IntegralBound* integral() const noexcept { return integral_.get(); }
+  /// Where that is: before each step() or brake().
+  void observe(double position) noexcept { integral_->observe(position); }
+  /// True if these bounds have changed its motion since begin().
+  bool was_held_back() const noexcept { return held_back_; }
+  /// True if they hold it back in this iteration, and it stands.
+  bool stands() const noexcept { return stands_; }
+  /// First (order 1) or second difference of its positions, to the iteration before.
+  double difference(std::uint32_t order) const noexcept {
+    return order == 1 ? difference_ : difference_ - former_difference_;
+  }
 
   const NumberLimiter& guard() const noexcept { return guard_; }
   double position() const noexcept { return guard_.position(); }
@@ -81,7 +101,10 @@ class NumberMotion {
   void release() noexcept { held_ = false; }
   bool is_held_away() const noexcept { return held_ && guard_.position() != *rest_; }
   /// True if braking would change nothing.
-  bool at_rest() const noexcept { return guard_.at_rest() && !is_away(); }
+  bool at_rest() const noexcept {
+    const bool moves_integral = integral_ && guard_.position() != 0.0;
+    return guard_.at_rest() && !is_away() && !moves_integral;
+  }
   /// True if braking would not move it.
   bool stays() const noexcept { return guard_.stays() && !is_away() && !leaves_; }
   /// True if it rests, or has no limit of acceleration and can rest at once.
@@ -90,6 +113,10 @@ class NumberMotion {
  private:
   bool is_away() const noexcept { return rest_ && !held_ && guard_.position() != *rest_; }
   bool leave() noexcept;
+  Limit step_freely(double low, double high) noexcept;
+  bool brake_freely() noexcept;
+  template <class Move>
+  Limit move(Move&& move) noexcept;
   std::int64_t plan_for(const Asked& asked) noexcept;
 
   NumberLimiter guard_;
@@ -107,6 +134,11 @@ class NumberMotion {
   bool leaves_ = false;
   NumberPlan former_;
   double former_target_ = 0.0;
+  double difference_ = 0.0;  // of the positions of the last two iterations, and of those before
+  double former_difference_ = 0.0;
+  std::unique_ptr<IntegralBound> integral_;
+  bool held_back_ = false;
+  bool stands_ = false;
 };
 
 }  // namespace o80

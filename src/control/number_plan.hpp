@@ -10,7 +10,16 @@
 namespace o80 {
 
 /// The limit that kept a number from its wanted position, or that makes a motion long.
-enum class Limit : std::uint8_t { none, minimum, maximum, speed, acceleration, jerk };
+enum class Limit : std::uint8_t {
+  none,
+  minimum,
+  maximum,
+  speed,
+  acceleration,
+  jerk,
+  below_integral,  // the minimum and the maximum of what the number moves
+  above_integral
+};
 
 /// The longest plan [iterations]. A command that needs more is rejected.
 inline constexpr std::int64_t kLongestPlan = std::int64_t{1} << 31;

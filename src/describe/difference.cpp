@@ -71,6 +71,12 @@ std::string limits_of(const Schema& schema, const ActuatorRow& actuator) {
             number(limit.jerk) + "/s^3, error " + number(limit.error) +
             (limit.resting != 0 ? ", rests at " + number(limit.rest) : "");
   }
+  for (const IntegralRow& row : schema.integrals) {
+    if (row.limit - actuator.first_limit >= actuator.limits) continue;
+    text += "; integral of " + std::to_string(row.limit - actuator.first_limit) + " is " +
+            std::to_string(row.number) + ", " + number(row.minimum) + " to " + number(row.maximum) +
+            ", reaction " + number(row.reaction) + " s";
+  }
   return text;
 }
 

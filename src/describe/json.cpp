@@ -177,6 +177,20 @@ void write_actuator(JsonWriter& json, const Schema& schema, const ActuatorRow& a
       json.key("rest");
       json.value(limit.rest);
     }
+    for (const IntegralRow& row : schema.integrals) {
+      if (row.limit != actuator.first_limit + i) continue;
+      json.key("integral");
+      json.open('{');
+      json.key("number");
+      json.value(std::int64_t{row.number});
+      json.key("minimum");
+      json.value(row.minimum);
+      json.key("maximum");
+      json.value(row.maximum);
+      json.key("reaction");
+      json.value(row.reaction);
+      json.close('}');
+    }
     json.close('}');
   }
   json.close(']');

@@ -48,6 +48,13 @@ struct ShownHead {
   std::uint32_t mjcf = 0;  // [bytes]
 };
 
+/// Follows them if a number has bounds of its integral, then the rows.
+struct IntegralsHead {
+  std::uint64_t magic = 0x6C6172676E4980;  // "80Ingral" behind a byte that is no text
+  std::uint32_t rows = 0;
+  std::uint32_t row_size = sizeof(IntegralRow);
+};
+
 [[noreturn]] void refuse(const std::string& why) {
   throw InvalidArgument("invalid description: " + why);
 }
@@ -251,6 +258,52 @@ void check_actuators(const Schema& schema, const std::vector<std::uint64_t>& num
   }
 }
 
+void check_integral(const Schema& schema, const ActuatorRow& actuator, const IntegralRow& row) {
+  const std::string of = "the integral bounds of actuator '" + actuator.name.str() + "': ";
+  const std::uint32_t own = row.limit - actuator.first_limit;
+  if (row.number >= actuator.limits || row.number == own) {
+    refuse(of + "they must name another field of its state");
+  }
+  std::uint32_t i = 0;
+  schema.each_scalar(actuator.type, [&](std::uint32_t, const FieldRow& field) {
+    const bool is_used = i == own || i == row.number;
+    ++i;
+    if (!is_used || field.kind == Kind::float64 || field.kind == Kind::float32) return;
+    refuse(of + "'" + field.name.str() + "' is not a floating-point number");
+  });
+  if (std::isnan(row.minimum) || std::isnan(row.maximum) || row.minimum > row.maximum) {
+    refuse(of + "the minimum must not exceed the maximum, got " + std::to_string(row.minimum) +
+           " to " + std::to_string(row.maximum));
+  }
+  if (!std::isfinite(row.reaction) || row.reaction < 0.0) {
+    refuse(of + "the reaction must be a time of 0 s or more, got " + std::to_string(row.reaction));
+  }
+  const LimitRow& limit = schema.limits[row.limit];
+  if (std::isfinite(limit.jerk)) {
+    refuse(of +
+           "what moves the integral must have no limit of jerk: its speed and acceleration "
+           "are the acceleration and the jerk of the integral");
+  }
+  if (limit.minimum > 0.0 || limit.maximum < 0.0 || limit.resting == 0 || limit.rest != 0.0) {
+    refuse(of +
+           "what moves the integral must rest at 0; describe rests_at(0), and limits around 0");
+  }
+}
+
+void check_integrals(const Schema& schema) {
+  std::set<std::uint32_t> used;
+  for (const IntegralRow& row : schema.integrals) {
+    const auto owner = std::ranges::find_if(schema.actuators, [&](const ActuatorRow& actuator) {
+      return row.limit >= actuator.first_limit &&
+             row.limit - actuator.first_limit < actuator.limits;
+    });
+    if (owner == schema.actuators.end() || !used.insert(row.limit).second) {
+      refuse("integral bounds of a missing number, or two of one number");
+    }
+    check_integral(schema, *owner, row);
+  }
+}
+
 void check_groups(const Schema& schema) {
   std::uint64_t next = 0;
   for (const GroupRow& group : schema.groups) {
@@ -303,6 +356,27 @@ std::size_t size_of(const ShownModel& shown) {
          shown.mjcf.size();
 }
 
+std::size_t size_of(const std::vector<IntegralRow>& rows) {
+  return rows.empty() ? 0 : sizeof(IntegralsHead) + rows.size() * sizeof(IntegralRow);
+}
+
+std::vector<IntegralRow> integrals_from(std::span<const std::byte> bytes) {
+  std::vector<IntegralRow> rows;
+  IntegralsHead head;
+  const IntegralsHead known;
+  if (bytes.size() < sizeof head) return rows;
+  std::memcpy(&head, bytes.data(), sizeof head);
+  if (head.magic != known.magic) return rows;
+  bytes = bytes.subspan(sizeof head);
+  if (head.row_size != known.row_size || head.rows > kMostRows ||
+      bytes.size() < head.rows * sizeof(IntegralRow)) {
+    refuse("integral bounds of another size");
+  }
+  rows.resize(head.rows);
+  if (head.rows > 0) std::memcpy(rows.data(), bytes.data(), head.rows * sizeof(IntegralRow));
+  return rows;
+}
+
 /// Reads the part behind the tables; nothing there, or something else, is no model.
 ShownModel shown_from(std::span<const std::byte> bytes) {
   ShownModel shown;
@@ -348,6 +422,7 @@ void check(const Schema& schema) {
       if (std::isnan(value)) refuse("a limit is NaN");
     }
   }
+  check_integrals(schema);
   check_groups(schema);
   check_shown(schema);
   if (schema.requests.size() >= kMostActuators) refuse("too many requests");
@@ -372,7 +447,7 @@ std::vector<std::byte> to_bytes(const Schema& schema) {
     head.sizes[i] = sizeof(Row);
     size += rows.size() * sizeof(Row);
   });
-  std::vector<std::byte> bytes(size + size_of(schema.shown));
+  std::vector<std::byte> bytes(size + size_of(schema.shown) + size_of(schema.integrals));
   std::byte* out = bytes.data();
   const auto put = [&](const void* from, std::size_t count) {
     if (count > 0) std::memcpy(out, from, count);
@@ -383,15 +458,20 @@ std::vector<std::byte> to_bytes(const Schema& schema) {
   each_table(schema, [&]<class Row>(int, const std::vector<Row>& rows) {
     put(rows.data(), rows.size() * sizeof(Row));
   });
-  const ShownModel& shown = schema.shown;
-  if (shown.empty()) return bytes;
-  const ShownHead shown_head{.rows = static_cast<std::uint32_t>(shown.values.size()),
-                             .file = static_cast<std::uint32_t>(shown.file.size()),
-                             .mjcf = static_cast<std::uint32_t>(shown.mjcf.size())};
-  put(&shown_head, sizeof shown_head);
-  put(shown.values.data(), shown.values.size() * sizeof(ShownRow));
-  put(shown.file.data(), shown.file.size());
-  put(shown.mjcf.data(), shown.mjcf.size());
+  if (const ShownModel& shown = schema.shown; !shown.empty()) {
+    const ShownHead shown_head{.rows = static_cast<std::uint32_t>(shown.values.size()),
+                               .file = static_cast<std::uint32_t>(shown.file.size()),
+                               .mjcf = static_cast<std::uint32_t>(shown.mjcf.size())};
+    put(&shown_head, sizeof shown_head);
+    put(shown.values.data(), shown.values.size() * sizeof(ShownRow));
+    put(shown.file.data(), shown.file.size());
+    put(shown.mjcf.data(), shown.mjcf.size());
+  }
+  if (!schema.integrals.empty()) {
+    const IntegralsHead integrals{.rows = static_cast<std::uint32_t>(schema.integrals.size())};
+    put(&integrals, sizeof integrals);
+    put(schema.integrals.data(), schema.integrals.size() * sizeof(IntegralRow));
+  }
   return bytes;
 }
 
@@ -421,6 +501,7 @@ Schema schema_from_bytes(std::span<const std::byte> bytes) {
   schema.keys.resize(schema.types.size());
   try {
     schema.shown = shown_from(bytes.subspan(at));
+    schema.integrals = integrals_from(bytes.subspan(at + size_of(schema.shown)));
     check(schema);
   } catch (const InvalidArgument& error) {
     throw foreign(error.what());

@@ -98,6 +98,7 @@ Schema DriverInstance::describe(std::int64_t period) const {
     out.groups.assign(rows->groups, rows->groups + rows->group_count);
     out.actuators.assign(rows->actuators, rows->actuators + rows->actuator_count);
     out.limits.assign(rows->limits, rows->limits + rows->limit_count);
+    out.integrals.assign(rows->integrals, rows->integrals + rows->integral_count);
     out.requests.assign(rows->requests, rows->requests + rows->request_count);
     out.defaults.assign(rows->defaults, rows->defaults + rows->default_count);
     out.shown = {.mjcf = rows->mjcf,

@@ -119,8 +119,16 @@ bool Loop::iterate() noexcept {
 }
 
 bool Loop::write() noexcept {
-  const DesiredView view{backend_.desired(), backend_.active(), backend_.iteration(),
-                         backend_.time(), backend_.schema().head.period};
+  const auto difference = [](const void* backend, std::uint32_t offset, std::uint32_t order) {
+    return static_cast<const UntypedBackend*>(backend)->difference(offset, order);
+  };
+  const DesiredView view{backend_.desired(),
+                         backend_.active(),
+                         backend_.iteration(),
+                         backend_.time(),
+                         backend_.schema().head.period,
+                         difference,
+                         &backend_};
   return calls(Verb::write, [&] { return robot_->write(view); }) || failed("write");
 }
 

@@ -400,6 +400,9 @@ const std::byte* UntypedBackend::desired() const noexcept { return body_->contro
 const std::uint64_t* UntypedBackend::active() const noexcept {
   return body_->controller.active_mask();
 }
+double UntypedBackend::difference(std::uint32_t offset, std::uint32_t order) const noexcept {
+  return body_->controller.difference(offset, order);
+}
 const std::uint64_t* UntypedBackend::braking() const noexcept {
   return body_->controller.braking_mask();
 }

@@ -4,6 +4,8 @@
 #include <unordered_map>
 
 #include "base/printable.hpp"
+#include "control/number_name.hpp"
+#include "control/number_plan.hpp"
 #include "memory/atomic_words.hpp"
 #include "memory/running_slot.hpp"
 #include "o80/base/error.hpp"
@@ -20,6 +22,11 @@ struct Batch::Kept {
   /// End statuses that were read once; kept because the segment reuses their slots.
   std::unordered_map<CommandId, Handle> ended;
   std::vector<SentCommand> commands;  // constant
+
+  /// Those of one record.
+  std::span<const SentCommand> commands_of(std::uint64_t place) const {
+    return std::ranges::equal_range(commands, place, {}, &SentCommand::place);
+  }
 };
 
 Batch::Batch(std::shared_ptr<Link> link, Sent sent)
@@ -60,7 +67,25 @@ std::string limited_by(std::uint8_t packed, std::int64_t late) {
          (number == 0 ? "" : " (number " + std::to_string(number) + " of its state)");
 }
 
-std::string words_for(const Link& link, const Handle& handle, std::uint8_t detail) {
+/// Describes which bound of an integral ended a command; `packed` as in Limited::packed().
+std::string held_by(const Schema& schema, std::span<const SentCommand> commands,
+                    std::uint8_t packed) {
+  const std::string bound =
+      (packed & 7U) == static_cast<unsigned>(Limit::below_integral) ? "minimum" : "maximum";
+  for (const SentCommand& command : commands) {
+    if (command.index >= schema.actuators.size()) continue;
+    for (const IntegralRow& row : schema.integrals) {
+      if (row.limit != schema.actuators[command.index].first_limit + (packed >> 3U)) continue;
+      ShortText<200> name;
+      name_number(schema, command.index, row.number, name);
+      return "it is held back at the " + bound + " of the " + std::string(name.view());
+    }
+  }
+  return "it is held back at the " + bound + " of what it moves";
+}
+
+std::string words_for(const Link& link, std::span<const SentCommand> commands, const Handle& handle,
+                      std::uint8_t detail) {
   switch (handle.reason) {
     case Reason::late:
       return "it came after the iteration for which it was sent";
@@ -72,7 +97,9 @@ std::string words_for(const Link& link, const Handle& handle, std::uint8_t detai
                  : "the record was invalid: it was built by another version of o80, or the lane "
                    "was corrupted";
     case Reason::limits:
-      return limited_by(detail, handle.late);
+      return handle.status == Status::interrupted
+                 ? held_by(link.description->schema, commands, detail)
+                 : limited_by(detail, handle.late);
     case Reason::fresh_start:
       return "the robot made a fresh start (reset, restore or resume)";
     case Reason::dead_frontend:
@@ -124,7 +151,9 @@ Handle Batch::ask(CommandId id) const {
   }
   const bool has_message = handle.reason == Reason::driver || handle.reason == Reason::halted;
   if (has_message) handle.text = lane_->message(id).value_or("");
-  if (handle.text.empty()) handle.text = words_for(*link_, handle, answer.word.detail);
+  if (handle.text.empty())
+    handle.text =
+        words_for(*link_, kept_->commands_of(id - record_id(id_, 0)), handle, answer.word.detail);
   const std::scoped_lock lock(kept_->mutex);
   kept_->ended.emplace(id, handle);
   return handle;
@@ -267,8 +296,7 @@ void Batch::throw_unless_completed() const {
     if (is_known && is_success(static_cast<Status>(answer.word.status))) continue;
     const Handle handle = ask(id);
     if (is_success(handle.status) || handle.status == Status::forgotten) continue;
-    const std::span<const SentCommand> command =
-        std::ranges::equal_range(kept_->commands, place, {}, &SentCommand::place);
+    const std::span<const SentCommand> command = kept_->commands_of(place);
     const bool is_overwritten = handle.status == Status::overwritten;
     if (is_overwritten && link_->has_replaced(id, handle.iteration, command)) continue;
     ends.push_back({handle, names_of(schema, command)});

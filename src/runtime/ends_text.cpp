@@ -31,10 +31,12 @@ std::string subject_of(const Schema& schema, std::span<const SentCommand> comman
   }
 }
 
-std::string verb_of(Status status) {
-  if (status == Status::overwritten) return "overwritten by a command of another frontend";
-  if (status == Status::interrupted) return "interrupted by the driver";
-  return std::string(to_text(status));
+std::string verb_of(const Handle& handle) {
+  if (handle.status == Status::overwritten) return "overwritten by a command of another frontend";
+  if (handle.status == Status::interrupted && handle.reason != Reason::limits) {
+    return "interrupted by the driver";
+  }
+  return std::string(to_text(handle.status));
 }
 
 }  // namespace
@@ -50,7 +52,7 @@ std::vector<std::string> names_of(const Schema& schema, std::span<const SentComm
 
 std::string end_text(const Schema& schema, std::span<const SentCommand> command,
                      const Handle& handle) {
-  const std::string text = subject_of(schema, command) + verb_of(handle.status) + " in iteration " +
+  const std::string text = subject_of(schema, command) + verb_of(handle) + " in iteration " +
                            std::to_string(handle.iteration);
   return handle.text.empty() ? text : text + " (" + handle.text + ")";
 }

@@ -159,3 +159,64 @@ def test_limits_that_make_no_sense_are_refused(
 ) -> None:
     with pytest.raises(o80.InvalidArgument, match=text):
         o80.Backend(segment, ["joint"], limits={"joint": limits})
+
+
+def test_bounds_of_an_integral_end_a_velocity_and_say_so(segment: str) -> None:
+    """A joint that follows velocities stops at the bound of its position."""
+    bound = o80.IntegralBounds("position", minimum=-1.0, maximum=0.2, reaction=0.001)
+    velocity = o80.Limits(speed=50.0, acceleration=5000.0, integral=bound)
+    loop = Loop(
+        segment,
+        limits={"joint": {"velocity": velocity}},
+        rests_at={"joint": {"velocity": 0.0}},
+    )
+    try:
+        assert loop.frontend.actuators[0].numbers[1].limits == velocity
+        loop.frontend.add_command("joint", {"velocity": 1.0}, iterations=800)
+        held = loop.frontend.pulse()
+        position = 0.0
+        for _ in range(1000):
+            desired = loop.backend.step()
+            assert desired is not None
+            position += 0.001 * float(desired["velocity"][0])
+            loop.backend.publish({"position": position, "velocity": desired["velocity"][0]})
+        assert position == pytest.approx(0.2, abs=1e-4)
+        handle = held.handles[0]
+        assert (handle.status, handle.reason) == ("interrupted", "limits")
+        assert handle.text == "it is held back at the maximum of the position of actuator 'joint'"
+    finally:
+        loop.close()
+
+
+@pytest.mark.parametrize(
+    ("velocity", "said"),
+    [
+        ({"integral": o80.IntegralBounds("place")}, "position"),
+        ({"integral": o80.IntegralBounds("velocity")}, "another field"),
+        ({"integral": o80.IntegralBounds("position", 1.0, -1.0)}, "must not exceed the maximum"),
+        ({"integral": o80.IntegralBounds("position", reaction=-0.1)}, "reaction"),
+        (
+            {
+                "speed": 1.0,
+                "acceleration": 1.0,
+                "jerk": 1.0,
+                "integral": o80.IntegralBounds("position"),
+            },
+            "no limit of jerk",
+        ),
+        ({"minimum": 0.5, "integral": o80.IntegralBounds("position")}, "rest at 0"),
+    ],
+)
+def test_bounds_of_an_integral_that_cannot_be_are_refused(
+    segment: str, velocity: dict[str, Any], said: str
+) -> None:
+    rests = {} if "minimum" in velocity else {"joint": {"velocity": 0.0}}
+    with pytest.raises(o80.InvalidArgument, match=said):
+        o80.Backend(
+            segment,
+            ["joint"],
+            JOINT,
+            frequency=1000.0,
+            limits={"joint": {"velocity": o80.Limits(**velocity)}},
+            rests_at=rests,
+        )

@@ -378,3 +378,71 @@ def test_the_thermometer_of_the_page_runs(segment: str, tmp_path: Path) -> None:
         assert room.latest().extended.temperature == 21.5
         with pytest.raises(o80.BackendHalted, match="the room is too hot"):
             room.burst(2)
+
+
+# ---------------------------------------------------------------------- differences
+
+
+class Follower:
+    """Has its velocities summed, as a feed-forward would use them."""
+
+    actuators = ("left", "right")
+    dtype = {"angle": float, "on": bool}  # noqa: RUF012
+    limits = {"left": {"angle": o80.Limits(speed=2.0, acceleration=15.0)}}  # noqa: RUF012
+    frequency = 500.0
+
+    def __init__(self) -> None:
+        self.sums = np.zeros(2)
+        self.speeds = np.zeros(2)
+        self.states = np.zeros(2, [("angle", float), ("on", bool)])
+
+    def write(self, desired: Any) -> None:
+        speeds = desired.rate("angle")
+        self.sums += speeds * desired.period
+        active = desired.active
+        changes = (speeds - self.speeds) / desired.period
+        np.testing.assert_allclose(desired.rate2("angle")[active], changes[active], atol=1e-6)
+        np.testing.assert_allclose(self.sums, desired["angle"], atol=1e-12)
+        assert not desired.rate("on").any()
+        self.speeds = speeds
+        self.states = desired[:].copy()
+
+    def read(self, reading: Reading) -> None:
+        reading.observed = self.states
+
+
+def test_rates_of_desired_states_sum_to_the_states(segment: str) -> None:
+    with o80.robots.load(Follower).inline(segment) as robot:
+        robot.add_command("left", {"angle": 0.3})
+        robot.add_command("right", {"angle": 1.0, "on": True}, iterations=40)
+        robot.burst(60)
+        robot.add_command("left", {"angle": -0.1}, mode="overwrite")
+        assert robot.burst(300).desired["angle"].tolist() == [-0.1, 1.0]
+
+
+class Mistaken(Follower):
+    """Asks for the rates of what is no number, or when there are none."""
+
+    field = "angel"
+    desired: Any = None
+
+    def write(self, desired: Any) -> None:
+        self.desired = desired
+        self.states = desired[:].copy()
+        if self.field:
+            desired.rate(self.field or None)
+
+    def read(self, reading: Reading) -> None:
+        if not self.field and self.desired is not None:
+            self.desired.rate("angle")
+
+
+@pytest.mark.parametrize(
+    ("field", "said"), [("angel", "no field 'angel'.*angle"), ("", "in write\\(\\) only")]
+)
+def test_rates_that_are_not_there_are_a_fault_that_says_so(
+    segment: str, field: str, said: str
+) -> None:
+    named = type("Mistaken", (Mistaken,), {"field": field})
+    with pytest.raises(o80.Error, match=said), o80.robots.load(named).inline(segment) as robot:
+        robot.burst(1)

@@ -125,6 +125,16 @@ struct LimitRow {
   bool operator==(const LimitRow&) const = default;
 };
 
+/// Bounds of what a number of an actuator's state moves: a velocity moves a position.
+struct IntegralRow {
+  std::uint32_t limit = 0;   // index of the limits of the number that moves the other
+  std::uint32_t number = 0;  // index of the other in the state, where it is observed
+  double minimum = 0.0;      // in the unit of the other
+  double maximum = 0.0;
+  double reaction = 0.0;  // from the desired velocity to the observed one [s]
+  bool operator==(const IntegralRow&) const = default;
+};
+
 /// One actuator.
 struct ActuatorRow {
   NameText name;

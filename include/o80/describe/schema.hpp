@@ -15,6 +15,15 @@
 
 namespace o80 {
 
+/// Bounds of what a number moves: a velocity moves the observed position of the same actuator. o80
+/// brakes it in time, and lets it move inward only where the position is outside.
+struct IntegralBounds {
+  std::string_view field;  // of the observed state; of an array, the element of the same index
+  double minimum = -std::numeric_limits<double>::infinity();
+  double maximum = std::numeric_limits<double>::infinity();
+  double reaction = 0.0;  // time from the desired velocity to the observed one [s]
+};
+
 /// Limits of one number of a state, as a driver gives them. Default: no limit.
 struct Limits {
   double minimum = -std::numeric_limits<double>::infinity();
@@ -24,6 +33,8 @@ struct Limits {
   double jerk = std::numeric_limits<double>::infinity();          // [1/s^3], needs an acceleration
   /// Largest allowed |desired - observed|; a larger one halts the backend.
   double error = std::numeric_limits<double>::infinity();
+  /// What the number moves, if it is the velocity of another one; no limit of jerk then.
+  IntegralBounds integral = {};
 
   LimitRow row(double rest = 0.0, bool resting = false) const {
     return {minimum, maximum, speed, acceleration, jerk, error, rest, resting ? 1U : 0U};
@@ -58,9 +69,12 @@ class ActuatorDescription {
   ActuatorDescription& moves_joint(std::string_view joint);
 
  private:
-  /// Calls `visit(LimitRow&)` for every number of a named field.
-  template <class Visit>
-  void each_number(std::string_view field, Visit&& visit);
+  /// The numbers of a named field, or the first one if `field` is empty.
+  struct Numbers {
+    std::uint32_t first;  // index in the state
+    std::uint32_t count;
+  };
+  Numbers numbers_of(std::string_view field) const;
 
   Schema& schema_;
   std::uint32_t index_;
@@ -78,6 +92,7 @@ class Schema {
   std::vector<GroupRow> groups;
   std::vector<ActuatorRow> actuators;
   std::vector<LimitRow> limits;
+  std::vector<IntegralRow> integrals;
   std::vector<RequestRow> requests;
   std::vector<std::byte> defaults;  // default values of the types that have some
   ShownModel shown;                 // for viewers
@@ -118,8 +133,8 @@ class Schema {
   bool operator==(const Schema& other) const {
     return head == other.head && types == other.types && fields == other.fields &&
            labels == other.labels && groups == other.groups && actuators == other.actuators &&
-           limits == other.limits && requests == other.requests && defaults == other.defaults &&
-           shown == other.shown;
+           limits == other.limits && integrals == other.integrals && requests == other.requests &&
+           defaults == other.defaults && shown == other.shown;
   }
 
   /// Adds a group of actuators at a given offset; used by describe_actuators().
@@ -358,12 +373,7 @@ inline ActuatorDescription& ActuatorDescription::when_idle(WhenIdle when_idle) {
 }
 
 inline ActuatorDescription& ActuatorDescription::limits(const Limits& limits) {
-  const ActuatorRow& row = schema_.actuators[index_];
-  if (row.limits > 0) {
-    LimitRow& first = schema_.limits[row.first_limit];
-    first = limits.row(first.rest, first.resting != 0);
-  }
-  return *this;
+  return this->limits("", limits);
 }
 
 inline ActuatorDescription& ActuatorDescription::moves_joint(std::string_view joint) {
@@ -378,23 +388,20 @@ inline ActuatorDescription& ActuatorDescription::moves_joint(std::string_view jo
   return *this;
 }
 
-template <class Visit>
-void ActuatorDescription::each_number(std::string_view field, Visit&& visit) {
+inline ActuatorDescription::Numbers ActuatorDescription::numbers_of(std::string_view field) const {
   const ActuatorRow& row = schema_.actuators[index_];
+  if (field.empty()) return {0, row.limits > 0 ? 1U : 0U};
   const TypeRow& type = schema_.types.at(row.type);
-  std::uint32_t scalar = row.first_limit;
+  std::uint32_t first = 0;
   std::vector<std::string> known;
   for (std::uint32_t i = 0; i < type.fields; ++i) {
     const FieldRow& member = schema_.fields.at(type.first_field + i);
     const std::uint32_t inside =
         member.kind == Kind::structure ? schema_.scalar_count(member.type) : 1;
     const std::uint32_t numbers = inside * member.count();
-    if (member.name.view() == field) {
-      for (std::uint32_t n = 0; n < numbers; ++n) visit(schema_.limits[scalar + n]);
-      return;
-    }
+    if (member.name.view() == field) return {first, numbers};
     known.push_back(member.name.str());
-    scalar += numbers;
+    first += numbers;
   }
   throw InvalidArgument("'" + type.name.str() + "' has no field '" + std::string(field) + "'" +
                         names_instead(field, known));
@@ -402,15 +409,37 @@ void ActuatorDescription::each_number(std::string_view field, Visit&& visit) {
 
 inline ActuatorDescription& ActuatorDescription::limits(std::string_view field,
                                                         const Limits& limits) {
-  each_number(field, [&](LimitRow& row) { row = limits.row(row.rest, row.resting != 0); });
+  const Numbers numbers = numbers_of(field);
+  const std::uint32_t first = schema_.actuators[index_].first_limit + numbers.first;
+  for (std::uint32_t i = 0; i < numbers.count; ++i) {
+    LimitRow& row = schema_.limits[first + i];
+    row = limits.row(row.rest, row.resting != 0);
+  }
+  std::erase_if(schema_.integrals, [&](const IntegralRow& row) {
+    return row.limit >= first && row.limit < first + numbers.count;
+  });
+  const IntegralBounds& integral = limits.integral;
+  if (integral.field.empty()) return *this;
+  const Numbers moved = numbers_of(integral.field);
+  if (moved.count != numbers.count) {
+    throw InvalidArgument("the integral '" + std::string(integral.field) + "' has " +
+                          std::to_string(moved.count) + " numbers, what moves it has " +
+                          std::to_string(numbers.count));
+  }
+  for (std::uint32_t i = 0; i < numbers.count; ++i) {
+    schema_.integrals.push_back(
+        {first + i, moved.first + i, integral.minimum, integral.maximum, integral.reaction});
+  }
   return *this;
 }
 
 inline ActuatorDescription& ActuatorDescription::rests_at(std::string_view field, double value) {
-  each_number(field, [&](LimitRow& row) {
-    row.rest = value;
-    row.resting = 1;
-  });
+  const Numbers numbers = numbers_of(field);
+  const std::uint32_t first = schema_.actuators[index_].first_limit + numbers.first;
+  for (std::uint32_t i = 0; i < numbers.count; ++i) {
+    schema_.limits[first + i].rest = value;
+    schema_.limits[first + i].resting = 1;
+  }
   return *this;
 }
 

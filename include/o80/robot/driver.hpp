@@ -44,6 +44,19 @@ class Desired {
   bool active(std::size_t actuator) const {
     return (view_.active[actuator / 64] >> (actuator % 64) & 1) != 0;
   }
+  /// The velocity of a number of these states, for feed-forward: `desired.rate(desired[0].angle)`.
+  /// It is the difference to the last iteration by the period [unit/s], so that times the period
+  /// its sum is the position; 0 for an actuator that is not active(). Throws for a copy of a state.
+  template <class Number>
+  double rate(const Number& number) const {
+    return difference(number, 1) / period();
+  }
+  /// The difference of the velocities of two iterations by the period [unit/s^2].
+  template <class Number>
+  double rate2(const Number& number) const {
+    return difference(number, 2) / (period() * period());
+  }
+
   std::int64_t iteration() const { return view_.iteration; }
   /// On the backend's clock [ns].
   std::int64_t time() const { return view_.time; }
@@ -51,6 +64,21 @@ class Desired {
   double period() const { return static_cast<double>(view_.period) * 1e-9; }
 
  private:
+  template <class T>
+  double difference(const Place<T>& place, std::uint32_t order) const {
+    return view_.difference(view_.context, place.offset, order);
+  }
+  template <class Number>
+    requires std::is_arithmetic_v<Number>
+  double difference(const Number& number, std::uint32_t order) const {
+    const auto at = reinterpret_cast<std::uintptr_t>(&number);
+    const auto first = reinterpret_cast<std::uintptr_t>(&states);
+    if (at < first || at - first >= sizeof states) {
+      throw InvalidArgument("rate() and rate2() want a number of these desired states, not a copy");
+    }
+    return view_.difference(view_.context, static_cast<std::uint32_t>(at - first), order);
+  }
+
   DesiredView view_;
 };
 

@@ -130,6 +130,7 @@ const RobotTable* robot_table(const char* name, const char* versions = "") {
                              schema.groups.data(),
                              schema.actuators.data(),
                              schema.limits.data(),
+                             schema.integrals.data(),
                              schema.requests.data(),
                              schema.defaults.data(),
                              schema.shown.values.data(),
@@ -141,6 +142,7 @@ const RobotTable* robot_table(const char* name, const char* versions = "") {
                              count(schema.groups),
                              count(schema.actuators),
                              count(schema.limits),
+                             count(schema.integrals),
                              count(schema.requests),
                              count(schema.defaults),
                              count(schema.shown.values)};

@@ -13,7 +13,7 @@
 
 namespace o80 {
 
-inline constexpr std::uint32_t kRobotTableVersion = 5;
+inline constexpr std::uint32_t kRobotTableVersion = 6;
 
 /// Reason for the failure of a call.
 struct FaultText {
@@ -44,13 +44,14 @@ struct SchemaRows {
   const GroupRow* groups;
   const ActuatorRow* actuators;
   const LimitRow* limits;
+  const IntegralRow* integrals;
   const RequestRow* requests;
   const std::byte* defaults;
   const ShownRow* shown;
   const char* mjcf;       // of the model that viewers draw, with its terminating 0
   const char* mjcf_file;  // likewise
   std::uint32_t type_count, field_count, label_count, group_count, actuator_count, limit_count,
-      request_count, default_count, shown_count;
+      integral_count, request_count, default_count, shown_count;
 };
 
 /// The desired states that a driver writes.
@@ -60,6 +61,10 @@ struct DesiredView {
   std::int64_t iteration;
   std::int64_t time;    // [ns]
   std::int64_t period;  // [ns]
+  /// First (order 1) or second difference, to the iteration before, of the number at this offset
+  /// of the desired block; 0 for one that does not move by itself.
+  double (*difference)(const void* context, std::uint32_t offset, std::uint32_t order);
+  const void* context;
 };
 
 /// Result of a request; `running`: it ends in a later reading.
@@ -135,7 +140,8 @@ struct RobotTable {
 
 inline constexpr std::uint32_t kSchemaRowSizes =
     sizeof(SchemaHead) + sizeof(TypeRow) + sizeof(FieldRow) + sizeof(LabelRow) + sizeof(GroupRow) +
-    sizeof(ActuatorRow) + sizeof(LimitRow) + sizeof(RequestRow) + sizeof(ShownRow);
+    sizeof(ActuatorRow) + sizeof(LimitRow) + sizeof(IntegralRow) + sizeof(RequestRow) +
+    sizeof(ShownRow);
 
 /// The only symbol that a robot library exports.
 inline constexpr const char* kRobotSymbol = "o80_robot_table";

@@ -125,6 +125,9 @@ class UntypedBackend {
   const std::byte* desired() const noexcept;
   /// One bit for each actuator: a command or braking gave its desired state.
   const std::uint64_t* active() const noexcept;
+  /// First (order 1) or second difference, to the iteration before, of the number at this offset
+  /// of the desired block; 0 for an actuator that is not active, and for what does not move.
+  double difference(std::uint32_t offset, std::uint32_t order) const noexcept;
   /// One bit for each actuator: it comes to rest within its limits, without a command.
   const std::uint64_t* braking() const noexcept;
   /// The current iteration; 0 before the first `step`.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
@@ -121,6 +122,10 @@ def _limit(limit: dict[str, Any]) -> str:
         parts.append(f"error {limit['error']:g}")
     if "rest" in limit:
         parts.append(f"rests at {limit['rest']:g}")
+    if moved := limit.get("integral"):
+        low = -math.inf if moved["minimum"] is None else moved["minimum"]
+        high = math.inf if moved["maximum"] is None else moved["maximum"]
+        parts.append(f"its integral {low:g} to {high:g}, reaction {moved['reaction']:g} s")
     return ", ".join(parts) or "-"
 
 

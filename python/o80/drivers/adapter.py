@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from o80 import _core
 from o80.checked import mapping
 from o80.description import SchemaWriter
-from o80.drivers.reading import Answer, Desired, DriverFaultError, Reading
+from o80.drivers.reading import Answer, Desired, Differences, DriverFaultError, Reading
 from o80.errors import Error, InvalidArgument, RequestRejected
 from o80.layout import Layout, dtype_of_type
 from o80.record import Record
@@ -65,6 +65,10 @@ class Adapter:
             writer.builder.of_the_world()
         self._make_blocks(Layout(writer.builder.description()))
         return writer.builder
+
+    def give_differences(self, differences: Differences) -> None:
+        """What `Desired.rate` asks for, given after describe()."""
+        self._desired.differences = differences
 
     def _told(self, name: str, otherwise: Any = None) -> Any:
         return getattr(self._driver, name, otherwise)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,10 @@ from o80 import _core
 from o80.backend import Running, StartAfresh, fill
 from o80.errors import InvalidArgument
 from o80.record import Record
+
+
+#: from offsets in the desired block and an order to the differences of those numbers
+Differences = Callable[[list[int], int], list[float]]
 
 
 class DriverFaultError(Exception):
@@ -37,6 +41,7 @@ class Desired:
         self.iteration = 0
         self.time = 0  #: [ns]
         self.period = 0.0  #: [s]
+        self.differences: Differences
 
     @property
     def states(self) -> Any:
@@ -48,6 +53,41 @@ class Desired:
         """(actuators,) True where a command or braking gives the state."""
         bits = np.unpackbits(self._words, count=self._count, bitorder="little")
         return bits.view(np.bool_)
+
+    def rate(self, field: str | None = None) -> NDArray[np.float64]:
+        """Velocities of the desired states, for feed-forward [unit/s], in write() only.
+
+        Each is the difference to the last iteration by the period, so that times the period their
+        sums are the positions; 0 for actuators that are not `active`.
+
+        field: of states that are structs: "angle", or with its group "arm.angle"
+        Returns: (actuators,), and the shape of the field
+        """
+        return self._differences(field, 1) / self.period
+
+    def rate2(self, field: str | None = None) -> NDArray[np.float64]:
+        """Accelerations [unit/s^2]: as `rate`, the differences of the velocities."""
+        return self._differences(field, 2) / self.period**2
+
+    def _differences(self, field: str | None, order: int) -> NDArray[np.float64]:
+        view = self._block
+        for name in field.split(".") if field else ():
+            known = view.dtype.names or ()
+            if name not in known:
+                instead = _core.names_instead(name, [*known])
+                raise InvalidArgument(f"the desired states have no field {name!r}{instead}")
+            view = view[name]
+        if view.dtype.names:
+            raise InvalidArgument(
+                f"rate() and rate2() want one field of a state: {', '.join(view.dtype.names)}"
+            )
+        first = view.__array_interface__["data"][0] - self._block.__array_interface__["data"][0]
+        places = np.full(view.shape, first)
+        for axis, stride in enumerate(view.strides):
+            along = stride * np.arange(view.shape[axis])
+            places += along.reshape([-1 if i == axis else 1 for i in range(view.ndim)])
+        found = self.differences(places.ravel().tolist(), order)
+        return np.array(found).reshape(view.shape)
 
     def __getitem__(self, index: Any) -> Any:
         return self.states[index]

@@ -107,6 +107,28 @@ TEST(Table, RefusesAModelThatCannotBeShown) {
               HasSubstr("does not begin with a double"));
 }
 
+TEST(Table, KeepsBoundsOfAnIntegral) {
+  for (const bool shows : {false, true}) {
+    Schema schema = shows ? shown_robot() : schema_of<MixedRobot>();
+    const auto type = schema.add_type(
+        "Wheel", {scalar_field("angle", Kind::float64), scalar_field("speed", Kind::float64)});
+    const std::uint32_t group = schema.add_actuators("wheels", type, 2);
+    ActuatorDescription wheel = schema.actuator(schema.groups[group].first_actuator + 1);
+    wheel.rests_at("speed", 0.0)
+        .limits("speed", {.speed = 1.0, .integral = {"angle", -1.0, 2.0, 0.1}});
+    const std::vector<std::byte> bytes = to_bytes(schema);
+    const Schema again = schema_from_bytes(bytes);
+    EXPECT_EQ(again, schema);
+    ASSERT_EQ(again.integrals.size(), 1U);
+    EXPECT_EQ(again.integrals[0].maximum, 2.0);
+    EXPECT_THAT(message_of<SegmentError>(
+                    [&] { schema_from_bytes(std::span(bytes).first(bytes.size() - 1)); }),
+                HasSubstr("integral bounds"));
+    wheel.limits("speed", {.speed = 1.0});
+    EXPECT_TRUE(schema.integrals.empty());
+  }
+}
+
 /// What `check` says after a change.
 template <class Change>
 std::string refusal(Change&& change) {

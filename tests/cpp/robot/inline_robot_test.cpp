@@ -122,5 +122,57 @@ TEST_F(InlineRobotTest, NamesThatNobodyUsesDiffer) {
   EXPECT_THAT(unused_segment_name("arm"), HasSubstr("arm-"));
 }
 
+/// Sums the rates of its desired states, as a feed-forward would use them.
+struct Summing {
+  struct Config {};
+  struct Joint {
+    double angle = 0;
+    bool on = false;
+  };
+  using Actuators = std::array<Joint, 2>;
+  using Extended = NoExtended;
+
+  explicit Summing(const Config&) {}
+  void describe(Schema& schema) const {
+    schema.actuator(0).limits("angle", {.speed = 2.0, .acceleration = 15.0});
+  }
+  void start() {}
+  void write(const Desired<Summing>& desired) {
+    for (std::size_t i = 0; i < 2; ++i) {
+      const double speed = desired.rate(desired[i].angle);
+      sums_[i] += speed * desired.period();
+      EXPECT_NEAR(sums_[i], desired[i].angle, 1e-12);
+      if (desired.active(i)) {
+        EXPECT_NEAR(desired.rate2(desired[i].angle), (speed - speeds_[i]) / desired.period(), 1e-6);
+      }
+      EXPECT_EQ(desired.rate(desired[i].on), 0.0);
+      speeds_[i] = speed;
+    }
+    const Joint copy = desired[0];
+    EXPECT_THROW(desired.rate(copy.angle), InvalidArgument);
+    states_ = desired.states;
+  }
+  void read(Reading<Summing>& reading) { reading.observed = states_; }
+  void stop() noexcept {}
+
+  Actuators states_{};
+  std::array<double, 2> sums_{};
+  std::array<double, 2> speeds_{};
+};
+O80_DESCRIBE(Summing::Config);
+O80_DESCRIBE(Summing::Joint, angle, on);
+
+TEST_F(InlineRobotTest, GivesADriverTheRatesOfItsDesiredStates) {
+  const auto robot = std::make_shared<InlineRobot>(
+      std::make_unique<DriverInstance>(*robot_table<Summing>("summing"), OptionValues{}),
+      BackendOptions{.segment = "here"});
+  Frontend<Summing> frontend("here", robot);
+  frontend.add_command(0, Summing::Joint{0.3, false});
+  frontend.add_command(1, Summing::Joint{1.0, true}, {.pace = iterations(40)});
+  frontend.burst(60, kPatience);
+  frontend.add_command(0, Summing::Joint{-0.1, false}, {.mode = Mode::overwrite});
+  EXPECT_EQ(frontend.burst(600, kPatience).desired()[0].angle, -0.1);
+}
+
 }  // namespace
 }  // namespace o80::test
