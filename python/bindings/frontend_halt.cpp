@@ -23,11 +23,11 @@ std::uint64_t halt(const Frontend& self, nb::handle why) {
   return frontend->halt(reason);
 }
 
-void resume(const Frontend& self, std::uint64_t number, nb::handle timeout) {
+void resume(const Frontend& self, std::uint64_t number, nb::handle timeout, bool accept_reading) {
   const o80::Timeout patience = timeout_of(timeout);
   const std::shared_ptr<o80::UntypedFrontend> frontend = self.shared();
   const Waiting waiting;
-  frontend->resume(number, patience, Waiting::keep_waiting);
+  frontend->resume(number, patience, Waiting::keep_waiting, accept_reading);
 }
 
 /// Name, iteration, who, progress.
@@ -64,5 +64,5 @@ void bind_halting(nb::module_& m, nb::class_<Frontend>& frontend) {
                    [](const Frontend& self) { return halt_fields(self.untyped().halted()); })
       .def_prop_ro("_running_requests", &running_requests,
                    nb::sig("def _running_requests(self) -> list[tuple[str, int, str, str]]"))
-      .def("_resume", &resume, "number"_a, "timeout"_a.none());
+      .def("_resume", &resume, "number"_a, "timeout"_a.none(), "accept_reading"_a);
 }

@@ -123,6 +123,14 @@ class Waits:
         batch = frontend._send_request(name, fields)
         await in_thread(lambda: frontend._wait_for_answer(name, batch, timeout))
 
-    async def resume(self, number: int | None = None, *, timeout: float | None = 5.0) -> None:
+    async def resume(
+        self,
+        number: int | None = None,
+        *,
+        timeout: float | None = 5.0,
+        accept_reading: bool = False,
+    ) -> None:
         """Ends a halt; see `Frontend.resume`."""
-        await in_thread(lambda: self._frontend.resume(number, timeout=timeout))
+        await in_thread(
+            lambda: self._frontend.resume(number, timeout=timeout, accept_reading=accept_reading)
+        )

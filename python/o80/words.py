@@ -60,6 +60,7 @@ class Reason(StrEnum):
     STOPPED = "stopped"
     HALTED = "halted"
     FULL = "full"  #: too many batches of its frontend wait for later iterations
+    READING = "reading"  #: the robot cannot be where it was read
 
 
 ModeWord: TypeAlias = Mode | Literal["queue", "overwrite"]

@@ -131,8 +131,9 @@ std::uint32_t BatchBuilder::release_control() {
   return records_ - 1;
 }
 
-std::uint32_t BatchBuilder::resume(std::uint64_t number) {
+std::uint32_t BatchBuilder::resume(std::uint64_t number, bool accept_reading) {
   RecordHead head = head_of(RecordKind::resume);
+  head.accepts = accept_reading ? 1 : 0;
   head.amount = static_cast<std::int64_t>(number);
   open(head, 0);
   return records_ - 1;

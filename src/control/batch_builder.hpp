@@ -41,7 +41,7 @@ class BatchBuilder {
   std::uint32_t take_control();
   std::uint32_t release_control();
   /// Clears halts up to this number.
-  std::uint32_t resume(std::uint64_t number);
+  std::uint32_t resume(std::uint64_t number, bool accept_reading = false);
 
   /// Completes the batch. `batch` has id, ticket, at, late_now, burst and flags. A batch of few
   /// purges and control orders, without `at` and without a burst, is marked as express.

@@ -27,8 +27,9 @@ class BatchHandler {
   virtual Outcome take_control(std::uint32_t lane) noexcept = 0;
   virtual Outcome release_control(std::uint32_t lane) noexcept = 0;
   /// Clears halts up to this number; may call `Controller::restart`, as a request may.
-  virtual Outcome resume(std::uint32_t /*lane*/, CommandId /*id*/,
-                         std::uint64_t /*number*/) noexcept {
+  /// `accepts`: whatever the readings are.
+  virtual Outcome resume(std::uint32_t /*lane*/, CommandId /*id*/, std::uint64_t /*number*/,
+                         bool /*accepts*/) noexcept {
     return {};
   }
 

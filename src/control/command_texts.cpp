@@ -36,7 +36,7 @@ std::string_view to_text(Status status) noexcept {
 
 std::string_view to_text(Reason reason) noexcept {
   return text_of(reason, {"none", "late", "exclusive", "invalid", "limits", "driver", "fresh_start",
-                          "dead_frontend", "silence", "stopped", "halted", "full"});
+                          "dead_frontend", "silence", "stopped", "halted", "full", "reading"});
 }
 
 }  // namespace o80

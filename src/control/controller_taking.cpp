@@ -51,7 +51,8 @@ void Controller::take_step(const Taking& from, BlockIndex record, BatchHandler& 
     case RecordKind::release_control:
       return end(handler.release_control(from.lane));
     case RecordKind::resume:
-      return end(handler.resume(from.lane, head.id, static_cast<std::uint64_t>(head.amount)));
+      return end(handler.resume(from.lane, head.id, static_cast<std::uint64_t>(head.amount),
+                                head.accepts != 0));
     case RecordKind::overwritten_list:
       return ledger_.drop(record, Status::overwritten, Reason::none, now);
     case RecordKind::purged_list:

@@ -67,6 +67,7 @@ struct RecordHead {
   union {
     std::uint8_t masked = 0;  // command: 1 if the payload begins with a mask
     std::uint8_t only_own;    // purge: 1 to purge only commands of this lane
+    std::uint8_t accepts;     // resume: 1 to accept a reading that cannot be
   };
   std::uint16_t actuator = 0;  // purge: may be kEveryActuator; request: index of the request
   CommandId id = 0;            // record_id() of the batch and the index in it

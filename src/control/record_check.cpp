@@ -90,8 +90,9 @@ RecordCheck::Verdict RecordCheck::begin(const BlockPool& pool, BlockIndex block,
                      (head.actuator == kEveryActuator || head.actuator < actuator_types_.size()));
     case RecordKind::take_control:
     case RecordKind::release_control:
-    case RecordKind::resume:
       return verdict(head.payload_bytes == 0);
+    case RecordKind::resume:
+      return verdict(head.payload_bytes == 0 && head.accepts <= 1);
     default:
       return Verdict::invalid;
   }

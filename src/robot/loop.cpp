@@ -40,6 +40,7 @@ Loop::Loop(std::unique_ptr<DriverInstance> robot, const BackendOptions& options,
       backend_(robot_->describe(options.period), with_provenance(options, *robot_), this, recorded),
       pacer_(backend_.schema().head.period),
       paced_(!options.bursting && recorded == nullptr),
+      accepts_reading_(options.accept_reading),
       interrupted_(backend_.layout().mask_words + 1),
       reports_(backend_.schema().requests.size()),
       snapshot_(snapshot_of(backend_.schema())) {
@@ -58,16 +59,41 @@ Loop::~Loop() {
 void Loop::start() {
   const bool started = calls(Verb::start, [&] { return robot_->start(); });
   if (!started) failed("start");
-  if (!started || !read() || !begin()) {
+  if (!started || !read_first() || !begin()) {
     const std::string why = fault_;
     stop();
     throw DriverError(why);
   }
 }
 
+/// The reading of row 0. In real time the robot must be where it was a period before, as far as it can
+/// have moved: a sensor that gives one wrong value is read again.
+bool Loop::read_first() {
+  constexpr int kReadings = 6;
+  if (!read()) return false;
+  if (!paced_ || accepts_reading_ || !backend_.watches_readings()) return true;
+  const std::int64_t period = std::min(backend_.schema().head.period, kLongestBraking);
+  backend_.judge_first(false);
+  for (int i = 0; i < kReadings; ++i) {
+    const std::int64_t due = monotonic_now() + period;
+    const bool paces_itself = robot_->table().paces_itself != 0;
+    if (paces_itself && !calls(Verb::wait, [&] { return robot_->wait(due); })) {
+      return failed("wait");
+    }
+    while (!paces_itself && !sleep_until(due)) {
+    }
+    if (!read()) return false;
+    if (backend_.judge_first(true)) return true;
+  }
+  return cannot_begin();
+}
+
 /// Row 0.
 bool Loop::begin() {
-  if (backend_.publish()) return true;
+  return backend_.publish() || cannot_begin();
+}
+
+bool Loop::cannot_begin() {
   fault_ = "'";
   fault_ += robot_->table().name;
   fault_ += "' cannot begin: ";
@@ -254,6 +280,11 @@ bool Loop::read_fresh(FreshReading& reading) noexcept {
   const bool reads = read_into_view();
   std::ranges::fill(interrupted_, 0);  // there is nothing to interrupt
   reading.has_desired = view_.has_desired != 0;
+  if (!reads && reading.may_fail) {
+    unread_ = fault_;
+    fault_.clear();
+    reading.why = unread_;
+  }
   return reads;
 }
 

@@ -84,7 +84,9 @@ class Loop final : public RequestServer {
   bool read_into_view() noexcept;
   void note_requests(const ReadingView& view) noexcept;
   void note_halt(const ReadingView& view) noexcept;
+  bool read_first();
   bool begin();
+  bool cannot_begin();
   /// Calls a function of the driver. Observers see which one has not returned
   /// (memory/verb_word.hpp).
   template <class Call>
@@ -103,10 +105,12 @@ class Loop final : public RequestServer {
   UntypedBackend backend_;
   Pacer pacer_;
   bool paced_;             // real time: by the clock or by the driver's wait()
+  bool accepts_reading_;   // in real time: of row 0
   bool braking_ = false;   // the actuators come to rest before the end
   bool finished_ = false;  // by Reading::finish()
   bool ended_ = false;
-  std::string fault_;  // capacity reserved, so that run() does not allocate
+  std::string unread_;  // why a resume could not read
+  std::string fault_;   // capacity reserved, so that run() does not allocate
   std::vector<std::uint64_t> interrupted_;
   std::vector<RequestReport> reports_;  // of each request
   bool reported_ = true;                // `reports_` must be filled before the next reading

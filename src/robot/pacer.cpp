@@ -11,6 +11,7 @@ bool Pacer::in_time(std::int64_t now) noexcept {
 }
 
 const Timing& Pacer::next(std::int64_t now) noexcept {
+  timing_.missed = false;
   timing_.lateness = now - due_;
   due_ += period_;
   if (due_ <= now) {
@@ -23,6 +24,7 @@ const Timing& Pacer::next(std::int64_t now) noexcept {
 }
 
 const Timing& Pacer::tick(std::int64_t now) noexcept {
+  timing_.missed = false;
   timing_.lateness = now - due_;
   // the robot has a clock of its own: a tick counts for the nearest period
   if (timing_.lateness > 0) {
@@ -45,6 +47,7 @@ const Timing& Pacer::tick(std::int64_t now) noexcept {
 
 const Timing& Pacer::missed() noexcept {
   count_overrun();
+  timing_.missed = true;
   return timing_;
 }
 

@@ -198,6 +198,8 @@ UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, Reques
       outbox_(lanes, journal,
               2 * (schema.actuators.size() + 2 * Controller::kStatusesPerIteration)),
       errors_(schema),
+      readings_(schema),
+      last_reading_(layout.block / 8),
       overruns_(options.max_overruns) {
   express_lanes_.reserve(lanes.size());
   for (std::uint32_t i = 0; i < lanes.size(); ++i) lives_[i] = liveness.lane(i);
@@ -329,6 +331,7 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
   history.publish(current, row());
   // before a fresh start the robot may be away from its desired states
   if (begun_ && !fresh && !will_start_afresh()) watch_errors();
+  watch_readings();
   tell_ended_requests(fresh);
 
   // report statuses, then wake waiting processes
@@ -382,6 +385,8 @@ void UntypedBackend::publish_as(const std::string& name) { body_->segment.publis
 
 std::byte* UntypedBackend::observed() noexcept { return body_->row() + body_->layout.observed; }
 std::byte* UntypedBackend::extended() noexcept { return body_->row() + body_->layout.extended; }
+bool UntypedBackend::watches_readings() const noexcept { return body_->watches_readings(); }
+bool UntypedBackend::judge_first(bool again) noexcept { return body_->judge_first(again); }
 bool UntypedBackend::publish() noexcept {
   if (!body_->has_begun()) return body_->publish_first();
   body_->publish(false);

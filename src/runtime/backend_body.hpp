@@ -12,6 +12,7 @@
 #include "base/short_text.hpp"
 #include "control/controller.hpp"
 #include "control/error_watch.hpp"
+#include "control/reading_watch.hpp"
 #include "memory/fork.hpp"
 #include "memory/halt_word.hpp"
 #include "memory/history.hpp"
@@ -41,6 +42,9 @@ inline constexpr std::uint32_t kWorkAheadOfAll = 512;
 /// Budget for express batches; in each iteration every lane may have one taken in any case.
 inline constexpr std::uint32_t kExpressWork = 512;
 
+/// What a user may do about a reading that cannot be.
+inline constexpr std::string_view kToResume = "resume with --accept-reading";
+
 /// Implementation of UntypedBackend: its parts, and the order in which batches reach the
 /// controller.
 class UntypedBackend::Body final : public StatusSink, public BatchHandler {
@@ -57,7 +61,8 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
                   Cursor payload) noexcept override;
   Outcome take_control(std::uint32_t lane) noexcept override;
   Outcome release_control(std::uint32_t lane) noexcept override;
-  Outcome resume(std::uint32_t lane, CommandId id, std::uint64_t number) noexcept override;
+  Outcome resume(std::uint32_t lane, CommandId id, std::uint64_t number,
+                 bool accepts) noexcept override;
 
   // StatusSink
   void changed(const StatusChange& change) noexcept override;
@@ -66,6 +71,8 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   std::byte* row() noexcept { return reinterpret_cast<std::byte*>(row_.data()); }
   bool has_begun() const noexcept { return begun_; }
   bool publish_first() noexcept;
+  bool watches_readings() const noexcept { return !readings_.empty(); }
+  bool judge_first(bool again) noexcept;
   void publish(bool fresh) noexcept;
   Step step(std::int64_t at_most) noexcept;
   bool begin_direct(const DirectBurst& burst) noexcept;
@@ -173,6 +180,14 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   bool name_not_finite(const std::byte* states, std::string_view what,
                        ShortText<248>& why) const noexcept;
   bool can_begin(const std::byte* states, std::string_view what) noexcept;
+  void keep_reading() noexcept;
+  void put_back_reading() noexcept;
+  void watch_readings() noexcept;
+  double since_reading() const noexcept;
+  bool is_misread(const std::byte* observed, std::string_view cure,
+                  ShortText<248>& why) const noexcept;
+  bool read_to_resume(FreshReading& reading, bool accepts, ShortText<248>& why) noexcept;
+  Outcome begin_afresh(std::uint32_t lane, const FreshReading& reading) noexcept;
 
   ForkGuard guard_;
   RequestServer* server_;
@@ -206,6 +221,9 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   std::uint32_t shown_acts_ = 0;    // as in Counters::acts
   bool reason_missing_ = false;     // the requester of the halt has not written its reason yet
   ErrorWatch errors_;
+  ReadingWatch readings_;
+  std::int64_t read_at_ = 0;                 // time of the last row whose reading was not missed
+  std::vector<std::uint64_t> last_reading_;  // observed states, while a fresh reading is judged
   OverrunLimit overruns_;
   bool stopping_ = false;       // braking before an end in order
   bool driver_halted_ = false;  // the driver's halt() was called

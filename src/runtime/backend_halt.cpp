@@ -107,6 +107,10 @@ void UntypedBackend::Body::begin_halt() noexcept {
   controller.halt(current);
   drop_running({Status::halted, Reason::halted});
   stop_burst(BurstEnd::cut);
+  if (!driver_halted_) {
+    readings_.begin(row() + layout.observed, controller.desired());
+    read_at_ = time();
+  }
   if (!driver_halted_ && server_ != nullptr && !server_->halt()) {
     fail("the robot failed in the call that begins a halt");
   }
@@ -144,8 +148,8 @@ bool UntypedBackend::Body::suits_halt(const StagedBatch& sent) noexcept {
   return false;
 }
 
-Outcome UntypedBackend::Body::resume(std::uint32_t lane, CommandId id,
-                                     std::uint64_t number) noexcept {
+Outcome UntypedBackend::Body::resume(std::uint32_t lane, CommandId id, std::uint64_t number,
+                                     bool accepts) noexcept {
   if (!halts.acts()) return {};
   const auto refuse = [&](std::string_view why, Reason reason = Reason::halted) {
     lanes[lane].set_message(id, why);
@@ -172,6 +176,10 @@ Outcome UntypedBackend::Body::resume(std::uint32_t lane, CommandId id,
   if (name_not_finite(row() + layout.observed, "the last reading", unread)) {
     return refuse(unread.view(), Reason::driver);
   }
+  accepts = accepts || recorded_ != nullptr;  // a replay obeys
+  if (!accepts && is_misread(row() + layout.observed, kToResume, unread)) {
+    return refuse(unread.view(), Reason::reading);
+  }
 
   // the robot may refuse; a halt requested meanwhile stays
   if (server_ != nullptr) {
@@ -184,21 +192,40 @@ Outcome UntypedBackend::Body::resume(std::uint32_t lane, CommandId id,
       return refuse(served.why(), Reason::driver);
     }
   }
-  driver_halted_ = false;
-  const bool confirmed = recorded_ == nullptr || recorded_->confirms(JournalKind::resume);
-  // before the halt is cleared: a driver's thread that halts again for the same reason from then on
-  // requests a new halt
+  constexpr std::string_view kAnother =
+      "another halt was requested meanwhile: read its reason, then resume that one";
+  if (recorded_ != nullptr && !recorded_->confirms(JournalKind::resume)) return refuse(kAnother);
+  // from here on, whoever halts again for the same reason requests a new halt
   for (auto& last : own_halts_) last.store(0, std::memory_order_seq_cst);
-  if (!confirmed || !halts.clear()) {
-    return refuse("another halt was requested meanwhile: read its reason, then resume that one");
+  FreshReading reading{row() + layout.observed, row() + layout.extended,
+                       reinterpret_cast<std::byte*>(fresh_desired_.data())};
+  const bool reads = server_ == nullptr || read_to_resume(reading, accepts, unread);
+  if (!reads || !halts.clear()) {
+    if (server_ != nullptr && !server_->halt()) fail("the robot failed in the call that halts it");
+    return reads ? refuse(kAnother) : refuse(unread.view(), Reason::reading);
   }
+  driver_halted_ = false;
   reason_missing_ = false;
   journal.resume(lane, taking_owner_, number);
-  if (server_ != nullptr) return start_afresh(lane, id);
-  controller.restart(row() + layout.observed, nullptr, current);
-  journal.fresh_start(lane);
-  publish(true);
-  return {};
+  return begin_afresh(lane, reading);
+}
+
+/// Reads the robot for the fresh start of a resume; false if it cannot begin there, and the last
+/// reading stays.
+bool UntypedBackend::Body::read_to_resume(FreshReading& reading, bool accepts,
+                                          ShortText<248>& why) noexcept {
+  keep_reading();
+  reading.may_fail = true;
+  if (!server_->read_fresh(reading)) {
+    why.add(reading.why.empty() ? "the robot could not be read" : reading.why);
+  } else if (!name_not_finite(reading.observed, "the reading of a fresh start", why) &&
+             (!reading.has_desired ||
+              !name_not_finite(reading.desired, "the desired states of a fresh start", why)) &&
+             (accepts || !is_misread(reading.observed, kToResume, why))) {
+    return true;
+  }
+  put_back_reading();
+  return false;
 }
 
 }  // namespace o80

@@ -62,6 +62,10 @@ Outcome UntypedBackend::Body::reject_request(std::uint32_t lane, CommandId id,
 Outcome UntypedBackend::Body::start_afresh(std::uint32_t lane, CommandId id) noexcept {
   auto* desired = reinterpret_cast<std::byte*>(fresh_desired_.data());
   FreshReading reading{row() + layout.observed, row() + layout.extended, desired};
+  // a simulator may be put anywhere, a robot of the world cannot
+  const bool judges = schema.head.of_the_world != 0 && recorded_ == nullptr && begun_;
+  if (judges && !halts.acts()) readings_.begin(reading.observed, nullptr);
+  if (judges) keep_reading();
   bool reads = server_->read_fresh(reading);
   if (!reads) note_failure("the robot could not be read in a fresh start");
   reads = reads && can_begin(reading.observed, "the reading of a fresh start");
@@ -73,11 +77,69 @@ Outcome UntypedBackend::Body::start_afresh(std::uint32_t lane, CommandId id) noe
     stop.store(true, std::memory_order_relaxed);
     return reject_request(lane, id, failure.data());
   }
+  ShortText<248> why;
+  if (judges && !reading.has_desired && is_misread(reading.observed, kToResume, why)) {
+    put_back_reading();
+    ask_to_halt(HaltCause::error, why.view());
+    lanes[lane].set_message(id, why.view());
+    return {Status::rejected, Reason::reading, 0};
+  }
+  return begin_afresh(lane, reading);
+}
+
+Outcome UntypedBackend::Body::begin_afresh(std::uint32_t lane,
+                                           const FreshReading& reading) noexcept {
   controller.restart(reading.observed, reading.has_desired ? reading.desired : nullptr, current);
   if (recorded_ != nullptr) recorded_->fresh_start(current);
   journal.fresh_start(lane);
+  readings_.begin(reading.observed, nullptr);
+  read_at_ = time();
   publish(true);
   return {};
+}
+
+// ------------------------------------------------------------------------------ readings
+
+void UntypedBackend::Body::keep_reading() noexcept {
+  if (layout.block > 0) std::memcpy(last_reading_.data(), row() + layout.observed, layout.block);
+}
+
+void UntypedBackend::Body::put_back_reading() noexcept {
+  if (layout.block > 0) std::memcpy(row() + layout.observed, last_reading_.data(), layout.block);
+}
+
+/// While the robot is halted and at rest: notes each reading, for the resume.
+void UntypedBackend::Body::watch_readings() noexcept {
+  if (!halts.acts() || readings_.empty() || timing.missed) return;
+  if (controller.braking()) {
+    readings_.begin(row() + layout.observed, controller.desired());
+  } else {
+    readings_.add(row() + layout.observed, since_reading());
+  }
+  read_at_ = time();
+}
+
+/// The time since the last reading, at least a period: a backend may run ahead of its clock [s].
+double UntypedBackend::Body::since_reading() const noexcept {
+  return static_cast<double>(std::max(time() - read_at_, schema.head.period)) * 1e-9;
+}
+
+/// True if the robot cannot be where it was read; `why` says so.
+bool UntypedBackend::Body::is_misread(const std::byte* observed, std::string_view cure,
+                                      ShortText<248>& why) const noexcept {
+  const auto fault = readings_.find(observed, since_reading());
+  if (fault) describe_reading(schema, *fault, cure, why);
+  return fault.has_value();
+}
+
+bool UntypedBackend::Body::judge_first(bool again) noexcept {
+  const std::byte* observed = row() + layout.observed;
+  ShortText<248> why;
+  const bool is_good = !again || !is_misread(observed, "start with --accept-reading", why);
+  if (!is_good) note_failure(why.view());
+  readings_.begin(observed, nullptr);
+  read_at_ = time();
+  return is_good;
 }
 
 // ------------------------------------------------------------------------------ running

@@ -149,7 +149,8 @@ Handle Batch::ask(CommandId id) const {
     }
     return handle;
   }
-  const bool has_message = handle.reason == Reason::driver || handle.reason == Reason::halted;
+  const bool has_message = handle.reason == Reason::driver || handle.reason == Reason::halted ||
+                           handle.reason == Reason::reading;
   if (has_message) handle.text = lane_->message(id).value_or("");
   if (handle.text.empty())
     handle.text =

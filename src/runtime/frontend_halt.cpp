@@ -44,21 +44,25 @@ std::optional<Halt> UntypedFrontend::halted() const {
 }
 
 void UntypedFrontend::resume(std::uint64_t number, Timeout timeout,
-                             const KeepWaiting& keep_waiting) {
+                             const KeepWaiting& keep_waiting, bool accept_reading) {
+  // one wrong reading need not refuse it
+  constexpr int kReadings = 5;
+  int readings = 0;
   refuse_if_played(link_->segment);
   const Deadline deadline(timeout);
   while (true) {
     wait_for_rest(number, deadline, keep_waiting);
     BatchBuilder builder;
-    builder.resume(number);
+    builder.resume(number, accept_reading);
     const Batch batch = pulse(builder);
     batch.wait(left_of(deadline, timeout), keep_waiting, {.check = false});
     const Handle handle = batch.handle(0);
     if (handle.status == Status::completed) return;
     // at rest, the backend may still have scheduled batches to end
     const std::optional<Halt> acting = link_->halt();
-    const bool is_early = !bursting() && handle.reason == Reason::halted && acting &&
-                          acting->number == number && !deadline.over();
+    const bool is_misread = handle.reason == Reason::reading && ++readings <= kReadings;
+    const bool is_early = !bursting() && (handle.reason == Reason::halted || is_misread) &&
+                          acting && acting->number == number && !deadline.over();
     if (!is_early) {
       throw BackendHalted("'" + segment() + "' does not resume: " + handle.text);
     }

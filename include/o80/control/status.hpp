@@ -39,9 +39,10 @@ enum class Reason : std::uint8_t {
   silence,
   stopped,
   halted,
-  full  // the lane has too many batches that wait for a later iteration
+  full,     // the lane has too many batches that wait for a later iteration
+  reading  // the robot cannot be where it was read
 };
-inline constexpr std::size_t kReasons = static_cast<std::size_t>(Reason::full) + 1;
+inline constexpr std::size_t kReasons = static_cast<std::size_t>(Reason::reading) + 1;
 
 std::string_view to_text(Status status) noexcept;
 std::string_view to_text(Reason reason) noexcept;

@@ -66,7 +66,7 @@ class Desired {
  private:
   template <class T>
   double difference(const Place<T>& place, std::uint32_t order) const {
-    return view_.difference(view_.context, place.offset, order);
+    return view_.difference != nullptr ? view_.difference(view_.context, place.offset, order) : 0.0;
   }
   template <class Number>
     requires std::is_arithmetic_v<Number>
@@ -76,7 +76,7 @@ class Desired {
     if (at < first || at - first >= sizeof states) {
       throw InvalidArgument("rate() and rate2() want a number of these desired states, not a copy");
     }
-    return view_.difference(view_.context, static_cast<std::uint32_t>(at - first), order);
+    return difference(Place<Number>{static_cast<std::uint32_t>(at - first)}, order);
   }
 
   DesiredView view_;

@@ -62,9 +62,9 @@ struct DesiredView {
   std::int64_t time;    // [ns]
   std::int64_t period;  // [ns]
   /// First (order 1) or second difference, to the iteration before, of the number at this offset
-  /// of the desired block; 0 for one that does not move by itself.
-  double (*difference)(const void* context, std::uint32_t offset, std::uint32_t order);
-  const void* context;
+  /// of the desired block; 0 for one that does not move by itself. Null: there are none.
+  double (*difference)(const void* context, std::uint32_t offset, std::uint32_t order) = nullptr;
+  const void* context = nullptr;
 };
 
 /// Result of a request; `running`: it ends in a later reading.

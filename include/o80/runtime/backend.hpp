@@ -45,6 +45,8 @@ struct BackendOptions {
   /// Real time only: starts without a halt even if the previous backend of this name was halted, or
   /// was killed while commands acted.
   bool resume = false;
+  /// Real time only: starts wherever the robot is read, even if it cannot be there.
+  bool accept_reading = false;
   /// What the caller knows of the robot: its options, library and files, and further run options.
   /// The backend adds its own options, the versions and the clock, and the robot's name if none is
   /// given.
@@ -59,6 +61,7 @@ struct Timing {
   std::int64_t lateness = 0;   // [ns]
   std::uint32_t overruns = 0;  // so far
   std::uint32_t skipped = 0;   // so far
+  bool missed = false;         // this iteration brought no reading
 };
 
 /// Result of `step`.
@@ -99,6 +102,11 @@ class UntypedBackend {
   /// The observed and extended parts of the current row; fill them before `publish`.
   std::byte* observed() noexcept;
   std::byte* extended() noexcept;
+  /// True if limits say how far the robot can move between two readings.
+  bool watches_readings() const noexcept;
+  /// Before row 0 in real time: notes the first reading; then (`again`), a period later each, false
+  /// if the robot cannot have come there from the reading before; `failure` names the number.
+  bool judge_first(bool again) noexcept;
   /// Publishes the current row. The first one is row 0 and makes the backend running. If a number
   /// of row 0 is NaN or infinite, publishes nothing and returns false; `failure` names the number.
   bool publish() noexcept;

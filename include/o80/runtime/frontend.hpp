@@ -189,9 +189,11 @@ class UntypedFrontend {
   std::optional<Halt> halted() const;
   /// Clears halts up to this number; the robot makes a fresh start. In real time it first waits
   /// until the halt is in force and the robot is at rest. Needs a lane, but no control. Throws
-  /// BackendHalted if it is refused (another halt came after it, the robot refuses, or, in bursting
-  /// mode, it still brakes), TimeoutError, NoLane, BackendGone.
-  void resume(std::uint64_t number, Timeout timeout, const KeepWaiting& keep_waiting = {});
+  /// BackendHalted if it is refused (another halt came after it, the robot refuses, it cannot be
+  /// where it is read unless you `accept_reading`, or, in bursting mode, it still brakes),
+  /// TimeoutError, NoLane, BackendGone.
+  void resume(std::uint64_t number, Timeout timeout, const KeepWaiting& keep_waiting = {},
+              bool accept_reading = false);
   /// A sign of life for the backend's watchdog, as a pulse or a wait for a batch is.
   void keep_alive();
 

@@ -30,6 +30,12 @@ def resume(
     timeout: Annotated[
         float, typer.Option(help="Seconds to wait until the robot is at rest.")
     ] = 5.0,
+    accept_reading: Annotated[
+        bool,
+        typer.Option(
+            "--accept-reading", help="Go on from what is read, even if the robot cannot be there."
+        ),
+    ] = False,
 ) -> None:
     """Clear a halt: the robot makes a fresh start at its present position, with empty queues."""
     chosen = None if number is None else _number(number, segment)
@@ -38,7 +44,11 @@ def resume(
         if acting is None:
             print(f"{segment} is not halted")
             return
-        frontend.resume(acting.number if chosen is None else chosen, timeout=timeout)
+        frontend.resume(
+            acting.number if chosen is None else chosen,
+            timeout=timeout,
+            accept_reading=accept_reading,
+        )
         print(f"{segment} has resumed")
 
 

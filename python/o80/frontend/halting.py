@@ -34,18 +34,26 @@ class Halting(Controlling):
         number, cause, iteration, who, text = fields
         return Halt(number, cause, None if iteration < 0 else iteration, who, text)
 
-    def resume(self, number: int | None = None, *, timeout: float | None = 5.0) -> None:
+    def resume(
+        self,
+        number: int | None = None,
+        *,
+        timeout: float | None = 5.0,
+        accept_reading: bool = False,
+    ) -> None:
         """Ends a halt: the robot makes a fresh start at its present position, with empty queues.
 
         number: number of the halt (None: the one in force now). A halt that came after it stays.
         timeout: how long to wait until the halt is in force, the robot is at rest, and the backend
             has answered [s].
+        accept_reading: go on from wherever the robot is read, even if it cannot have come there
+            since the halt.
 
         Needs a lane, but no control. In bursting mode it does not wait until the robot is at rest:
         burst until it is.
 
-        Raises BackendHalted if it is refused: another halt came after it, the robot refuses, or, in
-        bursting mode, it still brakes. Raises TimeoutError, NoLane, BackendGone.
+        Raises BackendHalted if it is refused: another halt came after it, the robot refuses, it
+        cannot be where it is read, or, in bursting mode, it still brakes. Raises TimeoutError, NoLane, BackendGone.
         Does nothing if no halt is in force.
         """
         if number is None:
@@ -53,4 +61,4 @@ class Halting(Controlling):
             if halt is None:
                 return
             number = halt.number
-        self._resume(whole(number, "the number of a halt", 1), timeout)
+        self._resume(whole(number, "the number of a halt", 1), timeout, accept_reading)

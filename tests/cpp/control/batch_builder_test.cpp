@@ -68,7 +68,7 @@ TEST(Record, EveryWordHasItsText) {
   every_value_has_its_own_text(Profile::minimum_jerk);
   every_value_has_its_own_text(Start::observed);
   every_value_has_its_own_text(Status::halted);
-  every_value_has_its_own_text(Reason::full);
+  every_value_has_its_own_text(Reason::reading);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <random>
 #include <thread>
 
 #include "memory/verb_word.hpp"
@@ -212,6 +213,187 @@ TEST_F(LoopHaltTest, AVerbThatDoesNotReturnIsSeenFromOutside) {
   hangs = false;
   loop.ask_to_stop();
   runner.join();
+}
+
+// ------------------------------------------------------------------------- readings
+
+/// A bursting puppet that is commanded, halted and resumed; its sensor may lie.
+class ReadingTest : public LoopHaltTest {
+ protected:
+  void begin(const Limits& limits) {
+    Puppet::limits = limits;
+    Puppet::on_write = [this](const Desired<Puppet>& desired) { written_ = desired[0]; };
+    Puppet::on_read = [this](Reading<Puppet>& reading) {
+      reading.observed[0] += moved_ + offset_ + (reading.fresh() ? fresh_offset_ : 0.0);
+    };
+    loop_ = bursting_loop();
+    frontend_ = std::make_unique<UntypedFrontend>("puppet");
+  }
+  void run(int iterations) {
+    frontend_->start_burst(iterations);
+    loop_->run_granted(kAll);
+  }
+  std::uint64_t halt() {
+    const std::uint64_t number = frontend_->halt("");
+    run(1);
+    return number;
+  }
+  Handle resume(std::uint64_t number, bool accepts = false) {
+    BatchBuilder builder;
+    builder.resume(number, accepts);
+    const Batch batch = frontend_->pulse(builder);
+    loop_->run_granted(kAll);
+    return batch.handle(0);
+  }
+  bool is_alive() { return loop_->fault().empty(); }
+
+  std::unique_ptr<Loop> loop_;
+  std::unique_ptr<UntypedFrontend> frontend_;
+  double written_ = 0.0;
+  double moved_ = 0.0;         // by hand, or noise
+  double offset_ = 0.0;        // of every reading
+  double fresh_offset_ = 0.0;  // of the reading of a fresh start
+};
+
+TEST_F(ReadingTest, AResumeRefusesOneThatCannotBe) {
+  std::mt19937 random(3);
+  const auto uniform = [&](double low, double high) {
+    return std::uniform_real_distribution(low, high)(random);
+  };
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  const double period = 1e-3;
+  for (int i = 0; i < 63; ++i) {
+    Limits limits{.minimum = -5.0, .maximum = 5.0, .speed = uniform(0.5, 4.0)};
+    if (i % 2 == 0) limits.error = uniform(0.1, 1.0);
+    begin(limits);
+    offset_ = fresh_offset_ = moved_ = 0.0;
+    add(*frontend_, 0, uniform(-2.0, 2.0), {.pace = iterations(20)});
+    run(static_cast<int>(uniform(1.0, 30.0)));
+    const std::uint64_t number = halt();
+    run(static_cast<int>(uniform(1.0, 5.0)));
+
+    const double tolerance = limits.speed * period + (i % 2 == 0 ? limits.error / 10.0 : 0.0);
+    const double sizes[] = {2.1 * tolerance, 10.0 * tolerance,          10.0, 1e6, 1e300,
+                            kInfinity,       std::nan("")};
+    const double wrong = std::copysign(sizes[i % 7], uniform(-1.0, 1.0));
+    const int when = i % 3;
+    if (when == 0) fresh_offset_ = wrong;
+    if (when == 1) offset_ = wrong;  // of the last row, and from then on
+    if (when == 2) {                 // of one row
+      offset_ = wrong;
+      run(1);
+      offset_ = 0.0;
+    } else {
+      run(1);
+    }
+    const double before = written_;
+    const Handle handle = resume(number);
+    run(3);
+    EXPECT_EQ(written_, before);
+    ASSERT_TRUE(is_alive());
+    if (when == 2) {
+      // it has come back by itself, or will in the next row
+      if (handle.status != Status::completed) {
+        EXPECT_EQ(resume(number).status, Status::completed) << resume(number).text;
+      }
+    } else {
+      EXPECT_EQ(handle.status, Status::rejected) << i;
+      EXPECT_TRUE(frontend_->halted());
+      offset_ = fresh_offset_ = 0.0;
+      run(1);
+      EXPECT_EQ(resume(number).status, Status::completed) << i << ": " << resume(number).text;
+    }
+    EXPECT_EQ(written_, before);
+    frontend_.reset();
+    loop_.reset();
+  }
+}
+
+TEST_F(ReadingTest, OneTurnOffInEveryRowIsRefusedUntilItIsAccepted) {
+  begin({.speed = 2.0, .error = 0.3});
+  run(10);
+  offset_ = 6.283;
+  run(1);  // halts by its error limit
+  run(5000);
+  ASSERT_TRUE(frontend_->halted());
+  const std::uint64_t number = frontend_->halted()->number;
+  const Handle handle = resume(number);
+  EXPECT_EQ(handle.status, Status::rejected);
+  EXPECT_EQ(handle.reason, Reason::reading);
+  EXPECT_THAT(handle.text, AllOf(HasSubstr("actuator 'left' was read at 6.283 after 0"),
+                                 HasSubstr("resume with --accept-reading")));
+  EXPECT_EQ(written_, 0.0);
+  EXPECT_EQ(resume(number, true).status, Status::completed);
+  run(1);
+  EXPECT_EQ(written_, 6.283);
+}
+
+TEST_F(ReadingTest, ARobotThatIsRightIsNeverRefused) {
+  std::mt19937 random(5);
+  const auto uniform = [&](double low, double high) {
+    return std::uniform_real_distribution(low, high)(random);
+  };
+  for (int i = 0; i < 20; ++i) {
+    const Limits limits{.speed = uniform(0.5, 4.0), .error = uniform(0.1, 1.0)};
+    begin(limits);
+    double place = 0.0;
+    const std::uint64_t number = halt();
+    const double motion = uniform(-1.0, 1.0) * limits.speed * 1e-3;
+    const double noise = limits.error / 20.0;
+    for (int k = 0; k < 50; ++k) {
+      place += motion;
+      moved_ = place + uniform(-noise, noise);
+      run(1);
+    }
+    const Handle handle = resume(number);
+    EXPECT_EQ(handle.status, Status::completed) << handle.text;
+    moved_ = 0.0;
+    frontend_.reset();
+    loop_.reset();
+  }
+}
+
+TEST_F(ReadingTest, ARobotThatCannotBeReadInAResumeStaysHalted) {
+  begin({});
+  const std::uint64_t number = halt();
+  Puppet::on_read = [](Reading<Puppet>& reading) {
+    if (reading.fresh()) throw std::runtime_error("the cable is off");
+  };
+  const Handle handle = resume(number);
+  EXPECT_EQ(handle.status, Status::rejected);
+  EXPECT_THAT(handle.text, HasSubstr("the cable is off"));
+  EXPECT_TRUE(frontend_->halted());
+  EXPECT_EQ(Puppet::calls.halted, 2) << "the driver had resumed";
+  run(2);
+  Puppet::on_read = {};
+  EXPECT_EQ(resume(number).status, Status::completed);
+  EXPECT_TRUE(is_alive());
+}
+
+TEST_F(ReadingTest, RowZeroInRealTimeIsReadUntilTwoReadingsAgree) {
+  Puppet::limits = {.speed = 2.0};
+  int reads = 0;
+  const auto start = [&](double every, bool accepts) {
+    Puppet::on_read = [&reads, every](Reading<Puppet>& reading) {
+      if (reads++ == 0 || every != 0.0) reading.observed[0] = 7.0 + every * reads;
+    };
+    reads = 0;
+    Loop loop(std::make_unique<DriverInstance>(table(), OptionValues{}),
+              BackendOptions{.segment = "puppet", .period = 100'000, .accept_reading = accepts});
+    loop.start();
+    return UntypedFrontend("puppet").latest().iteration();
+  };
+  EXPECT_EQ(start(0.0, false), 0);
+  EXPECT_EQ(reads, 3) << "the second differs from the first, the third agrees";
+  try {
+    start(5.0, false);
+    FAIL();
+  } catch (const DriverError& error) {
+    EXPECT_THAT(error.what(), AllOf(HasSubstr("actuator 'left' was read at"),
+                                    HasSubstr("start with --accept-reading")));
+  }
+  EXPECT_EQ(start(5.0, true), 0);
+  EXPECT_EQ(reads, 1);
 }
 
 }  // namespace

@@ -178,7 +178,7 @@ class Replay : public StatusSink, public BatchHandler {
     return {};
   }
   Outcome resume(std::uint32_t /*lane*/, CommandId /*id*/,
-                 std::uint64_t /*number*/) noexcept override {
+                 std::uint64_t /*number*/, bool /*accepts*/) noexcept override {
     if (follows(JournalKind::resume) && follows(JournalKind::fresh_start)) start_afresh();
     return {};
   }

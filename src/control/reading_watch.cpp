@@ -1,0 +1,88 @@
+#include "control/reading_watch.hpp"
+
+#include <cmath>
+#include <utility>
+
+#include "control/number_name.hpp"
+
+namespace o80 {
+
+ReadingWatch::ReadingWatch(const Schema& schema) : layouts_(schema.types.size()) {
+  for (std::uint32_t i = 0; i < schema.actuators.size(); ++i) {
+    const ActuatorRow& row = schema.actuators[i];
+    for (std::uint32_t number = 0; number < row.limits; ++number) {
+      const LimitRow& limit = schema.limits[row.first_limit + number];
+      const double width = limit.maximum - limit.minimum;
+      if (limit.resting != 0 || (!std::isfinite(limit.speed) && !std::isfinite(width))) continue;
+      auto& layout = layouts_[row.type];
+      if (!layout) layout.emplace(schema, row.type);
+      const double noise = std::isfinite(limit.error) ? limit.error / 10.0 : 0.0;
+      const double outside = std::isfinite(limit.error) ? limit.error : width / 10.0;
+      watched_.push_back({i, number, row.offset, row.type, limit.speed, noise, limit.error,
+                          limit.minimum - outside, limit.maximum + outside});
+    }
+  }
+}
+
+void ReadingWatch::begin(const std::byte* observed, const std::byte* desired) noexcept {
+  for (Watched& each : watched_) {
+    each.before = each.good = value(each, observed);
+    each.since = 0.0;
+    each.is_wrong = false;
+    if (desired == nullptr) continue;
+    const double wanted = value(each, desired);
+    if (std::abs(each.before - wanted) <= each.error) continue;
+    each.good = wanted;
+    each.is_wrong = true;
+  }
+}
+
+void ReadingWatch::add(const std::byte* observed, double elapsed) noexcept {
+  for (Watched& each : watched_) {
+    const double now = value(each, observed);
+    const double before = std::exchange(each.before, now);
+    each.since += elapsed;
+    // `<=`, because a comparison with NaN is false: NaN must count as wrong
+    if (std::abs(now - before) <= each.reach(elapsed)) continue;
+    if (!each.is_wrong) {
+      each.is_wrong = true;
+      each.good = before;
+      each.since = elapsed;
+    } else if (std::abs(now - each.good) <= each.reach(each.since)) {
+      each.is_wrong = false;
+    }
+  }
+}
+
+std::optional<ReadingWatch::Fault> ReadingWatch::find(const std::byte* observed,
+                                                      double elapsed) const noexcept {
+  for (const Watched& each : watched_) {
+    const double now = value(each, observed);
+    if (!(now >= each.low && now <= each.high)) {
+      const double bound = now > each.high ? each.high : each.low;
+      return Fault{each.actuator, each.number, bound, now, 0.0, true};
+    }
+    const bool steps = !(std::abs(now - each.before) <= each.reach(elapsed));
+    const bool returns = std::abs(now - each.good) <= each.reach(each.since + elapsed);
+    if (each.is_wrong ? !(steps && returns) : steps) {
+      return Fault{each.actuator, each.number, each.is_wrong ? each.good : each.before, now,
+                   each.reach(elapsed), false};
+    }
+  }
+  return std::nullopt;
+}
+
+void describe_reading(const Schema& schema, const ReadingWatch::Fault& fault,
+                      std::string_view cure, ShortText<248>& text) noexcept {
+  name_number(schema, fault.actuator, fault.number, text);
+  text.add(" was read at ").add(fault.read);
+  if (fault.is_outside) {
+    text.add(", too far outside its bounds (beyond ").add(fault.before).add(")");
+  } else {
+    text.add(" after ").add(fault.before).add(": farther than its speed limit allows (");
+    text.add(fault.tolerance).add(")");
+  }
+  text.add(". Check the sensor and the robot; if the reading is right, ").add(cure);
+}
+
+}  // namespace o80
