@@ -27,9 +27,9 @@ struct Joint {
 
   NumberMotion at_rest() const {
     const double t = 1.0 / frequency;
-    NumberMotion motion(NumberLimiter(-kInfinity, kInfinity,
-                                      {speed * t, acceleration * t * t, jerk * t * t * t}),
-                        std::nullopt);
+    NumberMotion motion(
+        NumberLimiter(-kInfinity, kInfinity, {speed * t, acceleration * t * t, jerk * t * t * t}),
+        std::nullopt);
     motion.restart(0.0);
     return motion;
   }
@@ -52,10 +52,9 @@ struct Begun {
 
 class Draw {
  public:
-  /// From rest, to a target up to `farthest` away.
-  Begun at_rest(double farthest = 1.0) {
+  Begun at_rest() {
     Begun one{kJoints[random_() % 2].at_rest(), {}};
-    one.asked.target = one.motion.position() + real(-farthest, farthest);
+    one.asked.target = real(-1.0, 1.0);
     return one;
   }
   /// From any iteration of another motion.
@@ -101,6 +100,7 @@ void measure_starts(const std::string& name, const std::vector<Begun>& starts) {
   sample((name + "_p99").c_str(), "us", times[times.size() * 99 / 100]);
 }
 
+/// To the end of each motion.
 void measure_iterations(const std::vector<Begun>& starts) {
   double time = 0.0;
   std::int64_t steps = 0;

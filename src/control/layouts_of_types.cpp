@@ -17,8 +17,8 @@ void refuse_limits(const Schema& schema, const ActuatorRow& actuator) {
     const bool limited = std::isfinite(limit.minimum) || std::isfinite(limit.maximum) ||
                          std::isfinite(limit.speed);  // the other limits need one of speed
     if (limited || limit.resting != 0) {
-      const std::string type = ", but its type '" + schema.types[actuator.type].name.str() +
-                               "' has its own blend(): ";
+      const std::string type =
+          ", but its type '" + schema.types[actuator.type].name.str() + "' has its own blend(): ";
       throw InvalidArgument("actuator '" + actuator.name.str() + "' has " +
                             (limited ? "limits" + type + "limit it in the driver"
                                      : "a rest value" + type + "bring it to rest in the driver"));
