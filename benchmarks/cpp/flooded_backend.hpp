@@ -27,8 +27,8 @@ inline constexpr std::uint32_t kLanes = 8;
 class Robot final : private RequestServer {
  public:
   explicit Robot(const std::string& segment, std::uint32_t actuators,
-                 std::uint32_t lane_blocks = 16'384)
-      : backend(schema_of(actuators),
+                 std::uint32_t lane_blocks = 16'384, const Limits& limits = {})
+      : backend(schema_of(actuators, limits),
                 {.segment = segment, .history = 64, .lanes = kLanes, .lane_blocks = lane_blocks},
                 this) {
     backend.publish();
@@ -47,11 +47,12 @@ class Robot final : private RequestServer {
   UntypedBackend backend;
 
  private:
-  static Schema schema_of(std::uint32_t actuators) {
+  static Schema schema_of(std::uint32_t actuators, const Limits& limits) {
     Schema schema;
     schema.head.robot = NameText("flooded");
     const auto type = schema.add_type("float64", {scalar_field("", Kind::float64)});
     schema.add_actuators("joint", type, actuators);
+    for (std::uint32_t i = 0; i < actuators; ++i) schema.actuator(i).limits(limits);
     const auto nothing = schema.add_type("Nothing", {});
     schema.add_request("restart", nothing, "starts afresh");
     schema.add_request("nothing", nothing, "does nothing");

@@ -9,16 +9,19 @@ namespace o80 {
 
 namespace {
 
-/// Throws if an actuator has limits: they apply to single numbers, which a type with its own
-/// blend() does not interpolate one by one.
+/// Throws if an actuator has limits or rest values: they apply to single numbers, which a type with
+/// its own blend() does not interpolate one by one.
 void refuse_limits(const Schema& schema, const ActuatorRow& actuator) {
   for (std::uint32_t i = 0; i < actuator.limits; ++i) {
     const LimitRow& limit = schema.limits.at(actuator.first_limit + i);
-    if (std::isfinite(limit.minimum) || std::isfinite(limit.maximum) ||
-        std::isfinite(limit.speed) || limit.resting != 0) {
-      throw InvalidArgument("actuator '" + actuator.name.str() + "' has limits, but its type '" +
-                            schema.types[actuator.type].name.str() +
-                            "' has its own blend(): limit it in the driver");
+    const bool limited = std::isfinite(limit.minimum) || std::isfinite(limit.maximum) ||
+                         std::isfinite(limit.speed);  // the other limits need one of speed
+    if (limited || limit.resting != 0) {
+      const std::string type =
+          ", but its type '" + schema.types[actuator.type].name.str() + "' has its own blend(): ";
+      throw InvalidArgument("actuator '" + actuator.name.str() + "' has " +
+                            (limited ? "limits" + type + "limit it in the driver"
+                                     : "a rest value" + type + "bring it to rest in the driver"));
     }
   }
 }

@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "control/visit_block.hpp"
+
 namespace o80 {
 
 SmoothMotion::SmoothMotion(const Moment& start, double target, std::int64_t iterations) noexcept
     : last_(static_cast<double>(iterations)), target_(target) {
+  O80_COUNT(smooth_motion);
   const double n = last_;
   const double d = start.position - target;
   const double v = start.speed;

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "control/visit_block.hpp"
+
 namespace o80 {
 namespace {
 
@@ -22,6 +24,7 @@ double share_between(double wanted, double at_zero, double at_one) noexcept {
 
 VelocityChange::VelocityChange(double change, double acceleration, const Rates& rates) noexcept
     : start_(acceleration), acceleration_(rates.acceleration), jerk_(rates.jerk) {
+  O80_COUNT(speed_change);
   if (std::isfinite(jerk_)) {
     plan_with_jerk(change);
   } else {
@@ -60,6 +63,7 @@ double VelocityChange::trough(double i, double steps) const noexcept {
 /// The sums of trough(), for its three parts: down, along the limit, up.
 VelocityChange::Sums VelocityChange::sums(double steps) const noexcept {
   if (steps <= 0.0) return {};
+  O80_COUNT(trapezoid);
   const double meet = std::floor((start_ / jerk_ + steps) / 2.0);
   const double down =
       std::clamp(std::min(meet, std::floor((start_ + acceleration_) / jerk_)), 0.0, steps);

@@ -11,7 +11,10 @@ namespace o80 {
 enum class Work : std::uint8_t {
   batch_taken,
   status_told,
-  queue_dropped  // the queue of one actuator
+  queue_dropped,  // the queue of one actuator
+  speed_change,   // a VelocityChange was planned
+  trapezoid,      // one that it tried
+  smooth_motion   // a SmoothMotion was planned
 };
 void visit_block(std::uint32_t block) noexcept;
 void count(Work work) noexcept;

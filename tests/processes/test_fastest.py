@@ -10,7 +10,7 @@ may hang on that. So each motion is compared with ruckig's from all states withi
 import math
 import subprocess
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 
@@ -20,6 +20,7 @@ import ruckig
 from numpy.typing import NDArray
 
 CASES = 10_000
+FROM_REST = 5_000
 SAMPLES = 4  # positions compared of each motion
 Trajectories = list[ruckig.Trajectory]
 
@@ -36,14 +37,14 @@ class Case:
     second: float
 
 
-def random_cases(seed: int) -> list[Case]:
+def random_cases(seed: int, count: int) -> list[Case]:
     random = np.random.default_rng(seed)
 
     def magnitude(low: float, high: float) -> float:
         return float(10.0 ** random.uniform(low, high))
 
     cases = []
-    for _ in range(CASES):
+    for _ in range(count):
         speed = magnitude(-3, 0)
         acceleration = speed * magnitude(-2, 0.3)
         jerk = acceleration * magnitude(-1.5, 0.3) if random.random() < 0.7 else math.inf
@@ -119,7 +120,7 @@ def whole(duration: float) -> int:
 
 @pytest.mark.timeout(600)
 def test_fastest_takes_as_long_as_ruckig_and_goes_the_same_way(build_prefix: Path) -> None:
-    cases = random_cases(seed=1)
+    cases = random_cases(seed=1, count=CASES)
     motions = played(build_prefix / "bin" / "o80_fastest", cases)
     later: Counter[int] = Counter()
     far = []
@@ -138,3 +139,21 @@ def test_fastest_takes_as_long_as_ruckig_and_goes_the_same_way(build_prefix: Pat
     assert sum(count for more, count in later.items() if more > 2) < 0.001 * CASES
     assert max(later) <= 4
     assert max(far) < 0.75
+
+
+def test_from_rest_fastest_takes_at_most_three_iterations_more_than_ruckig(
+    build_prefix: Path,
+) -> None:
+    cases = [replace(case, cut=0) for case in random_cases(seed=2, count=FROM_REST)]
+    motions = played(build_prefix / "bin" / "o80_fastest", cases)
+    later: Counter[int] = Counter()
+    far = []
+    for case, motion in zip(cases, motions, strict=True):
+        assert motion[-1] == case.second, case
+        expected = trajectory(case, 0.0, 0.0, 0.0)  # from rest nothing is in doubt
+        later[len(motion) - 3 - whole(expected.duration)] += 1
+        far.append(distance_from(case, motion, [expected]))
+    print("iterations more than ruckig takes from rest:", sorted(later.items()))
+    assert min(later) >= 0
+    assert max(later) <= 3
+    assert max(far) < 0.05

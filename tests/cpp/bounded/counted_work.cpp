@@ -30,6 +30,15 @@ void count(Work what) noexcept {
       break;
     case Work::queue_dropped:
       ++work.drops;
+      break;
+    case Work::speed_change:
+      ++work.speed_changes;
+      break;
+    case Work::trapezoid:
+      ++work.trapezoids;
+      break;
+    case Work::smooth_motion:
+      ++work.smooth_motions;
   }
 }
 

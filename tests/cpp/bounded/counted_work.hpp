@@ -10,7 +10,10 @@ struct CountedWork {
   std::uint32_t visits = 0;  // looks at blocks
   std::uint32_t batches = 0;
   std::uint32_t statuses = 0;
-  std::uint32_t drops = 0;  // of an actuator's queue
+  std::uint32_t drops = 0;          // of an actuator's queue
+  std::uint32_t speed_changes = 0;  // planned
+  std::uint32_t trapezoids = 0;     // tried for them
+  std::uint32_t smooth_motions = 0;
 };
 
 /// Since this was last asked.

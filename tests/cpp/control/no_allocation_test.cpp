@@ -10,6 +10,8 @@ TEST(Controller, AllocatesNothingOnceItIsMade) {
   Schema schema = plain_robot(8, 2);
   schema.actuator(0).limits({.minimum = -1.0, .maximum = 1.0, .speed = 5.0});
   schema.actuator(1).when_idle(WhenIdle::follow);
+  const Limits arm{.speed = 2.0, .acceleration = 15.0, .jerk = 500.0};
+  schema.actuator(5).limits("x0", arm).limits("x1", arm);
   schema.add_request("nothing", kNoType, "no payload");
   Rig rig(schema, 20'000);
   rig.witness.keep = false;
@@ -30,6 +32,8 @@ TEST(Controller, AllocatesNothingOnceItIsMade) {
   rig.add(0, over(100), {0.0, 0.0});
   const BlockIndex first = rig.send(0);
   rig.add(2, overwriting(smoothly(over(100))), {0.0, 0.0});
+  rig.add(5, overwriting(paced(Pace::fastest, 0)), {1.0, 0.5});
+  rig.add(6, overwriting(smoothly(over(100))), {0.0, 0.0});
   rig.batch.purge_own(3);
   const BlockIndex second = rig.send(1);
   for (int i = 0; i < 2000; ++i) rig.add(0, over(5), {0.0, 0.0});

@@ -1,0 +1,149 @@
+// Whatever a number does, and whatever its limits and its target are, the start of a plan and each
+// iteration do a bounded amount of work.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <random>
+#include <vector>
+
+#include "bounded/counted_work.hpp"
+#include "control/number_motion.hpp"
+
+namespace o80::test {
+namespace {
+
+constexpr double kNoLimit = std::numeric_limits<double>::infinity();
+constexpr std::int64_t kPlayed = 500;  // iterations of a motion, at most
+
+// a root of FastestMotion: the changes of speed of each evaluation
+constexpr std::uint32_t kRoot = 2 * (60 + 2);
+// two roots, and what is done once or bisects a number of iterations
+constexpr std::uint32_t kStart = 2 * kRoot + 50;
+constexpr std::uint32_t kStretch = 8 * (kRoot + 2);
+// the searches of a NumberLimiter that follows
+constexpr std::uint32_t kFollow = 2 * 16 + 8;
+// of a VelocityChange: it searches by doubling and halving, up to 1e12 iterations
+constexpr std::uint32_t kTrapezoids = 4 + 2 * 40;
+// numbers of iterations that are tried, each also with up to ten stops on the way
+constexpr std::uint32_t kSmooth = (8 + 32) * (2 + 2 * 10);
+
+class PlansTest : public testing::Test {
+ protected:
+  double real(double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random_);
+  }
+  double magnitude(double low, double high) { return std::pow(10.0, real(low, high)); }
+  bool one_in(int count) { return real(0.0, count) < 1.0; }
+
+  NumberMotion number_at(double position, double bound, const Rates& rates) {
+    NumberMotion number(NumberLimiter(-bound, bound, rates), std::nullopt);
+    number.restart(position);
+    return number;
+  }
+  NumberMotion any_number() {
+    Rates rates{magnitude(-5, 1), kNoLimit, kNoLimit};
+    if (!one_in(8)) rates.acceleration = rates.speed * magnitude(-4, 1);
+    if (!one_in(4)) rates.jerk = rates.acceleration * magnitude(-4, 1);
+    const double bound = one_in(3) ? magnitude(-2, 2) : kNoLimit;
+    return number_at(real(-1, 1) * std::min(bound, 1.0), bound, rates);
+  }
+  NumberMotion::Asked any_target(const NumberMotion& number) {
+    const double far = one_in(20) ? magnitude(4, 300) : magnitude(-8, 3);
+    const double near = number.guard().moment().speed * real(0, 20);  // about where it can stop
+    NumberMotion::Asked asked;
+    asked.target = number.position() + (one_in(4) ? near : real(-1, 1) * far);
+    if (one_in(3)) asked.profile = Profile::minimum_jerk;
+    if (one_in(3)) asked.cruise = number.guard().rates().speed * magnitude(-3, 0.2);
+    if (one_in(3)) asked.iterations = static_cast<std::int64_t>(magnitude(0, 9));
+    if (one_in(10)) asked.start = real(-1, 1);
+    return asked;
+  }
+  std::int64_t some_of(std::int64_t iterations) {
+    return static_cast<std::int64_t>(real(0, 1) * static_cast<double>(iterations));
+  }
+
+  std::mt19937_64 random_{11};
+};
+
+void expect_bounded(const CountedWork& work, std::uint32_t speed_changes) {
+  EXPECT_LE(work.speed_changes, speed_changes);
+  EXPECT_LE(work.trapezoids, kTrapezoids * work.speed_changes);
+  EXPECT_LE(work.smooth_motions, kSmooth);
+}
+
+TEST_F(PlansTest, AreBoundedFromAnyMotionWithinAnyLimits) {
+  for (int round = 0; round < 5'000 && !HasFailure(); ++round) {
+    NumberMotion number = any_number();
+    for (int part = 0; part < 5; ++part) {
+      SCOPED_TRACE(testing::Message() << "round " << round << ", part " << part);
+      work_since_last_asked();
+      number.begin();
+      std::int64_t iterations = number.propose(any_target(number));
+      expect_bounded(work_since_last_asked(), kStart);
+      if (iterations > kLongestPlan) break;
+      // often another number of the state needs more
+      if (one_in(2)) iterations += static_cast<std::int64_t>(magnitude(0, 3));
+      number.settle(iterations);
+      expect_bounded(work_since_last_asked(), kStart + kStretch);
+
+      for (std::int64_t i = std::min(some_of(iterations), kPlayed); i > 0; --i) {
+        number.step(-kNoLimit, kNoLimit);
+        expect_bounded(work_since_last_asked(), number.follows() ? kFollow : 0);
+      }
+      if (!one_in(4)) continue;
+      number.end();
+      for (int i = 0; i < 10; ++i) number.brake();
+      expect_bounded(work_since_last_asked(), 10 * kFollow);
+    }
+  }
+}
+
+/// Of many starts: the changes of speed of the median, and of the 99th percentile.
+struct Usual {
+  std::uint32_t median;
+  std::uint32_t p99;
+};
+Usual usual_of(std::vector<std::uint32_t> counts) {
+  std::sort(counts.begin(), counts.end());
+  return {counts[counts.size() / 2], counts[counts.size() * 99 / 100]};
+}
+
+TEST_F(PlansTest, OfAnArmUsuallyNeedFewChangesOfSpeed) {
+  // 2/s 15/s2 500/s3 at 500 Hz
+  const Rates arm{2.0 / 500, 15.0 / 250'000, 500.0 / 125'000'000};
+  std::vector<std::uint32_t> from_rest;
+  std::vector<std::uint32_t> moving;
+  std::vector<std::uint32_t> stretched;
+  for (int round = 0; round < 3'000; ++round) {
+    NumberMotion number = number_at(0.0, kNoLimit, arm);
+    const auto start = [&](std::int64_t more) {
+      NumberMotion::Asked asked;
+      asked.target = number.position() + real(-1, 1);
+      work_since_last_asked();
+      number.begin();
+      const std::int64_t iterations = number.propose(asked) + more;
+      number.settle(iterations);
+      return iterations;
+    };
+    for (auto i = some_of(start(0)); i > 0; --i) number.step(-kNoLimit, kNoLimit);
+    from_rest.push_back(work_since_last_asked().speed_changes);
+    for (auto i = some_of(start(0)); i > 0; --i) number.step(-kNoLimit, kNoLimit);
+    moving.push_back(work_since_last_asked().speed_changes);
+    start(1 + some_of(100));
+    stretched.push_back(work_since_last_asked().speed_changes);
+  }
+  EXPECT_LE(usual_of(from_rest).median, 30U);
+  EXPECT_LE(usual_of(from_rest).p99, 45U);
+  EXPECT_LE(usual_of(moving).median, 30U);
+  EXPECT_LE(usual_of(moving).p99, 120U);
+  EXPECT_LE(usual_of(stretched).median, 100U);
+  EXPECT_LE(usual_of(stretched).p99, 300U);
+}
+
+}  // namespace
+}  // namespace o80::test
