@@ -211,6 +211,8 @@ class Robot:
         stale: Literal["hold", "purge", "halt", "stop"] | None = None,
         silence: int | None = None,
         max_overruns: int | None = None,
+        gap: float | None = None,
+        accept_reading: bool = False,
         resume: bool = False,
         policy: Literal["other", "fifo", "rr"] | None = None,
         priority: int | None = None,
@@ -236,6 +238,9 @@ class Robot:
             "halt" halts the robot, "stop" stops it. Signs of life are a pulse, a wait for a batch
             and `keep_alive`, but not reading.
         max_overruns: number of late iterations within a second that halts the robot.
+        gap: a longer time between two iterations halts the robot [s]; 0: none does; None: 20 periods
+            and at least 0.1 s for robots of the world, none for simulations.
+        accept_reading: start wherever the robot is read, even if it cannot have come there.
         resume: start without a halt even if the previous process was halted, or was killed while
             commands acted.
         policy, priority, cpus, lock_memory: real-time scheduling; settings that the machine refuses
@@ -258,6 +263,8 @@ class Robot:
                 "stale": stale,
                 "silence": silence,
                 "max_overruns": max_overruns,
+                "gap": gap,
+                "accept_reading": accept_reading,
                 "resume": resume,
                 "policy": policy,
                 "priority": priority,

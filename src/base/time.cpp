@@ -18,6 +18,7 @@ std::int64_t read_clock(clockid_t clock) noexcept {
 }  // namespace
 
 std::int64_t monotonic_now() noexcept { return read_clock(CLOCK_MONOTONIC); }
+std::int64_t boot_now() noexcept { return read_clock(CLOCK_BOOTTIME); }
 std::int64_t wall_clock_now() noexcept { return read_clock(CLOCK_REALTIME); }
 std::int64_t monotonic_roughly_now() noexcept { return read_clock(CLOCK_MONOTONIC_COARSE); }
 

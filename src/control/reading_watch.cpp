@@ -65,15 +65,15 @@ std::optional<ReadingWatch::Fault> ReadingWatch::find(const std::byte* observed,
     const bool steps = !(std::abs(now - each.before) <= each.reach(elapsed));
     const bool returns = std::abs(now - each.good) <= each.reach(each.since + elapsed);
     if (each.is_wrong ? !(steps && returns) : steps) {
-      return Fault{each.actuator, each.number, each.is_wrong ? each.good : each.before, now,
-                   each.reach(elapsed), false};
+      return Fault{each.actuator, each.number,         each.is_wrong ? each.good : each.before,
+                   now,           each.reach(elapsed), false};
     }
   }
   return std::nullopt;
 }
 
-void describe_reading(const Schema& schema, const ReadingWatch::Fault& fault,
-                      std::string_view cure, ShortText<248>& text) noexcept {
+void describe_reading(const Schema& schema, const ReadingWatch::Fault& fault, std::string_view cure,
+                      ShortText<248>& text) noexcept {
   name_number(schema, fault.actuator, fault.number, text);
   text.add(" was read at ").add(fault.read);
   if (fault.is_outside) {

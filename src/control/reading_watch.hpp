@@ -16,9 +16,9 @@ namespace o80 {
 /// speed allow, nor lie far outside its bounds.
 ///
 /// A number is farther than it can be if it has moved by more than its speed allows since the
-/// reading before, and a tenth of its error limit; or if it lies outside its bounds by more than its
-/// error limit, or without one by a tenth of their width. Resting numbers are not watched, because
-/// they begin at rest, nor what has no such limit.
+/// reading before, and a tenth of its error limit; or if it lies outside its bounds by more than
+/// its error limit, or without one by a tenth of their width. Resting numbers are not watched,
+/// because they begin at rest, nor what has no such limit.
 ///
 /// Realtime: everything but construction; O(numbers with a limit of speed or bounds).
 class ReadingWatch {
@@ -41,8 +41,8 @@ class ReadingWatch {
   /// Later readings are compared with this one. Numbers farther than their error limit from
   /// `desired` (null: not compared) are taken for wrong.
   void begin(const std::byte* observed, const std::byte* desired) noexcept;
-  /// The next reading, `elapsed` [s] after the one before. A step that cannot be is remembered, until
-  /// another one leads back.
+  /// The next reading, `elapsed` [s] after the one before. A step that cannot be is remembered,
+  /// until another one leads back.
   void add(const std::byte* observed, double elapsed) noexcept;
   /// The first number that is wrong since begin(), or would be with this reading; bounds included.
   std::optional<Fault> find(const std::byte* observed, double elapsed) const noexcept;
@@ -59,7 +59,7 @@ class ReadingWatch {
     double low;  // bounds, with their tolerance
     double high;
     double before = 0.0;
-    double good = 0.0;  // before the step that cannot be
+    double good = 0.0;   // before the step that cannot be
     double since = 0.0;  // time since `good` [s]
     bool is_wrong = false;
 
@@ -79,7 +79,7 @@ class ReadingWatch {
 
 /// "position of actuator 'elbow' was read at 10 after 0.1, farther than 0.03: check its sensor; if
 /// the reading is right, resume with --accept-reading".
-void describe_reading(const Schema& schema, const ReadingWatch::Fault& fault,
-                      std::string_view cure, ShortText<248>& text) noexcept;
+void describe_reading(const Schema& schema, const ReadingWatch::Fault& fault, std::string_view cure,
+                      ShortText<248>& text) noexcept;
 
 }  // namespace o80

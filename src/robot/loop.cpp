@@ -66,8 +66,8 @@ void Loop::start() {
   }
 }
 
-/// The reading of row 0. In real time the robot must be where it was a period before, as far as it can
-/// have moved: a sensor that gives one wrong value is read again.
+/// The reading of row 0. In real time the robot must be where it was a period before, as far as it
+/// can have moved: a sensor that gives one wrong value is read again.
 bool Loop::read_first() {
   constexpr int kReadings = 6;
   if (!read()) return false;
@@ -89,9 +89,7 @@ bool Loop::read_first() {
 }
 
 /// Row 0.
-bool Loop::begin() {
-  return backend_.publish() || cannot_begin();
-}
+bool Loop::begin() { return backend_.publish() || cannot_begin(); }
 
 bool Loop::cannot_begin() {
   fault_ = "'";

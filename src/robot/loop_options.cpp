@@ -119,6 +119,13 @@ constexpr std::array kOptions = {
     LoopOption{"max_overruns", OptionKind::integer, "a whole number from 1 to 100000", 1, 1e5,
                "no limit", "number of late iterations within a second that halts the robot",
                kProcess | kEmbedded, O80_SET(backend.max_overruns)},
+    LoopOption{"gap", OptionKind::number, "0 or a number from 0.001 to 3600 [s]", 0, 3600,
+               "20 periods and at least 0.1; none for simulations",
+               "longest time between two iterations; a longer one halts [s], 0: any", kProcess,
+               [](LoopOptions& options, std::string_view, double number) {
+                 options.backend.gap = std::llround(number * 1e9);
+                 return number == 0 || number >= 1e-3;
+               }},
     LoopOption{"resume", OptionKind::boolean, "true or false", 0, 1, "no",
                "start without a halt even if the previous backend was halted or killed",
                kProcess | kEmbedded, O80_SET(backend.resume)},

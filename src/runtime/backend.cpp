@@ -155,6 +155,15 @@ OwnedSegment segment_of(const Schema& schema, const Provenance& provenance,
   return OwnedSegment::create(spec);
 }
 
+/// The time between two rows that halts [ns]; 0: none does.
+std::int64_t longest_gap(const Schema& schema, const BackendOptions& options) {
+  constexpr std::int64_t kPeriods = 20;
+  constexpr std::int64_t kLeast = 100'000'000;
+  if (options.bursting) return 0;
+  if (options.gap >= 0) return options.gap;
+  return schema.head.of_the_world != 0 ? std::max(kPeriods * schema.head.period, kLeast) : 0;
+}
+
 std::size_t largest_request(const Schema& schema) {
   std::size_t size = 0;
   for (const RequestRow& row : schema.requests) {
@@ -200,7 +209,8 @@ UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, Reques
       errors_(schema),
       readings_(schema),
       last_reading_(layout.block / 8),
-      overruns_(options.max_overruns) {
+      overruns_(options.max_overruns),
+      gaps_(recorded == nullptr ? longest_gap(schema, options) : 0) {
   express_lanes_.reserve(lanes.size());
   for (std::uint32_t i = 0; i < lanes.size(); ++i) lives_[i] = liveness.lane(i);
 }
@@ -332,6 +342,7 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
   // before a fresh start the robot may be away from its desired states
   if (begun_ && !fresh && !will_start_afresh()) watch_errors();
   watch_readings();
+  if (gaps_.is_on()) watch_gaps(fresh);
   tell_ended_requests(fresh);
 
   // report statuses, then wake waiting processes

@@ -153,6 +153,8 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   void purge_to_stop() noexcept;
   void show_acts() noexcept;
   void watch_errors() noexcept;
+  void watch_gaps(bool fresh) noexcept;
+  void count_missed() noexcept;
   void begin_halt() noexcept;
   void end_scheduled() noexcept;
   bool suits_halt(const StagedBatch& sent) noexcept;
@@ -225,8 +227,13 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   std::int64_t read_at_ = 0;                 // time of the last row whose reading was not missed
   std::vector<std::uint64_t> last_reading_;  // observed states, while a fresh reading is judged
   OverrunLimit overruns_;
-  bool stopping_ = false;       // braking before an end in order
-  bool driver_halted_ = false;  // the driver's halt() was called
+  GapLimit gaps_;
+  std::uint32_t seen_skipped_ = 0;  // periods that the loop missed
+  Iteration missed_periods_ = 0;    // of these, not yet counted by the watchdog
+  Iteration missed_at_ = 0;         // row behind the first of them
+  Iteration counted_periods_ = 0;   // those counted last
+  bool stopping_ = false;           // braking before an end in order
+  bool driver_halted_ = false;      // the driver's halt() was called
 
   BurstGrant burst_;
 };

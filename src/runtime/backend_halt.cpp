@@ -65,6 +65,18 @@ void UntypedBackend::Body::watch_errors() noexcept {
   ask_to_halt(HaltCause::error, text.view());
 }
 
+/// Halts if the loop stood still since the row before. A request that makes a fresh start may take
+/// its time.
+void UntypedBackend::Body::watch_gaps(bool fresh) noexcept {
+  const std::int64_t gap = gaps_.exceeded(fresh ? 0 : current, boot_now());
+  if (gap == 0 || halts.acts()) return;
+  ShortText<160> text;
+  text.add("no iteration for ").add(static_cast<double>(gap / 1'000'000) * 1e-3);
+  text.add(" s, longer than --gap ").add(static_cast<double>(gaps_.most()) * 1e-9);
+  text.add(": the process was stopped, the machine slept, or the driver hung");
+  ask_to_halt(HaltCause::overruns, text.view());
+}
+
 /// One iteration before an end in order: commands have ended, actuators brake.
 Step UntypedBackend::Body::brake() noexcept {
   if (!stopping_) {

@@ -1,8 +1,10 @@
 // How a backend handles frontends that die or become silent.
 // See ARCHITECTURE.md, Lanes and their owners; Halts.
 
+#include <algorithm>
 #include <array>
 #include <iterator>
+#include <utility>
 
 #include "base/short_text.hpp"
 #include "memory/atomic_words.hpp"
@@ -83,12 +85,31 @@ void UntypedBackend::Body::break_silence(std::uint32_t lane) noexcept {
 
 /// The watchdog: applies the policy to commanders that gave no sign of life for too long while they
 /// hold control or one of their commands acts.
+/// Periods that the loop missed are iterations without life. They count 10 ms later, when signs of
+/// life that came meanwhile have been seen.
+void UntypedBackend::Body::count_missed() noexcept {
+  constexpr std::int64_t kGrace = 10'000'000;  // [ns]
+  if (timing.skipped != seen_skipped_) {
+    if (missed_periods_ == 0) missed_at_ = current - 1;  // the row behind the gap
+    missed_periods_ += timing.skipped - seen_skipped_;
+    seen_skipped_ = timing.skipped;
+  }
+  if (missed_periods_ == 0 || (current - missed_at_) * schema.head.period < kGrace) return;
+  for (Iteration& life : last_life_) {
+    if (life < missed_at_) life -= missed_periods_;
+  }
+  counted_periods_ = std::exchange(missed_periods_, 0);
+}
+
 void UntypedBackend::Body::watch_silence() noexcept {
   if (silence_ == 0 || halts.acts()) return;
+  count_missed();
   for (std::uint32_t i = 0; i < lanes.size(); ++i) {
     if (current - last_life_[i] <= silence_) continue;
     // a sign of life without a batch; clamped, because a frontend may write any number
-    last_life_[i] = std::max(last_life_[i], std::min(lanes[i].life(), current - 1));
+    Iteration life = std::min(lanes[i].life(), current - 1);
+    if (missed_periods_ == 0 && life < missed_at_) life -= counted_periods_;
+    last_life_[i] = std::max(last_life_[i], life);
     if (current - last_life_[i] <= silence_) continue;
     const bool bursts = burst_.runs_for(i);
     const bool acts = holder_.lane() == i || controller.acts(i) || running.moves(i);

@@ -43,8 +43,8 @@ std::optional<Halt> UntypedFrontend::halted() const {
   return link_->halt();
 }
 
-void UntypedFrontend::resume(std::uint64_t number, Timeout timeout,
-                             const KeepWaiting& keep_waiting, bool accept_reading) {
+void UntypedFrontend::resume(std::uint64_t number, Timeout timeout, const KeepWaiting& keep_waiting,
+                             bool accept_reading) {
   // one wrong reading need not refuse it
   constexpr int kReadings = 5;
   int readings = 0;

@@ -1,7 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
+
+#include "o80/base/time.hpp"
 
 namespace o80 {
 
@@ -30,6 +33,30 @@ class OverrunLimit {
   std::vector<std::int64_t> times_;
   std::size_t next_ = 0;
   std::size_t count_ = 0;
+};
+
+/// Detects that a loop stood still: two rows further apart than a limit. The process was stopped,
+/// the machine slept, or a verb of the driver hung.
+///
+/// Realtime: yes.
+class GapLimit {
+ public:
+  /// `most` [ns]; 0: no limit.
+  explicit GapLimit(std::int64_t most) : most_(most) {}
+
+  std::int64_t most() const noexcept { return most_; }
+  bool is_on() const noexcept { return most_ > 0; }
+  /// Row `iteration` is published at `now` [ns], on a clock that also counts while the machine
+  /// sleeps; the time since the row before, if that is too long. What comes before row 1 counts
+  /// not: a driver may load something first.
+  std::int64_t exceeded(Iteration iteration, std::int64_t now) noexcept {
+    const std::int64_t since = now - std::exchange(last_, now);
+    return iteration > 1 && since > most_ ? since : 0;
+  }
+
+ private:
+  std::int64_t most_;
+  std::int64_t last_ = 0;
 };
 
 }  // namespace o80

@@ -1,9 +1,11 @@
 """A driver class in Python is a robot like any other."""
 
+import os
 import re
 import signal
 import subprocess
 import sys
+import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -231,7 +233,7 @@ def test_copies_of_a_driver_are_stepped_together() -> None:
 
 def test_a_process_serves_a_driver_in_python(segment: str) -> None:
     robot = o80.robots.load("room_sensor:Joint")
-    with robot.start(segment, frequency=200, gain=1.0) as process:
+    with robot.start(segment, frequency=200, gain=1.0, gap=0) as process:
         joint = process.frontend(WAIT)
         joint.add_command("elbow", 0.5, iterations=10)
         joint.pulse_and_wait(WAIT)
@@ -243,7 +245,7 @@ def test_a_process_serves_a_driver_in_python(segment: str) -> None:
 
 @pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_frontends_learn_how_the_process_ended(end: signal.Signals, segment: str) -> None:
-    with o80.robots.load(Joint).start(segment, frequency=200) as process:
+    with o80.robots.load(Joint).start(segment, frequency=200, gap=0) as process:
         joint = process.frontend(WAIT)
         joint.wait_for(5, timeout=WAIT)
         process._popen.send_signal(end)
@@ -265,7 +267,7 @@ def test_an_exception_of_a_process_reaches_its_frontends(segment: str) -> None:
 
 
 def test_a_driver_may_pace_the_loop_by_its_own_clock(segment: str) -> None:
-    with o80.robots.load(Paced).start(segment) as process:
+    with o80.robots.load(Paced).start(segment, gap=0) as process:
         paced = process.frontend(WAIT)
         paced.wait_for(20, timeout=WAIT)
         assert paced.period == pytest.approx(1 / 250)
@@ -378,6 +380,30 @@ def test_the_thermometer_of_the_page_runs(segment: str, tmp_path: Path) -> None:
         assert room.latest().extended.temperature == 21.5
         with pytest.raises(o80.BackendHalted, match="the room is too hot"):
             room.burst(2)
+
+
+# ---------------------------------------------------------------------- gaps
+
+
+def test_a_robot_that_stood_still_is_halted_when_it_goes_on(segment: str) -> None:
+    """A second that the process was stopped is no late iteration (docs/safety.md)."""
+    with (
+        o80.robots.load(Joint).start(segment, frequency=200, gain=1.0, gap=0.5) as process,
+        process.frontend() as joint,
+    ):
+        joint.add_command("elbow", 0.5, iterations=100_000)
+        batch = joint.pulse()
+        joint.wait_for(3, timeout=WAIT)
+        os.kill(process.pid, signal.SIGSTOP)
+        time.sleep(1.0)  # what is tested, not a wait
+        os.kill(process.pid, signal.SIGCONT)
+        with pytest.raises(o80.BackendHalted, match=r"no iteration for \d.*longer than --gap 0.5"):
+            batch.wait(WAIT)
+        halt = joint.halted
+        assert halt is not None
+        assert halt.cause == "overruns"
+        joint.resume()
+        assert joint.halted is None
 
 
 # ---------------------------------------------------------------------- differences

@@ -11,6 +11,8 @@ using Iteration = std::int64_t;
 
 /// The monotonic clock [ns].
 std::int64_t monotonic_now() noexcept;
+/// The monotonic clock, which also counts while the machine sleeps [ns].
+std::int64_t boot_now() noexcept;
 /// The wall clock: time since 1970 [ns].
 std::int64_t wall_clock_now() noexcept;
 /// The coarse monotonic clock: up to some milliseconds old, but cheap to read [ns].

@@ -39,7 +39,7 @@ enum class Reason : std::uint8_t {
   silence,
   stopped,
   halted,
-  full,     // the lane has too many batches that wait for a later iteration
+  full,    // the lane has too many batches that wait for a later iteration
   reading  // the robot cannot be where it was read
 };
 inline constexpr std::size_t kReasons = static_cast<std::size_t>(Reason::reading) + 1;

@@ -273,8 +273,8 @@ TEST_F(ReadingTest, AResumeRefusesOneThatCannotBe) {
     run(static_cast<int>(uniform(1.0, 5.0)));
 
     const double tolerance = limits.speed * period + (i % 2 == 0 ? limits.error / 10.0 : 0.0);
-    const double sizes[] = {2.1 * tolerance, 10.0 * tolerance,          10.0, 1e6, 1e300,
-                            kInfinity,       std::nan("")};
+    const double sizes[] = {2.1 * tolerance, 10.0 * tolerance, 10.0,        1e6,
+                            1e300,           kInfinity,        std::nan("")};
     const double wrong = std::copysign(sizes[i % 7], uniform(-1.0, 1.0));
     const int when = i % 3;
     if (when == 0) fresh_offset_ = wrong;

@@ -177,8 +177,8 @@ class Replay : public StatusSink, public BatchHandler {
     if (follows(JournalKind::fresh_start)) start_afresh();
     return {};
   }
-  Outcome resume(std::uint32_t /*lane*/, CommandId /*id*/,
-                 std::uint64_t /*number*/, bool /*accepts*/) noexcept override {
+  Outcome resume(std::uint32_t /*lane*/, CommandId /*id*/, std::uint64_t /*number*/,
+                 bool /*accepts*/) noexcept override {
     if (follows(JournalKind::resume) && follows(JournalKind::fresh_start)) start_afresh();
     return {};
   }

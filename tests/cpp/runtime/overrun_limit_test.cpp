@@ -41,5 +41,18 @@ TEST_F(OverrunLimitTest, HaltsTheBackend) {
   EXPECT_EQ(frontend.halted()->cause, HaltCause::overruns);
 }
 
+TEST(GapLimit, IsExceededByOneLongGapOnly) {
+  constexpr std::int64_t kMs = 1'000'000;
+  GapLimit limit(100 * kMs);
+  std::int64_t now = 5'000 * kMs;
+  EXPECT_EQ(limit.exceeded(0, now), 0);
+  EXPECT_EQ(limit.exceeded(1, now += 3'000 * kMs), 0) << "a driver loads something before row 1";
+  for (Iteration row = 2; row < 10'000; ++row) {
+    EXPECT_EQ(limit.exceeded(row, now += (row % 50 == 0 ? 100 : 20) * kMs), 0) << "late, no gap";
+  }
+  EXPECT_EQ(limit.exceeded(10'000, now += 3'600'000 * kMs), 3'600'000 * kMs) << "the machine slept";
+  EXPECT_EQ(limit.exceeded(10'001, now += kMs), 0);
+}
+
 }  // namespace
 }  // namespace o80::test

@@ -31,6 +31,28 @@ TEST_F(SilenceTest, PurgesTheCommandsOfASilentCommander) {
   EXPECT_EQ(desired(frontend.latest()), 6.0) << "five iterations after the batch";
 }
 
+TEST_F(SilenceTest, CountsPeriodsThatTheLoopMissedAfterWhatCameMeanwhile) {
+  Station station(watched(Stale::purge, 50));
+  station.start();
+  UntypedFrontend silent("pair");
+  UntypedFrontend lively("pair");
+  const Batch batch = send(silent, 0, 1000.0, {.pace = iterations(1000)});
+  const Batch other = send(lively, 1, 1000.0, {.pace = iterations(1000)});
+  station.run(5);
+  const double before = desired(silent.latest());
+  station.backend.set_timing({.skipped = 100});
+  station.run(1);
+  EXPECT_EQ(desired(silent.latest()), before + 1.0) << "a plan counts no missed periods";
+  lively.keep_alive();
+  const auto grace = static_cast<int>(10'000'000 / station.backend.schema().head.period) + 2;
+  station.run(grace);
+  EXPECT_EQ(batch.handle(0).status, Status::purged);
+  EXPECT_EQ(batch.handle(0).reason, Reason::silence);
+  EXPECT_EQ(other.handle(0).status, Status::active) << "its sign of life came after the gap";
+  station.run(30);
+  EXPECT_EQ(other.handle(0).status, Status::active);
+}
+
 TEST_F(SilenceTest, EndsWhatTheSilentCommanderHasScheduled) {
   Station station(watched(Stale::purge));
   station.start();
