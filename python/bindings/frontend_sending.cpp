@@ -7,6 +7,7 @@
 #include <nanobind/stl/vector.h>
 
 #include <cstring>
+#include <optional>
 #include <utility>
 
 #include "arguments.hpp"
@@ -14,6 +15,8 @@
 #include "buffer.hpp"
 #include "control/batch_builder.hpp"
 #include "control/limits.hpp"
+#include "control/record.hpp"
+#include "control/state_layout.hpp"
 #include "enums.hpp"
 #include "frontend.hpp"
 #include "verb.hpp"
@@ -47,18 +50,72 @@ void set_every(o80::PaceSpec& pace, nb::handle every, std::int64_t period) {
   pace = o80::direct(time);
 }
 
-void add_command(const Frontend& self, nb::handle actuator, nb::handle target, nb::handle duration,
-                 nb::handle speed, nb::handle until, nb::handle iterations, nb::handle fastest,
-                 nb::handle mode, nb::handle profile, nb::handle start, nb::handle every) {
+o80::CommandOptions options_of(const Frontend& self, nb::handle duration, nb::handle speed,
+                               nb::handle until, nb::handle iterations, nb::handle fastest,
+                               nb::handle mode, nb::handle profile, nb::handle start,
+                               nb::handle every) {
   const bool is_fastest = truth_of(fastest, "fastest");
   o80::CommandOptions options = command_options(
       pace_of(duration, speed, until, iterations, is_fastest), mode, profile, start);
   if (!every.is_none()) set_every(options.pace, every, self.shared()->schema().head.period);
+  return options;
+}
+
+void add_command(const Frontend& self, nb::handle actuator, nb::handle target, nb::handle duration,
+                 nb::handle speed, nb::handle until, nb::handle iterations, nb::handle fastest,
+                 nb::handle mode, nb::handle profile, nb::handle start, nb::handle every) {
+  const o80::CommandOptions options =
+      options_of(self, duration, speed, until, iterations, fastest, mode, profile, start, every);
   if (names_several(actuator)) {
     self.add_commands(actuator, target, options);
   } else {
     self.add_command(actuator, target, options);
   }
+}
+
+/// The newest row, with these actuators at `initial`.
+o80::UntypedObservation row_with(const Frontend& self, nb::handle actuators, nb::handle initial) {
+  o80::UntypedObservation row = self.shared()->latest();
+  const Targets at = [&] {
+    try {
+      return self.targets_of(actuators, initial);
+    } catch (const o80::InvalidArgument& error) {
+      throw o80::InvalidArgument(std::string("initial: ") + error.what());
+    }
+  }();
+  const std::byte* state = at.states.data();
+  const std::uint64_t* mask = at.masks.empty() ? nullptr : at.masks.data();
+  for (const std::uint32_t index : at.actuators) {
+    const o80::ActuatorRow& actuator = row.schema().actuators[index];
+    const o80::StateLayout layout(row.schema(), actuator.type);
+    layout.copy(row.bytes() + row.layout().desired + actuator.offset, state, mask);
+    state += layout.size();
+    if (mask != nullptr) mask += o80::mask_words(row.schema().scalar_count(actuator.type));
+  }
+  return row;
+}
+
+/// How much later, why, and the desired blocks.
+nb::tuple preview(const Frontend& self, nb::handle named, nb::handle target, nb::handle initial,
+                  nb::handle duration, nb::handle speed, nb::handle until, nb::handle iterations,
+                  nb::handle fastest, nb::handle profile, nb::handle start, nb::handle every) {
+  const auto frontend = self.shared();
+  const o80::CommandOptions options = options_of(self, duration, speed, until, iterations, fastest,
+                                                 nb::str("queue"), profile, start, every);
+  const bool several = names_several(named);
+  const auto each = [&](nb::handle one) {
+    return several ? nb::borrow(one) : nb::object(nb::make_tuple(one));
+  };
+  const Targets to = self.targets_of(each(named), each(target));
+  std::optional<o80::UntypedObservation> row;
+  if (!initial.is_none()) row = row_with(self, each(named), each(initial));
+  const o80::Preview preview = [&] {
+    const Waiting waiting;
+    return row ? frontend->preview_from(*row, to.actuators, to.states, options, to.masks)
+               : frontend->preview(to.actuators, to.states, options, to.masks);
+  }();
+  const std::vector<std::byte>& rows = preview.rows.bytes;
+  return nb::make_tuple(preview.late, preview.text, nb::bytes(rows.data(), rows.size()));
 }
 
 /// Adds one trajectory for several actuators. `states` holds all rows of the first, then all rows
@@ -277,6 +334,14 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
            [](const Frontend& self) {
              return send_alone(self, [](o80::BatchBuilder& batch) { batch.release_control(); });
            })
+      .def("_preview", &preview, "actuator"_a.none(), "target"_a.none(), "initial"_a.none(),
+           "duration"_a.none(), "speed"_a.none(), "until"_a.none(), "iterations"_a.none(),
+           "fastest"_a.none(), "profile"_a.none(), "start"_a.none(), "every"_a.none(),
+           nb::sig("def _preview(self, actuator: typing.Any, target: typing.Any, "
+                   "initial: typing.Any, duration: float | None, speed: float | None, "
+                   "until: int | None, iterations: int | None, fastest: bool, "
+                   "profile: str | None, start: str, every: float | int | None) "
+                   "-> tuple[int, str, bytes]"))
       .def("_index", &Frontend::actuator, "named"_a.none())
       .def("_send_request", &send_request, "name"_a.none(), "fields"_a)
       .def("_wait_until_ended", &wait_until_ended, "batch"_a, "timeout"_a.none())

@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     from o80.limits import IntegralBounds, Limits
     from o80.playing.playback import Playback, play
     from o80.prepared_burst import PreparedBurst
+    from o80.preview import Preview
     from o80.provenance import Provenance, ProvenanceFile
     from o80.record import Record
     from o80.recording.reader import RecordingFile
@@ -108,6 +109,7 @@ _LAZY = {
     "Playback": "o80.playing.playback",
     "play": "o80.playing.playback",
     "PreparedBurst": "o80.prepared_burst",
+    "Preview": "o80.preview",
     "Provenance": "o80.provenance",
     "ProvenanceFile": "o80.provenance",
     "Record": "o80.record",
@@ -198,6 +200,7 @@ __all__ = [
     "Observation",
     "Playback",
     "PreparedBurst",
+    "Preview",
     "Profile",
     "Provenance",
     "ProvenanceFile",

@@ -71,6 +71,11 @@ class ActuatorQueue {
 
   /// Sets the desired state, at rest. Numbers that are not finite keep their last desired value.
   void restart(const std::byte* state) noexcept;
+  /// One more iteration, after restart(), of a motion that was made elsewhere.
+  void trace(const std::byte* state) noexcept {
+    layout_->copy_finite(desired_, state);
+    motion_.trace(desired_);
+  }
   /// For an idle actuator that follows: the observed state becomes the desired one, except for
   /// numbers with a rest value, which go to it. True while one of these moves.
   bool follow(const std::byte* observed) noexcept;

@@ -46,6 +46,11 @@ class Controller {
   /// that is null. All commands end as purged (fresh_start) at iteration `row`.
   void restart(const std::byte* observed, const std::byte* desired, Iteration row) noexcept;
 
+  /// One more iteration, after restart(), of a motion that was made elsewhere: its desired block.
+  void trace(const std::byte* desired) noexcept {
+    for (std::uint32_t i = 0; i < actuators_.size(); ++i) actuators_[i].trace(of(i, desired));
+  }
+
   /// Checks the records of a complete batch in the pool before it is due, about `budget` blocks,
   /// and reduces `budget` by them. True when all are checked. The batches of one lane are checked
   /// one after the other. take() checks the rest.

@@ -98,6 +98,17 @@ void Motion::restart(const std::byte* state) noexcept {
   for (Number& each : numbers_) each.motion.restart(layout_.number(each.number, state));
 }
 
+void Motion::trace(const std::byte* state) noexcept {
+  for (Number& each : numbers_) {
+    const double position = layout_.number(each.number, state);
+    if (each.kind == Kind::float64 && each.motion.accelerates()) {
+      each.motion.trace(position);
+    } else {
+      each.motion.restart(position);
+    }
+  }
+}
+
 void Motion::begin(const std::uint64_t* mask) noexcept {
   begun_ = true;
   observed_ = nullptr;

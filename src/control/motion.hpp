@@ -113,6 +113,9 @@ class Motion {
 
   /// Sets all numbers to this state, at rest.
   void restart(const std::byte* state) noexcept;
+  /// One iteration of a motion that was made elsewhere, after restart(). Numbers whose differences
+  /// a command would not use, or whose bytes are rounded, are at rest there.
+  void trace(const std::byte* state) noexcept;
   /// One iteration of braking. Numbers with a rest value go to it, unless they are held. True while
   /// a number moves.
   bool brake(std::byte* state) noexcept;

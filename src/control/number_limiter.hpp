@@ -83,6 +83,14 @@ class NumberLimiter {
     accept(next);
     return true;
   }
+  /// One iteration to `next`, whatever the limits say.
+  void accept(double next) noexcept {
+    const double speed = next - position_;
+    acceleration_ = speed - speed_;
+    speed_ = speed;
+    position_ = wanted_ = next;
+    stop_known_ = false;
+  }
   /// One iteration towards `wanted`; returns the limit that kept it from there.
   Limit follow(double wanted) noexcept {
     const double step = wanted - wanted_;
@@ -121,13 +129,6 @@ class NumberLimiter {
     return Limit::none;
   }
   bool pass_rounded(double next) noexcept;
-  void accept(double next) noexcept {
-    const double speed = next - position_;
-    acceleration_ = speed - speed_;
-    speed_ = speed;
-    position_ = wanted_ = next;
-    stop_known_ = false;
-  }
   Limit follow_at_once() noexcept;
   Limit follow_with_acceleration(double step, double lag) noexcept;
   Limit follow_with_jerk(double step, double lag) noexcept;

@@ -48,6 +48,8 @@ class NumberMotion {
 
   /// Sets the position, at rest.
   void restart(double position) noexcept;
+  /// One iteration of a motion that was made elsewhere.
+  void trace(double position) noexcept { guard_.accept(position); }
   /// A command begins: notes from which motion.
   void begin() noexcept;
 

@@ -54,19 +54,6 @@ bool is_rejected(const LaneSender& lane, CommandId batch) noexcept {
          static_cast<Status>(answer.word.status) == Status::rejected;
 }
 
-/// Describes why a command takes longer than asked; `packed` as in Limited::packed().
-std::string limited_by(std::uint8_t packed, std::int64_t late) {
-  constexpr const char* kLimits[] = {
-      "a limit",       "its minimum", "its maximum", "its speed limit", "its acceleration limit",
-      "its jerk limit"};
-  const std::size_t limit = packed & 7U;
-  const unsigned number = packed >> 3U;
-  const std::string text = kLimits[limit < std::size(kLimits) ? limit : 0];
-  return std::to_string(late) + (late == 1 ? " iteration" : " iterations") +
-         " later than asked, because of " + text +
-         (number == 0 ? "" : " (number " + std::to_string(number) + " of its state)");
-}
-
 /// Describes which bound of an integral ended a command; `packed` as in Limited::packed().
 std::string held_by(const Schema& schema, std::span<const SentCommand> commands,
                     std::uint8_t packed) {
@@ -99,7 +86,7 @@ std::string words_for(const Link& link, std::span<const SentCommand> commands, c
     case Reason::limits:
       return handle.status == Status::interrupted
                  ? held_by(link.description->schema, commands, detail)
-                 : limited_by(detail, handle.late);
+                 : late_text(detail, handle.late);
     case Reason::fresh_start:
       return "the robot made a fresh start (reset, restore or resume)";
     case Reason::dead_frontend:

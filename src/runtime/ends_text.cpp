@@ -57,6 +57,18 @@ std::string end_text(const Schema& schema, std::span<const SentCommand> command,
   return handle.text.empty() ? text : text + " (" + handle.text + ")";
 }
 
+std::string late_text(std::uint8_t packed, std::int64_t late) {
+  constexpr const char* kLimits[] = {
+      "a limit",       "its minimum", "its maximum", "its speed limit", "its acceleration limit",
+      "its jerk limit"};
+  const std::size_t limit = packed & 7U;
+  const unsigned number = packed >> 3U;
+  const std::string text = kLimits[limit < std::size(kLimits) ? limit : 0];
+  return std::to_string(late) + (late == 1 ? " iteration" : " iterations") +
+         " later than asked, because of " + text +
+         (number == 0 ? "" : " (number " + std::to_string(number) + " of its state)");
+}
+
 std::string not_completed_text(const std::string& segment, const std::vector<std::string>& ends,
                                std::size_t records) {
   std::string text = records == 1 ? "the command sent to '" + segment + "' did not complete: "

@@ -136,7 +136,7 @@ std::uint32_t UntypedFrontend::add_commands_to(BatchBuilder& builder,
                                                std::span<const std::uint32_t> actuators,
                                                std::span<const std::byte> states,
                                                const CommandOptions& options,
-                                               std::span<const std::uint64_t> masks) {
+                                               std::span<const std::uint64_t> masks) const {
   std::size_t bytes = 0;
   std::size_t words = 0;
   for (const std::uint32_t actuator : actuators) {

@@ -28,6 +28,7 @@ CALLS: dict[str, dict[str, Callable[[Any], Any]]] = {
         "at_time": lambda it: it.at_time(0),
         "wait_for_next": lambda it: it.wait_for_next(WAIT),
         "pulse_and_wait": lambda it: it.pulse_and_wait(WAIT),
+        "preview": lambda it: it.preview(0, 0.1),
         "move_to": lambda it: it.move_to(0, 0.1, tolerance=0.1, timeout=WAIT),
         "reattach": lambda it: it.reattach(WAIT),
         "burst": lambda it: it.burst(timeout=WAIT),

@@ -1,4 +1,4 @@
-"""The programs of docs/commands.md (its first one) and of docs/streaming.md run."""
+"""The whole programs of docs/commands.md, and those of docs/streaming.md, run."""
 
 import re
 from pathlib import Path
@@ -17,6 +17,15 @@ def test_the_first_program_about_commands_runs(capsys: pytest.CaptureFixture[str
     exec(compile(programs("commands.md")[0], "commands.md", "exec"), {})
 
     assert capsys.readouterr().out == "COMPLETED 0 [0.  0.5]\n"
+
+
+def test_the_program_about_previews_prints_what_it_says(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    (program,) = (text for text in programs("commands.md") if "arm.preview(" in text)
+    exec(compile(program, "commands.md", "exec"), {"__name__": "preview"})
+
+    assert capsys.readouterr().out.splitlines() == re.findall(r"print\(.*\)  # (.*)", program)
 
 
 def test_the_programs_about_streaming_run(capsys: pytest.CaptureFixture[str]) -> None:

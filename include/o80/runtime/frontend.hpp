@@ -22,6 +22,7 @@
 #include "o80/runtime/move.hpp"
 #include "o80/runtime/not_completed.hpp"
 #include "o80/runtime/observation.hpp"
+#include "o80/runtime/preview.hpp"
 #include "o80/runtime/provenance.hpp"
 
 namespace o80 {
@@ -98,6 +99,22 @@ class UntypedFrontend {
   std::uint32_t add_commands(std::span<const std::uint32_t> actuators,
                              std::span<const std::byte> states, const CommandOptions& options = {},
                              std::span<const std::uint64_t> masks = {});
+  /// What the command of add_commands would do if it began after the newest row: how many
+  /// iterations it takes, later than asked by how many and why, and the desired states in each of
+  /// them, bit for bit, because the loop's own code computes them here. Sends nothing and needs no
+  /// lane.
+  ///
+  /// It begins at the desired states of that row; doubles with acceleration limits also with the
+  /// velocity and acceleration of the last three rows, other numbers at rest. Commands that run or
+  /// wait do not count. Throws InvalidArgument as add_commands, for an `until` that has passed, for
+  /// more than 4 million iterations, and for state types that interpolate in C++ (`blend`).
+  Preview preview(std::span<const std::uint32_t> actuators, std::span<const std::byte> states,
+                  const CommandOptions& options = {},
+                  std::span<const std::uint64_t> masks = {}) const;
+  /// The same from rest, after `row`: one of the history, or one with other desired states.
+  Preview preview_from(const UntypedObservation& row, std::span<const std::uint32_t> actuators,
+                       std::span<const std::byte> states, const CommandOptions& options = {},
+                       std::span<const std::uint64_t> masks = {}) const;
   /// Adds one command through `rows` states: at `times` (when each row is reached, since the start
   /// [ns]; options.pace is then ignored), or with options.pace for each row.
   std::uint32_t add_trajectory(std::uint32_t actuator, std::uint32_t rows,
@@ -254,7 +271,10 @@ class UntypedFrontend {
                            const KeepWaiting& keep_waiting, const PulseOptions& options);
   std::uint32_t add_commands_to(BatchBuilder& builder, std::span<const std::uint32_t> actuators,
                                 std::span<const std::byte> states, const CommandOptions& options,
-                                std::span<const std::uint64_t> masks);
+                                std::span<const std::uint64_t> masks) const;
+  Preview preview_after(const Rows& rows, std::span<const std::uint32_t> actuators,
+                        std::span<const std::byte> states, const CommandOptions& options,
+                        std::span<const std::uint64_t> masks) const;
   UntypedObservation first_row_of(const Move& move, const Deadline& deadline,
                                   const KeepWaiting& keep_waiting) const;
   UntypedObservation burst_to(const Move& move, Timeout timeout, const KeepWaiting& keep_waiting);

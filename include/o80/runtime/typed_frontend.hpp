@@ -3,9 +3,11 @@
 #include <array>
 #include <initializer_list>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -61,6 +63,28 @@ class Frontend : public UntypedFrontend {
                              const CommandOptions& options = {}) {
     return add_commands(std::span(names.begin(), names.size()),
                         std::span<const State>(targets.begin(), targets.size()), options);
+  }
+  using UntypedFrontend::preview;
+  /// What a command of add_command would do after the newest row; with `initial`, from rest there.
+  template <Shareable State>
+  TypedPreview<R> preview(std::string_view name, const State& target,
+                          const CommandOptions& options = {},
+                          const std::type_identity_t<std::optional<State>>& initial = {}) const {
+    const auto [indices, bytes] = packed(std::span(&name, 1), std::span(&target, 1));
+    if (!initial) return TypedPreview<R>(UntypedFrontend::preview(indices, bytes, options));
+    UntypedObservation row = UntypedFrontend::latest();
+    const std::uint32_t offset = schema().actuators[indices.front()].offset;
+    pack(*initial, row.bytes() + row.layout().desired + offset);
+    return TypedPreview<R>(preview_from(row, indices, bytes, options));
+  }
+  /// The same for several actuators of one state type, a target for each.
+  template <Shareable State>
+  TypedPreview<R> preview(std::initializer_list<std::string_view> names,
+                          std::initializer_list<State> targets,
+                          const CommandOptions& options = {}) const {
+    const auto [indices, bytes] = packed(std::span(names.begin(), names.size()),
+                                         std::span<const State>(targets.begin(), targets.size()));
+    return TypedPreview<R>(UntypedFrontend::preview(indices, bytes, options));
   }
   /// Adds one command through all rows, with `options.pace` for each row.
   template <Shareable State>

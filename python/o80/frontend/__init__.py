@@ -6,6 +6,7 @@
 | watching.py | rate_reached, overruns, missed_ticks, row_age, slow_verb, trouble |
 | observing.py | latest, wait_for, wait_for_next, stream, history, ... |
 | commanding.py | add_command, add_trajectory, add_request, purge, pulse, pulse_and_wait, ... |
+| previewing.py | preview |
 | moving.py | move_to |
 | bursting.py | burst, prepared_burst |
 | controlling.py | exclusive control |

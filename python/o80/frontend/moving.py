@@ -4,14 +4,14 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, SupportsIndex, TypeAlias
 
 from o80 import _core
-from o80.frontend.commanding import Commanding
+from o80.frontend.previewing import Previewing
 from o80.words import ModeWord, ProfileWord, StartWord
 
 #: A number, a mapping from fields to numbers, or one of these for each actuator.
 Tolerance: TypeAlias = float | Mapping[str, Any] | Sequence[float | Mapping[str, Any]]
 
 
-class Moving(Commanding):
+class Moving(Previewing):
     """The part of o80.Frontend that moves a robot until it is observed at its targets."""
 
     if TYPE_CHECKING:

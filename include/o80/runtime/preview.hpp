@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+
+#include "o80/runtime/observation.hpp"
+#include "o80/runtime/robot_types.hpp"
+
+namespace o80 {
+
+/// What a command would do, computed by UntypedFrontend::preview.
+struct Preview {
+  /// Number of iterations that the command takes.
+  std::int64_t iterations() const { return static_cast<std::int64_t>(rows.count); }
+
+  /// By how many iterations it takes longer than asked, at most 65535.
+  std::int64_t late = 0;
+  std::string text;  // why, as Handle::text says it; empty if it is not late
+  /// The desired states of all actuators in each of these iterations. `rows.first` is the iteration
+  /// in which the command would begin.
+  Rows rows;
+};
+
+/// The same, in the robot's own types.
+template <class R>
+struct TypedPreview : Preview {
+  explicit TypedPreview(Preview&& untyped) : Preview(std::move(untyped)) {}
+
+  ActuatorsOf<R> desired(std::size_t i) const { return unpack<ActuatorsOf<R>>(rows.row(i).data()); }
+};
+
+}  // namespace o80

@@ -1,0 +1,62 @@
+"""How a frontend computes what a command would do."""
+
+from collections.abc import Sequence
+from typing import Any, SupportsIndex
+
+import numpy as np
+
+from o80.frontend.commanding import Commanding
+from o80.preview import Preview
+from o80.words import ProfileWord, StartWord
+
+
+class Previewing(Commanding):
+    """The part of o80.Frontend that computes what a command would do."""
+
+    def preview(
+        self,
+        actuator: SupportsIndex | str | Sequence[SupportsIndex | str] | None,
+        target: Any,
+        *,
+        duration: float | None = None,
+        speed: float | None = None,
+        until: int | None = None,
+        iterations: int | None = None,
+        fastest: bool = False,
+        profile: ProfileWord | None = None,
+        start: StartWord = "desired",
+        every: float | int | None = None,
+        initial: Any = None,
+    ) -> Preview:
+        """What `add_command` with the same arguments would do if it began after the newest row.
+
+        The code of the loop computes it here, so the robot does the same bit for bit. Sends
+        nothing, adds nothing, works read-only.
+
+        actuator, target, duration, speed, until, iterations, fastest, profile, start, every: as in
+            add_command.
+        initial: the state from which it begins at rest, in the form of `target`. Fields that are
+            left out, and with None all, begin as they are in the newest row.
+
+        With None, fields of type float64 with acceleration limits begin with the velocity and
+        acceleration of the last three rows, other fields at rest. Commands that run or wait do not
+        count. Actuators without a target are shown as if they had no command.
+
+        Raises InvalidArgument as add_command, for an `until` that has passed, for a motion of more
+        than 4 million iterations, and for states that the driver interpolates in C++ (`blend`).
+        """
+        late, text, desired = self._preview(
+            actuator,
+            target,
+            initial,
+            duration,
+            speed,
+            until,
+            iterations,
+            fastest,
+            profile,
+            start,
+            every,
+        )
+        rows = np.frombuffer(desired, np.dtype([("desired", self._layout.states)]))
+        return Preview(len(rows), late, text, self._layout.many(rows, "desired"))
