@@ -35,7 +35,7 @@ def random_command(rng: random.Random, next_iteration: int) -> dict[str, Any]:
     names = rng.sample(["joints_0", "joints_1", "slide"], rng.randint(1, 3))
     targets = [random_target(rng, name) for name in names]
     n = rng.randint(1, 200)
-    command = rng.choice(
+    command: dict[str, Any] = rng.choice(
         [
             {"duration": n / 1000},
             {"speed": rng.uniform(0.3, 1.0)},
@@ -55,7 +55,7 @@ def random_command(rng: random.Random, next_iteration: int) -> dict[str, Any]:
 @pytest.mark.parametrize("seed", range(4))
 def test_the_robot_then_does_it_bit_for_bit(segment: str, seed: int) -> None:
     rng = random.Random(seed)
-    limits = {
+    limits: Any = {
         "joints_0": {"position": random_limits(rng)},
         "joints_1": {"velocity": random_limits(rng)},
         "slide": random_limits(rng),
