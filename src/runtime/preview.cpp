@@ -14,7 +14,7 @@ namespace o80 {
 namespace {
 
 /// Longest motion that is previewed, because its rows are kept in memory [iterations].
-constexpr std::size_t kMostPreviewed = 4'000'000;
+constexpr std::size_t kMostPreviewed = 1'000'000;
 
 /// What a controller with a single command needs around it.
 class Surroundings final : public StatusSink, public BatchHandler {

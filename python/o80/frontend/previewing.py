@@ -43,7 +43,7 @@ class Previewing(Commanding):
         count. Actuators without a target are shown as if they had no command.
 
         Raises InvalidArgument as add_command, for an `until` that has passed, for a motion of more
-        than 4 million iterations, and for states that the driver interpolates in C++ (`blend`).
+        than a million iterations, and for states that the driver interpolates in C++ (`blend`).
         """
         late, text, desired = self._preview(
             actuator,
