@@ -47,11 +47,22 @@ std::string quoted(const Schema& schema, std::uint32_t actuator) {
 
 /// Refuses what this process cannot compute, and a start that no robot has.
 void refuse_unknown(const Schema& schema, std::span<const std::uint32_t> actuators,
-                    const Controller& controller, const std::byte* start) {
+                    std::span<const std::uint64_t> masks, const Controller& controller,
+                    const std::byte* start) {
+  const auto refuse = [&](std::uint32_t actuator, const char* why) {
+    throw InvalidArgument(quoted(schema, actuator) + " has no preview: " + why);
+  };
   for (const std::uint32_t actuator : actuators) {
-    if (schema.types[schema.actuators[actuator].type].blends == 0) continue;
-    throw InvalidArgument(quoted(schema, actuator) +
-                          " has no preview: code of its driver (blend) interpolates its state");
+    const ActuatorRow& row = schema.actuators[actuator];
+    if (schema.types[row.type].blends != 0) {
+      refuse(actuator, "code of its driver (blend) interpolates its state");
+    }
+    for (const IntegralRow& bound : schema.integrals) {
+      const std::uint32_t number = bound.limit - row.first_limit;
+      if (number >= row.limits || !masked(masks.empty() ? nullptr : masks.data(), number)) continue;
+      refuse(actuator, "what it will observe decides where the bound of an integral acts");
+    }
+    if (!masks.empty()) masks = masks.subspan(mask_words(row.limits));
   }
   if (const auto found = controller.not_finite(start)) {
     throw InvalidArgument("the state from which " + quoted(schema, found->actuator) +
@@ -128,7 +139,7 @@ Preview UntypedFrontend::preview_after(const Rows& rows, std::span<const std::ui
   preview.rows.row_bytes = layout().block;
   Surroundings around(preview.rows.first);
   Controller controller(schema(), pool, around, 1);
-  refuse_unknown(schema(), actuators, controller, desired(rows.count - 1));
+  refuse_unknown(schema(), actuators, masks, controller, desired(rows.count - 1));
   controller.restart(observed, desired(0), rows.first);
   for (std::size_t i = 1; i < rows.count; ++i) controller.trace(desired(i));
   controller.take(0, batch.first, around);

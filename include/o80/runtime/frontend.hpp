@@ -107,7 +107,8 @@ class UntypedFrontend {
   /// It begins at the desired states of that row; doubles with acceleration limits also with the
   /// velocity and acceleration of the last three rows, other numbers at rest. Commands that run or
   /// wait do not count. Throws InvalidArgument as add_commands, for an `until` that has passed, for
-  /// more than a million iterations, and for state types that interpolate in C++ (`blend`).
+  /// more than a million iterations, for state types that interpolate in C++ (`blend`), and for
+  /// numbers with the bound of an integral, which depends on what will be observed.
   Preview preview(std::span<const std::uint32_t> actuators, std::span<const std::byte> states,
                   const CommandOptions& options = {},
                   std::span<const std::uint64_t> masks = {}) const;

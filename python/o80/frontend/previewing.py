@@ -43,7 +43,8 @@ class Previewing(Commanding):
         count. Actuators without a target are shown as if they had no command.
 
         Raises InvalidArgument as add_command, for an `until` that has passed, for a motion of more
-        than a million iterations, and for states that the driver interpolates in C++ (`blend`).
+        than a million iterations, for states that the driver interpolates in C++ (`blend`), and for
+        fields with the bound of an integral, which depends on what will be observed.
         """
         late, text, desired = self._preview(
             actuator,

@@ -361,6 +361,30 @@ TEST_F(PreviewTest, RefusesStatesThatCodeOfTheDriverInterpolates) {
               HasSubstr("blend"));
 }
 
+TEST_F(PreviewTest, RefusesOnlyTheFieldsThatAnIntegralBounds) {
+  Schema schema;
+  schema.head.robot = NameText("robot");
+  const auto joint = schema.add_type(
+      "Joint", {scalar_field("position", Kind::float64), scalar_field("velocity", Kind::float64)});
+  schema.add_actuators("joint", joint, 2);
+  schema.actuator(1).rests_at("velocity", 0);
+  schema.actuator(1).limits("velocity",
+                            {.speed = 1, .acceleration = 10, .integral = {"position", -1, 1}});
+  UntypedBackend backend(schema, {.segment = "robot"});
+  backend.publish();
+  const UntypedFrontend frontend("robot");
+  const std::array<std::uint32_t, 2> both{0, 1};
+  const std::array<Joint, 2> targets{Joint{0.1, 0.2}, Joint{0.1, 0.2}};
+  const auto refusal = [&](const std::vector<std::uint64_t>& masks) {
+    return message_of<InvalidArgument>([&] {
+      frontend.preview(both, std::as_bytes(std::span(targets)), {.pace = iterations(2)}, masks);
+    });
+  };
+  EXPECT_THAT(refusal({}), AllOf(HasSubstr("'joint_1'"), HasSubstr("integral")));
+  EXPECT_THAT(refusal({1, 2}), HasSubstr("'joint_1'"));
+  EXPECT_EQ(refusal({3, 1}), "");
+}
+
 TEST_F(PreviewTest, HasTheTypesOfTheRobot) {
   Backend<MixedRobot> backend({.segment = "mixed"});
   backend.publish({});
