@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from o80.layout import dtype_of_field
 
 if TYPE_CHECKING:
-    from o80._core import Observation
     from o80.history import History
 
 
@@ -64,6 +63,6 @@ def values_of(history: "History", column: Column) -> NDArray[Any]:
     return values
 
 
-def value_of(row: "Observation", column: Column) -> Any:
-    """The number of a column in one row."""
+def value_of(row: Any, column: Column) -> Any:
+    """The number of a column in an observation."""
     return np.ndarray((), column.dtype, row, column.offset)[()]

@@ -223,7 +223,7 @@ class Readers:
     def difference(self) -> None:
         """Rows that are swapped are found at the first number that differs."""
         rows = self.history.rows.copy()
-        part = "extended" if "extended" in rows.dtype.names else "observed"
+        part = "extended" if "extended" in (rows.dtype.names or ()) else "observed"
         rows[5][part] = self.history.rows[2][part]
         names = [
             name for name, values in self.expected.items()
@@ -264,7 +264,8 @@ def between(values: NDArray[Any], share: NDArray[np.float64]) -> NDArray[Any]:
     older, newer = values[:-1], values[1:]
     if values.dtype.kind != "f":
         return older
-    return (older + (newer - older) * share).astype(values.dtype)
+    mixed: NDArray[Any] = (older + (newer - older) * share).astype(values.dtype)
+    return mixed
 
 
 def part(columns: Columns, rows: slice) -> Columns:

@@ -118,7 +118,7 @@ def test_echo_prints_rows_in_order(folder: Path, robot: "subprocess.Popen[str]")
     assert rows[0]["extended"] == {"homing": False, "effort": [0.0, 0.0]}
     line = o80(folder, "echo", "two_joints", "--count", "1")
     assert "observed (0 0)" in line
-    assert "extended homing no effort (0 0)" in line
+    assert "extended homing False effort (0 0)" in line
     assert line.rstrip().endswith("idle")
 
 

@@ -5,6 +5,8 @@
 
 import os
 import pickle
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,6 +19,8 @@ from published_rows import Published, check_every_reader
 
 import o80
 from o80.drivers import Reading
+from o80.layout import with_padding
+from o80.trajectory import states_of
 
 LAYOUTS = settings(ROBOTS, max_examples=int(os.environ.get("O80_LAYOUTS", "8")))
 SEEDS = st.integers(0, 2**32 - 1)
@@ -112,3 +116,33 @@ def test_rows_without_their_padding_are_no_history(segment: str) -> None:
     copy = pickle.loads(pickle.dumps(history))
     assert copy.extended.heat.tolist() == [20.0]
     o80.History(copy._decoder, history.rows)
+
+
+def after_other_values(copied: Callable[[], Any]) -> Any:
+    """What a call makes of memory that held something before."""
+    used = [np.full(32 << i % 16, 255, np.uint8) for i in range(320)]
+    del used
+    return copied()
+
+
+def test_copies_of_rows_have_the_padding_of_the_rows(arm: o80.Frontend) -> None:
+    arm.burst(50)
+    history = arm.history()
+    times, half = history.time[::2], with_padding(history.rows)[::2].tobytes()
+    copies = {
+        "pickled": lambda: pickle.loads(pickle.dumps(history[::2])).rows,
+        "linear": lambda: o80.align({"arm": history}, at=times, how="linear")["arm"].rows,
+        "before": lambda: o80.align({"arm": history}, at=times)["arm"].rows,
+    }
+    for how, copied in copies.items():
+        assert after_other_values(copied).tobytes() == half, how
+
+
+def test_padding_of_targets_is_zero(segment: str) -> None:
+    with o80.Backend(segment, ["left", "right"], {"on": bool, "position": float}) as backend:
+        for count in (2, 20, 200):
+            targets = np.zeros((count, 2), [("on", bool), ("position", float)])
+            for given in (targets, {name: targets[name] for name in ("on", "position")}):
+                copied = partial(states_of, given, [0, 1], False, backend._layout)
+                states, _ = after_other_values(copied)
+                assert not states.any()

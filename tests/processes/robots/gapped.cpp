@@ -22,9 +22,8 @@ void count_into(T& value, int& next) {
   } else if constexpr (requires { value.size(); }) {
     for (auto& each : value) count_into(each, next);
   } else {
-    o80_describe(o80::Tag<T>(), [&](auto, auto member, auto, auto) {
-      count_into(value.*member, next);
-    });
+    o80_describe(o80::Tag<T>(),
+                 [&](auto, auto member, auto, auto) { count_into(value.*member, next); });
   }
 }
 
