@@ -101,8 +101,8 @@ def test_every_reader_sees_what_a_driver_in_python_published(
     (run,) = o80.replay(folder / "run.mcap", robot="published_rows:Publisher")
     before, after = published.columns(8), Publisher.rows.columns(8)
     changed = [name for name in before if before[name][5].tobytes() != after[name][5].tobytes()]
-    assert run.difference is not None
-    assert (run.difference.iteration, run.difference.field) == (5, changed[0])
+    found = run.difference and (run.difference.iteration, run.difference.field)
+    assert found == ((5, changed[0]) if changed else None)
 
 
 def test_rows_without_their_padding_are_no_history(segment: str) -> None:
