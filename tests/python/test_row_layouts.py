@@ -22,7 +22,7 @@ from o80.drivers import Reading
 from o80.layout import with_padding
 from o80.trajectory import states_of
 
-LAYOUTS = settings(ROBOTS, max_examples=int(os.environ.get("O80_LAYOUTS", "8")))
+LAYOUTS = settings(ROBOTS, max_examples=int(os.environ.get("O80_LAYOUTS", ROBOTS.max_examples)))
 SEEDS = st.integers(0, 2**32 - 1)
 
 
