@@ -11,9 +11,11 @@ namespace {
 
 // the types of the robot; its driver is not needed here
 struct Sensors {
+  bool homing;
   std::array<double, 2> effort;
 };
-O80_DESCRIBE(Sensors, (effort, "what is asked less what is there [rad]"));
+O80_DESCRIBE(Sensors, (homing, "it moves to 0 by itself"),
+             (effort, "what is asked less what is there [rad]"));
 
 struct TwoJoints {
   using Actuators = std::array<double, 2>;  // [rad]

@@ -2,12 +2,15 @@
 
 import itertools
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from o80.layout import dtype_of_field
+
+if TYPE_CHECKING:
+    from o80.history import History
 
 
 class Column(NamedTuple):
@@ -54,12 +57,12 @@ def _numbers(
                 yield Column(name, dtype, offset, labels, origin)
 
 
-def values_of(rows: NDArray[Any], column: Column) -> NDArray[Any]:
+def values_of(history: "History", column: Column) -> NDArray[Any]:
     """The numbers of a column as a contiguous copy: (T,)."""
-    if not len(rows):
-        return np.empty(0, column.dtype)
-    rows = np.ascontiguousarray(rows)  # those of a slice with a step have gaps
-    part: NDArray[Any] = np.ndarray(
-        (len(rows),), column.dtype, rows, column.offset, (rows.strides[0],)
-    )
-    return part.copy()
+    values: NDArray[Any] = history.rows.getfield(column.dtype, column.offset).copy()
+    return values
+
+
+def value_of(row: Any, column: Column) -> Any:
+    """The number of a column in an observation."""
+    return np.ndarray((), column.dtype, row, column.offset)[()]

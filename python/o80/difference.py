@@ -44,21 +44,23 @@ def first_difference(
 
     Numbers are compared bit for bit. The fields of the clock are left out: `time`, `lateness`,
     `overruns` and `skipped` of a robot in real time, and those that its driver marks so.
-    ignore: columns to leave out, such as "lateness" or "extended" (all sensor values).
+    ignore: columns to leave out, such as "lateness" or "extended" (all sensor values). Only these
+        may be those of one robot alone.
     tolerances: by column, likewise, the largest absolute difference that counts as equal.
     Raises InvalidArgument if the robots differ, or a column is unknown.
     """
     if one.schema["actuators"] != other.schema["actuators"]:
         raise InvalidArgument("the robots differ: they have different actuators or limits")
     mine, others = columns_in(one), columns_in(other)
-    if list(mine) != list(others):
-        names = ", ".join(sorted(set(mine) ^ set(others))[:5])
-        raise InvalidArgument(f"the robots differ in their fields: {names}")
+    every = dict.fromkeys([*mine, *others])
     for named in [*ignore, *(tolerances or {})]:
-        if not any(_belongs(column, named) for column in mine):
-            known = [name.partition(separator)[0] for separator in ".[" for name in mine]
+        if not any(_belongs(column, named) for column in every):
+            known = [name.partition(separator)[0] for separator in ".[" for name in every]
             instead = _core.names_instead(named, list(dict.fromkeys(known)))
             raise InvalidArgument(f"there is no column '{named}'{instead}")
+    for column in every:
+        if (column in mine) != (column in others) and not any(_belongs(column, n) for n in ignore):
+            raise InvalidArgument(f"the robots differ in their fields: {column} is in one of them")
 
     first, second, lacking = _rows_of_both(mine["iteration"], others["iteration"])
     found = [] if lacking is None else [lacking]

@@ -20,7 +20,7 @@ def columns_in(history: History) -> Columns:
     """All numbers of all rows, by name, as in `History.to_frame`; enumerations as numbers."""
     columns = {name: np.ascontiguousarray(getattr(history, name)) for name in HEAD}
     for column in columns_of(history.schema):
-        columns[column.name] = values_of(history.rows, column)
+        columns[column.name] = values_of(history, column)
     names = [actuator["name"] for actuator in history.schema["actuators"]]
     for part in ("active", "clamped", "braking"):
         mask = getattr(history, part)

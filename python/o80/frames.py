@@ -17,13 +17,12 @@ if TYPE_CHECKING:
 def frame_of(history: "History") -> "pandas.DataFrame":
     """A row for each observation, a column for each number."""
     pandas = needed("pandas", "pandas", "a data frame")
-    rows = history.rows
     data: dict[str, Any] = {
         name: getattr(history, name)
         for name in ("time", "lateness", "overruns", "skipped", "fresh", "halted")
     }
     for column in columns_of(history.schema):
-        values = values_of(rows, column)
+        values = values_of(history, column)
         data[column.name] = (
             values if column.labels is None else _categories(pandas, values, column.labels)
         )

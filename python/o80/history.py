@@ -1,6 +1,6 @@
 """Many observations at once."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from o80 import _core
 from o80.checked import whole
 from o80.errors import InvalidArgument, RowOverwritten
+from o80.layout import with_padding
 from o80.record import Record
 from o80.selection import Selection
 from o80.states import States
@@ -28,9 +29,18 @@ class History:
     __slots__ = ("_decoder", "_layout", "rows")
 
     def __init__(self, decoder: _core.Decoder, rows: NDArray[Any]) -> None:
+        """Raises InvalidArgument if the rows do not lie as the description says."""
+        decoder.layout.check(rows)
         self._decoder = decoder
         self._layout = decoder.layout
         self.rows = rows  #: structured array (T,): whole rows, as in the segment
+
+    @classmethod
+    def _joined(cls, decoder: _core.Decoder, parts: Iterable["History"]) -> "History":
+        """One history of consecutive ones."""
+        nothing = np.empty(0, decoder.layout.row)
+        each = [with_padding(rows) for rows in (nothing, *(part.rows for part in parts))]
+        return cls(decoder, np.concatenate(each).view(nothing.dtype))
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -227,7 +237,12 @@ class History:
         return np.array(self.rows, dtype=dtype, copy=copy)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return History, (self._decoder, self.rows)
+        return History, (self._decoder, self._contiguous)
+
+    @property
+    def _contiguous(self) -> NDArray[Any]:
+        """The rows without rows between them, which a slice may leave out."""
+        return np.ascontiguousarray(with_padding(self.rows)).view(self.rows.dtype)
 
     def __repr__(self) -> str:
         if not len(self):

@@ -169,7 +169,7 @@ class InlineGroup(Closeable):
         return GroupRequest(
             self._group,
             name,
-            np.frombuffer(payload * self.copies, kind).copy(),
+            np.frombuffer(bytearray(payload * self.copies), kind),
             np.zeros(self.copies, self._layout.row),
             self._all,
         )

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o80 import _core
+from o80.errors import InvalidArgument
 from o80.record import Record
 
 HEAD = (
@@ -129,6 +130,14 @@ def joined(
                 continue
         result.append((kind, offset, count))
     return result
+
+
+def with_padding(rows: NDArray[Any]) -> NDArray[Any]:
+    """A view of rows as items without fields: its copies have the padding of the rows too.
+
+    NumPy copies rows field by field. It leaves out the padding, or leaves it undefined.
+    """
+    return rows.view(np.dtype((np.void, rows.itemsize)))
 
 
 class Layout:
@@ -267,6 +276,16 @@ class Layout:
 
     # many rows, as an array of `row` => views with a first dimension
 
+    def check(self, rows: NDArray[Any]) -> None:
+        """Raises InvalidArgument if rows do not lie as the description says."""
+        if rows.dtype is self.row or rows.dtype == self.row:
+            return
+        raise InvalidArgument(
+            f"rows of {rows.dtype.itemsize} bytes do not lie as '{self.schema['robot']}' describes "
+            f"them ({self.size} bytes). NumPy's concatenate and where leave out padding: give them "
+            f"single fields, such as history.observed"
+        )
+
     def many(self, rows: NDArray[Any], part: str) -> Any:
         """The states of an array of rows: (T, actuators), or a record of groups."""
         if not self.actuators:
@@ -297,11 +316,9 @@ class Layout:
         kind = np.dtype(np.float32 if dtype is None else dtype)
         columns = sum(count for _, _, count in self.runs)
         result = np.empty((len(rows), columns), kind)
-        rows = np.ascontiguousarray(rows)  # those of a slice with a step have gaps
         column = 0
         for own, offset, count in self.runs:
-            strides = (rows.strides[0], own.itemsize)
-            part: NDArray[Any] = np.ndarray((len(rows), count), own, rows, offset, strides)
+            part = rows.getfield(np.dtype((own, (count,))), offset)
             result[:, column : column + count] = part
             column += count
         return result

@@ -148,7 +148,7 @@ def _draw(
     for curve in curves:
         part = _part(curve.column.name)
         color = {"desired": "tab:gray", "observed": "tab:blue"}.get(part, "tab:green")
-        values = values_of(history.rows, curve.column)
+        values = values_of(history, curve.column)
         ax.plot(times, values, STYLES[part], color=color, label=part, linewidth=1.2)
         if curve.column.labels:
             ax.set_yticks(list(curve.column.labels.values()), list(curve.column.labels))

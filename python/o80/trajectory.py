@@ -29,7 +29,9 @@ def states_of(
         raise InvalidArgument(
             f"the targets of {len(actuators)} actuators are {expected}, not {array.shape}"
         )
-    return np.ascontiguousarray(array.T).reshape(-1).view(np.uint8), len(array)
+    states = np.zeros(array.T.shape, kind)  # a copy would hold anything in its padding
+    states[...] = array.T
+    return states.reshape(-1).view(np.uint8), len(array)
 
 
 def states_from(targets: ArrayLike, kind: np.dtype[Any]) -> NDArray[Any]:

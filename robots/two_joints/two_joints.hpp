@@ -28,6 +28,7 @@ class TwoJoints {
     double reach = 3.0;
   };
   struct Sensors {
+    bool homing;  // its padding is in every test that uses this robot
     std::array<double, 2> effort;
   };
   using Actuators = std::array<double, 2>;  // positions [rad]
@@ -66,7 +67,8 @@ class TwoJoints {
     reading.extended.effort = now_.effort;
     tell_of_home(reading);
     if (reading.fresh()) now_.mode = Mode::follows;  // what is asked begins where it is
-    reading.go_on_from(now_.desired);                // heard after a reset or a restore only
+    reading.extended.homing = now_.mode == Mode::homes;
+    reading.go_on_from(now_.desired);  // heard after a reset or a restore only
   }
 
   o80::Served on(const o80::Reset&) {
@@ -158,4 +160,5 @@ class TwoJoints {
 
 O80_DESCRIBE(TwoJoints::Config, (gain, "how fast a joint closes in on what is asked [1/s]"),
              (reach, "largest angle of a joint, either way [rad]"));
-O80_DESCRIBE(TwoJoints::Sensors, (effort, "what is asked less what is there [rad]"));
+O80_DESCRIBE(TwoJoints::Sensors, (homing, "it moves to 0 by itself"),
+             (effort, "what is asked less what is there [rad]"));

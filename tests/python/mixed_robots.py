@@ -25,8 +25,13 @@ SHAPED = st.builds(
     NUMBERS,
     st.lists(st.integers(1, 3), max_size=2).map(tuple),
 )
-FIELDS = st.one_of(SHAPED, st.just(Mode))
 NAMES = st.sampled_from(["position", "velocity", "force", "count", "on", "mode"])
+STRUCT_ARRAYS = st.builds(
+    lambda fields, shape: (np.dtype(list(fields.items())), shape),
+    st.dictionaries(NAMES, NUMBERS, min_size=1, max_size=3),
+    st.lists(st.integers(1, 3), min_size=1, max_size=2).map(tuple),
+)
+FIELDS = st.one_of(SHAPED, st.just(Mode), STRUCT_ARRAYS)
 STRUCTS = st.dictionaries(NAMES, FIELDS, min_size=1, max_size=4)
 STATES = st.one_of(NUMBERS, st.just(Mode), STRUCTS, st.fixed_dictionaries({"inner": STRUCTS}))
 GROUPS = st.dictionaries(
@@ -36,6 +41,10 @@ GROUPS = st.dictionaries(
     max_size=3,
 )
 SENSORS = st.one_of(st.none(), STRUCTS)
+
+
+def is_enum(described: Any) -> bool:
+    return isinstance(described, type) and issubclass(described, IntEnum)
 
 
 def fill(random: np.random.Generator, array: np.ndarray[Any, np.dtype[Any]]) -> None:

@@ -115,10 +115,10 @@ def test_echo_prints_rows_in_order(folder: Path, robot: "subprocess.Popen[str]")
     rows = [json.loads(line) for line in lines]
     first = rows[0]["iteration"]
     assert [row["iteration"] for row in rows] == list(range(first, first + 5))
-    assert rows[0]["extended"] == {"effort": [0.0, 0.0]}
+    assert rows[0]["extended"] == {"homing": False, "effort": [0.0, 0.0]}
     line = o80(folder, "echo", "two_joints", "--count", "1")
     assert "observed (0 0)" in line
-    assert "extended effort (0 0)" in line
+    assert "extended homing False effort (0 0)" in line
     assert line.rstrip().endswith("idle")
 
 

@@ -60,7 +60,7 @@ def test_an_action_is_what_was_asked_in_its_step(recorded: Path, segment: str) -
 
     assert np.array_equal(first.observed, history.observed)
     assert np.array_equal(first.actions, history.desired[1:])
-    assert np.array_equal(first.extended[:, 0], history.extended.effort[:, 0])
+    assert np.array_equal(first.extended[:, 1:], history.extended.effort)
 
 
 def test_rewards_belong_to_the_step_in_which_they_were_marked(recorded: Path) -> None:
@@ -189,7 +189,8 @@ def test_a_lerobot_data_set_has_the_documented_files(recorded: Path, tmp_path: P
         assert np.array_equal(state, episode.observed[:-1].astype(np.float32))
         assert own["next.reward"].to_numpy() == pytest.approx(episode.rewards)
     assert info["features"]["action"]["names"] == ["shoulder", "elbow"]
-    assert info["features"]["observation.environment_state"]["names"][0] == "effort[0]"
+    sensors = info["features"]["observation.environment_state"]["names"]
+    assert sensors == ["homing", "effort[0]", "effort[1]"]
 
     table = pyarrow.parquet.read_table(root / "meta/episodes/chunk-000/file-000.parquet")
     rows = table.to_pylist()

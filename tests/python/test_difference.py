@@ -119,6 +119,15 @@ def test_different_robots_are_refused(segment: str) -> None:
         first_difference(run_of(0.5, segment), recorded({"hand": "f8"}, None, 1))
 
 
+def test_a_column_that_one_robot_lacks_may_be_ignored() -> None:
+    one = recorded({"hand": "f8"}, {"force": "f8"}, 1)[:1]
+    other = recorded({"hand": "f8"}, {"force": "f8", "warm": "?"}, 1)[:1]
+    for pair in ((one, other), (other, one)):
+        assert first_difference(*pair, ignore=["extended.warm"]) is None
+        with pytest.raises(o80.InvalidArgument, match=r"extended\.warm is in one of them"):
+            first_difference(*pair, ignore=["extended.force"])
+
+
 def test_the_command_tells_by_its_exit_code(segment: str, tmp_path: Path) -> None:
     paths = []
     for i, target in enumerate((0.5, 0.5, 0.6)):

@@ -93,7 +93,10 @@ def test_desired_and_observed_share_a_panel_and_a_halt_is_shaded(arm: o80.Fronte
     [
         (["elbow"], ["elbow\n[rad]"]),
         (["observed.elbow"], ["elbow\n[rad]"]),
-        (["extended"], ["extended.effort[0]\n[rad]", "extended.effort[1]\n[rad]"]),
+        (
+            ["extended"],
+            ["extended.homing", "extended.effort[0]\n[rad]", "extended.effort[1]\n[rad]"],
+        ),
         (["effort[1]"], ["extended.effort[1]\n[rad]"]),
     ],
 )

@@ -50,7 +50,7 @@ def test_it_knows_its_robot(arm: o80.Frontend, segment: str) -> None:
     assert arm.period == pytest.approx(0.001)
     assert arm.bursting
     assert arm.alive
-    assert arm.schema["extended"]["fields"][0]["name"] == "effort"
+    assert [field["name"] for field in arm.schema["extended"]["fields"]] == ["homing", "effort"]
 
 
 def test_what_was_added_and_never_pulsed_is_warned_about(segment: str) -> None:

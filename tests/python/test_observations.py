@@ -141,7 +141,8 @@ def test_flat_of_plain_numbers(arm: o80.Frontend) -> None:
     arm.add_command(0, 1.0)
     observation = arm.burst(1)
 
-    whole = np.concatenate([observation.observed, observation.extended.effort])
+    extended = observation.extended
+    whole = np.concatenate([observation.observed, [extended.homing], extended.effort])
     assert np.array_equal(observation.flat(np.float64), whole)
     assert np.array_equal(arm.history(1).flat(np.float64), whole[np.newaxis])
 

@@ -86,6 +86,7 @@ def test_a_recording_is_replayed_as_far_as_its_motion_rules_are_those_of_this_o8
     name: str,
 ) -> None:
     command = [str(Path(sys.executable).parent / "o80"), "replay", f"{name}.mcap"]
+    command += ["--ignore", "extended.homing"]  # which the robot did not have then
     done = subprocess.run(command, cwd=RECORDINGS, capture_output=True, text=True, timeout=WAIT)
 
     said = done.stdout + done.stderr

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 import o80
 from o80 import _core
+from o80.columns import columns_of
 from o80.machine import this_machine
 from o80.replaying.recorded_run import FileRun, RecordedRun, runs_in
 from o80.replaying.replay import replay_runs
@@ -306,12 +307,13 @@ def test_a_flipped_bit_is_found_in_its_row_and_field(
     run = run_in_file
     row = data.draw(st.integers(0, run.rows - 1))
     part, actuator = data.draw(st.sampled_from([("desired", 0), ("observed", 1), ("extended", 1)]))
-    byte = run.schema["row"][part] + 8 * actuator + data.draw(st.integers(0, 7))
+    name = f"extended.effort[{actuator}]" if part == "extended" else f"{part}.{NAMES[actuator]}"
+    (place,) = [column.offset for column in columns_of(run.schema) if column.name == name]
+    byte = place + data.draw(st.integers(0, 7))
     flipped = Flipped(run, row, byte, 1 << data.draw(st.integers(0, 7)))
     (report,) = replay_runs([flipped])
 
     assert report.difference is not None
-    name = f"extended.effort[{actuator}]" if part == "extended" else f"{part}.{NAMES[actuator]}"
     assert (report.difference.iteration, report.difference.field) == (row, name)
 
 
@@ -382,7 +384,7 @@ def test_the_command_says_whether_a_recording_repeats(arm: o80.Frontend, tmp_pat
 
 
 def test_a_recording_of_an_older_version_repeats_as_far_as_its_motion_rules_do() -> None:
-    report = o80.replay(RECORDINGS / "format_1.mcap")
+    report = o80.replay(RECORDINGS / "format_1.mcap", ignore=("extended.homing",))
     assert [run.difference for run in report] == [None, None]
     for run in report:
         assert "motion rules" in (run.gap or ""), run.gap

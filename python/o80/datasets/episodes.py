@@ -57,7 +57,7 @@ class Episode:
         columns = [each for each in columns_of(self.rows.schema) if _part(each.name) == part]
         numbers = np.empty((len(self.rows), len(columns)))
         for i, column in enumerate(columns):
-            numbers[:, i] = values_of(self.rows.rows, column)
+            numbers[:, i] = values_of(self.rows, column)
         return numbers
 
 

@@ -38,7 +38,7 @@ class AlignedHistory(History):
         self.found = found  #: (T,) False where there is no row that is young enough
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return AlignedHistory, (self._decoder, self.rows, self.age, self.found)
+        return AlignedHistory, (self._decoder, self._contiguous, self.age, self.found)
 
 
 class Aligned(Mapping[str, AlignedHistory]):

@@ -107,7 +107,7 @@ def _sampled(source: Timed, signal: Signal, grid: NDArray[np.int64]) -> FloatArr
                 f"row, got {values.shape}"
             )
     else:
-        values = values_of(history.rows, _column(history, signal)).astype(np.float64)
+        values = values_of(history, _column(history, signal)).astype(np.float64)
     values = values[source.rows]
     whole = np.isfinite(values)
     if whole.sum() < LEAST_ROWS:

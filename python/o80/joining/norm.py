@@ -30,7 +30,7 @@ def norm_of(path: str) -> Callable[[History], NDArray[np.float64]]:
 
     def norm(history: History) -> NDArray[np.float64]:
         chosen = columns_below(history, path)
-        numbers = [values_of(history.rows, column).astype(np.float64) for column in chosen]
+        numbers = [values_of(history, column).astype(np.float64) for column in chosen]
         length: NDArray[np.float64] = np.linalg.norm(numbers, axis=0)
         return length
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from o80.columns import columns_of
 from o80.history import History
 from o80.joining.sources import Timed
+from o80.layout import with_padding
 
 NANOSECOND = 1e-9
 NOWHERE = np.iinfo(np.int64).max  # age where there is no row [ns]
@@ -58,16 +58,14 @@ def linear(source: Timed, times: NDArray[np.int64]) -> Picked:
     inside &= (since == 0) | (until >= 0)
     span = np.maximum(source.times[right] - source.times[left], 1)
     share = np.where(since == 0, 0.0, since / span)
-    older, newer = (source.history.rows[source.rows[place]] for place in (left, right))
-    mixed = older.copy()
-    raw = mixed.view(np.uint8).reshape(len(mixed), -1)
+    older, newer = (_rows(source, place) for place in (left, right))
+    mixed = _rows(source, left)
     for column in columns_of(source.history.schema):
         if column.dtype.kind != "f":
             continue
-        a, b = (_column(rows, column.offset, column.dtype) for rows in (older, newer))
-        between = np.where(share == 0.0, a, a + (b - a) * share).astype(column.dtype)
-        end = column.offset + column.dtype.itemsize
-        raw[:, column.offset : end] = between[:, np.newaxis].view(np.uint8)
+        place = column.dtype, column.offset
+        a, b = older.getfield(*place), newer.getfield(*place)
+        mixed.getfield(*place)[...] = np.where(share == 0.0, a, a + (b - a) * share)
     age = np.where(since == 0, 0, np.maximum(since, until))
     return Picked(mixed, np.where(inside, age, NOWHERE))
 
@@ -78,11 +76,13 @@ def _picked(source: Timed, times: NDArray[np.int64], places: NDArray[np.intp]) -
         return Picked(np.zeros(len(times), source.history.rows.dtype), np.full(len(times), NOWHERE))
     places = np.maximum(places, 0)
     age = np.where(found, times - source.times[places], NOWHERE)
-    return Picked(source.history.rows[source.rows[places]], age)
+    return Picked(_rows(source, places), age)
 
 
-def _column(rows: NDArray[np.void], offset: int, dtype: np.dtype[Any]) -> NDArray[Any]:
-    return np.ndarray((len(rows),), dtype, rows, offset, (rows.strides[0],))
+def _rows(source: Timed, places: NDArray[np.intp]) -> NDArray[np.void]:
+    """A copy of these rows."""
+    rows = source.history.rows
+    return with_padding(rows)[source.rows[places]].view(rows.dtype)
 
 
 def blanked(history: History, rows: NDArray[np.void], missing: NDArray[np.bool_]) -> None:
@@ -93,4 +93,4 @@ def blanked(history: History, rows: NDArray[np.void], missing: NDArray[np.bool_]
     raw[missing] = 0
     for column in columns_of(history.schema):
         if column.dtype.kind == "f":
-            _column(rows, column.offset, column.dtype)[missing] = np.nan
+            rows.getfield(column.dtype, column.offset)[missing] = np.nan

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from o80 import _core
 from o80.errors import InvalidArgument, RecordingError
+from o80.layout import with_padding
 from o80.playing.track import Part, Track
 from o80.provenance import Provenance
 from o80.recording.journal_channel import Entries
@@ -78,7 +79,7 @@ class Player:
         """Publishes rows when they are due [ns] (None: at once). False after `stop`."""
         rows = part.rows
         if due is not None and self._has_clock(part.run):
-            rows = rows.copy()
+            rows = with_padding(rows).copy().view(rows.dtype)
             rows["time"] += due[0] - rows["time"][0]
         segment = self._of(part)
         if segment is None:

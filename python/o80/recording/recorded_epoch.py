@@ -213,10 +213,7 @@ class RecordedEpoch:
 
         Raises RecordingError if the file is damaged there.
         """
-        layout = self._decoder.layout
-        parts = [*self._rows(from_time, to_time)]
-        rows = np.concatenate(parts) if parts else np.empty(0, layout.row)
-        history = History(self._decoder, rows)
+        history = History._joined(self._decoder, self._blocks(from_time, to_time))
         return history.select(
             n, since=since, until=until, seconds=seconds, from_time=from_time, to_time=to_time
         )
@@ -228,8 +225,8 @@ class RecordedEpoch:
 
         For recordings larger than the memory. Raises RecordingError if the file is damaged there.
         """
-        for rows in self._rows(from_time, to_time):
-            history = History(self._decoder, rows).select(from_time=from_time, to_time=to_time)
+        for block in self._blocks(from_time, to_time):
+            history = block.select(from_time=from_time, to_time=to_time)
             if len(history):
                 yield history
 
@@ -247,14 +244,14 @@ class RecordedEpoch:
         """When its recording began, on the wall clock [ns since 1970]."""
         return self._parts[0].began_at
 
-    def _rows(self, from_time: int | None = None, to_time: int | None = None) -> Iterator[Any]:
+    def _blocks(self, from_time: int | None, to_time: int | None) -> Iterator[History]:
         """The rows of each chunk that may have rows of these times."""
         layout = self._decoder.layout
         plan = MessagePlan(row_type(layout), layout.size)
         for part in self._parts:
             for messages in self._messages(part, plan.size, from_time, to_time):
                 raw = np.ascontiguousarray(plan.decode(messages))
-                yield raw.view(layout.row).reshape(len(raw))
+                yield History(self._decoder, raw.view(layout.row).reshape(len(raw)))
 
     def _messages(
         self, part: EpochPart, size: int, from_time: int | None, to_time: int | None

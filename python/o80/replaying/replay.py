@@ -345,4 +345,4 @@ class _RunReplay:
 def _joined(one: History, other: History) -> History:
     from o80.history import History
 
-    return History(one._decoder, np.concatenate([one.rows, other.rows]))
+    return History._joined(one._decoder, [one, other])

@@ -5,9 +5,6 @@ import threading
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 import o80
 from o80.view.curves import Panels
 from o80.view.kept import Kept
@@ -69,7 +66,7 @@ class Answers:
             answer |= shown.scene.poses(_bytes_of(row), row.active)
         panels = asked.get("panels")
         panels = shown.panels.first if not isinstance(panels, list) else [str(p) for p in panels]
-        answer["values"] = shown.panels.values(_as_rows(row), panels)
+        answer["values"] = shown.panels.values(row, panels)
         if asked.get("curves"):
             answer["curves"] = shown.curves(source, panels, _window(asked), at)
         return answer
@@ -160,12 +157,6 @@ class _Shown:
 
 def _bytes_of(row: Any) -> bytes:
     return bytes(memoryview(row))
-
-
-def _as_rows(row: o80.Observation) -> NDArray[Any]:
-    """The bytes of one row as an array of rows."""
-    whole = _bytes_of(row)
-    return np.frombuffer(whole, np.dtype((np.void, len(whole))))
 
 
 def _chosen(sources: Sequence[Source], label: Any) -> Source | None:

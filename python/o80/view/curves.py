@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from o80.columns import Column, columns_of, values_of
+from o80._core import Observation
+from o80.columns import Column, columns_of, value_of, values_of
 from o80.history import History
 from o80.view.packed import packed
 
@@ -57,16 +58,16 @@ class Panels:
             if columns is None:
                 continue
             found[panel] = {
-                part: [seconds, *_extremes(values_of(rows.rows, column), starts)]
+                part: [seconds, *_extremes(values_of(rows, column), starts)]
                 for part, column in columns.items()
             }
         return found
 
-    def values(self, row: NDArray[Any], panels: list[str]) -> dict[str, dict[str, str]]:
+    def values(self, row: Observation, panels: list[str]) -> dict[str, dict[str, str]]:
         """The numbers of one row as text, by panel and part."""
         return {
             panel: {
-                part: _text(values_of(row, column)[0], column)
+                part: _text(value_of(row, column), column)
                 for part, column in self.columns[panel].items()
             }
             for panel in panels[:MOST_PANELS]

@@ -1,0 +1,361 @@
+"""What a robot published, and a check of everything that reads its rows against it.
+
+The expected numbers are made without offsets: from nested values and the names of their fields.
+"""
+
+import json
+import math
+import pickle
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pyarrow.parquet
+from mcap.reader import make_reader
+from minari import MinariDataset
+from mixed_robots import is_enum
+from numpy.typing import NDArray
+from rosbags.highlevel import AnyReader
+
+import o80
+from o80.datasets import lerobot, minari
+from o80.datasets.episodes import episodes_of
+from o80.difference import first_difference
+from o80.export import columns_in, write
+from o80.plot import plot
+from o80.view.curves import Panels
+from o80.view.packed import packed
+
+WAIT = 30.0  # [s] longer than any wait should take
+Columns = dict[str, NDArray[Any]]
+
+
+def drawn(random: np.random.Generator, described: Any, lead: tuple[int, ...] = ()) -> Any:
+    """Random values of a type: a mapping for a struct, an array (*lead, ...) otherwise."""
+    if isinstance(described, Mapping):
+        return {name: drawn(random, inner, lead) for name, inner in described.items()}
+    if is_enum(described):
+        return random.choice([*described], lead).astype(np.int64)
+    element, shape = np.dtype(described).subdtype or (np.dtype(described), ())
+    if element.names is not None:
+        kinds = [(name, element.fields[name][0]) for name in element.names]  # without its gaps
+        values = np.zeros((*lead, *shape), kinds)
+        for name, kind in kinds:
+            values[name] = drawn(random, kind, values.shape)
+        return values
+    if element.kind == "f":
+        return random.normal(size=(*lead, *shape)).astype(element)
+    low, high = (0, 1) if element.kind == "b" else (np.iinfo(element).min, np.iinfo(element).max)
+    dtype = np.uint8 if element.kind == "b" else element
+    return random.integers(low, high, (*lead, *shape), dtype, endpoint=True).astype(element)
+
+
+def numbers(path: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """The numbers of a value, each with the name of its column."""
+    if isinstance(value, Mapping):
+        for name in value:
+            yield from numbers(f"{path}.{name}", value[name])
+        return
+    array = np.asarray(value)
+    for place in np.ndindex(array.shape):
+        inner = path + "".join(f"[{i}]" for i in place)
+        if array.dtype.names is None:
+            yield inner, array[place]
+        for name in array.dtype.names or ():
+            yield from numbers(f"{inner}.{name}", array[place][name])
+
+
+def element(value: Any, index: int) -> Any:
+    """Of values of several actuators those of one."""
+    if isinstance(value, Mapping):
+        return {name: element(inner, index) for name, inner in value.items()}
+    return value[index]
+
+
+def many(members: Any) -> tuple[Any, tuple[int, ...]]:
+    """The type of a group, and (how many,); () if it is a single actuator."""
+    return (members[0], (members[1],)) if isinstance(members, tuple) else (members, ())
+
+
+class Published:
+    """The rows that a robot of described types publishes: an endless list of them."""
+
+    def __init__(self, groups: Mapping[str, Any], sensors: Any, seed: int) -> None:
+        self.groups, self.sensors = groups, sensors
+        self._random = np.random.default_rng(seed)
+        self._rows: list[tuple[Any, Any]] = []
+
+    def row(self, number: int) -> tuple[Any, Any]:
+        """States and sensor values, for `Backend.publish`."""
+        while len(self._rows) <= number:
+            states = {
+                name: drawn(self._random, *many(members)) for name, members in self.groups.items()
+            }
+            sensors = None if self.sensors is None else drawn(self._random, self.sensors)
+            self._rows.append((states, sensors))
+        return self._rows[number]
+
+    def swap(self, one: int, other: int) -> None:
+        """Publishes two rows each in the place of the other."""
+        states = [self.row(one), self.row(other)]
+        self._rows[other], self._rows[one] = states
+
+    def columns(self, rows: int) -> Columns:
+        """All numbers: (rows,) each. Without commands the desired states stay those of row 0."""
+        each = [dict(self._numbers(row)) for row in range(rows)]
+        return {name: np.array([row[name] for row in each]) for name in each[0]}
+
+    def _numbers(self, row: int) -> Iterator[tuple[str, Any]]:
+        for part, (states, _) in (("desired", self.row(0)), ("observed", self.row(row))):
+            for name, members in self.groups.items():
+                if lead := many(members)[1]:
+                    for i in range(lead[0]):
+                        named = f"{name}_{i}"
+                        yield from numbers(f"{part}.{named}", element(states[name], i))
+                else:
+                    yield from numbers(f"{part}.{name}", states[name])
+        if self.sensors is not None:
+            yield from numbers("extended", self.row(row)[1])
+
+
+# ---------------------------------------------------------------------------- consumers
+
+
+def check_every_reader(
+    frontend: o80.Frontend,
+    iterate: Callable[[], object],
+    expect: Callable[[int], Columns],
+    folder: Path,
+) -> None:
+    """Records a robot that stands at row 0, and compares everything that shows its rows.
+
+    iterate: makes the robot publish one row more. expect: all numbers of so many rows.
+    """
+    path, marked = folder / "run.mcap", folder / "marked.mcap"
+    with o80.Recording(path, frontend) as recording, o80.Recording(marked, frontend) as episode:
+        episode.mark("episode")
+        for _ in range(3):
+            iterate()
+        recording.flush()  # a chunk of its own
+        for _ in range(4):
+            iterate()
+        episode.mark("episode_end")
+    live = frontend.history()
+    expected = expect(len(live))
+    assert len(live) == 8
+    Readers(live, expected).check()
+
+    epoch = o80.open(path)[frontend.segment].epochs[0]
+    recorded = epoch.history()
+    Readers(recorded, expected).check()
+    assert first_difference(live, recorded) is None
+    assert recorded.rows.tobytes() == live.rows.tobytes()
+    blocks = [*epoch.blocks()]
+    assert len(blocks) > 1
+    for block in blocks:
+        first, last = int(block.iteration[0]), int(block.iteration[-1])
+        same(part(expected, slice(first, last + 1)), columns_in(block))
+    played(path, frontend.segment, expected)
+    messages(path, frontend.segment, expected)
+    files(recorded, folder, expected)
+    data_sets(marked, folder, expected)
+
+
+@dataclass
+class Readers:
+    """What reads one history."""
+
+    history: o80.History
+    expected: Columns
+
+    def check(self) -> None:
+        self.rows()
+        self.derived()
+        self.aligned()
+        self.difference()
+        self.picture()
+        self.page()
+
+    def rows(self) -> None:
+        """Rows one by one, by name and as flat numbers."""
+        seen = [name for name in self.expected if not name.startswith("desired.")]
+        flat = np.array([self.expected[name].astype(np.float64) for name in seen]).T
+        assert np.array_equal(self.history.flat(np.float64), flat)
+        assert np.array_equal(self.history[::3].flat(np.float64), flat[::3])
+        for i, row in enumerate(self.history):
+            assert np.array_equal(row.flat(np.float64), flat[i])
+            parts = (row.desired, row.observed, row.extended)
+            found = [number for part in parts for _, number in numbers("", part)]
+            assert found == [values[i] for values in self.expected.values()]
+        assert str(self.history[-1]) == str(self.history[2:][-1])
+
+    def derived(self) -> None:
+        """Histories that are made of this one, and files of them."""
+        for history, values in (
+            (self.history, self.expected),
+            (self.history[1::2], part(self.expected, slice(1, None, 2))),
+            (self.history.select(3), part(self.expected, slice(-3, None))),
+            (pickle.loads(pickle.dumps(self.history)), self.expected),
+            (pickle.loads(pickle.dumps(self.history[::2])), part(self.expected, slice(0, None, 2))),
+        ):
+            same(values, columns_in(history))
+            same(values, as_numbers(history.to_frame(), labels_of(history)))
+
+    def aligned(self) -> None:
+        times = self.history.time
+        for how in ("before", "nearest", "linear"):
+            joined = o80.align({"robot": self.history}, at=times, how=how)
+            same(self.expected, columns_in(joined["robot"]))
+            same(self.expected, columns_in(pickle.loads(pickle.dumps(joined["robot"]))))
+        middle = (times[:-1] + times[1:]) // 2
+        joined = o80.align({"robot": self.history}, at=middle, how="linear")
+        share = (middle - times[:-1]) / (times[1:] - times[:-1])
+        mixed = {name: between(values, share) for name, values in self.expected.items()}
+        same(mixed, columns_in(joined["robot"]))
+        nothing = o80.align({"robot": self.history}, at=times[:1] - 1)["robot"]
+        for name, values in columns_in(nothing).items():
+            if name in self.expected:
+                assert np.isnan(values).all() if values.dtype.kind == "f" else not values.any()
+
+    def difference(self) -> None:
+        """Rows that are swapped are found at the first number that differs."""
+        rows = self.history.rows.copy()
+        part = "extended" if "extended" in (rows.dtype.names or ()) else "observed"
+        rows[5][part] = self.history.rows[2][part]
+        names = [
+            name for name, values in self.expected.items()
+            if name.startswith(part) and values[5].tobytes() != values[2].tobytes()
+        ]  # fmt: skip
+        found = first_difference(self.history, o80.History(self.history._decoder, rows))
+        if names:
+            values = self.expected[names[0]]
+            assert found is not None
+            assert (found.iteration, found.field) == (5, names[0])
+            assert found.values == (values[5].item(), values[2].item())
+        else:
+            assert found is None
+
+    def picture(self) -> None:
+        fields = [name for name in self.expected if not name.startswith("desired.")][-3:]
+        figure = plot({"robot": self.history}, fields)
+        curves = [axes.get_lines()[0].get_ydata() for axes in figure.axes]
+        for name, curve in zip(fields, curves, strict=True):
+            assert np.array_equal(curve, self.expected[name]), name
+
+    def page(self) -> None:
+        """The numbers and curves of `o80 view`."""
+        panels = Panels(self.history.schema)
+        labels = {(str(number), label) for label, number in labels_of(self.history).items()}
+        for name in panels.names[:12]:
+            parts = panels.curves(self.history, [name], 0)[name]
+            texts = panels.values(self.history[4], [name])[name]
+            for part, (_, curve) in parts.items():
+                column = name if part == "extended" else f"{part}.{name}"
+                values = self.expected[column]
+                assert curve == packed(values.astype(np.float64)), column
+                text = f"{values[4]:.4g}" if values.dtype.kind == "f" else str(values[4])
+                assert texts[part] == text or (text, texts[part]) in labels
+
+
+def between(values: NDArray[Any], share: NDArray[np.float64]) -> NDArray[Any]:
+    older, newer = values[:-1], values[1:]
+    if values.dtype.kind != "f":
+        return older
+    mixed: NDArray[Any] = (older + (newer - older) * share).astype(values.dtype)
+    return mixed
+
+
+def part(columns: Columns, rows: slice) -> Columns:
+    return {name: values[rows] for name, values in columns.items()}
+
+
+def same(expected: Columns, found: Mapping[str, Any]) -> None:
+    for name, values in expected.items():
+        assert np.array_equal(np.asarray(found[name]), values), name
+
+
+def labels_of(history: o80.History) -> dict[str, int]:
+    """The numbers of all labels of enumerations."""
+    return {each.name: each.value for enum in history._layout.enums.values() for each in enum}
+
+
+def as_numbers(frame: Any, labels: Mapping[str, int]) -> dict[str, Any]:
+    return {
+        name: [labels[label] for label in column] if column.dtype == "category" else column
+        for name, column in frame.items()
+    }
+
+
+def played(path: Path, segment: str, expected: Columns) -> None:
+    with o80.play(path, prefix="again-", speed=math.inf) as playback:
+        assert playback.wait(WAIT)
+        with o80.Frontend(f"again-{segment}", dead=True) as frontend:
+            same(expected, columns_in(frontend.history()))
+
+
+def messages(path: Path, segment: str, expected: Columns) -> None:
+    """What the libraries of mcap and rosbags read."""
+    topic = f"/{segment}"
+    with AnyReader([path]) as reader:
+        found = [(each, raw) for each, _, raw in reader.messages() if each.topic == topic]
+        rows: list[Any] = [reader.deserialize(raw, each.msgtype) for each, raw in found]
+    with path.open("rb") as file:
+        of_mcap = [message.data for _, _, message in make_reader(file).iter_messages([topic])]
+    assert of_mcap == [bytes(raw) for _, raw in found]
+    for i, row in enumerate(rows):
+        parts = (getattr(row, name, []) for name in ("desired", "observed", "extended"))
+        assert leaves([*parts]) == [values[i] for values in expected.values()]
+
+
+def leaves(value: Any) -> list[Any]:
+    """All numbers of a decoded message, in their order."""
+    if isinstance(value, np.ndarray):
+        return value.ravel().tolist()
+    if isinstance(value, list):
+        return [number for each in value for number in leaves(each)]
+    if hasattr(value, "__dataclass_fields__"):
+        fields = [name for name in value.__dataclass_fields__ if name.islower() and name[0] != "_"]
+        return [number for name in fields for number in leaves(getattr(value, name))]
+    return [value]
+
+
+def files(history: o80.History, folder: Path, expected: Columns) -> None:
+    for suffix in (".npz", ".h5", ".parquet"):
+        write(folder / f"run{suffix}", {"robot": history})
+    arrays = np.load(folder / "run.npz").items()
+    same(expected, {name.removeprefix("robot/"): values for name, values in arrays})
+    with h5py.File(folder / "run.h5") as file:
+        same(expected, {name: values[:] for name, values in file["robot"].items()})
+    table = pyarrow.parquet.read_table(folder / "run.parquet")
+    same(expected, {name: table[name].to_numpy() for name in table.column_names})
+
+
+def data_sets(path: Path, folder: Path, expected: Columns) -> None:
+    """Episodes for learning."""
+    parts = {
+        part: np.array([v for name, v in expected.items() if name.startswith(part)], np.float64).T
+        for part in ("desired.", "observed.", "extended.")
+    }
+    found = episodes_of(o80.open(path))
+    minari.write(folder / "minari", found)
+    (episode,) = MinariDataset(folder / "minari/data").iterate_episodes()
+    seen = [parts[part] for part in ("observed.", "extended.") if parts[part].size]
+    assert np.array_equal(episode.observations, np.hstack(seen))
+    assert np.array_equal(episode.actions, parts["desired."][1:])
+
+    lerobot.write(folder / "lerobot", found)
+    frames = pyarrow.parquet.read_table(folder / "lerobot/data/chunk-000/file-000.parquet")
+    features = json.loads((folder / "lerobot/meta/info.json").read_text())["features"]
+    for name, part, rows in (
+        ("action", "desired.", slice(1, None)),
+        ("observation.state", "observed.", slice(-1)),
+        ("observation.environment_state", "extended.", slice(-1)),
+    ):
+        if parts[part].size:
+            names = [each.removeprefix(part) for each in expected if each.startswith(part)]
+            assert features[name]["names"] == names
+            values = np.array(frames[name].to_pylist(), np.float32)
+            assert np.array_equal(values, parts[part][rows].astype(np.float32))

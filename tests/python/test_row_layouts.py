@@ -1,0 +1,148 @@
+"""Rows of any layout, with padding at any place: all that reads them sees what was published.
+
+`O80_LAYOUTS=1000` tries more layouts than the usual few.
+"""
+
+import os
+import pickle
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+import published_rows
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mixed_robots import GROUPS, ROBOTS, SENSORS
+from published_rows import Published, check_every_reader
+
+import o80
+from o80.drivers import Reading
+from o80.layout import with_padding
+from o80.trajectory import states_of
+
+LAYOUTS = settings(ROBOTS, max_examples=int(os.environ.get("O80_LAYOUTS", ROBOTS.max_examples)))
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def padded(segment: str) -> o80.Backend:
+    """A robot whose rows have padding in the middle and at the end."""
+    sensors = {"warm": bool, "heat": float, "on": bool}
+    return o80.Backend(segment, ["left", "right"], extended=sensors)
+
+
+@LAYOUTS
+@given(groups=GROUPS, sensors=SENSORS, seed=SEEDS)
+def test_every_reader_sees_what_an_embedded_backend_published(
+    groups: Any, sensors: Any, seed: int, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    published = Published(groups, sensors, seed)
+    name = f"test-layout-{os.getpid()}"
+    with o80.Backend(name, groups, extended=sensors, bursting=True) as backend:
+        backend.publish(*published.row(0))
+        with o80.Frontend(name) as frontend:
+
+            def iterate() -> None:
+                frontend.burst(1, wait=False)
+                backend.step()
+                backend.publish(*published.row(frontend.published + 1))
+
+            folder = tmp_path_factory.mktemp("backend")
+            check_every_reader(frontend, iterate, published.columns, folder)
+
+
+class Publisher:
+    """A simulated robot of a layout that a test sets."""
+
+    name = "publisher"
+    of_the_world = False
+    requests = {  # noqa: RUF012  what a simulation serves that is replayed with its driver
+        "reset": {"seed": np.uint64},
+        "snapshot": {"slot": np.uint32},
+        "restore": {"slot": np.uint32},
+    }
+    rows: Published
+
+    def read(self, reading: Reading) -> None:
+        states, sensors = self.rows.row(reading.iteration)
+        reading.observed = states
+        if sensors is not None:
+            reading.extended = sensors
+
+    def on_reset(self, fields: Any) -> None: ...
+    def on_snapshot(self, fields: Any) -> None: ...
+    def on_restore(self, fields: Any) -> None: ...
+
+
+# where a replay finds it
+Publisher.__module__ = published_rows.__name__
+published_rows.Publisher = Publisher  # type: ignore[attr-defined]
+
+
+@LAYOUTS
+@given(groups=GROUPS, sensors=SENSORS, seed=SEEDS)
+def test_every_reader_sees_what_a_driver_in_python_published(
+    groups: Any, sensors: Any, seed: int, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    published = Published(groups, sensors, seed)
+    Publisher.rows = published
+    Publisher.actuators, Publisher.extended = groups, sensors  # type: ignore[attr-defined]
+    folder = tmp_path_factory.mktemp("driver")
+    robot = o80.robots.load(Publisher)
+    with robot.inline(f"test-layout-{os.getpid()}") as frontend:
+        check_every_reader(frontend, lambda: frontend.burst(1), published.columns, folder)
+        report = o80.replay(frontend, robot="published_rows:Publisher")
+        assert report.identical, report
+    report = o80.replay(folder / "run.mcap", robot="published_rows:Publisher")
+    assert report.identical, report
+    Publisher.rows = Published(groups, sensors, seed)
+    Publisher.rows.swap(5, 6)
+    (run,) = o80.replay(folder / "run.mcap", robot="published_rows:Publisher")
+    before, after = published.columns(8), Publisher.rows.columns(8)
+    changed = [name for name in before if before[name][5].tobytes() != after[name][5].tobytes()]
+    found = run.difference and (run.difference.iteration, run.difference.field)
+    assert found == ((5, changed[0]) if changed else None)
+
+
+def test_rows_without_their_padding_are_no_history(segment: str) -> None:
+    with padded(segment) as backend:
+        backend.publish([0.1, 0.2], {"warm": True, "heat": 20.0, "on": True})
+        with o80.Frontend(segment) as frontend:
+            history = frontend.history()
+    for rows in (np.concatenate([history.rows]), np.where([True], history.rows, history.rows)):
+        with pytest.raises(o80.InvalidArgument, match=r"leave out padding.*history\.observed"):
+            o80.History(history._decoder, rows)
+    copy = pickle.loads(pickle.dumps(history))
+    assert copy.extended.heat.tolist() == [20.0]
+    o80.History(copy._decoder, history.rows)
+
+
+def after_other_values(copied: Callable[[], Any]) -> Any:
+    """What a call makes of memory that held something before."""
+    used = [np.full(32 << i % 16, 255, np.uint8) for i in range(320)]
+    del used
+    return copied()
+
+
+def test_copies_of_rows_have_the_padding_of_the_rows(arm: o80.Frontend) -> None:
+    arm.burst(50)
+    history = arm.history()
+    times, half = history.time[::2], with_padding(history.rows)[::2].tobytes()
+    copies = {
+        "pickled": lambda: pickle.loads(pickle.dumps(history[::2])).rows,
+        "linear": lambda: o80.align({"arm": history}, at=times, how="linear")["arm"].rows,
+        "before": lambda: o80.align({"arm": history}, at=times)["arm"].rows,
+    }
+    for how, copied in copies.items():
+        assert after_other_values(copied).tobytes() == half, how
+
+
+def test_padding_of_targets_is_zero(segment: str) -> None:
+    with o80.Backend(segment, ["left", "right"], {"on": bool, "position": float}) as backend:
+        for count in (2, 20, 200):
+            targets = np.zeros((count, 2), [("on", bool), ("position", float)])
+            for given in (targets, {name: targets[name] for name in ("on", "position")}):
+                copied = partial(states_of, given, [0, 1], False, backend._layout)
+                states, _ = after_other_values(copied)
+                assert not states.any()
