@@ -247,7 +247,7 @@ def test_an_image_that_is_cut_is_told() -> None:
         ({"sources": "Fake_1,Fake_1"}, "named twice"),
         ({"sources": "Fake_1", "width": 0}, "width must be from 1 to 16384"),
         ({"sources": "Fake_1", "exposure": -1.0}, "exposure must not be negative"),
-        ({"sources": "Fake_1", "gap": 0.0}, "gap must be positive"),
+        ({"sources": "Fake_1", "silent_after": 0.0}, "silent_after must be positive"),
     ],
 )
 def test_options_that_cannot_be_used_are_refused(options: dict[str, Any], error: str) -> None:

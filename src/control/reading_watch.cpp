@@ -18,22 +18,17 @@ ReadingWatch::ReadingWatch(const Schema& schema) : layouts_(schema.types.size())
       if (!layout) layout.emplace(schema, row.type);
       const double noise = std::isfinite(limit.error) ? limit.error / 10.0 : 0.0;
       const double outside = std::isfinite(limit.error) ? limit.error : width / 10.0;
-      watched_.push_back({i, number, row.offset, row.type, limit.speed, noise, limit.error,
+      watched_.push_back({i, number, row.offset, row.type, limit.speed, noise,
                           limit.minimum - outside, limit.maximum + outside});
     }
   }
 }
 
-void ReadingWatch::begin(const std::byte* observed, const std::byte* desired) noexcept {
+void ReadingWatch::begin(const std::byte* observed) noexcept {
   for (Watched& each : watched_) {
     each.before = each.good = value(each, observed);
     each.since = 0.0;
     each.is_wrong = false;
-    if (desired == nullptr) continue;
-    const double wanted = value(each, desired);
-    if (std::abs(each.before - wanted) <= each.error) continue;
-    each.good = wanted;
-    each.is_wrong = true;
   }
 }
 

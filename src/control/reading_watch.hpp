@@ -38,9 +38,8 @@ class ReadingWatch {
     bool is_outside = false;
   };
 
-  /// Later readings are compared with this one. Numbers farther than their error limit from
-  /// `desired` (null: not compared) are taken for wrong.
-  void begin(const std::byte* observed, const std::byte* desired) noexcept;
+  /// Later readings are compared with this one.
+  void begin(const std::byte* observed) noexcept;
   /// The next reading, `elapsed` [s] after the one before. A step that cannot be is remembered,
   /// until another one leads back.
   void add(const std::byte* observed, double elapsed) noexcept;
@@ -55,8 +54,7 @@ class ReadingWatch {
     std::uint32_t type;
     double speed;  // [unit/s]
     double noise;  // a tenth of the error limit
-    double error;
-    double low;  // bounds, with their tolerance
+    double low;    // bounds, with their tolerance
     double high;
     double before = 0.0;
     double good = 0.0;   // before the step that cannot be

@@ -161,7 +161,8 @@ std::int64_t longest_gap(const Schema& schema, const BackendOptions& options) {
   constexpr std::int64_t kLeast = 100'000'000;
   if (options.bursting) return 0;
   if (options.gap >= 0) return options.gap;
-  return schema.head.of_the_world != 0 ? std::max(kPeriods * schema.head.period, kLeast) : 0;
+  const bool moves = schema.head.of_the_world != 0 && !schema.actuators.empty();
+  return moves ? std::max(kPeriods * schema.head.period, kLeast) : 0;
 }
 
 std::size_t largest_request(const Schema& schema) {
@@ -208,7 +209,7 @@ UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, Reques
               2 * (schema.actuators.size() + 2 * Controller::kStatusesPerIteration)),
       errors_(schema),
       readings_(schema),
-      last_reading_(layout.block / 8),
+      last_row_(layout.size / 8),
       overruns_(options.max_overruns),
       gaps_(recorded == nullptr ? longest_gap(schema, options) : 0) {
   express_lanes_.reserve(lanes.size());

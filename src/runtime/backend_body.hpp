@@ -184,6 +184,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   bool can_begin(const std::byte* states, std::string_view what) noexcept;
   void keep_reading() noexcept;
   void put_back_reading() noexcept;
+  void begin_to_watch() noexcept;
   void watch_readings() noexcept;
   double since_reading() const noexcept;
   bool is_misread(const std::byte* observed, std::string_view cure,
@@ -224,8 +225,8 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   bool reason_missing_ = false;     // the requester of the halt has not written its reason yet
   ErrorWatch errors_;
   ReadingWatch readings_;
-  std::int64_t read_at_ = 0;                 // time of the last row whose reading was not missed
-  std::vector<std::uint64_t> last_reading_;  // observed states, while a fresh reading is judged
+  std::int64_t read_at_ = 0;             // time of the last row whose reading was not missed
+  std::vector<std::uint64_t> last_row_;  // or observed states, while a fresh reading is judged
   OverrunLimit overruns_;
   GapLimit gaps_;
   std::uint32_t seen_skipped_ = 0;  // periods that the loop missed

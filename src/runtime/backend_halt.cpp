@@ -119,10 +119,7 @@ void UntypedBackend::Body::begin_halt() noexcept {
   controller.halt(current);
   drop_running({Status::halted, Reason::halted});
   stop_burst(BurstEnd::cut);
-  if (!driver_halted_) {
-    readings_.begin(row() + layout.observed, controller.desired());
-    read_at_ = time();
-  }
+  if (!driver_halted_ && !readings_.empty()) begin_to_watch();
   if (!driver_halted_ && server_ != nullptr && !server_->halt()) {
     fail("the robot failed in the call that begins a halt");
   }

@@ -7,6 +7,11 @@
 
 namespace o80 {
 
+namespace {
+// a robot that moves at its highest speed may be read to be faster, because of noise
+constexpr double kInMotion = 2.0;
+}  // namespace
+
 void UntypedBackend::Body::interrupt(std::uint32_t actuator) noexcept {
   if (recorded_ != nullptr) {
     recorded_->interrupt(current, static_cast<std::uint16_t>(actuator),
@@ -64,7 +69,7 @@ Outcome UntypedBackend::Body::start_afresh(std::uint32_t lane, CommandId id) noe
   FreshReading reading{row() + layout.observed, row() + layout.extended, desired};
   // a simulator may be put anywhere, a robot of the world cannot
   const bool judges = schema.head.of_the_world != 0 && recorded_ == nullptr && begun_;
-  if (judges && !halts.acts()) readings_.begin(reading.observed, nullptr);
+  if (judges && !halts.acts()) readings_.begin(reading.observed);
   if (judges) keep_reading();
   bool reads = server_->read_fresh(reading);
   if (!reads) note_failure("the robot could not be read in a fresh start");
@@ -92,7 +97,7 @@ Outcome UntypedBackend::Body::begin_afresh(std::uint32_t lane,
   controller.restart(reading.observed, reading.has_desired ? reading.desired : nullptr, current);
   if (recorded_ != nullptr) recorded_->fresh_start(current);
   journal.fresh_start(lane);
-  readings_.begin(reading.observed, nullptr);
+  readings_.begin(reading.observed);
   read_at_ = time();
   publish(true);
   return {};
@@ -101,21 +106,29 @@ Outcome UntypedBackend::Body::begin_afresh(std::uint32_t lane,
 // ------------------------------------------------------------------------------ readings
 
 void UntypedBackend::Body::keep_reading() noexcept {
-  if (layout.block > 0) std::memcpy(last_reading_.data(), row() + layout.observed, layout.block);
+  if (layout.block > 0) std::memcpy(last_row_.data(), row() + layout.observed, layout.block);
 }
 
 void UntypedBackend::Body::put_back_reading() noexcept {
-  if (layout.block > 0) std::memcpy(row() + layout.observed, last_reading_.data(), layout.block);
+  if (layout.block > 0) std::memcpy(row() + layout.observed, last_row_.data(), layout.block);
 }
 
-/// While the robot is halted and at rest: notes each reading, for the resume.
+/// The last reading before a halt may be the wrong one that has caused it: begins with the one
+/// before.
+void UntypedBackend::Body::begin_to_watch() noexcept {
+  auto* before = reinterpret_cast<std::byte*>(last_row_.data());
+  const bool has_before =
+      begun_ && current > 1 && HistoryReader(segment.view()).read(current - 2, before);
+  readings_.begin((has_before ? before : row()) + layout.observed);
+  read_at_ = time();
+  if (has_before) readings_.add(row() + layout.observed, kInMotion * since_reading());
+}
+
+/// While the robot is halted: notes each reading, for the resume.
 void UntypedBackend::Body::watch_readings() noexcept {
   if (!halts.acts() || readings_.empty() || timing.missed) return;
-  if (controller.braking()) {
-    readings_.begin(row() + layout.observed, controller.desired());
-  } else {
-    readings_.add(row() + layout.observed, since_reading());
-  }
+  const double share = controller.braking() ? kInMotion : 1.0;
+  readings_.add(row() + layout.observed, share * since_reading());
   read_at_ = time();
 }
 
@@ -137,7 +150,7 @@ bool UntypedBackend::Body::judge_first(bool again) noexcept {
   ShortText<248> why;
   const bool is_good = !again || !is_misread(observed, "start with --accept-reading", why);
   if (!is_good) note_failure(why.view());
-  readings_.begin(observed, nullptr);
+  readings_.begin(observed);
   read_at_ = time();
   return is_good;
 }

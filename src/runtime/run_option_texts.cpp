@@ -35,8 +35,11 @@ Provenance::Options texts_of(const BackendOptions& options) {
       {"permission", octal(options.permission)},
       {"stale", std::string(name_of(options.stale))},
       {"resume", text_of(options.resume)},
+      {"accept_reading", text_of(options.accept_reading)},
   };
   if (options.silence > 0) texts.emplace_back("silence", std::to_string(options.silence));
+  if (options.gap >= 0)
+    texts.emplace_back("gap", shortest(static_cast<double>(options.gap) * 1e-9));
   if (options.max_overruns > 0)
     texts.emplace_back("max_overruns", std::to_string(options.max_overruns));
   return texts;

@@ -44,7 +44,7 @@ class GenicamCameras:
         exposure: float = option(0.0, "time; 0: as the cameras are set", "s")
         trigger: str = option("", "line that triggers the cameras, such as Line1; empty: none")
         latency: float = option(0.0, "from capture to the earliest arrival", "s")
-        gap: float = option(0.08, "without an image, after which rows say silent", "s")
+        silent_after: float = option(0.08, "without an image, after which rows say silent", "s")
 
     def __init__(self, config: Config) -> None:
         self._sources = [each.strip() for each in config.sources.split(",") if each.strip()]
@@ -63,8 +63,8 @@ class GenicamCameras:
         for name in ("left", "top", "rate", "exposure", "latency"):
             if not 0 <= getattr(config, name) < 1e6:
                 raise InvalidArgument(f"{name} must not be negative, got {getattr(config, name)}")
-        if not 0 < config.gap < 1e6:
-            raise InvalidArgument(f"gap must be positive [s], got {config.gap}")
+        if not 0 < config.silent_after < 1e6:
+            raise InvalidArgument(f"silent_after must be positive [s], got {config.silent_after}")
         if config.pixel_format not in get_args(PixelFormat):
             raise InvalidArgument(f"pixel_format must be one of {', '.join(get_args(PixelFormat))}")
         self._config = config
@@ -116,7 +116,7 @@ class GenicamCameras:
         self._pace.returned(time.monotonic_ns(), missed=not complete)
 
     def read(self, reading: Reading) -> None:
-        now, gap = time.monotonic_ns(), round(self._config.gap * SECOND)
+        now, gap = time.monotonic_ns(), round(self._config.silent_after * SECOND)
         row = reading.extended
         for k, camera in enumerate(self._cameras):
             taken, reason = camera.take(now, gap)

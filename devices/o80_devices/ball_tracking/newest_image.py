@@ -34,7 +34,7 @@ class CameraReason(IntEnum):
     no_new_image = 1
     """None has come since the last row; the next one is not late yet."""
     silent = 2
-    """None for longer than the option gap: the cable, the trigger, or the camera."""
+    """None for longer than the option silent_after: the cable, the trigger, or the camera."""
     damaged = 3
     """Parts of the image were lost on the way."""
     connecting = 4

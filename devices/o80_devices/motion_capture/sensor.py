@@ -31,7 +31,7 @@ class Reason(IntEnum):
 
     SEEN = 0
     NO_NEW_FRAME = 1  #: since the row before; the next one is not late yet
-    SILENT = 2  #: connected, but no frame for longer than the option gap
+    SILENT = 2  #: connected, but no frame for longer than the option silent_after
     CONNECTING = 3
     DISCONNECTED = 4  #: refused, closed by the other side, or its process died
     ENDED = 5  #: a recording was played to its end
@@ -69,7 +69,7 @@ class SensorConfig:
     transform: str = option("", "file with the transform from the system to the world")
     latency: float = option(0.0, "from capture to arrival, added to what the system reports", "s")
     latency_error: float = option(0.0, "of this latency", "s")
-    gap: float = option(0.08, "without a frame, after which rows say why", "s")
+    silent_after: float = option(0.08, "without a frame, after which rows say why", "s")
 
 
 class Sensor:
@@ -82,8 +82,8 @@ class Sensor:
     }
 
     def __init__(self, config: SensorConfig, frames: Frames) -> None:
-        if not config.gap > 0:
-            raise InvalidArgument(f"gap must be positive, got {config.gap}")
+        if not config.silent_after > 0:
+            raise InvalidArgument(f"silent_after must be positive, got {config.silent_after}")
         self._config = config
         self._frames = frames
         self._world = Transform.load(Path(config.transform)) if config.transform else None
@@ -216,7 +216,9 @@ class Sensor:
         if reason is not Reason.SEEN:
             return reason
         silence = now - (self._last_seen or 0)
-        return Reason.SILENT if silence > self._config.gap * SECOND else Reason.NO_NEW_FRAME
+        return (
+            Reason.SILENT if silence > self._config.silent_after * SECOND else Reason.NO_NEW_FRAME
+        )
 
 
 FRAME_FIELDS: dict[str, Any] = {

@@ -43,7 +43,7 @@ struct BackendOptions {
   /// Number of late iterations within a second that halts the backend; 0: no limit.
   std::uint32_t max_overruns = 0;
   /// Real time only: the longest time between two rows; a longer one halts [ns]. -1: 20 periods,
-  /// and at least 0.1 s, for robots of the world, else none; 0: none.
+  /// and at least 0.1 s, for robots of the world with actuators, else none; 0: none.
   std::int64_t gap = -1;
   /// Real time only: starts without a halt even if the previous backend of this name was halted, or
   /// was killed while commands acted.

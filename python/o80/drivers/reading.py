@@ -13,7 +13,6 @@ from o80.backend import Running, StartAfresh, fill
 from o80.errors import InvalidArgument
 from o80.record import Record
 
-
 #: from offsets in the desired block and an order to the differences of those numbers
 Differences = Callable[[list[int], int], list[float]]
 

@@ -53,7 +53,8 @@ class Halting(Controlling):
         burst until it is.
 
         Raises BackendHalted if it is refused: another halt came after it, the robot refuses, it
-        cannot be where it is read, or, in bursting mode, it still brakes. Raises TimeoutError, NoLane, BackendGone.
+        cannot be where it is read, or, in bursting mode, it still brakes. Raises
+        TimeoutError, NoLane, BackendGone.
         Does nothing if no halt is in force.
         """
         if number is None:

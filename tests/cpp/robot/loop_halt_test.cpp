@@ -353,6 +353,32 @@ TEST_F(ReadingTest, ARobotThatIsRightIsNeverRefused) {
   }
 }
 
+TEST_F(ReadingTest, ARobotThatCollidedResumesWhereItIs) {
+  begin({.speed = 2.0, .acceleration = 15.0, .error = 0.05});
+  Puppet::on_read = [](Reading<Puppet>& reading) {
+    reading.observed[0] = std::min(reading.observed[0], 0.3);
+  };
+  add(*frontend_, 0, 1.0);
+  run(1000);
+  ASSERT_TRUE(frontend_->halted()) << "it is held back";
+  EXPECT_EQ(frontend_->halted()->cause, HaltCause::error);
+  run(1000);
+  const Handle handle = resume(frontend_->halted()->number);
+  EXPECT_EQ(handle.status, Status::completed) << handle.text;
+}
+
+TEST_F(ReadingTest, OneWrongReadingThatHaltsItIsForgotten) {
+  begin({.speed = 2.0, .error = 0.05});
+  run(10);
+  offset_ = 3.0;
+  run(1);
+  offset_ = 0.0;
+  run(10);
+  ASSERT_TRUE(frontend_->halted());
+  const Handle handle = resume(frontend_->halted()->number);
+  EXPECT_EQ(handle.status, Status::completed) << handle.text;
+}
+
 TEST_F(ReadingTest, ARobotThatCannotBeReadInAResumeStaysHalted) {
   begin({});
   const std::uint64_t number = halt();

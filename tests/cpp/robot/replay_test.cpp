@@ -158,7 +158,9 @@ class RandomCommanders {
     UntypedFrontend& one = frontends_[below(2)];
     try {
       if (one.halted()) {
-        if (below(3) == 0) one.resume(one.halted()->number, kAtOnce);
+        // a halted homing leaves the joints to jump back: a reading that some resumes refuse
+        const std::uint64_t number = one.halted()->number;
+        if (below(3) == 0) one.resume(number, kAtOnce, {}, number % 4 != 0);
       } else if (below(80) == 0) {
         one.halt("now and then");
       } else if (below(12) == 0) {

@@ -147,6 +147,9 @@ LoopOptions drawn_options(std::uint32_t seed) {
   options.backend.silence = chance() ? 0 : static_cast<std::int64_t>(1 + random() % 1'000'000'000);
   options.backend.max_overruns = chance() ? 0 : static_cast<std::uint32_t>(1 + random() % 100'000);
   options.backend.resume = chance();
+  options.backend.gap =
+      chance() ? -1 : static_cast<std::int64_t>(1'000'000 + random() % 1'000'000'000);
+  options.backend.accept_reading = chance();
   options.real_time.policy = static_cast<RealTimeOptions::Policy>(random() % 3);
   if (options.real_time.policy != RealTimeOptions::Policy::other)
     options.real_time.priority = static_cast<int>(1 + random() % 99);
@@ -179,6 +182,8 @@ TEST(RunOptionTextsTest, GiveTheSameOptionsWhenTheyAreReadAgain) {
     ASSERT_EQ(again.backend.silence, drawn.backend.silence);
     ASSERT_EQ(again.backend.max_overruns, drawn.backend.max_overruns);
     ASSERT_EQ(again.backend.resume, drawn.backend.resume);
+    ASSERT_EQ(again.backend.gap, drawn.backend.gap);
+    ASSERT_EQ(again.backend.accept_reading, drawn.backend.accept_reading);
     ASSERT_EQ(again.real_time.policy, drawn.real_time.policy);
     ASSERT_EQ(again.real_time.priority, drawn.real_time.priority);
     ASSERT_EQ(again.real_time.processors, drawn.real_time.processors);
@@ -190,6 +195,7 @@ TEST(RunOptionTextsTest, NameEveryOptionOfABackend) {
   LoopOptions all = drawn_options(0);
   all.backend.silence = 1;
   all.backend.max_overruns = 1;
+  all.backend.gap = 0;
   all.real_time.policy = RealTimeOptions::Policy::fifo;
   all.real_time.processors = {0};
   Provenance::Options texts = texts_of(all.backend);
