@@ -2,6 +2,7 @@
 
 #include <cstring>
 
+#include "o80/describe/describe.hpp"
 #include "runtime/backend_body.hpp"
 #include "runtime/recorded_decisions.hpp"
 
@@ -69,7 +70,10 @@ Outcome UntypedBackend::Body::start_afresh(std::uint32_t lane, CommandId id) noe
   FreshReading reading{row() + layout.observed, row() + layout.extended, desired};
   // a simulator may be put anywhere, a robot of the world cannot
   const bool judges = schema.head.of_the_world != 0 && recorded_ == nullptr && begun_;
-  if (judges && !halts.acts()) readings_.begin(reading.observed);
+  if (judges && !halts.acts()) {
+    readings_.begin(reading.observed);
+    read_at_ = unpack<RowHead>(row()).time;
+  }
   if (judges) keep_reading();
   bool reads = server_->read_fresh(reading);
   if (!reads) note_failure("the robot could not be read in a fresh start");

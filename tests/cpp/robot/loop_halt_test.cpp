@@ -379,6 +379,28 @@ TEST_F(ReadingTest, OneWrongReadingThatHaltsItIsForgotten) {
   EXPECT_EQ(handle.status, Status::completed) << handle.text;
 }
 
+TEST_F(ReadingTest, ARobotOfTheWorldCannotComeFarByARequest) {
+  for (const bool of_the_world : {false, true}) {
+    Puppet::of_the_world = of_the_world;
+    begin({.speed = 2.0});
+    run(10);
+    add_request(*frontend_, Poke{.how = 2});  // it is at 7 and starts afresh
+    const Batch batch = frontend_->pulse();
+    run(3);
+    EXPECT_TRUE(is_alive());
+    EXPECT_EQ(frontend_->halted().has_value(), of_the_world);
+    EXPECT_EQ(written_, of_the_world ? 0.0 : 7.0);
+    if (of_the_world) {
+      EXPECT_EQ(batch.handle(0).reason, Reason::reading);
+      EXPECT_THAT(batch.handle(0).text, HasSubstr("was read at 7 after 0"));
+      const std::uint64_t number = frontend_->halted()->number;
+      EXPECT_EQ(resume(number, true).status, Status::completed);
+    }
+    frontend_.reset();
+    loop_.reset();
+  }
+}
+
 TEST_F(ReadingTest, ARobotThatCannotBeReadInAResumeStaysHalted) {
   begin({});
   const std::uint64_t number = halt();

@@ -64,6 +64,7 @@ class Puppet {
   static inline std::function<void(Reading<Puppet>&)> on_read;
   static inline std::function<Served()> on_resume;
   static inline Limits limits;
+  static inline bool of_the_world = false;
 
   explicit Puppet(const Config& config) : config_(config) {
     if (config.fails == Fails::construct) throw std::runtime_error("no cable");
@@ -76,6 +77,7 @@ class Puppet {
     schema.actuator(0).name("left");
     schema.actuator(1).name("right");
     schema.actuator(0).limits(limits);
+    if (of_the_world) schema.of_the_world();
   }
   void start() {
     ++calls.started;
@@ -151,6 +153,7 @@ class PuppetTest : public StationTest {
     Puppet::on_read = {};
     Puppet::on_resume = {};
     Puppet::limits = {};
+    Puppet::of_the_world = false;
   }
   static const RobotTable& table() { return *robot_table<Puppet>("puppet"); }
 };
