@@ -14,7 +14,7 @@ JOINT = {"position": float, "velocity": float, "held": bool}
 
 
 def random_limits(rng: random.Random) -> o80.Limits:
-    rates = {"speed": rng.uniform(1, 4), "acceleration": rng.uniform(5, 40)}
+    rates: dict[str, Any] = {"speed": rng.uniform(1, 4), "acceleration": rng.uniform(5, 40)}
     if rng.random() < 0.5:
         rates["jerk"] = rng.uniform(200, 2000)
     return o80.Limits(minimum=-1.0, maximum=1.0, **rates)
