@@ -202,21 +202,25 @@ Outcome UntypedBackend::Body::resume(std::uint32_t lane, CommandId id, std::uint
       return refuse(served.why(), Reason::driver);
     }
   }
-  constexpr std::string_view kAnother =
-      "another halt was requested meanwhile: read its reason, then resume that one";
-  if (recorded_ != nullptr && !recorded_->confirms(JournalKind::resume)) return refuse(kAnother);
-  // from here on, whoever halts again for the same reason requests a new halt
-  for (auto& last : own_halts_) last.store(0, std::memory_order_seq_cst);
-  FreshReading reading{row() + layout.observed, row() + layout.extended,
-                       reinterpret_cast<std::byte*>(fresh_desired_.data())};
-  const bool reads = server_ == nullptr || read_to_resume(reading, accepts, unread);
-  if (!reads || !halts.clear()) {
-    if (server_ != nullptr && !server_->halt()) fail("the robot failed in the call that halts it");
-    return reads ? refuse(kAnother) : refuse(unread.view(), Reason::reading);
-  }
   driver_halted_ = false;
+  const bool confirmed = recorded_ == nullptr || recorded_->confirms(JournalKind::resume);
+  // before the halt is cleared: a driver's thread that halts again for the same reason from then on
+  // requests a new halt
+  for (auto& last : own_halts_) last.store(0, std::memory_order_seq_cst);
+  if (!confirmed || !halts.clear()) {
+    return refuse("another halt was requested meanwhile: read its reason, then resume that one");
+  }
   reason_missing_ = false;
   journal.resume(lane, taking_owner_, number);
+  if (recorded_ != nullptr && !recorded_->begins_with_fresh_start(current)) {
+    return refuse("the reading was refused in the recorded run", Reason::reading);
+  }
+  FreshReading reading{row() + layout.observed, row() + layout.extended,
+                       reinterpret_cast<std::byte*>(fresh_desired_.data())};
+  if (server_ != nullptr && !read_to_resume(reading, accepts, unread)) {
+    ask_to_halt(HaltCause::error, unread.view());
+    return refuse(unread.view(), Reason::reading);
+  }
   return begin_afresh(lane, reading);
 }
 
