@@ -102,7 +102,11 @@ void UntypedBackend::Body::count_missed() noexcept {
 }
 
 void UntypedBackend::Body::watch_silence() noexcept {
-  if (silence_ == 0 || halts.acts()) return;
+  if (silence_ == 0) return;
+  if (halts.acts()) {
+    seen_skipped_ = timing.skipped;  // nothing acts
+    return;
+  }
   count_missed();
   for (std::uint32_t i = 0; i < lanes.size(); ++i) {
     if (current - last_life_[i] <= silence_) continue;

@@ -118,11 +118,11 @@ void UntypedBackend::Body::put_back_reading() noexcept {
 }
 
 /// The last reading before a halt may be the wrong one that has caused it: begins with the one
-/// before.
+/// before, unless a fresh start lies between them.
 void UntypedBackend::Body::begin_to_watch() noexcept {
   auto* before = reinterpret_cast<std::byte*>(last_row_.data());
-  const bool has_before =
-      begun_ && current > 1 && HistoryReader(segment.view()).read(current - 2, before);
+  const bool has_before = begun_ && current > 1 && unpack<RowHead>(row()).fresh == 0 &&
+                          HistoryReader(segment.view()).read(current - 2, before);
   readings_.begin((has_before ? before : row()) + layout.observed);
   read_at_ = time();
   if (has_before) readings_.add(row() + layout.observed, kInMotion * since_reading());

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <limits>
 #include <random>
 #include <vector>
 
@@ -16,7 +17,7 @@ namespace {
 constexpr std::int64_t kVelocityPeriod = 4'000'000;  // [ns]
 
 /// A joint with an observed position and a commanded velocity, bounded at -1 and 1.
-Schema velocity_robot(const Limits& velocity, double reaction) {
+Schema velocity_robot(const Limits& velocity, double reaction, double minimum = -1.0) {
   Schema schema;
   schema.head.robot = NameText("robot");
   schema.head.period = kVelocityPeriod;
@@ -24,7 +25,7 @@ Schema velocity_robot(const Limits& velocity, double reaction) {
       "State", {scalar_field("position", Kind::float64), scalar_field("velocity", Kind::float64)});
   schema.add_actuators("joint", type, 1);
   Limits limits = velocity;
-  limits.integral = {"position", -1.0, 1.0, reaction};
+  limits.integral = {"position", minimum, 1.0, reaction};
   schema.actuator(0).limits("velocity", limits).rests_at("velocity", 0.0);
   return schema;
 }
@@ -35,8 +36,9 @@ constexpr Limits kJoint{.minimum = -1.5, .maximum = 1.5, .speed = 5.0, .accelera
 /// order [s].
 class VelocityRig : public Rig {
  public:
-  VelocityRig(const Limits& limits, double reaction, int delay = 0, double lag = 0.0)
-      : Rig(velocity_robot(limits, reaction)), lag_(lag), sent_(delay, 0.0) {}
+  VelocityRig(const Limits& limits, double reaction, int delay = 0, double lag = 0.0,
+              double minimum = -1.0)
+      : Rig(velocity_robot(limits, reaction, minimum)), lag_(lag), sent_(delay, 0.0) {}
 
   void command(double velocity, RecordHead head = overwriting(direct())) {
     head.masked = 1;
@@ -156,6 +158,21 @@ TEST(IntegralBounds, OutsideItMovesInwardOnly) {
     EXPECT_LT(rig.desired(1), 0.0);
     for (int i = 0; i < 200; ++i) rig.iterate();
     EXPECT_EQ(rig.desired(1), -0.8);
+  }
+}
+
+TEST(IntegralBounds, OneOfThemIsEnough) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  for (const Limits& limits : {kJoint, Limits{.speed = 5.0}, Limits{}}) {
+    VelocityRig rig(limits, 0.01, 0, 0.0, -kInfinity);
+    rig.command(1.5);
+    for (int i = 0; i < 500; ++i) rig.iterate();
+    EXPECT_NEAR(rig.position, 1.0, 0.01);
+    EXPECT_LE(rig.position, 1.0 + 1e-3);
+    rig.command(-1.5, direct());
+    for (int i = 0; i < 2000; ++i) rig.iterate();
+    EXPECT_EQ(rig.desired(1), -1.5);
+    EXPECT_LT(rig.position, -10.0);
   }
 }
 

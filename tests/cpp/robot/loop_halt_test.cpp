@@ -402,6 +402,18 @@ TEST_F(ReadingTest, ARobotOfTheWorldCannotComeFarByARequest) {
   }
 }
 
+TEST_F(ReadingTest, AFreshStartBeforeAHaltIsNoStep) {
+  begin({.speed = 2.0});
+  run(10);
+  add_request(*frontend_, Poke{.how = 2});  // a simulator: it is at 7
+  frontend_->pulse();
+  loop_->run_granted(kAll);
+  const std::uint64_t number = halt();
+  run(3);
+  const Handle handle = resume(number);
+  EXPECT_EQ(handle.status, Status::completed) << handle.text;
+}
+
 TEST_F(ReadingTest, ARobotThatCannotBeReadInAResumeStaysHalted) {
   begin({});
   const std::uint64_t number = halt();

@@ -53,6 +53,28 @@ TEST_F(SilenceTest, CountsPeriodsThatTheLoopMissedAfterWhatCameMeanwhile) {
   EXPECT_EQ(other.handle(0).status, Status::active);
 }
 
+TEST_F(SilenceTest, CountsNoPeriodsThatWereMissedWhileHalted) {
+  Station station(watched(Stale::purge, 50));
+  station.start();
+  UntypedFrontend holder("pair");
+  UntypedFrontend other("pair");
+  holder.add_take_control();
+  holder.pulse();
+  station.run(2);
+  const std::uint64_t number = other.halt("");
+  station.run(2);
+  station.backend.set_timing({.skipped = 1000});
+  station.run(2);
+  BatchBuilder builder;
+  builder.resume(number);
+  const Batch resume = other.pulse(builder);
+  station.run(20);
+  EXPECT_EQ(resume.handle(0).status, Status::completed);
+  const Batch refused = send(other, 0, 1.0);
+  station.run(1);
+  EXPECT_EQ(refused.rejected_by(), Reason::exclusive) << "the holder has kept its control";
+}
+
 TEST_F(SilenceTest, EndsWhatTheSilentCommanderHasScheduled) {
   Station station(watched(Stale::purge));
   station.start();
