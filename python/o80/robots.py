@@ -240,7 +240,7 @@ class Robot:
         max_overruns: number of late iterations within a second that halts the robot.
         gap: a longer time between two iterations halts the robot [s]; 0: none does; None: 20
             periods and at least 0.1 s for robots of the world, none for simulations.
-        accept_reading: start wherever the robot is read, even if it cannot have come there.
+        accept_reading: start where the robot is read to be, even if it cannot have come there.
         resume: start without a halt even if the previous process was halted, or was killed while
             commands acted.
         policy, priority, cpus, lock_memory: real-time scheduling; settings that the machine refuses

@@ -147,6 +147,10 @@ void write_type(JsonWriter& json, const Schema& schema, std::uint32_t index) {
 }
 
 void write_actuator(JsonWriter& json, const Schema& schema, const ActuatorRow& actuator) {
+  const auto put = [&](std::string_view name, double value) {
+    json.key(name);
+    json.value(value);
+  };
   json.open('{');
   json.key("name");
   json.value(actuator.name.view());
@@ -161,34 +165,22 @@ void write_actuator(JsonWriter& json, const Schema& schema, const ActuatorRow& a
   for (std::uint32_t i = 0; i < actuator.limits; ++i) {
     const LimitRow& limit = schema.limits[actuator.first_limit + i];
     json.open('{');
-    json.key("minimum");
-    json.value(limit.minimum);
-    json.key("maximum");
-    json.value(limit.maximum);
-    json.key("speed");
-    json.value(limit.speed);
-    json.key("acceleration");
-    json.value(limit.acceleration);
-    json.key("jerk");
-    json.value(limit.jerk);
-    json.key("error");
-    json.value(limit.error);
-    if (limit.resting != 0) {
-      json.key("rest");
-      json.value(limit.rest);
-    }
+    put("minimum", limit.minimum);
+    put("maximum", limit.maximum);
+    put("speed", limit.speed);
+    put("acceleration", limit.acceleration);
+    put("jerk", limit.jerk);
+    put("error", limit.error);
+    if (limit.resting != 0) put("rest", limit.rest);
     for (const IntegralRow& row : schema.integrals) {
       if (row.limit != actuator.first_limit + i) continue;
       json.key("integral");
       json.open('{');
       json.key("number");
       json.value(std::int64_t{row.number});
-      json.key("minimum");
-      json.value(row.minimum);
-      json.key("maximum");
-      json.value(row.maximum);
-      json.key("reaction");
-      json.value(row.reaction);
+      put("minimum", row.minimum);
+      put("maximum", row.maximum);
+      put("reaction", row.reaction);
       json.close('}');
     }
     json.close('}');

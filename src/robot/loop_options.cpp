@@ -130,7 +130,7 @@ constexpr std::array kOptions = {
                "start without a halt even if the previous backend was halted or killed",
                kProcess | kEmbedded, O80_SET(backend.resume)},
     LoopOption{"accept_reading", OptionKind::boolean, "true or false", 0, 1, "no",
-               "start wherever the robot is read, even if it cannot have come there", kProcess,
+               "start where the robot is read to be, even if it cannot have come there", kProcess,
                O80_SET(backend.accept_reading)},
     LoopOption{"policy", OptionKind::word, "other, fifo or rr", 0, 0, "other",
                "scheduling class of the loop", kProcess, set_policy},

@@ -48,7 +48,8 @@ struct BackendOptions {
   /// Real time only: starts without a halt even if the previous backend of this name was halted, or
   /// was killed while commands acted.
   bool resume = false;
-  /// Real time only: starts wherever the robot is read, even if it cannot be there.
+  /// Real time only: starts where the robot is read to be, even if it cannot have come
+  /// there.
   bool accept_reading = false;
   /// What the caller knows of the robot: its options, library and files, and further run options.
   /// The backend adds its own options, the versions and the clock, and the robot's name if none is

@@ -33,7 +33,8 @@ def resume(
     accept_reading: Annotated[
         bool,
         typer.Option(
-            "--accept-reading", help="Go on from what is read, even if the robot cannot be there."
+            "--accept-reading",
+            help="Go on from where the robot is read to be, even if it cannot be there.",
         ),
     ] = False,
 ) -> None:

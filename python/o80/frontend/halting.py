@@ -46,8 +46,8 @@ class Halting(Controlling):
         number: number of the halt (None: the one in force now). A halt that came after it stays.
         timeout: how long to wait until the halt is in force, the robot is at rest, and the backend
             has answered [s].
-        accept_reading: go on from wherever the robot is read, even if it cannot have come there
-            since the halt.
+        accept_reading: go on from where the robot is read to be, even if it cannot have come
+            there since the halt.
 
         Needs a lane, but no control. In bursting mode it does not wait until the robot is at rest:
         burst until it is.
