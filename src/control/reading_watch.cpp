@@ -1,6 +1,8 @@
 #include "control/reading_watch.hpp"
 
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <utility>
 
 #include "control/number_name.hpp"
@@ -74,8 +76,10 @@ void describe_reading(const Schema& schema, const ReadingWatch::Fault& fault, st
   if (fault.is_outside) {
     text.add(", too far outside its bounds (beyond ").add(fault.before).add(")");
   } else {
+    std::array<char, 16> tolerance{};
+    std::snprintf(tolerance.data(), tolerance.size(), "%.3g", fault.tolerance);
     text.add(" after ").add(fault.before).add(": farther than its speed limit allows (");
-    text.add(fault.tolerance).add(")");
+    text.add(tolerance.data()).add(")");
   }
   text.add(". Check the sensor and the robot; if the reading is right, ").add(cure);
 }

@@ -75,8 +75,8 @@ class ReadingWatch {
   std::vector<std::optional<StateLayout>> layouts_;  // one for each type; empty: not watched
 };
 
-/// "position of actuator 'elbow' was read at 10 after 0.1, farther than 0.03: check its sensor; if
-/// the reading is right, resume with --accept-reading".
+/// "position of actuator 'elbow' was read at 1 after 0.1: farther than its speed limit allows
+/// (0.03). Check the sensor and the robot; if the reading is right, resume with --accept-reading".
 void describe_reading(const Schema& schema, const ReadingWatch::Fault& fault, std::string_view cure,
                       ShortText<248>& text) noexcept;
 
