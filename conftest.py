@@ -91,21 +91,23 @@ def segment_files() -> set[Path]:
     return set(DIRECTORY.iterdir())
 
 
-def command_line(process: int) -> str:
-    """The words a process was started with."""
+def told_of(path: Path) -> str:
+    """What the kernel says of a process or thread; empty if that has ended."""
     try:
-        return Path(f"/proc/{process}/cmdline").read_text().replace("\0", " ")
+        return path.read_bytes().decode(errors="replace")
     except OSError:
         return ""
 
 
+def command_line(process: int) -> str:
+    """The words a process was started with."""
+    return told_of(Path(f"/proc/{process}/cmdline")).replace("\0", " ")
+
+
 def lives(process: int) -> bool:
     """Whether the process still runs: a zombie does not."""
-    try:
-        state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
-    except OSError:
-        return False
-    return state not in "ZX"
+    words = told_of(Path(f"/proc/{process}/stat")).rpartition(")")[2].split()
+    return bool(words) and words[0] not in "ZX"
 
 
 def children() -> set[int]:
@@ -113,7 +115,7 @@ def children() -> set[int]:
     found = {
         int(child)
         for task in Path("/proc/self/task").iterdir()
-        for child in (task / "children").read_text().split()
+        for child in told_of(task / "children").split()
     }
     own = {child for child in found if "multiprocessing.resource_tracker" in command_line(child)}
     return {child for child in found - own if lives(child)}

@@ -47,13 +47,32 @@ def row_where(system: Any, condition: Callable[[Any], bool]) -> Any:
 
 def clients() -> list[int]:
     """Child processes of this one that run a client."""
-    found = []
-    for task in Path("/proc/self/task").iterdir():
-        for child in (task / "children").read_text().split():
-            words = Path(f"/proc/{child}/cmdline").read_bytes()
-            if b"watched_child" in words:
-                found.append(int(child))
-    return found
+    return [
+        int(child)
+        for task in Path("/proc/self/task").iterdir()
+        for child in told_of(task / "children").split()
+        if b"watched_child" in told_of(Path(f"/proc/{child.decode()}/cmdline"))
+    ]
+
+
+def told_of(path: Path) -> bytes:
+    """What the kernel says of a process or thread; empty if that has ended."""
+    try:
+        return path.read_bytes()
+    except OSError:
+        return b""
+
+
+def clients_of(system: Any, condition: Callable[[list[int]], bool]) -> list[int]:
+    """The clients, once they are so: they may end between two looks."""
+    seen: list[int] = []
+
+    def are_so(_row: Any) -> bool:
+        seen[:] = clients()
+        return condition(seen)
+
+    row_where(system, are_so)
+    return seen
 
 
 @pytest.mark.parametrize("kind", ["mock", "vicon"])
@@ -63,18 +82,16 @@ def test_a_client_without_poses_is_a_gap_and_is_started_again(kind: str, segment
         row = row_where(system, lambda row: row.reason == Reason.SILENT)
         assert not row.racket.visible
         assert row.capture_time == 0
-        row_where(system, lambda row: bool(clients()))
-        first = clients()
-        row_where(system, lambda row: bool(clients()) and clients() != first)
+        first = clients_of(system, bool)
+        clients_of(system, lambda found: bool(found) and found != first)
     assert not clients()
 
 
 def test_a_client_that_dies_is_started_again(segment: str) -> None:
     with ROBOT.inline(segment, frequency=1000, system="vicon", subjects="racket") as system:
-        row_where(system, lambda row: bool(clients()))
-        (first,) = clients()
+        (first,) = clients_of(system, bool)
         os.kill(first, signal.SIGKILL)
-        row_where(system, lambda row: bool(clients()) and first not in clients())
+        clients_of(system, lambda found: bool(found) and first not in found)
 
 
 def test_an_interrupt_ends_a_driver_whose_client_blocks(segment: str) -> None:

@@ -46,7 +46,10 @@ def test_it_measures_both_frequencies_and_draws_them() -> None:
 
 
 def children_of(pid: int) -> set[int]:
-    text = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    try:
+        text = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    except OSError:
+        return set()  # it has ended
     return {grandchild for child in map(int, text) for grandchild in {child, *children_of(child)}}
 
 
