@@ -88,6 +88,7 @@ void bind_schema_builder(nb::module_& m) {
            "integral"_a, "bounds"_a)
       .def("rests_at", &SchemaBuilder::rests_at, "actuator"_a, "field"_a, "value"_a)
       .def("of_the_world", &SchemaBuilder::of_the_world)
+      .def("gap", &SchemaBuilder::gap, "longest"_a)
       .def("description", &SchemaBuilder::description)
       .def("set_model", &SchemaBuilder::set_model, "mjcf"_a, "file"_a)
       .def("moves_joint", &SchemaBuilder::moves_joint, "actuator"_a, "joint"_a)

@@ -49,9 +49,9 @@ struct SchemaBuilder {
   /// Sets the limits of a field (empty: the first number), in the order of o80::Limits, and of its
   /// integral (empty: none), in the order of o80::IntegralBounds.
   void set_limits(std::uint32_t actuator, const std::string& field,
-                  const std::array<double, 6>& given, const std::string& integral,
+                  const std::array<double, 7>& given, const std::string& integral,
                   const std::array<double, 3>& bounds) {
-    o80::Limits limits{given[0], given[1], given[2], given[3], given[4], given[5]};
+    o80::Limits limits{given[0], given[1], given[2], given[3], given[4], given[5], given[6]};
     if (!integral.empty()) limits.integral = {integral, bounds[0], bounds[1], bounds[2]};
     schema.actuator(actuator).limits(field, limits);
   }
@@ -61,6 +61,7 @@ struct SchemaBuilder {
   }
 
   void of_the_world() { schema.of_the_world(); }
+  void gap(std::int64_t longest) { schema.gap(longest); }
 
   /// The schema as readers see it.
   std::shared_ptr<o80::Description> description() const;

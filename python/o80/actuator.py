@@ -87,7 +87,7 @@ def names_of(described: dict[str, Any], path: str = "") -> Iterator[tuple[str, s
 
 def _limits(described: dict[str, Any], paths: list[str]) -> Limits:
     """The limits of one number. paths: names of all numbers of the state."""
-    given = {key: described[key] for key in LIMITS if described[key] is not None}
+    given = {key: described[key] for key in LIMITS if described.get(key) is not None}
     if integral := described.get("integral"):
         known = {key: value for key, value in integral.items() if value is not None}
         given["integral"] = IntegralBounds(paths[known.pop("number")], **known)

@@ -81,6 +81,7 @@ class Backend:
     joints: of the model, each with what moves it: an actuator, whose state must begin with a
         float64, or (field, index) of an extended field of float64.
     max_overruns: halt when so many rows within a second come half a period late, or later.
+    accept_reading: begin where the robot is read to be, even if it cannot have come there.
 
     Leaving a `with` block by an exception ends it as failed: frontends raise its text.
     Used by one thread; `stop` and `close` may come from any. Raises SegmentTaken, SegmentError,
@@ -111,6 +112,7 @@ class Backend:
         silence: int | None = None,
         max_overruns: int | None = None,
         resume: bool = False,
+        accept_reading: bool = False,
         while_halted: Sequence[str] = (),
         model: str | os.PathLike[str] | None = None,
         joints: Mapping[str, int | str | tuple[str, int]] | None = None,
@@ -128,6 +130,7 @@ class Backend:
                 "silence": silence,
                 "max_overruns": max_overruns,
                 "resume": resume,
+                "accept_reading": accept_reading,
             }
         )
         requests = mapping(requests, "requests", "names to dtypes or None")
@@ -176,8 +179,10 @@ class Backend:
         extended: a mapping from fields to values, or a record. None, and fields that the mapping
             leaves out, keep the values of the row before.
 
-        Raises InvalidArgument if row 0 has a number that is NaN or infinite: publish it again when
-        the robot reads.
+        Raises InvalidArgument if row 0 has a number that is NaN, infinite or, in real time, too far
+        outside its bounds: publish it again when the robot reads. In real time also if the robot
+        cannot have come from row 0 to the next reading: one of the two is wrong, and the backend
+        ends.
         """
         native = self._open
         if observed is not None:

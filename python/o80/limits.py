@@ -34,6 +34,7 @@ class Limits:
     acceleration: float = math.inf  #: [unit/s^2]
     jerk: float = math.inf  #: [unit/s^3]
     error: float = math.inf  #: a larger difference of desired and observed halts the backend
+    noise: float = 0.0  #: of its readings, beside motion; 0: a tenth of `error`
     integral: IntegralBounds | None = None  #: what the number moves, if it is a velocity
 
     @classmethod
@@ -41,7 +42,7 @@ class Limits:
         """Limits from Limits, or from (minimum, maximum, ...) in the order of the fields."""
         if isinstance(given, Limits):
             return given
-        names = ("minimum", "maximum", "speed", "acceleration", "jerk", "error")
+        names = ("minimum", "maximum", "speed", "acceleration", "jerk", "error", "noise")
         if not isinstance(given, (tuple, list)) or len(given) > len(names):
             raise InvalidArgument(
                 f"limits must be o80.Limits({', '.join(n + '=' for n in names)}), got {given!r}"
@@ -51,4 +52,4 @@ class Limits:
 
     def numbers(self) -> tuple[float, ...]:
         """All limits but those of the integral, in the order of the fields."""
-        return astuple(self)[:6]
+        return astuple(self)[:7]

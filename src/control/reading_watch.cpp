@@ -9,18 +9,23 @@
 
 namespace o80 {
 
-ReadingWatch::ReadingWatch(const Schema& schema) : layouts_(schema.types.size()) {
+ReadingWatch::ReadingWatch(const Schema& schema, Of of) : layouts_(schema.types.size()) {
   for (std::uint32_t i = 0; i < schema.actuators.size(); ++i) {
     const ActuatorRow& row = schema.actuators[i];
+    if (of == Of::none || (of == Of::followers && row.when_idle != WhenIdle::follow)) continue;
     for (std::uint32_t number = 0; number < row.limits; ++number) {
       const LimitRow& limit = schema.limits[row.first_limit + number];
       const double width = limit.maximum - limit.minimum;
-      if (limit.resting != 0 || (!std::isfinite(limit.speed) && !std::isfinite(width))) continue;
+      const bool is_bound =
+          std::isfinite(limit.speed) || std::isfinite(width) || limit.noise > 0.0F;
+      if (limit.resting != 0 || !is_bound) continue;
       auto& layout = layouts_[row.type];
       if (!layout) layout.emplace(schema, row.type);
-      const double noise = std::isfinite(limit.error) ? limit.error / 10.0 : 0.0;
+      const double by_error = std::isfinite(limit.error) ? limit.error / 10.0 : 0.0;
+      const double noise = limit.noise > 0.0F ? static_cast<double>(limit.noise) : by_error;
+      const bool is_slow = std::isfinite(limit.speed) || limit.noise == 0.0F;
       const double outside = std::isfinite(limit.error) ? limit.error : width / 10.0;
-      watched_.push_back({i, number, row.offset, row.type, limit.speed, noise,
+      watched_.push_back({i, number, row.offset, row.type, is_slow ? limit.speed : 0.0, noise,
                           limit.minimum - outside, limit.maximum + outside});
     }
   }
@@ -28,9 +33,9 @@ ReadingWatch::ReadingWatch(const Schema& schema) : layouts_(schema.types.size())
 
 void ReadingWatch::begin(const std::byte* observed) noexcept {
   for (Watched& each : watched_) {
-    each.before = each.good = value(each, observed);
+    each.last = each.before = each.good = value(each, observed);
     each.since = 0.0;
-    each.is_wrong = false;
+    each.is_wrong = each.was_wrong = false;
   }
 }
 
@@ -38,6 +43,8 @@ void ReadingWatch::add(const std::byte* observed, double elapsed) noexcept {
   for (Watched& each : watched_) {
     const double now = value(each, observed);
     const double before = std::exchange(each.before, now);
+    each.last = before;
+    each.was_wrong = each.is_wrong;
     each.since += elapsed;
     // `<=`, because a comparison with NaN is false: NaN must count as wrong
     if (std::abs(now - before) <= each.reach(elapsed)) continue;
@@ -55,15 +62,26 @@ std::optional<ReadingWatch::Fault> ReadingWatch::find(const std::byte* observed,
                                                       double elapsed) const noexcept {
   for (const Watched& each : watched_) {
     const double now = value(each, observed);
-    if (!(now >= each.low && now <= each.high)) {
-      const double bound = now > each.high ? each.high : each.low;
-      return Fault{each.actuator, each.number, bound, now, 0.0, true};
-    }
+    if (each.is_outside(now)) return each.outside(now);
     const bool steps = !(std::abs(now - each.before) <= each.reach(elapsed));
     const bool returns = std::abs(now - each.good) <= each.reach(each.since + elapsed);
     if (each.is_wrong ? !(steps && returns) : steps) {
       return Fault{each.actuator, each.number,         each.is_wrong ? each.good : each.before,
                    now,           each.reach(elapsed), false};
+    }
+  }
+  return std::nullopt;
+}
+
+std::optional<ReadingWatch::Fault> ReadingWatch::find_idle(
+    const std::uint64_t* active) const noexcept {
+  for (const Watched& each : watched_) {
+    if ((active[each.actuator / 64] >> (each.actuator % 64) & 1) != 0) continue;
+    if (each.is_outside(each.before)) return each.outside(each.before);
+    if (each.is_outside(each.last)) return each.outside(each.last);
+    if (each.is_wrong || each.was_wrong) {
+      const double read = each.is_wrong ? each.before : each.last;
+      return Fault{each.actuator, each.number, each.good, read, each.reach(0.0), false};
     }
   }
   return std::nullopt;

@@ -23,7 +23,8 @@ namespace o80 {
 /// Realtime: everything but construction; O(numbers with a limit of speed or bounds).
 class ReadingWatch {
  public:
-  explicit ReadingWatch(const Schema& schema);
+  enum class Of : std::uint8_t { all, followers, none };
+  explicit ReadingWatch(const Schema& schema, Of of = Of::all);
 
   /// True if no number is watched.
   bool empty() const noexcept { return watched_.empty(); }
@@ -45,6 +46,9 @@ class ReadingWatch {
   void add(const std::byte* observed, double elapsed) noexcept;
   /// The first number that is wrong since begin(), or would be with this reading; bounds included.
   std::optional<Fault> find(const std::byte* observed, double elapsed) const noexcept;
+  /// The first number that is wrong since begin(), or was until the last reading, of actuators
+  /// whose bit is 0.
+  std::optional<Fault> find_idle(const std::uint64_t* active) const noexcept;
 
  private:
   struct Watched {
@@ -60,7 +64,13 @@ class ReadingWatch {
     double good = 0.0;   // before the step that cannot be
     double since = 0.0;  // time since `good` [s]
     bool is_wrong = false;
+    double last = 0.0;  // read before `before`
+    bool was_wrong = false;
 
+    bool is_outside(double value) const noexcept { return !(value >= low && value <= high); }
+    Fault outside(double value) const noexcept {
+      return {actuator, number, value > high ? high : low, value, 0.0, true};
+    }
     /// How far it may have come in this time; rounding of the reading is no motion.
     double reach(double elapsed) const noexcept {
       constexpr double kRounding = 1e-9;

@@ -69,6 +69,7 @@ std::string limits_of(const Schema& schema, const ActuatorRow& actuator) {
     text += (i == 0 ? "" : "; ") + number(limit.minimum) + " to " + number(limit.maximum) + " at " +
             number(limit.speed) + "/s, " + number(limit.acceleration) + "/s^2, " +
             number(limit.jerk) + "/s^3, error " + number(limit.error) +
+            (limit.noise != 0.0F ? ", noise " + number(limit.noise) : "") +
             (limit.resting != 0 ? ", rests at " + number(limit.rest) : "");
   }
   for (const IntegralRow& row : schema.integrals) {
@@ -183,10 +184,11 @@ void forgive(Lines& expected, Lines& found) {
 }  // namespace
 
 std::string difference(const Schema& expected, const Schema& found) {
-  // watchdog settings may differ, and the model that viewers draw
+  // watchdog settings and the gap may differ, and the model that viewers draw
   Schema same = found;
   same.head.stale = expected.head.stale;
   same.head.silence = expected.head.silence;
+  same.head.gap = expected.head.gap;
   same.shown = expected.shown;
   if (expected == same) return "";
   const std::string text = compare(lines_of(expected), lines_of(found));

@@ -171,6 +171,10 @@ void write_actuator(JsonWriter& json, const Schema& schema, const ActuatorRow& a
     put("acceleration", limit.acceleration);
     put("jerk", limit.jerk);
     put("error", limit.error);
+    if (limit.noise != 0.0F) {
+      json.key("noise");
+      json.value(limit.noise);
+    }
     if (limit.resting != 0) put("rest", limit.rest);
     for (const IntegralRow& row : schema.integrals) {
       if (row.limit != actuator.first_limit + i) continue;
@@ -258,6 +262,10 @@ std::string to_json(const Schema& schema) {
   json.value(name_of(schema.head.stale));
   json.key("of_the_world");
   json.value(schema.head.of_the_world != 0);
+  if (schema.head.gap != 0) {
+    json.key("gap");
+    json.value(schema.head.gap * 1e-6);
+  }
   json.key("row");
   write_layout(json, row_layout(schema));
   json.key("groups");

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <iomanip>
@@ -50,6 +52,13 @@ class JsonWriter {
     } else {
       text_ << "null";
     }
+  }
+  /// A finite number, with as few digits as tell it from others of its type.
+  void value(float number) {
+    separate();
+    std::array<char, 24> digits{};
+    const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), number).ptr;
+    text_.write(digits.data(), end - digits.data());
   }
   std::string str() const { return text_.str(); }
 

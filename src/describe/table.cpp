@@ -218,6 +218,9 @@ void check_limit(const ActuatorRow& actuator, const FieldRow& field, const Limit
   positive(limit.acceleration, "acceleration");
   positive(limit.jerk, "jerk");
   positive(limit.error, "error");
+  if (!(limit.noise >= 0.0F) || !std::isfinite(limit.noise)) {
+    refuse(of + "noise must be a finite number of 0 or more, got " + std::to_string(limit.noise));
+  }
   if (std::isfinite(limit.jerk) && !std::isfinite(limit.acceleration)) {
     refuse(of + "jerk without an acceleration; set both");
   }

@@ -120,7 +120,7 @@ constexpr std::array kOptions = {
                "no limit", "number of late iterations within a second that halts the robot",
                kProcess | kEmbedded, O80_SET(backend.max_overruns)},
     LoopOption{"gap", OptionKind::number, "0 or a number from 0.001 to 3600 [s]", 0, 3600,
-               "20 periods and at least 0.1; none for simulations",
+               "the driver's, or 20 periods and at least 0.1 (none for simulations)",
                "longest time between two iterations; a longer one halts [s], 0: any", kProcess,
                [](LoopOptions& options, std::string_view, double number) {
                  options.backend.gap = std::llround(number * 1e9);
@@ -130,8 +130,8 @@ constexpr std::array kOptions = {
                "start without a halt even if the previous backend was halted or killed",
                kProcess | kEmbedded, O80_SET(backend.resume)},
     LoopOption{"accept_reading", OptionKind::boolean, "true or false", 0, 1, "no",
-               "start where the robot is read to be, even if it cannot have come there", kProcess,
-               O80_SET(backend.accept_reading)},
+               "start where the robot is read to be, even if it cannot have come there",
+               kProcess | kEmbedded, O80_SET(backend.accept_reading)},
     LoopOption{"policy", OptionKind::word, "other, fifo or rr", 0, 0, "other",
                "scheduling class of the loop", kProcess, set_policy},
     LoopOption{"priority", OptionKind::integer, "a whole number from 1 to 99", 1, 99, "80",

@@ -162,7 +162,9 @@ std::int64_t longest_gap(const Schema& schema, const BackendOptions& options) {
   if (options.bursting) return 0;
   if (options.gap >= 0) return options.gap;
   const bool moves = schema.head.of_the_world != 0 && !schema.actuators.empty();
-  return moves ? std::max(kPeriods * schema.head.period, kLeast) : 0;
+  const std::int64_t least = moves ? std::max(kPeriods * schema.head.period, kLeast) : 0;
+  const std::int64_t own = schema.head.gap * std::int64_t{1000};
+  return own > 0 && (least == 0 || own < least) ? own : least;
 }
 
 std::size_t largest_request(const Schema& schema) {
@@ -209,6 +211,10 @@ UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, Reques
               2 * (schema.actuators.size() + 2 * Controller::kStatusesPerIteration)),
       errors_(schema),
       readings_(schema),
+      followed_(schema, options.bursting || recorded != nullptr ? ReadingWatch::Of::none
+                                                                : ReadingWatch::Of::followers),
+      judges_first_(!options.bursting && recorded == nullptr && !options.accept_reading &&
+                    !readings_.empty()),
       last_row_(layout.size / 8),
       overruns_(options.max_overruns),
       gaps_(recorded == nullptr ? longest_gap(schema, options) : 0) {
@@ -304,6 +310,7 @@ bool UntypedBackend::Body::can_begin(const std::byte* states, std::string_view w
 
 bool UntypedBackend::Body::publish_first() noexcept {
   if (!can_begin(row() + layout.observed, "the first reading")) return false;
+  if (!agrees_with_first()) return false;
   if (!stop.load(std::memory_order_relaxed)) failure[0] = 0;  // that of a row 0 refused before
   publish(false);
   return true;
@@ -343,6 +350,7 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
   // before a fresh start the robot may be away from its desired states
   if (begun_ && !fresh && !will_start_afresh()) watch_errors();
   watch_readings();
+  if (!followed_.empty()) watch_followers(fresh);
   if (gaps_.is_on()) watch_gaps(fresh);
   tell_ended_requests(fresh);
 
@@ -401,6 +409,7 @@ bool UntypedBackend::watches_readings() const noexcept { return body_->watches_r
 bool UntypedBackend::judge_first(bool again) noexcept { return body_->judge_first(again); }
 bool UntypedBackend::publish() noexcept {
   if (!body_->has_begun()) return body_->publish_first();
+  if (!body_->agrees_with_first()) return false;
   body_->publish(false);
   return true;
 }

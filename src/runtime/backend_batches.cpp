@@ -216,7 +216,7 @@ bool UntypedBackend::Body::admit(const StagedBatch& sent) noexcept {
   if (!is_free && !is_holders) return reject(sent, Reason::exclusive, holder_.lane());
   if (sent.at < current && !sent.late_now) return reject(sent, Reason::late);
   if (stale_ == Stale::purge && is_of_dead(sent)) return reject(sent, Reason::dead_frontend);
-  return true;
+  return suits_followers(sent);
 }
 
 bool UntypedBackend::Body::is_of_dead(const StagedBatch& sent) noexcept {

@@ -73,6 +73,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   bool publish_first() noexcept;
   bool watches_readings() const noexcept { return !readings_.empty(); }
   bool judge_first(bool again) noexcept;
+  bool agrees_with_first() noexcept;
   void publish(bool fresh) noexcept;
   Step step(std::int64_t at_most) noexcept;
   bool begin_direct(const DirectBurst& burst) noexcept;
@@ -186,10 +187,13 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   void put_back_reading() noexcept;
   void begin_to_watch() noexcept;
   void watch_readings() noexcept;
+  void watch_followers(bool fresh) noexcept;
+  bool suits_followers(const StagedBatch& sent) noexcept;
   double since_reading() const noexcept;
   bool is_misread(const std::byte* observed, std::string_view cure,
                   ShortText<248>& why) const noexcept;
-  bool read_to_resume(FreshReading& reading, bool accepts, ShortText<248>& why) noexcept;
+  enum class Judged : std::uint8_t { none, readings, all };  // of a fresh start
+  bool read_again(FreshReading& reading, Judged judged, ShortText<248>& why) noexcept;
   Outcome begin_afresh(std::uint32_t lane, const FreshReading& reading) noexcept;
 
   ForkGuard guard_;
@@ -225,6 +229,9 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   bool reason_missing_ = false;     // the requester of the halt has not written its reason yet
   ErrorWatch errors_;
   ReadingWatch readings_;
+  ReadingWatch followed_;  // of actuators that follow
+  std::int64_t followed_at_ = 0;
+  bool judges_first_;                    // an embedded backend, until the second reading
   std::int64_t read_at_ = 0;             // time of the last row whose reading was not missed
   std::vector<std::uint64_t> last_row_;  // or observed states, while a fresh reading is judged
   OverrunLimit overruns_;

@@ -217,29 +217,11 @@ Outcome UntypedBackend::Body::resume(std::uint32_t lane, CommandId id, std::uint
   }
   FreshReading reading{row() + layout.observed, row() + layout.extended,
                        reinterpret_cast<std::byte*>(fresh_desired_.data())};
-  if (server_ != nullptr && !read_to_resume(reading, accepts, unread)) {
+  if (server_ != nullptr && !read_again(reading, accepts ? Judged::none : Judged::all, unread)) {
     ask_to_halt(HaltCause::error, unread.view());
     return refuse(unread.view(), Reason::reading);
   }
   return begin_afresh(lane, reading);
-}
-
-/// Reads the robot for the fresh start of a resume; false if it cannot begin there, and the last
-/// reading stays.
-bool UntypedBackend::Body::read_to_resume(FreshReading& reading, bool accepts,
-                                          ShortText<248>& why) noexcept {
-  keep_reading();
-  reading.may_fail = true;
-  if (!server_->read_fresh(reading)) {
-    why.add(reading.why.empty() ? "the robot could not be read" : reading.why);
-  } else if (!name_not_finite(reading.observed, "the reading of a fresh start", why) &&
-             (!reading.has_desired ||
-              !name_not_finite(reading.desired, "the desired states of a fresh start", why)) &&
-             (accepts || !is_misread(reading.observed, kToResume, why))) {
-    return true;
-  }
-  put_back_reading();
-  return false;
 }
 
 }  // namespace o80

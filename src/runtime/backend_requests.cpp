@@ -70,11 +70,17 @@ Outcome UntypedBackend::Body::start_afresh(std::uint32_t lane, CommandId id) noe
   FreshReading reading{row() + layout.observed, row() + layout.extended, desired};
   // a simulator may be put anywhere, a robot of the world cannot
   const bool judges = schema.head.of_the_world != 0 && recorded_ == nullptr && begun_;
-  if (judges && !halts.acts()) {
-    readings_.begin(reading.observed);
-    read_at_ = unpack<RowHead>(row()).time;
+  if (judges) {
+    if (!halts.acts()) {
+      readings_.begin(reading.observed);
+      read_at_ = unpack<RowHead>(row()).time;
+    }
+    ShortText<248> why;
+    if (read_again(reading, Judged::readings, why)) return begin_afresh(lane, reading);
+    ask_to_halt(HaltCause::error, why.view());
+    lanes[lane].set_message(id, why.view());
+    return {Status::rejected, Reason::reading, 0};
   }
-  if (judges) keep_reading();
   bool reads = server_->read_fresh(reading);
   if (!reads) note_failure("the robot could not be read in a fresh start");
   reads = reads && can_begin(reading.observed, "the reading of a fresh start");
@@ -86,14 +92,26 @@ Outcome UntypedBackend::Body::start_afresh(std::uint32_t lane, CommandId id) noe
     stop.store(true, std::memory_order_relaxed);
     return reject_request(lane, id, failure.data());
   }
-  ShortText<248> why;
-  if (judges && !reading.has_desired && is_misread(reading.observed, kToResume, why)) {
-    put_back_reading();
-    ask_to_halt(HaltCause::error, why.view());
-    lanes[lane].set_message(id, why.view());
-    return {Status::rejected, Reason::reading, 0};
-  }
   return begin_afresh(lane, reading);
+}
+
+/// Reads the robot for a fresh start; false if it cannot begin there, and the last reading stays.
+bool UntypedBackend::Body::read_again(FreshReading& reading, Judged judged,
+                                      ShortText<248>& why) noexcept {
+  keep_reading();
+  reading.may_fail = true;
+  if (!server_->read_fresh(reading)) {
+    why.add(reading.why.empty() ? "the robot could not be read" : reading.why);
+  } else if (!name_not_finite(reading.observed, "the reading of a fresh start", why) &&
+             (!reading.has_desired ||
+              !name_not_finite(reading.desired, "the desired states of a fresh start", why))) {
+    // a homing that gives desired states may move the zero of a sensor
+    const bool is_judged =
+        judged == Judged::all || (judged == Judged::readings && !reading.has_desired);
+    if (!is_judged || !is_misread(reading.observed, kToResume, why)) return true;
+  }
+  put_back_reading();
+  return false;
 }
 
 Outcome UntypedBackend::Body::begin_afresh(std::uint32_t lane,
@@ -136,6 +154,27 @@ void UntypedBackend::Body::watch_readings() noexcept {
   read_at_ = time();
 }
 
+/// Notes each reading of actuators that follow, for the next command.
+void UntypedBackend::Body::watch_followers(bool fresh) noexcept {
+  if (timing.missed && begun_ && !fresh) return;
+  const std::int64_t since = time() - std::exchange(followed_at_, time());
+  if (!begun_ || fresh) return followed_.begin(row() + layout.observed);
+  const std::int64_t elapsed = std::max(since, schema.head.period);
+  followed_.add(row() + layout.observed, kInMotion * static_cast<double>(elapsed) * 1e-9);
+}
+
+/// True if actuators without a command that follow can be where they are read; else rejects what
+/// moves.
+bool UntypedBackend::Body::suits_followers(const StagedBatch& sent) noexcept {
+  if (followed_.empty() || !controller.effort(sent.batch).moves) return true;
+  const auto fault = followed_.find_idle(controller.active_mask());
+  if (!fault) return true;
+  ShortText<248> why;
+  describe_reading(schema, *fault, "halt the robot and resume with --accept-reading", why);
+  lanes[sent.lane].set_message(pool.batch(sent.batch).id, why.view());
+  return reject(sent, Reason::reading);
+}
+
 /// The time since the last reading, at least a period: a backend may run ahead of its clock [s].
 double UntypedBackend::Body::since_reading() const noexcept {
   return static_cast<double>(std::max(time() - read_at_, schema.head.period)) * 1e-9;
@@ -150,6 +189,7 @@ bool UntypedBackend::Body::is_misread(const std::byte* observed, std::string_vie
 }
 
 bool UntypedBackend::Body::judge_first(bool again) noexcept {
+  judges_first_ = false;
   const std::byte* observed = row() + layout.observed;
   ShortText<248> why;
   const bool is_good = !again || !is_misread(observed, "start with --accept-reading", why);
@@ -157,6 +197,23 @@ bool UntypedBackend::Body::judge_first(bool again) noexcept {
   readings_.begin(observed);
   read_at_ = time();
   return is_good;
+}
+
+/// The program of an embedded backend reads once an iteration: row 0 must lie within the bounds,
+/// and the next reading where the robot can have come to. Else nothing is commanded any more.
+bool UntypedBackend::Body::agrees_with_first() noexcept {
+  if (!judges_first_ || (begun_ && timing.missed)) return true;
+  if (begun_) {
+    judges_first_ = false;
+  } else {
+    readings_.begin(row() + layout.observed);
+    read_at_ = time();
+  }
+  ShortText<248> why;
+  if (!is_misread(row() + layout.observed, "begin with accept_reading", why)) return true;
+  note_failure(why.view());
+  if (begun_) stop.store(true, std::memory_order_relaxed);
+  return false;
 }
 
 // ------------------------------------------------------------------------------ running

@@ -139,6 +139,8 @@ Handle Batch::ask(CommandId id) const {
   const bool has_message = handle.reason == Reason::driver || handle.reason == Reason::halted ||
                            handle.reason == Reason::reading;
   if (has_message) handle.text = lane_->message(id).value_or("");
+  const bool is_of_batch = handle.reason == Reason::reading && handle.text.empty();
+  if (is_of_batch) handle.text = lane_->message(id_).value_or("");
   if (handle.text.empty())
     handle.text =
         words_for(*link_, kept_->commands_of(id - record_id(id_, 0)), handle, answer.word.detail);

@@ -121,7 +121,8 @@ struct LimitRow {
   double jerk;            // [1/s^3]
   double error;           // largest |desired - observed|; a larger one halts the backend
   double rest;            // value without a command, if `resting` is 1
-  std::uint64_t resting;  // 1: the number goes to `rest` when no command drives it
+  std::uint32_t resting;  // 1: the number goes to `rest` when no command drives it
+  float noise;            // of its reading; 0: a tenth of `error`
   bool operator==(const LimitRow&) const = default;
 };
 
@@ -201,7 +202,7 @@ struct SchemaHead {
   std::uint8_t bursting = 0;
   Stale stale = Stale::hold;
   std::uint8_t of_the_world = 0;  // 1: all that the robot observes comes from the world
-  std::array<std::uint8_t, 4> reserved{};
+  std::uint32_t gap = 0;     // longest time between two rows that does not halt [us]; 0: by default
   std::int64_t silence = 0;  // iterations without a sign of life until `stale`; 0: no watchdog
   bool operator==(const SchemaHead&) const = default;
 };

@@ -33,11 +33,22 @@ struct Limits {
   double jerk = std::numeric_limits<double>::infinity();          // [1/s^3], needs an acceleration
   /// Largest allowed |desired - observed|; a larger one halts the backend.
   double error = std::numeric_limits<double>::infinity();
+  /// How far two readings may be apart beside the motion that `speed` allows, before one is held
+  /// for wrong; 0: a tenth of `error`.
+  double noise = 0.0;
   /// What the number moves, if it is the velocity of another one; no limit of jerk then.
   IntegralBounds integral = {};
 
   LimitRow row(double rest = 0.0, bool resting = false) const {
-    return {minimum, maximum, speed, acceleration, jerk, error, rest, resting ? 1U : 0U};
+    return {minimum,
+            maximum,
+            speed,
+            acceleration,
+            jerk,
+            error,
+            rest,
+            resting ? 1U : 0U,
+            static_cast<float>(noise)};
   }
 };
 
@@ -108,6 +119,16 @@ class Schema {
   /// does not start the driver, and reads the recorded values instead. Single fields are marked in
   /// O80_DESCRIBE: `o80::of_the_world()`, `o80::of_the_clock()`.
   void of_the_world() { head.of_the_world = 1; }
+  /// Sets the longest time between two rows that does not halt the robot [ns], up to an hour, where
+  /// it is less than by default.
+  void gap(std::int64_t longest) {
+    constexpr std::int64_t kHour = 3'600'000'000'000;
+    if (longest < 1000 || longest > kHour) {
+      throw InvalidArgument("the gap must be from 1000 to 3600000000000 ns, got " +
+                            std::to_string(longest));
+    }
+    head.gap = static_cast<std::uint32_t>(longest / 1000);
+  }
   ActuatorDescription actuator(std::uint32_t index);
   ActuatorDescription actuator(std::string_view name);
 

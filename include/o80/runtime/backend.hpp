@@ -111,8 +111,10 @@ class UntypedBackend {
   /// Before row 0 in real time: notes the first reading; then (`again`), a period later each, false
   /// if the robot cannot have come there from the reading before; `failure` names the number.
   bool judge_first(bool again) noexcept;
-  /// Publishes the current row. The first one is row 0 and makes the backend running. If a number
-  /// of row 0 is NaN or infinite, publishes nothing and returns false; `failure` names the number.
+  /// Publishes the current row. The first one is row 0 and makes the backend running. Publishes
+  /// nothing and returns false if a number of row 0 is NaN or infinite or, in real time, lies too
+  /// far outside its bounds, or if the robot cannot have come from row 0 to the next row; then the
+  /// backend ends. `failure` names the number.
   bool publish() noexcept;
 
   /// Of a replay: makes this the first iteration, instead of 0. Call it before `publish`.

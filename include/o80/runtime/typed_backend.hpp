@@ -65,8 +65,10 @@ class Backend final : private RequestServer {
   /// Halts on behalf of the program, as a driver does in its reading.
   void halt(std::string_view why) noexcept { backend_.halt(HaltCause::driver, why); }
 
-  /// Publishes the reading of the current iteration; the first call publishes row 0. Only that one
-  /// throws: InvalidArgument if a number is NaN or infinite.
+  /// Publishes the reading of the current iteration; the first call publishes row 0. The first two
+  /// throw InvalidArgument, row 0 if a number is NaN, infinite or, in real time, too far outside
+  /// its bounds, the next one if the robot cannot have come there, see
+  /// BackendOptions::accept_reading.
   void publish(const Actuators& observed, const Extended& extended = {}) {
     if constexpr (!std::is_same_v<Actuators, NoActuators>) pack(observed, backend_.observed());
     if constexpr (!std::is_same_v<Extended, NoExtended>) pack(extended, backend_.extended());

@@ -120,6 +120,8 @@ def _limit(limit: dict[str, Any]) -> str:
             parts.append(f"{limit[name]:g}{unit}")
     if limit["error"] is not None:
         parts.append(f"error {limit['error']:g}")
+    if "noise" in limit:
+        parts.append(f"noise {limit['noise']:g}")
     if "rest" in limit:
         parts.append(f"rests at {limit['rest']:g}")
     if moved := limit.get("integral"):

@@ -63,6 +63,10 @@ class Adapter:
         writer.set_model(self._told("model"), joints)
         if self._told("of_the_world", True):
             writer.builder.of_the_world()
+        if (gap := self._told("gap")) is not None:
+            if not isinstance(gap, (int, float)) or not 1e-6 <= gap <= 3600:
+                raise InvalidArgument(f"gap must be from 0.000001 to 3600 s, got {gap!r}")
+            writer.builder.gap(round(gap / NANOSECOND))
         self._make_blocks(Layout(writer.builder.description()))
         return writer.builder
 

@@ -65,6 +65,7 @@ class Puppet {
   static inline std::function<Served()> on_resume;
   static inline Limits limits;
   static inline bool of_the_world = false;
+  static inline std::int64_t own_gap = 0;  // [ns]; 0: by default
 
   explicit Puppet(const Config& config) : config_(config) {
     if (config.fails == Fails::construct) throw std::runtime_error("no cable");
@@ -78,6 +79,7 @@ class Puppet {
     schema.actuator(1).name("right");
     schema.actuator(0).limits(limits);
     if (of_the_world) schema.of_the_world();
+    if (own_gap > 0) schema.gap(own_gap);
   }
   void start() {
     ++calls.started;
@@ -154,6 +156,7 @@ class PuppetTest : public StationTest {
     Puppet::on_resume = {};
     Puppet::limits = {};
     Puppet::of_the_world = false;
+    Puppet::own_gap = 0;
   }
   static const RobotTable& table() { return *robot_table<Puppet>("puppet"); }
 };

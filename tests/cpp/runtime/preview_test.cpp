@@ -51,6 +51,7 @@ Limits random_limits(Dice& dice, std::int64_t most = 4) {
   if (kinds >= 2) limits.speed = dice.real(0.5, 5);
   if (kinds >= 3) limits.acceleration = dice.real(5, 50);
   if (kinds >= 4) limits.jerk = dice.real(100, 5000);
+  limits.noise = 10.0;  // readings are drawn
   return limits;
 }
 

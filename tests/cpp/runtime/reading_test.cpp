@@ -1,0 +1,177 @@
+// Which readings an embedded backend begins with, and those of actuators that follow.
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "control/batch_builder.hpp"
+#include "o80/base/error.hpp"
+#include "o80/runtime/typed_backend.hpp"
+#include "runtime/station.hpp"
+
+namespace o80::test {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using EmbeddedReadingTest = StationTest;
+using FollowerTest = StationTest;
+
+constexpr Limits kLimits{.minimum = -2.0, .maximum = 2.0, .speed = 1.0, .error = 0.3};
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+Schema pair_with(const Limits& limits, WhenIdle when_idle = WhenIdle::hold) {
+  Schema schema;
+  schema.head.robot = NameText("pair");
+  describe_types<test::Pair>(schema);
+  schema.actuator(0).name("shoulder").limits(limits).when_idle(when_idle);
+  schema.actuator(1).name("elbow");
+  return schema;
+}
+
+bool publish(UntypedBackend& backend, double shoulder) {
+  pack(std::array{shoulder, 0.0}, backend.observed());
+  return backend.publish();
+}
+
+TEST_F(EmbeddedReadingTest, OfRowZeroMustLieWithinItsBounds) {
+  UntypedBackend backend(pair_with(kLimits), {.segment = "pair"});
+  for (const double wrong : {2.31, -2.31, 1e300, kInfinity, std::nan("")}) {
+    EXPECT_FALSE(publish(backend, wrong)) << wrong;
+    EXPECT_THAT(std::string(backend.failure()), HasSubstr("actuator 'shoulder'"));
+  }
+  EXPECT_TRUE(publish(backend, 2.29));
+  EXPECT_EQ(std::string(backend.failure()), "");
+  EXPECT_EQ(backend.try_step(), Step::run);
+}
+
+TEST_F(EmbeddedReadingTest, AfterRowZeroMustBeWhereTheRobotCanHaveCome) {
+  // the period bounds what the robot can do, however little time passes
+  const std::int64_t period = 1'000'000;
+  for (const double step : {0.0, 0.03, -0.03, 1e5, -1e300, kInfinity, std::nan("")}) {
+    UntypedBackend backend(pair_with({.speed = 1.0, .error = 0.3}),
+                           {.segment = "pair", .period = period});
+    ASSERT_TRUE(publish(backend, 0.5));
+    ASSERT_EQ(backend.try_step(), Step::run);
+    EXPECT_EQ(unpack<double>(backend.desired()), 0.5);
+    const bool is_right = std::abs(step) < 0.1;
+    EXPECT_EQ(publish(backend, 0.5 + step), is_right) << step;
+    EXPECT_EQ(backend.try_step(), is_right ? Step::run : Step::ended);
+    if (is_right) {
+      EXPECT_TRUE(publish(backend, 0.5)) << "later ones are judged by the error limit";
+    } else {
+      EXPECT_THAT(std::string(backend.failure()),
+                  AllOf(HasSubstr("actuator 'shoulder' was read at"),
+                        HasSubstr("begin with accept_reading")));
+      EXPECT_EQ(backend.iteration(), 1) << "the row was not published";
+    }
+  }
+}
+
+TEST_F(EmbeddedReadingTest, IsAcceptedIfTheProgramSaysSo) {
+  UntypedBackend backend(pair_with(kLimits), {.segment = "pair", .accept_reading = true});
+  EXPECT_TRUE(publish(backend, 5.0));
+  ASSERT_EQ(backend.try_step(), Step::run);
+  EXPECT_TRUE(publish(backend, -5.0));
+}
+
+TEST_F(EmbeddedReadingTest, OfASimulationMayBeAnything) {
+  UntypedBackend backend(pair_with(kLimits), {.segment = "pair", .bursting = true});
+  EXPECT_TRUE(publish(backend, 5.0));
+}
+
+/// A pair whose shoulder follows, moved by hand.
+class Follower {
+ public:
+  explicit Follower(const Limits& limits)
+      : backend(pair_with(limits, WhenIdle::follow), {.segment = "pair", .period = 1'000'000}) {
+    publish(backend, now);
+  }
+  void run(int iterations) {
+    for (int i = 0; i < iterations; ++i) {
+      ASSERT_EQ(backend.try_step(), Step::run);
+      written = unpack<double>(backend.desired());
+      ASSERT_TRUE(publish(backend, now + offset));
+    }
+  }
+  UntypedBackend backend;
+  double now = 0.0;
+  double offset = 0.0;
+  double written = 0.0;
+};
+
+TEST_F(FollowerTest, IsCommandedOnlyFromWhereItCanBe) {
+  std::mt19937 random(9);
+  const auto uniform = [&](double low, double high) {
+    return std::uniform_real_distribution(low, high)(random);
+  };
+  for (int i = 0; i < 60; ++i) {
+    Limits limits{.speed = uniform(0.5, 4.0)};
+    limits.noise = uniform(0.01, 0.1);
+    Follower follower(limits);
+    UntypedFrontend frontend("pair");
+    follower.run(3);
+    // an arm that is right is never refused, also while somebody moves it
+    for (int k = 0; k < 20; ++k) {
+      follower.now += uniform(-1.0, 1.0) * limits.speed * 1e-3;
+      follower.offset = uniform(-0.49, 0.49) * limits.noise;
+      follower.run(1);
+    }
+    const Batch good = send(frontend, 0, follower.now, {.pace = iterations(5)});
+    follower.offset = 0.0;
+    follower.run(400);
+    ASSERT_EQ(good.handle(0).status, Status::completed) << good.handle(0).text;
+
+    // far enough that no delay of this machine makes it plausible, in one row or in all
+    const double wrong = std::copysign(1e5 * std::pow(10.0, uniform(0.0, 290.0)), uniform(-1, 1));
+    follower.offset = i % 3 == 0 ? kInfinity : wrong;
+    follower.run(1);
+    if (i % 2 == 0) follower.run(3000);
+    add(frontend, 1, 1.0);
+    add(frontend, 0, 1.0, {.pace = iterations(5)});
+    const Batch bad = frontend.pulse();
+    follower.run(1);
+    for (const Handle& handle : bad.handles()) {
+      EXPECT_EQ(handle.status, Status::rejected) << i;
+      EXPECT_EQ(handle.reason, Reason::reading);
+      EXPECT_THAT(handle.text, AllOf(HasSubstr("actuator 'shoulder' was read at"),
+                                     HasSubstr("resume with --accept-reading")));
+    }
+    // it comes back, and is followed to there
+    follower.offset = 0.0;
+    follower.run(1);
+    const Batch early = send(frontend, 0, 0.0, {.pace = iterations(5)});
+    follower.run(1);
+    EXPECT_EQ(early.handle(0).reason, Reason::reading);
+    EXPECT_EQ(follower.written, follower.now);
+    const Batch again = send(frontend, 0, 0.0, {.pace = iterations(5)});
+    follower.run(400);
+    EXPECT_EQ(again.handle(0).status, Status::completed) << again.handle(0).text;
+  }
+}
+
+TEST_F(FollowerTest, OneTurnOffInEveryRowIsAcceptedByAResumeOnly) {
+  Follower follower({.speed = 2.0, .noise = 0.03});
+  UntypedFrontend frontend("pair");
+  follower.run(3);
+  follower.offset = 6.283e5;
+  follower.run(5);
+  const Batch refused = send(frontend, 0, 6.283e5, {.pace = iterations(5)});
+  follower.run(1);
+  EXPECT_EQ(refused.handle(0).reason, Reason::reading);
+  const std::uint64_t number = frontend.halt("");
+  follower.run(3);
+  BatchBuilder builder;
+  builder.resume(number, true);
+  const Batch resumed = frontend.pulse(builder);
+  follower.run(1);
+  ASSERT_EQ(resumed.handle(0).status, Status::completed) << resumed.handle(0).text;
+  const Batch taken = send(frontend, 0, 6.283e5, {.pace = iterations(5)});
+  follower.run(6);
+  EXPECT_EQ(taken.handle(0).status, Status::completed) << taken.handle(0).text;
+}
+
+}  // namespace
+}  // namespace o80::test
