@@ -134,6 +134,7 @@ Handle Batch::ask(CommandId id) const {
     if (const auto running = running_request(link_->segment.view(), lane_->lane(), id)) {
       handle.progress = printable(running->progress_text());
     }
+    if (handle.reason == Reason::limits) handle.text = late_text(answer.word.detail, handle.late);
     return handle;
   }
   const bool has_message = handle.reason == Reason::driver || handle.reason == Reason::halted ||
