@@ -22,6 +22,7 @@ from o80_table_tennis.lab.parts import (
 )
 from o80_table_tennis.lab.picture import BOXES, drawn
 from o80_table_tennis.lab.real_time import Lab
+from o80_table_tennis.lab.report import not_measured
 
 PAGE = Path(__file__).parents[3] / "docs" / "lab.md"
 LONGEST = 300.0
@@ -83,10 +84,32 @@ def test_balls_are_played_and_reported(tmp_path: Path) -> None:
     assert report["launcher"]["completed"] >= 2
     assert set(report["processes"]) == set(NINE) - {"recorder", "view"}
     assert report["processes"][ARM]["scheduling"] == "other"
-    assert report["motion_capture_error_mm"]["50%"] < 5.0
-    assert report["tracking_error_mm"]["at the time of the images"]["50%"] < 5.0
+    # a busy machine may take no image of a flight: then the report says so
+    tracking = report["tracking_error_mm"]
+    for name, found in (
+        ("motion_capture_error_mm", report["motion_capture_error_mm"]),
+        ("tracking_error_mm", tracking and tracking["at the time of the images"]),
+    ):
+        assert found is None or found["50%"] < 5.0
+        assert found or any(said.startswith(f"{name}: no row") for said in report["not_measured"])
     assert SUPERVISOR in report["processor_percent"]
     assert not [each.name for each in o80.segments() if each.name.startswith(prefix)]
+
+
+def test_a_figure_that_no_row_gives_is_told_with_what_was_missed() -> None:
+    good = {"mean": 1.0}
+    report = {
+        "processes": {ARM: {"missed_percent": 0.0}, "tracker": {"missed_percent": 71.4}},
+        "latency_ms": {"image to row of the tracker": None, "other": good},
+        "tracking_error_mm": None,
+        "motion_capture_error_mm": good,
+    }
+    latency, tracking = not_measured(report)
+    assert latency.startswith("latency_ms: no row tells image to row of the tracker; of the ")
+    assert tracking.startswith("tracking_error_mm: no row tells tracking_error_mm; of the periods:")
+    assert "tracker 71 % missed" in tracking
+    assert "environment did not run" in tracking
+    assert not_measured({**report, "latency_ms": {}, "tracking_error_mm": good}) == []
 
 
 def test_the_page_shows_the_picture_that_the_command_draws() -> None:

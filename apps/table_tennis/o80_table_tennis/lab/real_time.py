@@ -166,6 +166,8 @@ def play_in_real_time(
             wanted = found.get("wanted", f"at most {found.get('most')}")
             missed = "" if found["reached"] else ": not reached"
             console.print(f"{what}: {found['measured']} ({wanted}){missed}", highlight=False)
+        for sentence in report["not_measured"]:
+            console.print(sentence, highlight=False)
         console.print(f"report: {settings.folder / 'report.json'}")
         return report
 

@@ -67,6 +67,7 @@ def write_report(
         "wall_clock": time.strftime("%Y-%m-%d %H:%M:%S"),
         "kernel": os.uname().version,
     }
+    report["not_measured"] = not_measured(report)
     path = settings.folder / REPORT
     if (bursting := _told_before(path)) is not None:
         report[BURSTING] = bursting
@@ -216,14 +217,15 @@ def _tracking_error(rows: _Rows) -> dict[str, Any] | None:
     then = np.minimum(np.searchsorted(played.arm_time, when), len(when) - 1)
     seen_then = seen_then & (np.asarray(played.arm_time)[then] == when)
     observed = np.asarray(played.observed_ball) - np.asarray(played.true_ball)[then]
+    in_play = np.asarray(played.seen)[played.phase == Phase.playing]
     return {
         "at the time of the images": spread(1e3 * np.linalg.norm(away, axis=1)),
         "as observed, flown on to the row of the arm": spread(
             1e3 * np.linalg.norm(observed[np.asarray(played.seen)], axis=1)
         ),
-        "share of the rows with a ball that was seen": round(
-            float(np.mean(np.asarray(played.seen)[played.phase == Phase.playing])), 4
-        ),
+        "share of the rows with a ball that was seen": round(float(np.mean(in_play)), 4)
+        if len(in_play) > 0
+        else None,
     }
 
 
@@ -248,6 +250,34 @@ def _launcher(rows: _Rows) -> dict[str, int]:
         return {}
     names = ("completed", "rejected", "not_sent", "timed_out")
     return {name: int(history.extended[name][-1]) for name in names}
+
+
+SOURCES = {
+    "latency_ms": (TRACKER, MOTION_CAPTURE, ENVIRONMENT),
+    "tracking_error_mm": (TRACKER, CAMERAS, ENVIRONMENT),
+    "motion_capture_error_mm": (MOTION_CAPTURE, ARM),
+}
+"""Figures of the report, with the processes whose rows they are computed from."""
+
+
+def not_measured(report: Mapping[str, Any]) -> list[str]:
+    """A sentence for each figure that no row gives, as on a machine that is much too slow."""
+    sentences = []
+    for name, parts in SOURCES.items():
+        figures = report[name]
+        if isinstance(figures, dict) and None not in figures.values():
+            continue
+        said = []
+        for part in parts:
+            process = report["processes"].get(part)
+            share = None if process is None else process["missed_percent"]
+            missed = "did not run" if share is None else f"{share:.0f} % missed"
+            said.append(f"{part} {missed}")
+        lacking = [key for key, value in (figures or {name: None}).items() if value is None]
+        sentences.append(
+            f"{name}: no row tells {', '.join(lacking)}; of the periods: {', '.join(said)}"
+        )
+    return sentences
 
 
 def _wanted(processes: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
