@@ -39,7 +39,7 @@ class Said:
     seconds: float
     """From the last row of the killed process to the row that says so."""
     rows: int
-    """Of that part in between."""
+    """Of that part since the killed process had ended: a busy machine takes its time to end it."""
 
     @property
     def in_time(self) -> bool:
@@ -52,6 +52,8 @@ class Outcome:
     """What was seen after a kill."""
 
     killed: str
+    ended_at: int = 0
+    """When the killed process had ended [ns]."""
     said: list[Said] = field(default_factory=list)
     stood_still: list[str] = field(default_factory=list)
     went_on: list[str] = field(default_factory=list)
@@ -85,7 +87,7 @@ class Killer:
             last = self._kill(name, observers, outcome)
             for mark in kill.marks:
                 if mark.part != SUPERVISOR:
-                    outcome.said.append(said(mark, observers[mark.part], last))
+                    outcome.said.append(said(mark, observers[mark.part], last, outcome.ended_at))
             self._look_at_others(kill, observers, outcome)
         finally:
             for each in observers.values():
@@ -98,6 +100,7 @@ class Killer:
         lab = self._lab
         before = time.monotonic_ns()
         ended: PartEndedError = lab.processes.kill(name)
+        outcome.ended_at = time.monotonic_ns()
         lab.events.add(name, str(ended))
         assert ended.code == -9, f"{name} ended before it was killed: {ended}"
         outcome.said.append(Said(SUPERVISOR, (time.monotonic_ns() - before) * 1e-9, 0))
@@ -115,7 +118,7 @@ class Killer:
             if name in observers:
                 observer = observers[name]
                 if not observer.bursting or ENVIRONMENT in kill.goes_on:
-                    observer.wait_for(observer.published + ROWS_ON, timeout=WITHIN)
+                    wait_for_rows(observer, name)
             else:
                 assert self._lab.processes.runs(name), f"{name} has ended with {kill.killed}"
             outcome.went_on.append(name)
@@ -155,8 +158,8 @@ class Killer:
             wait_until(another, "a ball is played")
 
 
-def said(mark: Mark, observer: o80.Frontend, last: int) -> Said:
-    """The first row, or entry, after the time `last` [ns] that says so."""
+def said(mark: Mark, observer: o80.Frontend, last: int, ended_at: int) -> Said:
+    """The first row, or entry, after the time `last` [ns] that says so, after the end [ns]."""
     found: list[int] = []
 
     def look() -> bool:
@@ -164,7 +167,8 @@ def said(mark: Mark, observer: o80.Frontend, last: int) -> Said:
         return bool(found)
 
     wait_until(look, f"{mark.part} says: {mark.says}")
-    rows = observer.history().select(from_time=last, to_time=found[0])
+    begin = min(max(last, ended_at), found[0])
+    rows = observer.history().select(from_time=begin, to_time=found[0])
     return Said(mark.part, (found[0] - last) * 1e-9, len(rows))
 
 
@@ -180,6 +184,12 @@ def _first(mark: Mark, observer: o80.Frontend, last: int) -> list[int]:
             if when > last:
                 return [when]
     return []
+
+
+def wait_for_rows(observer: o80.Frontend, name: str) -> None:
+    """Until rows have come: not for one of them, which a short history may have lost by then."""
+    enough = observer.published + ROWS_ON
+    wait_until(lambda: observer.published >= enough, f"{name} goes on")
 
 
 def wait_until(holds: object, what: str) -> None:
