@@ -2,26 +2,27 @@
 
 import json
 import socket
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from http.client import HTTPConnection
 from typing import Any
 
 import pytest
 
 import o80
+from o80.view.head import LARGEST_HEAD, LARGEST_REQUEST, Head, Refused, take_head
 from o80.view.serve import page_server
-from o80.view.server import LARGEST_REQUEST, PageServer
+from o80.view.server import PageServer
 
 TIMEOUT = 60.0
 
 
 @pytest.fixture
-def server(segment: str) -> Iterator[PageServer]:
-    with (
-        o80.robots.load("two_joints").inline(segment) as frontend,
-        page_server([segment]) as server,
-    ):
-        frontend.burst(5)
+def server(arm: o80.Frontend, monkeypatch: pytest.MonkeyPatch) -> Iterator[PageServer]:
+    """One that refuses without delay."""
+    monkeypatch.setattr("o80.view.gate.REFUSED_AFTER", 0.0)
+    monkeypatch.setattr("o80.view.gate.TICK", 0.005)
+    arm.burst(5)
+    with page_server([arm.segment]) as server:
         yield server
 
 
@@ -73,13 +74,13 @@ def test_nothing_comes_without_the_token(server: PageServer, target: str) -> Non
 
 @pytest.mark.parametrize("path", ["/look", "/halt", "/resume"])
 @pytest.mark.parametrize("given", ["", "Bearer ", "Bearer wrong", "Basic dXNlcg=="])
-def test_no_request_is_obeyed_without_the_token(server: PageServer, path: str, given: str) -> None:
-    [segment] = [entry.name for entry in o80.segments()]
-    body = json.dumps({"segment": segment})
+def test_no_request_is_obeyed_without_the_token(
+    server: PageServer, arm: o80.Frontend, path: str, given: str
+) -> None:
+    body = json.dumps({"segment": arm.segment})
     code, _ = ask(server, "POST", path, {"Authorization": given}, body)
     assert code == 403
-    with o80.Frontend(segment, read_only=True) as frontend:
-        assert frontend.halted is None
+    assert not halted(arm)
 
 
 @pytest.mark.parametrize(
@@ -195,19 +196,164 @@ def test_a_taken_port_is_an_error(server: PageServer) -> None:
 
 
 def test_the_server_listens_on_this_computer_alone(server: PageServer) -> None:
-    assert server.server_address[0] == "127.0.0.1"
+    assert server.address == "127.0.0.1"
     assert server.url.startswith(f"http://127.0.0.1:{server.port}/?token=")
     assert len(server.token) >= 32
 
 
-def test_many_idle_connections_do_not_keep_a_page_out_for_ever(server: PageServer) -> None:
-    idle = [socket.create_connection(("127.0.0.1", server.port), TIMEOUT) for _ in range(120)]
-    for connection in idle:
-        connection.close()
-    for _ in range(100):
-        try:
-            assert post(server, "/look", {})[0] == 200
-            return
-        except OSError:
-            continue
-    raise AssertionError("the server refuses all connections")
+def answer_to(server: PageServer, request: str) -> str:
+    """All that is sent until the server closes the connection."""
+    with socket.create_connection(("127.0.0.1", server.port), TIMEOUT) as connection:
+        connection.sendall(request.encode("latin-1"))
+        return connection.makefile(encoding="latin-1", newline="").read()
+
+
+FIRST = "POST /halt HTTP/1.1"
+
+
+def request(
+    server: PageServer, arm: o80.Frontend, *more: str, first: str = FIRST, end: str = "\r\n"
+) -> str:
+    """A halt with the token, which would be obeyed, and with further lines."""
+    body = json.dumps({"segment": arm.segment})
+    own = [f"Host: 127.0.0.1:{server.port}", f"Authorization: Bearer {server.token}"]
+    if not any(line.startswith("Content-Length") for line in more):
+        own.append(f"Content-Length: {len(body)}")
+    return end.join([first, *own, *more, "", ""]) + body
+
+
+def halted(arm: o80.Frontend) -> bool:
+    """Whether a halt has arrived; it acts in the next step."""
+    arm.burst(1)
+    return arm.halted is not None
+
+
+@pytest.mark.parametrize(
+    ("lines", "code"),
+    [
+        *(
+            ([f"Content-Length: {length}"], code)
+            for length, code in (
+                *((text, 400) for text in ("", "-1", "+5", "1_0", "0x5", "5, 5", "5 5", "\xb2")),
+                ("9" * 5000, 413),
+                ("0" * 5000, 413),
+                (str(LARGEST_REQUEST + 1), 413),
+            )
+        ),
+        *(
+            ([line], 400)
+            for line in (
+                "Host: evil.example",
+                "hOST: 127.0.0.1",
+                "AUTHORIZATION: Bearer wrong",
+                "Transfer-Encoding: chunked",
+                "transfer-encoding: identity",
+                " folded",
+                "\tfolded",
+                "no colon",
+                ": no name",
+                "Name : x",
+                "Na\xefme: x",
+                "X: a\0b",
+                "X: a\rb",
+                "X: a\r",
+                "X: a\nb: c",
+                "X: a\x7fb",
+            )
+        ),
+        (["Content-Length: 5", "Content-Length: 5"], 400),
+        (["Content-Length: 5", "CONTENT-LENGTH: 6"], 400),
+        ([f"X: {'a' * LARGEST_HEAD}"], 431),
+    ],
+)
+def test_a_head_that_can_be_read_in_two_ways_is_refused_and_its_connection_closed(
+    server: PageServer, arm: o80.Frontend, lines: list[str], code: int
+) -> None:
+    answer = answer_to(server, request(server, arm, *lines))
+    assert answer.startswith(f"HTTP/1.1 {code} ")
+    assert answer.count("HTTP/1.1") == 1, "the rest was not read as a request"
+    assert post(server, "/look", {})[0] == 200
+    assert not halted(arm)
+
+
+@pytest.mark.parametrize(
+    "first",
+    [
+        "",
+        "POST /halt",
+        "POST /halt HTTP/2.0",
+        "POST /halt HTTP/1.1 ",
+        "POST  /halt HTTP/1.1",
+        "POST /ha lt HTTP/1.1",
+        "POST halt HTTP/1.1",
+        "POST http://127.0.0.1/halt HTTP/1.1",
+        "post /halt HTTP/1.1",
+        "\x16\x03\x01",
+    ],
+)
+def test_a_first_line_that_is_none_is_refused(
+    server: PageServer, arm: o80.Frontend, first: str
+) -> None:
+    assert answer_to(server, request(server, arm, first=first)).startswith("HTTP/1.1 400 ")
+    assert not halted(arm)
+
+
+def test_lines_end_with_both_characters(server: PageServer, arm: o80.Frontend) -> None:
+    assert answer_to(server, request(server, arm, end="\n")).startswith("HTTP/1.1 400 ")
+    assert not halted(arm)
+
+
+@pytest.mark.parametrize("written", [str.lower, str.upper, str.title, str.swapcase])
+def test_the_names_of_headers_have_no_case(
+    server: PageServer, written: Callable[[str], str]
+) -> None:
+    host = f"{written('Host')}: localhost:{server.port}"
+    token = f"{written('Authorization')}: {written('Bearer')} {server.token}"
+    length = f"{written('Content-Length')}: 2"
+    foreign = (f"{written('Origin')}: http://evil", f"{written('Sec-Fetch-Site')}: cross-site")
+    for more, code in ((), 200), (foreign[:1], 403), (foreign[1:], 403):
+        close = f"{written('Connection')}: {written('Close')}"
+        head = "\r\n".join(["POST /look HTTP/1.1", host, token, length, close, *more, "", ""])
+        assert answer_to(server, head + "{}").startswith(f"HTTP/1.1 {code} ")
+
+
+@pytest.mark.parametrize("cut", range(1, 40, 3))
+def test_a_head_is_read_alike_however_it_is_cut(cut: int) -> None:
+    well = b"POST /look?a=b HTTP/1.1\r\nHost: here\r\nContent-Length: 2\r\n\r\n"
+    assert read_in_parts(well + b"{}", cut) == read_in_parts(well + b"{}", 1000)
+    for place in range(len(well) - 4):
+        for wrong in (b"\r", b"\n", b"\0", b"\r\r\n"):
+            given = well[:place] + wrong + well[place:]
+            assert isinstance(read_in_parts(given, 1000), int), given
+            assert isinstance(read_in_parts(given, cut), int), given
+
+
+def read_in_parts(given: bytes, cut: int) -> Head | int:
+    """The head, or the code with which it is refused."""
+    received = bytearray()
+    checked = 0
+    try:
+        for begin in range(0, len(given), cut):
+            received += given[begin : begin + cut]
+            head = take_head(received, checked)
+            if head is not None:
+                return head
+            checked = len(received)
+    except Refused as refused:
+        return refused.code
+    raise AssertionError("the head is never complete")
+
+
+def test_requests_may_follow_each_other_on_a_connection(
+    server: PageServer, arm: o80.Frontend
+) -> None:
+    look = request(server, arm, first="POST /look HTTP/1.1")
+    answer = answer_to(server, look + look + request(server, arm, "Connection: close"))
+    assert answer.count("HTTP/1.1 200 OK") == 3
+    assert halted(arm)
+
+
+def test_a_number_that_is_none_is_answered(server: PageServer) -> None:
+    for number in (1e400, 10**30, -(10**30)):
+        code, _ = post(server, "/resume", {"segment": "none", "number": number})
+        assert code in (400, 409)

@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import resource
 import signal
 import sys
 import threading
@@ -14,6 +15,7 @@ from o80.view.server import PageServer
 from o80.view.source_list import SourceList
 
 HOST = "127.0.0.1"
+DESCRIPTORS = 4096  # so that many strangers are no problem; the usual limit is 1024
 
 
 @contextmanager
@@ -29,19 +31,27 @@ def page_server(
 
     Raises o80.Error if the port is taken, RecordingError if a file cannot be read.
     """
+    allow_descriptors(DESCRIPTORS)
     sources = SourceList(names, model_files=model_files)
     answers = Answers(sources, control=control)
     server = PageServer(
         host, port, {"/look": answers.look, "/halt": answers.halt, "/resume": answers.resume}
     )
-    thread = threading.Thread(target=server.serve_forever, args=(0.1,), daemon=True)
+    thread = threading.Thread(target=server.serve, daemon=True)
     thread.start()
     try:
         yield server
     finally:
-        server.shutdown()
-        server.server_close()
+        server.close()
         thread.join()
+
+
+def allow_descriptors(wanted: int) -> None:
+    """Raises the limit of this process as far as its user may."""
+    now, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    allowed = wanted if most == resource.RLIM_INFINITY else min(wanted, most)
+    if now != resource.RLIM_INFINITY and now < allowed:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (allowed, most))
 
 
 def wait_for_end(*, until_eof: bool) -> None:

@@ -1,0 +1,98 @@
+"""The head of a request. It is read strictly: whatever two programs could read in two ways is
+refused, and no number is made of digits before they are counted."""
+
+import re
+from dataclasses import dataclass
+
+import o80
+
+LARGEST_HEAD = 1 << 14  # [bytes]
+LARGEST_REQUEST = 1 << 16  # the body [bytes]
+
+_END = b"\r\n\r\n"
+_CONTROL = re.compile(rb"[\0-\x08\x0b\x0c\x0e-\x1f\x7f]")
+_FIRST_LINE = re.compile(r"([A-Z]{1,20}) (/[!-~]*) HTTP/1\.([01])")
+_NAME = re.compile(r"[\w!#$%&'*+.^`|~-]+", re.ASCII)
+_LENGTH = re.compile(r"[0-9]+")
+
+
+class Refused(o80.Error):
+    """A head that is not obeyed."""
+
+    def __init__(self, code: int, why: str) -> None:
+        super().__init__(why)
+        self.code = code
+
+
+@dataclass(frozen=True)
+class Head:
+    """A request without its body."""
+
+    method: str
+    path: str
+    query: str
+    headers: dict[str, str]  #: by name in lower case
+    length: int  #: of the body [bytes]
+    last: bool  #: the connection is closed after the answer
+
+
+def take_head(received: bytearray, checked: int) -> Head | None:
+    """Takes a head from the begin of what was received; None while it is incomplete.
+
+    checked: so many bytes were looked at before. Raises Refused, also for an incomplete head.
+    """
+    end = received.find(_END, max(0, checked - len(_END) + 1))
+    stop = min(len(received) if end < 0 else end + len(_END), LARGEST_HEAD)
+    if _CONTROL.search(received, checked, stop) or not _lines_end_well(received, checked, stop):
+        raise Refused(400, "the head has a control character, or a line that ends without CR LF")
+    if end > LARGEST_HEAD or (end < 0 and len(received) > LARGEST_HEAD):
+        raise Refused(431, f"the head is longer than {LARGEST_HEAD} bytes")
+    if end < 0:
+        return None
+    first, *lines = received[:end].decode("latin-1").split("\r\n")
+    del received[: end + len(_END)]
+    asked = _FIRST_LINE.fullmatch(first)
+    if asked is None:
+        raise Refused(400, "the first line must be: METHOD /path HTTP/1.1")
+    method, target, minor = asked.groups()
+    headers = _headers(lines)
+    path, _, query = target.partition("?")
+    last = minor == "0" or "close" in headers.get("connection", "").lower()
+    return Head(method, path, query, headers, _length(headers), last)
+
+
+def _lines_end_well(received: bytearray, checked: int, stop: int) -> bool:
+    """Each CR has its LF, and the reverse; the last CR may still wait for it."""
+    before = max(0, checked - 1)
+    both = received.count(b"\r\n", before, stop)
+    return (
+        both
+        == received.count(b"\n", checked, stop)
+        == received.count(b"\r", before, max(before, stop - 1))
+    )
+
+
+def _headers(lines: list[str]) -> dict[str, str]:
+    headers: dict[str, str] = {}
+    for number, line in enumerate(lines, 2):
+        name, colon, value = line.partition(":")
+        if not colon or not _NAME.fullmatch(name):
+            raise Refused(400, f"line {number} of the head is not: Name: value")
+        name = name.lower()
+        if name in headers:
+            raise Refused(400, f"the header {name} is given twice")
+        headers[name] = value.strip(" \t")
+    if "host" not in headers:
+        raise Refused(400, "the header Host is missing")
+    return headers
+
+
+def _length(headers: dict[str, str]) -> int:
+    if "transfer-encoding" in headers:
+        raise Refused(400, "Transfer-Encoding is not supported: send a Content-Length")
+    digits = headers.get("content-length", "0")
+    if not _LENGTH.fullmatch(digits):
+        raise Refused(400, "Content-Length must be digits")
+    if len(digits) > len(str(LARGEST_REQUEST)) or int(digits) > LARGEST_REQUEST:
+        raise Refused(413, f"the request is larger than {LARGEST_REQUEST} bytes")
+    return int(digits)

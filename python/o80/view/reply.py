@@ -1,0 +1,40 @@
+"""An answer as the bytes of HTTP."""
+
+import json
+from dataclasses import dataclass
+from http import HTTPStatus
+from typing import Any
+
+NOTHING = "default-src 'none'"  # a content security policy
+
+
+@dataclass(frozen=True)
+class Reply:
+    """Status, and what is shown."""
+
+    code: int
+    body: bytes
+    kind: str = "text/plain"
+    policy: str = NOTHING
+
+    @classmethod
+    def json(cls, code: int, body: dict[str, Any]) -> "Reply":
+        """A JSON object."""
+        return cls(code, json.dumps(body).encode(), "application/json")
+
+    def as_bytes(self, *, last: bool) -> bytes:
+        """Head and body. last: the connection is closed after it."""
+        lines = [
+            f"HTTP/1.1 {self.code} {HTTPStatus(self.code).phrase}",
+            "Server: o80",
+            f"Content-Type: {self.kind}; charset=utf-8",
+            f"Content-Length: {len(self.body)}",
+            f"Content-Security-Policy: {self.policy}",
+            "Cache-Control: no-store",
+            "Referrer-Policy: no-referrer",  # the address holds the token
+            "X-Content-Type-Options: nosniff",
+            "X-Frame-Options: DENY",
+            "Cross-Origin-Resource-Policy: same-origin",
+            *(["Connection: close"] if last else []),
+        ]
+        return "\r\n".join([*lines, "", ""]).encode() + self.body
