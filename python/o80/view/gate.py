@@ -139,7 +139,11 @@ class Gate:
             return
         except OSError:
             data = b""
-        if not data:
+        if not data and connection in self._strangers and not connection.refused:
+            connection.refused = True  # closed later, as one that is told why
+            connection.until = time.monotonic() + REFUSED_AFTER
+            self._unwatch(connection)
+        elif not data:
             self._drop(connection)
         elif connection.refused:
             connection.ignored += len(data)
