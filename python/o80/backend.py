@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from o80 import _core, at_exit
 from o80.checked import mapping
 from o80.description import Described, Limit, SchemaWriter
+from o80.enumerations import numbers_of
 from o80.errors import Closed, InvalidArgument, RequestRejected
-from o80.layout import Layout, dtype_of_type
+from o80.layout import Layout, record_of
 from o80.loop_options import loop_texts
 from o80.record import Record
 from o80.words import IdleWord, StaleWord
@@ -152,9 +153,9 @@ class Backend:
         self._handlers: dict[str, Handler] = {}
         self._fresh_start: StartAfresh | None = None  # of a request that has ended
         self._halt_handlers: dict[str, Callable[[], None]] = {}
-        self._observed = self._states(native.observed)
-        self._fresh_desired = self._states(native.fresh_desired)
-        self._extended: NDArray[Any] = np.ndarray((), self._layout.extras, native.extended)
+        self._observed = self._layout.labelled_states(self._states(native.observed))
+        self._fresh_desired = self._layout.labelled_states(self._states(native.fresh_desired))
+        self._extended = self._layout.labelled_extras(native.extended)
         native.serve_with = Server(self)
         self._native = native
         at_exit.close_later(self)
@@ -207,7 +208,7 @@ class Backend:
         if not native.step(timeout):
             return None
         states = self._states(native.desired())
-        return states if self._layout.states.subdtype is not None else Record(states)
+        return self._layout.of_states(states)
 
     # ------------------------------------------------------------------ requests and halts
 
@@ -389,9 +390,8 @@ class Server:
                 f"Backend.on({row['name']!r}, handler)"
             )
         fields = np.frombuffer(bytearray(payload), np.uint8)
-        described = dtype_of_type(row["type"])
         try:
-            answer = handler(Record(np.ndarray((), described, fields)))
+            answer = handler(record_of(row["type"], fields))
         except RequestRejected as why:
             return str(why) or "the handler gave no reason"
         if answer is None:
@@ -459,6 +459,7 @@ def fill(block: NDArray[Any], values: Any, what: str) -> None:
             except (TypeError, ValueError) as error:
                 raise InvalidArgument(f"{what}: field {name!r}: {error}") from error
     else:
+        values = numbers_of(getattr(block, "_labels", None), values)
         try:
             array = np.asarray(values, block.dtype)
         except (TypeError, ValueError) as error:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from o80.layout import dtype_of_field
+from o80.layout import dtype_of_field, labels_of_field
 
 if TYPE_CHECKING:
     from o80.history import History
@@ -53,7 +53,7 @@ def _numbers(
             if field["kind"] == "struct":
                 yield from _numbers(field["type"], name, offset, origin)
             else:
-                labels = field["labels"] if field["kind"] == "enum" else None
+                labels = labels_of_field(field)._labels_ if field["kind"] == "enum" else None
                 yield Column(name, dtype, offset, labels, origin)
 
 

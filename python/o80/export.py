@@ -1,5 +1,6 @@
 """Histories as files of other formats, one column a number."""
 
+import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from o80.extras import needed
 from o80.history import History
 
 Columns = dict[str, NDArray[Any]]
+Labels = dict[str, dict[int, str]]
 HEAD = ("iteration", "time", "lateness", "overruns", "skipped", "fresh", "halted")
 
 
@@ -32,31 +34,55 @@ def write(path: Path, histories: Mapping[str, History]) -> None:
     """Writes histories, by name, in the format that the suffix of the path names.
 
     .npz: arrays `name/column`. .h5, .hdf5: a group per name with a dataset per column. .parquet:
-    one table; only for a single history. Raises InvalidArgument, MissingExtra, OSError.
+    one table; only for a single history. Enumerations are numbers, and their labels are in an array
+    `name/column.labels` of (label, number), in the HDF5 type of the dataset, or as JSON in
+    the metadata `labels` of the column. Raises InvalidArgument, MissingExtra, OSError.
     """
     if path.suffix not in WRITERS:
         known = ", ".join(WRITERS)
         raise InvalidArgument(f"unknown format '{path.suffix}' of {path}: choose one of {known}")
-    WRITERS[path.suffix](path, {name: columns_in(each) for name, each in histories.items()})
+    labels = {name: labels_in(each) for name, each in histories.items()}
+    columns = {name: columns_in(each) for name, each in histories.items()}
+    WRITERS[path.suffix](path, columns, labels)
 
 
-def _write_npz(path: Path, histories: Mapping[str, Columns]) -> None:
+def labels_in(history: History) -> Labels:
+    """The labels of the columns with an enumeration, by number."""
+    return {
+        column.name: {number: label for label, number in reversed(column.labels.items())}
+        for column in columns_of(history.schema)
+        if column.labels is not None
+    }
+
+
+def _write_npz(path: Path, histories: Mapping[str, Columns], labels: Mapping[str, Labels]) -> None:
     arrays = {
         f"{name}/{column}": v for name, each in histories.items() for column, v in each.items()
     }
+    for name, each in labels.items():
+        for column, known in each.items():
+            rows = [(label, number) for number, label in known.items()]
+            text = f"U{max(map(len, known.values()), default=1) or 1}"
+            kind = [("label", text), ("number", histories[name][column].dtype)]
+            arrays[f"{name}/{column}.labels"] = np.array(rows, kind)
     np.savez_compressed(path, allow_pickle=False, **arrays)
 
 
-def _write_hdf5(path: Path, histories: Mapping[str, Columns]) -> None:
+def _write_hdf5(path: Path, histories: Mapping[str, Columns], labels: Mapping[str, Labels]) -> None:
     h5py = needed("h5py", "export", "a file of HDF5")
     with h5py.File(path, "w") as file:
         for name, columns in histories.items():
             group = file.create_group(name)
             for column, values in columns.items():
+                if known := labels[name].get(column):
+                    numbers = {label: number for number, label in known.items()}
+                    values = values.astype(h5py.enum_dtype(numbers, values.dtype))
                 group.create_dataset(column, data=values, compression="gzip", compression_opts=1)
 
 
-def _write_parquet(path: Path, histories: Mapping[str, Columns]) -> None:
+def _write_parquet(
+    path: Path, histories: Mapping[str, Columns], labels: Mapping[str, Labels]
+) -> None:
     if len(histories) != 1:
         raise InvalidArgument(
             f"a Parquet file holds one table, but there are {len(histories)}: "
@@ -64,11 +90,17 @@ def _write_parquet(path: Path, histories: Mapping[str, Columns]) -> None:
         )
     arrow = needed("pyarrow", "export", "a file of Parquet")
     parquet = needed("pyarrow.parquet", "export", "a file of Parquet")
-    ((_, columns),) = histories.items()
-    parquet.write_table(arrow.table({name: arrow.array(v) for name, v in columns.items()}), path)
+    ((name, columns),) = histories.items()
+    arrays = [arrow.array(values) for values in columns.values()]
+    fields = []
+    for column, array in zip(columns, arrays, strict=True):
+        numbers = {label: number for number, label in labels[name].get(column, {}).items()}
+        metadata = {"labels": json.dumps(numbers)} if numbers else None
+        fields.append(arrow.field(column, array.type, metadata=metadata))
+    parquet.write_table(arrow.Table.from_arrays(arrays, schema=arrow.schema(fields)), path)
 
 
-WRITERS: dict[str, Callable[[Path, Mapping[str, Columns]], None]] = {
+WRITERS: dict[str, Callable[[Path, Mapping[str, Columns], Mapping[str, Labels]], None]] = {
     ".npz": _write_npz,
     ".h5": _write_hdf5,
     ".hdf5": _write_hdf5,

@@ -20,14 +20,15 @@ from numpy.typing import NDArray
 from o80 import _core, at_exit
 from o80.checked import whole
 from o80.closeable import Closeable
+from o80.enumerations import labelled
 from o80.errors import InvalidArgument, UsedAfterFork
 from o80.frontend import Frontend
 from o80.gather import Comparison, Gather, Gathered, flags_from, numbers_from
 from o80.group_burst import GroupBurst, chosen_copies
 from o80.group_request import GroupRequest
-from o80.layout import Layout, dtype_of_type
+from o80.layout import Layout, dtype_of_type, labels_of_type
 from o80.prepared_burst import checked_count
-from o80.trajectory import common_type, state_types
+from o80.trajectory import common_labels, common_type, state_types
 from o80.words import ModeWord, ProfileWord, StartWord
 
 if TYPE_CHECKING:
@@ -131,7 +132,9 @@ class InlineGroup(Closeable):
         """Memory for targets: in each copy those of the first actuator, then of the second, ..."""
         if not actuators or len(set(state_types(actuators, self._layout))) == 1:
             kind = common_type(actuators, self._layout)
-            return np.empty((self.copies, len(actuators), steps), kind)
+            states = np.empty((self.copies, len(actuators), steps), kind)
+            known: NDArray[Any] = labelled(states, common_labels(actuators, self._layout))
+            return known
         kinds = state_types(actuators, self._layout)
         names = [self._layout.schema["actuators"][actuator]["name"] for actuator in actuators]
         columns = [(name, kind, (steps,)) for name, kind in zip(names, kinds, strict=True)]
@@ -169,7 +172,10 @@ class InlineGroup(Closeable):
         return GroupRequest(
             self._group,
             name,
-            np.frombuffer(bytearray(payload * self.copies), kind),
+            labelled(
+                np.frombuffer(bytearray(payload * self.copies), kind),
+                labels_of_type(described["type"]),
+            ),
             np.zeros(self.copies, self._layout.row),
             self._all,
         )

@@ -8,7 +8,9 @@ import numpy as np
 
 from o80 import _core
 from o80.checked import whole
-from o80.layout import dtype_of_type, is_plain
+from o80.enumerations import labelled
+from o80.layout import dtype_of_type, is_plain, labels_of_type, record_of
+from o80.record import Record
 from o80.words import Reason, Status
 
 if TYPE_CHECKING:
@@ -171,8 +173,8 @@ class EntryDecoder:
             return JournalCommand(kind, native.id, names, only_own=native.only_own)
         if kind == "request":
             described = self._schema["requests"][native.request]
-            payload = np.frombuffer(native.payload, dtype_of_type(described["type"]), 1)[0]
-            fields = {name: payload[name].tolist() for name in payload.dtype.names or ()}
+            record = record_of(described["type"], native.payload)
+            fields = {name: _plain(record[name]) for name in record}
             return JournalCommand(kind, native.id, request=described["name"], fields=fields)
         return JournalCommand(kind, native.id, halt=native.halt or None, unknown=native.unknown)
 
@@ -180,17 +182,24 @@ class EntryDecoder:
         """The rows of one actuator; of a struct the fields that were given."""
         described = self._types[native.actuator]
         states = np.frombuffer(native.states, dtype_of_type(described), rows)
-        whole = states if rows > 1 else states[0]
+        known = labelled(states, labels_of_type(described))
+        whole = known if rows > 1 else known[0]
         if is_plain(described):
-            return whole if rows > 1 or whole.ndim else whole.item()
+            return whole.item() if isinstance(whole, np.generic) else whole
         given = iter(_bits(native.mask)) if native.mask else None
         fields: dict[str, Any] = {}
         for field in described["fields"]:
             bits = [given is None or next(given) for _ in range(_numbers(field))]
             if any(bits):
                 value = whole[field["name"]]
-                fields[field["name"]] = value if rows > 1 or value.ndim else value.item()
+                fields[field["name"]] = value.item() if isinstance(value, np.generic) else value
         return fields
+
+
+def _plain(value: Any) -> Any:
+    """A value of a record without NumPy; an enumerated one knows its label."""
+    value = np.asarray(value) if isinstance(value, Record) else value
+    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
 
 
 def _amount(native: _core.JournalRecord) -> float | None:

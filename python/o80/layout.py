@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Iterator
-from enum import IntEnum
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o80 import _core
+from o80.enumerations import Enumeration, enumeration_of, labelled
 from o80.errors import InvalidArgument
 from o80.record import Record
 
@@ -56,20 +56,32 @@ def dtype_of_type(described: dict[str, Any]) -> np.dtype[Any]:
     )
 
 
-def labels_of_type(described: dict[str, Any]) -> dict[Any, Any]:
-    """Labels of enumerations, by field and number; those of nested structs by field and field."""
+def labels_of_type(described: dict[str, Any]) -> Any:
+    """The enumeration of a plain field; of a struct those of its fields, by name."""
     if is_plain(described):
-        return labels_of_field(described["fields"][0])
+        return labels_of_field(described["fields"][0], described["name"])
     found = {field["name"]: labels_of_field(field) for field in described["fields"]}
     return {name: labels for name, labels in found.items() if labels}
 
 
-def labels_of_field(field: dict[str, Any]) -> dict[Any, Any]:
+def labels_of_field(field: dict[str, Any], otherwise: str = "") -> Any:
+    """The labels of a field, empty or None without enumerations. otherwise: name for no name."""
     if field["kind"] == "struct":
         return labels_of_type(field["type"])
     if field["kind"] != "enum":
-        return {}
-    return {number: label for label, number in field["labels"].items()}
+        return None
+    bits, is_signed = 8 * field["size"], field["signed"]
+    wrapped = 1 << bits
+    labels = []
+    for label, number in field["labels"].items():
+        value = number % wrapped  # an unsigned number is described as a signed one of 64 bits
+        labels.append((label, value - wrapped if is_signed and value >> (bits - 1) else value))
+    return enumeration_of(field["name"] or otherwise or "state", tuple(labels))
+
+
+def record_of(described: dict[str, Any], buffer: Any) -> Record:
+    """A record of a described type in the memory of a buffer."""
+    return Record(np.ndarray((), dtype_of_type(described), buffer), labels_of_type(described))
 
 
 def dtype_of_block(groups: list[dict[str, Any]], size: int) -> np.dtype[Any]:
@@ -161,6 +173,12 @@ class Layout:
         self._mask_bytes: int = row["mask_words"] * 8
         self._is_array = self.states.subdtype is not None
         self._element, self._shape = self.states.subdtype or (self.states, ())
+        groups = {group["name"]: labels_of_type(group["type"]) for group in schema["groups"]}
+        #: enumerations of states, by group
+        self.labels = {name: labels for name, labels in groups.items() if labels}
+        #: enumerations of sensor values, by field
+        self.extended_labels = labels_of_type(schema["extended"]) if "extended" in schema else {}
+        self._is_plain_array = self._is_array and not self.labels
 
     @cached_property
     def row(self) -> np.dtype[Any]:
@@ -197,12 +215,12 @@ class Layout:
         )
 
     @cached_property
-    def enums(self) -> dict[str, type[IntEnum]]:
+    def enums(self) -> dict[str, type[Enumeration]]:
         """An enum for each enumerated field: by its name, and by "Type.field".
 
         If a state is a plain enum, its enum is named after the group, or "state".
         """
-        found: dict[str, type[IntEnum]] = {}
+        found: dict[str, type[Enumeration]] = {}
         ambiguous: set[str] = set()
         types = [(group["type"], group["name"]) for group in self.schema["groups"]]
         types += [(request["type"], request["name"]) for request in self.schema["requests"]]
@@ -213,27 +231,35 @@ class Layout:
                 if field["kind"] != "enum":
                     continue
                 name = field["name"] or owner["name"] or place or "state"
-                values = IntEnum(name, field["labels"])  # type: ignore[misc]
+                values = labels_of_field(field, owner["name"])
                 found[f"{owner['name']}.{name}" if field["name"] else name] = values
-                if name in found and list(found[name].__members__) != list(values.__members__):
+                if name in found and found[name]._labels_ != values._labels_:
                     ambiguous.add(name)
                 found.setdefault(name, values)
         return {name: values for name, values in found.items() if name not in ambiguous}
 
-    @cached_property
-    def _state_labels(self) -> dict[Any, Any]:
-        return {group["name"]: labels_of_type(group["type"]) for group in self.schema["groups"]}
+    def of_states(self, states: NDArray[Any]) -> Any:
+        """States as an array, or as a record of groups; they know their labels."""
+        if self._is_plain_array:
+            return states
+        return labelled(states, self.labels[""]) if self._is_array else Record(states, self.labels)
 
-    @cached_property
-    def _extended_labels(self) -> dict[Any, Any]:
-        return labels_of_type(self.schema["extended"]) if "extended" in self.schema else {}
+    def labelled_states(self, states: NDArray[Any]) -> NDArray[Any]:
+        """The same states as an array to write: it takes labels."""
+        array: NDArray[Any] = labelled(
+            states, self.labels.get("") if self._is_array else self.labels
+        )
+        return array
+
+    def labelled_extras(self, buffer: Any) -> NDArray[Any]:
+        """The sensor values in a buffer as an array to write: it takes labels."""
+        array: NDArray[Any] = labelled(np.ndarray((), self.extras, buffer), self.extended_labels)
+        return array
 
     # one row, as a buffer => arrays over its memory
 
     def _block(self, row: Any, offset: int) -> Any:
-        if self._is_array:
-            return np.ndarray(self._shape, self._element, row, offset)
-        return Record(np.ndarray((), self.states, row, offset), self._state_labels)
+        return self.of_states(np.ndarray(self._shape, self._element, row, offset))
 
     def desired(self, row: Any) -> Any:
         return self._block(row, self._desired_at)
@@ -242,7 +268,7 @@ class Layout:
         return self._block(row, self._observed_at)
 
     def extended(self, row: Any) -> Record:
-        return Record(np.ndarray((), self.extras, row, self._extended_at), self._extended_labels)
+        return Record(np.ndarray((), self.extras, row, self._extended_at), self.extended_labels)
 
     def _mask(self, row: Any, offset: int) -> NDArray[np.bool_]:
         bits = np.ndarray((self._mask_bytes,), np.uint8, row, offset)
@@ -290,13 +316,13 @@ class Layout:
         """The states of an array of rows: (T, actuators), or a record of groups."""
         if not self.actuators:
             return Record(np.empty(len(rows), np.dtype([])))
-        return rows[part] if self._is_array else Record(rows[part], self._state_labels)
+        return self.of_states(rows[part])
 
     def many_extras(self, rows: NDArray[Any]) -> Record:
         """The extended values of an array of rows."""
         if not self.extras.itemsize:
             return Record(np.empty(len(rows), np.dtype([])))
-        return Record(rows["extended"], self._extended_labels)
+        return Record(rows["extended"], self.extended_labels)
 
     @property
     def model(self) -> str:

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from o80 import _core
 from o80.checked import whole
+from o80.enumerations import numbers_of
 from o80.errors import InvalidArgument
 from o80.trajectory import states_from
 from o80.words import LateWord
@@ -83,7 +84,10 @@ def fill_targets(targets: NDArray[Any], values: ArrayLike, axes: str) -> None:
     Raises InvalidArgument.
     """
     wanted = targets.dtype
-    given = np.asarray(values) if wanted.names is None else states_from(values, wanted)
+    if wanted.names is None:
+        given = np.asarray(numbers_of(getattr(targets, "_labels", None), values))
+    else:
+        given = states_from(values, wanted)
     if given.shape != targets.shape:
         raise InvalidArgument(
             f"targets must have the shape {axes} = {targets.shape}, got {given.shape}"

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o80 import _core
+from o80.enumerations import labelled
 
 if TYPE_CHECKING:
     from o80.states import States
@@ -22,7 +23,7 @@ class Record:
     __slots__ = ("_array", "_labels")
 
     def __init__(self, array: NDArray[Any], labels: Mapping[str, Any] | None = None) -> None:
-        """labels: of enumerations, by field and number; by field and field in nested structs."""
+        """labels: the enumerations, by field; by field and field in nested structs."""
         self._array = array
         self._labels = labels or {}
 
@@ -32,10 +33,13 @@ class Record:
         except (KeyError, ValueError, IndexError):
             instead = _core.names_instead(str(name), list(self.keys()))
             raise KeyError(f"there is no value {name!r}{instead}") from None
+        labels = self._labels.get(name) if self._labels else None
         if value.dtype.names and value.ndim == self._array.ndim:
-            value = Record(value, self._labels.get(name))
-        elif not value.ndim:
-            value = value[()]
+            value = Record(value, labels)
+        elif labels is None:
+            value = value if value.ndim else value[()]
+        else:
+            value = labelled(value, labels) if value.ndim else labels(value.item())
         states: States = value
         return states
 
@@ -72,16 +76,4 @@ class Record:
     __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
-        return f"Record({', '.join(f'{name}={self._shown(name)}' for name in self)})"
-
-    def _shown(self, name: str) -> object:
-        """A value for people: labels instead of the numbers of an enumeration."""
-        labels = self._labels.get(name)
-        value: Any = self[name]
-        if not labels or isinstance(value, Record) or np.asarray(value).dtype.names:
-            return value
-        if not np.ndim(value):
-            return labels.get(int(value), value)
-        array = np.asarray(value)
-        named = np.array([labels.get(int(each), str(each)) for each in array.ravel()], object)
-        return named.reshape(array.shape)
+        return f"Record({', '.join(f'{name}={self[name]}' for name in self)})"

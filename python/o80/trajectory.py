@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from o80.enumerations import numbers_of
 from o80.errors import InvalidArgument
-from o80.layout import Layout, dtype_of_type, runs_of
+from o80.layout import Layout, dtype_of_type, labels_of_type, runs_of
 
 
 def states_of(
@@ -18,10 +19,11 @@ def states_of(
 ) -> tuple[NDArray[np.uint8], int]:
     """Bytes of all rows of the first actuator, then of the second, and so on; number of rows."""
     kind = common_type(actuators, layout)
+    labels = common_labels(actuators, layout)
     if isinstance(targets, Mapping):
-        array = _from_fields(targets, kind)
+        array = _from_fields(targets, kind, labels)
     else:
-        array = states_from(targets, kind)
+        array = states_from(numbers_of(labels, targets), kind)
     if single and array.ndim == 1:
         array = array[:, np.newaxis]
     if array.ndim != 2 or array.shape[1] != len(actuators):
@@ -58,9 +60,7 @@ def states_from(targets: ArrayLike, kind: np.dtype[Any]) -> NDArray[Any]:
 
 def state_types(actuators: Sequence[int], layout: Layout) -> list[np.dtype[Any]]:
     """The state type of each of these actuators."""
-    schema = layout.schema
-    groups = [schema["actuators"][actuator]["group"] for actuator in actuators]
-    return [dtype_of_type(schema["groups"][group]["type"]) for group in groups]
+    return [dtype_of_type(_type_of(actuator, layout)) for actuator in actuators]
 
 
 def common_type(actuators: Sequence[int], layout: Layout) -> np.dtype[Any]:
@@ -78,7 +78,21 @@ def common_type(actuators: Sequence[int], layout: Layout) -> np.dtype[Any]:
     )
 
 
-def _from_fields(targets: Mapping[str, ArrayLike], kind: np.dtype[Any]) -> NDArray[Any]:
+def common_labels(actuators: Sequence[int], layout: Layout) -> Any:
+    """The enumerations in the state of actuators that have a common type."""
+    return labels_of_type(_type_of(actuators[0], layout))
+
+
+def _type_of(actuator: int, layout: Layout) -> dict[str, Any]:
+    """The described type of an actuator's state."""
+    schema = layout.schema
+    described: dict[str, Any] = schema["groups"][schema["actuators"][actuator]["group"]]["type"]
+    return described
+
+
+def _from_fields(
+    targets: Mapping[str, ArrayLike], kind: np.dtype[Any], labels: Any
+) -> NDArray[Any]:
     """One structured array from an array for each field."""
     names = kind.names or ()
     if set(targets) != set(names):
@@ -86,7 +100,9 @@ def _from_fields(targets: Mapping[str, ArrayLike], kind: np.dtype[Any]) -> NDArr
         raise InvalidArgument(
             f"a trajectory needs every field of the state ({there}), not {', '.join(targets)}"
         )
-    columns = {name: np.asarray(values) for name, values in targets.items()}
+    columns = {
+        name: np.asarray(numbers_of(labels.get(name), values)) for name, values in targets.items()
+    }
     assert kind.fields is not None
     inner = {name: len(kind.fields[name][0].shape) for name in names}
     shapes = {column.shape[: column.ndim - inner[name]] for name, column in columns.items()}

@@ -25,7 +25,8 @@ def read(path: Path, name: str) -> dict[str, Any]:
     """The columns in a file."""
     if path.suffix == ".npz":
         arrays = np.load(path)
-        return {key.removeprefix(f"{name}/"): arrays[key] for key in arrays.files}
+        values = [key for key in arrays.files if not key.endswith(".labels")]
+        return {key.removeprefix(f"{name}/"): arrays[key] for key in values}
     if path.suffix == ".h5":
         with h5py.File(path) as file:
             return {key: np.asarray(file[name][key]) for key in file[name]}

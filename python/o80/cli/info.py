@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
@@ -57,6 +58,10 @@ def info(
         if "extended" in schema:
             print(style("\nsensor values", "bold"))
             for line in _fields(schema["extended"], ""):
+                print(f"  {line}")
+        if frontend.enums:
+            print(style("\nenumerations", "bold"))
+            for line in _enumerations(frontend.enums):
                 print(f"  {line}")
         if schema["requests"]:
             print(style("\nrequests", "bold"))
@@ -129,6 +134,16 @@ def _limit(limit: dict[str, Any]) -> str:
         high = math.inf if moved["maximum"] is None else moved["maximum"]
         parts.append(f"its integral {low:g} to {high:g}, reaction {moved['reaction']:g} s")
     return ", ".join(parts) or "-"
+
+
+def _enumerations(enums: Mapping[str, Any]) -> list[str]:
+    """The labels and numbers of each: "status: ok 0, moved 3"."""
+    short = [name for name in enums if "." not in name or name.rpartition(".")[2] not in enums]
+    return [
+        f"{name}: "
+        + ", ".join(f"{label} {number}" for label, number in enums[name]._labels_.items())
+        for name in short
+    ]
 
 
 def _fields(described: dict[str, Any], prefix: str) -> list[str]:

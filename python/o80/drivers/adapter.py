@@ -15,8 +15,7 @@ from o80.checked import mapping
 from o80.description import SchemaWriter
 from o80.drivers.reading import Answer, Desired, Differences, DriverFaultError, Reading
 from o80.errors import Error, InvalidArgument, RequestRejected
-from o80.layout import Layout, dtype_of_type
-from o80.record import Record
+from o80.layout import Layout, dtype_of_type, record_of
 
 NANOSECOND = 1e-9
 
@@ -114,9 +113,10 @@ class Adapter:
         self.observed_block, observed = states()
         self.fresh_block, fresh = states()
         self.extended_block = np.zeros(layout.extras.itemsize, np.uint8)
-        extended: NDArray[Any] = np.ndarray((), layout.extras, self.extended_block)
+        extended = layout.labelled_extras(self.extended_block)
+        observed, fresh = layout.labelled_states(observed), layout.labelled_states(fresh)
         self.active_words = np.zeros(8 * ((len(actuators) + 63) // 64), np.uint8)
-        self._desired = Desired(desired, self.active_words, len(actuators))
+        self._desired = Desired(layout, desired, self.active_words, len(actuators))
         self._reading = Reading(observed, extended, fresh, actuators, names)
 
     # ------------------------------------------------------------------ verbs
@@ -144,8 +144,7 @@ class Adapter:
 
     def request(self, index: int, payload: bytes) -> tuple[int, str]:
         row = self._requests[index]
-        described = dtype_of_type(row["type"])
-        fields = Record(np.ndarray((), described, bytearray(payload)))
+        fields = record_of(row["type"], bytearray(payload))
         handler = getattr(self._driver, f"on_{row['name']}")
         try:
             return Answer.of(handler(fields), f"on_{row['name']}")

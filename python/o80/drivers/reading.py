@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from o80 import _core
 from o80.backend import Running, StartAfresh, fill
 from o80.errors import InvalidArgument
-from o80.record import Record
+from o80.layout import Layout
 
 #: from offsets in the desired block and an order to the differences of those numbers
 Differences = Callable[[list[int], int], list[float]]
@@ -33,7 +33,10 @@ def numbered(name: str | int, known: Sequence[str], what: str) -> int:
 class Desired:
     """Desired states of an iteration. Its arrays change with the next one: copy them to keep."""
 
-    def __init__(self, block: NDArray[Any], active: NDArray[np.uint8], count: int) -> None:
+    def __init__(
+        self, layout: Layout, block: NDArray[Any], active: NDArray[np.uint8], count: int
+    ) -> None:
+        self._layout = layout
         self._block = block
         self._words = active
         self._count = count
@@ -45,7 +48,7 @@ class Desired:
     @property
     def states(self) -> Any:
         """An array (actuators,), or a record of groups of actuators."""
-        return self._block if self._block.ndim else Record(self._block)
+        return self._layout.of_states(self._block)
 
     @property
     def active(self) -> NDArray[np.bool_]:

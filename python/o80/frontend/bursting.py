@@ -6,10 +6,11 @@ from typing import Literal, overload
 import numpy as np
 
 from o80 import _core
+from o80.enumerations import labelled
 from o80.errors import NotBursting
 from o80.frontend.moving import Moving
 from o80.prepared_burst import PreparedBurst, checked_count
-from o80.trajectory import common_type
+from o80.trajectory import common_labels, common_type
 from o80.words import LateWord, ModeWord, ProfileWord, StartWord
 
 
@@ -96,7 +97,10 @@ class Bursting(Moving):
         return PreparedBurst(
             self,
             chosen,
-            np.empty(shape, common_type(chosen, self._layout)),
+            labelled(
+                np.empty(shape, common_type(chosen, self._layout)),
+                common_labels(chosen, self._layout),
+            ),
             np.zeros(checked_count(iterations, "iterations"), self._layout.row),
             pace=(checked_count(each, "each"), mode, profile, start),
         )
