@@ -57,6 +57,17 @@ std::string text_of(const Handle& handle) {
   return text + ">";
 }
 
+/// As in a list: negative places count from the end.
+Handle handle_at(const Batch& batch, std::int64_t place) {
+  const auto size = static_cast<std::int64_t>(batch.size());
+  if (place < -size || place >= size) {
+    throw nb::index_error(
+        ("the batch has " + std::to_string(size) + " records, there is no " + std::to_string(place))
+            .c_str());
+  }
+  return batch.handle(static_cast<std::size_t>(place < 0 ? place + size : place));
+}
+
 nb::list statuses_of(const Batch& batch) {
   nb::list statuses;
   for (std::size_t i = 0; i < batch.size(); ++i) {
@@ -106,6 +117,12 @@ void bind_batch(nb::module_& m) {
   refuse_to_pickle(batch, "a batch", "its handles, its first_iteration or its last_iteration");
   batch.def("__len__", &Batch::size)
       .def("__bool__", [](const Batch&) { return true; })
+      .def(
+          "__iter__", [](const Batch& self) { return nb::iter(nb::cast(self.handles())); },
+          nb::sig("def __iter__(self) -> collections.abc.Iterator[Handle]"),
+          "A handle for each, in the order they were added.")
+      .def("__getitem__", &handle_at, "place"_a,
+           "The handle of one: `batch[arm.add_command(...)]`; -1 is the last.")
       .def_prop_ro("handles", &Batch::handles,
                    "A handle for each command, request and purge, in the order they were added.")
       .def_prop_ro("statuses", &statuses_of, nb::sig("def statuses(self) -> list[Status]"),

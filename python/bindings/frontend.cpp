@@ -67,8 +67,8 @@ std::uint32_t Frontend::actuator(nb::handle named) const {
   return frontend->command_check().actuator(number);
 }
 
-void Frontend::add_command(nb::handle named, nb::handle target,
-                           const o80::CommandOptions& options) const {
+std::uint32_t Frontend::add_command(nb::handle named, nb::handle target,
+                                    const o80::CommandOptions& options) const {
   const std::shared_ptr<UntypedFrontend> frontend = untyped_;
   const std::uint32_t index = actuator(named);
   const o80::Schema& schema = decoder_->description->schema;
@@ -80,12 +80,11 @@ void Frontend::add_command(nb::handle named, nb::handle target,
     } else {
       write_number(schema, *number, target, state.data(), name_of(index));
     }
-    frontend->add_command(index, {state.data(), number->size}, options);
-    return;
+    return frontend->add_command(index, {state.data(), number->size}, options);
   }
   const StateBytes state(schema, schema.actuators[index].type, target, name_of(index));
-  frontend->add_command(index, state.bytes, options,
-                        state.whole ? std::span<const std::uint64_t>{} : state.mask);
+  return frontend->add_command(index, state.bytes, options,
+                               state.whole ? std::span<const std::uint64_t>{} : state.mask);
 }
 
 std::vector<std::uint32_t> Frontend::actuators(nb::handle named) const {
@@ -98,11 +97,11 @@ std::vector<std::uint32_t> Frontend::actuators(nb::handle named) const {
   return indices;
 }
 
-void Frontend::add_commands(nb::handle named, nb::handle targets,
-                            const o80::CommandOptions& options) const {
+std::uint32_t Frontend::add_commands(nb::handle named, nb::handle targets,
+                                     const o80::CommandOptions& options) const {
   const std::shared_ptr<UntypedFrontend> frontend = untyped_;
   const auto [chosen, states, masks] = targets_of(named, targets);
-  frontend->add_commands(chosen, states, options, masks);
+  return frontend->add_commands(chosen, states, options, masks);
 }
 
 Targets Frontend::targets_of(nb::handle named, nb::handle targets) const {

@@ -42,11 +42,12 @@ class Frontend {
 
   /// From an index or a name.
   std::uint32_t actuator(nanobind::handle named) const;
-  void add_command(nanobind::handle named, nanobind::handle target,
-                   const o80::CommandOptions& options) const;
+  /// Each returns the index of its record in the batch.
+  std::uint32_t add_command(nanobind::handle named, nanobind::handle target,
+                            const o80::CommandOptions& options) const;
   /// Adds one command for several actuators (None: all), with a target for each.
-  void add_commands(nanobind::handle named, nanobind::handle targets,
-                    const o80::CommandOptions& options) const;
+  std::uint32_t add_commands(nanobind::handle named, nanobind::handle targets,
+                             const o80::CommandOptions& options) const;
   /// The targets of one command for several actuators (None: all).
   Targets targets_of(nanobind::handle named, nanobind::handle targets) const;
   std::vector<std::byte> request_bytes(std::uint32_t index, nanobind::handle fields) const;

@@ -177,7 +177,7 @@ void bind_reading(nb::module_& m, nb::class_<Frontend>& frontend) {
            [](const Stream& self) { await_row(*self.frontend, self.next, self.timeout); });
   refuse_to_pickle(stream, "a stream", "its frontend, and open a stream of that");
 
-  frontend.def("latest", &latest, nb::sig(verbs::latest.signature), verbs::latest.help);
+  def_verb(frontend, "latest", verbs::latest, &latest);
   def_verb(frontend, "wait_for", verbs::wait_for, &wait_for, "iteration"_a.none(),
            "timeout"_a = nb::none());
   def_verb(frontend, "wait_for_next", verbs::wait_for_next, &wait_for_next,

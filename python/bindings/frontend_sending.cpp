@@ -61,16 +61,14 @@ o80::CommandOptions options_of(const Frontend& self, nb::handle duration, nb::ha
   return options;
 }
 
-void add_command(const Frontend& self, nb::handle actuator, nb::handle target, nb::handle duration,
-                 nb::handle speed, nb::handle until, nb::handle iterations, nb::handle fastest,
-                 nb::handle mode, nb::handle profile, nb::handle start, nb::handle every) {
+std::uint32_t add_command(const Frontend& self, nb::handle actuator, nb::handle target,
+                          nb::handle duration, nb::handle speed, nb::handle until,
+                          nb::handle iterations, nb::handle fastest, nb::handle mode,
+                          nb::handle profile, nb::handle start, nb::handle every) {
   const o80::CommandOptions options =
       options_of(self, duration, speed, until, iterations, fastest, mode, profile, start, every);
-  if (names_several(actuator)) {
-    self.add_commands(actuator, target, options);
-  } else {
-    self.add_command(actuator, target, options);
-  }
+  return names_several(actuator) ? self.add_commands(actuator, target, options)
+                                 : self.add_command(actuator, target, options);
 }
 
 /// The newest row, with these actuators at `initial`.
@@ -120,10 +118,10 @@ nb::tuple preview(const Frontend& self, nb::handle named, nb::handle target, nb:
 
 /// Adds one trajectory for several actuators. `states` holds all rows of the first, then all rows
 /// of the second, and so on; `times` are the ends of rows [ns].
-void add_trajectories(const Frontend& self, const std::vector<std::uint32_t>& actuators,
-                      std::uint32_t rows, nb::handle states, nb::handle times, nb::handle speed,
-                      nb::handle iterations, nb::handle mode, nb::handle profile,
-                      nb::handle start) {
+std::uint32_t add_trajectories(const Frontend& self, const std::vector<std::uint32_t>& actuators,
+                               std::uint32_t rows, nb::handle states, nb::handle times,
+                               nb::handle speed, nb::handle iterations, nb::handle mode,
+                               nb::handle profile, nb::handle start) {
   const auto frontend = self.shared();
   o80::CommandOptions options{.pace = pace_of(nb::none(), speed, nb::none(), iterations),
                               .mode = mode_of(mode),
@@ -136,7 +134,7 @@ void add_trajectories(const Frontend& self, const std::vector<std::uint32_t>& ac
     std::memcpy(ends.data(), bytes.span().data(), ends.size() * sizeof(std::int64_t));
   }
   const Bytes all(states);
-  frontend->add_trajectories(actuators, rows, all.span(), options, ends);
+  return frontend->add_trajectories(actuators, rows, all.span(), options, ends);
 }
 
 Batch pulse(const Frontend& self, nb::handle at, nb::handle late) {
@@ -278,10 +276,10 @@ void wait_until_ended(const Frontend& self, const Batch& batch, nb::handle timeo
   });
 }
 
-void add_request(const Frontend& self, nb::handle name, const nb::kwargs& fields) {
+std::uint32_t add_request(const Frontend& self, nb::handle name, const nb::kwargs& fields) {
   const auto frontend = self.shared();
   const std::uint32_t index = frontend->request_index(string_of(name, "the name of a request"));
-  frontend->add_request(index, self.request_bytes(index, fields));
+  return frontend->add_request(index, self.request_bytes(index, fields));
 }
 
 }  // namespace
@@ -297,7 +295,7 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
   def_verb(
       frontend, "add_purge", verbs::add_purge,
       [](const Frontend& self, nb::handle actuator) {
-        self.untyped().add_purge(purged(self, actuator));
+        return self.untyped().add_purge(purged(self, actuator));
       },
       all);
   def_verb(

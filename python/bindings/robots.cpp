@@ -1,5 +1,6 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/pair.h>
+#include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
@@ -50,6 +51,15 @@ Attachment start_inline(const o80::RobotLibrary& library, const std::string& seg
   return {std::make_shared<o80::UntypedFrontend>(robot->segment(), robot), robot};
 }
 
+/// What a robot says of itself with these options, without being started.
+std::shared_ptr<o80::Description> description_of(const o80::RobotLibrary& library,
+                                                 const o80::OptionValues& options) {
+  auto description = std::make_shared<o80::Description>();
+  description->schema = o80::DriverInstance(*library.table, options).describe();
+  description->layout = o80::row_layout(description->schema);
+  return description;
+}
+
 }  // namespace
 
 o80::LoopOptions loop_options_of(const o80::OptionValues& values, o80::LoopOptions otherwise) {
@@ -78,6 +88,7 @@ void bind_robots(nb::module_& m) {
           [](const o80::RobotLibrary& self) { return std::string(self.table->built_with); })
       .def_prop_ro("options",
                    [](const o80::RobotLibrary& self) { return o80::options_of(*self.table); })
+      .def("describe", &description_of, "options"_a)
       .def("start_inline", &start_inline, "segment"_a, "loop"_a, "options"_a);
   m.def("load_robot", &o80::RobotLibrary::load, "name_or_path"_a);
   m.def("unused_segment_name", &o80::unused_segment_name, "robot"_a);

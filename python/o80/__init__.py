@@ -145,7 +145,7 @@ if not TYPE_CHECKING:  # otherwise a type checker would accept every name
         return value
 
     def __dir__() -> list[str]:
-        return sorted({*globals(), *__all__})
+        return sorted({*__all__, "learning", "open"})
 
 
 __version__ = version()

@@ -1,27 +1,55 @@
-"""Error texts for calls of compiled methods with wrong arguments."""
+"""Signatures of compiled methods, and error texts for calls with wrong arguments."""
 
 import difflib
 import inspect
 from collections.abc import Mapping, Sequence
-from typing import Any, NoReturn
+from functools import cache
+from typing import Any
+
+
+@cache
+def _declared(signature: str) -> Any:
+    """A function of this signature without a body."""
+    made: dict[str, Any] = {}
+    exec(f"from __future__ import annotations\n{signature}: ...", made)
+    return made[signature.removeprefix("def ").partition("(")[0]]
+
+
+class _Annotation(str):
+    """The text of an annotation, printed without quotation marks."""
+
+    __repr__ = str.__str__
+
+
+def signature_of(signature: str) -> inspect.Signature:
+    """What `inspect.signature` says of a method with this signature."""
+    plain = inspect.signature(_declared(signature))
+    return plain.replace(
+        parameters=[
+            each
+            if each.annotation is each.empty
+            else each.replace(annotation=_Annotation(each.annotation))
+            for each in plain.parameters.values()
+        ],
+        return_annotation=_Annotation(plain.return_annotation),
+    )
 
 
 def refuse(
     signature: str, this: object, arguments: Sequence[Any], keywords: Mapping[str, Any]
-) -> NoReturn:
-    """Raises the TypeError of a function with this signature, with a list of its arguments."""
-    made: dict[str, Any] = {}
-    exec(f"from __future__ import annotations\n{signature}: ...", made)
-    function = made[signature.removeprefix("def ").partition("(")[0]]
-    takes = inspect.signature(function)
+) -> None:
+    """Raises the TypeError of a function with this signature, with a list of its arguments.
+
+    Returns if the arguments fit.
+    """
+    function = _declared(signature)
+    takes = signature_of(signature)
     names = [name for name in takes.parameters if name != "self"]
-    text = ""
     try:
         function(this, *arguments, **keywords)
+        return
     except TypeError as error:
         text = str(error)
-    else:
-        text = f"{function.__name__}() cannot be called with {arguments!r} and {keywords!r}"
     near = [
         close
         for word in keywords

@@ -55,6 +55,10 @@ class Record:
         """The names of the values."""
         return self._array.dtype.names or ()
 
+    def _ipython_key_completions_(self) -> tuple[str, ...]:
+        """Names that IPython and Jupyter complete in `record["`."""
+        return self.keys()
+
     def __iter__(self) -> Iterator[str]:
         return iter(self.keys())
 

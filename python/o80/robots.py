@@ -9,6 +9,7 @@ with o80.robots.load("two_joints").inline() as arm:
 
 import builtins
 import inspect
+import json
 import numbers
 import os
 import sys
@@ -186,6 +187,14 @@ class Robot:
             )
             for option in self._library.options
         ]
+
+    def describe(self, **config: Any) -> dict[str, Any]:
+        """The description that its segment would have (`Frontend.schema`), without a start.
+
+        config: the robot's own options, see `options`. Raises DriverError, InvalidArgument.
+        """
+        schema: dict[str, Any] = json.loads(self._library.describe(self._config(config, ())).json())
+        return schema
 
     @property
     def _program(self) -> builtins.list[str | Path]:

@@ -174,3 +174,20 @@ def test_batches_outlive_their_frontend(process: o80.robots.Process) -> None:
     assert batch.statuses == [o80.Status.COMPLETED]
     assert "ended" in repr(batch)
     assert "completed" in repr(batch.handles[0])
+
+
+def test_a_batch_is_a_sequence_of_handles_by_the_places_of_its_commands(arm: o80.Frontend) -> None:
+    places = [
+        arm.add_command("elbow", 0.1),
+        arm.add_command(["shoulder", "elbow"], [0.1, 0.2]),
+        arm.add_trajectory([[0.1, 0.2]]),
+        arm.add_purge("elbow"),
+        arm.add_request("reset", seed=1),
+    ]
+    batch = arm.pulse()
+    assert places == [0, 1, 2, 3, 4]
+    assert [handle.id for handle in batch] == [batch[place].id for place in places]
+    assert batch[-1].id == batch.handles[-1].id
+    for place in (5, -6):
+        with pytest.raises(IndexError, match="the batch has 5 records"):
+            _ = batch[place]

@@ -39,22 +39,36 @@ def test_declares_the_compiled_verbs_as_such() -> None:
 @pytest.mark.parametrize("name", sorted(declared(compiled=True)))
 def test_shows_signature_and_help_of_a_compiled_verb_once(name: str) -> None:
     verb = declared(compiled=True)[name]
-    said = inspect.getdoc(getattr(_core.Frontend, name)) or ""
+    method = getattr(_core.Frontend, name)
+    said = inspect.getdoc(method) or ""
     text = ast.get_docstring(verb)
     assert text
     assert said.count(text) == 1
-    if isinstance(getattr(_core.Frontend, name), property):
+    if isinstance(method, property):
         return
-    assert "Overloaded" not in said
-    shown, other = said.splitlines()[:2]
-    assert other == f"{name}(self, *wrong, **arguments) -> NoReturn" or name == "latest"
-    made = ast.parse(f"def {shown}: ...").body[0]
+    assert said == text
+    assert method.__name__ == name
+    made = ast.parse(f"def {name}{inspect.signature(method)}: ...").body[0]
     assert isinstance(made, ast.FunctionDef)
     expected = ast.unparse(verb.args).replace("_core.", "")
     assert ast.unparse(made.args) == expected
     assert verb.returns is not None
     assert made.returns is not None
     assert ast.unparse(made.returns) == ast.unparse(verb.returns).replace("_core.", "")
+
+
+def test_a_method_of_an_object_has_the_signature_without_self() -> None:
+    with o80.robots.load("two_joints").inline() as arm:
+        assert list(inspect.signature(arm.wait_for).parameters) == ["iteration", "timeout"]
+
+
+def test_an_error_of_the_call_itself_is_not_taken_for_wrong_arguments() -> None:
+    class Seven:
+        def __index__(self) -> int:
+            raise TypeError("no seven today")
+
+    with o80.robots.load("two_joints").inline() as arm, pytest.raises(o80.InvalidArgument):
+        arm.add_command(Seven(), 0.5)
 
 
 @pytest.mark.parametrize("name", sorted(declared(compiled=False)))

@@ -30,3 +30,9 @@ def test_every_public_name_is_there_and_listed() -> None:
 
 def test_a_name_that_is_not_there_is_an_attribute_error() -> None:
     assert not hasattr(o80, "Fronted")
+
+
+def test_dir_shows_public_names_only() -> None:
+    import o80
+
+    assert set(dir(o80)) == {*o80.__all__, "open", "learning"}

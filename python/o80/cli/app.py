@@ -22,6 +22,7 @@ from o80.cli.replay import replay
 from o80.cli.run import run
 from o80.cli.save import repair, save
 from o80.cli.stop import stop
+from o80.cli.stub import stub
 from o80.cli.top import top
 from o80.cli.view import view
 
@@ -44,6 +45,7 @@ app.command(
 app.command("list")(list_segments)
 app.command("top")(top)
 app.command("info")(info)
+app.command("stub")(stub)
 app.command("echo")(echo)
 app.command("record")(record)
 app.command("save")(save)

@@ -33,7 +33,7 @@ class Commanding(Observing):
             profile: ProfileWord | None = None,
             start: StartWord = "desired",
             every: float | int | None = None,
-        ) -> None:
+        ) -> int:
             """Adds a command to the next pulse.
 
             actuator: its index or its name. Several, or None for all, make one command for all of
@@ -61,18 +61,19 @@ class Commanding(Observing):
             Every command ends at its target. If the limits make it longer than asked, it is
             completed later, with the reason "limits".
 
+            Returns its place in the batch, whose element it is: `arm.pulse()[place]` is its handle.
             Raises InvalidArgument for a command that the robot cannot follow.
             """
 
-        def add_request(self, name: str, /, **fields: Any) -> None:
+        def add_request(self, name: str, /, **fields: Any) -> int:
             """Adds a request to the next pulse.
 
             It is served in order with the commands of that pulse. Every field without a default
-            must be given; `o80 info` shows the defaults.
+            must be given; `o80 info` shows the defaults. Returns its place, as add_command.
             """
 
-        def add_purge(self, actuator: SupportsIndex | str | None = None) -> None:
-            """Adds a purge of one actuator, or of all, to the next pulse."""
+        def add_purge(self, actuator: SupportsIndex | str | None = None) -> int:
+            """Adds a purge of one actuator, or of all, to the next pulse; returns its place."""
 
         @property
         def added(self) -> int:
@@ -132,7 +133,7 @@ class Commanding(Observing):
         mode: ModeWord = "queue",
         profile: ProfileWord = "linear",
         start: StartWord = "desired",
-    ) -> None:
+    ) -> int:
         """Adds one command through many states, for one or several actuators.
 
         targets: (T, actuators), or (T,) for a single actuator. Numbers for states of one number;
@@ -144,7 +145,7 @@ class Commanding(Observing):
         mode, profile, start: as in add_command.
 
         Several actuators reach each row together, as in add_command. If InvalidArgument is raised,
-        nothing is added.
+        nothing is added. Returns its place, as add_command.
         """
         if times is not None and (iterations is not None or speed is not None):
             raise InvalidArgument(
@@ -154,7 +155,7 @@ class Commanding(Observing):
             iterations = 1
         chosen, single = self._chosen(actuators)
         states, rows = states_of(targets, chosen, single, self._layout)
-        self._add_trajectories(
+        return self._add_trajectories(
             chosen,
             rows,
             states,

@@ -1,0 +1,36 @@
+"""``o80 stub``: writes a typed Python module for a robot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import o80
+from o80.cli.attach import attach
+from o80.stub import module_of
+
+
+def stub(
+    name: Annotated[
+        str,
+        typer.Argument(help="A segment, see o80 list; or a robot, which need not run."),
+    ],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="File to write (default: print it).")
+    ] = None,
+) -> None:
+    """Write a typed Python module for a robot: editors and type checkers then know its names.
+
+    o80 stub arm -o my_arm.py, and in a program: from my_arm import attach
+    """
+    if any(entry.name == name and entry.readable for entry in o80.segments()):
+        with attach(name) as frontend:
+            text = module_of(frontend.schema, name)
+    else:
+        text = module_of(o80.robots.load(name).describe())
+    if output is None:
+        print(text, end="")
+    else:
+        output.write_text(text)
