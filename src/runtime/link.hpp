@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstdint>
 #include <deque>
 #include <memory>
 #include <mutex>
@@ -83,6 +84,8 @@ struct Link {
   };
   std::deque<Scheduled> scheduled;  // guarded by `sending`; may hold batches already taken
   mutable std::mutex sending;
+  std::uint32_t control_blocks = 0;  // guarded by `controlling`: runtime/control_block.hpp
+  std::recursive_mutex controlling;  // locked before `sending`
   std::atomic<bool> closed{false};
 
  private:

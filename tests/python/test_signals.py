@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 from alarm import alarm_in
 from blocking import CALLS
+from interrupting import at_every_moment
 
 import o80
 
@@ -282,6 +283,22 @@ def test_ctrl_c_while_control_is_awaited_gives_it_back(segment: str) -> None:
             backend.publish([1.0])
 
             assert batch.statuses == ["completed"]
+
+
+def test_an_interrupt_at_any_moment_gives_control_back(process: o80.robots.Process) -> None:
+    with process.frontend() as arm, process.frontend() as other:
+
+        def block() -> None:
+            with arm.control(WAIT), arm.control(WAIT) as same:
+                assert same is arm
+
+        moments = 0
+        for error in at_every_moment(block):
+            moments += 1
+            # also while the traceback keeps the frames
+            with other.control(WAIT):
+                assert error.__traceback__ is not None
+        assert moments > 20
 
 
 TWICE = """

@@ -1,7 +1,6 @@
 """Opening, closing and attaching a frontend again."""
 
 import contextlib
-import threading
 import warnings
 from collections.abc import Callable
 from functools import cached_property
@@ -87,8 +86,6 @@ class Frontend(Halting):
         self._decoder = _core.Decoder(self._description, self._layout)
         super().__init__(attachment, self._decoder)
         self._first = self._read(self.oldest, 1) if self.published >= 0 else None
-        self._control_lock = threading.Lock()
-        self._control_blocks = 0
         self._is_set_up = True
         at_exit.close_later(self)
 
