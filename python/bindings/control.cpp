@@ -46,8 +46,7 @@ class Control {
       wait_for(taken);
       const o80::Handle handle = taken.handle(0);
       if (handle.status != o80::Status::completed) {
-        raise_python("ControlTaken",
-                     "no control of '" + frontend->segment() + "': " + handle.text);
+        raise_python("ControlTaken", "no control of '" + frontend->segment() + "': " + handle.text);
       }
     } catch (...) {
       drop();
@@ -123,8 +122,7 @@ void bind_control(nb::module_& m) {
            nb::sig("def __init__(self, frontend: Frontend, timeout: float | None) -> None"))
       .def("__enter__", &Control::enter, nb::sig("def __enter__(self) -> Frontend"))
       .def(
-          "__exit__",
-          [](Control& self, nb::handle, nb::handle, nb::handle) { self.exit(); },
+          "__exit__", [](Control& self, nb::handle, nb::handle, nb::handle) { self.exit(); },
           "kind"_a.none(), "error"_a.none(), "trace"_a.none(),
           nb::sig("def __exit__(self, kind: type[BaseException] | None, error: BaseException | "
                   "None, trace: types.TracebackType | None) -> None"));

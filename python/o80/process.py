@@ -25,6 +25,7 @@ from o80.errors import (
 from o80.frontend import Frontend
 
 GRACE = 5.0  # [s] for a robot to stop
+COLLECT = 1.0  # [s] for the exit code of a robot that has ended
 LOOK = 0.002  # [s] between checks of a robot that starts
 BAD_OPTIONS = 2  # exit code
 
@@ -94,7 +95,9 @@ class Process:
             popen.send_signal(signal.SIGTERM)
         if not self._ends_within(timeout):
             popen.kill()
-        popen.wait()
+        # an interrupt inside Popen may have left its lock taken
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            popen.wait(COLLECT)
 
     def _check_process(self) -> None:
         if self._owner != os.getpid():

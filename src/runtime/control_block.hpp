@@ -21,8 +21,8 @@ class ControlBlock {
 
   /// The order to take control, which is completed once this frontend has it.
   const Batch& taken() const { return taken_; }
-  /// Ends the block and returns the order to give control back; it is empty while other blocks last.
-  /// Throws as UntypedFrontend::pulse; then the destructor tries again.
+  /// Ends the block and returns the order to give control back; it is empty while other blocks
+  /// last. Throws as UntypedFrontend::pulse; then the destructor tries again.
   Batch leave();
   /// The same; what cannot be sent is forgotten.
   void leave_quietly() noexcept;
