@@ -3,13 +3,14 @@
 import json
 from collections.abc import Iterator
 from enum import IntEnum
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from o80 import _core
+from o80.cached import cached
 from o80.errors import InvalidArgument
 from o80.record import Record
 
@@ -162,7 +163,7 @@ class Layout:
         self._is_array = self.states.subdtype is not None
         self._element, self._shape = self.states.subdtype or (self.states, ())
 
-    @cached_property
+    @cached
     def row(self) -> np.dtype[Any]:
         """The dtype of a whole row; masks as bytes, a bit for each actuator."""
         parts = [(name, np.dtype(kind), self.schema["row"][name]) for name, kind in HEAD]
@@ -184,7 +185,7 @@ class Layout:
             {"names": names, "formats": formats, "offsets": offsets, "itemsize": self.size}
         )
 
-    @cached_property
+    @cached
     def runs(self) -> list[tuple[np.dtype[Any], int, int]]:
         """All numbers of observed, then of extended: (kind, offset in the row, how many)."""
         return joined(
@@ -196,7 +197,7 @@ class Layout:
             for run in runs_of(dtype, offset)
         )
 
-    @cached_property
+    @cached
     def enums(self) -> dict[str, type[IntEnum]]:
         """An enum for each enumerated field: by its name, and by "Type.field".
 
@@ -220,11 +221,11 @@ class Layout:
                 found.setdefault(name, values)
         return {name: values for name, values in found.items() if name not in ambiguous}
 
-    @cached_property
+    @cached
     def _state_labels(self) -> dict[Any, Any]:
         return {group["name"]: labels_of_type(group["type"]) for group in self.schema["groups"]}
 
-    @cached_property
+    @cached
     def _extended_labels(self) -> dict[Any, Any]:
         return labels_of_type(self.schema["extended"]) if "extended" in self.schema else {}
 

@@ -13,6 +13,7 @@ import pytest
 from processes import end_of
 
 import o80
+from o80.layout import HEAD
 
 WAIT = 30.0  # [s] longer than any wait should take
 
@@ -202,12 +203,12 @@ def test_control_that_was_not_waited_for_is_given_back(segment: str) -> None:
 # ---------------------------------------------------------------------------- forked
 
 
-def in_child(work: Callable[[], object]) -> str:
+def in_child(work: Callable[[], object], within: float = WAIT) -> str:
     """Runs it in a forked child; what it raised, or nothing. Ends it if it hangs."""
     told, tell = os.pipe()
     child = os.fork()
     if child == 0:
-        signal.alarm(int(WAIT))
+        signal.alarm(int(within))
         try:
             work()
         except BaseException as error:
@@ -294,6 +295,33 @@ def test_a_child_forked_while_other_threads_send_can_close_its_copy(
             thread.join(WAIT)
 
         assert told == [""] * 40
+
+
+def test_a_child_forked_while_another_thread_computes_a_value_computes_its_own(
+    process: o80.robots.Process, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    parent, begun, go_on = os.getpid(), threading.Event(), threading.Event()
+
+    class Blocking(tuple[tuple[str, str], ...]):
+        def __iter__(self) -> Iterator[tuple[str, str]]:
+            if os.getpid() == parent:
+                begun.set()
+                assert go_on.wait(WAIT)
+            return super().__iter__()
+
+    def look() -> None:
+        with process.frontend() as arm:
+            assert len(arm.history(1)) == 1
+
+    monkeypatch.setattr("o80.layout.HEAD", Blocking(HEAD))
+    thread = threading.Thread(target=look)
+    thread.start()
+    assert begun.wait(WAIT)
+    told = in_child(look, within=5)
+    go_on.set()
+    thread.join(WAIT)
+
+    assert told == ""
 
 
 def test_a_robot_does_not_live_on_with_a_child_of_its_killed_parent(segment: str) -> None:

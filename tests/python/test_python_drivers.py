@@ -598,3 +598,22 @@ def test_rates_that_are_not_there_are_a_fault_that_says_so(
     named = type("Mistaken", (Mistaken,), {"field": field})
     with pytest.raises(o80.Error, match=said), o80.robots.load(named).inline(segment) as robot:
         robot.burst(1)
+
+
+# ---------------------------------------------------------------------- forks
+
+
+@pytest.mark.parametrize("bursting", [False, True])
+def test_a_child_that_returns_into_the_loop_ends_there(segment: str, bursting: bool) -> None:
+    robot = o80.robots.load(room_sensor.Forks)
+    with robot.start(segment, bursting=bursting) as process, process.frontend() as joint:
+        if bursting:
+            joint.burst(500, timeout=WAIT)
+        joint.wait_for(500, WAIT)
+        end = time.monotonic() + WAIT
+        while "'forks' forked in write" not in process.output and time.monotonic() < end:
+            time.sleep(0.001)
+        assert "os._exit" in process.output
+        assert set(joint.history().observed[:, 0]) == {process.pid}
+        process.stop()
+        assert joint.life == "stopped"

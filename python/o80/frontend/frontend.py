@@ -3,11 +3,11 @@
 import contextlib
 import warnings
 from collections.abc import Callable
-from functools import cached_property
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, cast
 
 from o80 import _core, at_exit, frontend_classes
+from o80.cached import cached
 from o80.errors import Error, InvalidArgument, SchemaMismatch, UsedAfterFork
 from o80.frontend.halting import Halting
 from o80.layout import Layout
@@ -89,7 +89,7 @@ class Frontend(Halting):
         self._is_set_up = True
         at_exit.close_later(self)
 
-    @cached_property
+    @cached
     def aio(self) -> "Waits":
         """The waiting methods as asyncio coroutines: `await arm.aio.wait_for_next()`."""
         from o80.aio import Waits  # here, because most programs do not need asyncio
