@@ -1,11 +1,13 @@
 """Whatever is closed, or belongs to the parent of a forked process, says so."""
 
 import contextlib
+import importlib
 import operator
 import os
 import signal
 import threading
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -319,6 +321,28 @@ def test_a_child_forked_while_another_thread_computes_a_value_computes_its_own(
     assert begun.wait(WAIT)
     told = in_child(look, within=5)
     go_on.set()
+    thread.join(WAIT)
+
+    assert told == ""
+
+
+def test_a_child_forked_while_another_thread_imports_a_module_imports_it_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun, go_on = threading.Event(), threading.Event()
+    (tmp_path / "slowly_imported.py").write_text("import builtins\nbuiltins.o80_test_wait()\n")
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def wait() -> None:
+        begun.set()
+        assert go_on.wait(WAIT)
+
+    monkeypatch.setattr("builtins.o80_test_wait", wait, raising=False)
+    thread = threading.Thread(target=importlib.import_module, args=["slowly_imported"])
+    thread.start()
+    assert begun.wait(WAIT)
+    os.register_at_fork(before=go_on.set)  # the last thing before the fork
+    told = in_child(lambda: importlib.import_module("slowly_imported"), within=5)
     thread.join(WAIT)
 
     assert told == ""
