@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -190,6 +190,56 @@ def test_an_exception_of_a_verb_ends_the_robot_as_failed(verb: str, segment: str
             use()
         with pytest.raises(o80.BackendFailed, match=f"broken {verb}"):
             joint.burst(1)
+
+
+@pytest.mark.parametrize("value", [False, 0, "the bus is down"])
+@pytest.mark.parametrize("verb", ["start", "write", "read", "halt", "resume", "on_home", "stop"])
+def test_a_verb_that_returns_something_is_named_with_it(
+    segment: str, capfd: pytest.CaptureFixture[str], verb: str, value: object
+) -> None:
+    def returns(self: Joint, *arguments: object) -> object:
+        getattr(Joint, verb)(self, *arguments)
+        return value
+
+    def use() -> None:
+        with o80.robots.load(driver).inline(segment) as joint:
+            joint.burst(1)
+            joint.halt("enough")
+            joint.burst(1)
+            joint.resume()
+            joint.request("home", place=0.0)
+
+    driver = type("Joint", (Joint,), {verb: returns})
+    text = rf"{verb}(\(\))? must return None.*got {value!r}"
+    if verb == "stop":
+        use()
+        assert re.search(text, capfd.readouterr().err)
+        return
+    with pytest.raises(o80.Error, match=rf"'joint' .*{text}"):
+        use()
+
+
+@pytest.mark.parametrize(
+    ("report", "text"),
+    [
+        (lambda it: it.halt(5), "reason of reading.halt must be a text, got 5"),
+        (lambda it: it.halt(OSError()), r"reading.halt must be a text, got OSError\(\)"),
+        (lambda it: it.fault(5), "reason of reading.fault must be a text, got 5"),
+        (lambda it: it.progress("home", 5), "reading.progress must be a text, got 5"),
+        (lambda it: it.ended("home", False), "answer must be None or o80.StartAfresh.*got False"),
+        (lambda it: it.ended("home", rejected=5), "rejected must be a text, got 5"),
+        (lambda it: o80.Running(5), "progress of o80.Running must be a text, got 5"),
+    ],
+)
+def test_a_report_of_another_type_says_what_it_wants(
+    segment: str, report: Callable[[Any], object], text: str
+) -> None:
+    def read(self: Joint, reading: Reading) -> None:
+        report(reading)
+
+    driver = type("Joint", (Joint,), {"read": read})
+    with pytest.raises(o80.DriverError, match=f"'joint' failed in read: .*{text}"):
+        o80.robots.load(driver).inline(segment)
 
 
 def test_what_a_reading_reports_reaches_the_loop(segment: str) -> None:
