@@ -340,6 +340,38 @@ def test_a_file_names_a_driver_too(segment: str, tmp_path: Path) -> None:
         assert process.frontend(WAIT).latest().extended.temperature == 20.5
 
 
+SCRIPT = """
+import os, o80
+class Counter:
+    extended = {{"count": int}}
+    def read(self, reading): ...
+open({started!r}, "a").write("x")
+assert os.path.getsize({started!r}) < 4, "a chain of processes"
+{guard}
+    with o80.robots.load(Counter).start({name!r}) as process:
+        print(process.frontend().robot)
+"""
+
+
+@pytest.mark.parametrize("guard", ['if __name__ == "__main__":', "if True:"])
+def test_a_script_with_a_driver_of_its_own_needs_a_main_guard(
+    segment: str, tmp_path: Path, guard: str
+) -> None:
+    script, started = tmp_path / "script.py", tmp_path / "started"
+    script.write_text(SCRIPT.format(guard=guard, started=str(started), name=segment))
+    done = subprocess.run(
+        [sys.executable, str(script)], capture_output=True, text=True, timeout=WAIT
+    )
+    assert started.read_text() == "xx"  # by the script and by the robot's process
+    if guard == "if True:":
+        assert done.returncode == 1
+        assert "o80.errors.DriverError: the driver" in done.stderr
+        assert f"{script} starts a robot when it is imported" in done.stderr
+        assert 'put what the script does under `if __name__ == "__main__":`' in done.stderr
+    else:
+        assert done.stdout == "counter\n", done.stderr
+
+
 # ---------------------------------------------------------------------- mistakes
 
 
