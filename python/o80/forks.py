@@ -21,7 +21,7 @@ def _wait_for_imports() -> None:
 
 
 def _others_import() -> bool:
-    locks = getattr(importlib._bootstrap, "_module_locks", {})  # type: ignore[attr-defined]
+    locks = getattr(importlib._bootstrap, "_module_locks", {})
     here = (None, _thread.get_ident())
     return any(getattr(lock(), "owner", None) not in here for lock in list(locks.values()))
 

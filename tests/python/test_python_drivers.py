@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -228,7 +228,7 @@ def test_a_verb_that_returns_something_is_named_with_it(
         (lambda it: it.progress("home", 5), "reading.progress must be a text, got 5"),
         (lambda it: it.ended("home", False), "answer must be None or o80.StartAfresh.*got False"),
         (lambda it: it.ended("home", rejected=5), "rejected must be a text, got 5"),
-        (lambda it: o80.Running(5), "progress of o80.Running must be a text, got 5"),
+        (lambda it: o80.Running(cast(str, 5)), "progress of o80.Running must be a text, got 5"),
     ],
 )
 def test_a_report_of_another_type_says_what_it_wants(
