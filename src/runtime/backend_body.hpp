@@ -13,6 +13,7 @@
 #include "control/controller.hpp"
 #include "control/error_watch.hpp"
 #include "control/reading_watch.hpp"
+#include "memory/queue_word.hpp"
 #include "memory/fork.hpp"
 #include "memory/halt_word.hpp"
 #include "memory/history.hpp"
@@ -214,6 +215,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   StatusOutbox outbox_;
 
   WorkShare share_;
+  QueueWord queue_;
   std::uint32_t ahead_from_ = 0;              // last lane that was staged ahead
   std::vector<std::uint32_t> express_lanes_;  // by ticket
 

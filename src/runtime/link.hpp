@@ -64,6 +64,10 @@ struct Link {
   /// 7 (halt 3, cause frontend, requested by pid 5 (python)): why". Empty if it is no longer in
   /// force.
   std::string halt_text(Iteration iteration) const;
+  /// The process that owns a lane: "the frontend of pid 5 (python)".
+  std::string owner_of(std::uint32_t lane) const;
+  /// "the frontend of pid 5 (python) has held the queue since iteration 7"; empty if no batch waits.
+  std::string queue_text() const;
   /// `keep_waiting`, extended to throw Closed when the frontend is closed during a wait.
   KeepWaiting guarded(const KeepWaiting& keep_waiting) const;
 
