@@ -43,8 +43,8 @@ struct LoopState {
   bool stalled() const noexcept;
   /// Reason why no row is published although one is due; empty if rows are published.
   std::string hang() const;
-  /// hang(), or else recent overruns with the rate that is reached, or else the queue; empty if there
-  /// is no trouble.
+  /// hang(), or else recent overruns with the rate that is reached, or else the queue; empty if
+  /// there is no trouble.
   std::string trouble() const;
 };
 
