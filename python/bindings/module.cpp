@@ -23,6 +23,7 @@ NB_MODULE(_core, m) {
   bind_batch(m);
   bind_canceller(m);
   bind_frontend(m);
+  bind_control(m);
   bind_prepared_burst(m);
   bind_backend(m);
   bind_robots(m);

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 # imported first, so that exit handlers registered after `import o80` run before its own
 from o80 import at_exit as _at_exit  # noqa: F401
+from o80 import forks as _forks  # noqa: F401
 from o80._core import Batch, Burst, Handle, Observation, Stream, version
 from o80.errors import (
     BackendFailed,

@@ -9,8 +9,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from o80 import _core, at_exit
-from o80.checked import mapping
+from o80 import _core, at_exit, checked
+from o80.checked import mapping, nothing
 from o80.description import Described, Limit, SchemaWriter
 from o80.enumerations import numbers_of
 from o80.errors import Closed, InvalidArgument, RequestRejected
@@ -43,6 +43,24 @@ class Running:
 
     progress: str = ""
 
+    def __post_init__(self) -> None:
+        checked.text(self.progress, "progress of o80.Running")
+
+
+def check_end(answer: StartAfresh | None, rejected: str | None) -> None:
+    """Checks how a request ends. Raises InvalidArgument."""
+    if answer is not None and not isinstance(answer, StartAfresh):
+        raise InvalidArgument(
+            f"answer must be None or o80.StartAfresh(...), got {answer!r}; to reject the "
+            f"request, give rejected='why'"
+        )
+    if rejected is not None:
+        checked.text(rejected, "rejected")
+        if answer is not None:
+            raise InvalidArgument("give either answer or rejected, not both")
+
+
+KEEPS = ", or raise o80.RequestRejected to keep the halt"
 
 Handler = Callable[[Record], StartAfresh | Running | None]
 
@@ -231,7 +249,7 @@ class Backend:
 
     def progress(self, request: str, text: str) -> None:
         """Sets the text that frontends see while a request runs: at most 247 bytes."""
-        self._open.show_progress(self._index_of(request), text)
+        self._open.show_progress(self._index_of(request), checked.text(text, "progress"))
 
     def end_request(
         self, request: str, answer: StartAfresh | None = None, *, rejected: str | None = None
@@ -245,13 +263,7 @@ class Backend:
         It ends with the row that is published next. No effect if it does not run any more.
         """
         index = self._index_of(request)
-        if answer is not None and not isinstance(answer, StartAfresh):
-            raise InvalidArgument(
-                f"answer must be None or o80.StartAfresh(...), got {answer!r}; to reject the "
-                f"request, give rejected='why'"
-            )
-        if answer is not None and rejected is not None:
-            raise InvalidArgument("give either answer or rejected, not both")
+        check_end(answer, rejected)
         if not self._open.runs(index):
             return
         self._fresh_start = answer or self._fresh_start
@@ -286,7 +298,7 @@ class Backend:
         In force from the first `step` begun after it. May be called from any thread. The same
         reason again is the same halt; another reason is another halt.
         """
-        self._open.halt(reason)
+        self._open.halt(checked.text(reason, "the reason of a halt"))
 
     def interrupt(self, actuator: int | str) -> None:
         """Ends the commands of an actuator as interrupted, in the current iteration."""
@@ -418,7 +430,7 @@ class Server:
         if handler is None:
             return None
         try:
-            handler()
+            nothing(handler(), "the handler of on_resume", KEEPS)
         except RequestRejected as why:
             return str(why) or "the handler gave no reason"
         return None

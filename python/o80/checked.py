@@ -27,6 +27,19 @@ def whole_or_none(value: Any, name: str, least: int | None = None) -> int | None
     return None if value is None else whole(value, name, least)
 
 
+def text(value: Any, name: str) -> str:
+    """A text. Raises InvalidArgument."""
+    if not isinstance(value, str):
+        raise InvalidArgument(f"{name} must be a text, got {value!r}")
+    return value
+
+
+def nothing(value: Any, call: str, otherwise: str = "") -> None:
+    """Refuses what a function of the user returned. Raises InvalidArgument."""
+    if value is not None:
+        raise InvalidArgument(f"{call} must return None{otherwise}; got {value!r}")
+
+
 def mapping(value: Any, name: str, holds: str) -> Mapping[Any, Any]:
     """A mapping; None is an empty one. Raises InvalidArgument."""
     if value is None:

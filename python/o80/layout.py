@@ -2,13 +2,14 @@
 
 import json
 from collections.abc import Iterator
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from o80 import _core
+from o80.cached import cached
 from o80.enumerations import Enumeration, enumeration_of, labelled
 from o80.errors import InvalidArgument
 from o80.record import Record
@@ -180,7 +181,7 @@ class Layout:
         self.extended_labels = labels_of_type(schema["extended"]) if "extended" in schema else {}
         self._is_plain_array = self._is_array and not self.labels
 
-    @cached_property
+    @cached
     def row(self) -> np.dtype[Any]:
         """The dtype of a whole row; masks as bytes, a bit for each actuator."""
         parts = [(name, np.dtype(kind), self.schema["row"][name]) for name, kind in HEAD]
@@ -202,7 +203,7 @@ class Layout:
             {"names": names, "formats": formats, "offsets": offsets, "itemsize": self.size}
         )
 
-    @cached_property
+    @cached
     def runs(self) -> list[tuple[np.dtype[Any], int, int]]:
         """All numbers of observed, then of extended: (kind, offset in the row, how many)."""
         return joined(
@@ -214,7 +215,7 @@ class Layout:
             for run in runs_of(dtype, offset)
         )
 
-    @cached_property
+    @cached
     def enums(self) -> dict[str, type[Enumeration]]:
         """An enum for each enumerated field: by its name, and by "Type.field".
 

@@ -5,6 +5,7 @@ import os
 import select
 import signal
 import subprocess
+import sys
 import time
 import warnings
 from collections.abc import Mapping, Sequence
@@ -25,6 +26,7 @@ from o80.errors import (
 from o80.frontend import Frontend
 
 GRACE = 5.0  # [s] for a robot to stop
+COLLECT = 1.0  # [s] for the exit code of a robot that has ended
 LOOK = 0.002  # [s] between checks of a robot that starts
 BAD_OPTIONS = 2  # exit code
 
@@ -94,7 +96,9 @@ class Process:
             popen.send_signal(signal.SIGTERM)
         if not self._ends_within(timeout):
             popen.kill()
-        popen.wait()
+        # an interrupt inside Popen may have left its lock taken
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            popen.wait(COLLECT)
 
     def _check_process(self) -> None:
         if self._owner != os.getpid():
@@ -191,6 +195,7 @@ def start_process(
     """Starts the program of a robot and waits until it runs. environment: None: as here."""
     import tempfile  # here, for it takes a tenth of the time to import o80
 
+    _refuse_in_import()
     output = tempfile.TemporaryFile()  # noqa: SIM115, it lives as long as the process
     try:
         popen = subprocess.Popen(
@@ -217,6 +222,17 @@ def start_process(
         if line.startswith("o80: "):
             warnings.warn(f"'{segment}': {line[5:]}", RuntimeWarning, stacklevel=3)
     return process
+
+
+def _refuse_in_import() -> None:
+    """Refuses to start a robot from a script that a robot's process imports to find its class."""
+    drivers = sys.modules.get("o80.drivers.driver_class")
+    if drivers is not None and drivers.imported_to_run:
+        file = drivers.imported_to_run.rpartition(":")[0]
+        raise DriverError(
+            f"{file} starts a robot when it is imported, and the robot's process imports it to "
+            f'find the class: put what the script does under `if __name__ == "__main__":`'
+        )
 
 
 def _wait_until_running(process: Process, timeout: float | None) -> None:

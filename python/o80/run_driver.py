@@ -9,12 +9,12 @@ signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the loop stops in order by
 def main() -> int:
     """Returns the exit code."""
     from o80 import _core
-    from o80.drivers.driver_class import found, library_of
+    from o80.drivers.driver_class import found_to_run, library_of
     from o80.errors import Error
 
     place, *flags = sys.argv[1:]
     try:
-        library = library_of(found(place), place)
+        library = library_of(found_to_run(place), place)
     except Error as error:
         print(f"o80: {error}", file=sys.stderr)
         return 1

@@ -25,15 +25,21 @@ std::vector<int>& lock_files() {
   return *files;
 }
 
-void before_fork() { fork_mutex().lock(); }
-void after_fork_in_parent() { fork_mutex().unlock(); }
+InheritingMutex& mutex() noexcept {
+  // never destroyed, as above; no process can run without it
+  static auto* made = new InheritingMutex;  // NOLINT(bugprone-unhandled-exception-at-new)
+  return *made;
+}
+
+void before_fork() { mutex().lock(); }
+void after_fork_in_parent() { mutex().unlock(); }
 
 void after_fork_in_child() {
   // closing the copy keeps the parent's lock; unlocking would release it
   for (const int file : lock_files()) ::close(file);
   lock_files().clear();
   generation.fetch_add(1, std::memory_order_relaxed);
-  fork_mutex().unlock_in_child();
+  mutex().unlock_in_child();
 }
 
 void watch_forks() noexcept {
@@ -47,9 +53,8 @@ void watch_forks() noexcept {
 std::uint64_t process_generation() noexcept { return generation.load(std::memory_order_relaxed); }
 
 InheritingMutex& fork_mutex() noexcept {
-  // never destroyed, as above; no process can run without it
-  static auto* mutex = new InheritingMutex;  // NOLINT(bugprone-unhandled-exception-at-new)
-  return *mutex;
+  watch_forks();
+  return mutex();
 }
 
 ForkGuard::ForkGuard() noexcept : generation_(process_generation()) { watch_forks(); }
@@ -62,7 +67,6 @@ void ForkGuard::check(std::string_view what) const {
 }
 
 int open_for_this_process(const char* path, int flags, mode_t permission) {
-  watch_forks();
   const std::lock_guard lock(fork_mutex());
   lock_files().reserve(lock_files().size() + 1);
   const int descriptor = ::open(path, flags, permission);

@@ -118,6 +118,7 @@ struct Counters {
   std::atomic<std::uint64_t> verb;       // bits 8..63: driver calls; 0..7: present Verb, or 0
   std::atomic<std::uint64_t> slow_verb;  // `verb` at the last change seen by the helper thread
   std::atomic<std::int64_t> slow_since;  // time of that change [ns]
+  std::atomic<std::uint64_t> queue;      // who holds the queue: memory/queue_word.hpp
   HaltSlot halt;                         // the halt in force
   RunningSlot running[kMostRunning];
   JournalCounters journal;

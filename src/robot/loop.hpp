@@ -93,9 +93,11 @@ class Loop final : public RequestServer {
   auto calls(Verb verb, Call&& call) noexcept {
     backend_.enter(verb);
     const auto result = call();
+    if (guard_.forked()) end_child(verb);
     backend_.leave();
     return result;
   }
+  [[noreturn]] void end_child(Verb verb) const noexcept;
   bool failed(const char* verb) noexcept;
   bool failed(const char* verb, std::string_view why) noexcept;
   bool failed_to_wait() noexcept;

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "base/sha256.hpp"
+#include "memory/fork.hpp"
 
 namespace o80 {
 
@@ -49,10 +50,9 @@ fs::path holder_of(const RobotTable& table) {
   return fs::canonical(name.has_parent_path() ? name : fs::path("/proc/self/exe"), error);
 }
 
-struct KnownLibraries {
-  std::mutex guard;
-  std::map<const RobotTable*, std::pair<std::string, std::string>> of;  // path and hash
-};
+/// Path and hash of the library of each robot; guarded by fork_mutex(), so that a forked child does
+/// not find it locked.
+using KnownLibraries = std::map<const RobotTable*, std::pair<std::string, std::string>>;
 
 KnownLibraries& known_libraries() {
   static KnownLibraries known;
@@ -62,22 +62,22 @@ KnownLibraries& known_libraries() {
 /// The library of a robot and its hash, which are computed once: a library stays loaded until the
 /// process ends.
 std::pair<std::string, std::string> library_of(const RobotTable& table) {
-  KnownLibraries& libraries = known_libraries();
-  const std::scoped_lock lock(libraries.guard);
-  const auto [found, is_new] = libraries.of.try_emplace(&table);
-  if (is_new) {
-    const fs::path path = holder_of(table);
-    found->second = {path.string(), sha256_of(path)};
+  {
+    const std::scoped_lock lock(fork_mutex());
+    const auto found = known_libraries().find(&table);
+    if (found != known_libraries().end()) return found->second;
   }
-  return found->second;
+  const std::string path = holder_of(table).string();
+  name_library(table, path);
+  return library_of(table);
 }
 
 }  // namespace
 
 void name_library(const RobotTable& table, const std::string& path) {
-  KnownLibraries& libraries = known_libraries();
-  const std::scoped_lock lock(libraries.guard);
-  libraries.of[&table] = {path, sha256_of(path)};
+  const std::pair<std::string, std::string> library{path, sha256_of(path)};
+  const std::scoped_lock lock(fork_mutex());
+  known_libraries()[&table] = library;
 }
 
 Provenance provenance_of(const RobotTable& table, const OptionValues& options) {

@@ -209,6 +209,7 @@ UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, Reques
       // ends of commands in one step: completed and late ones, and those of their batches
       outbox_(lanes, journal,
               2 * (schema.actuators.size() + 2 * Controller::kStatusesPerIteration)),
+      queue_(segment.view()),
       errors_(schema),
       readings_(schema),
       followed_(schema, options.bursting || recorded != nullptr ? ReadingWatch::Of::none

@@ -70,7 +70,10 @@ void UntypedBackend::Body::take_due() noexcept {
 
 /// Takes batches from the lanes within the budget of one iteration.
 void UntypedBackend::Body::take_batches() noexcept {
-  if (!lanes.look()) return;
+  if (!lanes.look()) {
+    if (!burst_.runs()) queue_.is_empty();
+    return;
+  }
   if (lanes.tickets_were_put_back()) {
     controller.forget_tickets();
     journal.order_lost();
@@ -78,9 +81,13 @@ void UntypedBackend::Body::take_batches() noexcept {
   }
   const bool all_taken = take_in_order();
   if (burst_.runs()) {
+    queue_.bursts(burst_.lane(), current);
     lanes.look_again_after(burst_.lane());
     if (staging.busy()) lanes.look_again();
-  } else if (!all_taken) {
+  } else if (all_taken) {
+    queue_.is_empty();
+  } else {
+    queue_.waits(current);
     stage_ahead();
     take_express();
   }
@@ -92,8 +99,11 @@ bool UntypedBackend::Body::take_in_order() noexcept {
   while (!burst_.runs()) {
     const std::optional<std::uint32_t> lane = lanes.next(staging.tickets());
     if (!lane) return true;
-    if (!staging.has_staged(*lane) && !stage(*lane, share_.work)) return false;
-    if (staging.has_staged(*lane) && !take_staged(*lane)) return false;
+    const std::uint32_t before = share_.work;
+    const bool goes_on = (staging.has_staged(*lane) || stage(*lane, share_.work)) &&
+                         (!staging.has_staged(*lane) || take_staged(*lane));
+    queue_.spent(*lane, before - share_.work);
+    if (!goes_on) return false;
   }
   return true;
 }

@@ -19,6 +19,7 @@
 #include "memory/lane.hpp"
 #include "memory/liveness.hpp"
 #include "memory/owned_segment.hpp"
+#include "memory/queue_word.hpp"
 #include "memory/signal.hpp"
 #include "memory/verb_word.hpp"
 #include "o80/base/time.hpp"
@@ -214,6 +215,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   StatusOutbox outbox_;
 
   WorkShare share_;
+  QueueWord queue_;
   std::uint32_t ahead_from_ = 0;              // last lane that was staged ahead
   std::vector<std::uint32_t> express_lanes_;  // by ticket
 

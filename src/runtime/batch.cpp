@@ -40,14 +40,6 @@ Batch::Batch(std::shared_ptr<Link> link, Sent sent)
 
 namespace {
 
-/// Describes the owner of a lane.
-std::string owner_of(const Link& link, std::uint32_t lane) {
-  const SegmentView& view = link.segment.view();
-  if (lane >= view.shape.lanes) return "another frontend";
-  const LaneSenderPage& page = view.lane(lane);
-  return "the frontend of " + printable(load_text(page.owner, std::size(page.owner)));
-}
-
 bool is_rejected(const LaneSender& lane, CommandId batch) noexcept {
   const LaneSender::StatusAnswer answer = lane.status(batch);
   return answer.known == LaneSender::Known::yes &&
@@ -77,7 +69,7 @@ std::string words_for(const Link& link, std::span<const SentCommand> commands, c
     case Reason::late:
       return "it came after the iteration for which it was sent";
     case Reason::exclusive:
-      return owner_of(link, detail) + " has exclusive control";
+      return link.owner_of(detail) + " has exclusive control";
     case Reason::invalid:
       return (detail & 7U) != 0
                  ? "its target is so far away that it would take more than 2^31 iterations"
@@ -201,9 +193,11 @@ void Batch::wait_for_row(const Deadline& deadline, const KeepWaiting& keep_waiti
   const KeepWaiting guarded = link_->guarded(keep_waiting);
   const auto ended = [&] { return is_end(ask(id_ + 1).status); };
   if (lane_->wait_until(ended, deadline, guarded) == Waited::timed_out) {
+    const std::string queue = first_iteration() < 0 ? link_->queue_text() : "";
     throw TimeoutError("the batch sent to '" + link_->segment.name() +
                        "' has not ended in time: look at its handles, pass a longer timeout, or "
-                       "purge");
+                       "purge" +
+                       (queue.empty() ? "" : ". It was not taken yet: " + queue));
   }
   const Handle last = ask(id_ + 1);
   if (last.iteration <= link_->history.published()) return;
@@ -239,9 +233,11 @@ Iteration wait_for_burst(const Link& link, LaneSender& lane, CommandId id, Timeo
   };
   if (lane.wait_until(over, Deadline(timeout), link.guarded(keep_waiting), events_before_send) ==
       Waited::timed_out) {
+    const std::string queue = link.queue_text();
     throw TimeoutError("the burst of '" + link.segment.name() +
                        "' was not done in time: pass a longer timeout, or see whether the burst of "
-                       "another frontend comes first");
+                       "another frontend comes first" +
+                       (queue.empty() ? "" : ". Now " + queue));
   }
   if (answer.known == LaneSender::Known::forgotten) {
     throw RowOverwritten("this burst of '" + link.segment.name() +

@@ -1,9 +1,13 @@
 #include "runtime/link.hpp"
 
 #include <algorithm>
+#include <chrono>
+#include <iterator>
 
 #include "base/printable.hpp"
 #include "describe/table.hpp"
+#include "memory/atomic_words.hpp"
+#include "memory/queue_word.hpp"
 
 namespace o80 {
 
@@ -104,6 +108,31 @@ std::string Link::halt_text(Iteration iteration) const {
   text += ")";
   if (!acting->reason().empty()) text += ": " + printable(acting->reason());
   return text;
+}
+
+std::string Link::owner_of(std::uint32_t lane) const {
+  if (lane >= segment.view().shape.lanes) return "another frontend";
+  const auto name = [lane](const AttachedSegment& of) {
+    const LaneSenderPage& page = of.view().lane(lane);
+    return "the frontend of " + printable(load_text(page.owner, std::size(page.owner)));
+  };
+  if (segment.access() == Access::read_write) return name(segment);
+  try {
+    const AttachedSegment again = AttachedSegment::attach(segment.name(), Access::read_write,
+                                                          Deadline(std::chrono::nanoseconds(0)));
+    if (again.epoch() == segment.epoch()) return name(again);
+  } catch (const Error&) {  // this user may not see whose lane it is
+  }
+  return "a frontend";
+}
+
+std::string Link::queue_text() const {
+  const std::optional<QueueHolder> holder = queue_holder(segment.view());
+  if (!holder) return "";
+  const std::string owner = owner_of(holder->lane);
+  const std::string since = " since iteration " + std::to_string(holder->since);
+  return holder->bursts ? "a burst of " + owner + " has been running" + since
+                        : owner + " has held the queue" + since;
 }
 
 KeepWaiting Link::guarded(const KeepWaiting& keep_waiting) const {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstdint>
 #include <deque>
 #include <memory>
 #include <mutex>
@@ -63,6 +64,11 @@ struct Link {
   /// 7 (halt 3, cause frontend, requested by pid 5 (python)): why". Empty if it is no longer in
   /// force.
   std::string halt_text(Iteration iteration) const;
+  /// The process that owns a lane: "the frontend of pid 5 (python)".
+  std::string owner_of(std::uint32_t lane) const;
+  /// "the frontend of pid 5 (python) has held the queue since iteration 7"; empty if no batch
+  /// waits.
+  std::string queue_text() const;
   /// `keep_waiting`, extended to throw Closed when the frontend is closed during a wait.
   KeepWaiting guarded(const KeepWaiting& keep_waiting) const;
 
@@ -83,6 +89,8 @@ struct Link {
   };
   std::deque<Scheduled> scheduled;  // guarded by `sending`; may hold batches already taken
   mutable std::mutex sending;
+  std::uint32_t control_blocks = 0;  // guarded by `controlling`: runtime/control_block.hpp
+  std::recursive_mutex controlling;  // locked before `sending`
   std::atomic<bool> closed{false};
 
  private:

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "memory/process_start.hpp"
+#include "memory/queue_word.hpp"
 #include "o80/runtime/frontend.hpp"
 #include "runtime/link.hpp"
 
@@ -99,7 +100,8 @@ std::string LoopState::hang() const {
 
 std::string LoopState::trouble() const {
   std::string hangs = hang();
-  if (!hangs.empty() || recent_overruns == 0 || !rate) return hangs;
+  if (!hangs.empty()) return hangs;
+  if (recent_overruns == 0 || !rate) return queue;
   return late_text(recent_overruns, recent_rows, *rate, period);
 }
 
@@ -123,6 +125,10 @@ LoopState loop_state(const UntypedFrontend& frontend, std::int64_t now) {
     const SlowVerb slow = slow_verb(segment.view());
     state.slow_verb = slow.verb;
     state.slow_for = slow.verb == Verb::none ? 0 : now - slow.since;
+    const std::optional<QueueHolder> holder = queue_holder(segment.view());
+    if (holder && !holder->bursts && state.last - holder->since >= kLongQueue) {
+      state.queue = frontend.link()->queue_text();
+    }
     state.process_stopped = is_process_stopped(state.pid, segment.header().process_start);
   }
 

@@ -12,6 +12,9 @@ namespace o80 {
 
 class UntypedFrontend;
 
+/// A queue of batches that lasts longer is told [iterations].
+inline constexpr Iteration kLongQueue = 10;
+
 /// State of a backend's loop, from its rows and counters.
 struct LoopState {
   Life life = Life::killed;
@@ -33,11 +36,15 @@ struct LoopState {
   Verb slow_verb = Verb::none;          // a call into the driver that has not returned
   std::int64_t slow_for = 0;            // [ns]
 
+  /// Whose batches others wait for, for longer than kLongQueue iterations; empty: nobody's.
+  std::string queue;
+
   /// True if no row was published for longer than a second and two periods.
   bool stalled() const noexcept;
   /// Reason why no row is published although one is due; empty if rows are published.
   std::string hang() const;
-  /// hang(), or else recent overruns with the rate that is reached; empty if there is no trouble.
+  /// hang(), or else recent overruns with the rate that is reached, or else the queue; empty if
+  /// there is no trouble.
   std::string trouble() const;
 };
 

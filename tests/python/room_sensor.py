@@ -1,5 +1,6 @@
 """Drivers in Python, for tests: a module that other processes import too."""
 
+import os
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
@@ -146,3 +147,16 @@ class Paced:
 
     def read(self, reading: Reading) -> None:
         reading.extended["due"] = self.due
+
+
+class Forks:
+    """Forks in iteration 10, and returns from `write` in both processes."""
+
+    actuators = ("joint",)
+
+    def write(self, desired: Desired) -> None:
+        if desired.iteration == 10:
+            os.fork()
+
+    def read(self, reading: Reading) -> None:
+        reading.observed[0] = os.getpid()

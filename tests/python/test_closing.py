@@ -1,11 +1,13 @@
 """Whatever is closed, or belongs to the parent of a forked process, says so."""
 
 import contextlib
+import importlib
 import operator
 import os
 import signal
 import threading
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,7 @@ import pytest
 from processes import end_of
 
 import o80
+from o80.layout import HEAD
 
 WAIT = 30.0  # [s] longer than any wait should take
 
@@ -202,12 +205,12 @@ def test_control_that_was_not_waited_for_is_given_back(segment: str) -> None:
 # ---------------------------------------------------------------------------- forked
 
 
-def in_child(work: Callable[[], object]) -> str:
+def in_child(work: Callable[[], object], within: float = WAIT) -> str:
     """Runs it in a forked child; what it raised, or nothing. Ends it if it hangs."""
     told, tell = os.pipe()
     child = os.fork()
     if child == 0:
-        signal.alarm(int(WAIT))
+        signal.alarm(int(within))
         try:
             work()
         except BaseException as error:
@@ -294,6 +297,55 @@ def test_a_child_forked_while_other_threads_send_can_close_its_copy(
             thread.join(WAIT)
 
         assert told == [""] * 40
+
+
+def test_a_child_forked_while_another_thread_computes_a_value_computes_its_own(
+    process: o80.robots.Process, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    parent, begun, go_on = os.getpid(), threading.Event(), threading.Event()
+
+    class Blocking(tuple[tuple[str, str], ...]):
+        def __iter__(self) -> Iterator[tuple[str, str]]:
+            if os.getpid() == parent:
+                begun.set()
+                assert go_on.wait(WAIT)
+            return super().__iter__()
+
+    def look() -> None:
+        with process.frontend() as arm:
+            assert len(arm.history(1)) == 1
+
+    monkeypatch.setattr("o80.layout.HEAD", Blocking(HEAD))
+    thread = threading.Thread(target=look)
+    thread.start()
+    assert begun.wait(WAIT)
+    told = in_child(look, within=5)
+    go_on.set()
+    thread.join(WAIT)
+
+    assert told == ""
+
+
+def test_a_child_forked_while_another_thread_imports_a_module_imports_it_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun, go_on = threading.Event(), threading.Event()
+    (tmp_path / "slowly_imported.py").write_text("import builtins\nbuiltins.o80_test_wait()\n")
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def wait() -> None:
+        begun.set()
+        assert go_on.wait(WAIT)
+
+    monkeypatch.setattr("builtins.o80_test_wait", wait, raising=False)
+    thread = threading.Thread(target=importlib.import_module, args=["slowly_imported"])
+    thread.start()
+    assert begun.wait(WAIT)
+    os.register_at_fork(before=go_on.set)  # the last thing before the fork
+    told = in_child(lambda: importlib.import_module("slowly_imported"), within=5)
+    thread.join(WAIT)
+
+    assert told == ""
 
 
 def test_a_robot_does_not_live_on_with_a_child_of_its_killed_parent(segment: str) -> None:

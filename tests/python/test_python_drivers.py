@@ -7,10 +7,10 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -192,6 +192,56 @@ def test_an_exception_of_a_verb_ends_the_robot_as_failed(verb: str, segment: str
             joint.burst(1)
 
 
+@pytest.mark.parametrize("value", [False, 0, "the bus is down"])
+@pytest.mark.parametrize("verb", ["start", "write", "read", "halt", "resume", "on_home", "stop"])
+def test_a_verb_that_returns_something_is_named_with_it(
+    segment: str, capfd: pytest.CaptureFixture[str], verb: str, value: object
+) -> None:
+    def returns(self: Joint, *arguments: object) -> object:
+        getattr(Joint, verb)(self, *arguments)
+        return value
+
+    def use() -> None:
+        with o80.robots.load(driver).inline(segment) as joint:
+            joint.burst(1)
+            joint.halt("enough")
+            joint.burst(1)
+            joint.resume()
+            joint.request("home", place=0.0)
+
+    driver = type("Joint", (Joint,), {verb: returns})
+    text = rf"{verb}(\(\))? must return None.*got {value!r}"
+    if verb == "stop":
+        use()
+        assert re.search(text, capfd.readouterr().err)
+        return
+    with pytest.raises(o80.Error, match=rf"'joint' .*{text}"):
+        use()
+
+
+@pytest.mark.parametrize(
+    ("report", "text"),
+    [
+        (lambda it: it.halt(5), "reason of reading.halt must be a text, got 5"),
+        (lambda it: it.halt(OSError()), r"reading.halt must be a text, got OSError\(\)"),
+        (lambda it: it.fault(5), "reason of reading.fault must be a text, got 5"),
+        (lambda it: it.progress("home", 5), "reading.progress must be a text, got 5"),
+        (lambda it: it.ended("home", False), "answer must be None or o80.StartAfresh.*got False"),
+        (lambda it: it.ended("home", rejected=5), "rejected must be a text, got 5"),
+        (lambda it: o80.Running(cast(str, 5)), "progress of o80.Running must be a text, got 5"),
+    ],
+)
+def test_a_report_of_another_type_says_what_it_wants(
+    segment: str, report: Callable[[Any], object], text: str
+) -> None:
+    def read(self: Joint, reading: Reading) -> None:
+        report(reading)
+
+    driver = type("Joint", (Joint,), {"read": read})
+    with pytest.raises(o80.DriverError, match=f"'joint' failed in read: .*{text}"):
+        o80.robots.load(driver).inline(segment)
+
+
 def test_what_a_reading_reports_reaches_the_loop(segment: str) -> None:
     def start(fails_in: str) -> o80.Frontend:
         return o80.robots.load(Joint).inline(segment, fails_in=fails_in)
@@ -288,6 +338,38 @@ def test_a_file_names_a_driver_too(segment: str, tmp_path: Path) -> None:
     )
     with o80.robots.load(f"{file}:Thermometer").start(segment) as process:
         assert process.frontend(WAIT).latest().extended.temperature == 20.5
+
+
+SCRIPT = """
+import os, o80
+class Counter:
+    extended = {{"count": int}}
+    def read(self, reading): ...
+open({started!r}, "a").write("x")
+assert os.path.getsize({started!r}) < 4, "a chain of processes"
+{guard}
+    with o80.robots.load(Counter).start({name!r}) as process:
+        print(process.frontend().robot)
+"""
+
+
+@pytest.mark.parametrize("guard", ['if __name__ == "__main__":', "if True:"])
+def test_a_script_with_a_driver_of_its_own_needs_a_main_guard(
+    segment: str, tmp_path: Path, guard: str
+) -> None:
+    script, started = tmp_path / "script.py", tmp_path / "started"
+    script.write_text(SCRIPT.format(guard=guard, started=str(started), name=segment))
+    done = subprocess.run(
+        [sys.executable, str(script)], capture_output=True, text=True, timeout=WAIT
+    )
+    assert started.read_text() == "xx"  # by the script and by the robot's process
+    if guard == "if True:":
+        assert done.returncode == 1
+        assert "o80.errors.DriverError: the driver" in done.stderr
+        assert f"{script} starts a robot when it is imported" in done.stderr
+        assert 'put what the script does under `if __name__ == "__main__":`' in done.stderr
+    else:
+        assert done.stdout == "counter\n", done.stderr
 
 
 # ---------------------------------------------------------------------- mistakes
@@ -598,3 +680,22 @@ def test_rates_that_are_not_there_are_a_fault_that_says_so(
     named = type("Mistaken", (Mistaken,), {"field": field})
     with pytest.raises(o80.Error, match=said), o80.robots.load(named).inline(segment) as robot:
         robot.burst(1)
+
+
+# ---------------------------------------------------------------------- forks
+
+
+@pytest.mark.parametrize("bursting", [False, True])
+def test_a_child_that_returns_into_the_loop_ends_there(segment: str, bursting: bool) -> None:
+    robot = o80.robots.load(room_sensor.Forks)
+    with robot.start(segment, bursting=bursting) as process, process.frontend() as joint:
+        if bursting:
+            joint.burst(500, timeout=WAIT)
+        joint.wait_for(500, WAIT)
+        end = time.monotonic() + WAIT
+        while "'forks' forked in write" not in process.output and time.monotonic() < end:
+            time.sleep(0.001)
+        assert "os._exit" in process.output
+        assert set(joint.history().observed[:, 0]) == {process.pid}
+        process.stop()
+        assert joint.life == "stopped"

@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 from alarm import alarm_in
 from blocking import CALLS
+from interrupting import at_every_moment
 
 import o80
 
@@ -284,6 +285,21 @@ def test_ctrl_c_while_control_is_awaited_gives_it_back(segment: str) -> None:
             assert batch.statuses == ["completed"]
 
 
+def test_an_interrupt_at_any_moment_gives_control_back(process: o80.robots.Process) -> None:
+    with process.frontend() as arm, process.frontend() as other:
+
+        def block() -> None:
+            with arm.control(WAIT), arm.control(WAIT) as same:
+                assert same is arm
+
+        moments = 0
+        for error in at_every_moment(block):
+            moments += 1
+            with other.control(WAIT):  # also while the traceback keeps the frames
+                assert isinstance(error, KeyboardInterrupt)
+        assert moments > 20
+
+
 TWICE = """
 import os, signal, sys, o80
 with o80.robots.load("two_joints").start({name!r}) as process, process.frontend() as arm:
@@ -361,3 +377,49 @@ def test_ctrl_c_at_a_terminal_does_not_reach_the_robot(segment: str) -> None:
     os.close(terminal)
     assert os.waitstatus_to_exitcode(status) == 0, printed.decode()
     assert b"both live" in printed
+
+
+def inline(name: str, _: Path) -> None:
+    with o80.robots.load("two_joints").inline(name) as arm:
+        arm.burst(1)
+
+
+def embedded(name: str, _: Path) -> None:
+    with o80.Backend(name, ["a"]) as backend:
+        backend.publish([0.0])
+
+
+def commanding(name: str, _: Path) -> None:
+    with o80.Frontend(name) as arm:
+        arm.purge()
+
+
+def recording(name: str, folder: Path) -> None:
+    with o80.Recording(folder / "run.mcap", name, proceed=True):
+        pass
+
+
+def in_a_process(name: str, _: Path) -> None:
+    with o80.robots.load("two_joints").start(name):
+        pass
+
+
+@pytest.mark.filterwarnings(
+    "ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
+)
+@pytest.mark.parametrize(
+    ("take", "step"),
+    [(inline, 31), (embedded, 17), (commanding, 3), (recording, 131), (in_a_process, 131)],
+)
+def test_what_an_interrupt_left_is_given_back_with_its_exception(
+    segment: str, tmp_path: Path, take: Callable[[str, Path], None], step: int
+) -> None:
+    name = f"{segment}-robot"
+    other = f"{segment}-other"
+    with o80.robots.load("two_joints").inline(other, lanes=1):
+        there = other if take in (commanding, recording) else name
+        # a lane, a name or a file that is left taken makes the next call fail
+        for error in at_every_moment(lambda: take(there, tmp_path), step):
+            del error
+            while [entry.name for entry in o80.segments()] != [other]:
+                time.sleep(0.001)  # a robot's process ends when its pipe is closed

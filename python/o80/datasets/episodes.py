@@ -5,12 +5,12 @@ The rules are in docs/recording.md, Export for learning.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.cached import cached
 from o80.checked import whole
 from o80.columns import columns_of, values_of
 from o80.errors import InvalidArgument
@@ -38,17 +38,17 @@ class Episode:
     def __len__(self) -> int:
         return len(self.rewards)
 
-    @cached_property
+    @cached
     def observed(self) -> NDArray[np.float64]:
         """The observed states: (T + 1, numbers)."""
         return self._numbers("observed")
 
-    @cached_property
+    @cached
     def extended(self) -> NDArray[np.float64]:
         """Further sensor values: (T + 1, numbers)."""
         return self._numbers("extended")
 
-    @cached_property
+    @cached
     def actions(self) -> NDArray[np.float64]:
         """What was asked in each step, the desired states: (T, numbers)."""
         return self._numbers("desired")[1:]

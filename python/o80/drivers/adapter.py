@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o80 import _core
-from o80.checked import mapping
+from o80.backend import KEEPS
+from o80.checked import mapping, nothing
 from o80.description import SchemaWriter
 from o80.drivers.reading import Answer, Desired, Differences, DriverFaultError, Reading
 from o80.errors import Error, InvalidArgument, RequestRejected
@@ -123,23 +124,23 @@ class Adapter:
 
     def start(self) -> None:
         if verb := self._told("start"):
-            verb()
+            nothing(verb(), "start()")
 
     def wait(self, due: int) -> None:
-        self._driver.wait(due)
+        nothing(self._driver.wait(due), "wait()")
 
     def write(self, iteration: int, time: int, period: int) -> None:
         if verb := self._told("write"):
             desired = self._desired
             desired.iteration, desired.time = iteration, time
             desired.period = period * NANOSECOND
-            verb(desired)
+            nothing(verb(desired), "write()")
 
     def read(
         self, iteration: int, time: int, fresh: bool, runs: Sequence[bool]
     ) -> tuple[Any, ...] | None:
         self._reading.begin(iteration, time, fresh, runs)
-        self._driver.read(self._reading)
+        nothing(self._driver.read(self._reading), "read()")
         return self._reading.report()
 
     def request(self, index: int, payload: bytes) -> tuple[int, str]:
@@ -152,11 +153,11 @@ class Adapter:
             return Answer.REJECTED, str(why) or "the handler gave no reason"
 
     def halt(self) -> None:
-        self._driver.halt()
+        nothing(self._driver.halt(), "halt()")
 
     def resume(self) -> tuple[int, str]:
         try:
-            self._driver.resume()
+            nothing(self._driver.resume(), "resume()", KEEPS)
         except RequestRejected as why:
             return Answer.REJECTED, str(why) or "resume() gave no reason"
         return Answer.DONE, ""
@@ -164,7 +165,7 @@ class Adapter:
     def stop(self) -> None:
         if verb := self._told("stop"):
             try:
-                verb()
+                nothing(verb(), "stop()")
             except Exception:
                 traceback.print_exc()
 

@@ -17,6 +17,19 @@ from o80.drivers.adapter import Adapter, check_verbs
 from o80.drivers.option import Options
 from o80.errors import DriverError, InvalidArgument
 
+#: the driver that this process imports, if it is the process of a robot
+imported_to_run = ""
+
+
+def found_to_run(place: str) -> type[Any]:
+    """As `found`, in the process of that robot; there the import may start no further robot."""
+    global imported_to_run
+    imported_to_run = place
+    try:
+        return found(place)
+    finally:
+        imported_to_run = ""
+
 
 def found(place: str) -> type[Any]:
     """The class at "module:Class" or "file.py:Class". Raises DriverError."""

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from o80 import _core
-from o80.backend import Running, StartAfresh, fill
+from o80 import _core, checked
+from o80.backend import Running, StartAfresh, check_end, fill
 from o80.errors import InvalidArgument
 from o80.layout import Layout
 
@@ -148,11 +148,11 @@ class Reading:
 
     def halt(self, reason: str) -> None:
         """Halts the robot. May be repeated with each reading; the same text is the same halt."""
-        self._halt = reason
+        self._halt = checked.text(reason, "the reason of reading.halt")
 
     def fault(self, reason: str) -> None:
         """Ends the loop at once; frontends raise the reason."""
-        raise DriverFaultError(reason)
+        raise DriverFaultError(checked.text(reason, "the reason of reading.fault"))
 
     def finish(self) -> None:
         """Ends the loop in order: in real time the robot brakes first."""
@@ -177,12 +177,13 @@ class Reading:
 
     def progress(self, request: str, text: str) -> None:
         """Sets the text that frontends see while a request runs: at most 247 bytes."""
-        self._report(request, Answer.RUNNING, text)
+        self._report(request, Answer.RUNNING, checked.text(text, "reading.progress"))
 
     def ended(
         self, request: str, answer: StartAfresh | None = None, *, rejected: str | None = None
     ) -> None:
         """Ends a request that runs: done, with a fresh start, or rejected for a reason."""
+        check_end(answer, rejected)
         if rejected is not None:
             self._report(request, Answer.REJECTED, rejected)
         else:

@@ -1,10 +1,10 @@
 """How a frontend describes its backend and robot."""
 
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from o80 import _core
 from o80.actuator import Actuator, actuators_of
+from o80.cached import cached
 from o80.layout import Layout
 from o80.provenance import Provenance
 from o80.words import LifeWord
@@ -65,7 +65,7 @@ class Describing(_core.Frontend):
         """The model (MJCF) that draws the robot; empty if its driver names none."""
         return self._layout.model
 
-    @cached_property
+    @cached
     def actuators(self) -> list[Actuator]:
         """The actuators: index, name, unit, limits."""
         return actuators_of(self.schema)

@@ -1,14 +1,13 @@
 """Opening, closing and attaching a frontend again."""
 
 import contextlib
-import threading
 import warnings
 from collections.abc import Callable
-from functools import cached_property
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, cast
 
 from o80 import _core, at_exit, frontend_classes
+from o80.cached import cached
 from o80.errors import Error, InvalidArgument, SchemaMismatch, UsedAfterFork
 from o80.frontend.halting import Halting
 from o80.layout import Layout
@@ -87,12 +86,10 @@ class Frontend(Halting):
         self._decoder = _core.Decoder(self._description, self._layout)
         super().__init__(attachment, self._decoder)
         self._first = self._read(self.oldest, 1) if self.published >= 0 else None
-        self._control_lock = threading.Lock()
-        self._control_blocks = 0
         self._is_set_up = True
         at_exit.close_later(self)
 
-    @cached_property
+    @cached
     def aio(self) -> "Waits":
         """The waiting methods as asyncio coroutines: `await arm.aio.wait_for_next()`."""
         from o80.aio import Waits  # here, because most programs do not need asyncio

@@ -10,15 +10,17 @@ _open_here: "WeakSet[LockedFile]" = WeakSet()
 
 
 class LockedFile:
-    """An open file with a lock. Move-only: close it once; closed in forked children."""
+    """An open file with a lock. Closed in forked children, and when it is garbage collected."""
+
+    descriptor = -1  #: -1: closed
 
     def __init__(self, path: Path, flags: int) -> None:
         """flags: of os.open, beside O_RDWR. Raises OSError, BlockingIOError if it is locked."""
-        self.descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC | flags, 0o644)  #: -1: closed
+        self.descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC | flags, 0o644)
         try:
             fcntl.flock(self.descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            os.close(self.descriptor)
+            self.leave()
             raise
         except OSError:  # a file system without locks
             pass
@@ -34,8 +36,11 @@ class LockedFile:
 
     def leave(self) -> None:
         """Closes this descriptor and leaves the lock to that of the parent process."""
-        os.close(self.descriptor)
-        self.descriptor = -1
+        descriptor, self.descriptor = self.descriptor, -1
+        os.close(descriptor)
+
+    def __del__(self) -> None:
+        self.close()
 
 
 def _leave_to_parent() -> None:

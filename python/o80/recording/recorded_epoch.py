@@ -4,13 +4,13 @@ import struct
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import IO, Any, TypeVar
 
 import numpy as np
 
 from o80 import _core
+from o80.cached import cached
 from o80.checked import whole
 from o80.errors import InvalidArgument, RecordingError, SegmentError
 from o80.history import History
@@ -152,7 +152,7 @@ class RecordedEpoch:
         schema: dict[str, Any] = self._decoder.layout.schema
         return schema
 
-    @cached_property
+    @cached
     def provenance(self) -> Provenance:
         """How the backend was started; as `Frontend.provenance`. Raises RecordingError."""
         return self._started("json", Provenance.from_json)
@@ -171,7 +171,7 @@ class RecordedEpoch:
                 f"{self._parts[0].path}: the record {self._note.provenance} is damaged"
             ) from error
 
-    @cached_property
+    @cached
     def _provenance_texts(self) -> dict[str, str]:
         for each in self._parts[0].found.metadata:
             if each.name == self._note.provenance:
@@ -181,7 +181,7 @@ class RecordedEpoch:
             f"{self._parts[0].path} does not say how '{self._note.segment}' was started"
         )
 
-    @cached_property
+    @cached
     def _decoder(self) -> Any:
         table = self._parts[0].table()
         try:
@@ -191,7 +191,7 @@ class RecordedEpoch:
                 f"{self._parts[0].path}: the description of '{self._note.segment}' is damaged"
             ) from error
 
-    @cached_property
+    @cached
     def description(self) -> _core.Description:
         """The description of the robot as the compiled library reads it."""
         self._decoder  # noqa: B018  tells a damaged description

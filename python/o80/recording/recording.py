@@ -2,7 +2,10 @@
 
 import os
 import threading
+import warnings
+import weakref
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 from o80.at_exit import close_later
@@ -48,7 +51,9 @@ class Recording(Closeable):
         self._end = threading.Event()
         self._failure: Exception | None = None
         self._closed = False
-        self._thread = threading.Thread(target=self._run, name="o80-recording", daemon=True)
+        # not bound to this object, which ends when nobody refers to it any more
+        run = partial(_run, weakref.ref(self), self._end)
+        self._thread = threading.Thread(target=run, name="o80-recording", daemon=True)
         self._thread.start()
         close_later(self)
 
@@ -88,7 +93,8 @@ class Recording(Closeable):
             return
         self._closed = True
         self._end.set()
-        self._thread.join()
+        if self._thread.is_alive() and self._thread is not threading.current_thread():
+            self._thread.join()
         try:
             if self._failure is None:
                 self._recorder.catch_up()
@@ -103,11 +109,25 @@ class Recording(Closeable):
         if self._failure is not None:
             raise self._failure
 
-    def _run(self) -> None:
-        while not self._end.wait(BETWEEN_POLLS):
-            try:
-                with self._lock:
-                    self._recorder.catch_up()
-            except Exception as error:  # told by the next call, at the latest by close
-                self._failure = error
-                return
+    def _catch_up(self) -> bool:
+        """False if it failed."""
+        try:
+            with self._lock:
+                self._recorder.catch_up()
+        except Exception as error:  # told by the next call, at the latest by close
+            self._failure = error
+        return self._failure is None
+
+    def __del__(self) -> None:
+        if hasattr(self, "_thread") and not self._closed:
+            path = self._recorder.path
+            warnings.warn(f"the recording {path} was never closed", ResourceWarning, stacklevel=2)
+            self.close()
+
+
+def _run(recording: "weakref.ref[Recording]", end: threading.Event) -> None:
+    while not end.wait(BETWEEN_POLLS):
+        alive = recording()
+        if alive is None or not alive._catch_up():
+            return
+        del alive

@@ -1,6 +1,12 @@
 #include "robot/loop.hpp"
 
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
 #include <atomic>
+#include <string_view>
+#include <tuple>
 
 #include "robot/puppet.hpp"
 
@@ -9,6 +15,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Pair;
 
 class LoopTest : public PuppetTest {
  protected:
@@ -49,6 +56,58 @@ TEST_F(LoopTest, WritesAndReadsOnceAnIteration) {
   EXPECT_EQ(Puppet::calls.read, 6);
   EXPECT_EQ(observed(frontend.latest(), 1), 4.0);
 }
+
+/// A driver that forks in one of its functions, and whose child returns from it.
+class ForkingLoop : public LoopTest,
+                    public ::testing::WithParamInterface<std::tuple<const char*, bool>> {
+ protected:
+  void fork_at(Iteration now) {
+    if (child_ == 0) _exit(kGoesOn);
+    if (now != 2) return;
+    child_ = fork();
+    if (child_ == 0) dup2(said_[1], STDERR_FILENO);
+  }
+  /// How the child ended, and what it said.
+  std::pair<int, std::string> end_of_child() {
+    close(said_[1]);
+    std::string text;
+    char part = 0;
+    while (read(said_[0], &part, 1) == 1) text += part;
+    close(said_[0]);
+    int status = -1;
+    EXPECT_EQ(waitpid(child_, &status, 0), child_);
+    return {WEXITSTATUS(status), text};
+  }
+
+  static constexpr int kGoesOn = 7;
+  pid_t child_ = -1;
+  std::array<int, 2> said_{};
+};
+
+TEST_P(ForkingLoop, EndsTheChildWhichTouchesNothing) {
+  const auto [verb, bursting] = GetParam();
+  ASSERT_EQ(pipe(said_.data()), 0);
+  const bool writes = std::string_view(verb) == "write";
+  Puppet::on_write = [&](const Desired<Puppet>& desired) {
+    if (writes || child_ == 0) fork_at(desired.iteration());
+  };
+  Puppet::on_read = [&](Reading<Puppet>& reading) {
+    if (!writes || child_ == 0) fork_at(reading.iteration());
+  };
+  const auto loop = make({{"finish_at", "4"}}, bursting);
+  loop->start();
+  UntypedFrontend frontend("puppet");
+  if (bursting) frontend.start_burst(4);
+  EXPECT_TRUE(loop->run().in_order);
+
+  EXPECT_THAT(end_of_child(), Pair(1, HasSubstr(std::string("'puppet' forked in ") + verb)));
+  EXPECT_EQ(Puppet::calls.stopped, 1);
+  EXPECT_EQ(frontend.published(), 4);
+  EXPECT_EQ(frontend.life(), Life::stopped);
+}
+
+INSTANTIATE_TEST_SUITE_P(, ForkingLoop,
+                         ::testing::Combine(::testing::Values("write", "read"), ::testing::Bool()));
 
 /// What frontends see of a loop that fails, wherever.
 class LoopFails : public LoopTest,

@@ -3,11 +3,17 @@
 
 #include <gtest/gtest.h>
 
+#include <unistd.h>
+
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "memory/queue_word.hpp"
 #include "runtime/liar.hpp"
+#include "runtime/link.hpp"
+#include "runtime/loop_state.hpp"
 #include "runtime/schedule.hpp"
 #include "runtime/station.hpp"
 
@@ -63,6 +69,36 @@ TEST_F(ExpressTest, APurgeIsTakenInTheIterationAfterItsCommitWhateverLiesInOther
     EXPECT_EQ(flood.handle(0).status, Status::purged) << "older than the purge, taken later";
   }
   EXPECT_EQ(desired(one.latest()), desired(one.wait_for(now, kAtOnce))) << "nothing has moved it";
+}
+
+TEST_F(ExpressTest, NamesTheFrontendWhoseBatchesOthersWaitFor) {
+  station.start();
+  UntypedFrontend one("pair");
+  send(one, 1, 1.0);
+  station.run(1);
+  EXPECT_EQ(queue_holder(one.link()->segment.view()), std::nullopt);
+  const auto others = flood(1);
+  const Iteration begun = station.last() + 1;
+  station.run(1);
+  const Batch waiting = send(one, 1, 2.0);
+  station.run(kLongQueue);
+
+  const std::optional<QueueHolder> holder = queue_holder(one.link()->segment.view());
+  ASSERT_TRUE(holder.has_value());
+  EXPECT_EQ(holder->lane, others[0]->link()->lane()->lane());
+  EXPECT_EQ(holder->since, begun);
+  const std::string told = "the frontend of pid " + std::to_string(getpid()) +
+                           " (o80_test_runtim) has held the queue since iteration " +
+                           std::to_string(begun);
+  EXPECT_THAT([&] { waiting.wait(std::chrono::nanoseconds(0)); },
+              ::testing::ThrowsMessage<TimeoutError>(HasSubstr("not taken yet: " + told)));
+  EXPECT_EQ(loop_state(one).queue, told);
+  const UntypedFrontend reader("pair", {.access = Access::read_only});
+  EXPECT_EQ(loop_state(reader).trouble(), told);
+
+  for (int i = 0; i < 1000 && !waiting.ended(); ++i) station.run(1);
+  station.run(1);
+  EXPECT_EQ(loop_state(one).queue, "");
 }
 
 TEST_F(ExpressTest, ControlIsTakenAtOnceToo) {

@@ -1,0 +1,45 @@
+"""Interrupts at every moment at which Python can raise one."""
+
+import itertools
+import sys
+from collections.abc import Callable, Iterator
+from types import FrameType
+from typing import Any
+
+
+def interrupted(block: Callable[[], object], moment: int) -> BaseException | None:
+    """Calls it, interrupted before its instruction of that number; None if it ended before.
+
+    Python's own modules may raise another exception instead, such as a lock that is not locked.
+    """
+    left = moment
+
+    def trace(frame: FrameType, event: str, _: object) -> Any:
+        nonlocal left
+        frame.f_trace_opcodes = True
+        left -= event == "opcode"
+        if left == 0:
+            raise KeyboardInterrupt
+        return trace
+
+    before = sys.gettrace()
+    sys.settrace(trace)
+    try:
+        block()
+    except BaseException as error:
+        if left > 0:
+            raise
+        return error
+    finally:
+        sys.settrace(before)
+    return None
+
+
+def at_every_moment(block: Callable[[], object], step: int = 1) -> Iterator[BaseException | None]:
+    """The interrupts of calls of it, each so many instructions later than the last."""
+    block()  # imports what it needs, for an interrupted import leaves Python's lock of it taken
+    for moment in itertools.count(1, step):
+        errors = [interrupted(block, moment)]  # not a variable, which would keep the exception
+        if errors[0] is None:
+            return
+        yield errors.pop()
