@@ -23,11 +23,11 @@ std::uint64_t halt(const Frontend& self, nb::handle why) {
   return frontend->halt(reason);
 }
 
-void resume(const Frontend& self, std::uint64_t number, nb::handle timeout, bool accept_reading) {
+bool resume(const Frontend& self, std::uint64_t number, nb::handle timeout, bool accept_reading) {
   const o80::Timeout patience = timeout_of(timeout);
   const std::shared_ptr<o80::UntypedFrontend> frontend = self.shared();
   const Waiting waiting;
-  frontend->resume(number, patience, Waiting::keep_waiting, accept_reading);
+  return frontend->resume(number, patience, Waiting::keep_waiting, accept_reading);
 }
 
 /// Name, iteration, who, progress.

@@ -63,6 +63,7 @@ void bind_loop_state(nb::module_& m) {
   using o80::LoopState;
   nb::class_<LoopState>(m, "LoopState", "State of a backend's loop.")
       .def_prop_ro("life", [](const LoopState& self) { return std::string(name_of(self.life)); })
+      .def_prop_ro("word", [](const LoopState& self) { return std::string(self.word()); })
       .def_ro("bursting", &LoopState::bursting)
       .def_ro("played", &LoopState::played)
       .def_prop_ro("frequency",

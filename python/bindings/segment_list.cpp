@@ -16,6 +16,7 @@ void bind_segment_list(nb::module_& m) {
       .def_ro("name", &SegmentEntry::name)
       .def_prop_ro("life",
                    [](const SegmentEntry& entry) { return std::string(name_of(entry.life)); })
+      .def_prop_ro("state", [](const SegmentEntry& entry) { return std::string(entry.state()); })
       .def_ro("readable", &SegmentEntry::readable)
       .def_ro("pid", &SegmentEntry::pid)
       .def_ro("process_start", &SegmentEntry::process_start)

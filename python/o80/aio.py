@@ -1,5 +1,6 @@
 """The waits of a frontend, for programs on asyncio."""
 
+import asyncio
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, SupportsIndex
 
@@ -17,7 +18,9 @@ class Waits:
 
     Arguments, results and exceptions are those of the methods with the same names. Several tasks
     may wait at the same time. A cancelled task continues within 50 ms; the rest of its burst is
-    then cancelled too, as after a timeout, but commands that it has pulsed continue.
+    then cancelled too, as after a timeout. Commands that it has pulsed continue; a cancelled
+    `pulse_and_wait` purges those of its frontend, as an error in a `with` block does, unless
+    `on_error` is "continue".
     """
 
     def __init__(self, frontend: "Frontend") -> None:
@@ -50,12 +53,17 @@ class Waits:
     ) -> _core.Observation:
         """Sends what was added and waits until it has ended; see `Frontend.pulse_and_wait`."""
         frontend = self._frontend
-        if frontend._is_inline:  # iterations of an inline robot run in the calling thread
-            return await in_thread(
-                lambda: frontend.pulse_and_wait(timeout, at=at, late=late, check=check)
-            )
-        batch = frontend._pulse_to_end(at, late)
-        return await in_thread(lambda: frontend._wait_for_end(batch, timeout, check))
+        try:
+            if frontend._is_inline:  # iterations of an inline robot run in the calling thread
+                return await in_thread(
+                    lambda: frontend.pulse_and_wait(timeout, at=at, late=late, check=check)
+                )
+            batch = frontend._pulse_to_end(at, late)
+            return await in_thread(lambda: frontend._wait_for_end(batch, timeout, check))
+        except asyncio.CancelledError:
+            if not frontend.closed:
+                frontend._purge_on_error()
+            raise
 
     async def move_to(
         self,
@@ -129,8 +137,8 @@ class Waits:
         *,
         timeout: float | None = 5.0,
         accept_reading: bool = False,
-    ) -> None:
+    ) -> bool:
         """Ends a halt; see `Frontend.resume`."""
-        await in_thread(
+        return await in_thread(
             lambda: self._frontend.resume(number, timeout=timeout, accept_reading=accept_reading)
         )

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from o80 import _core
 from o80.columns import Column, columns_of, values_of
 from o80.command_ends import CommandEnd
 from o80.errors import InvalidArgument
+from o80.export import chosen
 from o80.extras import needed
 from o80.history import History
 from o80.words import Status
@@ -39,6 +39,7 @@ def plot(
     fields: Sequence[str] = (),
     *,
     ends: Mapping[str, Sequence[CommandEnd]] | None = None,
+    marks: Mapping[str, Sequence[tuple[str, int]]] | None = None,
     origins: Mapping[str, int] | None = None,
     label: str = "time [s]",
     window: bool = False,
@@ -49,6 +50,7 @@ def plot(
     fields: such as "observed.elbow", "elbow" (desired and observed), "extended.force", "extended";
         empty: all states.
     ends: ends of commands to mark, by name of robot: o80.command_ends.command_ends(arm.journal()).
+    marks: text and iteration of the marks of a recording, by name of robot.
     origins: the time of a row [ns] that is 0 on the axis, by name of robot (None: the earliest row
         of all). Give those of `o80.timelines.origins` if the clocks of the robots differ.
     label: of the time axis.
@@ -56,10 +58,10 @@ def plot(
     Raises InvalidArgument for an unknown field, MissingExtra without matplotlib.
     """
     needed("matplotlib", "plot", "a plot")
-    chosen = [
+    curves = [
         curve for name, history in histories.items() for curve in _chosen(name, history, fields)
     ]
-    panels = list(dict.fromkeys((curve.robot, curve.panel) for curve in chosen))
+    panels = list(dict.fromkeys((curve.robot, curve.panel) for curve in curves))
     if not panels:
         raise InvalidArgument(
             "there is nothing to plot: the robot has no actuators. Name sensor values in fields, "
@@ -73,12 +75,13 @@ def plot(
     axes = figure.subplots(len(panels), sharex=True, squeeze=False)[:, 0]
     start = min(int(history.time[0]) for history in histories.values() if len(history))
     for ax, panel in zip(axes, panels, strict=True):
-        curves = [curve for curve in chosen if (curve.robot, curve.panel) == panel]
+        drawn = [curve for curve in curves if (curve.robot, curve.panel) == panel]
         history = histories[panel[0]]
         zero = start if origins is None else origins[panel[0]]
         times = np.asarray((history.time - zero) * 1e-9, np.float64)
-        _draw(ax, curves, history, times, several=len(histories) > 1)
+        _draw(ax, drawn, history, times, several=len(histories) > 1)
         _mark_ends(ax, panel[1], history, times, (ends or {}).get(panel[0], ()))
+        _draw_marks(ax, history, times, (marks or {}).get(panel[0], ()))
         ax.legend(fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5))
     axes[-1].set_xlabel(label)
     return figure
@@ -99,14 +102,7 @@ def _chosen(name: str, history: History, fields: Sequence[str]) -> Iterable[Curv
     columns = {column.name: column for column in columns_of(history.schema)}
     wanted = list(columns) if fields else [each for each in columns if _part(each) != "extended"]
     if fields:
-        matched = {field: [each for each in columns if _matches(each, field)] for field in fields}
-        for field, found in matched.items():
-            if not found:
-                known = sorted({each.partition(".")[2].partition("[")[0] for each in columns})
-                raise InvalidArgument(
-                    f"'{name}' has no field '{field}'{_core.names_instead(field, known)}"
-                )
-        wanted = [each for each in columns if any(each in found for found in matched.values())]
+        wanted = chosen(name, list(columns), fields)
     units = _units(history.schema)
     for each in wanted:
         panel = each if _part(each) == "extended" else each.partition(".")[2]
@@ -115,14 +111,6 @@ def _chosen(name: str, history: History, fields: Sequence[str]) -> Iterable[Curv
 
 def _part(column: str) -> str:
     return column.partition(".")[0]
-
-
-def _matches(column: str, field: str) -> bool:
-    """Whether a field names this column, or what it is part of."""
-    for name in (column, column.partition(".")[2]):
-        if name == field or name.startswith((field + ".", field + "[")):
-            return True
-    return False
 
 
 def _units(schema: dict[str, Any]) -> dict[str, str]:
@@ -190,6 +178,23 @@ def _mark_ends(
             where = times[sorted(places)]
             line = ax.plot(where, at, marker, color=color, transform=_shares(ax), label=label)
             line[0].set(markersize=9 if marker == "|" else 6, markeredgewidth=2)
+
+
+def _draw_marks(
+    ax: "Axes",
+    history: History,
+    times: NDArray[np.float64],
+    marks: Sequence[tuple[str, int]],
+) -> None:
+    """A line with its text where the program that recorded made a mark."""
+    iterations = history.iteration
+    for text, iteration in marks:
+        if len(history) and iterations[0] <= iteration <= iterations[-1]:
+            at = times[np.searchsorted(iterations, iteration)]
+            ax.axvline(at, color="tab:olive", linewidth=1.0)
+            place = {"rotation": 90, "fontsize": 6, "va": "top", "ha": "right"}
+            # a mark holds any text: none of it is a formula
+            ax.text(at, 0.98, text, transform=_shares(ax), parse_math=False, **place)
 
 
 def _is_of(panel: str, actuator: str) -> bool:

@@ -244,8 +244,8 @@ class Robot:
         permission: the read bits permit users to observe, the write bits to command.
         stale: policy for a frontend that dies, or gives no sign of life for `silence` iterations
             while it has control or commands: "hold" does nothing, "purge" drops its commands,
-            "halt" halts the robot, "stop" stops it. Signs of life are a pulse, a wait for a batch
-            and `keep_alive`, but not reading.
+            "halt" halts the robot, "stop" stops it. None: "halt" with `silence`, else "hold". Signs
+            of life are a pulse, a wait for a batch and `keep_alive`, but not reading.
         max_overruns: number of late iterations within a second that halts the robot.
         gap: a longer time between two iterations halts the robot [s]; 0: none does; None: 20
             periods and at least 0.1 s for robots of the world, none for simulations.

@@ -10,7 +10,7 @@ class Segment:
     """One segment in shared memory."""
 
     name: str
-    life: str  #: starting, running, stopped, failed, superseded or killed
+    life: str  #: starting, running, stopped, failed, superseded, killed; unknown if not readable
     readable: bool  #: False: of another version, or this user may not read or trust it
     pid: int
     process_start: int  #: distinguishes its process from a later one with the same pid
@@ -19,12 +19,13 @@ class Segment:
     started_at: int  #: [s] since 1970
     bytes: int
     epoch: int  #: identifies this run of the backend
+    state: str = "unknown"  #: as texts name it: life, or halted or played while it runs
     played: bool = False  #: a recording is played into it: it takes no commands
     problem: str = ""  #: reason why it is not readable
 
     @property
     def alive(self) -> bool:
-        """True while its backend runs or starts."""
+        """True while its backend runs or starts; False also if that is unknown."""
         return self.life in ("starting", "running")
 
 
@@ -42,6 +43,7 @@ def segments() -> list[Segment]:
             started_at=entry.started_at,
             bytes=entry.size,
             epoch=entry.epoch,
+            state=entry.state,
             played=entry.played,
             problem=entry.problem,
         )

@@ -17,13 +17,22 @@ def stop(name: str, timeout: float = 5.0) -> None:
     """Stops the backend of a segment in order: its process gets SIGTERM.
 
     Returns when the backend has stopped. Raises InvalidArgument if no backend of that name runs,
-    SegmentError if this process may not signal it, TimeoutError if it still runs after `timeout`
-    [s].
+    SegmentError if this process may not read its segment or signal it, TimeoutError if it still
+    runs after `timeout` [s].
     """
-    running = {entry.name: entry for entry in segments() if entry.alive}
+    entries = segments()
+    running = {entry.name: entry for entry in entries if entry.alive}
+    unseen = {entry.name: entry for entry in entries if entry.life == "unknown"}
+    if name in unseen:
+        raise SegmentError(
+            f"it is unknown whether '{name}' of user {unseen[name].user} runs: "
+            f"{unseen[name].problem}. Its user and root can stop it"
+        )
     if name not in running:
-        there = _core.names_instead(name, list(running)) if running else "; nothing runs"
-        raise InvalidArgument(f"no backend '{name}' runs{there.replace('there are', 'running')}")
+        there = "; nothing that this user can see runs" if unseen else "; nothing runs"
+        if running:
+            there = _core.names_instead(name, list(running)).replace("there are", "running")
+        raise InvalidArgument(f"no backend '{name}' runs{there}")
     stop_entry(running[name], timeout)
 
 

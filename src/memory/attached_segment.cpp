@@ -36,7 +36,7 @@ std::string other_segments(std::string_view name) {
   std::vector<std::string> known;
   for (const SegmentEntry& entry : list_segments()) {
     names.push_back(entry.name);
-    known.push_back(entry.name + " (" + name_of(entry.life) + ")");
+    known.push_back(entry.name + " (" + entry.state() + ")");
   }
   if (names.empty()) return "Nothing runs in " + segment_directory() + ": start a robot, `o80 run`";
   const std::string near = nearest_name(name, names);
@@ -273,6 +273,7 @@ void AttachedSegment::throw_gone(Life life) const {
   switch (life) {
     case Life::starting:
     case Life::running:
+    case Life::unknown:
       return;
     case Life::stopped:
       throw BackendStopped(backend() + "has stopped." + cure);

@@ -105,8 +105,17 @@ const char* name_of(Life life) noexcept {
       return "superseded";
     case Life::killed:
       return "killed";
+    case Life::unknown:
+      break;
   }
   return "unknown";
+}
+
+const char* SegmentState::word() const noexcept {
+  if (life != Life::starting && life != Life::running) return name_of(life);
+  if (hangs) return "hangs";
+  if (halted) return "halted";
+  return played && life == Life::running ? "played" : name_of(life);
 }
 
 Life judge_life(int descriptor, const std::atomic<std::uint32_t>& state) noexcept {

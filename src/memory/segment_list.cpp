@@ -42,6 +42,9 @@ SegmentEntry describe(const std::string& name) {
   const std::atomic<std::uint32_t> state(word);
   entry.life = judge_life(file.descriptor(), state);
   entry.readable = true;
+  std::uint64_t halt = 0;
+  const auto shown = static_cast<off_t>(offsets.counters + offsetof(Counters, halted));
+  entry.halted = pread(file.descriptor(), &halt, sizeof halt, shown) == sizeof halt && halt != 0;
   entry.pid = header.pid;
   entry.process_start = header.process_start;
   entry.started_at = header.started_at;
@@ -61,6 +64,10 @@ bool remove_dead(NamedSegment& segment, bool& removed) {
 }
 
 }  // namespace
+
+const char* SegmentEntry::state() const noexcept {
+  return SegmentState{.life = life, .halted = halted, .played = played}.word();
+}
 
 std::vector<SegmentEntry> list_segments() {
   std::vector<SegmentEntry> entries;

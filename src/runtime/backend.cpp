@@ -74,7 +74,7 @@ Schema prepared(Schema schema, const BackendOptions& options) {
   schema.head.period = period_of(schema, options);
   schema.head.bursting = options.bursting ? 1 : 0;
   schema.head.clock = options.bursting ? Clock::simulated : Clock::monotonic;
-  schema.head.stale = options.stale;
+  schema.head.stale = options.stale_policy();
   schema.head.silence = options.silence;
   schema.head.block = round_up(schema.head.block, 8);
   check(schema);
@@ -203,7 +203,7 @@ UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, Reques
       row_(layout.size / 8),
       payload_(largest_request(schema), std::byte{0}),
       fresh_desired_(layout.block / 8),
-      stale_(options.stale),
+      stale_(options.stale_policy()),
       silence_(options.silence),
       last_life_(lanes.size()),
       // ends of commands in one step: completed and late ones, and those of their batches

@@ -43,12 +43,15 @@ std::optional<Halt> UntypedFrontend::halted() const {
   return link_->halt();
 }
 
-void UntypedFrontend::resume(std::uint64_t number, Timeout timeout, const KeepWaiting& keep_waiting,
+bool UntypedFrontend::resume(std::uint64_t number, Timeout timeout, const KeepWaiting& keep_waiting,
                              bool accept_reading) {
   // one wrong reading need not refuse it
   constexpr int kReadings = 5;
   int readings = 0;
+  link_->check_usable();
   refuse_if_played(link_->segment);
+  link_->segment.throw_if_gone();
+  if (!link_->halt()) return false;
   const Deadline deadline(timeout);
   while (true) {
     wait_for_rest(number, deadline, keep_waiting);
@@ -57,7 +60,7 @@ void UntypedFrontend::resume(std::uint64_t number, Timeout timeout, const KeepWa
     const Batch batch = pulse(builder);
     batch.wait(left_of(deadline, timeout), keep_waiting, {.check = false});
     const Handle handle = batch.handle(0);
-    if (handle.status == Status::completed) return;
+    if (handle.status == Status::completed) return true;
     // at rest, the backend may still have scheduled batches to end
     const std::optional<Halt> acting = link_->halt();
     const bool is_misread = handle.reason == Reason::reading && ++readings <= kReadings;

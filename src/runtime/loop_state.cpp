@@ -98,6 +98,11 @@ std::string LoopState::hang() const {
   return text;
 }
 
+const char* LoopState::word() const {
+  return SegmentState{.life = life, .hangs = !hang().empty(), .halted = halted, .played = played}
+      .word();
+}
+
 std::string LoopState::trouble() const {
   std::string hangs = hang();
   if (!hangs.empty()) return hangs;
@@ -118,6 +123,7 @@ LoopState loop_state(const UntypedFrontend& frontend, std::int64_t now) {
   state.life = frontend.life();
   state.pid = segment.header().pid;
   state.bursting = frontend.bursting();
+  state.halted = frontend.halted().has_value();
   state.played = is_played(segment);
   state.period = frontend.period();
   state.last = frontend.published();

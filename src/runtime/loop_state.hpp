@@ -17,10 +17,11 @@ inline constexpr Iteration kLongQueue = 10;
 
 /// State of a backend's loop, from its rows and counters.
 struct LoopState {
-  Life life = Life::killed;
+  Life life = Life::unknown;
   int pid = 0;
   bool process_stopped = false;  // by SIGSTOP or a debugger
   bool bursting = false;
+  bool halted = false;
   bool played = false;         // its rows come from a recording
   std::int64_t period = 0;     // [ns]
   Iteration last = -1;         // the newest row; -1: none yet
@@ -43,6 +44,8 @@ struct LoopState {
   bool stalled() const noexcept;
   /// Reason why no row is published although one is due; empty if rows are published.
   std::string hang() const;
+  /// The state of the segment for a text.
+  const char* word() const;
   /// hang(), or else recent overruns with the rate that is reached, or else the queue; empty if
   /// there is no trouble.
   std::string trouble() const;

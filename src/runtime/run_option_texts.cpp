@@ -33,7 +33,7 @@ Provenance::Options texts_of(const BackendOptions& options) {
       {"lane_blocks", std::to_string(options.lane_blocks)},
       {"journal", shortest(static_cast<double>(options.journal) / kMebi)},
       {"permission", octal(options.permission)},
-      {"stale", std::string(name_of(options.stale))},
+      {"stale", std::string(name_of(options.stale_policy()))},
       {"resume", text_of(options.resume)},
       {"accept_reading", text_of(options.accept_reading)},
   };

@@ -3,6 +3,7 @@
 import asyncio
 import threading
 from collections.abc import Awaitable, Callable
+from typing import Literal
 
 import pytest
 
@@ -123,6 +124,25 @@ def test_an_inline_burst_is_cancelled_with_its_task(arm: o80.Frontend) -> None:
 
     asyncio.run(cancel())
     assert not waiting_threads()
+
+
+@pytest.mark.parametrize("on_error", ["purge", "continue"])
+def test_a_cancelled_wait_for_commands_ends_them_as_an_error_does(
+    process: o80.robots.Process, on_error: Literal["purge", "continue"]
+) -> None:
+    async def cancel() -> None:
+        with o80.Frontend(process.segment, WAIT, on_error=on_error) as arm:
+            arm.add_command("elbow", 1.0, iterations=10**9)
+            task = asyncio.create_task(arm.aio.pulse_and_wait())
+            await started()
+            task.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await task
+            # an iteration that began after both batches were sent has taken them
+            row = arm.wait_for(arm.published + 3, timeout=WAIT)
+            assert row.active[1] == (on_error == "continue")
+
+    asyncio.run(cancel())
 
 
 def test_a_cancelled_task_loses_no_row(process: o80.robots.Process) -> None:

@@ -130,7 +130,7 @@ def test_info_describes_a_recording(tmp_path: Path) -> None:
             o80.robots.load("two_joints").inline("arm", gain=gain) as arm,
             o80.Recording(path, arm, proceed=path.exists()) as recording,
         ):
-            recording.mark("episode")
+            recording.mark("episode", gain=gain)
             arm.burst(100)
 
     said = run("info", path)
@@ -139,7 +139,10 @@ def test_info_describes_a_recording(tmp_path: Path) -> None:
     assert "arm, runs 0, 1: started with" in said
     assert "arm, run 2: started with" in said
     assert "gain=15" in said
-    assert "marks  episode (3)" in said
+    marks = said[said.index("3 marks") :].splitlines()[1:4]
+    assert [mark.split()[1:] for mark in marks] == [
+        ["episode", f"gain={gain}"] for gain in (13.0, 13.0, 15.0)
+    ]
     told = json.loads(run("info", path, "--json"))
     assert [each["rows"] for each in told] == [each.rows for each in o80.open(path)["arm"].epochs]
 

@@ -1,5 +1,6 @@
 """Rows in formats of other tools, and as plots."""
 
+import csv
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +15,7 @@ from hypothesis import strategies as st
 from mixed_robots import GROUPS, ROBOTS, SENSORS, Mode, recorded
 
 import o80
+from o80.cli.histories import histories
 from o80.columns import columns_of
 from o80.command_ends import command_ends
 from o80.export import columns_in, write
@@ -30,11 +32,16 @@ def read(path: Path, name: str) -> dict[str, Any]:
     if path.suffix == ".h5":
         with h5py.File(path) as file:
             return {key: np.asarray(file[name][key]) for key in file[name]}
+    if path.suffix == ".csv":
+        with path.open(newline="") as file:
+            names, *lines = csv.reader(file)
+        texts = zip(*lines, strict=True) if lines else [()] * len(names)
+        return {key: np.array(column) for key, column in zip(names, texts, strict=True)}
     table = pyarrow.parquet.read_table(path)
     return {key: table[key].to_numpy() for key in table.column_names}
 
 
-@pytest.mark.parametrize("suffix", [".npz", ".h5", ".parquet"])
+@pytest.mark.parametrize("suffix", [".npz", ".h5", ".parquet", ".csv"])
 @ROBOTS
 @given(groups=GROUPS, sensors=SENSORS, seed=st.integers(0, 2**32 - 1))
 def test_every_number_of_any_robot_is_in_the_file(
@@ -47,7 +54,22 @@ def test_every_number_of_any_robot_is_in_the_file(
 
     assert sorted(found) == sorted(columns)
     for name, values in columns.items():
-        assert np.array_equal(found[name], values), name
+        if suffix == ".csv":
+            assert [*found[name]] == [str(value) for value in values.tolist()], name
+        else:
+            assert np.array_equal(found[name], values), name
+
+
+def test_columns_are_chosen_by_the_names_of_fields(arm: o80.Frontend, tmp_path: Path) -> None:
+    arm.burst(3)
+    path = tmp_path / "rows.csv"
+
+    write(path, {"arm": arm.history()}, ["observed.elbow", "effort"])
+    assert list(read(path, "arm")) == [
+        *("iteration", "time", "observed.elbow", "extended.effort[0]", "extended.effort[1]")
+    ]
+    with pytest.raises(o80.InvalidArgument, match=r"no field 'elbwo'.*Did you mean 'elbow'"):
+        write(path, {"arm": arm.history()}, ["elbwo"])
 
 
 def test_columns_are_named_after_part_actuator_and_field(arm: o80.Frontend) -> None:
@@ -111,6 +133,26 @@ def test_an_unknown_field_and_too_many_panels_are_refused(arm: o80.Frontend) -> 
     many = {f"arm-{i}": arm.history() for i in range(20)}
     with pytest.raises(o80.InvalidArgument, match="40 panels are too many"):
         plot(many)
+
+
+def test_marks_are_drawn_in_their_run_where_they_were_made(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    for text, rows in (("first $x", 100), ("second", 50)):
+        with (
+            o80.robots.load("two_joints").inline("arm") as arm,
+            o80.Recording(path, arm, proceed=path.exists()) as recording,
+        ):
+            arm.burst(rows)
+            recording.mark(text)
+            arm.burst(100)
+
+    runs = list(histories(str(path), None))
+    assert [run.marks for run in runs] == [[("first $x", 100)], [("second", 50)]]
+    for run in runs:
+        figure = plot({"arm": run.history}, marks={"arm": [*run.marks, ("earlier", -1)]})
+        for axes in figure.axes:
+            drawn = [(text.get_text(), text.get_position()[0]) for text in axes.texts]
+            assert drawn == [(name, pytest.approx(row * 1e-3)) for name, row in run.marks]
 
 
 def test_an_enumeration_has_its_labels_at_the_axis() -> None:

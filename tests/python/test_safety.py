@@ -1,5 +1,6 @@
 """What the arm does when something fails: the rows of docs/safety.md that need whole processes."""
 
+import asyncio
 import os
 import re
 import signal
@@ -472,3 +473,16 @@ def test_every_row_of_the_page_names_tests_that_exist() -> None:
             suite, dot, case = name.partition(".")
             written = f"({suite}, {case})" if dot else f"def {name}("
             assert written in sources, name
+
+
+def test_a_resume_says_whether_there_was_a_halt(arm: o80.Frontend) -> None:
+    assert arm.resume() is False
+    assert arm.resume(7) is False
+    number = arm.halt()
+    assert arm.resume(number) is True
+    assert asyncio.run(arm.aio.resume()) is False
+
+
+def test_a_watchdog_halts_unless_told_otherwise(segment: str) -> None:
+    with o80.robots.load("two_joints").inline(segment, silence=50) as arm:
+        assert arm.schema["stale"] == "halt"

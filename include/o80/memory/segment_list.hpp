@@ -11,7 +11,7 @@ namespace o80 {
 
 struct SegmentEntry {
   std::string name;
-  Life life = Life::killed;
+  Life life = Life::unknown;
   bool readable = false;  // false: another version, no permission, or an owner without trust
   int pid = 0;
   std::uint64_t process_start = 0;  // as process_start() gives it
@@ -20,8 +20,12 @@ struct SegmentEntry {
   std::string program{};
   std::uint64_t epoch = 0;
   std::uint64_t bytes = 0;  // of both files
-  bool played = false;      // a recording is played into it
-  std::string problem{};    // why it is not readable
+  bool halted = false;
+  bool played = false;    // a recording is played into it
+  std::string problem{};  // why it is not readable
+
+  /// Its state for a text; rows are not read, so a hanging backend counts as running.
+  const char* state() const noexcept;
 };
 
 /// All segments of the directory, sorted by name.

@@ -161,7 +161,7 @@ class Reading {
   }
 
   /// True in the reading of a fresh start: after a request that answered start_afresh, and after
-  /// each resume.
+  /// each resume. False in row 0.
   bool fresh() const { return view_.desired != nullptr; }
   /// Sets the desired states from which a fresh start continues; without it, the observed states.
   /// No effect in other readings.

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -35,11 +36,14 @@ struct BackendOptions {
   /// Size of the journal [bytes], rounded up to a power of two; -1: twice the largest batch; 0: no
   /// journal. `pulse` refuses a batch larger than half of it.
   std::int64_t journal = -1;
-  mode_t permission = 0600;  // read: may observe; write: may command
-  Stale stale = Stale::hold;
+  mode_t permission = 0600;      // read: may observe; write: may command
+  std::optional<Stale> stale{};  // nothing: halt with `silence`, else hold
   /// Watchdog: iterations without a sign of life after which `stale` applies to a commander that
   /// has control or commands; 0: no watchdog. See ARCHITECTURE.md, Halts.
   std::int64_t silence = 0;
+  Stale stale_policy() const noexcept {
+    return stale.value_or(silence > 0 ? Stale::halt : Stale::hold);
+  }
   /// Number of late iterations within a second that halts the backend; 0: no limit.
   std::uint32_t max_overruns = 0;
   /// Real time only: the longest time between two rows; a longer one halts [ns]. -1: 20 periods,

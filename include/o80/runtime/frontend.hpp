@@ -205,12 +205,13 @@ class UntypedFrontend {
   std::uint64_t halt(std::string_view reason);
   /// The halt in force, or the last one requested (`iteration` is -1 until it is in force).
   std::optional<Halt> halted() const;
-  /// Clears halts up to this number; the robot makes a fresh start. In real time it first waits
+  /// Clears halts up to this number; the robot makes a fresh start. False, without an effect, if
+  /// the backend is not halted. In real time it first waits
   /// until the halt is in force and the robot is at rest. Needs a lane, but no control. Throws
   /// BackendHalted if it is refused (another halt came after it, the robot refuses, it cannot be
   /// where it is read unless you `accept_reading`, or, in bursting mode, it still brakes),
   /// TimeoutError, NoLane, BackendGone.
-  void resume(std::uint64_t number, Timeout timeout, const KeepWaiting& keep_waiting = {},
+  bool resume(std::uint64_t number, Timeout timeout, const KeepWaiting& keep_waiting = {},
               bool accept_reading = false);
   /// A sign of life for the backend's watchdog, as a pulse or a wait for a batch is.
   void keep_alive();

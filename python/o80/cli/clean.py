@@ -28,9 +28,13 @@ def clean(
         print(f"removed {name}")
     if removed:
         return
-    living = [entry.name for entry in o80.segments() if entry.alive]
-    running = f" ({len(living)} running: not removed)" if living else ""
-    print(f"Nothing to remove{running}.")
+    there = o80.segments()
+    counts = {
+        "running": sum(entry.alive for entry in there),
+        "unknown": sum(entry.life == "unknown" for entry in there),
+    }
+    kept = ", ".join(f"{count} {state}" for state, count in counts.items() if count)
+    print(f"Nothing to remove{f' ({kept}: not removed)' if kept else ''}.")
 
 
 def _clean_named(names: list[str]) -> None:

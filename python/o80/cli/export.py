@@ -27,10 +27,15 @@ def export(
     output: Annotated[
         Path,
         typer.Option(
-            "--output", "-o", help="File to write: .npz, .h5 or .parquet; with --format a folder."
+            "--output",
+            "-o",
+            help="File to write: .npz, .h5, .parquet or .csv; with --format a folder.",
         ),
     ],
     segment: Annotated[str | None, typer.Option(help="Only this segment of a recording.")] = None,
+    fields: Annotated[
+        str, typer.Option(help="Only these, for example observed.elbow,extended.effort")
+    ] = "",
     form: Annotated[
         Format | None,
         typer.Option("--format", help="A data set for learning, of the marked episodes."),
@@ -44,6 +49,8 @@ def export(
     With --format, the episodes of a recording as a data set for learning: see docs/recording.md.
     """
     if form is not None:
+        if fields:
+            raise o80.InvalidArgument("--fields is for rows: leave it out with --format")
         _export_episodes(source, output, segment, form, every)
         return
     if every != 1:
@@ -59,7 +66,7 @@ def export(
         for each in found
     }
     with writing(output):
-        write(output, named)
+        write(output, named, [field for field in fields.split(",") if field])
     for name, history in named.items():
         print(f"{name}: {len(history)} rows in {output}")
 

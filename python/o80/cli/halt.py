@@ -45,12 +45,12 @@ def resume(
         if acting is None:
             print(f"{segment} is not halted")
             return
-        frontend.resume(
+        resumed = frontend.resume(
             acting.number if chosen is None else chosen,
             timeout=timeout,
             accept_reading=accept_reading,
         )
-        print(f"{segment} has resumed")
+        print(f"{segment} has resumed" if resumed else f"{segment} is not halted")
 
 
 def _number(text: str, segment: str) -> int:

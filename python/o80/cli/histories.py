@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
+from bisect import bisect
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import o80
@@ -21,6 +22,7 @@ class Named:
     history: o80.History
     wall_offset: int | None  #: wall clock less row time [ns]; None: not known
     journal: Callable[[], list[JournalEntry]]  #: what its backend decided, as far as known
+    marks: list[tuple[str, int]] = field(default_factory=list)  #: name and iteration
 
 
 def histories(source: str, only: str | None, *, seconds: float | None = None) -> Iterator[Named]:
@@ -42,7 +44,15 @@ def histories(source: str, only: str | None, *, seconds: float | None = None) ->
     if only is not None and only not in recording.segments:
         there = ", ".join(recording) or "none"
         raise o80.InvalidArgument(f"no segment '{only}' in {source}; there are: {there}")
+    marks = recording.marks
     for name in [only] if only is not None else list(recording):
-        for number, epoch in enumerate(recording[name].epochs):
+        epochs = recording[name].epochs
+        of_run: list[list[tuple[str, int]]] = [[] for _ in epochs]
+        begins = [epoch.recorded_at for epoch in epochs]
+        for mark in marks:
+            if name in mark.rows:
+                run = max(bisect(begins, mark.time) - 1, 0)
+                of_run[run].append((mark.name, mark.rows[name]))
+        for number, epoch in enumerate(epochs):
             history = epoch.history(seconds=seconds)
-            yield Named(name, number, history, epoch.wall_offset, epoch.journal)
+            yield Named(name, number, history, epoch.wall_offset, epoch.journal, of_run[number])

@@ -10,7 +10,6 @@ from typing import Annotated, Any
 
 import typer
 
-import o80
 from o80 import _core
 from o80.cli.attach import attach
 from o80.cli.condition import halt_text, pace_text, running_texts, watchdog_text
@@ -40,7 +39,7 @@ def info(
             return
         loop = _core.loop_state(frontend)
         print(
-            f"{style(segment, 'bold')}: robot {schema['robot']}, {_life(frontend)}, "
+            f"{style(segment, 'bold')}: robot {schema['robot']}, {loop.word}, "
             f"rows {frontend.oldest} to {frontend.published}, "
             f"{schema['row']['size']} bytes a row"
         )
@@ -73,11 +72,6 @@ def info(
         print(style("\nstarted with", "bold"))
         for line in started_with(frontend.provenance):
             print(f"  {line}")
-
-
-def _life(frontend: o80.Frontend) -> str:
-    """As `o80 list` says it."""
-    return "played" if frontend.played and frontend.alive else frontend.life
 
 
 def _print_actuators(schema: dict[str, Any]) -> None:

@@ -25,7 +25,7 @@ def plot(
     segment: Annotated[str | None, typer.Option(help="Only this segment of a recording.")] = None,
 ) -> None:
     """Plot rows: desired and observed together, sensor values, halts, late iterations, ends of
-    commands.
+    commands, marks of a recording.
 
     Each run of a robot that was restarted has panels of its own. Runs of different times begin at 0
     each.
@@ -49,6 +49,7 @@ def plot(
         {name: each.history for name, each in found.items()},
         [field for field in fields.split(",") if field],
         ends={name: command_ends(each.journal()) for name, each in found.items()},
+        marks={name: each.marks for name, each in found.items()},
         origins=zeros,
         label="time [s]" if axes == 1 else f"time since each of {axes} beginnings [s]",
         window=output is None,

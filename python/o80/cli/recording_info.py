@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections import Counter
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,9 +14,11 @@ from o80.cli.screen import Column, bytes_text, plain, print_json, print_table, s
 from o80.cli.started_with import started_with
 
 if TYPE_CHECKING:
+    from o80.recording.marks import Mark
     from o80.recording.reader import RecordingFile
     from o80.recording.recorded_epoch import RecordedEpoch
 
+MARKS_AT_ENDS = 10  # listed at the beginning and at the end
 COLUMNS = (
     Column("segment"),
     Column("run", right=True),
@@ -45,10 +46,25 @@ def recording_info(path: Path, *, as_json: bool = False) -> None:
     if runs:
         print()
         print_table(COLUMNS, [_row(name, number, epoch) for name, number, epoch in runs])
-    if marks := Counter(mark.name for mark in recording.marks):
-        counts = ", ".join(f"{plain(name)} ({count})" for name, count in marks.items())
-        print(f"\n{style('marks', 'bold')}  {counts}")
+    _print_marks(recording.marks)
     _print_starts(runs)
+
+
+def _print_marks(marks: list[Mark]) -> None:
+    """Each with its wall clock and values; of many the first and the last."""
+    if not marks:
+        return
+    print(style(f"\n{len(marks)} marks", "bold"))
+    skipped = len(marks) - 2 * MARKS_AT_ENDS
+    for i, mark in enumerate(marks):
+        if skipped > 0 and MARKS_AT_ENDS <= i < len(marks) - MARKS_AT_ENDS:
+            if i == MARKS_AT_ENDS:
+                print(f"  ... {skipped} more, see o80.open(...).marks")
+            continue
+        local = time.localtime(mark.time * 1e-9)
+        clock = f"{time.strftime('%H:%M:%S', local)}.{mark.time // 10**6 % 1000:03d}"
+        values = ", ".join(f"{name}={value!r:.60}" for name, value in mark.values.items())
+        print(plain(f"  {clock}  {mark.name}  {values}").rstrip())
 
 
 def _print_starts(runs: list[tuple[str, int, RecordedEpoch]]) -> None:

@@ -30,6 +30,7 @@ _STYLES = {
     "played": "green",
     "hangs": "red",
     "killed": "red",
+    "unknown": "yellow",
     "failed": "red",
 }
 
@@ -58,7 +59,8 @@ def print_segments(*, as_json: bool) -> None:
 def _row(entry: o80.Segment) -> dict[str, Any]:
     row: dict[str, Any] = {
         "segment": entry.name,
-        "state": entry.life if entry.readable else "unreadable",
+        "state": entry.state,
+        "alive": entry.alive,
         "problem": entry.problem,
         "played": entry.played,
         "pid": entry.pid,
@@ -88,6 +90,7 @@ def _row(entry: o80.Segment) -> dict[str, Any]:
     loop = state.loop
     row |= {
         "robot": state.robot,
+        "state": loop.word,
         "frequency": loop.frequency,
         "rate": loop.rate,
         "bursting": loop.bursting,
@@ -106,18 +109,11 @@ def _row(entry: o80.Segment) -> dict[str, Any]:
 
 
 def _cells(row: dict[str, Any]) -> list[str]:
-    alive = row["state"] in ("starting", "running")
-    state = row["state"]
-    if row["hangs"]:
-        state = "hangs"
-    elif alive and row["halted"]:
-        state = "halted"
-    elif row["state"] == "running" and row["played"]:
-        state = "played"
+    alive = row["alive"]
     return [
         row["segment"],
         row["robot"] or "?",
-        state,
+        row["state"],
         _rate(row) if alive else "",
         _count(row["overruns"]),
         _count(row["missed_ticks"]),

@@ -16,10 +16,14 @@ def stop(
     timeout: Annotated[float, typer.Option(help="Seconds to wait for the end of each.")] = 5.0,
 ) -> None:
     """Stop backends in order: robots brake, drivers stop, frontends raise BackendStopped."""
-    names = [entry.name for entry in o80.segments() if entry.alive] if every else (segments or [])
+    there = o80.segments() if every else []
+    names = [entry.name for entry in there if entry.alive] if every else (segments or [])
+    unseen = [entry.name for entry in there if entry.life == "unknown"]
+    if unseen:
+        complain(f"not stopped, because it is unknown whether they run: {', '.join(unseen[:5])}")
     if not names:
         if every:
-            print("Nothing runs.")
+            print("Nothing that this user can see runs." if unseen else "Nothing runs.")
             return
         raise o80.InvalidArgument("name the segments to stop (see `o80 list`), or give --all")
     failed = False

@@ -121,7 +121,7 @@ class Reading:
         self.iteration = iteration
         self.time = time  #: [ns], of the row
         self.fresh = fresh
-        """True after a reset, a restore or a resume: go on from what is read now."""
+        """True in the reading of a fresh start: after a reset or a resume. Not in row 0."""
         self._runs = runs
         self._finished = self._missed = self._has_desired = False
         self._halt: str | None = None

@@ -156,10 +156,14 @@ class Frontend(Halting):
     ) -> None:
         if error is not None and not self.closed and not self._forked:
             self.forget_added()
-            if self._on_error == "purge":
-                with contextlib.suppress(Error):
-                    self._purge_own()
+            self._purge_on_error()
         self.close()
+
+    def _purge_on_error(self) -> None:
+        """Drops the commands of this frontend after an error, unless they shall continue."""
+        if self._on_error == "purge":
+            with contextlib.suppress(Error):
+                self._purge_own()
 
     def __reduce__(self) -> tuple[Callable[..., "Frontend"], tuple[Any, ...]]:
         if self._arguments is None:

@@ -40,7 +40,7 @@ class Halting(Controlling):
         *,
         timeout: float | None = 5.0,
         accept_reading: bool = False,
-    ) -> None:
+    ) -> bool:
         """Ends a halt: the robot makes a fresh start at its present position, with empty queues.
 
         number: number of the halt (None: the one in force now). A halt that came after it stays.
@@ -55,11 +55,11 @@ class Halting(Controlling):
         Raises BackendHalted if it is refused: another halt came after it, the robot refuses, it
         cannot be where it is read, or, in bursting mode, it still brakes. Raises
         TimeoutError, NoLane, BackendGone.
-        Does nothing if no halt is in force.
+        Returns whether a halt was ended: False, and nothing is done, if there is none.
         """
         if number is None:
             halt = self.halted
             if halt is None:
-                return
+                return False
             number = halt.number
-        self._resume(whole(number, "the number of a halt", 1), timeout, accept_reading)
+        return self._resume(whole(number, "the number of a halt", 1), timeout, accept_reading)

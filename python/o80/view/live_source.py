@@ -24,6 +24,7 @@ class LiveSource(Source):
         self._frontend: o80.Frontend | None = None
         self._lock = threading.Lock()
         self._problem = ""
+        self._state = "waiting"  # without a frontend
 
     def refresh(self) -> None:
         with self._lock:
@@ -34,6 +35,7 @@ class LiveSource(Source):
                 found = o80.Frontend(self.name, 0.0, read_only=True, dead=True)
             except o80.Error as error:
                 self._problem = str(error)
+                self._state = "waiting" if isinstance(error, o80.TimeoutError) else "unknown"
                 return
             if found.published < 0 or (known is not None and known.epoch == found.epoch):
                 self._problem = "" if known is not None else "there is no row yet"
@@ -87,7 +89,7 @@ class LiveSource(Source):
         line: dict[str, Any] = {
             "name": self.name,
             "live": True,
-            "state": "waiting",
+            "state": self._state,
             "problem": self._problem,
         }
         frontend = self._frontend
@@ -97,14 +99,9 @@ class LiveSource(Source):
         alive = frontend.alive
         halt = frontend.halted if alive else None
         rate = "bursting" if loop.bursting else rate_text(loop.rate, loop.frequency)
-        state: str = frontend.life
-        if alive and loop.hang:
-            state = "hangs"
-        elif halt is not None:
-            state = "halted"
         return line | {
             "robot": frontend.robot,
-            "state": state,
+            "state": loop.word,
             "alive": alive,
             "rate": rate if alive else "",
             "overruns": loop.overruns,

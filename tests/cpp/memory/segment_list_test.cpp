@@ -27,7 +27,7 @@ TEST_F(SegmentListTest, ShowsEverySegmentByNameWithItsLife) {
   std::vector<std::string> seen;
   seen.reserve(entries.size());
   for (const SegmentEntry& entry : entries) seen.push_back(entry.name + " " + name_of(entry.life));
-  EXPECT_THAT(seen, ElementsAre("a running", "b starting", "c failed", "d killed"));
+  EXPECT_THAT(seen, ElementsAre("a running", "b starting", "c failed", "d unknown"));
   EXPECT_EQ(entries[0].pid, getpid());
   EXPECT_EQ(entries[0].epoch, running.epoch());
   EXPECT_TRUE(entries[0].readable);

@@ -366,6 +366,14 @@ TEST_F(SilenceTest, TheSchemaTellsFrontends) {
   EXPECT_EQ(frontend.schema().head.stale, Stale::halt);
 }
 
+TEST_F(SilenceTest, HaltsUnlessAnotherPolicyIsAskedFor) {
+  const Station watched_station({.segment = "watched", .silence = 7});
+  const Station other({.segment = "other"});
+
+  EXPECT_EQ(watched_station.backend.schema().head.stale, Stale::halt);
+  EXPECT_EQ(other.backend.schema().head.stale, Stale::hold);
+}
+
 TEST_F(SilenceTest, ADeadCommanderHaltsIfToldSo) {
   Station station({.segment = "pair", .stale = Stale::halt});
   station.start();
