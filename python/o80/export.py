@@ -127,7 +127,7 @@ def _write_parquet(
 
 
 def _write_csv(path: Path, histories: Mapping[str, Columns], _: Mapping[str, Labels]) -> None:
-    _, columns = _only_table(path, histories)
+    columns = _only_table(path, histories)[1]
     with path.open("w", newline="", encoding="utf-8") as file:
         lines = csv.writer(file, lineterminator="\n")
         lines.writerow(columns)

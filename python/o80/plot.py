@@ -192,7 +192,7 @@ def _draw_marks(
         if len(history) and iterations[0] <= iteration <= iterations[-1]:
             at = times[np.searchsorted(iterations, iteration)]
             ax.axvline(at, color="tab:olive", linewidth=1.0)
-            place = {"rotation": 90, "fontsize": 6, "va": "top", "ha": "right"}
+            place: dict[str, Any] = {"rotation": 90, "fontsize": 6, "va": "top", "ha": "right"}
             # a mark holds any text: none of it is a formula
             ax.text(at, 0.98, text, transform=_shares(ax), parse_math=False, **place)
 

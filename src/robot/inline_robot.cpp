@@ -92,7 +92,7 @@ std::optional<std::size_t> InlineRobot::run(const DirectBurst& burst, std::span<
 }
 
 void InlineRobot::throw_if_ended(Step step) {
-  guard_.check("the inline robot of '" + segment() + "'");
+  if (guard_.forked()) guard_.check("the inline robot of '" + segment() + "'");
   if (stopping_) {
     loop_.stop();
     throw Closed("the inline robot of '" + segment() + "' was closed during a burst");

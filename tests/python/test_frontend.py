@@ -360,6 +360,13 @@ def test_a_burst_may_return_at_once(bursting: o80.robots.Process) -> None:
 
 
 def test_a_frontend_says_what_it_is(arm: o80.Frontend) -> None:
-    assert "two_joints" in repr(arm)
+    assert f"(two_joints), bursting at {arm.frequency:g} Hz>" in repr(arm)
     arm.close()
     assert "closed" in repr(arm)
+
+
+def test_a_frontend_of_a_halted_robot_says_so(segment: str) -> None:
+    with o80.robots.load("two_joints").inline(segment, frequency=500) as arm:
+        assert repr(arm).endswith("(two_joints), bursting at 500 Hz>")
+        arm.halt("too hot")
+        assert repr(arm).endswith("bursting at 500 Hz, halted: too hot>")

@@ -176,6 +176,10 @@ class Frontend(Halting):
     def __repr__(self) -> str:
         try:
             state: str = "closed" if self.closed else self.life
+            if state == "running":
+                state = f"{'bursting' if self.bursting else 'running'} at {self.frequency:g} Hz"
+                if (halt := self.halted) is not None:
+                    state += f", halted: {halt.text}" if halt.text else ", halted"
         except UsedAfterFork:
             state = "of the parent process"
         return f"<o80.{type(self).__name__} of '{self.segment}' ({self.robot}), {state}>"

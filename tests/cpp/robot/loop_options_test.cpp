@@ -69,15 +69,13 @@ TEST(LoopOptionsTest, WhatHoldsOtherwiseIsTheDefault) {
   options.backend.lanes = 1;
   options.backend.lane_blocks = 1;
   options.backend.permission = 0;
-  options.backend.stale = Stale::stop;
-  for (const char* name : {"lanes", "lane_blocks", "permission", "stale", "policy"}) {
+  for (const char* name : {"lanes", "lane_blocks", "permission", "policy"}) {
     const LoopOption& option = *find_loop_option(name);
     set_loop_option(options, option, option.otherwise, name);
   }
   EXPECT_EQ(options.backend.lanes, defaults.backend.lanes);
   EXPECT_EQ(options.backend.lane_blocks, defaults.backend.lane_blocks);
   EXPECT_EQ(options.backend.permission, defaults.backend.permission);
-  EXPECT_EQ(options.backend.stale, defaults.backend.stale);
   EXPECT_EQ(options.real_time.policy, defaults.real_time.policy);
 }
 

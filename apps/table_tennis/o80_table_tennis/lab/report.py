@@ -274,9 +274,8 @@ def not_measured(report: Mapping[str, Any]) -> list[str]:
             missed = "did not run" if share is None else f"{share:.0f} % missed"
             said.append(f"{part} {missed}")
         lacking = [key for key, value in (figures or {name: None}).items() if value is None]
-        sentences.append(
-            f"{name}: no row tells {', '.join(lacking)}; of the periods: {', '.join(said)}"
-        )
+        what = f"no row tells {', '.join(lacking)}"
+        sentences.append(f"{name}: {what}; of the periods: {', '.join(said)}")
     return sentences
 
 
