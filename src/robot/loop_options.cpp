@@ -33,7 +33,7 @@ bool read_number(std::string_view text, Number& number, Base... base) {
 
 bool set_stale(LoopOptions& options, std::string_view text, double /*number*/) {
   const std::optional<Stale> stale = stale_of(text);
-  if (stale) options.backend.stale = *stale;
+  if (stale) options.backend.stale = stale;
   return stale.has_value();
 }
 

@@ -120,10 +120,10 @@ std::string Link::owner_of(std::uint32_t lane) const {
   try {
     const AttachedSegment again = AttachedSegment::attach(segment.name(), Access::read_write,
                                                           Deadline(std::chrono::nanoseconds(0)));
-    if (again.epoch() == segment.epoch()) return name(again);
-  } catch (const Error&) {  // this user may not see whose lane it is
+    return again.epoch() == segment.epoch() ? name(again) : "a frontend";
+  } catch (const Error&) {
+    return "a frontend";  // this user may not see whose lane it is
   }
-  return "a frontend";
 }
 
 std::string Link::queue_text() const {
