@@ -300,7 +300,9 @@ def test_a_short_training_learns_to_touch_the_ball(tmp_path: Path) -> None:
     settings = LearningSettings(decisions=300_000, evaluate_every=300_000, evaluated=200)
     with Training(settings, tmp_path) as training:
         training.run()
-    first, *_, last = curve.read(tmp_path / CURVE)
+    points = curve.read(tmp_path / CURVE)
+    last = points[-1]
+    first = next(point for point in points if point.episodes >= 500)
     # how many depends on the processor: bits of NumPy and torch differ
     assert last.touched > first.touched
     assert last.evaluated_touched > first.touched
