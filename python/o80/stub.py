@@ -15,11 +15,13 @@ from o80.errors import SchemaMismatch
 from o80.frontend import Frontend, frontend
 from o80.layout import is_plain
 
-HEAD = '''"""The robot {robot!r} for editors and type checkers, made by `o80 stub {segment}`.
+# names of a segment are somebody's words: they stand in comments and literals, as their repr
+HEAD = '''"""A robot for editors and type checkers: attach() attaches to it.
 
-attach() attaches to it. Make this module again when the robot has changed.
+Make this module again when the robot has changed.
 """
 
+# The robot {robot!r}, written by `o80 stub` for {segment!r}.
 # Methods are narrower than those of o80.Frontend: they take the names of this robot only.
 # mypy: disable-error-code="override, misc"
 # pyright: reportIncompatibleMethodOverride=false

@@ -1,5 +1,6 @@
 """The typed module of a robot: type checkers accept its names and refuse others."""
 
+import ast
 import importlib.util
 import os
 import subprocess
@@ -11,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import given
+from hypothesis import strategies as st
 from mixed_robots import GROUPS, ROBOTS, SENSORS
 from test_typing import mypy
 
@@ -201,3 +203,25 @@ def test_the_command_writes_the_module_of_a_robot_or_a_segment(
     unknown = subprocess.run([O80, "stub", "two_joint"], capture_output=True, text=True)
     assert unknown.returncode != 0
     assert "Did you mean" in unknown.stderr
+
+
+PIECES = st.sampled_from(['"""', "'", "\\", "{0}", "#", "x", "\u2028"])
+NAME = st.lists(PIECES, min_size=1, max_size=6).map("".join)
+
+
+@ROBOTS
+@given(st.lists(NAME, min_size=5, max_size=5, unique=True))
+def test_names_of_a_robot_are_never_code(words: list[str]) -> None:
+    """Anybody may name a segment, and who writes its module then imports it."""
+    name = f"test-stub-{os.getpid()}"
+    with o80.Backend(
+        name,
+        words[:2],
+        robot=words[2],
+        extended={words[3]: IntEnum("Words", {words[4]: 1}), "place": float},
+        requests={words[0]: {words[1]: float}},
+        units={"place": words[2]},
+    ) as backend:
+        tree = ast.parse(module_of(backend.schema, name))
+    called = {ast.unparse(each.func) for each in ast.walk(tree) if isinstance(each, ast.Call)}
+    assert called == {"o80.Frontend", "o80.stub.check", "cast"}
