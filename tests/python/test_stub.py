@@ -203,6 +203,8 @@ def test_the_command_writes_the_module_of_a_robot_or_a_segment(
     unknown = subprocess.run([O80, "stub", "two_joint"], capture_output=True, text=True)
     assert unknown.returncode != 0
     assert "Did you mean" in unknown.stderr
+    nowhere = subprocess.run([O80, "stub", "pam", "-o", "/no/x.py"], capture_output=True, text=True)
+    assert nowhere.stderr == "o80: /no/x.py cannot be written: there is no folder /no\n"
 
 
 PIECES = st.sampled_from(['"""', "'", "\\", "{0}", "#", "x", "\u2028"])

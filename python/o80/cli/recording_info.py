@@ -54,7 +54,7 @@ def _print_marks(marks: list[Mark]) -> None:
     """Each with its wall clock and values; of many the first and the last."""
     if not marks:
         return
-    print(style(f"\n{len(marks)} marks", "bold"))
+    print(style(f"\n{len(marks)} mark{'s' if len(marks) > 1 else ''}", "bold"))
     skipped = len(marks) - 2 * MARKS_AT_ENDS
     for i, mark in enumerate(marks):
         if skipped > 0 and MARKS_AT_ENDS <= i < len(marks) - MARKS_AT_ENDS:

@@ -10,6 +10,7 @@ import typer
 import o80
 from o80.cli.attach import attach
 from o80.stub import module_of
+from o80.unwritable import writing
 
 
 def stub(
@@ -33,4 +34,5 @@ def stub(
     if output is None:
         print(text, end="")
     else:
-        output.write_text(text)
+        with writing(output):
+            output.write_text(text)
