@@ -51,7 +51,7 @@ Attachment start_inline(const o80::RobotLibrary& library, const std::string& seg
   return {std::make_shared<o80::UntypedFrontend>(robot->segment(), robot), robot};
 }
 
-/// What a robot says of itself with these options, without being started.
+/// Description of a robot with these options. The robot is constructed, but not started.
 std::shared_ptr<o80::Description> description_of(const o80::RobotLibrary& library,
                                                  const o80::OptionValues& options) {
   auto description = std::make_shared<o80::Description>();

@@ -22,7 +22,7 @@ class _Annotation(str):
 
 
 def signature_of(signature: str) -> inspect.Signature:
-    """What `inspect.signature` says of a method with this signature."""
+    """The result of `inspect.signature` for a method with this signature."""
     plain = inspect.signature(_declared(signature))
     return plain.replace(
         parameters=[
@@ -58,6 +58,7 @@ def refuse(
     ]
     if near:
         text += f" (did you mean '{near[0]}'?)"
-    if len(arguments) > sum(p.kind is not p.KEYWORD_ONLY for p in takes.parameters.values()) - 1:
+    by_place = sum(p.kind is not p.KEYWORD_ONLY for p in takes.parameters.values()) - 1
+    if names and len(arguments) > by_place:
         text += " (give the rest by name)"
-    raise TypeError(f"{text}. It takes {', '.join(names)}")
+    raise TypeError(f"{text}. It takes {', '.join(names)}" if names else text)

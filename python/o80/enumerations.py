@@ -62,7 +62,7 @@ class Enumeration(IntEnum, metaclass=EnumerationType):
         return type(self), (self._value_,)
 
 
-#: Of a plain field its enumeration; of a struct those of its fields, by name.
+#: The enumeration of a plain field; for a struct, the enumerations of its fields by name.
 Labels: TypeAlias = type[Enumeration] | Mapping[str, Any]
 
 
@@ -107,10 +107,12 @@ def numbers_of(labels: Labels | None, value: Any) -> Any:
         return value
     if isinstance(value, str):
         return number_of(labels, value)
+    if isinstance(value, np.ndarray) and value.dtype.kind not in "OUT":
+        return value
     if isinstance(value, (list, tuple, np.ndarray)):
-        given = np.asarray(value)
-        if given.dtype.kind in "UT":
-            numbers = [number_of(labels, label) for label in given.ravel().tolist()]
+        given = np.asarray(value, object)  # not as texts: numbers may stand beside labels
+        if any(isinstance(each, str) for each in given.flat):
+            numbers = [number_of(labels, e) if isinstance(e, str) else e for e in given.flat]
             return np.array(numbers, object).reshape(given.shape)
     return value
 
@@ -195,9 +197,10 @@ class EnumerationArray(np.ndarray[Any, np.dtype[Any]]):
         if function in (np.concatenate, np.where) and isinstance(result, np.ndarray):
             parts = given[0] if function is np.concatenate else given[1:]
             kinds = [getattr(part, "_labels", None) for part in parts]
-            same = all(kind == kinds[0] for kind in kinds)
+            if all(kind is None for kind in kinds):
+                return np.asarray(result)
             array = result.view(EnumerationArray)
-            array._labels = kinds[0] if same else None
+            array._labels = kinds[0] if all(kind == kinds[0] for kind in kinds) else None
             return array
         return result
 
@@ -229,6 +232,10 @@ class EnumerationRow(np.void):  # type: ignore[misc]
         if isinstance(value, np.void):
             return _row_of(np.asarray(value), labels)
         return labels(int(value))
+
+    def __setitem__(self, key: Any, value: Any) -> None:
+        name = key if isinstance(key, str) else (self.dtype.names or ())[key]
+        super().__setitem__(key, numbers_of(self._labels.get(name), value))
 
     def __iter__(self) -> Iterator[Any]:
         return (self[name] for name in self.dtype.names or ())

@@ -14,7 +14,10 @@ LOOK = 0.001  # [s]
 
 
 def _wait_for_imports() -> None:
-    """Waits for the imports of other threads. Not longer: one of them may wait for this thread."""
+    """Waits until other threads have finished their imports.
+
+    At most LONGEST: one of them may wait for this thread.
+    """
     end = time.monotonic() + LONGEST
     while _others_import() and time.monotonic() < end:
         time.sleep(LOOK)

@@ -34,7 +34,7 @@ class Limits:
     acceleration: float = math.inf  #: [unit/s^2]
     jerk: float = math.inf  #: [unit/s^3]
     error: float = math.inf  #: a larger difference of desired and observed halts the backend
-    noise: float = 0.0  #: of its readings, beside motion; 0: a tenth of `error`
+    noise: float = 0.0  #: largest difference of two readings at rest; 0: a tenth of `error`
     integral: IntegralBounds | None = None  #: what the number moves, if it is a velocity
 
     @classmethod

@@ -248,7 +248,8 @@ class Robot:
             of life are a pulse, a wait for a batch and `keep_alive`, but not reading.
         max_overruns: number of late iterations within a second that halts the robot.
         gap: a longer time between two iterations halts the robot [s]; 0: none does; None: 20
-            periods and at least 0.1 s for robots of the world, none for simulations.
+            periods and at least 0.1 s for robots of the world, none for simulations, or less if
+            the driver describes it.
         accept_reading: start where the robot is read to be, even if it cannot have come there.
         resume: start without a halt even if the previous process was halted, or was killed while
             commands acted.

@@ -76,6 +76,9 @@ def attach(
     return cast({cls}, opened)
 '''
 
+#: names that the module uses itself
+RESERVED = ("Row", "Rows", "RowStream", "Actuator", "Request", *re.findall(r"\b[A-Z]\w+", HEAD))
+
 #: what a class of the module has in the place of a type of o80
 ROW = {"_core.Observation": "Row", "History": "Rows", "_core.Stream": "RowStream"}
 PLAIN = {name: f"o80.{name}" for name in ("PreparedBurst", "Preview")}
@@ -89,11 +92,20 @@ def module_of(schema: dict[str, Any], segment: str | None = None) -> str:
     return "".join(Module(schema).parts(segment or schema["robot"]))
 
 
+def _typed(described: Any) -> Any:
+    """A description without what no type tells."""
+    if isinstance(described, dict):
+        left_out = ("unit", "help", "offset")
+        return {name: _typed(each) for name, each in described.items() if name not in left_out}
+    return [_typed(each) for each in described] if isinstance(described, list) else described
+
+
 def digest_of(schema: dict[str, Any]) -> str:
     """Changes with the names and types that a typed module has, not with limits or options."""
     named = [(each["name"], each["group"]) for each in schema["actuators"]]
     parts = [schema["groups"], schema.get("extended"), named]
-    text = json.dumps([*parts, [(each["name"], each["type"]) for each in schema["requests"]]])
+    requests = [[each["name"], each["type"]] for each in schema["requests"]]
+    text = json.dumps(_typed([*parts, requests]))
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
@@ -130,7 +142,7 @@ def array_type(field: Mapping[str, Any]) -> str:
 
 def verbs_of(source: Path, cls: str | None = None) -> Iterator[ast.FunctionDef]:
     """The public methods that a file declares."""
-    for node in ast.walk(ast.parse(source.read_text())):
+    for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ClassDef) and cls in (None, node.name):
             for inner in node.body:
                 block = inner.body if isinstance(inner, ast.If) else [inner]
@@ -156,12 +168,11 @@ class Module:
     def __init__(self, schema: dict[str, Any]) -> None:
         self._schema = schema
         self._classes: dict[str, str] = {}  # by name, in order
-        self._names: dict[tuple[str, str], str] = {}
         robot = re.sub(r"\W", "_", schema["robot"])
         self._cls = "".join(word.title() for word in robot.split("_")) or "Robot"
-        self._cls += "Frontend" if self._cls in ("Row", "Rows", "RowStream") else ""
+        self._cls += "Frontend" if self._cls in RESERVED else ""
         self._cls = self._cls if self._cls.isidentifier() else f"Robot{self._cls}"
-        self._names = {("", each): each for each in ("Row", "Rows", "RowStream", self._cls)}
+        self._names = {("", each): each for each in (*RESERVED, self._cls)}
         self._groups = schema["groups"]
         self._named: dict[int, list[str]] = {}
         for actuator in schema["actuators"]:

@@ -46,8 +46,8 @@ class ReadingWatch {
   void add(const std::byte* observed, double elapsed) noexcept;
   /// The first number that is wrong since begin(), or would be with this reading; bounds included.
   std::optional<Fault> find(const std::byte* observed, double elapsed) const noexcept;
-  /// The first number that is wrong since begin(), or was until the last reading, of actuators
-  /// whose bit is 0.
+  /// Among actuators whose bit is 0: the first number that is wrong now, or was wrong one reading
+  /// before.
   std::optional<Fault> find_idle(const std::uint64_t* active) const noexcept;
 
  private:

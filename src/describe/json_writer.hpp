@@ -53,7 +53,7 @@ class JsonWriter {
       text_ << "null";
     }
   }
-  /// A finite number, with as few digits as tell it from others of its type.
+  /// A finite number, with the fewest digits that read back as the same number.
   void value(float number) {
     separate();
     std::array<char, 24> digits{};

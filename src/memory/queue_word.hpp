@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <optional>
@@ -14,7 +15,7 @@ namespace o80 {
 struct QueueHolder {
   std::uint32_t lane = 0;
   bool bursts = false;
-  Iteration since = 0;  // batches have been waiting, or the burst has been running
+  Iteration since = 0;  // since when batches have been waiting, or the burst has been running
 
   bool operator==(const QueueHolder&) const = default;
 };
@@ -27,20 +28,23 @@ class QueueWord {
  public:
   explicit QueueWord(const SegmentView& view) noexcept : word_(&view.counters().queue) {}
 
-  /// The batches of a lane took so much work. A majority vote: after it, `lane_` is the lane that
-  /// did more than half of the work, if there is one.
+  /// Counts the work of a lane's batches. By majority vote `lane_` is then the lane that did more
+  /// than half of the work, if there is one.
   void spent(std::uint32_t lane, std::uint32_t work) noexcept {
     if (lane == lane_) {
-      weight_ += work;
+      weight_ = std::min(weight_ + work, kMostWeight);
     } else if (work > weight_) {
-      weight_ = work - weight_;
+      weight_ = std::min(work - weight_, kMostWeight);
       lane_ = lane;
     } else {
       weight_ -= work;
     }
   }
   /// Batches wait after this iteration.
-  void waits(Iteration now) noexcept { show(lane_, false, now); }
+  void waits(Iteration now) noexcept {
+    if (weight_ > 0) return show(lane_, false, now);
+    show_word(0);
+  }
   /// The burst of a lane runs.
   void bursts(std::uint32_t lane, Iteration now) noexcept { show(lane, true, now); }
   void is_empty() noexcept {
@@ -49,6 +53,7 @@ class QueueWord {
   }
 
  private:
+  static constexpr std::uint32_t kMostWeight = 1U << 14;  // some iterations of work
   static constexpr std::uint64_t kBursts = 0x8000;
   static constexpr std::uint64_t kLane = 0x7fff;
   friend std::optional<QueueHolder> queue_holder(const SegmentView& view) noexcept;

@@ -121,7 +121,7 @@ constexpr std::array kOptions = {
                "no limit", "number of late iterations within a second that halts the robot",
                kProcess | kEmbedded, O80_SET(backend.max_overruns)},
     LoopOption{"gap", OptionKind::number, "0 or a number from 0.001 to 3600 [s]", 0, 3600,
-               "the driver's, or 20 periods and at least 0.1 (none for simulations)",
+               "20 periods and at least 0.1 (none for simulations), or the driver's if it is less",
                "longest time between two iterations; a longer one halts [s], 0: any", kProcess,
                [](LoopOptions& options, std::string_view, double number) {
                  options.backend.gap = std::llround(number * 1e9);

@@ -63,6 +63,7 @@ void UntypedBackend::Body::take_due() noexcept {
     // the next iteration rejects it as late, or takes it (late_now)
     if (!share_.affords(effort)) return;
     share_.spend(effort);
+    queue_.spent(due.lane, effort.work);
     schedule.drop_next();
     if (admit(due)) take(due);
   }

@@ -199,8 +199,8 @@ bool UntypedBackend::Body::judge_first(bool again) noexcept {
   return is_good;
 }
 
-/// The program of an embedded backend reads once an iteration: row 0 must lie within the bounds,
-/// and the next reading where the robot can have come to. Else nothing is commanded any more.
+/// Judges the first two readings of an embedded backend: row 0 by its bounds, the next by how far
+/// the robot can have come. If the second is wrong, the backend ends.
 bool UntypedBackend::Body::agrees_with_first() noexcept {
   if (!judges_first_ || (begun_ && timing.missed)) return true;
   if (begun_) {

@@ -42,7 +42,8 @@ Batch ControlBlock::leave() {
   return released;
 }
 
-/// Where nothing can be sent, nothing is kept: a closed frontend has no lane, a child no control.
+/// If nothing can be sent, there is no control to give back: a closed frontend has no lane, a
+/// forked child no control.
 void ControlBlock::leave_quietly() noexcept {
   try {
     leave();

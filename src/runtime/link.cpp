@@ -131,8 +131,9 @@ std::string Link::queue_text() const {
   if (!holder) return "";
   const std::string owner = owner_of(holder->lane);
   const std::string since = " since iteration " + std::to_string(holder->since);
-  return holder->bursts ? "a burst of " + owner + " has been running" + since
-                        : owner + " has held the queue" + since;
+  return holder->bursts
+             ? "a burst of " + owner + " has been running" + since
+             : "most of the queue is of " + owner + "; batches have been waiting" + since;
 }
 
 KeepWaiting Link::guarded(const KeepWaiting& keep_waiting) const {

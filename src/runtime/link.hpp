@@ -66,7 +66,7 @@ struct Link {
   std::string halt_text(Iteration iteration) const;
   /// The process that owns a lane: "the frontend of pid 5 (python)".
   std::string owner_of(std::uint32_t lane) const;
-  /// "the frontend of pid 5 (python) has held the queue since iteration 7"; empty if no batch
+  /// "most of the queue is of the frontend of pid 5 (python)..."; empty if no batch
   /// waits.
   std::string queue_text() const;
   /// `keep_waiting`, extended to throw Closed when the frontend is closed during a wait.

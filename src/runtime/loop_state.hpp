@@ -12,7 +12,7 @@ namespace o80 {
 
 class UntypedFrontend;
 
-/// A queue of batches that lasts longer is told [iterations].
+/// A queue of batches is reported from this age on [iterations].
 inline constexpr Iteration kLongQueue = 10;
 
 /// State of a backend's loop, from its rows and counters.
@@ -37,7 +37,7 @@ struct LoopState {
   Verb slow_verb = Verb::none;          // a call into the driver that has not returned
   std::int64_t slow_for = 0;            // [ns]
 
-  /// Whose batches others wait for, for longer than kLongQueue iterations; empty: nobody's.
+  /// The frontend for whose batches others have waited for kLongQueue iterations; empty: none.
   std::string queue;
 
   /// True if no row was published for longer than a second and two periods.

@@ -205,12 +205,12 @@ def test_control_that_was_not_waited_for_is_given_back(segment: str) -> None:
 # ---------------------------------------------------------------------------- forked
 
 
-def in_child(work: Callable[[], object], within: float = WAIT) -> str:
+def in_child(work: Callable[[], object]) -> str:
     """Runs it in a forked child; what it raised, or nothing. Ends it if it hangs."""
     told, tell = os.pipe()
     child = os.fork()
     if child == 0:
-        signal.alarm(int(within))
+        signal.alarm(int(WAIT))
         try:
             work()
         except BaseException as error:
@@ -319,7 +319,7 @@ def test_a_child_forked_while_another_thread_computes_a_value_computes_its_own(
     thread = threading.Thread(target=look)
     thread.start()
     assert begun.wait(WAIT)
-    told = in_child(look, within=5)
+    told = in_child(look)
     go_on.set()
     thread.join(WAIT)
 
@@ -341,8 +341,9 @@ def test_a_child_forked_while_another_thread_imports_a_module_imports_it_too(
     thread = threading.Thread(target=importlib.import_module, args=["slowly_imported"])
     thread.start()
     assert begun.wait(WAIT)
-    os.register_at_fork(before=go_on.set)  # the last thing before the fork
-    told = in_child(lambda: importlib.import_module("slowly_imported"), within=5)
+    monkeypatch.setattr("o80.forks.LONGEST", WAIT)
+    os.register_at_fork(before=go_on.set)  # registered last, so called before the wait of o80
+    told = in_child(lambda: importlib.import_module("slowly_imported"))
     thread.join(WAIT)
 
     assert told == ""

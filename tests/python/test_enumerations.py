@@ -298,3 +298,32 @@ def test_the_classes_of_rows_are_those_of_the_frontend(segment: str) -> None:
             assert frontend.latest().extended.status is frontend.enums["status"].OK
             assert frontend.enums["status"]("OK") is frontend.enums["status"].OK
             assert isinstance(frontend._layout, Layout)
+
+
+def test_labels_and_numbers_may_stand_side_by_side(segment: str) -> None:
+    gear = IntEnum("Gear", {"low": 0, "high": 2})
+    with o80.Backend(segment, 3, gear) as backend:
+        backend.publish(["high", 0, gear["high"]])
+        with o80.Frontend(segment) as frontend:
+            gears = frontend.latest().observed
+            assert gears.labels().tolist() == ["high", "low", "high"]
+            assert (gears == ["high", 0, "low"]).tolist() == [True, True, False]
+            assert (gears == np.array(["low", "low", 2], object)).tolist() == [False, True, True]
+            assert np.isin(gears, np.array(["low"], object)).tolist() == [False, True, False]
+            assert type(np.where(gears == "low", 1.0, 2.0)) is np.ndarray
+            for wrong in (["hihg", 0, 0], np.array(["hihg", 0, 0], object)):
+                with pytest.raises(ValueError, match=r"no label 'hihg'.*'high'"):
+                    _ = gears == wrong
+                with pytest.raises(ValueError, match=r"no label 'hihg'.*'high'"):
+                    backend.publish(wrong)
+
+
+def test_one_struct_takes_labels_too(segment: str) -> None:
+    gear = IntEnum("Gear", {"low": 0, "high": 2})
+    with o80.Backend(segment, 2, {"gear": gear, "force": float}) as backend:
+        states = backend._observed
+        states[1]["gear"] = "high"
+        states[0]["force"] = 1.5
+        assert states["gear"].labels().tolist() == ["low", "high"]
+        with pytest.raises(ValueError, match="no label 'hihg'"):
+            states[0]["gear"] = "hihg"

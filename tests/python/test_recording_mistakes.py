@@ -80,6 +80,20 @@ def test_a_file_has_one_recorder(arm: o80.Frontend, tmp_path: Path) -> None:
     assert o80.open(path)[arm.segment].epochs[0].history().iteration.tolist() == [*range(21)]
 
 
+def test_a_forked_child_that_drops_its_copy_of_a_recording_says_nothing(
+    arm: o80.Frontend, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    held = [o80.Recording(tmp_path / "run.mcap", arm.segment)]
+    child = os.fork()
+    if child == 0:
+        held.clear()  # the last reference
+        os._exit(0)
+    os.waitpid(child, 0)
+    held[0].close()
+
+    assert capfd.readouterr().err == ""
+
+
 def test_a_forked_child_does_not_keep_a_finished_file_from_its_next_recorder(
     arm: o80.Frontend, tmp_path: Path
 ) -> None:

@@ -421,5 +421,7 @@ def test_what_an_interrupt_left_is_given_back_with_its_exception(
         # a lane, a name or a file that is left taken makes the next call fail
         for error in at_every_moment(lambda: take(there, tmp_path), step):
             del error
+            end = time.monotonic() + WAIT
             while [entry.name for entry in o80.segments()] != [other]:
+                assert time.monotonic() < end, o80.segments()
                 time.sleep(0.001)  # a robot's process ends when its pipe is closed

@@ -17,7 +17,7 @@ from mixed_robots import GROUPS, ROBOTS, SENSORS
 from test_typing import mypy
 
 import o80
-from o80.stub import module_of
+from o80.stub import digest_of, module_of
 
 O80 = str(Path(sys.executable).parent / "o80")
 
@@ -184,6 +184,23 @@ def test_limits_do_not_make_it_another_robot(segment: str, tmp_path: Path) -> No
     (tmp_path / "one.py").write_text(module_of(o80.robots.load("two_joints").describe()))
     with o80.robots.load("two_joints").inline(segment, frequency=250, gain=3.0):
         imported(tmp_path / "one.py").attach(segment).close()
+
+
+def test_units_do_not_make_it_another_robot_and_types_do(segment: str) -> None:
+    def digest(dtype: Any, unit: str) -> str:
+        with o80.Backend(segment, ["a"], {"x": dtype}, units={"x": unit}) as backend:
+            return digest_of(backend.schema)
+
+    assert digest(float, "m") == digest(float, "mm") != digest(int, "m")
+
+
+@pytest.mark.parametrize("name", ["Actuator", "any", "Mapping", "Row"])
+def test_a_robot_may_be_called_as_what_its_module_uses(name: str, segment: str) -> None:
+    with o80.Backend(segment, {name: ({"x": float}, 2)}, robot=name) as backend:
+        tree = ast.parse(module_of(backend.schema, segment))
+    made = [each.name for each in ast.walk(tree) if isinstance(each, ast.ClassDef)]
+    assert len(made) == len({*made})
+    assert not {"Actuator", "Any", "Mapping", "Literal"} & {*made}
 
 
 def test_the_command_writes_the_module_of_a_robot_or_a_segment(

@@ -33,8 +33,8 @@ struct Limits {
   double jerk = std::numeric_limits<double>::infinity();          // [1/s^3], needs an acceleration
   /// Largest allowed |desired - observed|; a larger one halts the backend.
   double error = std::numeric_limits<double>::infinity();
-  /// How far two readings may be apart beside the motion that `speed` allows, before one is held
-  /// for wrong; 0: a tenth of `error`.
+  /// Largest difference of two readings, in addition to the motion that `speed` allows; with a
+  /// larger one a reading counts as wrong. 0: a tenth of `error`.
   double noise = 0.0;
   /// What the number moves, if it is the velocity of another one; no limit of jerk then.
   IntegralBounds integral = {};

@@ -8,8 +8,8 @@ namespace o80 {
 enum class BackendState : std::uint32_t { starting, running, stopped, failed, superseded };
 
 /// State of a backend as a reader decides it, from the stored state and the lock of the backend: a
-/// free lock without a stored end means that the process was killed. Of a segment that cannot be
-/// read it is unknown.
+/// free lock without a stored end means that the process was killed. It is unknown if the segment
+/// cannot be read.
 enum class Life { starting, running, stopped, failed, superseded, killed, unknown };
 const char* name_of(Life life) noexcept;
 /// True if the backend has ended. An end is final.

@@ -51,7 +51,7 @@ def recording_info(path: Path, *, as_json: bool = False) -> None:
 
 
 def _print_marks(marks: list[Mark]) -> None:
-    """Each with its wall clock and values; of many the first and the last."""
+    """Prints marks with time and values; of many only the first and the last ones."""
     if not marks:
         return
     print(style(f"\n{len(marks)} mark{'s' if len(marks) > 1 else ''}", "bold"))

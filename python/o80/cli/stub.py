@@ -35,4 +35,4 @@ def stub(
         print(text, end="")
     else:
         with writing(output):
-            output.write_text(text)
+            output.write_text(text, encoding="utf-8")

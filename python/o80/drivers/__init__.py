@@ -9,8 +9,8 @@ class Thermometer:
 `o80 run module:Thermometer` and `o80.robots.load("module:Thermometer")` run it like any robot. The
 attributes `actuators`, `dtype`, `extended`, `requests`, `limits`, `rests_at`, `when_idle`, `units`,
 `while_halted`, `model` and `joints`, of the class or of the object, describe its rows, as the
-arguments of `o80.Backend` do; `gap` is the longest time between two rows that does not halt it [s].
-See docs/drivers.md.
+arguments of `o80.Backend` do; `gap` is the longest time between two rows that does not halt it [s],
+if that is less than by default. See docs/drivers.md.
 """
 
 from o80.drivers.option import Seed, option

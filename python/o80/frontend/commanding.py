@@ -61,7 +61,7 @@ class Commanding(Observing):
             Every command ends at its target. If the limits make it longer than asked, it is
             completed later, with the reason "limits".
 
-            Returns its place in the batch, whose element it is: `arm.pulse()[place]` is its handle.
+            Returns its place in the batch: `arm.pulse()[place]` is its handle.
             Raises InvalidArgument for a command that the robot cannot follow.
             """
 

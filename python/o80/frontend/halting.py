@@ -55,7 +55,7 @@ class Halting(Controlling):
         Raises BackendHalted if it is refused: another halt came after it, the robot refuses, it
         cannot be where it is read, or, in bursting mode, it still brakes. Raises
         TimeoutError, NoLane, BackendGone.
-        Returns whether a halt was ended: False, and nothing is done, if there is none.
+        Returns True if it ended a halt, False if there was none.
         """
         if number is None:
             halt = self.halted

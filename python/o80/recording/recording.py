@@ -51,6 +51,7 @@ class Recording(Closeable):
         self._end = threading.Event()
         self._failure: Exception | None = None
         self._closed = False
+        self._owner = os.getpid()
         # not bound to this object, which ends when nobody refers to it any more
         run = partial(_run, weakref.ref(self), self._end)
         self._thread = threading.Thread(target=run, name="o80-recording", daemon=True)
@@ -119,7 +120,8 @@ class Recording(Closeable):
         return self._failure is None
 
     def __del__(self) -> None:
-        if hasattr(self, "_thread") and not self._closed:
+        # in a forked child the file belongs to the parent
+        if hasattr(self, "_thread") and not self._closed and self._owner == os.getpid():
             path = self._recorder.path
             warnings.warn(f"the recording {path} was never closed", ResourceWarning, stacklevel=2)
             self.close()

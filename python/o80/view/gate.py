@@ -1,8 +1,8 @@
 """The connections of the server: who is let in, and who must go.
 
 A halt must come through whatever else connects. So one thread, which never waits for a connection,
-reads the heads of all requests. A connection is a stranger's until a head with the token has come;
-then it is a holder's, and a thread reads the body and sends the answer. Each kind has a budget of
+reads the heads of all requests. A connection is a stranger until it has sent a head with the token.
+Then it is a holder, and a thread reads the body and sends the answer. Each kind has a budget of
 its own: too many strangers cost the oldest stranger its connection, never a holder.
 """
 
@@ -108,17 +108,20 @@ class Gate:
 
     def _make_room(self) -> None:
         while len(self._strangers) > self._most_strangers:
-            oldest = next(iter(self._strangers))
-            self._read(oldest)  # its token may have arrived meanwhile
-            if oldest in self._strangers:
-                self._drop(oldest)
+            self._drop_oldest()
 
     def _free_one(self) -> None:
         """The process has no descriptor left."""
         if self._strangers:
-            self._drop(next(iter(self._strangers)))
+            self._drop_oldest()
         else:
             time.sleep(TICK)
+
+    def _drop_oldest(self) -> None:
+        oldest = next(iter(self._strangers))
+        self._read(oldest)  # its token may have arrived meanwhile
+        if oldest in self._strangers:
+            self._drop(oldest)
 
     def _expire(self, now: float) -> None:
         for connection in [*self._strangers, *self._holders]:
@@ -135,7 +138,7 @@ class Gate:
         try:
             data = connection.socket.recv(LARGEST_HEAD)
         except BlockingIOError:
-            self._watch(connection)
+            self._try_to_watch(connection)
             return
         except OSError:
             data = b""
@@ -176,7 +179,7 @@ class Gate:
         connection.refusal = Reply(refused.code, f"{refused}\n".encode()).as_bytes(last=True)
         connection.received.clear()
         connection.until = time.monotonic() + REFUSED_AFTER
-        self._watch(connection)
+        self._try_to_watch(connection)
 
     def _tell(self, connection: "_Connection", now: float) -> None:
         """Says why it is refused. Closed later: with unread bytes the answer would be lost."""
@@ -200,13 +203,13 @@ class Gate:
 
     def _answer(self, connection: "_Connection", head: Head) -> None:
         """In a thread of its own."""
-        connection.last = head.last
+        connection.last = head.last or head.method == "HEAD"  # an answer to that has no body
         try:
             if "expect" in head.headers:
                 connection.send(CONTINUE)
             reply = self._reply(head, connection.body(head.length))
-            connection.send(reply.as_bytes(last=head.last))
-        except OSError:  # its client went, or was too slow
+            connection.send(reply.as_bytes(last=connection.last))
+        except Exception:  # its client went or was too slow, or the answer failed
             connection.last = True
         with self._closing:
             if self._closed:
@@ -234,6 +237,13 @@ class Gate:
             self._selector.register(connection.socket, selectors.EVENT_READ, connection)
             connection.watched = True
 
+    def _try_to_watch(self, connection: "_Connection") -> None:
+        """Drops it if the user may watch no more: that costs this connection, not the others."""
+        try:
+            self._watch(connection)
+        except OSError:
+            self._drop(connection)
+
     def _unwatch(self, connection: "_Connection") -> None:
         if connection.watched:
             self._selector.unregister(connection.socket)
@@ -255,7 +265,7 @@ class Gate:
     def _end(self) -> None:
         with self._closing:
             for connection in [*self._answered]:
-                connection.busy = False
+                connection.busy = False  # its thread has ended
         for connection in [*self._strangers, *self._holders, *self._answered]:
             self._drop(connection)
         self._selector.close()

@@ -1,5 +1,8 @@
-"""The head of a request. It is read strictly: whatever two programs could read in two ways is
-refused, and no number is made of digits before they are counted."""
+"""The head of a request.
+
+A head that two programs could read differently is refused. Digits are counted before they become a
+number.
+"""
 
 import re
 from dataclasses import dataclass

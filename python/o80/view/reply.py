@@ -10,7 +10,7 @@ NOTHING = "default-src 'none'"  # a content security policy
 
 @dataclass(frozen=True)
 class Reply:
-    """Status, and what is shown."""
+    """Status, content and its type."""
 
     code: int
     body: bytes

@@ -39,7 +39,7 @@ class Said:
     seconds: float
     """From the last row of the killed process to the row that says so."""
     rows: int
-    """Of that part since the killed process had ended: a busy machine takes its time to end it."""
+    """Rows of that part from the end of the killed process on; a busy machine may need long."""
 
     @property
     def in_time(self) -> bool:
@@ -187,7 +187,7 @@ def _first(mark: Mark, observer: o80.Frontend, last: int) -> list[int]:
 
 
 def wait_for_rows(observer: o80.Frontend, name: str) -> None:
-    """Until rows have come: not for one of them, which a short history may have lost by then."""
+    """Waits until so many rows are published; a short history may have lost any one of them."""
     enough = observer.published + ROWS_ON
     wait_until(lambda: observer.published >= enough, f"{name} goes on")
 
