@@ -115,7 +115,7 @@ TEST_F(RunTest, OneThatIsAskedToStopWhileItStartsEndsAtOnce) {
   };
   const std::int64_t begin = monotonic_now();
   EXPECT_EQ(run_here(table(), {}), 0);
-  EXPECT_LT(monotonic_now() - begin, 2'500'000'000);
+  EXPECT_LT(monotonic_now() - begin, 5'000'000'000) << "it waits 5 s for a backend that may come";
   EXPECT_EQ(Puppet::calls.stopped, 1);
 }
 
