@@ -42,8 +42,7 @@ class QueueWord {
   }
   /// Batches wait after this iteration.
   void waits(Iteration now) noexcept {
-    if (weight_ > 0) return show(lane_, false, now);
-    show_word(0);
+    if (weight_ > 0) show(lane_, false, now);  // else as before
   }
   /// The burst of a lane runs.
   void bursts(std::uint32_t lane, Iteration now) noexcept { show(lane, true, now); }
