@@ -300,12 +300,14 @@ def test_the_classes_of_rows_are_those_of_the_frontend(segment: str) -> None:
             assert isinstance(frontend._layout, Layout)
 
 
+GEARS: Any = IntEnum("GEARS", {"low": 0, "high": 2})
+
+
 def test_labels_and_numbers_may_stand_side_by_side(segment: str) -> None:
-    gear = IntEnum("Gear", {"low": 0, "high": 2})
-    with o80.Backend(segment, 3, gear) as backend:
-        backend.publish(["high", 0, gear["high"]])
+    with o80.Backend(segment, 3, GEARS) as backend:
+        backend.publish(["high", 0, GEARS["high"]])
         with o80.Frontend(segment) as frontend:
-            gears = frontend.latest().observed
+            gears: Any = frontend.latest().observed
             assert gears.labels().tolist() == ["high", "low", "high"]
             assert (gears == ["high", 0, "low"]).tolist() == [True, True, False]
             assert (gears == np.array(["low", "low", 2], object)).tolist() == [False, True, True]
@@ -319,9 +321,8 @@ def test_labels_and_numbers_may_stand_side_by_side(segment: str) -> None:
 
 
 def test_one_struct_takes_labels_too(segment: str) -> None:
-    gear = IntEnum("Gear", {"low": 0, "high": 2})
-    with o80.Backend(segment, 2, {"gear": gear, "force": float}) as backend:
-        states = backend._observed
+    with o80.Backend(segment, 2, {"gear": GEARS, "force": float}) as backend:
+        states: Any = backend._observed
         states[1]["gear"] = "high"
         states[0]["force"] = 1.5
         assert states["gear"].labels().tolist() == ["low", "high"]

@@ -285,6 +285,7 @@ def test_ctrl_c_while_control_is_awaited_gives_it_back(segment: str) -> None:
             assert batch.statuses == ["completed"]
 
 
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_an_interrupt_at_any_moment_gives_control_back(process: o80.robots.Process) -> None:
     with process.frontend() as arm, process.frontend() as other:
 

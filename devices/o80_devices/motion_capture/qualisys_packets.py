@@ -139,7 +139,8 @@ def _bodies(content: bytes, place: int) -> list[Subject]:
         place += BODY.size
         rotation = np.array(numbers[:9]).reshape(3, 3).T
         # not seen: the server sends NaN. What is no rotation is no pose either
-        turns = np.abs(rotation @ rotation.T - np.eye(3)).max() < NOT_ORTHOGONAL
+        with np.errstate(invalid="ignore"):
+            turns = np.abs(rotation @ rotation.T - np.eye(3)).max() < NOT_ORTHOGONAL
         if not (turns and np.isfinite([x, y, z]).all() and np.linalg.det(rotation) > 0):
             bodies.append(Subject(False))
             continue
