@@ -305,6 +305,17 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
         return send_alone(self, [&](o80::BatchBuilder& batch) { batch.purge(which); });
       },
       all);
+  def_verb(
+      frontend, "mark", verbs::mark,
+      [](const Frontend& self, nb::handle text) {
+        const std::string line = string_of(text, "the text of a mark");
+        if (!nb::cast<bool>(text.attr("isprintable")())) {
+          throw o80::InvalidArgument("a mark is one line of printable text, got " +
+                                     nb::cast<std::string>(nb::repr(text)));
+        }
+        return send_alone(self, [&](o80::BatchBuilder& batch) { batch.mark(line); });
+      },
+      "text"_a.none());
   def_noun(frontend, "added", verbs::added,
            [](const Frontend& self) { return self.untyped().added(); });
   def_verb(frontend, "forget_added", verbs::forget_added,

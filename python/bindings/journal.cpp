@@ -38,6 +38,8 @@ std::string word_of(o80::JournalRecord::Kind kind) {
       return "release_control";
     case resume:
       return "resume";
+    case mark:
+      return "mark";
     case unknown:
       return "unknown";
   }
@@ -73,10 +75,19 @@ std::vector<o80::JournalEntry> entries_of(o80::Journal& journal, std::size_t mos
   return entries;
 }
 
-/// Bytes, number of the first entry, number after the last one, whether there may be more.
+/// The text of a mark, which may be any bytes.
+nb::object text_of(const std::string& bytes) {
+  return nb::bytes(bytes.data(), bytes.size()).attr("decode")("utf-8", "replace");
+}
+
+/// Bytes, number of the first entry, number after the last one, whether there may be more, and
+/// iteration and text of the marks in them.
 nb::tuple read_raw(o80::RawJournal& journal, std::size_t most) {
   const o80::RawJournal::Entries entries = journal.read(most);
-  return nb::make_tuple(bytes_of(entries.bytes), entries.first, entries.next, entries.more);
+  nb::list marks;
+  for (const auto& mark : entries.marks)
+    marks.append(nb::make_tuple(mark.iteration, text_of(mark.text)));
+  return nb::make_tuple(bytes_of(entries.bytes), entries.first, entries.next, entries.more, marks);
 }
 
 std::vector<o80::JournalEntry> decoded(o80::RecordedJournal& journal, const nb::bytes& bytes,
@@ -97,7 +108,8 @@ void bind_raw(nb::module_& m) {
           "frontend"_a, "first"_a)
       .def_prop_ro("exists", &o80::RawJournal::exists)
       .def("read", &read_raw, "most"_a,
-           nb::sig("def read(self, most: int) -> tuple[bytes, int, int, bool]"));
+           nb::sig("def read(self, most: int) "
+                   "-> tuple[bytes, int, int, bool, list[tuple[int, str]]]"));
   nb::class_<o80::RecordedJournal>(m, "RecordedJournal")
       .def(nb::init<std::shared_ptr<const o80::Description>, std::uint64_t>(), "description"_a,
            "first"_a)
@@ -129,6 +141,9 @@ void bind_record(nb::module_& m) {
       .def_ro("only_own", &JournalRecord::only_own)
       .def_ro("request", &JournalRecord::request)
       .def_prop_ro("payload", [](const JournalRecord& self) { return bytes_of(self.payload); })
+      .def_prop_ro(
+          "text", [](const JournalRecord& self) { return text_of(self.text); },
+          nb::sig("def text(self) -> str"))
       .def_ro("halt", &JournalRecord::halt)
       .def_ro("unknown", &JournalRecord::unknown);
 }

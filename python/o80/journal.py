@@ -24,7 +24,8 @@ _NEVER = 2**62  # a number that no entry reaches
 class JournalCommand:
     """A command, a request or an order of a batch, as its frontend sent it."""
 
-    kind: str  #: command, purge, request, take_control, release_control, resume or unknown
+    #: command, purge, request, take_control, release_control, resume, mark or unknown
+    kind: str
     id: int  #: the id that its `status` entries have
     actuators: tuple[str, ...] = ()  #: of a command or a purge; of a purge of all: none
     #: For each actuator its target: a number, or a dictionary of the fields that were given. For a
@@ -40,6 +41,7 @@ class JournalCommand:
     request: str = ""  #: the name of the request
     fields: dict[str, Any] | None = None  #: its values
     halt: int | None = None  #: of a resume
+    text: str = ""  #: of a mark
     unknown: str = ""  #: of kind unknown: what a newer o80 has recorded, such as "record kind 10"
 
 
@@ -176,7 +178,9 @@ class EntryDecoder:
             record = record_of(described["type"], native.payload)
             fields = {name: _plain(record[name]) for name in record}
             return JournalCommand(kind, native.id, request=described["name"], fields=fields)
-        return JournalCommand(kind, native.id, halt=native.halt or None, unknown=native.unknown)
+        return JournalCommand(
+            kind, native.id, halt=native.halt or None, text=native.text, unknown=native.unknown
+        )
 
     def _target(self, native: _core.JournalTarget, rows: int) -> Any:
         """The rows of one actuator; of a struct the fields that were given."""

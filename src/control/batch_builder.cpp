@@ -1,5 +1,6 @@
 #include "control/batch_builder.hpp"
 
+#include <algorithm>
 #include <cassert>
 #include <cstring>
 #include <limits>
@@ -47,6 +48,9 @@ std::byte* BatchBuilder::open(const RecordHead& head, std::uint64_t payload_byte
     case RecordKind::take_control:
     case RecordKind::release_control:
       ++control_orders_;
+      break;
+    case RecordKind::mark:
+      ++marks_;
       break;
     default:
       break;
@@ -139,6 +143,16 @@ std::uint32_t BatchBuilder::resume(std::uint64_t number, bool accept_reading) {
   return records_ - 1;
 }
 
+std::uint32_t BatchBuilder::mark(std::string_view text) {
+  if (text.empty() || text.size() > kMostMarkBytes) {
+    throw InvalidArgument("a mark has 1 to " + std::to_string(kMostMarkBytes) +
+                          " bytes of text, got " + std::to_string(text.size()));
+  }
+  const std::span<const std::byte> bytes = std::as_bytes(std::span(text));
+  std::ranges::copy(bytes, open(head_of(RecordKind::mark), bytes.size()));
+  return records_ - 1;
+}
+
 std::span<const Block> BatchBuilder::seal(const BatchRecord& batch) {
   BatchRecord written = batch;
   written.kind = RecordKind::batch;
@@ -161,7 +175,7 @@ std::span<const Block> BatchBuilder::seal(const BatchRecord& batch) {
 }
 
 bool BatchBuilder::is_express(const BatchRecord& batch) const noexcept {
-  return commands_ == 0 && requests_ == 0 && records_ > 0 && records_ <= kMostExpressRecords &&
+  return commands_ + requests_ + marks_ == 0 && records_ > 0 && records_ <= kMostExpressRecords &&
          batch.at == kNow && batch.burst == 0 && (batch.flags & kBurstUntilEnded) == 0;
 }
 
@@ -177,7 +191,7 @@ std::size_t BatchBuilder::set_id(std::size_t block, CommandId id) {
 
 void BatchBuilder::clear() {
   blocks_.resize(1);
-  records_ = commands_ = requests_ = control_orders_ = 0;
+  records_ = commands_ = requests_ = control_orders_ = marks_ = 0;
 }
 
 }  // namespace o80

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "control/record.hpp"
@@ -43,6 +44,9 @@ class BatchBuilder {
   /// Clears halts up to this number.
   std::uint32_t resume(std::uint64_t number, bool accept_reading = false);
 
+  /// A note for the journal: 1 to kMostMarkBytes bytes in UTF-8. Throws InvalidArgument.
+  std::uint32_t mark(std::string_view text);
+
   /// Completes the batch. `batch` has id, ticket, at, late_now, burst and flags. A batch of few
   /// purges and control orders, without `at` and without a burst, is marked as express.
   std::span<const Block> seal(const BatchRecord& batch);
@@ -69,6 +73,7 @@ class BatchBuilder {
   std::uint32_t commands_ = 0;
   std::uint32_t requests_ = 0;
   std::uint32_t control_orders_ = 0;
+  std::uint32_t marks_ = 0;
 };
 
 }  // namespace o80

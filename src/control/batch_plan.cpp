@@ -15,7 +15,7 @@ constexpr std::size_t kSpareBlocks = 4;
 
 // bits of kTraits
 constexpr std::uint32_t kRequests = 0x7F;  // number of requests
-constexpr std::uint32_t kResumes = 1U << 7;
+constexpr std::uint32_t kFree = 1U << 7;
 constexpr std::uint32_t kIsExpress = 1U << 8;
 constexpr std::uint32_t kReleases = 1U << 9;
 constexpr std::uint32_t kMoves = 1U << 10;
@@ -48,7 +48,7 @@ void BatchPlanner::begin(Lane& lane, BlockIndex batch) noexcept {
   lane.blocks = 1;
   lane.effort = {.work = kBatchWork, .express = true};
   lane.control_orders = 0;
-  lane.resumes = 0;
+  lane.free = 0;
   lane.group = kNoBlock;
   lane.groups = 0;
   begin_part(lane);
@@ -83,12 +83,12 @@ void BatchPlanner::complete(std::uint32_t lane_index, std::uint32_t& budget) noe
   BatchRecord& record = pool_.batch(lane.batch);
   const bool is_express = lane.effort.express && lane.place == record.records;
   const bool bursts = record.burst != 0 || (record.flags & kBurstUntilEnded) != 0;
-  const bool only_resumes = lane.resumes > 0 && lane.resumes == record.records && !bursts;
+  const bool is_free = lane.free > 0 && lane.free == record.records && !bursts;
   record.own[kMissingFrom] = lane.place;
   record.own[kSpareFirst] = lane.cursor;
   record.own[kTraits] = lane.effort.requests | (is_express ? kIsExpress : 0) |
                         (lane.effort.releases ? kReleases : 0) | (lane.effort.moves ? kMoves : 0) |
-                        (only_resumes ? kResumes : 0) | lane.groups << kFirstGroupBit;
+                        (is_free ? kFree : 0) | lane.groups << kFirstGroupBit;
   record.own[kSpareBlocks] = chain.blocks - lane.blocks;
   record.blocks = lane.effort.work;
   known_[lane.batch] = Known::plan;
@@ -276,7 +276,7 @@ Effort BatchPlanner::effort(BlockIndex batch) const noexcept {
           (traits & kIsExpress) != 0,
           (traits & kReleases) != 0,
           (traits & kMoves) != 0,
-          (traits & kResumes) != 0};
+          (traits & kFree) != 0};
 }
 
 std::optional<Plan> BatchPlanner::plan(BlockIndex batch) noexcept {

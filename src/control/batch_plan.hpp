@@ -30,7 +30,7 @@ struct Effort {
   bool express = false;        // only purges and control orders
   bool releases = false;       // releases exclusive control
   bool moves = false;          // has a command, or a request without `while_halted`
-  bool resumes = false;        // only resumes, and no burst
+  bool free = false;           // only resumes and marks, which need no control, and no burst
 };
 
 /// Checks the records of a batch in the pool, and reduces them to the few steps that take it.
@@ -96,7 +96,7 @@ class BatchPlanner {
     RecordCheck::Progress progress;
     Effort effort;
     std::uint32_t control_orders = 0;
-    std::uint32_t resumes = 0;
+    std::uint32_t free = 0;  // resumes and marks
     // the group whose members are being checked
     BlockIndex group = kNoBlock;
     BlockIndex first_member = kNoBlock;

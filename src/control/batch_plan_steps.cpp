@@ -28,13 +28,17 @@ void BatchPlanner::add(std::uint32_t lane_index, BlockIndex record,
       if (!while_halted_[pool_.head(record).actuator]) lane.effort.moves = true;
       [[fallthrough]];
     case RecordKind::resume:
-      if (pool_.head(record).kind == RecordKind::resume) ++lane.resumes;
+      if (pool_.head(record).kind == RecordKind::resume) ++lane.free;
       // a resume makes a fresh start too. It is never express: if it overtook commands that were
       // sent during the halt, they would act instead of being rejected
       lane.effort.express = false;
       ++lane.effort.requests;
       end_part(lane_index, budget);
       return add_step(lane, record, kRequestWork + actuators_);
+    case RecordKind::mark:
+      lane.effort.express = false;
+      ++lane.free;
+      return add_to_end(lane, End::completed, record);
     case RecordKind::release_control:
       lane.effort.releases = true;
       [[fallthrough]];

@@ -27,6 +27,7 @@ enum class RecordKind : std::uint8_t {
   resume,  // clears halts up to the number in `amount`
   group,   // one command for several actuators, with one status; `rows` members follow
   member,
+  mark,  // a note for the journal; the payload is its text
   // set by BatchPlanner only; invalid when sent by a frontend
   overwritten_list = 0x80,  // first of a list of records with this end status, in no queue
   purged_list,
@@ -38,7 +39,7 @@ enum class RecordKind : std::uint8_t {
 
 /// True for the kinds that a lane may hold, and for those of the backend.
 constexpr bool is_known(RecordKind kind) noexcept {
-  return (kind >= RecordKind::batch && kind <= RecordKind::member) ||
+  return (kind >= RecordKind::batch && kind <= RecordKind::mark) ||
          (kind >= RecordKind::overwritten_list && kind <= RecordKind::overwriter_purged);
 }
 
@@ -54,7 +55,7 @@ inline constexpr std::int64_t kLongestDuration = std::int64_t{1} << 61;
 /// - if a trajectory has its own times (pace `duration`, rows > 1): the end time of each row since
 ///   the start of the command (int64 [ns]);
 /// - the rows, one state each. `iterations` and `speed` apply to each row; `until` allows one row.
-/// Payload of a request: its struct. A group has none.
+/// Payload of a request: its struct; of a mark: its text in UTF-8. A group has none.
 ///
 /// Members follow their group record. They do not count as records of the batch, have the id of the
 /// group, and the layout of a command with the pace, mode, profile, start and rows of the group.
@@ -92,6 +93,8 @@ inline constexpr std::uint16_t kExpress = 2;
 // limits of one batch: `pulse` refuses more, and the backend rejects the records beyond them
 inline constexpr std::uint32_t kMostRequests = 8;
 inline constexpr std::uint32_t kMostControlOrders = 8;
+/// Longest text of a mark [bytes].
+inline constexpr std::uint32_t kMostMarkBytes = 1024 - sizeof(RecordHead);
 /// Most records of an express batch.
 inline constexpr std::uint32_t kMostExpressRecords = 32;
 

@@ -1,6 +1,7 @@
 #include "control/record_check.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -93,6 +94,11 @@ RecordCheck::Verdict RecordCheck::begin(const BlockPool& pool, BlockIndex block,
       return verdict(head.payload_bytes == 0);
     case RecordKind::resume:
       return verdict(head.payload_bytes == 0 && head.accepts <= 1);
+    case RecordKind::mark: {
+      std::array<std::byte, kMostMarkBytes> text;
+      return verdict(head.payload_bytes > 0 && head.payload_bytes <= text.size() &&
+                     progress.payload.read(text.data(), head.payload_bytes));
+    }
     default:
       return Verdict::invalid;
   }

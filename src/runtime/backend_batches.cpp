@@ -222,8 +222,8 @@ bool UntypedBackend::Body::admit(const StagedBatch& sent) noexcept {
   watch_holder();
   const std::uint64_t sender = sent.had_left ? 0 : sent.incarnation;
   const bool is_holders = holder_.is(sent.lane, sender);
-  // control covers commands only: any commander may resume
-  const bool is_free = holder_.is_nobody() || controller.effort(sent.batch).resumes;
+  // control covers commands only: any commander may resume and mark
+  const bool is_free = holder_.is_nobody() || controller.effort(sent.batch).free;
   if (!is_free && !is_holders) return reject(sent, Reason::exclusive, holder_.lane());
   if (sent.at < current && !sent.late_now) return reject(sent, Reason::late);
   if (stale_ == Stale::purge && is_of_dead(sent)) return reject(sent, Reason::dead_frontend);

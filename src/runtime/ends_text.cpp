@@ -26,6 +26,8 @@ std::string subject_of(const Schema& schema, std::span<const SentCommand> comman
       return "the order to take control was ";
     case RecordKind::release_control:
       return "the order to release control was ";
+    case RecordKind::mark:
+      return "the mark was ";
     default:
       return "a record was ";
   }

@@ -284,6 +284,11 @@ std::uint32_t UntypedFrontend::add_purge_own() {
   return link_->builder.purge_own(kEveryActuator);
 }
 
+std::uint32_t UntypedFrontend::add_mark(std::string_view text) {
+  const auto lock = link_->lock_to_add();
+  return link_->builder.mark(text);
+}
+
 std::uint32_t UntypedFrontend::add_request(std::uint32_t request,
                                            std::span<const std::byte> payload) {
   link_->command_check.request(request, payload);

@@ -6,9 +6,12 @@
 #include <cstdint>
 #include <cstring>
 #include <span>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "base/little_endian.hpp"
+#include "control/record.hpp"
 #include "o80/memory/journal_kind.hpp"
 #include "runtime/journal_format.hpp"
 
@@ -26,6 +29,14 @@ class JournalEncoder {
   /// Appends one entry to `to`.
   void encode(const Head& head, std::span<const std::byte> payload, std::vector<std::byte>& to);
 
+  /// A note in a batch that was encoded.
+  struct Mark {
+    std::int64_t iteration = 0;  // in which the backend read it
+    std::string text;            // as it was sent: any bytes
+  };
+  /// The marks since the last call.
+  std::vector<Mark> take_marks() { return std::exchange(marks_, {}); }
+
  private:
   using Batch = typename Layout::Batch;
   using Record = typename Layout::Record;
@@ -34,6 +45,8 @@ class JournalEncoder {
     std::uint64_t id = 0;
     std::uint64_t blocks = 0;  // read so far; 0: none, or the batch is invalid
     std::uint64_t left = 0;    // bytes of the last record's payload that were not read
+    bool in_mark = false;      // the last record is a mark, with this text
+    std::string text{};
   };
 
   template <class Struct>
@@ -44,7 +57,8 @@ class JournalEncoder {
   }
   void put_payload(LittleEndianWriter& put, const Head& head, std::span<const std::byte> payload);
   void put_records(LittleEndianWriter& put, const Head& head, std::span<const std::byte> blocks);
-  void put_record(LittleEndianWriter& put, Open& open, std::span<const std::byte>& blocks);
+  void put_record(LittleEndianWriter& put, Open& open, std::int64_t iteration,
+                  std::span<const std::byte>& blocks);
   static void put_lengths(LittleEndianWriter& put, std::uint16_t kind, std::size_t fields,
                           std::uint64_t payload, std::uint64_t here) {
     put.u16(kind, fields);
@@ -52,6 +66,7 @@ class JournalEncoder {
   }
 
   std::array<Open, 256> open_{};  // by lane
+  std::vector<Mark> marks_;
 };
 
 template <class Layout>
@@ -105,18 +120,23 @@ void JournalEncoder<Layout>::put_records(LittleEndianWriter& put, const Head& he
     blocks = blocks.subspan(Layout::kBlock);
   }
   open.blocks += count;
-  while (!blocks.empty()) put_record(put, open, blocks);
+  while (!blocks.empty()) put_record(put, open, head.iteration, blocks);
 }
 
 /// Writes the next record in `blocks`, or what they hold of the payload of the one before, and
 /// takes it off them.
 template <class Layout>
-void JournalEncoder<Layout>::put_record(LittleEndianWriter& put, Open& open,
+void JournalEncoder<Layout>::put_record(LittleEndianWriter& put, Open& open, std::int64_t iteration,
                                         std::span<const std::byte>& blocks) {
   const bool begins = open.left == 0;
   const std::size_t head = begins ? sizeof(Record) : 0;
   const auto record = loaded<Record>(blocks.first(head));
-  if (begins) open.left = record.payload_bytes;
+  if (begins) {
+    open.left = record.payload_bytes;
+    open.in_mark = static_cast<std::uint16_t>(record.kind) == journal_format::kMark &&
+                   open.left > 0 && open.left <= kMostMarkBytes;
+    open.text.clear();
+  }
   const std::uint64_t here = std::min<std::uint64_t>(open.left, blocks.size() - head);
   if (begins) {
     put_lengths(put, static_cast<std::uint16_t>(record.kind), journal_format::kRecordFields,
@@ -127,6 +147,11 @@ void JournalEncoder<Layout>::put_record(LittleEndianWriter& put, Open& open,
   }
   put.bytes(blocks.subspan(head, here));
   open.left -= here;
+  if (open.in_mark) {
+    const auto part = blocks.subspan(head, here);
+    open.text.append(reinterpret_cast<const char*>(part.data()), part.size());
+    if (open.left == 0) marks_.push_back({iteration, open.text});
+  }
   // padding up to the next block
   const std::size_t taken = (head + here + Layout::kBlock - 1) / Layout::kBlock * Layout::kBlock;
   blocks = blocks.subspan(taken);

@@ -45,6 +45,9 @@ inline constexpr std::uint16_t kMore = 256;  // the payload of the record before
 /// Blocks that are no whole batch: invalid, or the blocks before them were missed.
 inline constexpr std::uint16_t kLost = 257;
 
+/// A note: its payload is a text. JournalEncoder collects them.
+inline constexpr std::uint16_t kMark = 10;
+
 inline constexpr std::size_t kRecordFields = 27;
 inline constexpr std::size_t kBatchFields = 43;
 

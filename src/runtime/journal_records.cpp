@@ -154,6 +154,11 @@ std::optional<JournalRecord> take_record(const Schema& schema, std::span<const s
       record.kind = Kind::resume;
       record.halt = static_cast<std::uint64_t>(head.amount);
       break;
+    case RecordKind::mark:
+      record.kind = Kind::mark;
+      record.text.assign(reinterpret_cast<const char*>(piece->payload.data()),
+                         piece->payload.size());
+      break;
     default:
       if (is_known(head.kind)) return std::nullopt;
       return unknown_record(unknown_kind(head.kind));

@@ -21,11 +21,13 @@ RawJournal::Entries RawJournal::read(std::size_t most) {
     holds_ = false;
     if (head.number < first_) {  // the encoder needs it: a batch may begin in it
       entries.bytes.clear();
+      encoder_.take_marks();
       continue;
     }
     if (begins) entries.first = head.number;
     entries.next = head.number + head.numbers();
   }
+  entries.marks = encoder_.take_marks();
   entries.more = holds_ || entries.bytes.size() >= most;
   return entries;
 }

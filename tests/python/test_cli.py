@@ -134,6 +134,17 @@ def test_echo_refuses_odd_numbers(folder: Path) -> None:
     assert "timeout must not be negative, got nan" in in_a_line(said)
 
 
+def test_a_mark_stands_in_the_journal(folder: Path, robot: "subprocess.Popen[str]") -> None:
+    said = o80(folder, "mark", "two_joints", "changed the battery")
+    iteration = int(said.split("iteration ")[1].split(":")[0])
+    o80(folder, "halt", "two_joints")
+    assert "halted too" in o80(folder, "mark", "two_joints", "halted too")
+    lines = o80(folder, "echo", "two_joints", "--commands", "--count", "5").splitlines()
+    assert lines[0].startswith(f"{iteration:>8} pid ")
+    assert lines[0].endswith('mark "changed the battery"')
+    assert "a mark has 1 to 976 bytes" in o80(folder, "mark", "two_joints", "", fails=True)
+
+
 def test_stop_ends_a_robot_in_order(folder: Path, robot: "subprocess.Popen[str]") -> None:
     assert "two_joints has stopped" in o80(folder, "stop", "two_joints")
     assert robot.wait(timeout=20) == 0

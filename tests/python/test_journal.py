@@ -158,3 +158,40 @@ def test_a_first_entry_that_cannot_be_is_refused(since: Any, arm: o80.Frontend) 
 
 def test_there_is_nothing_after_the_newest_entry(arm: o80.Frontend) -> None:
     assert arm.journal(since=2**80) == []
+
+
+def test_a_mark_is_noted_at_the_iteration_in_which_it_is_taken(arm: o80.Frontend) -> None:
+    arm.burst(7)
+    mark = arm.mark("the cup is full: \u00bd l")
+    assert len(mark) == 1
+    assert arm.latest().iteration == 7
+    arm.burst(2)
+    mark.wait(WAIT)
+    (taken,) = [entry for entry in of_kind(arm.journal(), "taken") if entry.commands]
+    (command,) = taken.commands
+    assert (command.kind, command.text) == ("mark", "the cup is full: \u00bd l")
+    assert mark[0].status == "completed"
+    assert taken.iteration == mark[0].iteration == 8
+
+
+def test_a_mark_is_taken_while_the_robot_is_halted(arm: o80.Frontend) -> None:
+    number = arm.halt("wait")
+    arm.burst(1)
+    mark = arm.mark("somebody walks by")
+    arm.burst(1)
+    assert mark[0].status == "completed"
+    arm.resume(number)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (3, "the text of a mark must be a string, got 3"),
+        ("", "1 to 976 bytes of text, got 0"),
+        ("x" * 977, "1 to 976 bytes of text, got 977"),
+        ("two\nlines", r"one line of printable text, got 'two\\nlines'"),
+    ],
+)
+def test_a_mark_that_is_no_line_is_refused(arm: o80.Frontend, text: Any, said: str) -> None:
+    with pytest.raises(o80.InvalidArgument, match=said):
+        arm.mark(text)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
 
 import o80
 from o80.recording.recorder import Recorder
@@ -207,6 +208,49 @@ def test_a_mark_that_is_no_json_changes_nothing(
         recording.mark("good")
 
     assert [mark.name for mark in o80.open(tmp_path / "run.mcap").marks] == ["good"]
+
+
+def test_marks_of_frontends_are_recorded_at_their_rows(arm: o80.Frontend, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    arm.mark("before")  # still in the ring when the recorder begins
+    arm.burst(10)
+    with o80.Recording(path, arm.segment, whole=True):
+        arm.burst(20)
+        arm.mark("first")
+        arm.burst(20)
+        with o80.Frontend(arm.segment) as other:
+            other.mark("second")
+        arm.burst(5)
+    file = o80.open(path)
+    epoch = file[arm.segment].epochs[0]
+    assert [(mark.name, mark.rows) for mark in file.marks] == [
+        ("before", {arm.segment: 1}),
+        ("first", {arm.segment: 31}),
+        ("second", {arm.segment: 51}),
+    ]
+    times = epoch.history().time
+    with path.open("rb") as content:
+        logged = [
+            message.log_time
+            for _, channel, message in make_reader(content).iter_messages(topics=["/o80/marks"])
+        ]
+    assert logged == [int(times[row]) + epoch.wall_offset for row in (1, 31, 51)]
+
+
+def test_a_mark_has_the_log_time_of_the_newest_row(segment: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with o80.robots.load("two_joints").inline(segment) as arm, o80.Recording(path, arm) as file:
+        for episode in range(3):
+            file.mark("episode", number=episode)
+            arm.burst(200)  # at once; 0.2 s of the robot's time
+    epoch = o80.open(path)[segment].epochs[0]
+    with path.open("rb") as content:
+        logged = [
+            message.log_time - epoch.wall_offset
+            for _, channel, message in make_reader(content).iter_messages(topics=["/o80/marks"])
+        ]
+    times = epoch.history().time
+    assert logged == [int(times[row]) for row in (0, 200, 400)]
 
 
 def test_a_closed_recording_says_so(arm: o80.Frontend, tmp_path: Path) -> None:

@@ -174,6 +174,24 @@ def wait_for(look: Look, ready: Callable[[dict[str, Any]], bool], **asked: Any) 
     raise AssertionError("it was never shown")
 
 
+def test_marks_stand_in_the_curves(segment: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    live = looks_at(segment)
+    with o80.robots.load("two_joints").inline(segment) as arm, o80.Recording(path, arm):
+        arm.burst(100)
+        arm.mark("pushed")
+        arm.burst(200)
+        seen = wait_for(live, lambda answer: "curves" in answer, curves=True)["curves"]
+        assert seen["marks"] == [[pytest.approx(0.101), "pushed"]]
+        arm.burst(2000)
+        arm.mark("stopped")
+        arm.burst(10)
+        seen = live(curves=True, window=1.0)["curves"]
+        assert seen["marks"] == [[pytest.approx(0.991), "stopped"]]
+    recorded = looks_at(str(path))(curves=True, at=0.5, window=1.0)["curves"]
+    assert recorded["marks"] == [[pytest.approx(0.101), "pushed"]]
+
+
 @pytest.fixture
 def recording(tmp_path: Path, segment: str) -> Path:
     """A move of the elbow in a file."""

@@ -136,6 +136,9 @@ class UntypedFrontend {
   /// Drops only what this frontend sent.
   std::uint32_t add_purge_own();
   std::uint32_t add_request(std::uint32_t request, std::span<const std::byte> payload);
+  /// A note in the journal, of 1 to 976 bytes in UTF-8, at the iteration in which the batch is
+  /// taken. It moves nothing and needs no control. Throws InvalidArgument.
+  std::uint32_t add_mark(std::string_view text);
   std::uint32_t add_take_control();
   std::uint32_t add_release_control();
   /// Number of records that were added and not sent.

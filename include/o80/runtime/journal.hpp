@@ -26,6 +26,7 @@ struct JournalRecord {
     take_control,
     release_control,
     resume,
+    mark,
     unknown
   };
   /// What a command asks of one actuator.
@@ -51,6 +52,8 @@ struct JournalRecord {
   // of a request: its index in the schema, and its struct
   std::uint32_t request = 0;
   std::vector<std::byte> payload;
+  // of a mark
+  std::string text;
   // of a resume
   std::uint64_t halt = 0;
   // what this o80 does not know, "record kind 10" or "pace 7": a newer one has recorded it

@@ -15,6 +15,7 @@ from o80.cli.halt import halt, resume
 from o80.cli.info import info
 from o80.cli.latency import latency
 from o80.cli.list_segments import list_segments
+from o80.cli.mark import mark
 from o80.cli.play import play
 from o80.cli.plot import plot
 from o80.cli.record import record
@@ -57,6 +58,7 @@ app.command("export")(export)
 app.command("diff")(diff)
 app.command("latency")(latency)
 app.command("replay")(replay)
+app.command("mark")(mark)
 app.command("halt")(halt)
 app.command("resume")(resume)
 app.command("stop")(stop)

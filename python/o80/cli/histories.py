@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from bisect import bisect
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -38,21 +37,21 @@ def histories(source: str, only: str | None, *, seconds: float | None = None) ->
             real_time = frontend.schema["clock"] == "monotonic"
             offset = time.time_ns() - time.monotonic_ns() if real_time else None
             entries = frontend.journal()
-            yield Named(source, 0, history, offset, lambda: entries)
+            marks = [
+                (command.text, entry.iteration)
+                for entry in entries
+                if entry.kind == "taken"
+                for command in entry.commands
+                if command.kind == "mark"
+            ]
+            yield Named(source, 0, history, offset, lambda: entries, marks)
         return
     recording = o80.open(Path(source))
     if only is not None and only not in recording.segments:
         there = ", ".join(recording) or "none"
         raise o80.InvalidArgument(f"no segment '{only}' in {source}; there are: {there}")
-    marks = recording.marks
     for name in [only] if only is not None else list(recording):
-        epochs = recording[name].epochs
-        of_run: list[list[tuple[str, int]]] = [[] for _ in epochs]
-        begins = [epoch.recorded_at for epoch in epochs]
-        for mark in marks:
-            if name in mark.rows:
-                run = max(bisect(begins, mark.time) - 1, 0)
-                of_run[run].append((mark.name, mark.rows[name]))
+        epochs, of_run = recording[name].epochs, recording.marks_by_run(name)
         for number, epoch in enumerate(epochs):
             history = epoch.history(seconds=seconds)
             yield Named(name, number, history, epoch.wall_offset, epoch.journal, of_run[number])

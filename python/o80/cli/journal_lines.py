@@ -161,6 +161,8 @@ def command_text(command: JournalCommand) -> str:
         return f"{command.request}({fields})"
     if command.kind == "resume":
         return f"resume halt {command.halt}"
+    if command.kind == "mark":
+        return "mark " + json.dumps(command.text, ensure_ascii=False)
     if command.kind == "unknown":
         return f"something of a newer o80 ({command.unknown})"
     if command.kind != "command":

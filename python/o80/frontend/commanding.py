@@ -122,6 +122,16 @@ class Commanding(Observing):
             Needs no pulse; what was added and not pulsed stays added.
             """
 
+        def mark(self, text: str) -> _core.Batch:
+            """Notes a line of text in the journal, at the iteration in which it is taken.
+
+            Recordings list it among their marks; `o80 plot`, `view` and `echo --commands` show it.
+            It moves nothing and is taken while the robot is halted, or under another's control.
+            Needs no pulse. A backend that bursts inline takes it with its next burst.
+
+            text: printable, at most 976 bytes in UTF-8. Raises InvalidArgument.
+            """
+
     def add_trajectory(
         self,
         targets: ArrayLike | Mapping[str, ArrayLike],

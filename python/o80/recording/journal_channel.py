@@ -74,6 +74,7 @@ class JournalWriter:
         self.channel = channel
         self.missed = 0  #: entries that were overwritten before they were read
         self.drained = False  #: nothing was left at the last read
+        self.marks: list[tuple[int, str]] = []  #: iteration and text, in the last read
         self._core = _core.RawJournal(frontend, first)
         self._next = first if first > 0 else None  # None: begins with the oldest entry
 
@@ -94,7 +95,7 @@ class JournalWriter:
     def read(self, log_time: int) -> tuple[SingleMessage | None, tuple[int, int] | None]:
         """The entries since the last call, and the first and last number of a gap before them."""
         assert self.channel is not None
-        content, first, end, more = self._core.read(MOST)
+        content, first, end, more, self.marks = self._core.read(MOST)
         self.drained = not more
         if not content:
             return None, None

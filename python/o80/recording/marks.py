@@ -1,4 +1,8 @@
-"""Marks: notes of a program in a recording, such as the number of an episode."""
+"""Marks: notes in a recording, such as the number of an episode.
+
+A program that records writes them with `mark`; others note them in the journal of a backend
+(`Frontend.mark`, `o80 mark`), from which the recorder takes them.
+"""
 
 import json
 from collections.abc import Mapping
@@ -17,10 +21,10 @@ SCHEMA = '{"type": "object", "properties": {"name": {"type": "string"}}}'
 
 @dataclass(frozen=True)
 class Mark:
-    """A note of the program that recorded."""
+    """A note of the program that recorded, or of a frontend."""
 
     name: str
-    time: int  #: wall clock [ns since 1970]
+    time: int  #: wall clock, when it was recorded [ns since 1970]
     rows: Mapping[str, int]  #: newest iteration of each segment when it was made
     values: Mapping[str, Any] = field(default_factory=dict)
 
@@ -52,14 +56,14 @@ def _plain(value: Any) -> Any:
     raise TypeError(f"a mark holds what JSON can hold, not {type(value).__name__}: {value!r:.60}")
 
 
-def add_mark(file: FileWriter, mark: Mark) -> None:
-    """Writes a mark, in a chunk of its own."""
+def add_mark(file: FileWriter, mark: Mark, log_time: int) -> None:
+    """Writes a mark, in a chunk of its own. log_time: that of its newest row [ns]."""
     message = mark.message()
     channel = _channel_in(file.found)
     if channel is None:
         schema = file.add_schema("o80/Mark", SCHEMA, encoding="jsonschema")
         channel = file.add_channel(TOPIC, schema, {}, encoding="json")
-    file.add_chunk([SingleMessage(channel, mark.time, message)])
+    file.add_chunk([SingleMessage(channel, log_time, message)])
 
 
 def marks_in(file: IO[bytes], found: Scan) -> list[Mark]:

@@ -2,6 +2,7 @@
 
 import os
 import struct
+from bisect import bisect
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -47,7 +48,7 @@ class RecordingFile:
 
     @property
     def marks(self) -> list[Mark]:
-        """The notes of the program that recorded, in their order. Raises RecordingError."""
+        """The notes in the recording, in their order. Raises RecordingError."""
         marks = []
         for path, found in self._files:
             try:
@@ -56,6 +57,16 @@ class RecordingFile:
             except (ValueError, TypeError, RecursionError, struct.error) as error:
                 raise RecordingError(f"{path}: {error}") from error
         return marks
+
+    def marks_by_run(self, name: str) -> list[list[tuple[str, int]]]:
+        """Name and iteration of the marks of a segment, for each of its runs."""
+        epochs = self.segments[name].epochs
+        begins = [epoch.recorded_at for epoch in epochs]
+        runs: list[list[tuple[str, int]]] = [[] for _ in epochs]
+        for mark in self.marks:
+            if name in mark.rows:
+                runs[max(bisect(begins, mark.time) - 1, 0)].append((mark.name, mark.rows[name]))
+        return runs
 
     def __getitem__(self, name: str) -> "RecordedSegment":
         try:

@@ -104,6 +104,11 @@ class Recorder:
             blocks = [block for source in self.sources.values() for block in source.poll()]
             if blocks:
                 self.file.add_chunk(blocks)
+            for source in self.sources.values():
+                for iteration, text in source.marks:
+                    mark = Mark(text, time.time_ns(), {source.name: iteration})
+                    add_mark(self.file, mark, source.log_time(iteration))
+                source.marks.clear()
         return sum(block.count for block in blocks)
 
     @contextmanager
@@ -122,7 +127,9 @@ class Recorder:
     def mark(self, name: str, /, **values: Any) -> None:
         """Writes a note with the newest iteration of each segment. Raises TypeError."""
         with self.writing():
-            add_mark(self.file, Mark(name, time.time_ns(), self.newest, values))
+            now, newest = time.time_ns(), self.newest
+            log_times = (self.sources[each].log_time(row) for each, row in newest.items())
+            add_mark(self.file, Mark(name, now, newest, values), max(log_times, default=now))
 
     def catch_up(self) -> None:
         """Polls until rows and decisions that were published before the call are written."""

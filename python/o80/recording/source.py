@@ -30,6 +30,8 @@ class Source:
         self.rows = 0  #: recorded so far
         self.missed = 0  #: overwritten before they were read
         self.behind = 0  #: published and not read, at the last look
+        #: Iteration and text of those of frontends, read and not taken by the recorder.
+        self.marks: list[tuple[int, str]] = []
         self._file = file
         self._written = dict(written)
         self._whole = whole
@@ -191,7 +193,16 @@ class Source:
         message, gap = self._journal.read(self._last_log_time or time.time_ns())
         if gap is not None:
             self._note_gap(JOURNAL_GAP, *gap)
+        self.marks += self._journal.marks
         return message
+
+    def log_time(self, iteration: int) -> int:
+        """Of a row [ns]; of one that is not there any more, that of the newest one read."""
+        if self._frontend is not None and self._writer is not None:
+            rows = self._frontend.history(since=iteration, until=iteration)
+            if len(rows):
+                return int(rows.time[0]) + self._writer.note.wall_offset
+        return self._last_log_time or time.time_ns()
 
     def _note_gap(self, name: str, first: int, last: int) -> None:
         assert self._writer is not None

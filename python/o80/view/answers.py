@@ -5,7 +5,10 @@ import threading
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 import o80
+from o80.history import History
 from o80.view.curves import Panels
 from o80.view.kept import Kept
 from o80.view.scene import Scene
@@ -14,6 +17,7 @@ from o80.view.source_list import SourceList
 
 LONGEST_WINDOW = 60.0  # [s]
 LONGEST_REASON = 80  # of a halt
+MOST_MARKS = 50  # in a chart
 
 
 class Answers:
@@ -147,12 +151,23 @@ class _Shown:
                 "begin": source.seconds(begin),
                 "end": source.seconds(end),
                 "panels": self.panels.curves(rows, panels, begin),
+                "marks": _marks_in(rows, source.marks(), begin),
             }
 
         if at is not None:
             return read()
         found: dict[str, Any] = self._kept.get((source.key, tuple(panels), window), read)
         return found
+
+
+def _marks_in(rows: History, marks: Sequence[tuple[str, int]], begin: int) -> list[Any]:
+    """Seconds from `begin` [ns] and text of the last marks among these rows."""
+    iterations = rows.iteration
+    return [
+        [(int(rows.time[np.searchsorted(iterations, iteration)]) - begin) * 1e-9, text]
+        for text, iteration in marks
+        if len(rows) and iterations[0] <= iteration <= iterations[-1]
+    ][-MOST_MARKS:]
 
 
 def _bytes_of(row: Any) -> bytes:

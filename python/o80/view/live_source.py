@@ -1,6 +1,7 @@
 """A segment in shared memory as the source of a page."""
 
 import threading
+from collections.abc import Sequence
 from typing import Any
 
 import o80
@@ -11,6 +12,8 @@ from o80.own_robots import is_own
 from o80.view.source import NothingToShow, Source
 
 GUARD_ROWS = 16  # the oldest rows may be overwritten while they are read
+JOURNAL_BYTES = 1 << 20  # that are read at once
+MOST_MARKS = 1000  # the newest ones
 
 
 class LiveSource(Source):
@@ -22,6 +25,8 @@ class LiveSource(Source):
         self._model_files = model_files
         self.name = self.label = name
         self._frontend: o80.Frontend | None = None
+        self._journal: _core.RawJournal | None = None
+        self._marks: list[tuple[str, int]] = []
         self._lock = threading.Lock()
         self._problem = ""
         self._state = "waiting"  # without a frontend
@@ -43,6 +48,7 @@ class LiveSource(Source):
                 return
             self.trusted = self._model_files or is_own(found)
             self._frontend, self._problem = found, ""
+            self._journal, self._marks = _core.RawJournal(found, 0), []
             self.key = f"{self.name} {found.epoch}"
             self.zero = self.extent_of(found)[0]
             # the former frontend is not closed: another thread may be reading with it
@@ -84,6 +90,15 @@ class LiveSource(Source):
 
     def rows(self, begin: int, end: int) -> History:
         return self._attached.history(from_time=begin, to_time=end)
+
+    def marks(self) -> Sequence[tuple[str, int]]:
+        with self._lock:
+            journal, more = self._journal, True
+            while journal is not None and journal.exists and more:
+                *_, more, found = journal.read(JOURNAL_BYTES)
+                self._marks += [(text, iteration) for iteration, text in found]
+            del self._marks[:-MOST_MARKS]
+            return list(self._marks)
 
     def state(self) -> dict[str, Any]:
         line: dict[str, Any] = {

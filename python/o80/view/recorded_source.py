@@ -1,6 +1,7 @@
 """One epoch of a recording as the source of a page."""
 
 import threading
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -19,13 +20,20 @@ class RecordedSource(Source):
     live = False
 
     def __init__(
-        self, name: str, number: int, epoch: RecordedEpoch, *, model_files: bool = False
+        self,
+        name: str,
+        number: int,
+        epoch: RecordedEpoch,
+        marks: Sequence[tuple[str, int]] = (),
+        *,
+        model_files: bool = False,
     ) -> None:
         self.trusted = model_files
         self.name = name
         self.label = f"{name}, run {number + 1}" if number else name
         self.key = f"recorded {name} {number} {epoch.epoch}"
         self._epoch = epoch
+        self._marks = marks
         self._chunks = epoch.chunk_times
         self._lock = threading.Lock()
         self._kept: tuple[int, int, History] | None = None
@@ -84,6 +92,9 @@ class RecordedSource(Source):
                 if len(found):
                     return found[-1]
         raise NothingToShow(f"the recording has no row of '{self.label}' there")
+
+    def marks(self) -> Sequence[tuple[str, int]]:
+        return self._marks
 
     def rows(self, begin: int, end: int) -> History:
         return self._around(begin, end).select(from_time=begin, to_time=end)

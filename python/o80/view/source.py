@@ -1,6 +1,7 @@
 """What a page can show: one run of a robot, live or recorded."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from typing import Any
 
 import o80
@@ -52,6 +53,10 @@ class Source(ABC):
     @abstractmethod
     def rows(self, begin: int, end: int) -> History:
         """Rows from one time to another [ns]. Raises NothingToShow."""
+
+    @abstractmethod
+    def marks(self) -> Sequence[tuple[str, int]]:
+        """Text and iteration of the marks of this run, in their order."""
 
     @abstractmethod
     def state(self) -> dict[str, Any]:

@@ -74,9 +74,11 @@ def _runs_of(path: str, model_files: bool) -> list[Source]:
 
     recording = RecordingFile(path)
     found: list[Source] = [
-        RecordedSource(name, number, epoch, model_files=model_files)
+        RecordedSource(name, number, epoch, marks, model_files=model_files)
         for name, segment in recording.segments.items()
-        for number, epoch in enumerate(segment.epochs)
+        for number, (epoch, marks) in enumerate(
+            zip(segment.epochs, recording.marks_by_run(name), strict=True)
+        )
     ]
     if not found:
         raise o80.RecordingError(f"{path} holds no segment")

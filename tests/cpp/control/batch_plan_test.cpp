@@ -173,6 +173,32 @@ TEST(BatchPlan, KnowsWhatIsExpress) {
   EXPECT_EQ(rig.requests.size(), 1U);
   rig.batch.purge(kActuators);  // there is none
   EXPECT_FALSE(effort().express);
+  rig.batch.mark("it is taken in its turn");
+  const Effort mark = effort();
+  EXPECT_FALSE(mark.express);
+  EXPECT_TRUE(mark.free);
+  EXPECT_FALSE(mark.moves);
+  rig.batch.mark("with a command");
+  rig.add(0, over(1), {1.0});
+  EXPECT_FALSE(effort().free);
+}
+
+TEST(BatchPlan, AMarkIsCompletedAtOnceWhateverItsLength) {
+  Rig rig(robot());
+  rig.add(0, over(3), {1.0});
+  const CommandId moving = rig.pulse();
+  for (const std::size_t length :
+       {std::size_t{1}, std::size_t{16}, std::size_t{17}, std::size_t{kMostMarkBytes}}) {
+    rig.batch.mark(std::string(length, 'x'));
+    const CommandId batch = rig.pulse();
+    rig.step();
+    EXPECT_EQ(rig.witness.status(record_id(batch, 0)), Status::completed) << length;
+  }
+  EXPECT_THROW(rig.batch.mark(""), InvalidArgument);
+  EXPECT_THROW(rig.batch.mark(std::string(kMostMarkBytes + 1, 'x')), InvalidArgument);
+  rig.run(4);
+  EXPECT_EQ(rig.witness.status(record_id(moving, 0)), Status::completed);
+  EXPECT_TRUE(rig.all_blocks_back());
 }
 
 /// Takes a batch as if it had this ticket.

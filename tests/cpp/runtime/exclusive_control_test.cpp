@@ -35,6 +35,13 @@ TEST_F(ExclusiveControl, WhoHasControlHasItAlone) {
     EXPECT_THAT(batch.rejection(), HasSubstr("has exclusive control"));
   }
   EXPECT_EQ(before.handle(0).status, Status::active) << "what was taken before goes on";
+  other.add_mark("a note needs no control");
+  const Batch mark = other.pulse();
+  other.add_mark("a note beside a command");
+  const Batch mixed = send(other, 0, 1.0);
+  station.run(1);
+  EXPECT_EQ(mark.handle(0).status, Status::completed);
+  EXPECT_EQ(mixed.handle(0).reason, Reason::exclusive);
 
   holder.add_release_control();
   holder.pulse();

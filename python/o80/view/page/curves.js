@@ -27,14 +27,15 @@ class Chart {
     }
   }
 
-  // seconds from `begin` to `end`; `cursor` is the row that is shown
-  show(parts, begin, end, cursor) {
+  // seconds from `begin` to `end`; `marks` are seconds from `begin` and texts; `cursor` is the row
+  // that is shown
+  show(parts, { begin, end, marks }, cursor) {
     this.parts = {};
     for (const [part, [seconds, low, high]] of Object.entries(parts || {})) {
       const lows = floats(low);
       this.parts[part] = { seconds: floats(seconds), low: lows, high: high ? floats(high) : lows };
     }
-    [this.begin, this.end, this.cursor] = [begin, end, cursor];
+    [this.begin, this.end, this.marks, this.cursor] = [begin, end, marks, cursor];
     this.draw();
   }
 
@@ -72,12 +73,30 @@ class Chart {
     for (const part of ["extended", "observed", "desired"]) {
       if (this.parts[part]) this.curve(pen, this.parts[part], part, x, y);
     }
+    for (const [seconds, text] of this.marks) this.mark(pen, text, x(seconds), bottom);
     pen.restore();
     pen.strokeStyle = "#30363d";
     pen.beginPath();
     pen.moveTo(x(this.cursor - this.begin), 0);
     pen.lineTo(x(this.cursor - this.begin), bottom);
     pen.stroke();
+  }
+
+  // a note of a program or of a person: a line with its text
+  mark(pen, text, at, bottom) {
+    pen.strokeStyle = pen.fillStyle = "#8a8500";
+    pen.lineWidth = 1;
+    pen.beginPath();
+    pen.moveTo(at, 0);
+    pen.lineTo(at, bottom);
+    pen.stroke();
+    pen.save();
+    pen.translate(at - 3, 4);
+    pen.rotate(-Math.PI / 2);
+    pen.font = "10px system-ui, sans-serif";
+    pen.textAlign = "right";
+    pen.fillText(text, 0, 0, bottom - 8);
+    pen.restore();
   }
 
   axes(pen, { low, high, left, bottom, width, length, x, y }) {

@@ -105,7 +105,7 @@ class Page {
   showCurves(answer) {
     for (const chart of this.charts) {
       if (answer.values[chart.name]) chart.values(answer.values[chart.name]);
-      if (answer.curves) chart.show(answer.curves.panels[chart.name], answer.curves.begin, answer.curves.end, answer.at);
+      if (answer.curves) chart.show(answer.curves.panels[chart.name], answer.curves, answer.at);
     }
   }
 

@@ -1,0 +1,23 @@
+"""``o80 mark``: note a line of text in the journal of a robot."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from o80.cli.attach import attach
+
+
+def mark(
+    segment: Annotated[str, typer.Argument(help="Name of a segment; see o80 list.")],
+    text: Annotated[str, typer.Argument(help="One line of text.")],
+    timeout: Annotated[
+        float, typer.Option(help="Seconds to wait until the robot has taken it.")
+    ] = 5.0,
+) -> None:
+    """Note a text at this moment of a run: recordings list it, plot and view show it."""
+    with attach(segment, read_only=False) as frontend:
+        batch = frontend.mark(text)
+        batch.wait(timeout)
+        print(f"{segment}, iteration {batch[0].iteration}: {text}")
