@@ -1,5 +1,5 @@
 # Everything made lies in .venv and build/. Options go through ARGS="...".
-.PHONY: demo learn test check wheel scripts torture model fuzz rt systemd bench growth stress format clean distclean
+.PHONY: demo learn test check soak wheel scripts torture model fuzz rt systemd bench growth stress format clean distclean
 ARGS ?=
 export PYTHONDONTWRITEBYTECODE := 1
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
@@ -22,6 +22,11 @@ test:
 check:
 	@tools/setup.sh check
 	@.venv/bin/python tools/check.py $(ARGS)
+
+# what `make test` runs, again and again under hostile conditions drawn from a seed; see CONTRIBUTING.md
+soak:
+	@tools/setup.sh test
+	@.venv/bin/python tools/soak.py $(ARGS)
 
 # wheels and source distributions of all packages: build/wheels, build/sdists
 wheel:

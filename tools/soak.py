@@ -1,0 +1,326 @@
+"""Runs what `make test` runs, again and again, under conditions that a hostile machine could have.
+
+Each round draws its conditions from the seed. A test that failed even once is printed with the
+round and its conditions: `--seed S --first ROUND --rounds 1` repeats them. Logs: build/soak.
+"""
+
+import argparse
+import contextlib
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import xml.etree.ElementTree as ET
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from sources import ROOT
+from steps import JOBS, PYTHON, Step, build, run, use_tools
+
+FOLDER = ROOT / "build" / "soak"
+GROUPS = Path("/sys/fs/cgroup")
+NOBODY = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"]
+BURN = [sys.executable, "-c", "while True: pass"]
+WRITE = """
+import os, sys
+while True:
+    with open(sys.argv[1], "wb") as file:
+        for _ in range(64):
+            file.write(bytes(1 << 20))
+            os.fsync(file.fileno())
+"""
+
+
+@dataclass
+class Round:
+    """How the tests of a round are started."""
+
+    random: random.Random
+    folder: Path
+    prefix: list[str] = field(default_factory=list)  # of each command
+    environment: dict[str, str] = field(default_factory=dict)
+    shuffled: bool = False
+    runners: list[subprocess.Popen[bytes]] = field(default_factory=list)
+
+
+Condition = Callable[[Round], contextlib.AbstractContextManager[None]]
+
+
+@contextlib.contextmanager
+def programs(*commands: list[str]) -> Iterator[None]:
+    """Runs programs beside the block."""
+    running = [subprocess.Popen(command) for command in commands]
+    try:
+        yield
+    finally:
+        for process in running:
+            process.kill()
+            process.wait()
+
+
+@contextlib.contextmanager
+def one_processor(this: Round) -> Iterator[None]:
+    processor = this.random.choice(sorted(os.sched_getaffinity(0)))
+    this.prefix += ["taskset", "-c", str(processor)]
+    yield
+
+
+def busy(_: Round) -> contextlib.AbstractContextManager[None]:
+    return programs(*[BURN] * (2 * JOBS))
+
+
+@contextlib.contextmanager
+def quota(this: Round) -> Iterator[None]:
+    """30 % of each processor."""
+    group = processor_groups() / f"o80-soak-{os.getpid()}"
+    group.mkdir()
+    try:
+        if (group / "cpu.max").exists():
+            (group / "cpu.max").write_text(f"{30_000 * JOBS} 100000")
+        else:  # cgroups of version 1
+            (group / "cpu.cfs_quota_us").write_text(str(30_000 * JOBS))
+        enter = f'echo $$ > {group}/cgroup.procs && exec "$0" "$@"'
+        this.prefix[:0] = ["sh", "-c", enter]
+        yield
+    finally:
+        while left := (group / "cgroup.procs").read_text().split():
+            for process in left:
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(int(process), signal.SIGKILL)
+            time.sleep(0.01)
+        group.rmdir()
+
+
+def processor_groups() -> Path:
+    """Where control groups of the processor are made."""
+    return next((each for each in (GROUPS / "cpu", GROUPS) if each.is_dir()), GROUPS)
+
+
+@contextlib.contextmanager
+def order(this: Round) -> Iterator[None]:
+    this.shuffled = True
+    yield
+
+
+@contextlib.contextmanager
+def user(this: Round) -> Iterator[None]:
+    """An ordinary user; what the runners write beside the folder of the round is theirs too."""
+    this.prefix += NOBODY
+    home = tempfile.mkdtemp(prefix="soak-home-")
+    this.environment |= {"HOME": home, "PYTHONPYCACHEPREFIX": home}
+    written = [this.folder, Path(home), *(ROOT / "build" / each for each in ("hypothesis", "test"))]
+    written += [ROOT / "build/dev/Testing", ROOT / "build/pytest"]
+    for path in written:
+        path.mkdir(parents=True, exist_ok=True)
+        subprocess.run(["chown", "-R", "65534", path], check=True)
+    try:
+        yield
+    finally:
+        for path in written[2:]:
+            subprocess.run(["chown", "-R", "0", path], check=True)
+        shutil.rmtree(home, ignore_errors=True)
+
+
+@contextlib.contextmanager
+def zone(this: Round) -> Iterator[None]:
+    """Another time zone, and a language that writes 0,5, where it is installed."""
+    listed = subprocess.run(["locale", "-a"], capture_output=True, text=True, check=False).stdout
+    others = [each for each in listed.split() if each.startswith(("de_", "fr_", "tr_"))]
+    this.environment |= {"TZ": "Asia/Kathmandu", "LC_ALL": others[0] if others else "C"}
+    yield
+
+
+def disk(this: Round) -> contextlib.AbstractContextManager[None]:
+    """A disk that another program keeps busy."""
+    return programs([sys.executable, "-c", WRITE, str(this.folder / "busy")])
+
+
+@contextlib.contextmanager
+def memory(this: Round) -> Iterator[None]:
+    """A small /dev/shm, which no other program sees."""
+    mount = 'mount -t tmpfs -o size=256M tmpfs /dev/shm && exec "$0" "$@"'
+    this.prefix[:0] = ["unshare", "-m", "sh", "-c", mount]
+    yield
+
+
+@contextlib.contextmanager
+def stops(this: Round) -> Iterator[None]:
+    """Single test processes are stopped for up to three seconds."""
+    end = threading.Event()
+
+    def stop_some() -> None:
+        draw = random.Random(this.random.random())
+        while not end.wait(draw.uniform(0.5, 3.0)):
+            found = [each for runner in this.runners for each in test_processes(runner.pid)]
+            if not found:
+                continue
+            chosen = draw.choice(found)
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(chosen, signal.SIGSTOP)
+                end.wait(draw.uniform(0.2, 3.0))
+                os.kill(chosen, signal.SIGCONT)
+
+    thread = threading.Thread(target=stop_some)
+    thread.start()
+    try:
+        yield
+    finally:
+        end.set()
+        thread.join()
+
+
+def test_processes(parent: int) -> list[int]:
+    """The processes below `parent` that run tests: not what the tests have started."""
+    found = []
+    children = Path(f"/proc/{parent}/task/{parent}/children")
+    with contextlib.suppress(OSError):
+        for child in map(int, children.read_text().split()):
+            command = Path(f"/proc/{child}/cmdline").read_bytes()
+            if b"o80_test_" in command or b"execnet" in command:
+                found.append(child)
+            else:
+                found += test_processes(child)
+    return found
+
+
+CONDITIONS: dict[str, Condition] = {
+    "processor": one_processor,
+    "busy": busy,
+    "quota": quota,
+    "order": order,
+    "user": user,
+    "zone": zone,
+    "disk": disk,
+    "memory": memory,
+    "stops": stops,
+}
+
+
+def available() -> list[str]:
+    """The conditions that this machine can have."""
+    root = os.geteuid() == 0
+    with contextlib.suppress(OSError):
+        (processor_groups() / "o80-soak-try").mkdir(exist_ok=True)
+    trial = processor_groups() / "o80-soak-try"
+    has_quota = any((trial / name).exists() for name in ("cpu.max", "cpu.cfs_quota_us"))
+    with contextlib.suppress(OSError):
+        trial.rmdir()
+    lacking = {
+        "quota": not has_quota,
+        "memory": not root,
+        "user": not root
+        or subprocess.run([*NOBODY, sys.executable, "-c", ""], capture_output=True).returncode != 0,
+    }
+    for name in [name for name, lacks in lacking.items() if lacks]:
+        print(f"condition {name}: not possible here")
+    return [name for name in CONDITIONS if not lacking.get(name, False)]
+
+
+def python_files() -> list[str]:
+    """What pytest collects by default, a file each."""
+    listed = subprocess.run(
+        [*PYTHON, "pytest", "--collect-only", "-qq", "-m", "not check"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    lines = (line.partition(":")[0] for line in listed.stdout.splitlines())
+    return sorted({line for line in lines if line.endswith(".py") and (ROOT / line).exists()})
+
+
+def commands_of(this: Round, chosen: argparse.Namespace) -> dict[str, list[str]]:
+    """The two runners, by name."""
+    cpp = ["ctest", "--preset", "dev", "-j", str(JOBS), "-LE", "^check$"]
+    cpp += ["--output-junit", str(this.folder / "cpp.xml")]
+    if chosen.cpp:
+        cpp += ["-R", chosen.cpp]
+    python = [*PYTHON, "pytest", "-n", str(JOBS + 1), "--dist", "loadfile", "-m", "not check"]
+    python += [f"--junit-xml={this.folder / 'python.xml'}"]
+    files = list(chosen.python)
+    if this.shuffled:
+        cpp += ["--schedule-random"]
+        files = files or python_files()
+        this.random.shuffle(files)
+    runners = {"cpp": cpp, "python": [*python, *files]}
+    if bool(chosen.cpp) != bool(chosen.python):  # only the tests that were named
+        del runners["python" if chosen.cpp else "cpp"]
+    return {name: [*this.prefix, *command] for name, command in runners.items()}
+
+
+def play(this: Round, names: list[str], chosen: argparse.Namespace) -> list[str]:
+    """Runs the tests under these conditions; what failed."""
+    with contextlib.ExitStack() as stack:
+        for name in names:
+            stack.enter_context(CONDITIONS[name](this))
+        commands = commands_of(this, chosen)
+        for name, command in commands.items():
+            with (this.folder / f"{name}.log").open("wb") as log:
+                environment = {**os.environ, **this.environment}
+                this.runners.append(
+                    subprocess.Popen(command, cwd=ROOT, env=environment, stdout=log, stderr=log)
+                )
+        returned = [runner.wait() for runner in this.runners]
+    failed = [each for name in commands for each in failures(this.folder / f"{name}.xml")]
+    for name, status in zip(commands, returned, strict=True):
+        if status != 0 and not failures(this.folder / f"{name}.xml"):
+            failed.append(f"the runner itself, with status {status}: {this.folder / name}.log")
+    return failed
+
+
+def failures(report: Path) -> list[str]:
+    """The tests that failed, as a runner reported them."""
+    if not report.exists():
+        return []
+    return [
+        f"{case.get('classname')}: {case.get('name')}"
+        for case in ET.parse(report).getroot().iter("testcase")
+        if case.get("status") == "fail"
+        or case.find("failure") is not None
+        or case.find("error") is not None
+    ]
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rounds", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=int(time.time()))
+    parser.add_argument("--first", type=int, default=0, help="number of the first round")
+    parser.add_argument("--conditions", nargs="+", choices=CONDITIONS, help="all of these at once")
+    parser.add_argument("--cpp", metavar="PATTERN", help="tests in C++ whose name matches")
+    parser.add_argument("--python", nargs="+", default=[], metavar="FILE", help="tests in Python")
+    chosen = parser.parse_args()
+    use_tools()
+    # ctest lists the tests, which an ordinary user may not write
+    if not run(Step("build", [*build("dev"), ["ctest", "--preset", "dev", "-N"]])):
+        return 1
+    can = available()
+    found: dict[str, list[str]] = {}
+    for number in range(chosen.first, chosen.first + chosen.rounds):
+        draw = random.Random(f"{chosen.seed} {number}")
+        names = chosen.conditions or draw.sample(can, draw.randint(1, min(3, len(can))))
+        folder = FOLDER / f"{chosen.seed}-{number}"
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        begin, before = time.monotonic(), set(os.listdir("/dev/shm"))
+        what = f"round {number} of seed {chosen.seed} ({', '.join(names)})"
+        failed = play(Round(draw, folder), names, chosen)
+        failed += [f"left in /dev/shm: {name}" for name in set(os.listdir("/dev/shm")) - before]
+        print(f"{what}: {len(failed)} failed in {time.monotonic() - begin:.0f} s", flush=True)
+        for test in failed:
+            print(f"  {test}", flush=True)
+            found.setdefault(test, []).append(what)
+    print(f"{chosen.rounds} rounds, {len(found)} tests failed at least once")
+    for test, rounds in sorted(found.items()):
+        print(f"{test}\n  in {'; '.join(rounds)}")
+    return int(bool(found))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
