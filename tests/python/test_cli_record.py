@@ -60,6 +60,45 @@ def test_seconds_and_size_end_it(process: o80.robots.Process, tmp_path: Path) ->
     assert scan(tmp_path / "b.mcap").end >= 3000
 
 
+def recorded(segment: str, path: Path, *words: str) -> str:
+    """What `o80 record` says of one segment at once."""
+    said = run("record", segment, "-o", path, "--seconds", "0.1", *words)
+    return next(line for line in said.splitlines() if f"'{segment}' " in line)
+
+
+def test_a_robot_that_runs_is_recorded_from_row_0_and_replays(
+    process: o80.robots.Process, tmp_path: Path
+) -> None:
+    with o80.Frontend(process.segment) as arm:
+        arm.wait_for(300, WAIT)
+    said = recorded(process.segment, tmp_path / "run.mcap")
+    assert said.endswith("is recorded from row 0: the recording can be replayed")
+    report = o80.replay(tmp_path / "run.mcap")
+    assert report.identical, report
+    assert report.runs[0].rows > 300
+    from_now = recorded(process.segment, tmp_path / "now.mcap", "--from-now")
+    assert "(--from-now): a replay begins at the next reset or restored snapshot" in from_now
+    first = int(o80.open(tmp_path / "now.mcap")[process.segment].history().iteration[0])
+    assert first > 300
+    assert f"is recorded from row {first} " in from_now
+
+
+def test_a_recording_that_cannot_be_replayed_says_why(segment: str, tmp_path: Path) -> None:
+    joints = o80.robots.load("two_joints")
+    with joints.inline(segment, history=1000) as arm:
+        arm.burst(5000)
+        said = recorded(segment, tmp_path / "late.mcap")
+        first = int(o80.open(tmp_path / "late.mcap")[segment].history().iteration[0])
+        assert f"is recorded from row {first}, because earlier ones were overwritten" in said
+    with joints.inline(segment, journal=0):
+        said = recorded(segment, tmp_path / "mute.mcap")
+        assert said.endswith("cannot be replayed: it was started without a journal")
+    with o80.Backend(segment, actuators=["knee"]) as backend:
+        backend.publish([0.0])
+        said = recorded(segment, tmp_path / "world.mcap")
+        assert said.endswith("the recording can be replayed without its driver")
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

@@ -25,7 +25,7 @@ def joint_states(path: Path, segment: str) -> list[Any]:
 
 
 def recorded(segment: str, path: Path) -> o80.History:
-    recorder = Recorder(path, [segment], whole=True)
+    recorder = Recorder(path, [segment])
     recorder.catch_up()
     recorder.finish()
     return o80.open(path)[segment].history()
@@ -98,7 +98,7 @@ def test_a_successor_goes_on_in_the_same_channel(arm: o80.Frontend, tmp_path: Pa
     path = tmp_path / "run.mcap"
     for _ in range(2):
         arm.burst(10)
-        recorder = Recorder(path, [arm.segment], proceed=True, whole=True)
+        recorder = Recorder(path, [arm.segment], proceed=True)
         recorder.catch_up()
         recorder.finish()
 

@@ -74,7 +74,7 @@ def test_a_recording_of_a_played_recording_is_the_same(
     with (
         o80.play(recorded, bursts=True),
         o80.Frontend(segment, WAIT) as arm,
-        o80.Recording(copy, arm, whole=True),
+        o80.Recording(copy, arm),
     ):
         for count in (1, 5, 94, 100):
             arm.burst(count)
@@ -211,7 +211,7 @@ def test_gaps_are_played_as_gaps(segment: str, tmp_path: Path) -> None:
     assert gaps
     with o80.play(path, speed=math.inf, history=20) as playback:
         assert playback.wait(WAIT)
-        with o80.Recording(copy, segment, whole=True):
+        with o80.Recording(copy, segment):
             pass
     again = rows_of(copy, segment)
     assert again.iteration[0] == gaps[-1][1] + 1

@@ -112,7 +112,7 @@ def test_entries_that_were_overwritten_are_a_gap(segment: str, tmp_path: Path) -
 def test_a_successor_goes_on_with_the_next_entry(arm: o80.Frontend, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     for commands in (4, 0, 7):
-        recorder = Recorder(path, [arm.segment], proceed=True, whole=True)
+        recorder = Recorder(path, [arm.segment], proceed=True)
         play(arm, commands)
         recorder.catch_up()
         recorder.finish()
@@ -133,7 +133,7 @@ def test_wherever_a_file_is_cut_its_journal_is_continued(arm: o80.Frontend, tmp_
     cuts = {each.chunk_start_offset for each in scan(path).chunks}
     for cut in [*cuts, *chance.integers(0, len(whole), 30)]:
         path.write_bytes(whole[: int(cut)])
-        recorder = Recorder(path, [arm.segment], proceed=True, whole=True)
+        recorder = Recorder(path, [arm.segment], proceed=True)
         recorder.catch_up()
         recorder.finish()
         assert texts(recorded(path).journal()) == entries, f"cut at {cut}"

@@ -18,7 +18,7 @@ WAIT = 30.0  # [s] longer than any wait should take
 def test_a_program_records_what_it_does(arm: o80.Frontend, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     arm.burst(10)
-    with o80.Recording(path, arm) as recording:
+    with o80.Recording(path, arm, from_now=True) as recording:
         recording.mark("episode", number=3, ball=[0.1, 0.2])
         arm.add_command("elbow", 0.5, iterations=50)
         arm.burst(50)
@@ -39,9 +39,9 @@ def test_a_program_records_what_it_does(arm: o80.Frontend, tmp_path: Path) -> No
     assert first.time <= last.time
 
 
-def test_whole_begins_with_the_oldest_row(arm: o80.Frontend, tmp_path: Path) -> None:
+def test_recording_begins_with_the_oldest_row(arm: o80.Frontend, tmp_path: Path) -> None:
     arm.burst(10)
-    with o80.Recording(tmp_path / "run.mcap", arm, whole=True):
+    with o80.Recording(tmp_path / "run.mcap", arm):
         pass
 
     assert o80.open(tmp_path / "run.mcap")[arm.segment].history().iteration[0] == 0
@@ -75,7 +75,7 @@ def test_segments_of_a_pattern_join_when_they_appear(segment: str, tmp_path: Pat
     recorder = Recorder(tmp_path / "run.mcap", [f"{segment}*"])
     load = o80.robots.load("two_joints")
     with load.inline(f"{segment}-a") as one, load.inline(f"{segment}-b") as other:
-        recorder._search(whole=True)
+        recorder._search()
         one.burst(5)
         other.burst(7)
         recorder.catch_up()
@@ -214,7 +214,7 @@ def test_marks_of_frontends_are_recorded_at_their_rows(arm: o80.Frontend, tmp_pa
     path = tmp_path / "run.mcap"
     arm.mark("before")  # still in the ring when the recorder begins
     arm.burst(10)
-    with o80.Recording(path, arm.segment, whole=True):
+    with o80.Recording(path, arm.segment):
         arm.burst(20)
         arm.mark("first")
         arm.burst(20)
@@ -274,7 +274,7 @@ def test_no_name_and_no_folder_are_refused(arm: o80.Frontend, tmp_path: Path) ->
 def test_integers_beyond_2_to_the_53_are_kept(segment: str, tmp_path: Path) -> None:
     with o80.Backend(segment, {"count": np.int64}, bursting=True) as backend:
         backend.publish({"count": 2**62 + 1})
-        recorder = Recorder(tmp_path / "run.mcap", [segment], whole=True)
+        recorder = Recorder(tmp_path / "run.mcap", [segment])
         recorder.catch_up()
         recorder.finish()
 

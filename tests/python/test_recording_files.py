@@ -90,7 +90,7 @@ def test_wherever_it_is_cut_whole_chunks_are_read_and_continued(
     chance = np.random.default_rng(3)
     for cut in [*groups, *chance.integers(0, len(whole), CUTS)]:
         path.write_bytes(whole[: int(cut)])
-        recorder = Recorder(path, [arm.segment], proceed=True, whole=True)
+        recorder = Recorder(path, [arm.segment], proceed=True)
         recorder.catch_up()
         recorder.finish()
 

@@ -286,7 +286,7 @@ def test_recordings_of_one_robot_are_plotted_beside_each_other(
     arm: o80.Frontend, tmp_path: Path
 ) -> None:
     for name in "abc":
-        with o80.Recording(tmp_path / f"{name}.mcap", arm):
+        with o80.Recording(tmp_path / f"{name}.mcap", arm, from_now=True):
             arm.burst(10)
     files = [tmp_path / f"{name}.mcap" for name in "abc"]
     done = subprocess.run(
@@ -306,7 +306,7 @@ def test_a_sensor_without_actuators_is_recorded_plotted_and_exported(
     path = tmp_path / "run.mcap"
     with o80.Backend(segment, extended={"force": float}, bursting=True) as sensor:
         sensor.publish(None, {"force": 1.5})
-        recorder = Recorder(path, [segment], whole=True)
+        recorder = Recorder(path, [segment])
         recorder.catch_up()
         recorder.finish()
     history = o80.open(path)[segment].history()

@@ -191,7 +191,7 @@ def test_a_split_that_is_neither_size_nor_time_is_refused(
 
 def test_the_command_writes_a_folder(arm: o80.Frontend, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
-    options = ["--seconds", "0.3", "--split", "0.1s", "--whole"]
+    options = ["--seconds", "0.3", "--split", "0.1s"]
     done = subprocess.run(
         [O80, "record", arm.segment, "-o", path, *options],
         capture_output=True,

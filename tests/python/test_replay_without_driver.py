@@ -142,7 +142,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
         world.backend,
         world.running(),
         o80.Frontend(segment) as arm,
-        o80.Recording(path, arm, whole=True),
+        o80.Recording(path, arm),
     ):
         drive(arm, 3)
     o80.clean(segment)

@@ -33,7 +33,7 @@ def recording_with(model: str, folder: Path, segment: str) -> Path:
     path = folder / "stranger.mcap"
     with (
         o80.Backend(segment, ["elbow"], model=model, joints={"elbow": "elbow"}) as backend,
-        o80.Recording(path, segment, whole=True) as recording,
+        o80.Recording(path, segment) as recording,
     ):
         backend.publish()
         backend.step()

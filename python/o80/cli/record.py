@@ -14,7 +14,9 @@ from o80.cli.screen import bytes_text, complain
 from o80.cli.stop_request import StopRequest
 
 if TYPE_CHECKING:
+    from o80.frontend import Frontend
     from o80.recording.recorder import Recorder
+    from o80.recording.source import Source
 
 _BETWEEN_REPORTS = 0.5  # [s]
 _SUFFIXES = {"k": 1e3, "M": 1e6, "G": 1e9}
@@ -65,8 +67,11 @@ def record(
     proceed: Annotated[
         bool, typer.Option("--continue", help="Append to the file, also to one that was cut.")
     ] = False,
-    whole: Annotated[
-        bool, typer.Option(help="Begin with the oldest row that a segment still holds.")
+    from_now: Annotated[
+        bool,
+        typer.Option(
+            "--from-now", help="Begin with the newest row, not with the oldest that is there."
+        ),
     ] = False,
 ) -> None:
     """Record rows and decisions of robots to an MCAP file until Ctrl-C.
@@ -77,8 +82,8 @@ def record(
 
     most = _size(size)
     end = StopRequest()
-    recorder = Recorder(output, names, proceed=proceed, whole=whole, split=split)
-    report = _Report(recorder)
+    recorder = Recorder(output, names, proceed=proceed, from_now=from_now, split=split)
+    report = _Report(recorder, from_now)
     begin = time.monotonic()
     try:
         while not end.requested:
@@ -98,18 +103,43 @@ def record(
     report.show(last=True)
 
 
+def _replay_text(source: Source, frontend: Frontend, from_now: bool) -> str:
+    """From where on a run is recorded, and from where on that can be replayed."""
+    from o80.replaying.conditions import reads_the_world
+
+    if source.journal_begin is None:
+        return "cannot be replayed: it was started without a journal"
+    alone = " without its driver" if reads_the_world(frontend.schema) else ""
+    if source.begin == 0 and source.journal_begin == 0:
+        return f"is recorded from row 0: the recording can be replayed{alone}"
+    if source.begin == 0:
+        why = "is recorded from row 0, but its first decisions were overwritten (a larger --journal keeps more)"
+    elif from_now:
+        why = f"is recorded from row {source.begin} (--from-now)"
+    else:
+        why = (
+            f"is recorded from row {source.begin}, because earlier ones were overwritten (a longer "
+            f"--history keeps more)"
+        )
+    beginning = "resume" if alone else "reset or restored snapshot"
+    return f"{why}: a replay{alone} begins at the next {beginning}"
+
+
 class _Report:
     """Shows on stderr how far a recording is: one line, again and again on a terminal."""
 
-    def __init__(self, recorder: Recorder) -> None:
+    def __init__(self, recorder: Recorder, from_now: bool) -> None:
         self._recorder = recorder
+        self._from_now = from_now
         self._at = time.monotonic()
         self._rows = 0
         self._missed = 0
         self._absent: set[str] = set()
+        self._told: dict[str, int] = {}  # the run of a segment
         self._terminal = sys.stderr.isatty()
 
     def show(self, last: bool = False) -> None:
+        self._say_what_begins()
         now = time.monotonic()
         if now - self._at < _BETWEEN_REPORTS and not last:
             return
@@ -126,6 +156,13 @@ class _Report:
             line += f", {bytes_text(recorder.size)} in {recorder.path}"
             begin = "\r\033[K" if self._terminal else ""
             print(f"{begin}{line}", end="\n" if last else "", file=sys.stderr, flush=True)
+
+    def _say_what_begins(self) -> None:
+        for name, source in self._recorder.sources.items():
+            run = source.position[0]
+            if source.frontend is not None and self._told.get(name) != run:
+                self._told[name] = run
+                complain(f"'{name}' {_replay_text(source, source.frontend, self._from_now)}")
 
     def _say_what_changed(self, last: bool) -> None:
         recorder = self._recorder

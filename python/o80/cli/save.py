@@ -23,7 +23,7 @@ def save(
             raise o80.SegmentError(f"there is no segment '{name}' (see `o80 list`)")
         if not any(fnmatch.fnmatchcase(segment, name) for segment in there):
             raise o80.SegmentError(f"no segment matches '{name}' (see `o80 list`)")
-    recorder = Recorder(output, names, whole=True)
+    recorder = Recorder(output, names)
     try:
         recorder.catch_up()
     finally:

@@ -73,6 +73,7 @@ class JournalWriter:
         """first: number of the first entry to read, if it is still there; 0: the oldest."""
         self.channel = channel
         self.missed = 0  #: entries that were overwritten before they were read
+        self.begin = 0  #: number of the first entry; of a journal that is continued, 0
         self.drained = False  #: nothing was left at the last read
         self.marks: list[tuple[int, str]] = []  #: iteration and text, in the last read
         self._core = _core.RawJournal(frontend, first)
@@ -100,6 +101,8 @@ class JournalWriter:
         if not content:
             return None, None
         gap = None
+        if self._next is None:
+            self.begin = first
         if self._next is not None and first > self._next:
             gap = self._next, first - 1
             self.missed += first - self._next

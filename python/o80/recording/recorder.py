@@ -31,11 +31,12 @@ class Recorder:
         names: Sequence[str],
         *,
         proceed: bool = False,
-        whole: bool = False,
+        from_now: bool = False,
         compression: str = "zstd",
         split: str | None = None,
     ) -> None:
         """names: of segments, or patterns such as "arm*". proceed: continue an existing file.
+        from_now: begin with the newest rows instead of the oldest that the segments hold.
 
         path: ends in .mcap. split: go on in a new file after this size or time, see Split; `path`
         is a folder of files then. Raises RecordingError, InvalidArgument: then no new file is left.
@@ -63,8 +64,8 @@ class Recorder:
             with self.writing():
                 for name in names:
                     if name not in self._patterns:
-                        self._add(name, whole)
-                self._search(whole)
+                        self._add(name, from_now)
+                self._search(from_now)
         except BaseException:
             self._close_sources()
             self.file.close()
@@ -100,7 +101,7 @@ class Recorder:
             if self._is_full():
                 self._go_on_in_next_file()
             if self._patterns and time.monotonic() >= self._search_at:
-                self._search(whole=True)
+                self._search()
             blocks = [block for source in self.sources.values() for block in source.poll()]
             if blocks:
                 self.file.add_chunk(blocks)
@@ -167,11 +168,11 @@ class Recorder:
             full.finish()
             self._bytes_before += full.size
 
-    def _add(self, name: str, whole: bool) -> None:
+    def _add(self, name: str, from_now: bool) -> None:
         written = self._before.written(name) if self._before else {}
-        self.sources[name] = Source(name, self.file, written, whole=whole)
+        self.sources[name] = Source(name, self.file, written, from_now=from_now)
 
-    def _search(self, whole: bool) -> None:
+    def _search(self, from_now: bool = False) -> None:
         """Adds segments that match a pattern and are not recorded yet."""
         self._search_at = time.monotonic() + BETWEEN_SEARCHES
         if not self._patterns:
@@ -179,4 +180,4 @@ class Recorder:
         for segment in segments():
             matches = any(fnmatch.fnmatchcase(segment.name, each) for each in self._patterns)
             if matches and segment.readable and segment.name not in self.sources:
-                self._add(segment.name, whole)
+                self._add(segment.name, from_now)

@@ -24,10 +24,10 @@ class Recording(Closeable):
         recording.mark("episode", number=3)
 
     path: the file, NAME.mcap, which must not exist.
-    segments: names, patterns such as "arm*", or frontends. Rows are recorded from the newest one
-        on, of robots that start later from the first.
+    segments: names, patterns such as "arm*", or frontends. Recording begins with the oldest rows
+        that they still hold.
     proceed: continue an existing file, also one that was cut.
-    whole: begin with the oldest rows that the segments still hold.
+    from_now: begin with the newest rows; robots that start later are recorded from their first.
     split: go on in a new file after a size ("500M", "2G") or a time ("600s", "10min", "1h"): `path`
         is then a folder of complete files, which `o80.open` reads as one recording.
 
@@ -41,12 +41,12 @@ class Recording(Closeable):
         segments: str | Frontend | Sequence[str | Frontend],
         *,
         proceed: bool = False,
-        whole: bool = False,
+        from_now: bool = False,
         split: str | None = None,
     ) -> None:
         several = [segments] if isinstance(segments, (str, Frontend)) else segments
         names = [each.segment if isinstance(each, Frontend) else each for each in several]
-        self._recorder = Recorder(path, names, proceed=proceed, whole=whole, split=split)
+        self._recorder = Recorder(path, names, proceed=proceed, from_now=from_now, split=split)
         self._lock = threading.Lock()
         self._end = threading.Event()
         self._failure: Exception | None = None

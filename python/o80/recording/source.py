@@ -23,9 +23,9 @@ class Source:
     """Reads rows and journal of a segment by name. Not for several threads."""
 
     def __init__(
-        self, name: str, file: FileWriter, written: Mapping[int, Written], *, whole: bool
+        self, name: str, file: FileWriter, written: Mapping[int, Written], *, from_now: bool
     ) -> None:
-        """written: by epoch, at least the newest. whole: begin with the oldest row there is."""
+        """written: by epoch, at least the newest. from_now: begin with the newest row."""
         self.name = name
         self.rows = 0  #: recorded so far
         self.missed = 0  #: overwritten before they were read
@@ -34,7 +34,7 @@ class Source:
         self.marks: list[tuple[int, str]] = []
         self._file = file
         self._written = dict(written)
-        self._whole = whole
+        self._from_now = from_now
         self._frontend: Frontend | None = None
         self._writer: RowWriter | None = None
         self._journal: JournalWriter | None = None
@@ -42,7 +42,7 @@ class Source:
         self._last_log_time = max((each.last_log_time for each in written.values()), default=0)
         self._look_at = 0.0
         self._attach()  # recording begins now
-        self._whole = True  # a robot that starts later is recorded from its first row
+        self._from_now = False  # a robot that starts later is recorded from its first row
 
     @property
     def attached(self) -> bool:
@@ -67,6 +67,21 @@ class Source:
     def newest(self) -> int:
         """Iteration of the newest row; -1: there is none."""
         return -1 if self._frontend is None else self._frontend.published
+
+    @property
+    def frontend(self) -> Frontend | None:
+        """Of the backend that is read; None: there is none."""
+        return self._frontend
+
+    @property
+    def begin(self) -> int:
+        """The first row of this run in the recording."""
+        return -1 if self._frontend is None else self._written[self._frontend.epoch].note.begin
+
+    @property
+    def journal_begin(self) -> int | None:
+        """Number of the first decision of this run that was read; None: there is no journal."""
+        return None if self._journal is None else self._journal.begin
 
     def close(self) -> None:
         """Detaches."""
@@ -154,7 +169,9 @@ class Source:
 
     def _first_time(self, frontend: Frontend) -> Written:
         """Of an epoch that is not in the recording yet."""
-        first = frontend.oldest if self._whole or self._written else frontend.published
+        first = frontend.published
+        if not self._from_now or self._written:
+            first = min(first, _oldest_safe(frontend))
         number = 1 + max((each.note.number for each in self._written.values()), default=-1)
         note = note_of(frontend, number, first)
         if self._written:
@@ -208,3 +225,12 @@ class Source:
         assert self._writer is not None
         values = self._writer.note.run_texts() | {"first": str(first), "last": str(last)}
         self._file.add_metadata(name, values)
+
+
+def _oldest_safe(frontend: Frontend) -> int:
+    """The oldest row that a living backend does not overwrite while it is read."""
+    oldest = frontend.oldest
+    if oldest == 0 or not frontend.alive:
+        return oldest
+    rows = frontend.published - oldest
+    return oldest + rows // 50

@@ -226,8 +226,8 @@ class _RunReplay:
         elif found is None:
             self._gap = (
                 f"the first recorded row is row {first}: a replay begins at row 0, at a "
-                f"{self._beginnings(', or at a ')}, and none is recorded. Record from the start of "
-                f"the robot, or with --whole"
+                f"{self._beginnings(', or at a ')}, and none is recorded. Record before the "
+                f"robot overwrites its first rows (--history), and without --from-now"
             )
         return found
 

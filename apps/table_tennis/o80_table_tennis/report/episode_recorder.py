@@ -52,7 +52,7 @@ class EpisodeRecorder:
 
     def __init__(self, path: Path, rig: Rig, task: TaskSettings) -> None:
         self._frontends = [rig.arm.frontend, *(twin.frontend for twin in rig.twins)]
-        self._recording = o80.Recording(path, self._frontends, proceed=path.exists(), whole=True)
+        self._recording = o80.Recording(path, self._frontends, proceed=path.exists())
         self._task = task.task if isinstance(task.task, str) else type(task.task).__name__
         self._flushed = [-1] * len(self._frontends)
         """Iteration of each segment at the last flush."""
