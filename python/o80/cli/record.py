@@ -113,7 +113,10 @@ def _replay_text(source: Source, frontend: Frontend, from_now: bool) -> str:
     if source.begin == 0 and source.journal_begin == 0:
         return f"is recorded from row 0: the recording can be replayed{alone}"
     if source.begin == 0:
-        why = "is recorded from row 0, but its first decisions were overwritten (a larger --journal keeps more)"
+        why = (
+            "is recorded from row 0, but its first decisions were overwritten (a larger --journal "
+            "keeps more)"
+        )
     elif from_now:
         why = f"is recorded from row {source.begin} (--from-now)"
     else:
