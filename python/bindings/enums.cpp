@@ -55,6 +55,12 @@ o80::Mode mode_of(nb::handle word) {
 
 o80::Profile profile_of(nb::handle word) {
   using enum o80::Profile;
+  const bool is_pace =
+      PyUnicode_Check(word.ptr()) && PyUnicode_CompareWithASCIIString(word.ptr(), "fastest") == 0;
+  if (is_pace) {
+    throw o80::InvalidArgument(
+        "'fastest' is a pace, no profile: give fastest=True, without duration, speed and the like");
+  }
   return parse(word, std::array{linear, minimum_jerk, as_sent}, "profile");
 }
 

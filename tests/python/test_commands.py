@@ -53,6 +53,11 @@ def test_a_command_has_one_pace(arm: o80.Frontend) -> None:
         arm.add_command(0, 0.5, duration=1.0, iterations=3)
 
 
+def test_the_fastest_pace_is_no_profile_and_says_how_to_ask_for_it(arm: o80.Frontend) -> None:
+    with pytest.raises(o80.InvalidArgument, match="fastest=True"):
+        arm.add_command(0, 0.5, profile="fastest")  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize(
     "pace",
     [

@@ -175,9 +175,11 @@ def test_a_recording_is_played_and_scrubbed(
     with page_server([str(path)]) as server:
         page = browser.page(server.url)
         page.wait_for(SHOWN)
-        assert page.value("page.answer.iteration") == 0
+        page.wait_for("page.answer.iteration > 0")
         assert page.value("document.getElementById('halt').disabled")
         assert "4001 rows" in page.text()
+        click(page, "play")
+        page.wait_for("!page.timeline.playing")
         scrub(page, 1.0)
         page.wait_for("page.answer.iteration === 1000")
         assert page.value("page.answer.values.elbow.desired") == "0.5"

@@ -80,6 +80,8 @@ struct FieldNote {
 
   constexpr FieldNote(std::string_view said) : text(said) {}  // NOLINT(google-explicit-constructor)
   constexpr FieldNote(const char* said) : text(said) {}       // NOLINT(google-explicit-constructor)
+  /// One text has both: "[m] height of the table".
+  constexpr FieldNote(std::string_view unit, std::string_view help) = delete;
   constexpr FieldNote(std::string_view said, RestsAt where) : text(said), rest(where) {}
   constexpr FieldNote(RestsAt where) : rest(where) {}  // NOLINT(google-explicit-constructor)
   constexpr FieldNote(std::string_view said, Origin from) : text(said), origin(from) {}

@@ -15,11 +15,11 @@ class Timeline {
     this.liveButton.addEventListener("click", () => this.goLive());
   }
 
-  // another robot: live ones show the newest row, recordings begin at their first one
+  // another robot: live ones show the newest row, recordings play from their first one
   load(answer) {
     this.live = answer.live;
     this.at = answer.live ? null : answer.first;
-    this.playing = false;
+    this.play(!answer.live);
   }
 
   go(seconds) {
