@@ -1,4 +1,4 @@
-#include "control/reading_watch.hpp"
+#include "runtime/reading_watch.hpp"
 
 #include <array>
 #include <cmath>
