@@ -35,9 +35,9 @@ class ActuatorQueue {
     queue_.append(first, last, lane);
   }
   /// Ends all commands. With Status::overwritten the next command may continue the motion.
-  void drop(Status status, Reason reason, Iteration iteration) noexcept;
+  void drop(const Outcome& outcome, Iteration iteration) noexcept;
   /// Ends the commands of one lane, and releases a direct value that this lane has set.
-  void drop_lane(std::uint32_t lane, Status status, Reason reason, Iteration iteration) noexcept;
+  void drop_lane(std::uint32_t lane, const Outcome& outcome, Iteration iteration) noexcept;
   /// For commands of several actuators (ARCHITECTURE.md, Commands of several actuators); called for
   /// all queues before any step(). Reports that the next command is a member of a group.
   void arrive(Iteration iteration, std::uint32_t& late_budget) noexcept;
@@ -48,8 +48,8 @@ class ActuatorQueue {
   /// `late_budget`: number of late commands that may still be rejected in this iteration.
   Moved step(Iteration iteration, const std::byte* observed, std::uint32_t& late_budget) noexcept;
   /// True if no command or given target is running or queued.
-  bool empty() const noexcept { return queue_.empty() && !running_; }
-  bool has_no_command() const noexcept { return queue_.empty() && (!running_ || is_given()); }
+  bool empty() const noexcept { return has_no_command() && runs_ == Runs::nothing; }
+  bool has_no_command() const noexcept { return queue_.empty() && !has_record(); }
   /// For targets that are given without a command, to a queue that has none: begins a row of them.
   void begin_given(Mode mode) noexcept;
   /// Then, in each iteration: goes to the next one, as a direct command would. The last one stays
@@ -65,8 +65,7 @@ class ActuatorQueue {
   bool rests() const noexcept { return follows() ? motion_.resting_at_rest() : motion_.rests(); }
   /// True if a command of this lane is queued or running, or its direct value is still held.
   bool acts(std::uint32_t lane) const noexcept {
-    return queue_.has(lane) || (alone_ != kNoBlock && ledger_->lane_of(alone_) == lane) ||
-           (holder_ == lane && holds());
+    return queue_.has(lane) || is_of(lane) || (holder_ == lane && holds());
   }
 
   /// Sets the desired state, at rest. Numbers that are not finite keep their last desired value.
@@ -86,40 +85,57 @@ class ActuatorQueue {
   }
 
  private:
-  /// What a direct command, or a given target, is: an equal one behind it changes nothing.
+  /// What moves the actuator.
+  enum class Runs : std::uint8_t {
+    nothing,
+    queued,  // the command at the front of the queue
+    alone,   // a command that may give way to its successor: taken out of the queue
+    given    // a given target, without a record
+  };
+  /// What a direct command, or a given target, is, besides its mask and its target: an equal one
+  /// behind it changes nothing.
   struct SetPoint {
     Profile profile = Profile::linear;
     Start start = Start::desired;
     std::int64_t every = 0;  // [ns]
-    bool masked = false;
     bool operator==(const SetPoint&) const = default;
   };
 
+  bool has_record() const noexcept { return runs_ == Runs::queued || runs_ == Runs::alone; }
+  bool is_of(std::uint32_t lane) const noexcept {
+    return has_record() && ledger_->lane_of(record_) == lane;
+  }
+  bool may_give_way() const noexcept { return runs_ == Runs::alone || runs_ == Runs::given; }
+  bool gives_way_to(const RecordHead& next) const noexcept;
+  bool may_begin(const RecordHead& next, Iteration iteration) noexcept {
+    return !is_member(next) || ledger_->groups().is_complete(next, iteration);
+  }
+  const RecordHead* next_member() const noexcept;
   bool begin_next(Iteration iteration, const std::byte* observed,
                   std::uint32_t& late_budget) noexcept;
   bool end_late(Iteration iteration, std::uint32_t& late_budget) noexcept;
-  bool may_give_way() const noexcept { return running_ && (alone_ != kNoBlock || given_); }
-  bool gives_way_to(const RecordHead& next) const noexcept;
   void give_way(Iteration iteration) noexcept;
-  bool is_in_force(const RecordHead& head, BlockIndex record) noexcept;
   void begin_command(const std::byte* observed) noexcept;
+  bool is_in_force(const SetPoint& next) const noexcept {
+    return in_force_ && !motion_.was_held_back() && next == set_point_;
+  }
+  bool is_next_row_target() noexcept;
   bool begin_row(Iteration iteration) noexcept;
   void plan_row(Iteration iteration) noexcept;
   void read_row() noexcept;
-  void next_set_point() noexcept;
   void look_ahead() noexcept;
   Motion::Course course(const RecordHead& head, Iteration iteration) noexcept;
   std::int64_t row_of_own_time() noexcept;
+  Moved advance(Iteration iteration) noexcept;
+  BlockIndex leave() noexcept;
   void end_running(Iteration iteration) noexcept;
   void end_held_back(Iteration iteration, const Limited& bound) noexcept;
   void take_out() noexcept;
-  BlockIndex running_record() const noexcept {
-    return alone_ != kNoBlock ? alone_ : queue_.front();
-  }
-  bool is_given() const noexcept { return running_ && given_; }
   Moved come_to_rest(const std::byte* observed) noexcept;
+  void stop() noexcept;
   void end_motion() noexcept;
   const std::uint64_t* mask() const noexcept { return masked_ ? mask_.data() : nullptr; }
+  std::byte* scratch() noexcept { return reinterpret_cast<std::byte*>(scratch_.data()); }
 
   const StateLayout* layout_;
   BlockPool* pool_;
@@ -131,12 +147,10 @@ class ActuatorQueue {
   Profile usual_profile_;
   WhenIdle when_idle_;
 
-  LaneLists queue_;  // the front is the running command, if `running_` and not `alone_` or `given_`
-  bool running_ = false;
-  // the running command that may give way to its successor: taken out of the queue
-  BlockIndex alone_ = kNoBlock;
-  bool given_ = false;        // a given target is in force, without a record
-  std::uint32_t holder_ = 0;  // lane that gave the direct value that stays
+  LaneLists queue_;
+  Runs runs_ = Runs::nothing;
+  BlockIndex record_ = kNoBlock;  // the running command
+  std::uint32_t holder_ = 0;      // lane that gave the direct value that stays
 
   // the set-point in force: of the running command, or of the last one if nothing came after it
   bool in_force_ = false;
@@ -146,8 +160,6 @@ class ActuatorQueue {
   Pace pace_ = Pace::direct;
   std::uint32_t rows_left_ = 0;
   bool masked_ = false;
-  bool timed_ = false;
-  bool is_trajectory_ = false;
   bool keeps_plan_ = false;          // a set-point equal to the one in force
   bool begun_ = false;               // reported as active
   bool planned_ = false;             // plan_with_others() has planned its next waypoint

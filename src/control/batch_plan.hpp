@@ -4,7 +4,6 @@
 #include <array>
 #include <cstdint>
 #include <optional>
-#include <span>
 #include <vector>
 
 #include "control/command_group.hpp"
@@ -17,10 +16,17 @@ namespace o80 {
 
 /// The steps that take a checked batch.
 struct Plan {
-  BlockIndex steps = kNoBlock;     // the first step, linked by Own::kNextStep
-  std::uint32_t missing_from = 0;  // index of the first record without blocks
-  BlockChain spare;                // unused blocks
-  std::uint32_t groups = 0;        // number of commands of several actuators
+  BlockIndex steps = kNoBlock;        // the first step, linked by Own::kNextStep
+  std::uint32_t missing_from = 0;     // index of the first record without blocks
+  BlockIndex spare_first = kNoBlock;  // unused blocks, to the end of the batch
+  std::uint32_t spare_blocks = 0;
+  // as in Effort
+  std::uint32_t requests : 7 = 0;
+  std::uint32_t express : 1 = 1;
+  std::uint32_t releases : 1 = 0;
+  std::uint32_t moves : 1 = 0;
+  std::uint32_t resumes : 1 = 0;
+  std::uint32_t groups : 21 = 0;  // number of commands of several actuators
 };
 
 /// The cost of taking a checked batch, and the properties that decide when it may be taken.
@@ -46,8 +52,7 @@ struct Effort {
 /// Realtime: everything but construction.
 class BatchPlanner {
  public:
-  BatchPlanner(const Schema& schema, RecordCheck::Layouts layouts, BlockPool& pool,
-               std::uint32_t lanes);
+  BatchPlanner(const Schema& schema, const Layouts& layouts, BlockPool& pool, std::uint32_t lanes);
 
   /// Continues the check of a batch for about `budget` blocks, and reduces `budget` by them. True
   /// when the whole batch is checked.
@@ -62,8 +67,7 @@ class BatchPlanner {
   BlockIndex tail(BlockIndex step) const noexcept { return tails_[step]; }
 
  private:
-  static constexpr std::size_t kFirstStep = 0;  // of BatchRecord::own
-
+  using Verdict = RecordCheck::Verdict;
   enum class Known : std::uint8_t { nothing, plan, garbage };
   /// Effect of the present part of a batch on one queue, before its own commands are appended.
   struct Done {
@@ -77,24 +81,24 @@ class BatchPlanner {
     std::uint64_t epoch = 0;      // valid while it equals Lane::epoch
     BlockIndex list = kNoBlock;   // commands that will be appended, unless they are dropped
     bool list_is_step = false;    // its first command overwrites, and is a step already
-    bool listed = false;          // is in `listed_`
+    bool listed = false;          // is in Lane::listed
     BlockIndex group = kNoBlock;  // the last group with a member of this actuator
     Done done;
   };
-  struct Lane {
-    BlockIndex batch = kNoBlock;   // being checked
+  /// The batch of a lane that is being checked.
+  struct Batch {
+    BlockIndex batch = kNoBlock;
     BlockIndex cursor = kNoBlock;  // first block of the record being checked
     bool begun = false;            // the check of the record has begun
-    RecordCheck::Verdict verdict = RecordCheck::Verdict::unfinished;
+    Verdict verdict = Verdict::unfinished;
     BlockIndex last = kNoBlock;  // last block of the record that was reached
     std::uint32_t to_walk = 0;   // blocks from `last` to the end of the record
     BlockIndex last_step = kNoBlock;
     std::uint32_t place = 0;
     std::uint32_t record_blocks = 0;
-    std::uint32_t blocks = 0;  // blocks of the batch that are checked
-    std::uint64_t epoch = 0;
-    RecordCheck::Progress progress;
-    Effort effort;
+    std::uint32_t blocks = 1;  // blocks of the batch that are checked
+    Plan plan;
+    std::uint32_t work = 0;
     std::uint32_t control_orders = 0;
     std::uint32_t resumes = 0;
     // the group whose members are being checked
@@ -103,61 +107,57 @@ class BatchPlanner {
     BlockIndex last_member = kNoBlock;
     std::uint32_t members_left = 0;
     std::uint32_t group_blocks = 0;
-    std::uint32_t groups = 0;  // groups of the batch so far
+  };
+  struct Lane : Batch {
+    RecordCheck::Progress progress;
+    std::uint32_t budget = 0;
     // the present part
-    std::array<BlockIndex, 4> ends{};  // for each End the first record of its list
-    Done all;                          // effect on every queue
-    std::uint32_t listed = 0;
+    std::uint64_t epoch = 0;
+    std::array<BlockIndex, 4> ends{};   // for each End the first record of its list
+    Done all;                           // effect on every queue
+    std::vector<std::uint16_t> listed;  // actuators with a list
+    std::vector<Target> targets;        // one for each actuator
   };
   /// Index into Lane::ends.
   enum class End : std::uint8_t { invalid, overwritten, purged, completed };
 
-  void begin(Lane& lane, BlockIndex batch) noexcept;
   void begin_record(Lane& lane) noexcept;
   static void stop_reading(Lane& lane) noexcept;
-  bool check_record(std::uint32_t lane, std::uint32_t& budget) noexcept;
-  void go_on_behind(Lane& lane) noexcept;
-  bool is_one_too_many(Lane& lane, const RecordHead& head) const noexcept;
-  void complete(std::uint32_t lane, std::uint32_t& budget) noexcept;
+  bool check_record(Lane& lane) noexcept;
+  void enter(const Lane& lane, RecordHead& head) noexcept;
+  void reject(const Lane& lane, RecordHead& head, std::uint32_t blocks) noexcept;
+  static bool is_one_too_many(Lane& lane, const RecordHead& head) noexcept;
+  void complete(Lane& lane, BatchRecord& record) noexcept;
 
   // groups
-  bool fits_group(std::uint32_t lane, const RecordHead& head) noexcept;
-  void begin_group(Lane& lane) noexcept;
-  void add_member(Lane& lane) noexcept;
-  void complete_group(std::uint32_t lane, std::uint32_t& budget) noexcept;
-  void fail_group(std::uint32_t lane, std::uint32_t& budget) noexcept;
+  bool fits_group(Lane& lane, const RecordHead& head) noexcept;
+  void add_member(Lane& lane, RecordHead& head) noexcept;
+  void complete_group(Lane& lane) noexcept;
+  void fail_group(Lane& lane) noexcept;
 
   // a checked record => steps
-  void add(std::uint32_t lane, BlockIndex record, std::uint32_t& budget) noexcept;
-  void add_command(std::uint32_t lane, BlockIndex record) noexcept;
-  void add_purge(std::uint32_t lane, BlockIndex record, std::uint32_t& budget) noexcept;
-  bool purge_one(std::uint32_t lane, std::uint32_t actuator, bool own) noexcept;
-  bool purge_all(std::uint32_t lane, bool own, std::uint32_t& budget) noexcept;
-  void end_part(std::uint32_t lane, std::uint32_t& budget) noexcept;
-  void begin_part(Lane& lane) noexcept;
+  void add(Lane& lane, BlockIndex record) noexcept;
+  void add_command(Lane& lane, BlockIndex record) noexcept;
+  void add_purge(Lane& lane, BlockIndex record) noexcept;
+  bool purge_one(Lane& lane, std::uint32_t actuator, bool own) noexcept;
+  bool purge_all(Lane& lane, bool own) noexcept;
+  void end_part(Lane& lane) noexcept;
+  static void begin_part(Lane& lane) noexcept;
   void drop_list(Lane& lane, Target& target, End end) noexcept;
   void add_to_end(Lane& lane, End end, BlockIndex list) noexcept;
   void add_step(Lane& lane, BlockIndex record, std::uint32_t work) noexcept;
   void join(BlockIndex list, BlockIndex first, BlockIndex last) noexcept;
-
-  static void spend(std::uint32_t& budget, std::uint32_t work) noexcept {
-    budget -= std::min(budget, work);
-  }
-  Target& target(std::uint32_t lane, std::uint32_t actuator) noexcept;
-  void list(std::uint32_t lane, std::uint32_t actuator) noexcept;
-  std::span<std::uint16_t> listed(std::uint32_t lane) noexcept {
-    return {listed_.data() + std::size_t{lane} * actuators_, lanes_[lane].listed};
+  static Target& target(Lane& lane, std::uint32_t actuator) noexcept;
+  static void spend(Lane& lane, std::uint32_t work) noexcept {
+    lane.budget -= std::min(lane.budget, work);
   }
 
   BlockPool& pool_;
   RecordCheck check_;
-  std::uint32_t actuators_;
   std::vector<Lane> lanes_;
-  std::vector<Target> targets_;        // one for each lane and actuator
-  std::vector<std::uint16_t> listed_;  // for each lane: actuators of its present part
-  std::vector<BlockIndex> tails_;      // one for each block
-  std::vector<Known> known_;           // one for each block
-  std::vector<bool> while_halted_;     // one for each request
+  std::vector<BlockIndex> tails_;   // one for each block
+  std::vector<Known> known_;        // one for each block
+  std::vector<bool> while_halted_;  // one for each request
 };
 
 }  // namespace o80

@@ -1,6 +1,7 @@
 // BatchPlanner: converts the checked records of a batch to the steps of its plan.
 
 #include <array>
+#include <utility>
 
 #include "control/batch_plan.hpp"
 
@@ -13,44 +14,44 @@ constexpr std::uint32_t kRequestWork = 16;  // plus 1 for each actuator: it may 
 
 }  // namespace
 
-void BatchPlanner::add(std::uint32_t lane_index, BlockIndex record,
-                       std::uint32_t& budget) noexcept {
-  Lane& lane = lanes_[lane_index];
+void BatchPlanner::add(Lane& lane, BlockIndex record) noexcept {
   tails_[record] = record;
-  switch (pool_.head(record).kind) {
+  const RecordHead& head = pool_.head(record);
+  switch (head.kind) {
     case RecordKind::command:
-      lane.effort.express = false;
-      lane.effort.moves = true;
-      return add_command(lane_index, record);
+      lane.plan.express = 0;
+      lane.plan.moves = 1;
+      return add_command(lane, record);
     case RecordKind::purge:
-      return add_purge(lane_index, record, budget);
+      return add_purge(lane, record);
     case RecordKind::request:
-      if (!while_halted_[pool_.head(record).actuator]) lane.effort.moves = true;
-      [[fallthrough]];
     case RecordKind::resume:
-      if (pool_.head(record).kind == RecordKind::resume) ++lane.resumes;
+      if (head.kind == RecordKind::resume) {
+        ++lane.resumes;
+      } else if (!while_halted_[head.actuator]) {
+        lane.plan.moves = 1;
+      }
       // a resume makes a fresh start too. It is never express: if it overtook commands that were
       // sent during the halt, they would act instead of being rejected
-      lane.effort.express = false;
-      ++lane.effort.requests;
-      end_part(lane_index, budget);
-      return add_step(lane, record, kRequestWork + actuators_);
+      lane.plan.express = 0;
+      ++lane.plan.requests;
+      end_part(lane);
+      return add_step(lane, record, kRequestWork + static_cast<std::uint32_t>(lane.targets.size()));
     case RecordKind::release_control:
-      lane.effort.releases = true;
+      lane.plan.releases = 1;
       [[fallthrough]];
     case RecordKind::take_control:
       return add_step(lane, record, kStepWork);
     default:
-      lane.effort.express = false;
+      lane.plan.express = 0;
       add_to_end(lane, End::invalid, record);
   }
 }
 
-void BatchPlanner::add_command(std::uint32_t lane_index, BlockIndex record) noexcept {
-  Lane& lane = lanes_[lane_index];
+void BatchPlanner::add_command(Lane& lane, BlockIndex record) noexcept {
   const RecordHead& head = pool_.head(record);
-  Target& to = target(lane_index, head.actuator);
-  list(lane_index, head.actuator);
+  Target& to = target(lane, head.actuator);
+  if (!std::exchange(to.listed, true)) lane.listed.push_back(head.actuator);
   if (head.mode == Mode::queue) {
     if (to.list != kNoBlock) return join(to.list, record, record);
     to.list = record;
@@ -64,22 +65,19 @@ void BatchPlanner::add_command(std::uint32_t lane_index, BlockIndex record) noex
   to.done.empty = to.done.empty_own = true;
 }
 
-void BatchPlanner::add_purge(std::uint32_t lane_index, BlockIndex record,
-                             std::uint32_t& budget) noexcept {
+void BatchPlanner::add_purge(Lane& lane, BlockIndex record) noexcept {
   const RecordHead& head = pool_.head(record);
   const bool own = head.only_own != 0;
   const bool all = head.actuator == kEveryActuator;
-  const bool does_something =
-      all ? purge_all(lane_index, own, budget) : purge_one(lane_index, head.actuator, own);
-  Lane& lane = lanes_[lane_index];
+  const bool does_something = all ? purge_all(lane, own) : purge_one(lane, head.actuator, own);
   if (!does_something) return add_to_end(lane, End::completed, record);
-  add_step(lane, record, kStepWork + (all ? actuators_ : 0));
+  add_step(lane, record, kStepWork + (all ? static_cast<std::uint32_t>(lane.targets.size()) : 0));
 }
 
 /// True if the purge affects the queue, besides dropping commands that this part would append.
-bool BatchPlanner::purge_one(std::uint32_t lane_index, std::uint32_t actuator, bool own) noexcept {
-  Target& to = target(lane_index, actuator);
-  drop_list(lanes_[lane_index], to, End::purged);
+bool BatchPlanner::purge_one(Lane& lane, std::uint32_t actuator, bool own) noexcept {
+  Target& to = target(lane, actuator);
+  drop_list(lane, to, End::purged);
   const Done before = to.done;
   if (!own) {
     to.done = {.empty = true, .empty_own = true, .at_rest = true, .purged = true};
@@ -90,15 +88,14 @@ bool BatchPlanner::purge_one(std::uint32_t lane_index, std::uint32_t actuator, b
   return !before.empty_own || (before.empty && !before.at_rest);
 }
 
-bool BatchPlanner::purge_all(std::uint32_t lane_index, bool own, std::uint32_t& budget) noexcept {
-  Lane& lane = lanes_[lane_index];
+bool BatchPlanner::purge_all(Lane& lane, bool own) noexcept {
   bool does_something = own ? !lane.all.empty_own : !lane.all.purged;
-  for (const std::uint16_t actuator : listed(lane_index)) {
-    does_something = purge_one(lane_index, actuator, own) || does_something;
-    target(lane_index, actuator).listed = false;
-    spend(budget, 1);
+  for (const std::uint16_t actuator : lane.listed) {
+    does_something = purge_one(lane, actuator, own) || does_something;
+    target(lane, actuator).listed = false;
+    spend(lane, 1);
   }
-  lane.listed = 0;
+  lane.listed.clear();
   lane.all.empty_own = true;
   if (!own) {
     lane.all = {.empty = true, .empty_own = true, .at_rest = true, .purged = true};
@@ -108,11 +105,10 @@ bool BatchPlanner::purge_all(std::uint32_t lane_index, bool own, std::uint32_t& 
 }
 
 /// Ends a part: adds a step for each list of commands that was not dropped.
-void BatchPlanner::end_part(std::uint32_t lane_index, std::uint32_t& budget) noexcept {
-  Lane& lane = lanes_[lane_index];
-  for (const std::uint16_t actuator : listed(lane_index)) {
-    const Target& to = target(lane_index, actuator);
-    spend(budget, 1);
+void BatchPlanner::end_part(Lane& lane) noexcept {
+  for (const std::uint16_t actuator : lane.listed) {
+    const Target& to = target(lane, actuator);
+    spend(lane, 1);
     if (to.list == kNoBlock || to.list_is_step) continue;
     pool_.head(to.list).mode = Mode::queue;  // the queue is empty
     add_step(lane, to.list, kStepWork);
@@ -122,7 +118,7 @@ void BatchPlanner::end_part(std::uint32_t lane_index, std::uint32_t& budget) noe
 
 void BatchPlanner::begin_part(Lane& lane) noexcept {
   ++lane.epoch;
-  lane.listed = 0;
+  lane.listed.clear();
   lane.all = {};
   lane.ends.fill(kNoBlock);
 }
@@ -150,12 +146,9 @@ void BatchPlanner::add_to_end(Lane& lane, End end, BlockIndex list) noexcept {
 }
 
 void BatchPlanner::add_step(Lane& lane, BlockIndex record, std::uint32_t work) noexcept {
-  lane.effort.work += work;
-  if (lane.last_step == kNoBlock) {
-    pool_.batch(lane.batch).own[kFirstStep] = record;
-  } else {
-    pool_.head(lane.last_step).own[Own::kNextStep] = record;
-  }
+  lane.work += work;
+  (lane.last_step == kNoBlock ? lane.plan.steps : pool_.head(lane.last_step).own[Own::kNextStep]) =
+      record;
   lane.last_step = record;
 }
 
@@ -164,21 +157,10 @@ void BatchPlanner::join(BlockIndex list, BlockIndex first, BlockIndex last) noex
   tails_[list] = last;
 }
 
-BatchPlanner::Target& BatchPlanner::target(std::uint32_t lane_index,
-                                           std::uint32_t actuator) noexcept {
-  const Lane& lane = lanes_[lane_index];
-  Target& to = targets_[std::size_t{lane_index} * actuators_ + actuator];
+BatchPlanner::Target& BatchPlanner::target(Lane& lane, std::uint32_t actuator) noexcept {
+  Target& to = lane.targets[actuator];
   if (to.epoch != lane.epoch) to = {.epoch = lane.epoch, .done = lane.all};
   return to;
-}
-
-void BatchPlanner::list(std::uint32_t lane_index, std::uint32_t actuator) noexcept {
-  Target& to = target(lane_index, actuator);
-  if (to.listed) return;
-  to.listed = true;
-  Lane& lane = lanes_[lane_index];
-  listed_[std::size_t{lane_index} * actuators_ + lane.listed++] =
-      static_cast<std::uint16_t>(actuator);
 }
 
 }  // namespace o80

@@ -27,8 +27,6 @@ class LaneLists {
   bool has(std::uint32_t lane) const noexcept { return lists_[lane].first != kNoBlock; }
   /// The first record; kNoBlock if the queue is empty.
   BlockIndex front() const noexcept { return front_ == kNoLane ? kNoBlock : lists_[front_].first; }
-  /// The lane of front().
-  std::uint32_t front_lane() const noexcept { return front_; }
 
   /// Appends a list of records of one lane, linked by Own::kNext.
   void append(BlockIndex first, BlockIndex last, std::uint32_t lane) noexcept;

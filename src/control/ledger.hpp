@@ -37,27 +37,25 @@ class Ledger {
   CommandGroups& groups() noexcept { return groups_; }
 
   /// Enters a batch as taken. It ends after close() and the end of all its records. `spare`: its
-  /// unused blocks.
-  void enter(std::uint32_t lane, BlockIndex batch, const BlockChain& spare, std::uint32_t groups,
-             Iteration iteration) noexcept;
-  /// Rejects the records from index `place` on, which have no blocks; reported by report_ends().
-  void reject_from(BlockIndex batch, std::uint32_t place, Reason reason, std::uint8_t detail,
-                   Iteration iteration) noexcept;
+  /// unused blocks. The records from index `missing_from` on, which have no blocks, are rejected;
+  /// reported by report_ends().
+  void enter(std::uint32_t lane, BlockIndex batch, const BlockChain& spare,
+             std::uint32_t missing_from, std::uint32_t groups, Iteration iteration) noexcept;
   /// Call it after the last step of the batch.
   void close(BlockIndex batch, Iteration iteration) noexcept { ended(batch, iteration); }
-  /// Rejects a whole batch that was not taken; report_ends() reports its records with `status`.
-  void reject(std::uint32_t lane, BlockIndex batch, Reason reason, std::uint8_t detail,
-              Iteration iteration, Status status = Status::rejected) noexcept;
+  /// Rejects a whole batch that was not taken; report_ends() reports its records with the status of
+  /// `outcome`.
+  void reject(std::uint32_t lane, BlockIndex batch, const Outcome& outcome,
+              Iteration iteration) noexcept;
 
   /// A command, or a member of a group, has begun. Reason::limits: it takes longer than asked.
-  void activate(BlockIndex record, Iteration iteration, Reason reason = Reason::none,
-                std::uint8_t detail = 0, std::int64_t late = 0) noexcept;
+  void activate(BlockIndex record, Iteration iteration,
+                const Outcome& outcome = {Status::active}) noexcept;
   /// A record has ended; reported at once. A group is reported when its last member has ended, with
   /// the first end status that is not completed.
-  void end(BlockIndex record, Status status, Reason reason, std::uint8_t detail,
-           Iteration iteration, std::int64_t late = 0) noexcept;
-  /// A list of records has ended; reported by report_ends().
-  void drop(BlockIndex first, Status status, Reason reason, Iteration iteration) noexcept;
+  void end(BlockIndex record, const Outcome& outcome, Iteration iteration) noexcept;
+  /// A list of records has ended, without details; reported by report_ends().
+  void drop(BlockIndex first, const Outcome& outcome, Iteration iteration) noexcept;
 
   /// Reports at most `budget` end statuses; returns how many.
   std::uint32_t report_ends(std::uint32_t budget) noexcept;
@@ -70,18 +68,20 @@ class Ledger {
   /// A list of records with a common end.
   struct Group {
     BlockIndex record = kNoBlock;
-    Status status = Status::none;
-    Reason reason = Reason::none;
+    Outcome outcome;
     Iteration iteration = 0;
   };
 
   TakenBatch& batch(BlockIndex block) noexcept;
+  TakenBatch& take(std::uint32_t lane, BlockIndex block, const BlockChain& spare,
+                   std::uint32_t records, Iteration iteration) noexcept;
   void ended(BlockIndex batch, Iteration iteration) noexcept;
   void append(BlockIndex group) noexcept;
   BlockIndex& link(BlockIndex group) noexcept;
-  void member_ended(BlockIndex group, Status status, Reason reason, std::uint8_t detail,
-                    Iteration iteration, std::int64_t late) noexcept;
+  void member_ended(BlockIndex group, const Outcome& outcome, Iteration iteration) noexcept;
   bool tell_rejected(BlockIndex batch, std::uint32_t& budget) noexcept;
+  void tell(std::uint32_t lane, CommandId id, const Outcome& outcome, Iteration iteration,
+            StatusChange::Of of) noexcept;
 
   BlockPool& pool_;
   StatusSink& sink_;

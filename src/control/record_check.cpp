@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 namespace o80 {
 namespace {
@@ -43,32 +42,30 @@ Cursor rows_of_timed(const BlockPool& pool, const RecordHead& head,
           static_cast<std::uint32_t>(noted >> 32), std::uint64_t{head.rows} * row_bytes};
 }
 
-RecordCheck::RecordCheck(const Schema& schema, Layouts layouts) : layouts_(std::move(layouts)) {
-  std::uint32_t size = 0;
-  std::size_t numbers = 0;
-  for (const ActuatorRow& actuator : schema.actuators) {
-    actuator_types_.push_back(actuator.type);
-    first_limits_.push_back(static_cast<std::uint32_t>(has_acceleration_.size()));
-    const StateLayout& layout = *layouts_[actuator.type];
-    bool is_bounded = false;
-    for (std::uint32_t i = 0; i < actuator.limits; ++i) {
-      const bool moves = layout.numbers()[i].moves();
-      const LimitRow& limit = schema.limits.at(actuator.first_limit + i);
-      has_acceleration_.push_back(!moves || std::isfinite(limit.acceleration));
-      minima_.push_back(limit.minimum);
-      maxima_.push_back(limit.maximum);
-      is_bounded = is_bounded || std::isfinite(limit.minimum) || std::isfinite(limit.maximum);
+RecordCheck::RecordCheck(const Schema& schema, const Layouts& layouts) {
+  for (const ActuatorRow& row : schema.actuators) {
+    Actuator actuator{&*layouts[row.type], ranges_.size(), false};
+    for (std::uint32_t i = 0; i < row.limits; ++i) {
+      const bool moves = actuator.layout->numbers()[i].moves();
+      const LimitRow& limit = schema.limits.at(row.first_limit + i);
+      ranges_.push_back(
+          {limit.minimum, limit.maximum, !moves || std::isfinite(limit.acceleration)});
+      actuator.is_bounded |= std::isfinite(limit.minimum) || std::isfinite(limit.maximum);
     }
-    is_bounded_.push_back(is_bounded ? 1 : 0);
+    actuators_.push_back(actuator);
   }
-  for (const RequestRow& request : schema.requests) request_types_.push_back(request.type);
-  for (const StateLayout* layout : layouts_) {
-    if (layout == nullptr) continue;
-    size = std::max(size, layout->size());
-    numbers = std::max(numbers, layout->numbers().size());
+  for (const RequestRow& request : schema.requests) {
+    requests_.push_back(request.type == kNoType ? nullptr : &*layouts[request.type]);
+  }
+  std::size_t size = 0;
+  std::size_t words = 0;
+  for (const auto& layout : layouts) {
+    if (!layout) continue;
+    size = std::max<std::size_t>(size, layout->size());
+    words = std::max(words, layout->mask_words());
   }
   state_.resize((size + 7) / 8);
-  mask_.resize(mask_words(static_cast<std::uint32_t>(numbers)));
+  mask_.resize(words);
 }
 
 RecordCheck::Verdict RecordCheck::begin(const BlockPool& pool, BlockIndex block,
@@ -81,13 +78,12 @@ RecordCheck::Verdict RecordCheck::begin(const BlockPool& pool, BlockIndex block,
     case RecordKind::member:
       return begin_command(head, progress);
     case RecordKind::group:
-      return verdict(head.payload_bytes == 0 && head.rows > 0 &&
-                     head.rows <= actuator_types_.size());
+      return verdict(head.payload_bytes == 0 && head.rows > 0 && head.rows <= actuators_.size());
     case RecordKind::request:
       return check_request(head, progress.payload);
     case RecordKind::purge:
       return verdict(head.payload_bytes == 0 && head.only_own <= 1 &&
-                     (head.actuator == kEveryActuator || head.actuator < actuator_types_.size()));
+                     (head.actuator == kEveryActuator || head.actuator < actuators_.size()));
     case RecordKind::take_control:
     case RecordKind::release_control:
       return verdict(head.payload_bytes == 0);
@@ -100,17 +96,18 @@ RecordCheck::Verdict RecordCheck::begin(const BlockPool& pool, BlockIndex block,
 
 RecordCheck::Verdict RecordCheck::begin_command(const RecordHead& head,
                                                 Progress& progress) noexcept {
-  if (head.actuator >= actuator_types_.size() || head.rows == 0 || !known_enums(head) ||
+  if (head.actuator >= actuators_.size() || head.rows == 0 || !known_enums(head) ||
       !sane_pace(head)) {
     return Verdict::invalid;
   }
   if (head.profile == Profile::as_sent && (head.pace != Pace::direct || head.rows > 1)) {
     return Verdict::invalid;
   }
-  const StateLayout& layout = *layouts_[actuator_types_[head.actuator]];
-  const auto numbers = static_cast<std::uint32_t>(layout.numbers().size());
+  const Actuator& actuator = actuators_[head.actuator];
+  const StateLayout& layout = *actuator.layout;
+  const std::size_t numbers = layout.numbers().size();
   const bool timed = head.pace == Pace::duration && head.rows > 1;
-  const std::uint64_t mask_bytes = head.masked != 0 ? 8 * mask_words(numbers) : 0;
+  const std::uint64_t mask_bytes = head.masked != 0 ? 8 * layout.mask_words() : 0;
   const std::uint64_t time_bytes = timed ? 8 * std::uint64_t{head.rows} : 0;
   const std::uint64_t row_bytes = std::uint64_t{head.rows} * layout.size();
   if (head.payload_bytes != mask_bytes + time_bytes + row_bytes) return Verdict::invalid;
@@ -122,10 +119,9 @@ RecordCheck::Verdict RecordCheck::begin_command(const RecordHead& head,
   }
   // every commanded number has limits of speed and acceleration
   if (head.pace == Pace::fastest) {
-    const std::uint32_t first = first_limits_[head.actuator];
-    for (std::uint32_t i = 0; i < numbers; ++i) {
+    for (std::size_t i = 0; i < numbers; ++i) {
       const bool commanded = masked(head.masked != 0 ? mask_.data() : nullptr, i);
-      if (commanded && !has_acceleration_[first + i]) return Verdict::invalid;
+      if (commanded && !ranges_[actuator.first_range + i].accelerates) return Verdict::invalid;
     }
   }
   progress.times_left = timed ? head.rows : 0;
@@ -136,13 +132,12 @@ RecordCheck::Verdict RecordCheck::begin_command(const RecordHead& head,
 RecordCheck::Verdict RecordCheck::go_on(const BlockPool& pool, BlockIndex block, Progress& progress,
                                         std::uint32_t& budget) noexcept {
   const RecordHead& head = pool.head(block);
-  const StateLayout& layout = *layouts_[actuator_types_[head.actuator]];
-  const std::uint64_t* mask = nullptr;
-  if (head.masked != 0) {
-    const std::size_t mask_bytes =
-        sizeof(std::uint64_t) * mask_words(static_cast<std::uint32_t>(layout.numbers().size()));
-    Cursor(pool, block, sizeof(RecordHead), head.payload_bytes).read(mask_.data(), mask_bytes);
-    mask = mask_.data();
+  const Actuator& actuator = actuators_[head.actuator];
+  const StateLayout& layout = *actuator.layout;
+  const std::uint64_t* mask = head.masked != 0 ? mask_.data() : nullptr;
+  if (mask != nullptr) {
+    Cursor(pool, block, sizeof(RecordHead), head.payload_bytes)
+        .read(mask_.data(), 8 * layout.mask_words());
   }
   // payload in the block of the head is free
   constexpr std::int64_t kWithHead = kBlockBytes - sizeof(RecordHead);
@@ -160,7 +155,9 @@ RecordCheck::Verdict RecordCheck::go_on(const BlockPool& pool, BlockIndex block,
   auto* state = reinterpret_cast<std::byte*>(state_.data());
   for (; progress.rows_left > 0 && bytes_left > 0; --progress.rows_left) {
     progress.payload.read(state, layout.size());
-    if (!layout.finite(state, mask) || !within_bounds(head, state, mask)) return Verdict::invalid;
+    if (!layout.finite(state, mask) || !within_bounds(actuator, state, mask)) {
+      return Verdict::invalid;
+    }
     bytes_left -= layout.size();
   }
   budget = std::min(
@@ -169,28 +166,26 @@ RecordCheck::Verdict RecordCheck::go_on(const BlockPool& pool, BlockIndex block,
 }
 
 /// A target beyond the bounds would never be reached.
-bool RecordCheck::within_bounds(const RecordHead& head, const std::byte* state,
+bool RecordCheck::within_bounds(const Actuator& actuator, const std::byte* state,
                                 const std::uint64_t* mask) const noexcept {
-  if (is_bounded_[head.actuator] == 0) return true;
-  const StateLayout& layout = *layouts_[actuator_types_[head.actuator]];
-  const std::uint32_t first = first_limits_[head.actuator];
-  for (std::uint32_t i = 0; i < layout.numbers().size(); ++i) {
+  if (!actuator.is_bounded) return true;
+  const StateLayout& layout = *actuator.layout;
+  for (std::size_t i = 0; i < layout.numbers().size(); ++i) {
     if (!masked(mask, i) || !layout.numbers()[i].moves()) continue;
     const double value = layout.number(i, state);
-    if (value < minima_[first + i] || value > maxima_[first + i]) return false;
+    const Range& range = ranges_[actuator.first_range + i];
+    if (value < range.minimum || value > range.maximum) return false;
   }
   return true;
 }
 
 RecordCheck::Verdict RecordCheck::check_request(const RecordHead& head, Cursor& payload) noexcept {
-  if (head.actuator >= request_types_.size()) return Verdict::invalid;
-  const std::uint32_t type = request_types_[head.actuator];
-  const StateLayout* layout = type == kNoType ? nullptr : layouts_[type];
-  const std::uint32_t size = layout == nullptr ? 0 : layout->size();
-  if (head.payload_bytes != size) return Verdict::invalid;
+  if (head.actuator >= requests_.size()) return Verdict::invalid;
+  const StateLayout* layout = requests_[head.actuator];
+  if (head.payload_bytes != (layout == nullptr ? 0 : layout->size())) return Verdict::invalid;
   if (layout == nullptr) return Verdict::valid;
   auto* state = reinterpret_cast<std::byte*>(state_.data());
-  payload.read(state, size);
+  payload.read(state, layout->size());
   return layout->proper(state) ? Verdict::valid : Verdict::invalid;
 }
 

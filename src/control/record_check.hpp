@@ -25,9 +25,7 @@ Cursor rows_of_timed(const BlockPool& pool, const RecordHead& head,
 /// Realtime: everything but construction.
 class RecordCheck {
  public:
-  /// One layout for each type of an actuator or a request; null for other types.
-  using Layouts = std::vector<const StateLayout*>;
-  RecordCheck(const Schema& schema, Layouts layouts);
+  RecordCheck(const Schema& schema, const Layouts& layouts);
 
   enum class Verdict : std::uint8_t { unfinished, valid, invalid };
   /// The unchecked rest of a record.
@@ -47,19 +45,25 @@ class RecordCheck {
                 std::uint32_t& budget) noexcept;
 
  private:
+  struct Range {
+    double minimum;
+    double maximum;
+    bool accelerates;  // true also if the number is not interpolated
+  };
+  struct Actuator {
+    const StateLayout* layout;
+    std::size_t first_range;  // of its numbers
+    bool is_bounded;          // a number has a bound
+  };
+
   Verdict begin_command(const RecordHead& head, Progress& progress) noexcept;
-  bool within_bounds(const RecordHead& head, const std::byte* state,
+  bool within_bounds(const Actuator& actuator, const std::byte* state,
                      const std::uint64_t* mask) const noexcept;
   Verdict check_request(const RecordHead& head, Cursor& payload) noexcept;
 
-  Layouts layouts_;
-  std::vector<std::uint32_t> actuator_types_;
-  std::vector<std::uint32_t> first_limits_;     // for each actuator its index in the next vector
-  std::vector<std::uint8_t> has_acceleration_;  // for each number; 1 also if not interpolated
-  std::vector<double> minima_;                  // for each number
-  std::vector<double> maxima_;
-  std::vector<std::uint8_t> is_bounded_;  // for each actuator: a number has a bound
-  std::vector<std::uint32_t> request_types_;
+  std::vector<Actuator> actuators_;
+  std::vector<Range> ranges_;
+  std::vector<const StateLayout*> requests_;  // null: no payload
   std::vector<std::uint64_t> state_;
   std::vector<std::uint64_t> mask_;
 };

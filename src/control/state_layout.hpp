@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <optional>
 #include <vector>
 
 #include "o80/describe/hooks.hpp"
@@ -15,8 +16,9 @@ struct NumberPlace {
   std::uint32_t offset = 0;  // [bytes]
   std::uint32_t size = 0;    // [bytes]
   Kind kind = Kind::float64;
-  bool is_signed = false;         // for an enumeration
-  std::uint32_t first_label = 0;  // for an enumeration: index in the list of the layout
+  // for an enumeration
+  Kind integer = Kind::uint8;     // its underlying type
+  std::uint32_t first_label = 0;  // index in the list of the layout
   std::uint32_t labels = 0;
 
   /// True if the number is interpolated; booleans and enumerations switch.
@@ -38,6 +40,8 @@ class StateLayout {
 
   std::uint32_t size() const noexcept { return size_; }
   const std::vector<NumberPlace>& numbers() const noexcept { return numbers_; }
+  /// Number of 64-bit words of a mask of them.
+  std::size_t mask_words() const noexcept { return (numbers_.size() + 63) / 64; }
   const TypeHooks& hooks() const noexcept { return hooks_; }
   /// True if the state is an array of float64 without padding.
   bool plain() const noexcept { return plain_; }
@@ -71,10 +75,9 @@ class StateLayout {
   /// The first number that is infinite or NaN, or kNoNumber.
   std::uint32_t first_not_finite(const std::byte* state) const noexcept;
 
-  /// True if each boolean is 0 or 1 and each enumeration has a label; with `mask`, only numbers
-  /// whose bits are set are checked.
-  bool proper(const std::byte* state, const std::uint64_t* mask = nullptr) const noexcept;
-  /// True if proper(), and no number is NaN or infinite.
+  /// True if each boolean is 0 or 1 and each enumeration has a label.
+  bool proper(const std::byte* state) const noexcept;
+  /// True if the numbers whose bits are set are proper(), and neither NaN nor infinite.
   bool finite(const std::byte* state, const std::uint64_t* mask = nullptr) const noexcept;
   bool proper_number(std::size_t number, const std::byte* state) const noexcept;
   /// A number as double (large integers are rounded).
@@ -91,6 +94,14 @@ class StateLayout {
   bool plain_ = true;
   bool padded_ = false;
 };
+
+/// One layout for each type of a schema; empty where it is not needed.
+using Layouts = std::vector<std::optional<StateLayout>>;
+/// The layout of a type, which is made when it is first asked for.
+const StateLayout& layout_of(const Schema& schema, std::uint32_t type, Layouts& layouts);
+/// The layouts of the types of actuators and requests. Throws InvalidArgument if an actuator cannot
+/// be controlled.
+Layouts layouts_of_types(const Schema& schema);
 
 /// True if the bit of a number is set; a null mask means all.
 inline bool masked(const std::uint64_t* mask, std::size_t number) noexcept {
