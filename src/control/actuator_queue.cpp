@@ -79,7 +79,7 @@ void ActuatorQueue::restart(const std::byte* state) noexcept {
 bool ActuatorQueue::follow(const std::byte* observed) noexcept {
   layout_->copy_finite(desired_, observed);
   in_force_ = false;
-  return motion_.brake_resting(desired_);
+  return motion_.brake(desired_, true);
 }
 
 ActuatorQueue::Moved ActuatorQueue::step(Iteration iteration, const std::byte* observed,
@@ -189,7 +189,7 @@ void ActuatorQueue::end_held_back(Iteration iteration, const Limited& bound) noe
 ActuatorQueue::Moved ActuatorQueue::come_to_rest(const std::byte* observed) noexcept {
   motion_.end();
   carry_.reset();
-  const bool moves = follows() ? follow(observed) : motion_.brake(desired_);
+  const bool moves = follows() ? follow(observed) : motion_.brake(desired_, false);
   return moves ? Moved::braking : Moved::idle;
 }
 

@@ -58,11 +58,9 @@ class ActuatorQueue {
   /// True if a direct value keeps a number away from its rest value.
   bool holds() const noexcept { return motion_.holds(); }
   /// True if an iteration without a command would change nothing.
-  bool at_rest() const noexcept {
-    return follows() ? motion_.resting_at_rest() : motion_.at_rest();
-  }
+  bool at_rest() const noexcept { return motion_.at_rest(follows()); }
   /// True if nothing moves.
-  bool rests() const noexcept { return follows() ? motion_.resting_at_rest() : motion_.rests(); }
+  bool rests() const noexcept { return follows() ? at_rest() : motion_.rests(); }
   /// True if a command of this lane is queued or running, or its direct value is still held.
   bool acts(std::uint32_t lane) const noexcept {
     return queue_.has(lane) || is_of(lane) || (holder_ == lane && holds());

@@ -47,17 +47,16 @@ double root(Function&& function, double low, double high, double tolerance) noex
 
 }  // namespace
 
-FastestMotion::FastestMotion(double position, double speed, double acceleration, double target,
-                             const Rates& rates) noexcept
-    : start_speed_(speed),
-      start_acceleration_(std::isfinite(rates.jerk) ? acceleration : 0.0),
-      distance_(target - position),
+FastestMotion::FastestMotion(const Moment& start, double target, const Rates& rates) noexcept
+    : start_speed_(start.speed),
+      start_acceleration_(std::isfinite(rates.jerk) ? start.acceleration : 0.0),
+      distance_(target - start.position),
       rates_(rates),
       target_(target),
-      position_(position) {
+      position_(start.position) {
   const VelocityChange stop(-start_speed_, start_acceleration_, rates_);
-  const double rounding =
-      4.0 * std::numeric_limits<double>::epsilon() * std::max(std::abs(position), std::abs(target));
+  const double rounding = 4.0 * std::numeric_limits<double>::epsilon() *
+                          std::max(std::abs(start.position), std::abs(target));
   const double beyond = distance_ - stop.displacement();
   if (std::abs(beyond) <= rounding) {
     to_rest_ = stop;
@@ -88,12 +87,7 @@ FastestMotion::FastestMotion(double position, double speed, double acceleration,
                                         std::ceil(-at_most / rates_.speed * (1.0 - kTimeRounding)));
   } else {
     // the target is nearer: reduce the cruising speed until there is no time to cruise
-    const auto beyond_at = [&](double cruise) {
-      const VelocityChange to_cruise(cruise - start_speed_, start_acceleration_, rates_);
-      const VelocityChange to_rest(-cruise, 0.0, rates_);
-      return to_cruise.displacement() + to_cruise.time() * cruise + to_rest.displacement() -
-             distance_;
-    };
+    const auto beyond_at = [&](double cruise) { return distance(cruise, {}) - distance_; };
     // for the number of iterations; the speed that fits them is found below, a little beyond it
     cruise_ = root(beyond_at, lowest, rates_.speed, kRootForTime * distance_);
     before_ = static_cast<std::int64_t>(std::ceil(time_to(cruise_) * (1.0 - kTimeRounding)));
@@ -153,14 +147,11 @@ double FastestMotion::time_to(double cruise) const noexcept {
   return VelocityChange(cruise - start_speed_, start_acceleration_, rates_).time();
 }
 
-std::int64_t FastestMotion::steps_to(double cruise) const noexcept {
-  return VelocityChange(cruise - start_speed_, start_acceleration_, rates_).steps();
-}
-
-double FastestMotion::distance(double cruise, double before) const noexcept {
+double FastestMotion::distance(double cruise, std::optional<double> before) const noexcept {
   const VelocityChange to_cruise(cruise - start_speed_, start_acceleration_, rates_);
   const VelocityChange to_rest(-cruise, 0.0, rates_);
-  return to_cruise.displacement() + before * cruise + to_rest.displacement();
+  return to_cruise.displacement() + (before ? *before : to_cruise.time()) * cruise +
+         to_rest.displacement();
 }
 
 double FastestMotion::cruise_for(double before, double low, double high) const noexcept {

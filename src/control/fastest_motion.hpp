@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "control/velocity_change.hpp"
 
@@ -16,10 +17,8 @@ namespace o80 {
 class FastestMotion {
  public:
   FastestMotion() = default;
-  /// `position`, `speed` and `acceleration` are the present ones. The limits of speed and
-  /// acceleration must be finite.
-  FastestMotion(double position, double speed, double acceleration, double target,
-                const Rates& rates) noexcept;
+  /// `start` is the present motion. The limits of speed and acceleration must be finite.
+  FastestMotion(const Moment& start, double target, const Rates& rates) noexcept;
 
   /// Number of iterations until it rests at the target, at least 1.
   std::int64_t iterations() const noexcept { return iterations_; }
@@ -45,9 +44,9 @@ class FastestMotion {
 
   Stop stop_after(std::int64_t eased) const noexcept;
   void mix(double lowest) noexcept;
-  /// Distance of a motion that slows down from the speed `cruise` after `before` iterations.
-  double distance(double cruise, double before) const noexcept;
-  std::int64_t steps_to(double cruise) const noexcept;
+  /// Distance of a motion that slows down from the speed `cruise` after `before` iterations, or as
+  /// soon as it has that speed.
+  double distance(double cruise, std::optional<double> before) const noexcept;
   double time_to(double cruise) const noexcept;
   double cruise_for(double before, double low, double high) const noexcept;
   void settle() noexcept;

@@ -119,11 +119,6 @@ void Motion::begin(const std::uint64_t* mask) noexcept {
   }
 }
 
-bool Motion::accelerates() const noexcept {
-  return std::ranges::any_of(
-      numbers_, [](const Number& each) { return each.is_commanded && each.motion.accelerates(); });
-}
-
 /// Iterations of a row, or of a type that blends by itself, at the speed asked for.
 std::int64_t Motion::iterations_at(const Course& course) const noexcept {
   if (course.first == StateLayout::kNoNumber) return 1;
@@ -177,7 +172,6 @@ std::int64_t Motion::propose(const Course& course, const std::byte* desired) noe
 void Motion::settle(Iteration first, std::int64_t iterations) noexcept {
   first_ = first;
   last_ = first + (iterations - 1);
-  iterations_ = static_cast<double>(iterations);
   for (Number& each : numbers_) {
     if (!each.is_commanded) continue;
     if (is_row_) {
@@ -190,7 +184,6 @@ void Motion::settle(Iteration first, std::int64_t iterations) noexcept {
 
 void Motion::follow_as_sent(Iteration first) noexcept {
   first_ = last_ = first;
-  iterations_ = 1.0;
   begun_ = is_row_ = false;
   for (Number& each : numbers_) {
     if (each.is_commanded) each.motion.follow_as_sent(layout_.number(each.number, target()));
@@ -204,13 +197,13 @@ void Motion::widen(const std::byte* row) noexcept {
 }
 
 /// Types that blend by themselves: by the share of the time, from rest to rest.
-void Motion::blend(std::byte* state) noexcept {
-  if (now_ >= last_) return layout_.copy(state, target());
-  const auto i = static_cast<double>(now_ - first_ + 1);
-  const double share =
-      profile_ == Profile::minimum_jerk
-          ? SmoothMotion({}, 1.0, static_cast<std::int64_t>(iterations_)).position(i)
-          : i / iterations_;
+void Motion::blend(Iteration now, std::byte* state) noexcept {
+  if (now >= last_) return layout_.copy(state, target());
+  const auto i = static_cast<double>(now - first_ + 1);
+  const std::int64_t iterations = last_ - first_ + 1;
+  const double share = profile_ == Profile::minimum_jerk
+                           ? SmoothMotion({}, 1.0, iterations).position(i)
+                           : i / static_cast<double>(iterations);
   std::byte* blended = target() + stride_;
   layout_.hooks().blend(blended, from(), target(), share);
   // a blend() that divides by zero gives an invalid state: keep the last one
@@ -218,10 +211,9 @@ void Motion::blend(std::byte* state) noexcept {
 }
 
 Limited Motion::step(Iteration now, std::byte* state) noexcept {
-  now_ = now;
   Limited result;
   if (layout_.hooks().blend != nullptr) {
-    blend(state);
+    blend(now, state);
     return result;
   }
   for (const std::uint32_t i : switches_) {
@@ -299,41 +291,26 @@ void Motion::complete() noexcept {
   }
 }
 
-bool Motion::brake(std::byte* state) noexcept {
+bool Motion::brake(std::byte* state, bool follows) noexcept {
   bool moves = false;
   for (Number& each : numbers_) {
+    if (follows && !each.motion.has_rest()) {
+      each.motion.restart(layout_.number(each.number, state));
+      continue;
+    }
     const double before = each.motion.position();
     moves = each.motion.brake() || moves;
-    if (each.motion.position() != before) publish(each, state);
-  }
-  return moves;
-}
-
-bool Motion::brake_resting(std::byte* state) noexcept {
-  bool moves = false;
-  for (Number& each : numbers_) {
-    if (each.motion.has_rest()) {
-      moves = each.motion.brake() || moves;
-      publish(each, state);
-    } else {
-      each.motion.restart(layout_.number(each.number, state));
-    }
+    if (follows || each.motion.position() != before) publish(each, state);
   }
   return moves;
 }
 
 void Motion::hold() noexcept {
-  for (Number& each : numbers_) {
-    if (each.is_commanded) {
-      each.motion.hold();
-    } else {
-      each.motion.release();
-    }
-  }
+  for (Number& each : numbers_) each.motion.hold(each.is_commanded);
 }
 
 void Motion::release() noexcept {
-  for (Number& each : numbers_) each.motion.release();
+  for (Number& each : numbers_) each.motion.hold(false);
 }
 
 }  // namespace o80

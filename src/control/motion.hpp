@@ -67,7 +67,10 @@ class Motion {
   /// True if a limit can keep the actuator from a row.
   bool follows_rows() const noexcept { return follows_rows_; }
   /// True if a commanded number has a limit of acceleration.
-  bool accelerates() const noexcept;
+  bool accelerates() const noexcept {
+    return std::ranges::any_of(
+        numbers_, [](auto& each) { return each.is_commanded && each.motion.accelerates(); });
+  }
 
   /// Where the robot is: before step() or brake().
   void observe(const std::byte* observed) noexcept {
@@ -83,21 +86,16 @@ class Motion {
   Iteration last() const noexcept { return last_; }
   /// True if the state of the last step() was the target: nothing is left to follow.
   bool arrived() const noexcept {
-    return std::ranges::all_of(numbers_, [](const Number& each) { return each.motion.arrived(); });
+    return all([](auto& each) { return each.arrived(); });
   }
   /// True if bounds of an integral hold a number back, which stands, and the others have arrived.
   bool stands() const noexcept {
-    return has_integrals_ &&
-           std::ranges::all_of(
-               numbers_,
-               [](const Number& each) { return each.motion.stands() || each.motion.arrived(); }) &&
-           std::ranges::any_of(numbers_, [](const Number& each) { return each.motion.stands(); });
+    return has_integrals_ && any([](auto& each) { return each.stands(); }) &&
+           all([](auto& each) { return each.stands() || each.arrived(); });
   }
   /// True if such bounds have changed the motion since begin().
   bool was_held_back() const noexcept {
-    return has_integrals_ && std::ranges::any_of(numbers_, [](const Number& each) {
-             return each.motion.was_held_back();
-           });
+    return has_integrals_ && any([](auto& each) { return each.was_held_back(); });
   }
   /// Difference of the number at this offset to the iteration before: first (order 1) or second; 0
   /// for what does not move.
@@ -116,32 +114,23 @@ class Motion {
   /// One iteration of a motion that was made elsewhere, after restart(). Numbers whose differences
   /// a command would not use, or whose bytes are rounded, are at rest there.
   void trace(const std::byte* state) noexcept;
-  /// One iteration of braking. Numbers with a rest value go to it, unless they are held. True while
-  /// a number moves.
-  bool brake(std::byte* state) noexcept;
-  /// The same, but only for numbers with a rest value; the others are at `state`, the observed one.
-  bool brake_resting(std::byte* state) noexcept;
+  /// One iteration of braking. Numbers with a rest value go to it, unless they are held; if it
+  /// `follows`, the others are at `state`, the observed one. True while a number moves.
+  bool brake(std::byte* state, bool follows) noexcept;
   /// Holds the commanded numbers that have a rest value where they are, until release().
   void hold() noexcept;
   void release() noexcept;
   /// True if a number is held away from its rest value.
   bool holds() const noexcept {
-    return std::ranges::any_of(numbers_,
-                               [](const Number& each) { return each.motion.is_held_away(); });
+    return any([](auto& each) { return each.is_held_away(); });
   }
   /// True if braking would change nothing.
-  bool at_rest() const noexcept {
-    return std::ranges::all_of(numbers_, [](const Number& each) { return each.motion.at_rest(); });
+  bool at_rest(bool follows) const noexcept {
+    return all([&](auto& each) { return (follows && !each.has_rest()) || each.at_rest(); });
   }
   /// True if nothing moves, as far as limits of acceleration tell.
   bool rests() const noexcept {
-    return std::ranges::all_of(numbers_, [](const Number& each) { return each.motion.rests(); });
-  }
-  /// The same as at_rest(), for numbers with a rest value.
-  bool resting_at_rest() const noexcept {
-    return std::ranges::all_of(numbers_, [](const Number& each) {
-      return !each.motion.has_rest() || each.motion.at_rest();
-    });
+    return all([](auto& each) { return each.rests(); });
   }
 
  private:
@@ -156,13 +145,21 @@ class Motion {
     bool is_commanded = true;
   };
 
+  template <class Predicate>
+  bool all(Predicate&& predicate) const noexcept {
+    return std::ranges::all_of(numbers_, predicate, &Number::motion);
+  }
+  template <class Predicate>
+  bool any(Predicate&& predicate) const noexcept {
+    return std::ranges::any_of(numbers_, predicate, &Number::motion);
+  }
   std::byte* from() noexcept { return reinterpret_cast<std::byte*>(ends_.data()); }
   const std::byte* from() const noexcept {
     return reinterpret_cast<const std::byte*>(ends_.data());
   }
   const std::byte* target() const noexcept { return from() + stride_; }
   std::int64_t iterations_at(const Course& course) const noexcept;
-  void blend(std::byte* state) noexcept;
+  void blend(Iteration now, std::byte* state) noexcept;
   void publish(const Number& number, std::byte* state) const noexcept;
   void publish_exact(const Number& number, std::byte* state) const noexcept;
 
@@ -173,8 +170,6 @@ class Motion {
   std::vector<std::uint32_t> switches_;  // numbers that switch at the start
   Iteration first_ = 0;
   Iteration last_ = 0;
-  Iteration now_ = 0;
-  double iterations_ = 1.0;
   Profile profile_ = Profile::linear;
   const std::byte* observed_ = nullptr;
   bool has_integrals_ = false;

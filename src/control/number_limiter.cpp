@@ -30,9 +30,25 @@ struct NumberLimiter::Candidate {
   VelocityChange stop;
 };
 
+NumberLimiter::NumberLimiter(double minimum, double maximum, const Rates& rates) noexcept
+    : minimum_(minimum),
+      maximum_(maximum),
+      low_(minimum),
+      high_(maximum),
+      rates_(rates),
+      unlimited_(minimum <= -kHuge && maximum >= kHuge && !std::isfinite(rates.speed) &&
+                 !std::isfinite(rates.acceleration) && !std::isfinite(rates.jerk)) {
+  const double finest = std::min({rates.speed, rates.acceleration, rates.jerk});
+  tolerance_ = std::isfinite(finest) ? kLimitRounding * finest : 0.0;
+}
+
 void NumberLimiter::restart(double position) noexcept {
   position_ = position;
   begin();
+  stand();
+}
+
+void NumberLimiter::stand() noexcept {
   speed_ = acceleration_ = 0.0;
   stop_ = {};
   stopped_ = 0;
@@ -54,15 +70,16 @@ bool NumberLimiter::stays() const noexcept {
          std::abs(speed_ + acceleration_) <= rates_.jerk + tolerance;
 }
 
-NumberLimiter::Span NumberLimiter::stop() noexcept {
-  if (stays()) return {position_, position_};
+Span NumberLimiter::stop() const noexcept {
+  Span visited{position_, position_};
+  if (stays()) return visited;
   const VelocityChange stop(-speed_, acceleration_, rates_);
-  const double end = position_ + stop.displacement();
-  const double turn = position_ + stop.run_before_turn(speed_);
-  return {std::min({position_, turn, end}), std::max({position_, turn, end})};
+  visited.include(position_ + stop.run_before_turn(speed_));
+  visited.include(position_ + stop.displacement());
+  return visited;
 }
 
-bool NumberLimiter::stops_inside() noexcept {
+bool NumberLimiter::stops_inside() const noexcept {
   const Span visited = stop();
   return visited.low >= minimum_ - rounding() && visited.high <= maximum_ + rounding();
 }
@@ -84,11 +101,6 @@ bool NumberLimiter::pass_rounded(double next) noexcept {
   return keeps;
 }
 
-double NumberLimiter::tolerance_of(const Rates& rates) noexcept {
-  const double finest = std::min({rates.speed, rates.acceleration, rates.jerk});
-  return std::isfinite(finest) ? kLimitRounding * finest : 0.0;
-}
-
 /// Within the bounds, or no further outside than `before`.
 double NumberLimiter::inside(double position, double before) const noexcept {
   return std::clamp(position, std::min(low_, before), std::max(high_, before));
@@ -105,62 +117,48 @@ void NumberLimiter::move(double speed) noexcept {
 void NumberLimiter::forget_rounding() noexcept {
   const double nothing = slack() / 100.0 + 2.0 * rounding();
   const bool steady = !std::isfinite(rates_.jerk) || std::abs(acceleration_) <= nothing;
-  if (steady && std::abs(speed_) <= nothing) {
-    speed_ = acceleration_ = 0.0;
-    stop_ = {};
-    stopped_ = 0;
-    stop_known_ = true;
-  }
+  if (steady && std::abs(speed_) <= nothing) stand();
 }
 
-/// Without an acceleration limit: reaches the wanted position in this iteration, as far as speed
-/// and bounds allow. The same results as follow_with_acceleration(), bit for bit, with less work:
-/// most actuators have bounds only.
-Limit NumberLimiter::follow_at_once() noexcept {
-  const double before = position_;
-  const double speed = wanted_ - before;
-  const double up = std::max(0.0, high_ - before);
-  const double down = std::max(0.0, before - low_);
-  const double highest = std::min(rates_.speed, up);
-  const double lowest = std::max(-rates_.speed, -down);
-  const bool is_inside = speed <= highest && speed >= lowest;  // mostly, so no slack is needed
-  if (is_inside || (speed <= highest + slack() && speed >= lowest - slack())) {
-    move(speed);
-    position_ = inside(wanted_, before);
-    if (std::abs(speed_) <= slack() / 100.0 + 2.0 * rounding()) speed_ = acceleration_ = 0.0;
-    return position_ == wanted_ ? Limit::none : Limit::acceleration;
-  }
-  const bool upward = speed > highest;
-  const double bound = upward ? highest : lowest;
-  move(upward ? std::max(highest, lowest) : std::min(highest, lowest));
-  if (bound == (upward ? up : -down)) return upward ? Limit::maximum : Limit::minimum;
-  return Limit::speed;
+/// The speeds from which it stops inside its bounds, in both directions.
+Span NumberLimiter::speeds() const noexcept {
+  return {-speed_for(std::max(0.0, position_ - low_), rates_.acceleration),
+          speed_for(std::max(0.0, high_ - position_), rates_.acceleration)};
 }
 
-Limit NumberLimiter::follow_with_acceleration(double step, double lag) noexcept {
+/// The next accelerations that the limits of acceleration and jerk allow.
+Span NumberLimiter::accelerations() const noexcept {
+  return {std::max(acceleration_ - rates_.jerk, -rates_.acceleration),
+          std::min(acceleration_ + rates_.jerk, rates_.acceleration)};
+}
+
+Limit NumberLimiter::follow_without_jerk(double step, double lag) noexcept {
   // the wanted speed: reach the wanted position, or, from farther away, approach it at the highest
-  // speed from which it can stop there
+  // speed from which it can stop there. Without a limit of acceleration it is always within reach
   const double closing = speed_for(std::abs(lag), rates_.acceleration);
   const bool within_reach = closing >= std::abs(lag);
   const double speed = within_reach ? wanted_ - position_ : step - std::copysign(closing, lag);
-  const bool exact = within_reach;
 
   // the allowed speeds
-  const double up = speed_for(std::max(0.0, high_ - position_), rates_.acceleration);
-  const double down = speed_for(std::max(0.0, position_ - low_), rates_.acceleration);
-  const double highest = std::min({speed_ + rates_.acceleration, rates_.speed, up});
-  const double lowest = std::max({speed_ - rates_.acceleration, -rates_.speed, -down});
-  if (speed <= highest + slack() && speed >= lowest - slack()) {
+  const Span stopping = speeds();
+  const double highest = std::min({speed_ + rates_.acceleration, rates_.speed, stopping.high});
+  const double lowest = std::max({speed_ - rates_.acceleration, -rates_.speed, stopping.low});
+  const bool is_inside = speed <= highest && speed >= lowest;  // mostly, so no slack is needed
+  if (is_inside || (speed <= highest + slack() && speed >= lowest - slack())) {
     const double before = position_;
     move(speed);
-    if (exact) position_ = inside(wanted_, before);
-    if (exact) forget_rounding();
+    if (within_reach) {
+      position_ = inside(wanted_, before);
+      forget_rounding();
+    }
     return position_ == wanted_ ? Limit::none : Limit::acceleration;
   }
   const bool upward = speed > highest;
   const double bound = upward ? highest : lowest;
   move(upward ? std::max(highest, lowest) : std::min(highest, lowest));
-  if (bound == (upward ? up : -down)) return upward ? Limit::maximum : Limit::minimum;
+  if (bound == (upward ? stopping.high : stopping.low)) {
+    return upward ? Limit::maximum : Limit::minimum;
+  }
   return std::abs(bound) == rates_.speed ? Limit::speed : Limit::acceleration;
 }
 
@@ -228,8 +226,7 @@ void NumberLimiter::know_stop() noexcept {
 Limit NumberLimiter::follow_with_jerk(double step, double lag) noexcept {
   know_stop();
   const double tolerance = slack();
-  const double low = std::max(acceleration_ - rates_.jerk, -rates_.acceleration);
-  const double high = std::min(acceleration_ + rates_.jerk, rates_.acceleration);
+  const auto [low, high] = accelerations();
 
   // reach the wanted position exactly, if it can stay there
   const double wanted = wanted_ - position_ - speed_;
@@ -295,15 +292,13 @@ void NumberLimiter::place(const Moment& now) noexcept {
 
 Limit NumberLimiter::nearest_speed(double wanted) noexcept {
   if (std::isfinite(rates_.jerk)) {
-    const double low = std::max(acceleration_ - rates_.jerk, -rates_.acceleration);
-    const double high = std::min(acceleration_ + rates_.jerk, rates_.acceleration);
+    const auto [low, high] = accelerations();
     const Limit reason = accelerate(std::clamp(wanted - speed_, low, high));
     return reason == Limit::minimum || reason == Limit::maximum ? reason : Limit::none;
   }
-  const double up = speed_for(std::max(0.0, high_ - position_), rates_.acceleration);
-  const double down = speed_for(std::max(0.0, position_ - low_), rates_.acceleration);
-  const double highest = std::max(up, speed_ - rates_.acceleration);
-  const double lowest = std::min(-down, speed_ + rates_.acceleration);
+  const Span stopping = speeds();
+  const double highest = std::max(stopping.high, speed_ - rates_.acceleration);
+  const double lowest = std::min(stopping.low, speed_ + rates_.acceleration);
   move(std::clamp(wanted, lowest, highest));
   if (wanted > highest + slack()) return Limit::maximum;
   return wanted < lowest - slack() ? Limit::minimum : Limit::none;

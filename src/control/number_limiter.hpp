@@ -21,19 +21,15 @@ namespace o80 {
 /// Realtime: yes, bounded time.
 class NumberLimiter {
  public:
-  NumberLimiter(double minimum, double maximum, const Rates& rates) noexcept
-      : minimum_(minimum),
-        maximum_(maximum),
-        low_(minimum),
-        high_(maximum),
-        rates_(rates),
-        unlimited_(minimum <= -kHuge && maximum >= kHuge && !std::isfinite(rates.speed) &&
-                   !std::isfinite(rates.acceleration) && !std::isfinite(rates.jerk)),
-        tolerance_(tolerance_of(rates)) {}
+  NumberLimiter(double minimum, double maximum, const Rates& rates) noexcept;
 
   const Rates& rates() const noexcept { return rates_; }
   double minimum() const noexcept { return minimum_; }
   double maximum() const noexcept { return maximum_; }
+  /// False outside minimum and maximum.
+  bool admits(double position) const noexcept {
+    return !(position < minimum_ || position > maximum_);
+  }
   double position() const noexcept { return position_; }
   Moment moment() const noexcept { return {position_, speed_, acceleration_}; }
   /// True if braking would change nothing.
@@ -41,13 +37,9 @@ class NumberLimiter {
   /// True if braking would not move it: it may stop at once.
   bool stays() const noexcept;
   /// Positions that the shortest stop visits.
-  struct Span {
-    double low;
-    double high;
-  };
-  Span stop() noexcept;
+  Span stop() const noexcept;
   /// True if these lie between minimum and maximum.
-  bool stops_inside() noexcept;
+  bool stops_inside() const noexcept;
 
   /// Sets the position, at rest; it may be outside the bounds.
   void restart(double position) noexcept;
@@ -99,9 +91,8 @@ class NumberLimiter {
     if (unlimited_ && std::abs(wanted) < kHuge && std::abs(position_) < kHuge) {
       return follow_freely();
     }
-    if (!std::isfinite(rates_.acceleration) && !std::isfinite(rates_.jerk)) return follow_at_once();
     return std::isfinite(rates_.jerk) ? follow_with_jerk(step, lag)
-                                      : follow_with_acceleration(step, lag);
+                                      : follow_without_jerk(step, lag);
   }
   /// One iteration of braking, as fast as the limits allow.
   void brake() noexcept;
@@ -118,7 +109,7 @@ class NumberLimiter {
   // two numbers below it are not too far apart for a double
   static constexpr double kHuge = 0.25 * std::numeric_limits<double>::max();
 
-  /// What follow_at_once() does with a number that has a rest value only.
+  /// What follow_without_jerk() does with a number that has a rest value only.
   Limit follow_freely() noexcept {
     const double speed = wanted_ - position_;
     scale_ = std::max(scale_, std::abs(position_ + speed));
@@ -129,8 +120,7 @@ class NumberLimiter {
     return Limit::none;
   }
   bool pass_rounded(double next) noexcept;
-  Limit follow_at_once() noexcept;
-  Limit follow_with_acceleration(double step, double lag) noexcept;
+  Limit follow_without_jerk(double step, double lag) noexcept;
   Limit follow_with_jerk(double step, double lag) noexcept;
   Limit accelerate(double wanted) noexcept;
   Candidate candidate(double acceleration) const noexcept;
@@ -140,8 +130,10 @@ class NumberLimiter {
   void move(double speed) noexcept;
   void know_stop() noexcept;
   void slow_down() noexcept;
+  void stand() noexcept;
   void forget_rounding() noexcept;
-  static double tolerance_of(const Rates& rates) noexcept;
+  Span speeds() const noexcept;
+  Span accelerations() const noexcept;
   double inside(double position, double before) const noexcept;
   /// Rounding of the sums of a motion.
   double rounding() const noexcept {

@@ -38,59 +38,42 @@ std::int64_t NumberMotion::propose(const Asked& asked) noexcept {
 }
 
 std::int64_t NumberMotion::plan_for(const Asked& asked) noexcept {
-  const NumberLimiter::Span stop = guard_.stop();
-  NumberLimiter::Span span = stop;
-  span.low = std::min(span.low, asked.target);
-  span.high = std::max(span.high, asked.target);
-  const double from = asked.start.value_or(guard_.position());
-  span.low = std::min(span.low, from);
-  span.high = std::max(span.high, from);
-  guard_.begin(span);
+  PlanTask task{asked, asked.start ? Moment{*asked.start} : guard_.moment(), guard_.stop(),
+                guard_.rates(), asked.start || guard_.stays()};
+  task.span.include(asked.target);
+  task.span.include(task.from.position);
+  guard_.begin(task.span);
+  if (!accelerates()) task.span.include(former_target_);
 
-  PlanTask task;
-  task.start = asked.start ? Moment{*asked.start, 0.0, 0.0} : guard_.moment();
-  task.line_start = asked.line_start;
-  task.target = asked.target;
-  task.low = span.low;
-  task.high = span.high;
-  if (!accelerates()) {
-    task.low = std::min(task.low, former_target_);
-    task.high = std::max(task.high, former_target_);
-  }
-  task.rates = guard_.rates();
-  task.cruise = asked.cruise;
-  task.profile = asked.profile;
-  task.stays = asked.start || guard_.stays();
   planned_ = true;
   // without limits it jumps to where it starts, which is no speed
-  jumps_ = asked.start && !has_rates() && from >= guard_.minimum() && from <= guard_.maximum();
-  start_ = from;
+  const double from = task.from.position;
+  jumps_ = asked.start && !has_rates() && guard_.admits(from);
   const bool starts_elsewhere =
       asked.start && !jumps_ && (from != guard_.position() || !guard_.at_rest());
-  follows_ = leaves_ || starts_elsewhere || guard_.position() < guard_.minimum() ||
-             guard_.position() > guard_.maximum();
-  return plan_.propose(task, asked.iterations);
+  follows_ = leaves_ || starts_elsewhere || !guard_.admits(guard_.position());
+  return plan_.propose(task);
 }
 
 void NumberMotion::settle(std::int64_t iterations) noexcept {
   if (std::exchange(jumps_at_once_, false)) {
     if (iterations == 1) {
       planned_ = true;
-      follows_ = guard_.position() < guard_.minimum() || guard_.position() > guard_.maximum();
+      follows_ = !guard_.admits(guard_.position());
       return plan_.line(asked_.target, asked_.target);
     }
     plan_for(asked_);
   }
-  if (jumps_) guard_.restart(start_);
+  if (jumps_) guard_.restart(plan_.task().from.position);
   plan_.settle(iterations);
 }
 
 void NumberMotion::line(double start, double target) noexcept {
   if (!planned_) {
-    const NumberLimiter::Span stop = guard_.stop();
-    guard_.begin({std::min(stop.low, start), std::max(stop.high, start)});
-    planned_ = true;
-    follows_ = true;
+    Span stop = guard_.stop();
+    stop.include(start);
+    guard_.begin(stop);
+    planned_ = follows_ = true;
   }
   guard_.widen(target);
   plan_.line(start, target);
@@ -98,8 +81,7 @@ void NumberMotion::line(double start, double target) noexcept {
 
 void NumberMotion::follow_as_sent(double target) noexcept {
   if (!planned_) guard_.begin();
-  planned_ = true;
-  follows_ = true;
+  planned_ = follows_ = true;
   plan_.line(target, target);
 }
 

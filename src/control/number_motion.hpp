@@ -53,15 +53,7 @@ class NumberMotion {
   /// A command begins: notes from which motion.
   void begin() noexcept;
 
-  /// How a command asks for its target.
-  struct Asked {
-    double target = 0.0;
-    double line_start = 0.0;      // where a straight line begins
-    std::optional<double> start;  // a place to start from at rest, instead of its own
-    std::int64_t iterations = 0;  // 0: as few as the limits allow
-    double cruise = std::numeric_limits<double>::infinity();  // speed asked for [1/iteration]
-    Profile profile = Profile::linear;
-  };
+  using Asked = o80::Asked;
   /// Proposes a number of iterations for a plan to rest at the target.
   std::int64_t propose(const Asked& asked) noexcept;
   /// Then plans it for `iterations`, at least those.
@@ -98,9 +90,8 @@ class NumberMotion {
   bool brake() noexcept;
 
   bool has_rest() const noexcept { return rest_.has_value(); }
-  /// Stays where it is, away from its rest value, until release().
-  void hold() noexcept { held_ = rest_.has_value(); }
-  void release() noexcept { held_ = false; }
+  /// Stays where it is, away from its rest value, until hold(false).
+  void hold(bool holds) noexcept { held_ = holds && rest_.has_value(); }
   bool is_held_away() const noexcept { return held_ && guard_.position() != *rest_; }
   /// True if braking would change nothing.
   bool at_rest() const noexcept {
@@ -129,8 +120,7 @@ class NumberMotion {
   bool held_ = false;
   bool jumps_at_once_ = false;  // propose() needed no plan
   Asked asked_;                 // then
-  bool jumps_ = false;          // the plan begins at `start_`
-  double start_ = 0.0;
+  bool jumps_ = false;          // the plan begins at its start
   // a stop from where it was would leave the bounds: goes on with the former plan until it would
   // not
   bool leaves_ = false;

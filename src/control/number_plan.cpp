@@ -43,9 +43,10 @@ void NumberPlan::line(double start, double target) noexcept {
   line_for(1);
 }
 
-std::int64_t NumberPlan::propose(const PlanTask& task, std::int64_t asked) noexcept {
+std::int64_t NumberPlan::propose(const PlanTask& task) noexcept {
   task_ = task;
   has_fastest_ = false;
+  const std::int64_t asked = task.iterations;
   const bool is_smooth = task.profile == Profile::minimum_jerk;
   if (asked > 0 && is_smooth && std::isfinite(task.rates.acceleration) && smooth(asked)) {
     return asked;
@@ -61,18 +62,17 @@ std::int64_t NumberPlan::propose(const PlanTask& task, std::int64_t asked) noexc
 std::int64_t NumberPlan::fewest() noexcept {
   Rates rates = task_.rates;
   rates.speed = std::min(rates.speed, task_.cruise);
-  const double distance = std::abs(task_.target - task_.start.position);
+  const double distance = std::abs(task_.target - task_.from.position);
   if (!std::isfinite(rates.acceleration)) {
     return iterations_of(task_.target - task_.line_start, rates.speed);
   }
   // no motion is shorter; beyond the range of the plan nothing is computed
   const double least =
       std::max({distance / rates.speed, std::sqrt(distance / rates.acceleration),
-                std::cbrt(distance / rates.jerk), std::abs(task_.start.speed) / rates.acceleration,
+                std::cbrt(distance / rates.jerk), std::abs(task_.from.speed) / rates.acceleration,
                 rates.acceleration / rates.jerk / 2.0});
   if (!(least <= static_cast<double>(kLongestPlan))) return kLongestPlan + 1;
-  fastest_ = FastestMotion(task_.start.position, task_.start.speed, task_.start.acceleration,
-                           task_.target, rates);
+  fastest_ = FastestMotion(task_.from, task_.target, rates);
   has_fastest_ = true;
   return fastest_.iterations();
 }
@@ -97,13 +97,13 @@ std::int64_t NumberPlan::fewest_smooth(std::int64_t least) noexcept {
 bool NumberPlan::fits(const SmoothMotion& motion) const noexcept {
   const SmoothMotion::Extremes most = motion.extremes();
   const double speed =
-      std::min(task_.rates.speed, std::max(task_.cruise, std::abs(task_.start.speed)));
+      std::min(task_.rates.speed, std::max(task_.cruise, std::abs(task_.from.speed)));
   const auto within = [](double value, double limit) {
     return value <= limit * (1.0 + kPlanRounding / 2.0);
   };
   const double rounding = 4.0 * std::numeric_limits<double>::epsilon() *
-                          std::max(std::abs(task_.low), std::abs(task_.high));
-  return most.low >= task_.low - rounding && most.high <= task_.high + rounding &&
+                          std::max(std::abs(task_.span.low), std::abs(task_.span.high));
+  return most.low >= task_.span.low - rounding && most.high <= task_.span.high + rounding &&
          within(most.speed, speed) && within(most.acceleration, task_.rates.acceleration) &&
          within(most.jerk, task_.rates.jerk);
 }
@@ -111,12 +111,12 @@ bool NumberPlan::fits(const SmoothMotion& motion) const noexcept {
 /// A number that may stop at once can begin as from rest, if the step from its present speed to the
 /// first one keeps the limits too.
 bool NumberPlan::fits_after_stop(const SmoothMotion& motion) const noexcept {
-  const double first = motion.position(1.0) - task_.start.position;
+  const double first = motion.position(1.0) - task_.from.position;
   const double second = motion.position(2.0) - motion.position(1.0);
-  const double a1 = first - task_.start.speed;
+  const double a1 = first - task_.from.speed;
   const double a2 = second - first;
   return std::abs(a1) <= task_.rates.acceleration &&
-         std::abs(a1 - task_.start.acceleration) <= task_.rates.jerk &&
+         std::abs(a1 - task_.from.acceleration) <= task_.rates.jerk &&
          std::abs(a2 - a1) <= task_.rates.jerk && fits(motion);
 }
 
@@ -124,13 +124,13 @@ bool NumberPlan::fits_after_stop(const SmoothMotion& motion) const noexcept {
 bool NumberPlan::smooth(std::int64_t iterations) noexcept {
   smooth_for_ = iterations;
   shape_ = Shape::smooth;
-  smooth_ = SmoothMotion(task_.start, task_.target, iterations);
+  smooth_ = SmoothMotion(task_.from, task_.target, iterations);
   if (fits(smooth_)) return true;
-  const bool moves = task_.start.speed != 0.0 || task_.start.acceleration != 0.0;
+  const bool moves = task_.from.speed != 0.0 || task_.from.acceleration != 0.0;
   if (!std::isfinite(task_.rates.acceleration) && moves && stop_then_smooth(iterations))
     return true;
   if (!task_.stays || !moves) return false;
-  smooth_ = SmoothMotion({task_.start.position, 0.0, 0.0}, task_.target, iterations);
+  smooth_ = SmoothMotion({task_.from.position}, task_.target, iterations);
   return fits_after_stop(smooth_);
 }
 
@@ -140,12 +140,12 @@ bool NumberPlan::stop_then_smooth(std::int64_t iterations) noexcept {
   stop_ = iterations / 2;
   for (int i = 0; i < kMostHalvings && stop_ > 0; ++i, stop_ /= 2) {
     const auto r = static_cast<double>(stop_);
-    const double rest = task_.start.position + r * task_.start.speed / 2.0 +
-                        r * r * task_.start.acceleration / 12.0;
-    if (!(rest >= task_.low && rest <= task_.high)) continue;
-    to_stop_ = SmoothMotion(task_.start, rest, stop_);
+    const double rest =
+        task_.from.position + r * task_.from.speed / 2.0 + r * r * task_.from.acceleration / 12.0;
+    if (!(rest >= task_.span.low && rest <= task_.span.high)) continue;
+    to_stop_ = SmoothMotion(task_.from, rest, stop_);
     if (!fits(to_stop_)) continue;
-    smooth_ = SmoothMotion({rest, 0.0, 0.0}, task_.target, iterations - stop_);
+    smooth_ = SmoothMotion({rest}, task_.target, iterations - stop_);
     if (!fits(smooth_)) continue;
     shape_ = Shape::stop_first;
     return true;
@@ -192,7 +192,7 @@ double NumberPlan::next() noexcept {
 }
 
 Limit NumberPlan::slowest() const noexcept {
-  const double distance = std::abs(task_.target - task_.start.position);
+  const double distance = std::abs(task_.target - task_.from.position);
   const double by_speed = distance / task_.rates.speed;
   const double by_acceleration = 2.0 * std::sqrt(distance / task_.rates.acceleration);
   const double by_jerk = std::cbrt(32.0 * distance / task_.rates.jerk);

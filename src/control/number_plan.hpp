@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <optional>
 
 #include "control/fastest_motion.hpp"
 #include "control/smooth_motion.hpp"
@@ -27,18 +28,23 @@ inline constexpr std::int64_t kLongestPlan = std::int64_t{1} << 31;
 /// The iterations of a distance at a speed [1/iteration], at least 1. Rounding adds none.
 std::int64_t iterations_of(double distance, double speed) noexcept;
 
-/// What a plan is for: one number, from its present motion to rest at a target.
-struct PlanTask {
-  Moment start;
-  double line_start = 0.0;  // where a straight line begins
+/// How a command asks for the target of one number.
+struct Asked {
   double target = 0.0;
-  // a smooth motion stays between these: position, shortest stop (without a limit of acceleration:
-  // former target), and target
-  double low = 0.0;
-  double high = 0.0;
-  Rates rates{};
+  double line_start = 0.0;      // where a straight line begins
+  std::optional<double> start;  // a place to start from at rest, instead of its own
+  std::int64_t iterations = 0;  // 0: as few as the limits allow
   double cruise = std::numeric_limits<double>::infinity();  // speed asked for [1/iteration]
   Profile profile = Profile::linear;
+};
+
+/// What a plan is for: one number, from its present motion to rest at a target.
+struct PlanTask : Asked {
+  Moment from;
+  // a smooth motion stays in it: position, shortest stop (without a limit of acceleration: former
+  // target), and target
+  Span span;
+  Rates rates{};
   bool stays = true;  // it may stop at once
 };
 
@@ -48,9 +54,9 @@ struct PlanTask {
 /// Realtime: yes, bounded time.
 class NumberPlan {
  public:
-  /// Returns the number of iterations that it takes: `asked` (0: none), or the fewest that the
-  /// limits allow. More than kLongestPlan: it cannot be planned.
-  std::int64_t propose(const PlanTask& task, std::int64_t asked) noexcept;
+  /// Returns the number of iterations that it takes: those asked for, or the fewest that the limits
+  /// allow. More than kLongestPlan: it cannot be planned.
+  std::int64_t propose(const PlanTask& task) noexcept;
   /// Plans the motion for `iterations`, at least those of propose().
   void settle(std::int64_t iterations) noexcept;
   /// A straight line that no limit changes; line_for() sets its length.
@@ -62,6 +68,7 @@ class NumberPlan {
 
   /// The position in the next iteration; from the last one on the exact target.
   double next() noexcept;
+  const PlanTask& task() const noexcept { return task_; }
   double target() const noexcept { return task_.target; }
   /// For a straight line: the share of the way that is done.
   double share() const noexcept {

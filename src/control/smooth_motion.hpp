@@ -6,13 +6,6 @@
 
 namespace o80 {
 
-/// Position of one number and its differences: v(i) = p(i) - p(i-1), a(i) = v(i) - v(i-1).
-struct Moment {
-  double position = 0.0;
-  double speed = 0.0;
-  double acceleration = 0.0;
-};
-
 /// The minimum-jerk motion of one number to rest at a target in n iterations: the polynomial of
 /// degree 5 through the last three positions (iterations -2, -1, 0) and, in the iterations n, n + 1
 /// and n + 2, the target. Of all motions in n iterations from there to rest it has the least sum of

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 namespace o80 {
@@ -9,6 +10,23 @@ struct Rates {
   double speed;         // limit of v(i) = p(i) - p(i-1)
   double acceleration;  // limit of a(i) = v(i) - v(i-1)
   double jerk;          // limit of a(i) - a(i-1)
+};
+
+/// Position of one number and its differences: v(i) = p(i) - p(i-1), a(i) = v(i) - v(i-1).
+struct Moment {
+  double position = 0.0;
+  double speed = 0.0;
+  double acceleration = 0.0;
+};
+
+/// Positions from `low` to `high`.
+struct Span {
+  double low = 0.0;
+  double high = 0.0;
+  void include(double position) noexcept {
+    low = std::min(low, position);
+    high = std::max(high, position);
+  }
 };
 
 /// The shortest change of a speed by `change` that ends with acceleration 0, in whole iterations.
