@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -34,12 +36,18 @@ class BatchBuilder {
   };
   std::uint32_t group(std::span<const Member> members, std::span<const std::int64_t> times = {},
                       std::uint32_t rows = 1);
-  std::uint32_t purge(std::uint16_t actuator_or_every);
+  std::uint32_t purge(std::uint16_t actuator_or_every) {
+    return add({.kind = RecordKind::purge, .actuator = actuator_or_every});
+  }
   /// Purges only commands of this lane.
-  std::uint32_t purge_own(std::uint16_t actuator_or_every);
-  std::uint32_t request(std::uint16_t index, std::span<const std::byte> payload);
-  std::uint32_t take_control();
-  std::uint32_t release_control();
+  std::uint32_t purge_own(std::uint16_t actuator_or_every) {
+    return add({.kind = RecordKind::purge, .only_own = 1, .actuator = actuator_or_every});
+  }
+  std::uint32_t request(std::uint16_t index, std::span<const std::byte> payload) {
+    return add({.kind = RecordKind::request, .actuator = index}, payload);
+  }
+  std::uint32_t take_control() { return add({.kind = RecordKind::take_control}); }
+  std::uint32_t release_control() { return add({.kind = RecordKind::release_control}); }
   /// Clears halts up to this number.
   std::uint32_t resume(std::uint64_t number, bool accept_reading = false);
 
@@ -50,25 +58,30 @@ class BatchBuilder {
   void clear();
   bool empty() const noexcept { return records_ == 0; }
   std::uint32_t records() const noexcept { return records_; }
-  bool has_commands() const noexcept { return commands_ > 0; }
-  std::uint32_t requests() const noexcept { return requests_; }
-  std::uint32_t control_orders() const noexcept { return control_orders_; }
+  bool has_commands() const noexcept { return of(RecordKind::command) + of(RecordKind::group) > 0; }
+  std::uint32_t requests() const noexcept {
+    return of(RecordKind::request) + of(RecordKind::resume);
+  }
+  std::uint32_t control_orders() const noexcept {
+    return of(RecordKind::take_control) + of(RecordKind::release_control);
+  }
   /// Number of blocks of the batch.
   std::uint64_t blocks() const noexcept { return blocks_.size(); }
 
  private:
   std::byte* open(const RecordHead& head, std::uint64_t payload_bytes);
-  void add_command(const RecordHead& head, std::span<const std::uint64_t> mask,
+  std::uint32_t add(const RecordHead& head, std::span<const std::byte> payload = {});
+  void add_command(RecordHead head, RecordKind kind, std::span<const std::uint64_t> mask,
                    std::span<const std::int64_t> times, std::uint32_t rows,
                    std::span<const std::byte> states);
-  std::size_t set_id(std::size_t block, CommandId id);
-  bool is_express(const BatchRecord& batch) const noexcept;
+  std::uint32_t of(RecordKind kind) const noexcept {
+    return counts_[static_cast<std::size_t>(kind)];
+  }
 
   std::vector<Block> blocks_;  // the first is the BatchRecord
-  std::uint32_t records_ = 0;
-  std::uint32_t commands_ = 0;
-  std::uint32_t requests_ = 0;
-  std::uint32_t control_orders_ = 0;
+  std::uint32_t records_ = 0;  // without members
+  std::array<std::uint32_t, static_cast<std::size_t>(RecordKind::member) + 1>
+      counts_{};  // of a kind
 };
 
 }  // namespace o80
