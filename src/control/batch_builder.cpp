@@ -10,6 +10,15 @@ namespace o80 {
 
 BatchBuilder::BatchBuilder() : blocks_(1) {}
 
+/// `option`: only_own of a purge, accepts of a resume.
+RecordHead BatchBuilder::head_of(RecordKind kind, std::uint16_t actuator, std::uint8_t option) {
+  RecordHead head;
+  head.kind = kind;
+  head.actuator = actuator;
+  head.only_own = option;
+  return head;
+}
+
 std::byte* BatchBuilder::open(const RecordHead& head, std::uint64_t payload_bytes) {
   const std::size_t first = blocks_.size();
   const std::uint64_t all = first + blocks_of(payload_bytes);
@@ -35,7 +44,7 @@ std::uint32_t BatchBuilder::add(const RecordHead& head, std::span<const std::byt
 }
 
 std::uint32_t BatchBuilder::resume(std::uint64_t number, bool accept_reading) {
-  RecordHead head{.kind = RecordKind::resume, .accepts = accept_reading};
+  RecordHead head = head_of(RecordKind::resume, 0, accept_reading ? 1 : 0);
   head.amount = static_cast<std::int64_t>(number);
   return add(head);
 }

@@ -37,17 +37,17 @@ class BatchBuilder {
   std::uint32_t group(std::span<const Member> members, std::span<const std::int64_t> times = {},
                       std::uint32_t rows = 1);
   std::uint32_t purge(std::uint16_t actuator_or_every) {
-    return add({.kind = RecordKind::purge, .actuator = actuator_or_every});
+    return add(head_of(RecordKind::purge, actuator_or_every));
   }
   /// Purges only commands of this lane.
   std::uint32_t purge_own(std::uint16_t actuator_or_every) {
-    return add({.kind = RecordKind::purge, .only_own = 1, .actuator = actuator_or_every});
+    return add(head_of(RecordKind::purge, actuator_or_every, 1));
   }
   std::uint32_t request(std::uint16_t index, std::span<const std::byte> payload) {
-    return add({.kind = RecordKind::request, .actuator = index}, payload);
+    return add(head_of(RecordKind::request, index), payload);
   }
-  std::uint32_t take_control() { return add({.kind = RecordKind::take_control}); }
-  std::uint32_t release_control() { return add({.kind = RecordKind::release_control}); }
+  std::uint32_t take_control() { return add(head_of(RecordKind::take_control)); }
+  std::uint32_t release_control() { return add(head_of(RecordKind::release_control)); }
   /// Clears halts up to this number.
   std::uint32_t resume(std::uint64_t number, bool accept_reading = false);
 
@@ -69,6 +69,7 @@ class BatchBuilder {
   std::uint64_t blocks() const noexcept { return blocks_.size(); }
 
  private:
+  static RecordHead head_of(RecordKind kind, std::uint16_t actuator = 0, std::uint8_t option = 0);
   std::byte* open(const RecordHead& head, std::uint64_t payload_bytes);
   std::uint32_t add(const RecordHead& head, std::span<const std::byte> payload = {});
   void add_command(RecordHead head, RecordKind kind, std::span<const std::uint64_t> mask,

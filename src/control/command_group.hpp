@@ -24,9 +24,10 @@ struct CommandGroup {
   Status end = Status::none;  // the first end status of a member that is not completed
   Reason reason = Reason::none;
   std::uint8_t detail = 0;
-  std::uint8_t active : 1 = 0;   // reported as active
-  std::uint8_t offered : 2 = 0;  // a CommandGroups::Offer
-  std::uint8_t decided : 1 = 0;  // its members have nothing left to agree on
+  std::uint8_t active : 1 = 0;    // reported as active
+  std::uint8_t offered : 2 = 0;   // a CommandGroups::Offer
+  std::uint8_t decided : 1 = 0;   // its members have nothing left to agree on
+  std::uint8_t was_late : 1 = 0;  // kOffers is the delay of the latest member that has ended
 };
 static_assert(sizeof(CommandGroup) == kBlockBytes - sizeof(RecordHead));
 
@@ -75,20 +76,17 @@ class CommandGroups {
     group.offered = static_cast<std::uint8_t>(kind) & 3U;
     stamp(head, kOffers) = low(iteration);
   }
-  /// The members have nothing left to agree on. The word of the offers now keeps by how much its
-  /// members are late.
-  void decide(BlockIndex head) noexcept {
-    at(head).decided = 1;
-    stamp(head, kOffers) = 0;
-  }
+  /// A decided group needs no offers: their word keeps by how much its members are late.
   void note_late(BlockIndex head, std::int64_t late) noexcept {
-    if (at(head).decided == 0) return;
-    std::uint32_t& latest = stamp(head, kOffers);
-    latest =
-        std::max(latest, static_cast<std::uint32_t>(std::clamp<std::int64_t>(late, 0, 0xFFFF)));
+    CommandGroup& group = at(head);
+    if (late <= 0 || group.decided == 0) return;
+    const std::uint32_t known = group.was_late != 0 ? stamp(head, kOffers) : 0;
+    group.was_late = 1;
+    stamp(head, kOffers) = static_cast<std::uint32_t>(
+        std::max<std::int64_t>(known, std::min<std::int64_t>(late, 0xFFFF)));
   }
   std::int64_t late(BlockIndex head) noexcept {
-    return at(head).decided != 0 ? stamp(head, kOffers) : 0;
+    return at(head).was_late != 0 ? stamp(head, kOffers) : 0;
   }
   std::int64_t agreed(const RecordHead& member) const noexcept {
     return pool_->head(head_of(member)).amount;

@@ -93,7 +93,7 @@ void Ledger::activate(BlockIndex record, Iteration iteration, const Outcome& out
     groups_.at(group).active = 1;
     id = pool_.head(group).id;
     if (head.rows == 1) {
-      groups_.decide(group);
+      groups_.at(group).decided = 1;
       --undecided_groups_;
     }
   }

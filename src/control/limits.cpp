@@ -1,5 +1,6 @@
 #include "control/limits.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <limits>
@@ -66,6 +67,17 @@ std::string of_number(const Schema& schema, std::uint32_t actuator, const Number
   return (name.path.empty() ? "" : "'" + name.path + "' of ") + of_actuator(schema, actuator);
 }
 
+template <class Row>
+std::vector<std::string> names_of(const std::vector<Row>& rows) {
+  std::vector<std::string> names;
+  for (const Row& row : rows) names.push_back(row.name.str());
+  return names;
+}
+
+const std::uint64_t* bits_of(std::span<const std::uint64_t> mask) {
+  return mask.empty() ? nullptr : mask.data();
+}
+
 std::string labels_of(const Schema& schema, const FieldRow& field) {
   if (field.kind == Kind::boolean) return "0, 1";
   std::vector<std::string> labels;
@@ -87,63 +99,33 @@ Profile usual_profile(const Schema& schema, const ActuatorRow& actuator) noexcep
   return Profile::linear;
 }
 
-CommandCheck::CommandCheck(const Schema& schema) : schema_(schema), layouts_(schema.types.size()) {
-  for (const ActuatorRow& actuator : schema.actuators) {
-    auto& layout = layouts_.at(actuator.type);
-    if (!layout) layout.emplace(schema, actuator.type);
-  }
-  for (const RequestRow& request : schema.requests) {
-    if (request.type == kNoType) continue;
-    auto& layout = layouts_.at(request.type);
-    if (!layout) layout.emplace(schema, request.type);
-  }
+TargetLimits::TargetLimits(const Schema& schema, const Layouts& layouts) {
   constexpr double kLargest = std::numeric_limits<double>::max();
-  for (const LimitRow& limit : schema.limits) {
-    ranges_.push_back({std::fmax(limit.minimum, -kLargest), std::fmin(limit.maximum, kLargest)});
+  for (const ActuatorRow& row : schema.actuators) {
+    actuators_.push_back({&*layouts.at(row.type), ranges_.size()});
+    for (std::uint32_t i = 0; i < row.limits; ++i) {
+      const LimitRow& limit = schema.limits.at(row.first_limit + i);
+      ranges_.push_back(
+          {std::fmax(limit.minimum, -kLargest), std::fmin(limit.maximum, kLargest),
+           !layouts[row.type]->numbers()[i].moves() || std::isfinite(limit.acceleration)});
+    }
   }
 }
 
-std::uint32_t CommandCheck::actuator(std::string_view name) const {
-  for (std::size_t i = 0; i < schema_.actuators.size(); ++i) {
-    if (schema_.actuators[i].name.view() == name) return static_cast<std::uint32_t>(i);
-  }
-  std::vector<std::string> known;
-  known.reserve(schema_.actuators.size());
-  for (const ActuatorRow& row : schema_.actuators) known.push_back(row.name.str());
-  refuse_actuator("'" + std::string(name) + "'" + names_instead(name, known));
-}
-
-std::uint32_t CommandCheck::actuator(std::int64_t index) const {
-  const auto count = static_cast<std::int64_t>(schema_.actuators.size());
-  if (index >= 0 && index < count) return static_cast<std::uint32_t>(index);
-  std::vector<std::string> known;
-  known.reserve(schema_.actuators.size());
-  for (std::int64_t i = 0; i < count; ++i) {
-    known.push_back(schema_.actuators[static_cast<std::size_t>(i)].name.str() + " (" +
-                    std::to_string(i) + ")");
-  }
-  refuse_actuator(std::to_string(index) + names_instead("", known));
-}
-
-void CommandCheck::refuse_actuator(const std::string& which) const {
-  const std::string robot = "'" + schema_.head.robot.str() + "' has no actuator";
-  throw InvalidArgument(schema_.actuators.empty() ? robot + "s" : robot + " " + which);
-}
-
-bool CommandCheck::within(std::uint32_t actuator, const std::byte* state,
-                          const std::uint64_t* mask) const noexcept {
-  const ActuatorRow& row = schema_.actuators[actuator];
-  const StateLayout& layout = *layouts_[row.type];
-  const Range* ranges = ranges_.data() + row.first_limit;
+bool TargetLimits::admit(std::uint32_t actuator, const std::byte* state,
+                         const std::uint64_t* mask) const noexcept {
+  const StateLayout& layout = *actuators_[actuator].layout;
+  const Range* ranges = ranges_.data() + actuators_[actuator].first_range;
+  const std::size_t numbers = layout.numbers().size();
   if (layout.plain() && mask == nullptr) {
     bool all = true;
-    for (std::uint32_t i = 0; i < row.limits; ++i) {
+    for (std::size_t i = 0; i < numbers; ++i) {
       const double value = load<double>(state + i * sizeof(double));
       all = all && value >= ranges[i].lowest && value <= ranges[i].highest;
     }
     return all;
   }
-  for (std::uint32_t i = 0; i < row.limits; ++i) {
+  for (std::size_t i = 0; i < numbers; ++i) {
     if (!masked(mask, i)) continue;
     if (!layout.proper_number(i, state)) return false;
     if (!layout.numbers()[i].moves()) continue;
@@ -153,46 +135,73 @@ bool CommandCheck::within(std::uint32_t actuator, const std::byte* state,
   return true;
 }
 
+std::uint32_t TargetLimits::first_without_acceleration(std::uint32_t actuator,
+                                                       const std::uint64_t* mask) const noexcept {
+  const auto [layout, first_range] = actuators_[actuator];
+  for (std::uint32_t i = 0; i < layout->numbers().size(); ++i) {
+    if (masked(mask, i) && !ranges_[first_range + i].accelerates) return i;
+  }
+  return StateLayout::kNoNumber;
+}
+
+CommandCheck::CommandCheck(const Schema& schema)
+    : schema_(schema), layouts_(layouts_of_types(schema, false)), targets_(schema, layouts_) {}
+
+std::uint32_t CommandCheck::actuator(std::string_view name) const {
+  const std::vector<std::string> known = names_of(schema_.actuators);
+  const auto found = std::ranges::find(known, name);
+  if (found != known.end()) return static_cast<std::uint32_t>(found - known.begin());
+  refuse_actuator("'" + std::string(name) + "'" + names_instead(name, known));
+}
+
+std::uint32_t CommandCheck::actuator(std::int64_t index) const {
+  const auto count = static_cast<std::int64_t>(schema_.actuators.size());
+  if (index >= 0 && index < count) return static_cast<std::uint32_t>(index);
+  std::vector<std::string> known = names_of(schema_.actuators);
+  for (std::size_t i = 0; i < known.size(); ++i) known[i] += " (" + std::to_string(i) + ")";
+  refuse_actuator(std::to_string(index) + names_instead("", known));
+}
+
+void CommandCheck::refuse_actuator(const std::string& which) const {
+  const std::string robot = "'" + schema_.head.robot.str() + "' has no actuator";
+  throw InvalidArgument(schema_.actuators.empty() ? robot + "s" : robot + " " + which);
+}
+
 bool CommandCheck::admits(std::span<const std::uint32_t> actuators, std::uint32_t steps,
                           const std::byte* states) const noexcept {
   for (const std::uint32_t actuator : actuators) {
-    const std::size_t size = layouts_[schema_.actuators[actuator].type]->size();
+    const std::size_t size = targets_.layout(actuator).size();
     for (std::uint32_t step = 0; step < steps; ++step, states += size) {
-      if (!within(actuator, states, nullptr)) return false;
+      if (!targets_.admit(actuator, states, nullptr)) return false;
     }
   }
   return true;
 }
 
-std::uint32_t CommandCheck::words_of_mask(std::uint32_t actuator) const {
-  const StateLayout& layout = *layouts_[schema_.actuators[actuator].type];
-  return mask_words(static_cast<std::uint32_t>(layout.numbers().size()));
-}
-
 void CommandCheck::targets(std::uint32_t index, std::span<const std::byte> states,
                            std::span<const std::uint64_t> mask) const {
   const std::uint32_t known = actuator(std::int64_t{index});
-  const StateLayout& layout = *layouts_[schema_.actuators[known].type];
+  const StateLayout& layout = targets_.layout(known);
   if (states.empty() || states.size() % layout.size() != 0) {
     throw InvalidArgument("targets of " + of_actuator(schema_, known) + " must be a multiple of " +
                           std::to_string(layout.size()) + " bytes, got " +
                           std::to_string(states.size()));
   }
-  const std::size_t words = mask_words(static_cast<std::uint32_t>(layout.numbers().size()));
-  if (!mask.empty() && mask.size() != words) {
+  if (!mask.empty() && mask.size() != layout.mask_words()) {
     throw InvalidArgument("a mask for " + of_actuator(schema_, known) + " must have " +
-                          std::to_string(words) + " words, got " + std::to_string(mask.size()));
+                          std::to_string(layout.mask_words()) + " words, got " +
+                          std::to_string(mask.size()));
   }
-  const std::uint64_t* bits = mask.empty() ? nullptr : mask.data();
-  for (std::size_t at = 0; at < states.size(); at += layout.size()) {
-    if (!within(known, states.data() + at, bits)) refuse(known, states.data() + at, bits);
+  for (const std::byte* state = states.data(); state != states.data() + states.size();
+       state += layout.size()) {
+    if (!targets_.admit(known, state, bits_of(mask))) refuse(known, state, bits_of(mask));
   }
 }
 
 void CommandCheck::refuse(std::uint32_t actuator, const std::byte* state,
                           const std::uint64_t* mask) const {
   const ActuatorRow& row = schema_.actuators[actuator];
-  const StateLayout& layout = *layouts_[row.type];
+  const StateLayout& layout = targets_.layout(actuator);
   for (std::uint32_t i = 0; i < row.limits; ++i) {
     if (!masked(mask, i)) continue;
     const NumberName name = name_at(schema_, row.type, layout.numbers()[i].offset);
@@ -221,11 +230,12 @@ void CommandCheck::direct(std::uint32_t actuator, std::span<const std::byte> sta
                           std::span<const std::uint64_t> mask) const {
   if (schema_.head.bursting != 0 || schema_.head.silence > 0) return;
   const ActuatorRow& row = schema_.actuators[actuator];
-  const StateLayout& layout = *layouts_[row.type];
+  const StateLayout& layout = targets_.layout(actuator);
   for (std::uint32_t i = 0; i < row.limits; ++i) {
     const LimitRow& limit = schema_.limits[row.first_limit + i];
-    const bool given = mask.empty() || (mask[i / 64] >> (i % 64) & 1) != 0;
-    if (limit.resting == 0 || !given || layout.number(i, state.data()) == limit.rest) continue;
+    if (limit.resting == 0 || !masked(bits_of(mask), i) ||
+        layout.number(i, state.data()) == limit.rest)
+      continue;
     ShortText<200> name;
     name_number(schema_, actuator, i, name);
     throw InvalidArgument(
@@ -240,9 +250,9 @@ void CommandCheck::speed(std::uint32_t index, double speed,
                          std::span<const std::uint64_t> mask) const {
   const std::uint32_t known = actuator(std::int64_t{index});
   const ActuatorRow& row = schema_.actuators[known];
-  const StateLayout& layout = *layouts_[row.type];
+  const StateLayout& layout = targets_.layout(known);
   if (row.limits == 0) return;
-  const std::uint32_t first = layout.first_commanded(mask.empty() ? nullptr : mask.data());
+  const std::uint32_t first = layout.first_commanded(bits_of(mask));
   const std::uint32_t number = first == StateLayout::kNoNumber ? 0 : first;
   const double highest = schema_.limits[row.first_limit + number].speed;
   const bool positive = std::isfinite(speed) && speed > 0.0;
@@ -259,25 +269,19 @@ void CommandCheck::speed(std::uint32_t index, double speed,
 
 void CommandCheck::fastest(std::uint32_t index, std::span<const std::uint64_t> mask) const {
   const std::uint32_t known = actuator(std::int64_t{index});
-  const ActuatorRow& row = schema_.actuators[known];
-  const StateLayout& layout = *layouts_[row.type];
-  for (std::uint32_t i = 0; i < row.limits; ++i) {
-    if (!masked(mask.empty() ? nullptr : mask.data(), i) || !layout.numbers()[i].moves()) continue;
-    if (std::isfinite(schema_.limits[row.first_limit + i].acceleration)) continue;
-    const NumberName name = name_at(schema_, row.type, layout.numbers()[i].offset);
-    throw InvalidArgument("the fastest motion of " + of_number(schema_, known, name) +
-                          " is unknown: its driver sets no limits of speed and acceleration. Give "
-                          "a duration or a speed instead, or leave that field out.");
-  }
+  const std::uint32_t number = targets_.first_without_acceleration(known, bits_of(mask));
+  if (number == StateLayout::kNoNumber) return;
+  const std::uint32_t offset = targets_.layout(known).numbers()[number].offset;
+  const NumberName name = name_at(schema_, schema_.actuators[known].type, offset);
+  throw InvalidArgument("the fastest motion of " + of_number(schema_, known, name) +
+                        " is unknown: its driver sets no limits of speed and acceleration. Give "
+                        "a duration or a speed instead, or leave that field out.");
 }
 
 void CommandCheck::request(std::uint32_t index, std::span<const std::byte> payload) const {
   if (index >= schema_.requests.size()) {
-    std::vector<std::string> known;
-    known.reserve(schema_.requests.size());
-    for (const RequestRow& row : schema_.requests) known.push_back(row.name.str());
     throw InvalidArgument("'" + schema_.head.robot.str() + "' has no request " +
-                          std::to_string(index) + names_instead("", known));
+                          std::to_string(index) + names_instead("", names_of(schema_.requests)));
   }
   const RequestRow& row = schema_.requests[index];
   const std::size_t size = row.type == kNoType ? 0 : layouts_[row.type]->size();

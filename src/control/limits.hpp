@@ -16,6 +16,39 @@ namespace o80 {
 /// Profile of a command that names none: minimum_jerk for an actuator with acceleration limits.
 Profile usual_profile(const Schema& schema, const ActuatorRow& actuator) noexcept;
 
+/// What the targets of each actuator may be: for the check of a command on both sides of a lane.
+///
+/// Realtime: everything but construction.
+class TargetLimits {
+ public:
+  /// The layouts must outlive it.
+  TargetLimits(const Schema& schema, const Layouts& layouts);
+
+  std::size_t actuators() const noexcept { return actuators_.size(); }
+  const StateLayout& layout(std::uint32_t actuator) const noexcept {
+    return *actuators_[actuator].layout;
+  }
+  /// True if the numbers whose bits are set are finite and inside their bounds, or proper.
+  bool admit(std::uint32_t actuator, const std::byte* state,
+             const std::uint64_t* mask) const noexcept;
+  /// The first number whose bit is set, and that moves without a limit of acceleration.
+  std::uint32_t first_without_acceleration(std::uint32_t actuator,
+                                           const std::uint64_t* mask) const noexcept;
+
+ private:
+  struct Range {
+    double lowest;  // finite: an infinite target is refused even without a limit
+    double highest;
+    bool accelerates;  // true also if the number switches
+  };
+  struct Actuator {
+    const StateLayout* layout;
+    std::size_t first_range;  // of its numbers
+  };
+  std::vector<Actuator> actuators_;
+  std::vector<Range> ranges_;
+};
+
 /// Checks a command when it is added to a batch.
 ///
 /// Each function throws InvalidArgument with the actuator, the field, the value and the allowed
@@ -24,13 +57,16 @@ Profile usual_profile(const Schema& schema, const ActuatorRow& actuator) noexcep
 class CommandCheck {
  public:
   explicit CommandCheck(const Schema& schema);
+  CommandCheck(const CommandCheck&) = delete;
 
   /// Index of an actuator by its name.
   std::uint32_t actuator(std::string_view name) const;
   /// The same index, if there is such an actuator.
   std::uint32_t actuator(std::int64_t index) const;
   /// Number of 64-bit words of a mask for this actuator.
-  std::uint32_t words_of_mask(std::uint32_t actuator) const;
+  std::size_t words_of_mask(std::uint32_t actuator) const {
+    return targets_.layout(actuator).mask_words();
+  }
   /// Checks one or several targets, one state after the other.
   void targets(std::uint32_t actuator, std::span<const std::byte> states,
                std::span<const std::uint64_t> mask = {}) const;
@@ -53,20 +89,13 @@ class CommandCheck {
   void request(std::uint32_t index, std::span<const std::byte> payload) const;
 
  private:
-  struct Range {
-    double lowest;  // finite: an infinite target is refused even without a limit
-    double highest;
-  };
-
-  bool within(std::uint32_t actuator, const std::byte* state,
-              const std::uint64_t* mask) const noexcept;
   [[noreturn]] void refuse_actuator(const std::string& which) const;
   [[noreturn]] void refuse(std::uint32_t actuator, const std::byte* state,
                            const std::uint64_t* mask) const;
 
   const Schema& schema_;
-  std::vector<std::optional<StateLayout>> layouts_;
-  std::vector<Range> ranges_;  // one for each limit of the schema
+  Layouts layouts_;
+  TargetLimits targets_;
 };
 
 }  // namespace o80

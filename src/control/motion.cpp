@@ -207,7 +207,8 @@ void Motion::blend(Iteration now, std::byte* state) noexcept {
   std::byte* blended = target() + stride_;
   layout_.hooks().blend(blended, from(), target(), share);
   // a blend() that divides by zero gives an invalid state: keep the last one
-  if (layout_.finite(blended)) layout_.copy(state, blended);
+  const bool is_finite = layout_.first_not_finite(blended) == StateLayout::kNoNumber;
+  if (is_finite && layout_.proper(blended)) layout_.copy(state, blended);
 }
 
 Limited Motion::step(Iteration now, std::byte* state) noexcept {

@@ -42,18 +42,7 @@ Cursor rows_of_timed(const BlockPool& pool, const RecordHead& head,
           static_cast<std::uint32_t>(noted >> 32), std::uint64_t{head.rows} * row_bytes};
 }
 
-RecordCheck::RecordCheck(const Schema& schema, const Layouts& layouts) {
-  for (const ActuatorRow& row : schema.actuators) {
-    Actuator actuator{&*layouts[row.type], ranges_.size(), false};
-    for (std::uint32_t i = 0; i < row.limits; ++i) {
-      const bool moves = actuator.layout->numbers()[i].moves();
-      const LimitRow& limit = schema.limits.at(row.first_limit + i);
-      ranges_.push_back(
-          {limit.minimum, limit.maximum, !moves || std::isfinite(limit.acceleration)});
-      actuator.is_bounded |= std::isfinite(limit.minimum) || std::isfinite(limit.maximum);
-    }
-    actuators_.push_back(actuator);
-  }
+RecordCheck::RecordCheck(const Schema& schema, const Layouts& layouts) : targets_(schema, layouts) {
   for (const RequestRow& request : schema.requests) {
     requests_.push_back(request.type == kNoType ? nullptr : &*layouts[request.type]);
   }
@@ -78,12 +67,12 @@ RecordCheck::Verdict RecordCheck::begin(const BlockPool& pool, BlockIndex block,
     case RecordKind::member:
       return begin_command(head, progress);
     case RecordKind::group:
-      return verdict(head.payload_bytes == 0 && head.rows > 0 && head.rows <= actuators_.size());
+      return verdict(head.payload_bytes == 0 && head.rows > 0 && head.rows <= targets_.actuators());
     case RecordKind::request:
       return check_request(head, progress.payload);
     case RecordKind::purge:
       return verdict(head.payload_bytes == 0 && head.only_own <= 1 &&
-                     (head.actuator == kEveryActuator || head.actuator < actuators_.size()));
+                     (head.actuator == kEveryActuator || head.actuator < targets_.actuators()));
     case RecordKind::take_control:
     case RecordKind::release_control:
       return verdict(head.payload_bytes == 0);
@@ -96,16 +85,14 @@ RecordCheck::Verdict RecordCheck::begin(const BlockPool& pool, BlockIndex block,
 
 RecordCheck::Verdict RecordCheck::begin_command(const RecordHead& head,
                                                 Progress& progress) noexcept {
-  if (head.actuator >= actuators_.size() || head.rows == 0 || !known_enums(head) ||
+  if (head.actuator >= targets_.actuators() || head.rows == 0 || !known_enums(head) ||
       !sane_pace(head)) {
     return Verdict::invalid;
   }
   if (head.profile == Profile::as_sent && (head.pace != Pace::direct || head.rows > 1)) {
     return Verdict::invalid;
   }
-  const Actuator& actuator = actuators_[head.actuator];
-  const StateLayout& layout = *actuator.layout;
-  const std::size_t numbers = layout.numbers().size();
+  const StateLayout& layout = targets_.layout(head.actuator);
   const bool timed = head.pace == Pace::duration && head.rows > 1;
   const std::uint64_t mask_bytes = head.masked != 0 ? 8 * layout.mask_words() : 0;
   const std::uint64_t time_bytes = timed ? 8 * std::uint64_t{head.rows} : 0;
@@ -113,16 +100,15 @@ RecordCheck::Verdict RecordCheck::begin_command(const RecordHead& head,
   if (head.payload_bytes != mask_bytes + time_bytes + row_bytes) return Verdict::invalid;
 
   // no bit of the mask is beyond the last number
-  if (head.masked != 0) {
+  const std::uint64_t* mask = head.masked != 0 ? mask_.data() : nullptr;
+  const std::size_t numbers = layout.numbers().size();
+  if (mask != nullptr) {
     progress.payload.read(mask_.data(), mask_bytes);
     if (numbers % 64 != 0 && mask_[numbers / 64] >> (numbers % 64) != 0) return Verdict::invalid;
   }
-  // every commanded number has limits of speed and acceleration
-  if (head.pace == Pace::fastest) {
-    for (std::size_t i = 0; i < numbers; ++i) {
-      const bool commanded = masked(head.masked != 0 ? mask_.data() : nullptr, i);
-      if (commanded && !ranges_[actuator.first_range + i].accelerates) return Verdict::invalid;
-    }
+  if (head.pace == Pace::fastest &&
+      targets_.first_without_acceleration(head.actuator, mask) != StateLayout::kNoNumber) {
+    return Verdict::invalid;
   }
   progress.times_left = timed ? head.rows : 0;
   progress.rows_left = head.rows;
@@ -132,8 +118,7 @@ RecordCheck::Verdict RecordCheck::begin_command(const RecordHead& head,
 RecordCheck::Verdict RecordCheck::go_on(const BlockPool& pool, BlockIndex block, Progress& progress,
                                         std::uint32_t& budget) noexcept {
   const RecordHead& head = pool.head(block);
-  const Actuator& actuator = actuators_[head.actuator];
-  const StateLayout& layout = *actuator.layout;
+  const StateLayout& layout = targets_.layout(head.actuator);
   const std::uint64_t* mask = head.masked != 0 ? mask_.data() : nullptr;
   if (mask != nullptr) {
     Cursor(pool, block, sizeof(RecordHead), head.payload_bytes)
@@ -155,28 +140,13 @@ RecordCheck::Verdict RecordCheck::go_on(const BlockPool& pool, BlockIndex block,
   auto* state = reinterpret_cast<std::byte*>(state_.data());
   for (; progress.rows_left > 0 && bytes_left > 0; --progress.rows_left) {
     progress.payload.read(state, layout.size());
-    if (!layout.finite(state, mask) || !within_bounds(actuator, state, mask)) {
-      return Verdict::invalid;
-    }
+    // a target beyond the bounds would never be reached
+    if (!targets_.admit(head.actuator, state, mask)) return Verdict::invalid;
     bytes_left -= layout.size();
   }
   budget = std::min(
       budget, static_cast<std::uint32_t>(std::max<std::int64_t>(bytes_left, 0) / kBlockBytes));
   return progress.rows_left > 0 ? Verdict::unfinished : Verdict::valid;
-}
-
-/// A target beyond the bounds would never be reached.
-bool RecordCheck::within_bounds(const Actuator& actuator, const std::byte* state,
-                                const std::uint64_t* mask) const noexcept {
-  if (!actuator.is_bounded) return true;
-  const StateLayout& layout = *actuator.layout;
-  for (std::size_t i = 0; i < layout.numbers().size(); ++i) {
-    if (!masked(mask, i) || !layout.numbers()[i].moves()) continue;
-    const double value = layout.number(i, state);
-    const Range& range = ranges_[actuator.first_range + i];
-    if (value < range.minimum || value > range.maximum) return false;
-  }
-  return true;
 }
 
 RecordCheck::Verdict RecordCheck::check_request(const RecordHead& head, Cursor& payload) noexcept {

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "control/limits.hpp"
 #include "control/pool.hpp"
 #include "control/record.hpp"
 #include "control/state_layout.hpp"
@@ -45,24 +46,10 @@ class RecordCheck {
                 std::uint32_t& budget) noexcept;
 
  private:
-  struct Range {
-    double minimum;
-    double maximum;
-    bool accelerates;  // true also if the number is not interpolated
-  };
-  struct Actuator {
-    const StateLayout* layout;
-    std::size_t first_range;  // of its numbers
-    bool is_bounded;          // a number has a bound
-  };
-
   Verdict begin_command(const RecordHead& head, Progress& progress) noexcept;
-  bool within_bounds(const Actuator& actuator, const std::byte* state,
-                     const std::uint64_t* mask) const noexcept;
   Verdict check_request(const RecordHead& head, Cursor& payload) noexcept;
 
-  std::vector<Actuator> actuators_;
-  std::vector<Range> ranges_;
+  TargetLimits targets_;
   std::vector<const StateLayout*> requests_;  // null: no payload
   std::vector<std::uint64_t> state_;
   std::vector<std::uint64_t> mask_;

@@ -147,20 +147,6 @@ bool StateLayout::proper(const std::byte* state) const noexcept {
   return true;
 }
 
-bool StateLayout::finite(const std::byte* state, const std::uint64_t* mask) const noexcept {
-  if (plain_ && mask == nullptr) {
-    bool all = true;
-    for (std::uint32_t at = 0; at < size_; at += sizeof(double)) {
-      all = all && std::isfinite(load<double>(state + at));
-    }
-    return all;
-  }
-  for (std::size_t i = 0; i < numbers_.size(); ++i) {
-    if (masked(mask, i) && !(finite_number(i, state) && proper_number(i, state))) return false;
-  }
-  return true;
-}
-
 double StateLayout::number(std::size_t number, const std::byte* state) const noexcept {
   const std::byte* at = state + numbers_[number].offset;
   return visit_number(numbers_[number].kind,
@@ -172,10 +158,11 @@ const StateLayout& layout_of(const Schema& schema, std::uint32_t type, Layouts& 
   return layout ? *layout : layout.emplace(schema, type);
 }
 
-Layouts layouts_of_types(const Schema& schema) {
+Layouts layouts_of_types(const Schema& schema, bool controlled) {
   Layouts layouts(schema.types.size());
   for (const ActuatorRow& actuator : schema.actuators) {
     const StateLayout& layout = layout_of(schema, actuator.type, layouts);
+    if (!controlled) continue;
     if (layout.numbers().empty()) {
       throw InvalidArgument("actuator '" + actuator.name.str() +
                             "' has a state without numbers: describe at least one field of '" +

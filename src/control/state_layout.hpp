@@ -77,8 +77,6 @@ class StateLayout {
 
   /// True if each boolean is 0 or 1 and each enumeration has a label.
   bool proper(const std::byte* state) const noexcept;
-  /// True if the numbers whose bits are set are proper(), and neither NaN nor infinite.
-  bool finite(const std::byte* state, const std::uint64_t* mask = nullptr) const noexcept;
   bool proper_number(std::size_t number, const std::byte* state) const noexcept;
   /// A number as double (large integers are rounded).
   double number(std::size_t number, const std::byte* state) const noexcept;
@@ -99,9 +97,9 @@ class StateLayout {
 using Layouts = std::vector<std::optional<StateLayout>>;
 /// The layout of a type, which is made when it is first asked for.
 const StateLayout& layout_of(const Schema& schema, std::uint32_t type, Layouts& layouts);
-/// The layouts of the types of actuators and requests. Throws InvalidArgument if an actuator cannot
-/// be controlled.
-Layouts layouts_of_types(const Schema& schema);
+/// The layouts of the types of actuators and requests. If they are `controlled` here, throws
+/// InvalidArgument if an actuator cannot be.
+Layouts layouts_of_types(const Schema& schema, bool controlled = true);
 
 /// True if the bit of a number is set; a null mask means all.
 inline bool masked(const std::uint64_t* mask, std::size_t number) noexcept {
