@@ -94,10 +94,6 @@ Motion::Motion(const Schema& schema, const ActuatorRow& actuator, const StateLay
   }
 }
 
-void Motion::restart(const std::byte* state) noexcept {
-  for (Number& each : numbers_) each.motion.restart(layout_.number(each.number, state));
-}
-
 void Motion::trace(const std::byte* state) noexcept {
   for (Number& each : numbers_) {
     const double position = layout_.number(each.number, state);
@@ -190,12 +186,6 @@ void Motion::follow_as_sent(Iteration first) noexcept {
   }
 }
 
-void Motion::widen(const std::byte* row) noexcept {
-  for (Number& each : numbers_) {
-    if (each.is_commanded) each.motion.widen(layout_.number(each.number, row));
-  }
-}
-
 /// Types that blend by themselves: by the share of the time, from rest to rest.
 void Motion::blend(Iteration now, std::byte* state) noexcept {
   if (now >= last_) return layout_.copy(state, target());
@@ -235,16 +225,15 @@ Limited Motion::step(Iteration now, std::byte* state) noexcept {
       std::memcpy(state + each.offset, target() + each.offset, layout_.numbers()[each.number].size);
     } else if (each.kind == Kind::float64) {
       store(state + each.offset, each.motion.position());
-    } else if (each.is_limited) {
-      publish(each, state);
     } else {
-      publish_exact(each, state);
+      publish(each, state);
     }
   }
   return result;
 }
 
-/// Writes one number to the state, rounded to its kind, inward at its bounds.
+/// Writes one number to the state, rounded to its kind, inward at its bounds. Integers that a
+/// double cannot hold stay exact on a line without limits.
 void Motion::publish(const Number& number, std::byte* state) const noexcept {
   std::byte* at = state + number.offset;
   const double value = number.motion.position();
@@ -252,44 +241,15 @@ void Motion::publish(const Number& number, std::byte* state) const noexcept {
   const double low = std::min(number.motion.guard().minimum(), value);
   const double high = std::max(number.motion.guard().maximum(), value);
   visit_number(number.kind, [&]<class T>(T) {
-    if constexpr (std::is_integral_v<T>) {
-      store(at, to_integer<T>(nearest_whole(value, low, high)));
-    } else {
-      store(at, static_cast<T>(sizeof(T) < 8 ? nearest_float(value, low, high) : value));
-    }
-  });
-}
-
-/// The same for a number without limits; integers that a double cannot hold stay exact on a line.
-void Motion::publish_exact(const Number& number, std::byte* state) const noexcept {
-  std::byte* at = state + number.offset;
-  const double value = number.motion.position();
-  visit_number(number.kind, [&]<class T>(T) {
     if constexpr (std::is_floating_point_v<T>) {
-      store(at, static_cast<T>(value));
-    } else if (sizeof(T) < 8) {
-      store(at, to_integer<T>(value));
-    } else if (!number.motion.plan().is_line()) {
-      store(at, to_integer<T>(static_cast<long double>(value)));
+      store(at, static_cast<T>(sizeof(T) < 8 ? nearest_float(value, low, high) : value));
+    } else if (sizeof(T) < 8 || number.is_limited || !number.motion.is_on_line()) {
+      store(at, to_integer<T>(nearest_whole(value, low, high)));
     } else {
       store(at, moved_wide(load<T>(from() + number.offset), load<T>(target() + number.offset),
                            number.motion.plan().share()));
     }
   });
-}
-
-void Motion::end() noexcept {
-  for (Number& each : numbers_) each.motion.end();
-}
-
-void Motion::complete() noexcept {
-  for (Number& each : numbers_) {
-    if (each.is_commanded) {
-      each.motion.complete();
-    } else {
-      each.motion.end();
-    }
-  }
 }
 
 bool Motion::brake(std::byte* state, bool follows) noexcept {
@@ -304,14 +264,6 @@ bool Motion::brake(std::byte* state, bool follows) noexcept {
     if (follows || each.motion.position() != before) publish(each, state);
   }
   return moves;
-}
-
-void Motion::hold() noexcept {
-  for (Number& each : numbers_) each.motion.hold(each.is_commanded);
-}
-
-void Motion::release() noexcept {
-  for (Number& each : numbers_) each.motion.hold(false);
 }
 
 }  // namespace o80

@@ -63,7 +63,11 @@ class Motion {
   /// The plan goes on until this iteration or later.
   void extend(Iteration last) noexcept { last_ = std::max(last_, last); }
   /// What is followed reaches to this state, too.
-  void widen(const std::byte* row) noexcept;
+  void widen(const std::byte* row) noexcept {
+    for (Number& each : numbers_) {
+      if (each.is_commanded) each.motion.widen(layout_.number(each.number, row));
+    }
+  }
   /// True if a limit can keep the actuator from a row.
   bool follows_rows() const noexcept { return follows_rows_; }
   /// True if a commanded number has a limit of acceleration.
@@ -106,11 +110,17 @@ class Motion {
   /// The limit because of which plan() took more iterations than asked.
   Limited slowest() const noexcept { return slowest_; }
   /// The command has ended, at its target if it is complete().
-  void end() noexcept;
-  void complete() noexcept;
+  void end() noexcept {
+    for (Number& each : numbers_) each.motion.end();
+  }
+  void complete() noexcept {
+    for (Number& each : numbers_) each.motion.end(each.is_commanded);
+  }
 
   /// Sets all numbers to this state, at rest.
-  void restart(const std::byte* state) noexcept;
+  void restart(const std::byte* state) noexcept {
+    for (Number& each : numbers_) each.motion.restart(layout_.number(each.number, state));
+  }
   /// One iteration of a motion that was made elsewhere, after restart(). Numbers whose differences
   /// a command would not use, or whose bytes are rounded, are at rest there.
   void trace(const std::byte* state) noexcept;
@@ -118,8 +128,12 @@ class Motion {
   /// `follows`, the others are at `state`, the observed one. True while a number moves.
   bool brake(std::byte* state, bool follows) noexcept;
   /// Holds the commanded numbers that have a rest value where they are, until release().
-  void hold() noexcept;
-  void release() noexcept;
+  void hold() noexcept {
+    for (Number& each : numbers_) each.motion.hold(each.is_commanded);
+  }
+  void release() noexcept {
+    for (Number& each : numbers_) each.motion.hold(false);
+  }
   /// True if a number is held away from its rest value.
   bool holds() const noexcept {
     return any([](auto& each) { return each.is_held_away(); });
@@ -161,7 +175,6 @@ class Motion {
   std::int64_t iterations_at(const Course& course) const noexcept;
   void blend(Iteration now, std::byte* state) noexcept;
   void publish(const Number& number, std::byte* state) const noexcept;
-  void publish_exact(const Number& number, std::byte* state) const noexcept;
 
   const StateLayout& layout_;
   std::size_t stride_;                   // [bytes]

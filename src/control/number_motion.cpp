@@ -12,20 +12,16 @@ void NumberMotion::restart(double position) noexcept {
   difference_ = former_difference_ = 0.0;
 }
 
-void NumberMotion::begin() noexcept {
-  former_target_ = planned_ ? plan_.target() : guard_.position();
-  held_back_ = false;
-  end();
-}
-
 /// If the shortest stop would leave the bounds, the plan goes on until it stays inside.
-void NumberMotion::end() noexcept {
+void NumberMotion::end(bool arrived) noexcept {
   if (planned_ && !follows_ && !guard_.stops_inside()) {
     former_ = plan_;
     leaves_ = true;
   }
   planned_ = follows_ = false;
   guard_.follow_within_bounds();
+  // a jump is no speed
+  if (arrived && !accelerates()) guard_.rest();
 }
 
 std::int64_t NumberMotion::propose(const Asked& asked) noexcept {
@@ -77,19 +73,6 @@ void NumberMotion::line(double start, double target) noexcept {
   }
   guard_.widen(target);
   plan_.line(start, target);
-}
-
-void NumberMotion::follow_as_sent(double target) noexcept {
-  if (!planned_) guard_.begin();
-  planned_ = follows_ = true;
-  plan_.line(target, target);
-}
-
-/// One iteration of the former plan, if a stop would leave the bounds.
-bool NumberMotion::leave() noexcept {
-  if (!leaves_) return false;
-  leaves_ = !guard_.stops_inside();
-  return leaves_ && guard_.pass(former_.next());
 }
 
 /// One iteration by `move`, as far as the bounds of the integral allow; returns the one that does

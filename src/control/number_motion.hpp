@@ -40,6 +40,8 @@ class NumberMotion {
   const NumberLimiter& guard() const noexcept { return guard_; }
   double position() const noexcept { return guard_.position(); }
   const NumberPlan& plan() const noexcept { return plan_; }
+  /// True while a command moves it on a straight line.
+  bool is_on_line() const noexcept { return planned_ && plan_.is_line(); }
   /// True if it has a limit of speed or acceleration: rows are followed, not shown.
   bool has_rates() const noexcept {
     return std::isfinite(guard_.rates().speed) || std::isfinite(guard_.rates().acceleration);
@@ -51,7 +53,11 @@ class NumberMotion {
   /// One iteration of a motion that was made elsewhere.
   void trace(double position) noexcept { guard_.accept(position); }
   /// A command begins: notes from which motion.
-  void begin() noexcept;
+  void begin() noexcept {
+    former_target_ = planned_ ? plan_.target() : guard_.position();
+    held_back_ = false;
+    end();
+  }
 
   using Asked = o80::Asked;
   /// Proposes a number of iterations for a plan to rest at the target.
@@ -63,7 +69,11 @@ class NumberMotion {
   void line(double start, double target) noexcept;
   void line_for(std::int64_t iterations) noexcept { plan_.line_for(iterations); }
   /// Goes to the target within the limits, whatever they keep it from (Profile::as_sent).
-  void follow_as_sent(double target) noexcept;
+  void follow_as_sent(double target) noexcept {
+    if (!planned_) guard_.begin();
+    planned_ = follows_ = true;
+    plan_.line(target, target);
+  }
   /// The span of what is followed reaches to here.
   void widen(double position) noexcept {
     if (follows_) guard_.widen(position);
@@ -77,14 +87,8 @@ class NumberMotion {
     return !follows_ || (!leaves_ && guard_.position() == plan_.target());
   }
   bool follows() const noexcept { return follows_; }
-  /// The plan ends before its target: what follows is another command, or none.
-  void end() noexcept;
-  /// The plan ends at its target.
-  void complete() noexcept {
-    end();
-    // a jump is no speed
-    if (!accelerates()) guard_.rest();
-  }
+  /// The plan ends, at its target if that is `arrived`: what follows is another command, or none.
+  void end(bool arrived = false) noexcept;
   /// One iteration without a command: towards rest, as fast as the limits allow. True while it
   /// moves.
   bool brake() noexcept;
@@ -105,7 +109,11 @@ class NumberMotion {
 
  private:
   bool is_away() const noexcept { return rest_ && !held_ && guard_.position() != *rest_; }
-  bool leave() noexcept;
+  /// One iteration of the former plan, if a stop would leave the bounds.
+  bool leave() noexcept {
+    if (leaves_) leaves_ = !guard_.stops_inside();
+    return leaves_ && guard_.pass(former_.next());
+  }
   Limit step_freely(double low, double high) noexcept;
   bool brake_freely() noexcept;
   template <class Move>

@@ -54,12 +54,6 @@ void VelocityChange::plan_without_jerk(double change) noexcept {
   displacement_ = sign_ * (acceleration_ * n * (n - 1.0) / 2.0 + rest * n);
 }
 
-/// The acceleration of iteration i on the deepest trapezoid that ends at 0 after so many steps.
-double VelocityChange::trough(double i, double steps) const noexcept {
-  if (i >= steps) return 0.0;
-  return std::max({-acceleration_, start_ - i * jerk_, -(steps - i) * jerk_});
-}
-
 /// The sums of trough(), for its three parts: down, along the limit, up.
 VelocityChange::Sums VelocityChange::sums(double steps) const noexcept {
   if (steps <= 0.0) return {};
@@ -153,20 +147,12 @@ double VelocityChange::acceleration(std::int64_t i) const noexcept {
   if (i < 1 || i > steps_) return 0.0;
   const auto at = static_cast<double>(i);
   if (!std::isfinite(jerk_)) {
-    const double own = acceleration_;
-    return -sign_ * (i <= shorter_ ? own : (1.0 - share_) * own);
+    return -sign_ * (i <= shorter_ ? acceleration_ : (1.0 - share_) * acceleration_);
   }
-  const double own = trough(at, static_cast<double>(steps_));
-  double other = 0.0;
-  if (crest_) {
-    // the mirror image of a trough from -a(0)
-    other = at >= static_cast<double>(steps_)
-                ? 0.0
-                : std::min({acceleration_, start_ + at * jerk_,
-                            (static_cast<double>(steps_) - at) * jerk_});
-  } else {
-    other = trough(at, static_cast<double>(shorter_));
-  }
+  const double own = trough(start_, at, static_cast<double>(steps_));
+  // the crest is the mirror image of a trough from -a(0)
+  const double other = crest_ ? -trough(-start_, at, static_cast<double>(steps_))
+                              : trough(start_, at, static_cast<double>(shorter_));
   return sign_ * ((1.0 - share_) * own + share_ * other);
 }
 

@@ -70,7 +70,11 @@ class VelocityChange {
 
   void plan_without_jerk(double change) noexcept;
   void plan_with_jerk(double change) noexcept;
-  double trough(double i, double steps) const noexcept;
+  /// The acceleration of iteration i on the deepest trapezoid from `start` that ends at 0 after so
+  /// many steps.
+  double trough(double start, double i, double steps) const noexcept {
+    return i >= steps ? 0.0 : std::max({-acceleration_, start - i * jerk_, -(steps - i) * jerk_});
+  }
   Sums sums(double steps) const noexcept;
 
   // mirrored by sign_, so that the trough is negative
