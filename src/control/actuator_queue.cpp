@@ -48,17 +48,6 @@ void ActuatorQueue::drop(const Outcome& outcome, Iteration iteration) noexcept {
   while (!queue_.empty()) ledger_->drop(queue_.take_any(), outcome, iteration);
 }
 
-void ActuatorQueue::stop() noexcept {
-  carry_.reset();
-  runs_ = Runs::nothing;
-  planned_ = in_force_ = false;
-}
-
-void ActuatorQueue::end_motion() noexcept {
-  motion_.end();
-  stop();
-}
-
 void ActuatorQueue::drop_lane(std::uint32_t lane, const Outcome& outcome,
                               Iteration iteration) noexcept {
   if (is_of(lane)) {
@@ -68,18 +57,6 @@ void ActuatorQueue::drop_lane(std::uint32_t lane, const Outcome& outcome,
   if (holder_ == lane) motion_.release();
   ledger_->drop(queue_.take(lane), outcome, iteration);
   if (empty()) end_motion();
-}
-
-void ActuatorQueue::restart(const std::byte* state) noexcept {
-  layout_->copy_finite(desired_, state);
-  motion_.restart(desired_);
-  in_force_ = false;
-}
-
-bool ActuatorQueue::follow(const std::byte* observed) noexcept {
-  layout_->copy_finite(desired_, observed);
-  in_force_ = false;
-  return motion_.brake(desired_, true);
 }
 
 ActuatorQueue::Moved ActuatorQueue::step(Iteration iteration, const std::byte* observed,
@@ -101,7 +78,11 @@ ActuatorQueue::Moved ActuatorQueue::step(Iteration iteration, const std::byte* o
 
 /// One iteration of what runs, which may be its last.
 ActuatorQueue::Moved ActuatorQueue::advance(Iteration iteration) noexcept {
-  if (ahead_left_ > 0) look_ahead();
+  // rows of a trajectory widen the span in which the limiter follows it
+  for (std::uint32_t i = 0; i < kReadAhead && ahead_left_ > 0; ++i, --ahead_left_) {
+    ahead_.read(scratch(), layout_->size());
+    motion_.widen(scratch());
+  }
   const Limited limited = motion_.step(iteration, desired_);
   if (limited.limit != Limit::none && late_ == 0) reason_ = limited;
   if (iteration >= motion_.last() && rows_left_ == 0) {
@@ -114,11 +95,6 @@ ActuatorQueue::Moved ActuatorQueue::advance(Iteration iteration) noexcept {
     }
   }
   return limited.limit == Limit::none ? Moved::active : Moved::clamped;
-}
-
-void ActuatorQueue::begin_given(Mode mode) noexcept {
-  if (mode == Mode::overwrite) carry_.reset();
-  motion_.release();
 }
 
 ActuatorQueue::Moved ActuatorQueue::go_to(Iteration iteration, const std::byte* observed,
@@ -137,25 +113,6 @@ ActuatorQueue::Moved ActuatorQueue::go_to(Iteration iteration, const std::byte* 
   in_force_ = true;
   runs_ = Runs::given;
   return advance(iteration);
-}
-
-/// The running command leaves the queue; it ends when it has arrived, or gives way to the next one.
-void ActuatorQueue::take_out() noexcept {
-  queue_.pop();
-  pool_->head(record_).own[Own::kNext] = kNoBlock;
-  runs_ = Runs::alone;
-}
-
-/// Nothing runs any more; the record of what ran, if it has one.
-BlockIndex ActuatorQueue::leave() noexcept {
-  if (runs_ == Runs::queued) queue_.pop();
-  return std::exchange(runs_, Runs::nothing) == Runs::given ? kNoBlock : record_;
-}
-
-/// A set-point gives way to the next direct command. A trajectory whose rows have ended gives way
-/// to any.
-bool ActuatorQueue::gives_way_to(const RecordHead& next) const noexcept {
-  return pace_ != Pace::direct || next.pace == Pace::direct;
 }
 
 void ActuatorQueue::give_way(Iteration iteration) noexcept {
@@ -260,12 +217,6 @@ void ActuatorQueue::begin_command(const std::byte* observed) noexcept {
   if (head.start == Start::observed) motion_.start_at(observed);
 }
 
-/// The next command of the queue, if it is a member of a group.
-const RecordHead* ActuatorQueue::next_member() const noexcept {
-  const RecordHead* head = queue_.empty() ? nullptr : &pool_->head(queue_.front());
-  return head != nullptr && is_member(*head) ? head : nullptr;
-}
-
 void ActuatorQueue::arrive(Iteration iteration, std::uint32_t& late_budget) noexcept {
   if (runs_ == Runs::queued || !end_late(iteration, late_budget)) return;
   const RecordHead* head = next_member();
@@ -309,13 +260,6 @@ void ActuatorQueue::read_row() noexcept {
     layout_->copy(motion_.target(), scratch(), mask_.data());
   }
   --rows_left_;
-}
-
-/// True if the next row is the target already.
-bool ActuatorQueue::is_next_row_target() noexcept {
-  Cursor next = rows_;
-  next.read(scratch(), layout_->size());
-  return layout_->same(scratch(), motion_.target(), mask());
 }
 
 /// Begins the planned row; false if the command would take too long and is rejected.
@@ -380,14 +324,6 @@ void ActuatorQueue::plan_row(Iteration iteration) noexcept {
   asked_ = next.asked;
   // of several actuators, others may be slower
   if (head.pace == Pace::speed && !is_member(head)) asked_ = motion_.asked_by_speed();
-}
-
-/// Rows of a trajectory widen the span in which the limiter follows it.
-void ActuatorQueue::look_ahead() noexcept {
-  for (std::uint32_t i = 0; i < kReadAhead && ahead_left_ > 0; ++i, --ahead_left_) {
-    ahead_.read(scratch(), layout_->size());
-    motion_.widen(scratch());
-  }
 }
 
 Motion::Course ActuatorQueue::course(const RecordHead& head, Iteration iteration) noexcept {

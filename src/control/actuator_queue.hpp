@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "control/duration.hpp"
@@ -51,7 +52,10 @@ class ActuatorQueue {
   bool empty() const noexcept { return has_no_command() && runs_ == Runs::nothing; }
   bool has_no_command() const noexcept { return queue_.empty() && !has_record(); }
   /// For targets that are given without a command, to a queue that has none: begins a row of them.
-  void begin_given(Mode mode) noexcept;
+  void begin_given(Mode mode) noexcept {
+    if (mode == Mode::overwrite) carry_.reset();
+    motion_.release();
+  }
   /// Then, in each iteration: goes to the next one, as a direct command would. The last one stays
   /// in force.
   Moved go_to(Iteration iteration, const std::byte* observed, const std::byte* target) noexcept;
@@ -67,7 +71,11 @@ class ActuatorQueue {
   }
 
   /// Sets the desired state, at rest. Numbers that are not finite keep their last desired value.
-  void restart(const std::byte* state) noexcept;
+  void restart(const std::byte* state) noexcept {
+    layout_->copy_finite(desired_, state);
+    motion_.restart(desired_);
+    in_force_ = false;
+  }
   /// One more iteration, after restart(), of a motion that was made elsewhere.
   void trace(const std::byte* state) noexcept {
     layout_->copy_finite(desired_, state);
@@ -75,7 +83,11 @@ class ActuatorQueue {
   }
   /// For an idle actuator that follows: the observed state becomes the desired one, except for
   /// numbers with a rest value, which go to it. True while one of these moves.
-  bool follow(const std::byte* observed) noexcept;
+  bool follow(const std::byte* observed) noexcept {
+    layout_->copy_finite(desired_, observed);
+    in_force_ = false;
+    return motion_.brake(desired_, true);
+  }
   bool follows() const noexcept { return when_idle_ == WhenIdle::follow; }
   /// As Motion::difference().
   double difference(std::uint32_t offset, std::uint32_t order) const noexcept {
@@ -104,11 +116,19 @@ class ActuatorQueue {
     return has_record() && ledger_->lane_of(record_) == lane;
   }
   bool may_give_way() const noexcept { return runs_ == Runs::alone || runs_ == Runs::given; }
-  bool gives_way_to(const RecordHead& next) const noexcept;
+  /// A set-point gives way to the next direct command. A trajectory whose rows have ended gives way
+  /// to any.
+  bool gives_way_to(const RecordHead& next) const noexcept {
+    return pace_ != Pace::direct || next.pace == Pace::direct;
+  }
   bool may_begin(const RecordHead& next, Iteration iteration) noexcept {
     return !is_member(next) || ledger_->groups().is_complete(next, iteration);
   }
-  const RecordHead* next_member() const noexcept;
+  /// The next command of the queue, if it is a member of a group.
+  const RecordHead* next_member() const noexcept {
+    const RecordHead* head = queue_.empty() ? nullptr : &pool_->head(queue_.front());
+    return head != nullptr && is_member(*head) ? head : nullptr;
+  }
   bool begin_next(Iteration iteration, const std::byte* observed,
                   std::uint32_t& late_budget) noexcept;
   bool end_late(Iteration iteration, std::uint32_t& late_budget) noexcept;
@@ -117,21 +137,41 @@ class ActuatorQueue {
   bool is_in_force(const SetPoint& next) const noexcept {
     return in_force_ && !motion_.was_held_back() && next == set_point_;
   }
-  bool is_next_row_target() noexcept;
+  /// True if the next row is the target already.
+  bool is_next_row_target() noexcept {
+    Cursor next = rows_;
+    next.read(scratch(), layout_->size());
+    return layout_->same(scratch(), motion_.target(), mask());
+  }
   bool begin_row(Iteration iteration) noexcept;
   void plan_row(Iteration iteration) noexcept;
   void read_row() noexcept;
-  void look_ahead() noexcept;
   Motion::Course course(const RecordHead& head, Iteration iteration) noexcept;
   std::int64_t row_of_own_time() noexcept;
   Moved advance(Iteration iteration) noexcept;
-  BlockIndex leave() noexcept;
+  /// Nothing runs any more; the record of what ran, if it has one.
+  BlockIndex leave() noexcept {
+    if (runs_ == Runs::queued) queue_.pop();
+    return std::exchange(runs_, Runs::nothing) == Runs::given ? kNoBlock : record_;
+  }
   void end_running(Iteration iteration) noexcept;
   void end_held_back(Iteration iteration, const Limited& bound) noexcept;
-  void take_out() noexcept;
+  /// The running command leaves the queue; it ends when it has arrived, or gives way to the next.
+  void take_out() noexcept {
+    queue_.pop();
+    pool_->head(record_).own[Own::kNext] = kNoBlock;
+    runs_ = Runs::alone;
+  }
   Moved come_to_rest(const std::byte* observed) noexcept;
-  void stop() noexcept;
-  void end_motion() noexcept;
+  void stop() noexcept {
+    carry_.reset();
+    runs_ = Runs::nothing;
+    planned_ = in_force_ = false;
+  }
+  void end_motion() noexcept {
+    motion_.end();
+    stop();
+  }
   const std::uint64_t* mask() const noexcept { return masked_ ? mask_.data() : nullptr; }
   std::byte* scratch() noexcept { return reinterpret_cast<std::byte*>(scratch_.data()); }
 

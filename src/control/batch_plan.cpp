@@ -1,234 +1,451 @@
 #include "control/batch_plan.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <utility>
 
 namespace o80 {
 namespace {
 
-constexpr std::uint32_t kBatchWork = 6;  // work of a batch; copying a block is 1
+// work of a batch and of a step; copying a block is 1
+constexpr std::uint32_t kBatchWork = 6;
+constexpr std::uint32_t kStepWork = 2;
+constexpr std::uint32_t kRequestWork = 16;  // plus 1 for each actuator: it may make a fresh start
 
 }  // namespace
 
+/// What is known of a batch that is being checked.
+struct BatchPlanner::Batch {
+  BlockIndex batch = kNoBlock;
+  BlockIndex cursor = kNoBlock;  // first block of the record being checked
+  bool begun = false;            // the check of the record has begun
+  RecordCheck::Verdict verdict = RecordCheck::Verdict::unfinished;
+  BlockIndex last = kNoBlock;  // last block of the record that was reached
+  std::uint32_t to_walk = 0;   // blocks from `last` to the end of the record
+  BlockIndex last_step = kNoBlock;
+  std::uint32_t place = 0;
+  std::uint32_t record_blocks = 0;
+  std::uint32_t blocks = 1;  // blocks of the batch that are checked
+  Plan plan;
+  std::uint32_t work = kBatchWork;
+  std::uint32_t control_orders = 0;
+  std::uint32_t resumes = 0;
+  // the group whose members are being checked
+  BlockIndex group = kNoBlock;
+  BlockIndex first_member = kNoBlock;
+  BlockIndex last_member = kNoBlock;
+  std::uint32_t members_left = 0;
+  std::uint32_t group_blocks = 0;
+};
+
+/// The check of the batches of one lane.
+struct BatchPlanner::Lane : Batch {
+  using Verdict = RecordCheck::Verdict;
+  /// Effect of the present part of a batch on one queue, before its own commands are appended.
+  struct Done {
+    bool empty = false;      // all commands are dropped
+    bool empty_own = false;  // all commands of this lane are dropped
+    bool at_rest = false;    // the actuator brakes
+    bool purged = false;     // all commands are purged
+  };
+
+  /// One actuator in the present part of the batch of a lane.
+  struct Target {
+    std::uint64_t epoch = 0;      // valid while it equals Lane::epoch
+    BlockIndex list = kNoBlock;   // commands that will be appended, unless they are dropped
+    bool list_is_step = false;    // its first command overwrites, and is a step already
+    bool listed = false;          // is in Lane::listed
+    BlockIndex group = kNoBlock;  // the last group with a member of this actuator
+    Done done;
+  };
+
+  Lane(Shared& used, std::size_t actuators) : shared(used), pool(used.pool), targets(actuators) {
+    listed.reserve(actuators);
+  }
+
+  Shared& shared;
+  BlockPool& pool;
+  RecordCheck::Progress progress;
+  std::uint32_t budget = 0;
+  // the present part
+  std::uint64_t epoch = 0;
+  enum class End : std::uint8_t { invalid, overwritten, purged, completed };
+  std::array<BlockIndex, 4> ends{};   // for each End the first record of its list
+  Done all;                           // effect on every queue
+  std::vector<std::uint16_t> listed;  // actuators with a list
+  std::vector<Target> targets;        // one for each actuator
+
+  void begin(BlockIndex first) noexcept {
+    static_cast<Batch&>(*this) = {};
+    batch = first;
+    cursor = pool.next(first);
+    begin_part();
+  }
+
+  /// Stores the plan in `BatchRecord::own`, and its work in `BatchRecord::blocks`: the pool knows
+  /// the count of blocks as well.
+  void complete(BatchRecord& record) noexcept {
+    if (group != kNoBlock) fail_group();  // incomplete
+    end_part();
+    const bool bursts = record.burst != 0 || (record.flags & kBurstUntilEnded) != 0;
+    if (place < record.records) plan.express = 0;
+    plan.resumes = resumes > 0 && resumes == record.records && !bursts ? 1 : 0;
+    plan.missing_from = place;
+    plan.spare_first = cursor;
+    plan.spare_blocks = pool.chain(batch).blocks - blocks;
+    record.own = std::bit_cast<decltype(record.own)>(plan);
+    record.blocks = work;
+    batch = kNoBlock;
+  }
+
+  // ---------------------------------------------------------------------------- checking
+
+  bool check_record() noexcept {
+    if (!begun) {
+      begin_record();
+      --budget;
+    }
+    if (verdict == Verdict::unfinished) {
+      verdict = shared.check.go_on(pool, cursor, progress, budget);
+      if (verdict == Verdict::unfinished) return false;
+      stop_reading();
+    }
+    for (; to_walk > 0; --to_walk, --budget) {
+      if (budget == 0) return false;
+      last = pool.next(last);
+    }
+    RecordHead& head = pool.head(cursor);
+    const bool is_member = group != kNoBlock;
+    const bool fits = is_member ? fits_group(head) : !is_one_too_many(head);
+    const bool valid = fits && verdict == Verdict::valid;
+    if (is_member) {
+      group_blocks += record_blocks;
+      if (valid) {
+        add_member(head);
+      } else {
+        fail_group();
+      }
+    } else if (valid && head.kind == RecordKind::group) {
+      enter(head);
+      group = cursor;
+      first_member = kNoBlock;
+      members_left = head.rows;
+      group_blocks = 1;
+    } else {
+      if (!valid) reject(head, record_blocks);
+      enter(head);
+      add(cursor);
+      ++place;
+    }
+    cursor = pool.next(last);
+    begun = false;
+    blocks += record_blocks;
+    return true;
+  }
+
+  void begin_record() noexcept {
+    const RecordHead& head = pool.head(cursor);
+    const BlockChain chain = pool.chain(batch);
+    const std::uint64_t claimed = blocks_of(head.payload_bytes);
+    const std::uint32_t there = chain.blocks - blocks;
+    begun = true;
+    verdict = Verdict::invalid;
+    last = cursor;
+    to_walk = 0;
+    if (claimed > there) {
+      // it gets the remaining blocks
+      record_blocks = there;
+      last = chain.last;
+      return;
+    }
+    record_blocks = static_cast<std::uint32_t>(claimed);
+    const bool is_wanted = (head.kind == RecordKind::member) == (group != kNoBlock);
+    if (!is_wanted || head.id != record_id(pool.batch(batch).id, place)) {
+      to_walk = record_blocks - 1;
+      return;
+    }
+    verdict = shared.check.begin(pool, cursor, progress);
+    if (verdict != Verdict::unfinished) stop_reading();
+  }
+
+  /// After the check of a record: computes how many blocks remain to its end.
+  void stop_reading() noexcept {
+    const Cursor& payload = progress.payload;
+    const std::uint64_t here = kBlockBytes - payload.offset();
+    const std::uint64_t behind = payload.left() > here ? payload.left() - here : 0;
+    last = payload.block();
+    to_walk = static_cast<std::uint32_t>((behind + kBlockBytes - 1) / kBlockBytes);
+  }
+
+  /// Prepares a checked record, which ends at `last`, for the lists of the backend.
+  void enter(RecordHead& head) noexcept {
+    if (is_timed(head)) note_rows(head, progress.rows);
+    head.own = {kNoBlock, batch, last, kNoBlock};
+  }
+
+  /// Makes of so many blocks one invalid record.
+  void reject(RecordHead& head, std::uint32_t count) noexcept {
+    head.kind = RecordKind::invalid_list;
+    head.id = record_id(pool.batch(batch).id, place);
+    head.payload_bytes = static_cast<std::uint32_t>(count * kBlockBytes - sizeof(RecordHead));
+  }
+
+  /// True if the record exceeds the limits of a batch. pulse() refuses such a batch, but a frontend
+  /// can write its lane directly.
+  bool is_one_too_many(const RecordHead& head) noexcept {
+    switch (head.kind) {
+      case RecordKind::request:
+      case RecordKind::resume:
+        return plan.requests >= kMostRequests;
+      case RecordKind::take_control:
+      case RecordKind::release_control:
+        return ++control_orders > kMostControlOrders;
+      default:
+        return false;
+    }
+  }
+
+  // ---------------------------------------------------------------------------- groups
+
+  /// True if a member has the options of its group, and an actuator that no other member has.
+  bool fits_group(const RecordHead& head) noexcept {
+    if (head.actuator >= targets.size()) return false;
+    const RecordHead& of = pool.head(group);
+    const bool is_new = std::exchange(target(head.actuator).group, group) != group;
+    const bool is_first = first_member == kNoBlock;
+    const bool same_rows = is_first || head.rows == pool.head(first_member).rows;
+    return is_new && same_rows && head.mode == of.mode && head.pace == of.pace &&
+           head.profile == of.profile && head.start == of.start && head.amount == of.amount;
+  }
+
+  void add_member(RecordHead& head) noexcept {
+    head.kind = RecordKind::command;
+    enter(head);
+    head.id = kMemberMark | group;
+    (first_member == kNoBlock ? first_member : pool.head(last_member).own[Own::kNextStep]) = cursor;
+    last_member = cursor;
+    if (--members_left > 0) return;
+
+    // the members of a complete group go to their queues like other commands
+    CommandGroup whole;
+    whole.open = static_cast<std::uint16_t>(pool.head(group).rows);
+    CommandGroups(pool).at(group) = whole;
+    for (BlockIndex member = first_member; member != kNoBlock;) {
+      const BlockIndex record = member;
+      member = std::exchange(pool.head(record).own[Own::kNextStep], kNoBlock);
+      add(record);
+      spend(1);
+    }
+    group = kNoBlock;
+    ++plan.groups;
+    ++place;
+  }
+
+  /// Replaces an invalid group by one invalid record with all its blocks read so far.
+  void fail_group() noexcept {
+    const BlockIndex failed = std::exchange(group, kNoBlock);
+    RecordHead& head = pool.head(failed);
+    reject(head, group_blocks);
+    enter(head);
+    add(failed);
+    ++place;
+  }
+
+  // ---------------------------------------------------------------------------- steps
+
+  void add(BlockIndex record) noexcept {
+    shared.tails[record] = record;
+    const RecordHead& head = pool.head(record);
+    switch (head.kind) {
+      case RecordKind::command:
+        plan.express = 0;
+        plan.moves = 1;
+        return add_command(record);
+      case RecordKind::purge:
+        return add_purge(record);
+      case RecordKind::request:
+      case RecordKind::resume:
+        if (head.kind == RecordKind::resume) {
+          ++resumes;
+        } else if (!shared.while_halted[head.actuator]) {
+          plan.moves = 1;
+        }
+        // a resume makes a fresh start too. It is never express: if it overtook commands that were
+        // sent during the halt, they would act instead of being rejected
+        plan.express = 0;
+        ++plan.requests;
+        end_part();
+        return add_step(record, kRequestWork + static_cast<std::uint32_t>(targets.size()));
+      case RecordKind::release_control:
+        plan.releases = 1;
+        [[fallthrough]];
+      case RecordKind::take_control:
+        return add_step(record, kStepWork);
+      default:
+        plan.express = 0;
+        add_to_end(End::invalid, record);
+    }
+  }
+
+  void add_command(BlockIndex record) noexcept {
+    const RecordHead& head = pool.head(record);
+    Target& to = target(head.actuator);
+    if (!std::exchange(to.listed, true)) listed.push_back(head.actuator);
+    if (head.mode == Mode::queue) {
+      if (to.list != kNoBlock) return join(to.list, record);
+      to.list = record;
+      to.list_is_step = false;
+      return;
+    }
+    drop_list(to, End::overwritten);
+    to.list = record;
+    to.list_is_step = !to.done.empty;
+    if (to.list_is_step) add_step(record, kStepWork);
+    to.done.empty = to.done.empty_own = true;
+  }
+
+  void add_purge(BlockIndex record) noexcept {
+    const RecordHead& head = pool.head(record);
+    const bool own = head.only_own != 0;
+    const bool every = head.actuator == kEveryActuator;
+    if (!(every ? purge_all(own) : purge_one(head.actuator, own))) {
+      return add_to_end(End::completed, record);
+    }
+    add_step(record, kStepWork + (every ? static_cast<std::uint32_t>(targets.size()) : 0));
+  }
+
+  /// True if the purge affects the queue, besides dropping commands that this part would append.
+  bool purge_one(std::uint32_t actuator, bool own) noexcept {
+    Target& to = target(actuator);
+    drop_list(to, End::purged);
+    const Done before = to.done;
+    if (!own) {
+      to.done = {.empty = true, .empty_own = true, .at_rest = true, .purged = true};
+      return !before.purged;
+    }
+    to.done.empty_own = true;
+    to.done.at_rest = before.at_rest || before.empty;
+    return !before.empty_own || (before.empty && !before.at_rest);
+  }
+
+  bool purge_all(bool own) noexcept {
+    bool does_something = own ? !all.empty_own : !all.purged;
+    for (const std::uint16_t actuator : listed) {
+      does_something = purge_one(actuator, own) || does_something;
+      target(actuator).listed = false;
+      spend(1);
+    }
+    listed.clear();
+    all.empty_own = true;
+    if (!own) {
+      all = {.empty = true, .empty_own = true, .at_rest = true, .purged = true};
+      ++epoch;  // every target starts again from `all`
+    }
+    return does_something;
+  }
+
+  /// Ends a part: adds a step for each list of commands that was not dropped.
+  void end_part() noexcept {
+    for (const std::uint16_t actuator : listed) {
+      const Target& to = target(actuator);
+      spend(1);
+      if (to.list == kNoBlock || to.list_is_step) continue;
+      pool.head(to.list).mode = Mode::queue;  // the queue is empty
+      add_step(to.list, kStepWork);
+    }
+    begin_part();
+  }
+
+  void begin_part() noexcept {
+    ++epoch;
+    listed.clear();
+    all = {};
+    ends.fill(kNoBlock);
+  }
+
+  void drop_list(Target& to, End end) noexcept {
+    const BlockIndex list = std::exchange(to.list, kNoBlock);
+    if (list == kNoBlock) return;
+    if (!to.list_is_step) return add_to_end(end, list);
+    pool.head(list).kind = end == End::overwritten ? RecordKind::overwriter_overwritten
+                                                   : RecordKind::overwriter_purged;
+  }
+
+  void add_to_end(End end, BlockIndex list) noexcept {
+    constexpr std::array<RecordKind, 4> kKinds = {
+        RecordKind::invalid_list, RecordKind::overwritten_list, RecordKind::purged_list,
+        RecordKind::completed_list};
+    BlockIndex& first = ends[static_cast<std::size_t>(end)];
+    if (first != kNoBlock) return join(first, list);
+    first = list;
+    pool.head(list).kind = kKinds[static_cast<std::size_t>(end)];
+    add_step(list, kStepWork);
+  }
+
+  void add_step(BlockIndex record, std::uint32_t step_work) noexcept {
+    work += step_work;
+    (last_step == kNoBlock ? plan.steps : pool.head(last_step).own[Own::kNextStep]) = record;
+    last_step = record;
+  }
+
+  /// Appends a list of records, or a single one, to another list.
+  void join(BlockIndex list, BlockIndex first) noexcept {
+    pool.head(shared.tails[list]).own[Own::kNext] = first;
+    shared.tails[list] = shared.tails[first];
+  }
+
+  Target& target(std::uint32_t actuator) noexcept {
+    Target& to = targets[actuator];
+    if (to.epoch != epoch) to = {.epoch = epoch, .done = all};
+    return to;
+  }
+
+  void spend(std::uint32_t spent) noexcept { budget -= std::min(budget, spent); }
+};
+
 BatchPlanner::BatchPlanner(const Schema& schema, const Layouts& layouts, BlockPool& pool,
                            std::uint32_t lanes)
-    : pool_(pool),
-      check_(schema, layouts),
-      lanes_(lanes),
-      tails_(pool.size(), kNoBlock),
+    : shared_{pool, RecordCheck(schema, layouts), std::vector(pool.size(), kNoBlock), {}},
       known_(pool.size(), Known::nothing) {
-  for (Lane& lane : lanes_) {
-    lane.listed.reserve(schema.actuators.size());
-    lane.targets.resize(schema.actuators.size());
+  lanes_.reserve(lanes);
+  for (std::uint32_t i = 0; i < lanes; ++i) lanes_.emplace_back(shared_, schema.actuators.size());
+  for (const RequestRow& request : schema.requests) {
+    shared_.while_halted.push_back(request.while_halted != 0);
   }
-  for (const RequestRow& request : schema.requests)
-    while_halted_.push_back(request.while_halted != 0);
 }
+
+BatchPlanner::~BatchPlanner() = default;
 
 bool BatchPlanner::check(std::uint32_t lane_index, BlockIndex batch,
                          std::uint32_t& budget) noexcept {
   if (known_[batch] != Known::nothing) return true;
   Lane& lane = lanes_[lane_index];
-  BatchRecord& record = pool_.batch(batch);
+  BatchRecord& record = shared_.pool.batch(batch);
   if (lane.batch != batch) {
     if (record.kind != RecordKind::batch || record.records >= record.blocks ||
-        record.blocks != pool_.chain(batch).blocks) {
+        record.blocks != shared_.pool.chain(batch).blocks) {
       known_[batch] = Known::garbage;
       return true;
     }
-    static_cast<Batch&>(lane) = {};
-    lane.batch = batch;
-    lane.cursor = pool_.next(batch);
-    lane.work = kBatchWork;
-    begin_part(lane);
+    lane.begin(batch);
   }
   lane.budget = budget;
   bool goes_on = true;
   while (goes_on && lane.place < record.records && lane.cursor != kNoBlock) {
-    goes_on = lane.budget > 0 && check_record(lane);
+    goes_on = lane.budget > 0 && lane.check_record();
   }
-  if (goes_on) complete(lane, record);
+  if (goes_on) {
+    lane.complete(record);
+    known_[batch] = Known::plan;
+  }
   budget = lane.budget;
   return goes_on;
 }
 
-/// Stores the plan in `BatchRecord::own`, and its work in `BatchRecord::blocks`: the pool knows the
-/// count of blocks as well.
-void BatchPlanner::complete(Lane& lane, BatchRecord& record) noexcept {
-  if (lane.group != kNoBlock) fail_group(lane);  // incomplete
-  end_part(lane);
-  const bool bursts = record.burst != 0 || (record.flags & kBurstUntilEnded) != 0;
-  Plan& plan = lane.plan;
-  if (lane.place < record.records) plan.express = 0;
-  plan.resumes = lane.resumes > 0 && lane.resumes == record.records && !bursts ? 1 : 0;
-  plan.missing_from = lane.place;
-  plan.spare_first = lane.cursor;
-  plan.spare_blocks = pool_.chain(lane.batch).blocks - lane.blocks;
-  record.own = std::bit_cast<decltype(record.own)>(plan);
-  record.blocks = lane.work;
-  known_[std::exchange(lane.batch, kNoBlock)] = Known::plan;
-}
-
-void BatchPlanner::begin_record(Lane& lane) noexcept {
-  const RecordHead& head = pool_.head(lane.cursor);
-  const BlockChain chain = pool_.chain(lane.batch);
-  const std::uint64_t claimed = blocks_of(head.payload_bytes);
-  const std::uint32_t there = chain.blocks - lane.blocks;
-  lane.begun = true;
-  lane.verdict = Verdict::invalid;
-  lane.last = lane.cursor;
-  lane.to_walk = 0;
-  if (claimed > there) {
-    // it gets the remaining blocks
-    lane.record_blocks = there;
-    lane.last = chain.last;
-    return;
-  }
-  lane.record_blocks = static_cast<std::uint32_t>(claimed);
-  const bool is_wanted = (head.kind == RecordKind::member) == (lane.group != kNoBlock);
-  if (!is_wanted || head.id != record_id(pool_.batch(lane.batch).id, lane.place)) {
-    lane.to_walk = lane.record_blocks - 1;
-    return;
-  }
-  lane.verdict = check_.begin(pool_, lane.cursor, lane.progress);
-  if (lane.verdict != Verdict::unfinished) stop_reading(lane);
-}
-
-/// After the check of a record: computes how many blocks remain to its end.
-void BatchPlanner::stop_reading(Lane& lane) noexcept {
-  const Cursor& payload = lane.progress.payload;
-  const std::uint64_t here = kBlockBytes - payload.offset();
-  const std::uint64_t behind = payload.left() > here ? payload.left() - here : 0;
-  lane.last = payload.block();
-  lane.to_walk = static_cast<std::uint32_t>((behind + kBlockBytes - 1) / kBlockBytes);
-}
-
-bool BatchPlanner::check_record(Lane& lane) noexcept {
-  if (!lane.begun) {
-    begin_record(lane);
-    --lane.budget;
-  }
-  if (lane.verdict == Verdict::unfinished) {
-    lane.verdict = check_.go_on(pool_, lane.cursor, lane.progress, lane.budget);
-    if (lane.verdict == Verdict::unfinished) return false;
-    stop_reading(lane);
-  }
-  for (; lane.to_walk > 0; --lane.to_walk, --lane.budget) {
-    if (lane.budget == 0) return false;
-    lane.last = pool_.next(lane.last);
-  }
-  RecordHead& head = pool_.head(lane.cursor);
-  const bool is_member = lane.group != kNoBlock;
-  const bool fits = is_member ? fits_group(lane, head) : !is_one_too_many(lane, head);
-  const bool valid = fits && lane.verdict == Verdict::valid;
-  if (is_member) {
-    lane.group_blocks += lane.record_blocks;
-    if (valid) {
-      add_member(lane, head);
-    } else {
-      fail_group(lane);
-    }
-  } else if (valid && head.kind == RecordKind::group) {
-    enter(lane, head);
-    lane.group = lane.cursor;
-    lane.first_member = kNoBlock;
-    lane.members_left = head.rows;
-    lane.group_blocks = 1;
-  } else {
-    if (!valid) reject(lane, head, lane.record_blocks);
-    enter(lane, head);
-    add(lane, lane.cursor);
-    ++lane.place;
-  }
-  lane.cursor = pool_.next(lane.last);
-  lane.begun = false;
-  lane.blocks += lane.record_blocks;
-  return true;
-}
-
-/// Prepares a checked record, which ends at `lane.last`, for the lists of the backend.
-void BatchPlanner::enter(const Lane& lane, RecordHead& head) noexcept {
-  if (is_timed(head)) note_rows(head, lane.progress.rows);
-  head.own = {kNoBlock, lane.batch, lane.last, kNoBlock};
-}
-
-/// Makes of these blocks one invalid record.
-void BatchPlanner::reject(const Lane& lane, RecordHead& head, std::uint32_t blocks) noexcept {
-  head.kind = RecordKind::invalid_list;
-  head.id = record_id(pool_.batch(lane.batch).id, lane.place);
-  head.payload_bytes = static_cast<std::uint32_t>(blocks * kBlockBytes - sizeof(RecordHead));
-}
-
-// ------------------------------------------------------------------------------ groups
-
-/// True if a member has the options of its group, and an actuator that no other member has.
-bool BatchPlanner::fits_group(Lane& lane, const RecordHead& head) noexcept {
-  if (head.actuator >= lane.targets.size()) return false;
-  const RecordHead& group = pool_.head(lane.group);
-  const bool is_new = std::exchange(target(lane, head.actuator).group, lane.group) != lane.group;
-  const bool is_first = lane.first_member == kNoBlock;
-  const bool same_rows = is_first || head.rows == pool_.head(lane.first_member).rows;
-  return is_new && same_rows && head.mode == group.mode && head.pace == group.pace &&
-         head.profile == group.profile && head.start == group.start && head.amount == group.amount;
-}
-
-void BatchPlanner::add_member(Lane& lane, RecordHead& head) noexcept {
-  head.kind = RecordKind::command;
-  enter(lane, head);
-  head.id = kMemberMark | lane.group;
-  (lane.first_member == kNoBlock ? lane.first_member
-                                 : pool_.head(lane.last_member).own[Own::kNextStep]) = lane.cursor;
-  lane.last_member = lane.cursor;
-  if (--lane.members_left == 0) complete_group(lane);
-}
-
-/// Adds the members of a complete group, which go to their queues like other commands.
-void BatchPlanner::complete_group(Lane& lane) noexcept {
-  CommandGroup group;
-  group.open = static_cast<std::uint16_t>(pool_.head(lane.group).rows);
-  CommandGroups(pool_).at(lane.group) = group;
-  for (BlockIndex member = lane.first_member; member != kNoBlock;) {
-    const BlockIndex record = member;
-    member = std::exchange(pool_.head(record).own[Own::kNextStep], kNoBlock);
-    add(lane, record);
-    spend(lane, 1);
-  }
-  lane.group = kNoBlock;
-  ++lane.plan.groups;
-  ++lane.place;
-}
-
-/// Replaces an invalid group by one invalid record with all its blocks read so far.
-void BatchPlanner::fail_group(Lane& lane) noexcept {
-  const BlockIndex group = std::exchange(lane.group, kNoBlock);
-  RecordHead& head = pool_.head(group);
-  reject(lane, head, lane.group_blocks);
-  enter(lane, head);
-  add(lane, group);
-  ++lane.place;
-}
-
-/// True if the record exceeds the limits of a batch. pulse() refuses such a batch, but a frontend
-/// can write its lane directly.
-bool BatchPlanner::is_one_too_many(Lane& lane, const RecordHead& head) noexcept {
-  switch (head.kind) {
-    case RecordKind::request:
-    case RecordKind::resume:
-      return lane.plan.requests >= kMostRequests;
-    case RecordKind::take_control:
-    case RecordKind::release_control:
-      return ++lane.control_orders > kMostControlOrders;
-    default:
-      return false;
-  }
-}
-
-// ------------------------------------------------------------------------------ what was planned
-
 Effort BatchPlanner::effort(BlockIndex batch) const noexcept {
   if (known_[batch] != Known::plan) return {.work = kBatchWork};
-  const BatchRecord& record = pool_.batch(batch);
+  const BatchRecord& record = shared_.pool.batch(batch);
   const auto plan = std::bit_cast<Plan>(record.own);
   return {record.blocks,      plan.requests,   plan.express != 0,
           plan.releases != 0, plan.moves != 0, plan.resumes != 0};
@@ -237,7 +454,7 @@ Effort BatchPlanner::effort(BlockIndex batch) const noexcept {
 std::optional<Plan> BatchPlanner::plan(BlockIndex batch) noexcept {
   const Known known = std::exchange(known_[batch], Known::nothing);
   if (known != Known::plan) return std::nullopt;
-  return std::bit_cast<Plan>(pool_.batch(batch).own);
+  return std::bit_cast<Plan>(shared_.pool.batch(batch).own);
 }
 
 void BatchPlanner::forget(std::uint32_t lane, BlockIndex batch) noexcept {

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <algorithm>
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -53,6 +51,8 @@ struct Effort {
 class BatchPlanner {
  public:
   BatchPlanner(const Schema& schema, const Layouts& layouts, BlockPool& pool, std::uint32_t lanes);
+  BatchPlanner(const BatchPlanner&) = delete;
+  ~BatchPlanner();
 
   /// Continues the check of a batch for about `budget` blocks, and reduces `budget` by them. True
   /// when the whole batch is checked.
@@ -64,100 +64,23 @@ class BatchPlanner {
   /// Forgets a batch that will not be taken.
   void forget(std::uint32_t lane, BlockIndex batch) noexcept;
   /// The last record of the list of a step.
-  BlockIndex tail(BlockIndex step) const noexcept { return tails_[step]; }
+  BlockIndex tail(BlockIndex step) const noexcept { return shared_.tails[step]; }
 
  private:
-  using Verdict = RecordCheck::Verdict;
+  struct Batch;
+  struct Lane;
   enum class Known : std::uint8_t { nothing, plan, garbage };
-  /// Effect of the present part of a batch on one queue, before its own commands are appended.
-  struct Done {
-    bool empty = false;      // all commands are dropped
-    bool empty_own = false;  // all commands of this lane are dropped
-    bool at_rest = false;    // the actuator brakes
-    bool purged = false;     // all commands are purged
+  /// What all lanes use.
+  struct Shared {
+    BlockPool& pool;
+    RecordCheck check;
+    std::vector<BlockIndex> tails;   // one for each block
+    std::vector<bool> while_halted;  // one for each request
   };
-  /// One actuator in the present part of the batch of a lane.
-  struct Target {
-    std::uint64_t epoch = 0;      // valid while it equals Lane::epoch
-    BlockIndex list = kNoBlock;   // commands that will be appended, unless they are dropped
-    bool list_is_step = false;    // its first command overwrites, and is a step already
-    bool listed = false;          // is in Lane::listed
-    BlockIndex group = kNoBlock;  // the last group with a member of this actuator
-    Done done;
-  };
-  /// The batch of a lane that is being checked.
-  struct Batch {
-    BlockIndex batch = kNoBlock;
-    BlockIndex cursor = kNoBlock;  // first block of the record being checked
-    bool begun = false;            // the check of the record has begun
-    Verdict verdict = Verdict::unfinished;
-    BlockIndex last = kNoBlock;  // last block of the record that was reached
-    std::uint32_t to_walk = 0;   // blocks from `last` to the end of the record
-    BlockIndex last_step = kNoBlock;
-    std::uint32_t place = 0;
-    std::uint32_t record_blocks = 0;
-    std::uint32_t blocks = 1;  // blocks of the batch that are checked
-    Plan plan;
-    std::uint32_t work = 0;
-    std::uint32_t control_orders = 0;
-    std::uint32_t resumes = 0;
-    // the group whose members are being checked
-    BlockIndex group = kNoBlock;
-    BlockIndex first_member = kNoBlock;
-    BlockIndex last_member = kNoBlock;
-    std::uint32_t members_left = 0;
-    std::uint32_t group_blocks = 0;
-  };
-  struct Lane : Batch {
-    RecordCheck::Progress progress;
-    std::uint32_t budget = 0;
-    // the present part
-    std::uint64_t epoch = 0;
-    std::array<BlockIndex, 4> ends{};   // for each End the first record of its list
-    Done all;                           // effect on every queue
-    std::vector<std::uint16_t> listed;  // actuators with a list
-    std::vector<Target> targets;        // one for each actuator
-  };
-  /// Index into Lane::ends.
-  enum class End : std::uint8_t { invalid, overwritten, purged, completed };
 
-  void begin_record(Lane& lane) noexcept;
-  static void stop_reading(Lane& lane) noexcept;
-  bool check_record(Lane& lane) noexcept;
-  void enter(const Lane& lane, RecordHead& head) noexcept;
-  void reject(const Lane& lane, RecordHead& head, std::uint32_t blocks) noexcept;
-  static bool is_one_too_many(Lane& lane, const RecordHead& head) noexcept;
-  void complete(Lane& lane, BatchRecord& record) noexcept;
-
-  // groups
-  bool fits_group(Lane& lane, const RecordHead& head) noexcept;
-  void add_member(Lane& lane, RecordHead& head) noexcept;
-  void complete_group(Lane& lane) noexcept;
-  void fail_group(Lane& lane) noexcept;
-
-  // a checked record => steps
-  void add(Lane& lane, BlockIndex record) noexcept;
-  void add_command(Lane& lane, BlockIndex record) noexcept;
-  void add_purge(Lane& lane, BlockIndex record) noexcept;
-  bool purge_one(Lane& lane, std::uint32_t actuator, bool own) noexcept;
-  bool purge_all(Lane& lane, bool own) noexcept;
-  void end_part(Lane& lane) noexcept;
-  static void begin_part(Lane& lane) noexcept;
-  void drop_list(Lane& lane, Target& target, End end) noexcept;
-  void add_to_end(Lane& lane, End end, BlockIndex list) noexcept;
-  void add_step(Lane& lane, BlockIndex record, std::uint32_t work) noexcept;
-  void join(BlockIndex list, BlockIndex first, BlockIndex last) noexcept;
-  static Target& target(Lane& lane, std::uint32_t actuator) noexcept;
-  static void spend(Lane& lane, std::uint32_t work) noexcept {
-    lane.budget -= std::min(lane.budget, work);
-  }
-
-  BlockPool& pool_;
-  RecordCheck check_;
+  Shared shared_;
   std::vector<Lane> lanes_;
-  std::vector<BlockIndex> tails_;   // one for each block
-  std::vector<Known> known_;        // one for each block
-  std::vector<bool> while_halted_;  // one for each request
+  std::vector<Known> known_;  // one for each block
 };
 
 }  // namespace o80

@@ -162,17 +162,6 @@ void Ledger::append(BlockIndex group) noexcept {
   last_ = group;
 }
 
-void Ledger::drop(BlockIndex first, const Outcome& outcome, Iteration iteration) noexcept {
-  if (first == kNoBlock) return;
-  // store the common end in the first record, whose command is not needed any more: amount =
-  // iteration, rows = status << 8 | reason
-  RecordHead& head = pool_.head(first);
-  head.amount = iteration;
-  head.rows =
-      static_cast<std::uint32_t>(outcome.status) << 8 | static_cast<std::uint32_t>(outcome.reason);
-  append(first);
-}
-
 bool Ledger::tell_rejected(BlockIndex block, std::uint32_t& budget) noexcept {
   TakenBatch& taken = batch(block);
   const auto of =

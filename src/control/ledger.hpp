@@ -55,7 +55,15 @@ class Ledger {
   /// the first end status that is not completed.
   void end(BlockIndex record, const Outcome& outcome, Iteration iteration) noexcept;
   /// A list of records has ended, without details; reported by report_ends().
-  void drop(BlockIndex first, const Outcome& outcome, Iteration iteration) noexcept;
+  void drop(BlockIndex first, const Outcome& outcome, Iteration iteration) noexcept {
+    if (first == kNoBlock) return;
+    // store the common end in the first record, whose command is not needed any more
+    RecordHead& head = pool_.head(first);
+    head.amount = iteration;
+    head.rows = static_cast<std::uint32_t>(outcome.status) << 8 |
+                static_cast<std::uint32_t>(outcome.reason);
+    append(first);
+  }
 
   /// Reports at most `budget` end statuses; returns how many.
   std::uint32_t report_ends(std::uint32_t budget) noexcept;

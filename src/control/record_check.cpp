@@ -13,20 +13,18 @@ bool known_enums(const RecordHead& head) noexcept {
 
 bool sane_pace(const RecordHead& head) noexcept {
   switch (head.pace) {
-    case Pace::direct:
-      return head.amount >= 0 && head.amount <= kLongestDuration;
     case Pace::fastest:
       return true;
-    case Pace::duration:
-      return head.rows > 1 || (head.amount >= 0 && head.amount <= kLongestDuration);
     case Pace::speed:
       return std::isfinite(head.speed) && head.speed > 0.0;
     case Pace::until:
       return head.rows == 1 && head.amount <= kMostIterations;
     case Pace::iterations:
       return head.amount >= 0 && head.amount <= kMostIterations;
+    default:
+      return (head.pace == Pace::duration && head.rows > 1) ||
+             (head.amount >= 0 && head.amount <= kLongestDuration);
   }
-  return false;
 }
 
 }  // namespace
