@@ -104,7 +104,9 @@ ActuatorQueue::Moved ActuatorQueue::go_to(Iteration iteration, const std::byte* 
   if (masked_ || !is_in_force(set_point) || !layout_->same(target, motion_.target(), nullptr)) {
     motion_.begin(nullptr);
     layout_->copy(motion_.target(), target);
-    motion_.settle(iteration, motion_.propose({.profile = usual_profile_}, desired_));
+    Motion::Course course;
+    course.profile = usual_profile_;
+    motion_.settle(iteration, motion_.propose(course, desired_));
   }
   set_point_ = set_point;
   pace_ = Pace::direct;
@@ -321,7 +323,7 @@ void ActuatorQueue::plan_row(Iteration iteration) noexcept {
   const Motion::Course next = course(head, iteration);
   const bool is_as_sent = head.profile == Profile::as_sent;
   row_iterations_ = is_as_sent ? 1 : motion_.propose(next, desired_);
-  asked_ = next.asked;
+  asked_ = next.iterations;
   // of several actuators, others may be slower
   if (head.pace == Pace::speed && !is_member(head)) asked_ = motion_.asked_by_speed();
 }
@@ -335,7 +337,7 @@ Motion::Course ActuatorQueue::course(const RecordHead& head, Iteration iteration
   switch (head.pace) {
     case Pace::direct:
       if (head.amount > 0 && motion_.accelerates()) {
-        next.asked = std::max<std::int64_t>(
+        next.iterations = std::max<std::int64_t>(
             1, std::llround(2e-9 * static_cast<double>(head.amount) / period_));
       }
       break;
@@ -343,17 +345,17 @@ Motion::Course ActuatorQueue::course(const RecordHead& head, Iteration iteration
       next.profile = Profile::linear;
       break;
     case Pace::iterations:
-      next.asked = std::max<std::int64_t>(1, head.amount);
+      next.iterations = std::max<std::int64_t>(1, head.amount);
       break;
     case Pace::until:
       carry_.reset();
-      next.asked = head.amount - iteration + 1;
+      next.iterations = head.amount - iteration + 1;
       break;
     case Pace::speed:
       next.cruise = head.speed * period_;
       break;
     case Pace::duration:
-      next.asked = is_timed(head) ? row_of_own_time() : carry_.iterations(head.amount);
+      next.iterations = is_timed(head) ? row_of_own_time() : carry_.iterations(head.amount);
       break;
   }
   return next;

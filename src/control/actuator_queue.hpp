@@ -88,6 +88,7 @@ class ActuatorQueue {
     in_force_ = false;
     return motion_.brake(desired_, true);
   }
+  const StateLayout& layout() const noexcept { return *layout_; }
   bool follows() const noexcept { return when_idle_ == WhenIdle::follow; }
   /// As Motion::difference().
   double difference(std::uint32_t offset, std::uint32_t order) const noexcept {

@@ -36,7 +36,6 @@ Controller::Controller(const Schema& schema, BlockPool& pool, StatusSink& sink, 
   for (std::uint32_t i = 0; i < count; ++i) {
     const ActuatorRow& row = schema.actuators[i];
     offsets_.push_back(row.offset);
-    types_.push_back(&*layouts_[row.type]);
     actuators_.emplace_back(schema, row, *layouts_[row.type], pool_, ledger_, block + row.offset,
                             lanes);
     set(busy_, i);
@@ -87,23 +86,15 @@ void Controller::step(Iteration iteration, const std::byte* observed) noexcept {
     each_bit(follow_[word] & ~busy_[word], base,
              [&](std::uint32_t i) { actuators_[i].follow(of(i, observed)); });
     each_bit(busy_[word] & ~stepped, base, [&](std::uint32_t i) {
+      using Moved = ActuatorQueue::Moved;
       ActuatorQueue& queue = actuators_[i];
       const std::uint64_t bit = std::uint64_t{1} << (i % 64);
-      switch (queue.step(iteration, of(i, observed), late_budget)) {
-        case ActuatorQueue::Moved::idle:
-          // the queue is not empty if late commands have used up their budget
-          if (queue.empty() && queue.at_rest()) busy_[word] &= ~bit;
-          break;
-        case ActuatorQueue::Moved::braking:
-          braking |= bit;
-          active |= bit;
-          break;
-        case ActuatorQueue::Moved::clamped:
-          clamped |= bit;
-          [[fallthrough]];
-        case ActuatorQueue::Moved::active:
-          active |= bit;
-      }
+      const Moved moved = queue.step(iteration, of(i, observed), late_budget);
+      // the queue is not empty if late commands have used up their budget
+      if (moved == Moved::idle && queue.empty() && queue.at_rest()) busy_[word] &= ~bit;
+      if (moved != Moved::idle) active |= bit;
+      if (moved == Moved::braking) braking |= bit;
+      if (moved == Moved::clamped) clamped |= bit;
     });
     active_mask_[word] = active;
     clamped_mask_[word] = clamped;
@@ -120,7 +111,7 @@ void Controller::step_given(Iteration iteration, const std::byte* observed) noex
   const auto step = static_cast<std::size_t>(iteration - given_.first);
   const std::byte* states = given_.states;
   for (const std::uint32_t i : given_.actuators) {
-    const std::size_t size = types_[i]->size();
+    const std::size_t size = actuators_[i].layout().size();
     const std::byte* target = states + step * size;
     states += given_.steps * size;
     if (has(dropped_, i)) continue;
@@ -134,16 +125,6 @@ void Controller::step_given(Iteration iteration, const std::byte* observed) noex
   }
 }
 
-bool Controller::finish_all_pending() noexcept {
-  const std::uint32_t told = std::min(std::exchange(told_, 0), kStatusesPerIteration);
-  ledger_.report_ends(kStatusesPerIteration - told);
-  return !ledger_.pending();
-}
-
-bool Controller::acts(std::uint32_t lane) const noexcept {
-  return any([&](const ActuatorQueue& queue) { return queue.acts(lane); });
-}
-
 double Controller::difference(std::uint32_t offset, std::uint32_t order) const noexcept {
   const auto behind = std::ranges::upper_bound(offsets_, offset);
   if (behind == offsets_.begin()) return 0.0;
@@ -154,7 +135,7 @@ double Controller::difference(std::uint32_t offset, std::uint32_t order) const n
 
 std::optional<NotFinite> Controller::not_finite(const std::byte* block) const noexcept {
   for (std::uint32_t i = 0; i < actuators_.size(); ++i) {
-    const std::uint32_t number = types_[i]->first_not_finite(of(i, block));
+    const std::uint32_t number = actuators_[i].layout().first_not_finite(of(i, block));
     if (number != StateLayout::kNoNumber) return NotFinite{i, number};
   }
   return std::nullopt;
@@ -164,18 +145,6 @@ bool Controller::braking() const noexcept {
   // in the last step; or in the next one, for an actuator that has just lost its command
   return std::ranges::any_of(braking_mask_, [](std::uint64_t word) { return word != 0; }) ||
          any([](const ActuatorQueue& queue) { return queue.empty() && !queue.rests(); });
-}
-
-void Controller::drop(std::uint32_t actuator, const Outcome& outcome,
-                      Iteration iteration) noexcept {
-  each(actuator, [&](std::uint32_t i) { actuators_[i].drop(outcome, iteration); });
-}
-
-void Controller::purge_lane(std::uint32_t lane, std::uint32_t actuator, Iteration iteration,
-                            Reason reason) noexcept {
-  each(actuator, [&](std::uint32_t i) {
-    actuators_[i].drop_lane(lane, {Status::purged, reason}, iteration);
-  });
 }
 
 // ------------------------------------------------------------------------------ taking a batch
@@ -208,9 +177,16 @@ void Controller::take_step(const Taking& from, BlockIndex record, BatchHandler& 
     case RecordKind::overwriter_overwritten:
     case RecordKind::overwriter_purged:
       return take_commands(from, record, now);
-    case RecordKind::purge:
-      take_purge(from, head, now);
+    case RecordKind::purge: {
+      const bool own = head.only_own != 0;
+      purge_tickets_.raise(own ? from.lane : PurgeTickets::kEveryLane, head.actuator, from.ticket);
+      if (own) {
+        purge_lane(from.lane, head.actuator, now);
+      } else {
+        purge(head.actuator, now);
+      }
       return end({});
+    }
     case RecordKind::request: {
       const Cursor payload(pool_, record, sizeof(RecordHead), head.payload_bytes);
       const Outcome outcome = handler.request(from.lane, head.id, record, head.actuator, payload);
@@ -254,14 +230,6 @@ void Controller::take_commands(const Taking& from, BlockIndex first, Iteration i
   }
   queue.append(first, planner_.tail(first), from.lane);
   set(busy_, head.actuator);
-}
-
-void Controller::take_purge(const Taking& from, const RecordHead& head,
-                            Iteration iteration) noexcept {
-  const bool own = head.only_own != 0;
-  purge_tickets_.raise(own ? from.lane : PurgeTickets::kEveryLane, head.actuator, from.ticket);
-  if (own) return purge_lane(from.lane, head.actuator, iteration);
-  purge(head.actuator, iteration);
 }
 
 }  // namespace o80

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "control/actuator_queue.hpp"
@@ -136,7 +137,11 @@ class Controller {
   /// Ends the commands that one lane has sent to an actuator, or to kEveryActuator; O(lanes) for
   /// each actuator.
   void purge_lane(std::uint32_t lane, std::uint32_t actuator, Iteration iteration,
-                  Reason reason = Reason::none) noexcept;
+                  Reason reason = Reason::none) noexcept {
+    each(actuator, [&](std::uint32_t i) {
+      actuators_[i].drop_lane(lane, {Status::purged, reason}, iteration);
+    });
+  }
   /// Earlier purges no longer end commands that are taken later; for an invalid ticket counter.
   void forget_tickets() noexcept { purge_tickets_.forget(); }
   /// Ends all commands as halted; each actuator then brakes within its limits.
@@ -152,9 +157,9 @@ class Controller {
   /// Reports the end statuses of dropped commands, at most kStatusesPerIteration minus those that
   /// the last step() has reported. False if some are left.
   bool finish_pending() noexcept {
-    if (ledger_.pending()) return finish_all_pending();
-    told_ = 0;
-    return true;
+    const std::uint32_t told = std::min(std::exchange(told_, 0), kStatusesPerIteration);
+    if (ledger_.pending()) ledger_.report_ends(kStatusesPerIteration - told);
+    return !ledger_.pending();
   }
 
   /// The desired block, in the layout of the schema.
@@ -183,7 +188,9 @@ class Controller {
   bool holds() const noexcept { return any(&ActuatorQueue::holds); }
   /// True if a command of this lane is running or queued, or its direct value is still held;
   /// O(actuators).
-  bool acts(std::uint32_t lane) const noexcept;
+  bool acts(std::uint32_t lane) const noexcept {
+    return any([&](const ActuatorQueue& queue) { return queue.acts(lane); });
+  }
   /// The first number of a block of states that is infinite or NaN, if any; O(numbers).
   std::optional<NotFinite> not_finite(const std::byte* block) const noexcept;
   /// True if end statuses of dropped commands have not been reported yet.
@@ -197,12 +204,12 @@ class Controller {
   };
   void take_step(const Taking& from, BlockIndex record, BatchHandler& handler) noexcept;
   void take_commands(const Taking& from, BlockIndex first, Iteration iteration) noexcept;
-  void take_purge(const Taking& from, const RecordHead& head, Iteration iteration) noexcept;
   void step_groups(Iteration iteration, const std::byte* observed,
                    std::uint32_t& late_budget) noexcept;
-  bool finish_all_pending() noexcept;
   void step_given(Iteration iteration, const std::byte* observed) noexcept;
-  void drop(std::uint32_t actuator, const Outcome& outcome, Iteration iteration) noexcept;
+  void drop(std::uint32_t actuator, const Outcome& outcome, Iteration iteration) noexcept {
+    each(actuator, [&](std::uint32_t i) { actuators_[i].drop(outcome, iteration); });
+  }
   const std::byte* of(std::uint32_t actuator, const std::byte* block) const noexcept {
     return block + offsets_[actuator];
   }
@@ -241,8 +248,7 @@ class Controller {
   Mask active_mask_;
   Mask clamped_mask_;
   Mask braking_mask_;
-  std::vector<std::uint32_t> offsets_;     // offset of each actuator in a block of states [bytes]
-  std::vector<const StateLayout*> types_;  // layout of each actuator
+  std::vector<std::uint32_t> offsets_;  // offset of each actuator in a block of states [bytes]
   std::vector<ActuatorQueue> actuators_;
   Mask busy_;     // has commands, or is not known to be at rest
   Mask stepped_;  // has its desired state from given_ already

@@ -12,6 +12,8 @@
 namespace o80 {
 namespace {
 
+constexpr double kUnlimited = std::numeric_limits<double>::infinity();
+
 template <class T>
 void store(std::byte* out, T value) noexcept {
   std::memcpy(out, &value, sizeof value);
@@ -66,7 +68,6 @@ Motion::Motion(const Schema& schema, const ActuatorRow& actuator, const StateLay
     : layout_(layout),
       stride_((layout.size() + 15) / 16 * 16),
       ends_(3 * stride_ / sizeof(std::uint64_t)) {
-  constexpr double kUnlimited = std::numeric_limits<double>::infinity();
   const double period = static_cast<double>(schema.head.period) / 1e9;
   for (std::uint32_t i = 0; i < layout.numbers().size(); ++i) {
     const NumberPlace& place = layout.numbers()[i];
@@ -115,16 +116,6 @@ void Motion::begin(const std::uint64_t* mask) noexcept {
   }
 }
 
-/// Iterations of a row, or of a type that blends by itself, at the speed asked for.
-std::int64_t Motion::iterations_at(const Course& course) const noexcept {
-  if (course.first == StateLayout::kNoNumber) return 1;
-  constexpr double kPeakFromRest = 1.875;  // of a minimum-jerk motion, to its mean speed
-  const double distance =
-      layout_.number(course.first, target()) - layout_.number(course.first, from());
-  const bool is_smooth = course.profile == Profile::minimum_jerk;
-  return iterations_of(is_smooth ? kPeakFromRest * distance : distance, course.cruise);
-}
-
 std::int64_t Motion::propose(const Course& course, const std::byte* desired) noexcept {
   profile_ = course.profile;
   is_row_ = course.is_row;
@@ -134,15 +125,22 @@ std::int64_t Motion::propose(const Course& course, const std::byte* desired) noe
   const std::byte* observed = first_row ? std::exchange(observed_, nullptr) : nullptr;
   if (observed != nullptr) layout_.copy_finite(from(), observed);
 
-  std::int64_t longest = std::max<std::int64_t>(1, course.asked);
+  std::int64_t longest = std::max<std::int64_t>(1, course.iterations);
   slowest_ = {};
   if ((is_row_ || numbers_.empty()) && std::isfinite(course.cruise)) {
-    longest = iterations_at(course);
+    // a row, or a type that blends by itself, at the speed asked for
+    constexpr double kPeakFromRest = 1.875;  // of a minimum-jerk motion, to its mean speed
+    const bool has_first = course.first != StateLayout::kNoNumber;
+    const double distance =
+        has_first ? layout_.number(course.first, target()) - layout_.number(course.first, from())
+                  : 0.0;
+    const bool is_smooth = course.profile == Profile::minimum_jerk;
+    longest = iterations_of(is_smooth ? kPeakFromRest * distance : distance, course.cruise);
   }
   asked_by_speed_ = longest;
   for (Number& each : numbers_) {
     if (!each.is_commanded) continue;
-    NumberMotion::Asked asked;
+    Asked asked = course;
     asked.target = layout_.number(each.number, target());
     const bool at_published = observed != nullptr || !each.is_limited || !(first_row || !is_row_);
     asked.line_start = at_published ? layout_.number(each.number, from()) : each.motion.position();
@@ -153,9 +151,7 @@ std::int64_t Motion::propose(const Course& course, const std::byte* desired) noe
     }
     if (!first_row) each.motion.begin();
     if (observed != nullptr) asked.start = asked.line_start;
-    asked.iterations = course.asked;
-    asked.profile = course.profile;
-    if (each.number == course.first) asked.cruise = course.cruise;
+    if (each.number != course.first) asked.cruise = kUnlimited;
     const std::int64_t fewest = each.motion.propose(asked);
     if (each.number == course.first) asked_by_speed_ = fewest;
     if (fewest <= longest) continue;

@@ -36,12 +36,9 @@ class Motion {
   Motion(const Schema& schema, const ActuatorRow& actuator, const StateLayout& layout);
 
   /// How a command gets to its target, or to the next row of a trajectory.
-  struct Course {
-    Profile profile = Profile::linear;
-    std::int64_t asked = 0;  // iterations; 0: as few as the limits allow
-    double cruise = std::numeric_limits<double>::infinity();  // of `first` [1/iteration]
+  struct Course : Asked {
     std::uint32_t first = 0;  // the number that the cruising speed is for
-    bool is_row = false;      // of a trajectory in straight lines: it has `asked` iterations
+    bool is_row = false;      // of a trajectory in straight lines: it has `iterations`
   };
 
   /// The target of the next plan(); fill it before. Numbers of `mask` (null: all) move to it.
@@ -172,7 +169,6 @@ class Motion {
     return reinterpret_cast<const std::byte*>(ends_.data());
   }
   const std::byte* target() const noexcept { return from() + stride_; }
-  std::int64_t iterations_at(const Course& course) const noexcept;
   void blend(Iteration now, std::byte* state) noexcept;
   void publish(const Number& number, std::byte* state) const noexcept;
 

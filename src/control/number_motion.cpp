@@ -104,36 +104,30 @@ Limit NumberMotion::move(Move&& move) noexcept {
 
 Limit NumberMotion::step(double low, double high) noexcept {
   Limit limit = Limit::none;
-  const Limit bound = move([&] { limit = step_freely(low, high); });
+  const Limit bound = move([&] {
+    const double wanted = std::clamp(plan_.next(), low, high);
+    if (!follows_ && guard_.pass(wanted)) return;
+    follows_ = true;
+    limit = leave() ? Limit::acceleration : guard_.follow(wanted);
+  });
   return bound != Limit::none ? bound : limit;
 }
 
-Limit NumberMotion::step_freely(double low, double high) noexcept {
-  const double wanted = std::clamp(plan_.next(), low, high);
-  if (!follows_ && guard_.pass(wanted)) return Limit::none;
-  follows_ = true;
-  if (leave()) return Limit::acceleration;
-  return guard_.follow(wanted);
-}
-
 bool NumberMotion::brake() noexcept {
-  bool moves = false;
-  const Limit bound = move([&] { moves = brake_freely(); });
+  bool moves = is_away();
+  const Limit bound = move([&] {
+    const double before = guard_.position();
+    if (moves) {
+      guard_.widen(*rest_);
+      guard_.follow(*rest_);
+    } else if (!leave()) {
+      guard_.brake();
+    }
+    moves = moves || guard_.position() != before || !stays();
+  });
   // what stands at a bound is no longer held away from rest
   if (stands_) held_ = false;
   return moves || bound != Limit::none;
-}
-
-bool NumberMotion::brake_freely() noexcept {
-  const double before = guard_.position();
-  const bool was_away = is_away();
-  if (was_away) {
-    guard_.widen(*rest_);
-    guard_.follow(*rest_);
-  } else if (!leave()) {
-    guard_.brake();
-  }
-  return was_away || guard_.position() != before || !stays();
 }
 
 }  // namespace o80

@@ -114,8 +114,6 @@ class NumberMotion {
     if (leaves_) leaves_ = !guard_.stops_inside();
     return leaves_ && guard_.pass(former_.next());
   }
-  Limit step_freely(double low, double high) noexcept;
-  bool brake_freely() noexcept;
   template <class Move>
   Limit move(Move&& move) noexcept;
   std::int64_t plan_for(const Asked& asked) noexcept;
