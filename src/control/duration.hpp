@@ -35,14 +35,8 @@ class DurationCarry {
  private:
   /// Iterations until the exact end of a duration, rounded; 0 or less if that has passed.
   std::int64_t whole(std::int64_t duration) const noexcept {
-    const std::int64_t exact = carry_ + duration;
-    std::int64_t rounded = exact / period_;
-    std::int64_t rest = exact % period_;
-    if (rest < 0) {
-      rest += period_;
-      --rounded;
-    }
-    return rest >= period_ - rest ? rounded + 1 : rounded;
+    const std::int64_t shifted = carry_ + duration + period_ / 2;
+    return shifted / period_ - (shifted % period_ < 0 ? 1 : 0);
   }
 
   std::int64_t period_;     // [ns]

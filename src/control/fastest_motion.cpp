@@ -96,7 +96,7 @@ FastestMotion::FastestMotion(const Moment& start, double target, const Rates& ra
     mix(lowest);
   } else {
     const double highest = std::min(rates_.speed, cruise_ * (1.0 + kBracket));
-    cruise_ = cruise_for(static_cast<double>(before_), lowest, highest);
+    cruise_ = cruise_for(lowest, highest);
   }
   settle();
 }
@@ -143,10 +143,6 @@ void FastestMotion::mix(double lowest) noexcept {
   share_ = (farther_.distance - distance_) / (farther_.distance - nearer_.distance);
 }
 
-double FastestMotion::time_to(double cruise) const noexcept {
-  return VelocityChange(cruise - start_speed_, start_acceleration_, rates_).time();
-}
-
 double FastestMotion::distance(double cruise, std::optional<double> before) const noexcept {
   const VelocityChange to_cruise(cruise - start_speed_, start_acceleration_, rates_);
   const VelocityChange to_rest(-cruise, 0.0, rates_);
@@ -154,9 +150,12 @@ double FastestMotion::distance(double cruise, std::optional<double> before) cons
          to_rest.displacement();
 }
 
-double FastestMotion::cruise_for(double before, double low, double high) const noexcept {
-  const auto beyond = [&](double cruise) { return distance(cruise, before) - distance_; };
-  return root(beyond, low, high, 1e-16 * distance_);
+/// The cruising speed with which it reaches the target, if it slows down after `before_`
+/// iterations.
+double FastestMotion::cruise_for(double low, double high) const noexcept {
+  const auto before = static_cast<double>(before_);
+  return root([&](double cruise) { return distance(cruise, before) - distance_; }, low, high,
+              1e-16 * distance_);
 }
 
 void FastestMotion::settle() noexcept {
@@ -180,7 +179,7 @@ void FastestMotion::stretch(std::int64_t iterations) noexcept {
     exact = true;
     before_ += iterations - iterations_;
     if (before_ < 0) break;
-    cruise_ = cruise_for(static_cast<double>(before_), 0.0, cruise_);
+    cruise_ = cruise_for(0.0, cruise_);
     settle();
   }
   // keep the shortest motion if the stretched one is too long or has no time to get to its cruise

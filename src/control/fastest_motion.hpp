@@ -47,8 +47,10 @@ class FastestMotion {
   /// Distance of a motion that slows down from the speed `cruise` after `before` iterations, or as
   /// soon as it has that speed.
   double distance(double cruise, std::optional<double> before) const noexcept;
-  double time_to(double cruise) const noexcept;
-  double cruise_for(double before, double low, double high) const noexcept;
+  double time_to(double cruise) const noexcept {
+    return VelocityChange(cruise - start_speed_, start_acceleration_, rates_).time();
+  }
+  double cruise_for(double low, double high) const noexcept;
   void settle() noexcept;
 
   // mirrored by sign_, so that the target lies beyond the shortest stop

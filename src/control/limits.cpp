@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "base/short_text.hpp"
-#include "control/number_name.hpp"
+#include "describe/number_name.hpp"
 #include "o80/base/nearest_name.hpp"
 
 namespace o80 {
@@ -21,41 +21,9 @@ std::string text_of(double value) {
   return std::string(text, end);
 }
 
-/// The name of a number of a state for messages: its path of field names, and its field.
-struct NumberName {
-  std::string path;  // empty for a plain number
-  const FieldRow* field = nullptr;
-};
-
-/// The name of the number at `offset` of a type.
-NumberName name_at(const Schema& schema, std::uint32_t type, std::uint32_t offset) {
-  const TypeRow& row = schema.types.at(type);
-  for (std::uint32_t i = 0; i < row.fields; ++i) {
-    const FieldRow& field = schema.fields.at(row.first_field + i);
-    const std::uint32_t end = field.offset + field.size * field.count();
-    if (offset < field.offset || offset >= end) continue;
-
-    const std::uint32_t element = (offset - field.offset) / field.size;
-    NumberName name{field.name.str(), &field};
-    if (field.columns != 0) {
-      name.path += "[" + std::to_string(element / field.columns) + "][" +
-                   std::to_string(element % field.columns) + "]";
-    } else if (field.rows != 0) {
-      name.path += "[" + std::to_string(element) + "]";
-    }
-    if (field.kind != Kind::structure) return name;
-    const std::uint32_t inside = offset - field.offset - element * field.size;
-    const NumberName inner = name_at(schema, field.type, inside);
-    if (!inner.path.empty()) name.path += (name.path.empty() ? "" : ".") + inner.path;
-    name.field = inner.field;
-    return name;
-  }
-  return {};
-}
-
 std::string with_unit(const std::string& text, const FieldRow* field) {
-  const bool has_unit = field != nullptr && !field->unit.view().empty();
-  return has_unit ? text + " [" + field->unit.str() + "]" : text;
+  if (field == nullptr || field->unit.view().empty()) return text;
+  return text + " [" + field->unit.str() + "]";
 }
 
 std::string of_actuator(const Schema& schema, std::uint32_t actuator) {

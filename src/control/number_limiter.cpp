@@ -121,20 +121,16 @@ Limit NumberLimiter::violated(const Candidate& next) const noexcept {
   const double end = position + next.stop.displacement();
   const double turn = position + next.stop.run_before_turn(speed);
   const double rounding = this->rounding();
-  // outside the bounds it must not turn outward again
-  const double highest = std::max(span_.high, std::min(position, turn));
-  const double lowest = std::min(span_.low, std::max(position, turn));
-  if (position > std::max(span_.high, now_.position) + rounding ||
-      std::max(end, turn) > std::max(highest, position) + rounding ||
-      (end > turn && end > highest + rounding)) {
-    return Limit::maximum;
-  }
-  if (position < std::min(span_.low, now_.position) - rounding ||
-      std::min(end, turn) < std::min(lowest, position) - rounding ||
-      (end < turn && end < lowest - rounding)) {
-    return Limit::minimum;
-  }
-  return Limit::none;
+  // `side`: 1 above, -1 below. Outside the bounds it must not turn outward again
+  const auto leaves = [&](double side, double bound) {
+    const double next_to = side * position;
+    const double inner = std::max(bound, std::min(next_to, side * turn));
+    return next_to > std::max(bound, side * now_.position) + rounding ||
+           std::max(side * end, side * turn) > std::max(inner, next_to) + rounding ||
+           (side * end > side * turn && side * end > inner + rounding);
+  };
+  if (leaves(1.0, span_.high)) return Limit::maximum;
+  return leaves(-1.0, -span_.low) ? Limit::minimum : Limit::none;
 }
 
 /// The acceleration that approaches the wanted position as fast as possible without overshoot,

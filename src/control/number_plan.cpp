@@ -36,13 +36,6 @@ std::int64_t iterations_of(double distance, double speed) noexcept {
   return std::max<std::int64_t>(1, static_cast<std::int64_t>(up));
 }
 
-void NumberPlan::line(double start, double target) noexcept {
-  task_.line_start = start;
-  task_.target = target;
-  shape_ = Shape::line;
-  line_for(1);
-}
-
 std::int64_t NumberPlan::propose(const PlanTask& task) noexcept {
   task_ = task;
   has_fastest_ = false;
@@ -103,21 +96,9 @@ bool NumberPlan::fits(const SmoothMotion& motion) const noexcept {
   };
   const double rounding = 4.0 * std::numeric_limits<double>::epsilon() *
                           std::max(std::abs(task_.span.low), std::abs(task_.span.high));
-  return most.low >= task_.span.low - rounding && most.high <= task_.span.high + rounding &&
-         within(most.speed, speed) && within(most.acceleration, task_.rates.acceleration) &&
-         within(most.jerk, task_.rates.jerk);
-}
-
-/// A number that may stop at once can begin as from rest, if the step from its present speed to the
-/// first one keeps the limits too.
-bool NumberPlan::fits_after_stop(const SmoothMotion& motion) const noexcept {
-  const double first = motion.position(1.0) - task_.from.position;
-  const double second = motion.position(2.0) - motion.position(1.0);
-  const double a1 = first - task_.from.speed;
-  const double a2 = second - first;
-  return std::abs(a1) <= task_.rates.acceleration &&
-         std::abs(a1 - task_.from.acceleration) <= task_.rates.jerk &&
-         std::abs(a2 - a1) <= task_.rates.jerk && fits(motion);
+  return most.positions.low >= task_.span.low - rounding &&
+         most.positions.high <= task_.span.high + rounding && within(most.speed, speed) &&
+         within(most.acceleration, task_.rates.acceleration) && within(most.jerk, task_.rates.jerk);
 }
 
 /// Plans a smooth motion; false if none keeps all limits in this number of iterations.
@@ -130,8 +111,15 @@ bool NumberPlan::smooth(std::int64_t iterations) noexcept {
   if (!std::isfinite(task_.rates.acceleration) && moves && stop_then_smooth(iterations))
     return true;
   if (!task_.stays || !moves) return false;
+  // it can begin as from rest, if the step from its present speed to the first one keeps the limits
   smooth_ = SmoothMotion({task_.from.position}, task_.target, iterations);
-  return fits_after_stop(smooth_);
+  const double first = smooth_.position(1.0) - task_.from.position;
+  const double second = smooth_.position(2.0) - smooth_.position(1.0);
+  const double a1 = first - task_.from.speed;
+  const double a2 = second - first;
+  return std::abs(a1) <= task_.rates.acceleration &&
+         std::abs(a1 - task_.from.acceleration) <= task_.rates.jerk &&
+         std::abs(a2 - a1) <= task_.rates.jerk && fits(smooth_);
 }
 
 /// Without a limit of acceleration: comes to rest in a half, a quarter, ... of the iterations, the
@@ -157,18 +145,13 @@ void NumberPlan::settle(std::int64_t iterations) noexcept {
   done_ = 0;
   iterations_ = iterations;
   const bool accelerates = std::isfinite(task_.rates.acceleration);
-  if (!accelerates && iterations == 1) {
-    shape_ = Shape::line;
-    return;
-  }
-  const std::int64_t proposed = task_.profile == Profile::minimum_jerk ? smooth_for_ : 0;
-  if (task_.profile == Profile::minimum_jerk && smooth(iterations)) return;
-  if (!accelerates) {
-    shape_ = Shape::line;
-    return;
-  }
+  const bool is_smooth = task_.profile == Profile::minimum_jerk && (accelerates || iterations > 1);
+  const std::int64_t proposed = smooth_for_;
+  if (is_smooth && smooth(iterations)) return;
+  shape_ = Shape::line;
+  if (!accelerates) return;
   if (!has_fastest_) fewest();
-  if (fastest_.iterations() > iterations && proposed > 0 && smooth(proposed)) return;
+  if (fastest_.iterations() > iterations && is_smooth && proposed > 0 && smooth(proposed)) return;
   fastest_.stretch(iterations);
   shape_ = Shape::fastest;
 }

@@ -60,7 +60,12 @@ class NumberPlan {
   /// Plans the motion for `iterations`, at least those of propose().
   void settle(std::int64_t iterations) noexcept;
   /// A straight line that no limit changes; line_for() sets its length.
-  void line(double start, double target) noexcept;
+  void line(double start, double target) noexcept {
+    task_.line_start = start;
+    task_.target = target;
+    shape_ = Shape::line;
+    line_for(1);
+  }
   void line_for(std::int64_t iterations) noexcept {
     iterations_ = iterations;
     done_ = 0;
@@ -85,7 +90,6 @@ class NumberPlan {
   std::int64_t fewest_smooth(std::int64_t least) noexcept;
   bool smooth(std::int64_t iterations) noexcept;
   bool fits(const SmoothMotion& motion) const noexcept;
-  bool fits_after_stop(const SmoothMotion& motion) const noexcept;
   bool stop_then_smooth(std::int64_t iterations) noexcept;
 
   PlanTask task_;

@@ -54,12 +54,8 @@ SmoothMotion::Extremes SmoothMotion::extremes() const noexcept {
   const auto [h0, h1, h2] = h.c;
   const Quadratic k{{(n + 3.0) * (h1 - h2) - h0, h2 * (2.0 * n + 7.0) - 2.0 * h1, -3.0 * h2}};
 
-  Extremes all{target_, target_, 0.0, 0.0, 0.0};
-  const auto place = [&](double i) {
-    const double at = position(i);
-    all.low = std::min(all.low, at);
-    all.high = std::max(all.high, at);
-  };
+  Extremes all{{target_, target_}, 0.0, 0.0, 0.0};
+  const auto place = [&](double i) { all.positions.include(position(i)); };
   const auto speed = [&](double i) {
     all.speed = std::max(all.speed, std::abs((n - i + 1.0) * (n - i + 2.0) * u.at(i)));
   };

@@ -22,8 +22,7 @@ class SmoothMotion {
 
   /// Largest values from the first iteration to rest.
   struct Extremes {
-    double low;  // positions
-    double high;
+    Span positions;
     double speed;  // sizes of the differences
     double acceleration;
     double jerk;

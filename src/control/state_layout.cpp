@@ -108,20 +108,6 @@ void StateLayout::copy_finite(std::byte* to, const std::byte* from,
   }
 }
 
-std::uint32_t StateLayout::first_commanded(const std::uint64_t* mask) const noexcept {
-  for (std::uint32_t i = 0; i < numbers_.size(); ++i) {
-    if (masked(mask, i) && numbers_[i].moves()) return i;
-  }
-  return kNoNumber;
-}
-
-std::uint32_t StateLayout::first_not_finite(const std::byte* state) const noexcept {
-  for (std::uint32_t i = 0; i < numbers_.size(); ++i) {
-    if (!finite_number(i, state)) return i;
-  }
-  return kNoNumber;
-}
-
 bool StateLayout::finite_number(std::size_t number, const std::byte* state) const noexcept {
   const std::byte* at = state + numbers_[number].offset;
   if (numbers_[number].kind == Kind::float64) return std::isfinite(load<double>(at));
@@ -138,13 +124,6 @@ bool StateLayout::proper_number(std::size_t number, const std::byte* state) cons
       place.integer, [&]<class T>(T) { return static_cast<std::int64_t>(load<T>(at)); });
   const auto first = labels_.begin() + place.first_label;
   return std::find(first, first + place.labels, value) != first + place.labels;
-}
-
-bool StateLayout::proper(const std::byte* state) const noexcept {
-  for (std::size_t i = 0; i < numbers_.size(); ++i) {
-    if (!proper_number(i, state)) return false;
-  }
-  return true;
 }
 
 double StateLayout::number(std::size_t number, const std::byte* state) const noexcept {

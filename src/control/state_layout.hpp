@@ -32,6 +32,11 @@ T load(const std::byte* bytes) noexcept {
   return value;
 }
 
+/// True if the bit of a number is set; a null mask means all.
+inline bool masked(const std::uint64_t* mask, std::size_t number) noexcept {
+  return mask == nullptr || (mask[number / 64] >> (number % 64) & 1) != 0;
+}
+
 /// The numbers of a described struct, for use in the loop.
 class StateLayout {
  public:
@@ -71,17 +76,29 @@ class StateLayout {
 
   static constexpr std::uint32_t kNoNumber = 0xFFFFFFFF;
   /// The first number whose bit is set and that is interpolated; or kNoNumber.
-  std::uint32_t first_commanded(const std::uint64_t* mask) const noexcept;
+  std::uint32_t first_commanded(const std::uint64_t* mask) const noexcept {
+    return first([&](std::uint32_t i) { return masked(mask, i) && numbers_[i].moves(); });
+  }
   /// The first number that is infinite or NaN, or kNoNumber.
-  std::uint32_t first_not_finite(const std::byte* state) const noexcept;
+  std::uint32_t first_not_finite(const std::byte* state) const noexcept {
+    return first([&](std::uint32_t i) { return !finite_number(i, state); });
+  }
 
   /// True if each boolean is 0 or 1 and each enumeration has a label.
-  bool proper(const std::byte* state) const noexcept;
+  bool proper(const std::byte* state) const noexcept {
+    return first([&](std::uint32_t i) { return !proper_number(i, state); }) == kNoNumber;
+  }
   bool proper_number(std::size_t number, const std::byte* state) const noexcept;
   /// A number as double (large integers are rounded).
   double number(std::size_t number, const std::byte* state) const noexcept;
 
  private:
+  template <class Predicate>
+  std::uint32_t first(Predicate&& predicate) const noexcept {
+    std::uint32_t i = 0;
+    while (i < numbers_.size() && !predicate(i)) ++i;
+    return i < numbers_.size() ? i : kNoNumber;
+  }
   bool finite_number(std::size_t number, const std::byte* state) const noexcept;
   void copy_numbers(std::byte* to, const std::byte* from) const noexcept;
 
@@ -100,10 +117,5 @@ const StateLayout& layout_of(const Schema& schema, std::uint32_t type, Layouts& 
 /// The layouts of the types of actuators and requests. If they are `controlled` here, throws
 /// InvalidArgument if an actuator cannot be.
 Layouts layouts_of_types(const Schema& schema, bool controlled = true);
-
-/// True if the bit of a number is set; a null mask means all.
-inline bool masked(const std::uint64_t* mask, std::size_t number) noexcept {
-  return mask == nullptr || (mask[number / 64] >> (number % 64) & 1) != 0;
-}
 
 }  // namespace o80

@@ -11,7 +11,7 @@
 
 #include "base/crash_point.hpp"
 #include "control/motion_rules.hpp"
-#include "control/number_name.hpp"
+#include "describe/number_name.hpp"
 #include "describe/table.hpp"
 #include "o80/base/version.hpp"
 #include "runtime/backend_body.hpp"

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "control/number_name.hpp"
+#include "describe/number_name.hpp"
 
 namespace o80 {
 

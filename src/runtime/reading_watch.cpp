@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <utility>
 
-#include "control/number_name.hpp"
+#include "describe/number_name.hpp"
 
 namespace o80 {
 
