@@ -71,7 +71,11 @@ ActuatorQueue::Moved ActuatorQueue::step(Iteration iteration, const std::byte* o
     const bool next_row = planned_ || (row_is_over && rows_left_ > 0);
     if (next_row && !begin_row(iteration)) return step(iteration, observed, late_budget);
   } else if (!begin_next(iteration, observed, late_budget)) {
-    return come_to_rest(observed);
+    // the motion brakes within its limits, and fields with a rest value go to it
+    motion_.end();
+    carry_.reset();
+    const bool moves = follows() ? follow(observed) : motion_.brake(desired_, false);
+    return moves ? Moved::braking : Moved::idle;
   }
   return advance(iteration);
 }
@@ -87,7 +91,10 @@ ActuatorQueue::Moved ActuatorQueue::advance(Iteration iteration) noexcept {
   if (limited.limit != Limit::none && late_ == 0) reason_ = limited;
   if (iteration >= motion_.last() && rows_left_ == 0) {
     if (motion_.stands()) {
-      end_held_back(iteration, limited);
+      // bounds of an integral hold it back: it ends where it is
+      const BlockIndex record = leave();
+      end_motion();
+      end(record, {Status::interrupted, Reason::limits, limited.packed()}, iteration);
     } else if (motion_.arrived()) {
       end_running(iteration);
     } else if (runs_ == Runs::queued && pool_->head(record_).rows > 1) {
@@ -117,11 +124,6 @@ ActuatorQueue::Moved ActuatorQueue::go_to(Iteration iteration, const std::byte* 
   return advance(iteration);
 }
 
-void ActuatorQueue::give_way(Iteration iteration) noexcept {
-  const BlockIndex record = leave();
-  if (record != kNoBlock) ledger_->end(record, {Status::overwritten}, iteration);
-}
-
 void ActuatorQueue::end_running(Iteration iteration) noexcept {
   in_force_ = pace_ == Pace::direct;
   if (in_force_) motion_.hold();
@@ -134,22 +136,6 @@ void ActuatorQueue::end_running(Iteration iteration) noexcept {
   Outcome outcome;
   if (late_ > 0 && asked_ > 0) outcome = {outcome.status, Reason::limits, reason_.packed(), late_};
   ledger_->end(record, outcome, iteration);
-}
-
-/// Bounds of an integral hold the running command back, and it stands: it ends where it is.
-void ActuatorQueue::end_held_back(Iteration iteration, const Limited& bound) noexcept {
-  const BlockIndex record = leave();
-  end_motion();
-  if (record == kNoBlock) return;
-  ledger_->end(record, {Status::interrupted, Reason::limits, bound.packed()}, iteration);
-}
-
-/// Without a command: the motion brakes within its limits, and fields with a rest value go to it.
-ActuatorQueue::Moved ActuatorQueue::come_to_rest(const std::byte* observed) noexcept {
-  motion_.end();
-  carry_.reset();
-  const bool moves = follows() ? follow(observed) : motion_.brake(desired_, false);
-  return moves ? Moved::braking : Moved::idle;
 }
 
 bool ActuatorQueue::begin_next(Iteration iteration, const std::byte* observed,

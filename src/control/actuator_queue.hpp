@@ -133,7 +133,7 @@ class ActuatorQueue {
   bool begin_next(Iteration iteration, const std::byte* observed,
                   std::uint32_t& late_budget) noexcept;
   bool end_late(Iteration iteration, std::uint32_t& late_budget) noexcept;
-  void give_way(Iteration iteration) noexcept;
+  void give_way(Iteration iteration) noexcept { end(leave(), {Status::overwritten}, iteration); }
   void begin_command(const std::byte* observed) noexcept;
   bool is_in_force(const SetPoint& next) const noexcept {
     return in_force_ && !motion_.was_held_back() && next == set_point_;
@@ -156,14 +156,15 @@ class ActuatorQueue {
     return std::exchange(runs_, Runs::nothing) == Runs::given ? kNoBlock : record_;
   }
   void end_running(Iteration iteration) noexcept;
-  void end_held_back(Iteration iteration, const Limited& bound) noexcept;
+  void end(BlockIndex record, const Outcome& outcome, Iteration iteration) noexcept {
+    if (record != kNoBlock) ledger_->end(record, outcome, iteration);
+  }
   /// The running command leaves the queue; it ends when it has arrived, or gives way to the next.
   void take_out() noexcept {
     queue_.pop();
     pool_->head(record_).own[Own::kNext] = kNoBlock;
     runs_ = Runs::alone;
   }
-  Moved come_to_rest(const std::byte* observed) noexcept;
   void stop() noexcept {
     carry_.reset();
     runs_ = Runs::nothing;

@@ -10,7 +10,9 @@ namespace {
 // rounding must not add an iteration
 constexpr double kTimeRounding = 1e-12;
 constexpr int kMostTries = 60;
+// tolerances of a root, as shares of the distance
 constexpr double kRootForTime = 1e-6;
+constexpr double kExact = 1e-16;
 constexpr double kBracket = 1e-3;
 constexpr int kMostCorrections = 8;
 
@@ -87,16 +89,15 @@ FastestMotion::FastestMotion(const Moment& start, double target, const Rates& ra
                                         std::ceil(-at_most / rates_.speed * (1.0 - kTimeRounding)));
   } else {
     // the target is nearer: reduce the cruising speed until there is no time to cruise
-    const auto beyond_at = [&](double cruise) { return distance(cruise, {}) - distance_; };
     // for the number of iterations; the speed that fits them is found below, a little beyond it
-    cruise_ = root(beyond_at, lowest, rates_.speed, kRootForTime * distance_);
+    cruise_ = cruise_for({}, lowest, rates_.speed, kRootForTime);
     before_ = static_cast<std::int64_t>(std::ceil(time_to(cruise_) * (1.0 - kTimeRounding)));
   }
   if (distance(lowest, static_cast<double>(before_)) > distance_) {
     mix(lowest);
   } else {
     const double highest = std::min(rates_.speed, cruise_ * (1.0 + kBracket));
-    cruise_ = cruise_for(lowest, highest);
+    cruise_ = cruise_for(static_cast<double>(before_), lowest, highest, kExact);
   }
   settle();
 }
@@ -150,12 +151,11 @@ double FastestMotion::distance(double cruise, std::optional<double> before) cons
          to_rest.displacement();
 }
 
-/// The cruising speed with which it reaches the target, if it slows down after `before_`
-/// iterations.
-double FastestMotion::cruise_for(double low, double high) const noexcept {
-  const auto before = static_cast<double>(before_);
+/// The cruising speed with which distance() is that to the target, up to a share of it.
+double FastestMotion::cruise_for(std::optional<double> before, double low, double high,
+                                 double tolerance) const noexcept {
   return root([&](double cruise) { return distance(cruise, before) - distance_; }, low, high,
-              1e-16 * distance_);
+              tolerance * distance_);
 }
 
 void FastestMotion::settle() noexcept {
@@ -179,7 +179,7 @@ void FastestMotion::stretch(std::int64_t iterations) noexcept {
     exact = true;
     before_ += iterations - iterations_;
     if (before_ < 0) break;
-    cruise_ = cruise_for(0.0, cruise_);
+    cruise_ = cruise_for(static_cast<double>(before_), 0.0, cruise_, kExact);
     settle();
   }
   // keep the shortest motion if the stretched one is too long or has no time to get to its cruise

@@ -50,7 +50,8 @@ class FastestMotion {
   double time_to(double cruise) const noexcept {
     return VelocityChange(cruise - start_speed_, start_acceleration_, rates_).time();
   }
-  double cruise_for(double low, double high) const noexcept;
+  double cruise_for(std::optional<double> before, double low, double high,
+                    double tolerance) const noexcept;
   void settle() noexcept;
 
   // mirrored by sign_, so that the target lies beyond the shortest stop

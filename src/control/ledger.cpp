@@ -1,45 +1,8 @@
 #include "control/ledger.hpp"
 
 #include <algorithm>
-#include <new>
-#include <utility>
 
 namespace o80 {
-
-/// Replaces the BatchRecord in the first block of a batch that was taken.
-struct Ledger::TakenBatch {
-  RecordKind kind = RecordKind::batch;
-  Status end = Status::completed;  // end status of the batch
-  Reason reason = Reason::none;    // reason for the records without blocks
-  std::uint8_t detail = 0;
-  std::uint32_t records = 0;
-  CommandId id = 0;
-  Iteration last_end = 0;
-  Iteration taken_at = 0;
-  std::uint32_t open = 0;  // records that have not ended, plus 1 until close()
-  std::uint32_t told = 0;  // index of the next record without blocks to report
-  BlockIndex next_group = kNoBlock;
-  std::uint32_t lane = 0;
-  BlockChain spare;
-  Status told_as = Status::rejected;  // end status of the records without blocks
-};
-
-Ledger::TakenBatch& Ledger::batch(BlockIndex block) noexcept {
-  static_assert(sizeof(TakenBatch) <= kBlockBytes);
-  return *std::launder(reinterpret_cast<TakenBatch*>(pool_.bytes(block)));
-}
-
-std::uint32_t Ledger::lane_of(BlockIndex record) const noexcept {
-  const BlockIndex block = pool_.head(record).own[Own::kBatch];
-  return std::launder(reinterpret_cast<const TakenBatch*>(pool_.bytes(block)))->lane;
-}
-
-void Ledger::tell(std::uint32_t lane, CommandId id, const Outcome& outcome, Iteration iteration,
-                  StatusChange::Of of) noexcept {
-  // as much of a delay as a status can tell
-  const auto late = static_cast<std::uint16_t>(std::min<std::int64_t>(outcome.late, 0xFFFF));
-  sink_.changed({lane, id, outcome.status, outcome.reason, outcome.detail, iteration, of, late});
-}
 
 Ledger::TakenBatch& Ledger::take(std::uint32_t lane, BlockIndex block, const BlockChain& spare,
                                  std::uint32_t records, Iteration iteration) noexcept {
@@ -150,18 +113,6 @@ void Ledger::ended(BlockIndex block, Iteration iteration) noexcept {
   pool_.release(block, block, 1);
 }
 
-BlockIndex& Ledger::link(BlockIndex group) noexcept {
-  const auto kind = static_cast<RecordKind>(*pool_.bytes(group));
-  return kind == RecordKind::batch ? batch(group).next_group
-                                   : pool_.head(group).own[Own::kNextDropped];
-}
-
-void Ledger::append(BlockIndex group) noexcept {
-  link(group) = kNoBlock;
-  (first_ == kNoBlock ? first_ : link(last_)) = group;
-  last_ = group;
-}
-
 bool Ledger::tell_rejected(BlockIndex block, std::uint32_t& budget) noexcept {
   TakenBatch& taken = batch(block);
   const auto of =
@@ -192,7 +143,7 @@ std::uint32_t Ledger::report_ends(std::uint32_t most) noexcept {
 
     // the next list: records without blocks of a batch, or dropped records
     const BlockIndex group = first_;
-    if (static_cast<RecordKind>(*pool_.bytes(group)) == RecordKind::batch) {
+    if (is_batch(group)) {
       // keeps the batch open until all are reported
       if (!tell_rejected(group, budget)) return most - budget;
       first_ = link(group);

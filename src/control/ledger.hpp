@@ -1,7 +1,9 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <new>
 
 #include "control/command_group.hpp"
 #include "control/pool.hpp"
@@ -69,10 +71,29 @@ class Ledger {
   std::uint32_t report_ends(std::uint32_t budget) noexcept;
   bool pending() const noexcept { return group_.record != kNoBlock || first_ != kNoBlock; }
 
-  std::uint32_t lane_of(BlockIndex record) const noexcept;
+  std::uint32_t lane_of(BlockIndex record) noexcept {
+    return batch(pool_.head(record).own[Own::kBatch]).lane;
+  }
 
  private:
-  struct TakenBatch;
+  /// Replaces the BatchRecord in the first block of a batch that was taken.
+  struct TakenBatch {
+    RecordKind kind = RecordKind::batch;
+    Status end = Status::completed;  // end status of the batch
+    Reason reason = Reason::none;    // reason for the records without blocks
+    std::uint8_t detail = 0;
+    std::uint32_t records = 0;
+    CommandId id = 0;
+    Iteration last_end = 0;
+    Iteration taken_at = 0;
+    std::uint32_t open = 0;  // records that have not ended, plus 1 until close()
+    std::uint32_t told = 0;  // index of the next record without blocks to report
+    BlockIndex next_group = kNoBlock;
+    std::uint32_t lane = 0;
+    BlockChain spare;
+    Status told_as = Status::rejected;  // end status of the records without blocks
+  };
+  static_assert(sizeof(TakenBatch) <= kBlockBytes);
   /// A list of records with a common end.
   struct Group {
     BlockIndex record = kNoBlock;
@@ -80,16 +101,31 @@ class Ledger {
     Iteration iteration = 0;
   };
 
-  TakenBatch& batch(BlockIndex block) noexcept;
+  TakenBatch& batch(BlockIndex block) noexcept {
+    return *std::launder(reinterpret_cast<TakenBatch*>(pool_.bytes(block)));
+  }
   TakenBatch& take(std::uint32_t lane, BlockIndex block, const BlockChain& spare,
                    std::uint32_t records, Iteration iteration) noexcept;
   void ended(BlockIndex batch, Iteration iteration) noexcept;
-  void append(BlockIndex group) noexcept;
-  BlockIndex& link(BlockIndex group) noexcept;
+  bool is_batch(BlockIndex group) noexcept {
+    return static_cast<RecordKind>(*pool_.bytes(group)) == RecordKind::batch;
+  }
+  BlockIndex& link(BlockIndex group) noexcept {
+    return is_batch(group) ? batch(group).next_group : pool_.head(group).own[Own::kNextDropped];
+  }
+  void append(BlockIndex group) noexcept {
+    link(group) = kNoBlock;
+    (first_ == kNoBlock ? first_ : link(last_)) = group;
+    last_ = group;
+  }
   void member_ended(BlockIndex group, const Outcome& outcome, Iteration iteration) noexcept;
   bool tell_rejected(BlockIndex batch, std::uint32_t& budget) noexcept;
   void tell(std::uint32_t lane, CommandId id, const Outcome& outcome, Iteration iteration,
-            StatusChange::Of of) noexcept;
+            StatusChange::Of of) noexcept {
+    // as much of a delay as a status can tell
+    const auto late = static_cast<std::uint16_t>(std::min<std::int64_t>(outcome.late, 0xFFFF));
+    sink_.changed({lane, id, outcome.status, outcome.reason, outcome.detail, iteration, of, late});
+  }
 
   BlockPool& pool_;
   StatusSink& sink_;

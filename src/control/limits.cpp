@@ -59,12 +59,10 @@ std::string labels_of(const Schema& schema, const FieldRow& field) {
 }  // namespace
 
 Profile usual_profile(const Schema& schema, const ActuatorRow& actuator) noexcept {
-  for (std::uint32_t i = 0; i < actuator.limits; ++i) {
-    if (std::isfinite(schema.limits[actuator.first_limit + i].acceleration)) {
-      return Profile::minimum_jerk;
-    }
-  }
-  return Profile::linear;
+  const auto limits = std::span(schema.limits).subspan(actuator.first_limit, actuator.limits);
+  const bool accelerates = std::ranges::any_of(
+      limits, [](const LimitRow& limit) { return std::isfinite(limit.acceleration); });
+  return accelerates ? Profile::minimum_jerk : Profile::linear;
 }
 
 TargetLimits::TargetLimits(const Schema& schema, const Layouts& layouts) {

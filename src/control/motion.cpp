@@ -83,15 +83,15 @@ Motion::Motion(const Schema& schema, const ActuatorRow& actuator, const StateLay
         row.minimum > -kUnlimited || row.maximum < kUnlimited || rates.speed < kUnlimited;
     const auto [lowest, highest] = range_of(place.kind);
     const NumberLimiter guard(std::max(row.minimum, lowest), std::min(row.maximum, highest), rates);
-    numbers_.push_back(
-        {i, place.offset, lowest, highest, place.kind, limited || row.resting != 0,
-         NumberMotion(guard, row.resting != 0 ? std::optional(row.rest) : std::nullopt)});
-    for (const IntegralRow& integral : schema.integrals) {
-      if (integral.limit != actuator.first_limit + i) continue;
-      numbers_.back().motion.bound_integral(
-          std::make_unique<IntegralBound>(integral, rates, period));
+    std::unique_ptr<IntegralBound> integral;
+    for (const IntegralRow& each : schema.integrals) {
+      if (each.limit != actuator.first_limit + i) continue;
+      integral = std::make_unique<IntegralBound>(each, rates, period);
       has_integrals_ = true;
     }
+    const auto rest = row.resting != 0 ? std::optional(row.rest) : std::nullopt;
+    numbers_.push_back({i, place.offset, lowest, highest, place.kind, limited || rest,
+                        NumberMotion(guard, rest, std::move(integral))});
   }
 }
 

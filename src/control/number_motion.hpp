@@ -16,14 +16,12 @@ namespace o80 {
 /// Realtime: yes.
 class NumberMotion {
  public:
-  /// `rest`: the value that it goes to without a command, if it has one.
-  NumberMotion(const NumberLimiter& guard, std::optional<double> rest) noexcept
-      : guard_(guard), rest_(rest) {}
+  /// `rest`: the value that it goes to without a command, if it has one. `integral`: bounds of what
+  /// it moves, if any.
+  NumberMotion(const NumberLimiter& guard, std::optional<double> rest,
+               std::unique_ptr<IntegralBound> integral = nullptr) noexcept
+      : guard_(guard), rest_(rest), integral_(std::move(integral)) {}
 
-  /// Bounds of what it moves.
-  void bound_integral(std::unique_ptr<IntegralBound> bound) noexcept {
-    integral_ = std::move(bound);
-  }
   /// The number of the observed state that it moves, if that has bounds.
   const IntegralBound* integral() const noexcept { return integral_.get(); }
   /// Where that is: before each step() or brake().
@@ -59,7 +57,6 @@ class NumberMotion {
     end();
   }
 
-  using Asked = o80::Asked;
   /// Proposes a number of iterations for a plan to rest at the target.
   std::int64_t propose(const Asked& asked) noexcept;
   /// Then plans it for `iterations`, at least those.

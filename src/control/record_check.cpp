@@ -29,17 +29,6 @@ bool sane_pace(const RecordHead& head) noexcept {
 
 }  // namespace
 
-void note_rows(RecordHead& head, const Cursor& rows) noexcept {
-  head.amount = static_cast<std::int64_t>(std::uint64_t{rows.offset()} << 32 | rows.block());
-}
-
-Cursor rows_of_timed(const BlockPool& pool, const RecordHead& head,
-                     std::uint32_t row_bytes) noexcept {
-  const auto noted = static_cast<std::uint64_t>(head.amount);
-  return {pool, static_cast<BlockIndex>(noted & 0xFFFFFFFF),
-          static_cast<std::uint32_t>(noted >> 32), std::uint64_t{head.rows} * row_bytes};
-}
-
 RecordCheck::RecordCheck(const Schema& schema, const Layouts& layouts) : targets_(schema, layouts) {
   for (const RequestRow& request : schema.requests) {
     requests_.push_back(request.type == kNoType ? nullptr : &*layouts[request.type]);
@@ -67,7 +56,7 @@ RecordCheck::Verdict RecordCheck::begin(const BlockPool& pool, BlockIndex block,
     case RecordKind::group:
       return verdict(head.payload_bytes == 0 && head.rows > 0 && head.rows <= targets_.actuators());
     case RecordKind::request:
-      return check_request(head, progress.payload);
+      return verdict(is_request(head, progress.payload));
     case RecordKind::purge:
       return verdict(head.payload_bytes == 0 && head.only_own <= 1 &&
                      (head.actuator == kEveryActuator || head.actuator < targets_.actuators()));
@@ -83,11 +72,9 @@ RecordCheck::Verdict RecordCheck::begin(const BlockPool& pool, BlockIndex block,
 
 RecordCheck::Verdict RecordCheck::begin_command(const RecordHead& head,
                                                 Progress& progress) noexcept {
+  const bool as_sent = head.profile == Profile::as_sent;
   if (head.actuator >= targets_.actuators() || head.rows == 0 || !known_enums(head) ||
-      !sane_pace(head)) {
-    return Verdict::invalid;
-  }
-  if (head.profile == Profile::as_sent && (head.pace != Pace::direct || head.rows > 1)) {
+      !sane_pace(head) || (as_sent && (head.pace != Pace::direct || head.rows > 1))) {
     return Verdict::invalid;
   }
   const StateLayout& layout = targets_.layout(head.actuator);
@@ -147,14 +134,13 @@ RecordCheck::Verdict RecordCheck::go_on(const BlockPool& pool, BlockIndex block,
   return progress.rows_left > 0 ? Verdict::unfinished : Verdict::valid;
 }
 
-RecordCheck::Verdict RecordCheck::check_request(const RecordHead& head, Cursor& payload) noexcept {
-  if (head.actuator >= requests_.size()) return Verdict::invalid;
+bool RecordCheck::is_request(const RecordHead& head, Cursor& payload) noexcept {
+  if (head.actuator >= requests_.size()) return false;
   const StateLayout* layout = requests_[head.actuator];
-  if (head.payload_bytes != (layout == nullptr ? 0 : layout->size())) return Verdict::invalid;
-  if (layout == nullptr) return Verdict::valid;
+  if (layout == nullptr) return head.payload_bytes == 0;
   auto* state = reinterpret_cast<std::byte*>(state_.data());
-  payload.read(state, layout->size());
-  return layout->proper(state) ? Verdict::valid : Verdict::invalid;
+  return head.payload_bytes == layout->size() && payload.read(state, layout->size()) &&
+         layout->proper(state);
 }
 
 }  // namespace o80

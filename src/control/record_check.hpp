@@ -16,10 +16,16 @@ inline bool is_timed(const RecordHead& head) noexcept {
   return head.kind == RecordKind::command && head.pace == Pace::duration && head.rows > 1;
 }
 /// For such a command: stores the position of its first row in `amount`, which it does not use.
-void note_rows(RecordHead& head, const Cursor& rows) noexcept;
+inline void note_rows(RecordHead& head, const Cursor& rows) noexcept {
+  head.amount = static_cast<std::int64_t>(std::uint64_t{rows.offset()} << 32 | rows.block());
+}
 /// A cursor at that position, so that the times need not be skipped one by one.
-Cursor rows_of_timed(const BlockPool& pool, const RecordHead& head,
-                     std::uint32_t row_bytes) noexcept;
+inline Cursor rows_of_timed(const BlockPool& pool, const RecordHead& head,
+                            std::uint32_t row_bytes) noexcept {
+  const auto noted = static_cast<std::uint64_t>(head.amount);
+  return {pool, static_cast<BlockIndex>(noted), static_cast<std::uint32_t>(noted >> 32),
+          std::uint64_t{head.rows} * row_bytes};
+}
 
 /// Validates records from a lane. Arbitrary bytes are safe.
 ///
@@ -47,7 +53,7 @@ class RecordCheck {
 
  private:
   Verdict begin_command(const RecordHead& head, Progress& progress) noexcept;
-  Verdict check_request(const RecordHead& head, Cursor& payload) noexcept;
+  bool is_request(const RecordHead& head, Cursor& payload) noexcept;
 
   TargetLimits targets_;
   std::vector<const StateLayout*> requests_;  // null: no payload

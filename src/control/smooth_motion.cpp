@@ -6,6 +6,31 @@
 #include "control/visit_block.hpp"
 
 namespace o80 {
+namespace {
+
+/// A polynomial c[0] + c[1] i + c[2] i^2.
+struct Quadratic {
+  double c[3];
+  double at(double i) const noexcept { return c[0] + i * (c[1] + i * c[2]); }
+  /// Calls `visit` with the iterations from 1 to `last` next to its roots, at most four.
+  template <class Visit>
+  void near_roots(double last, Visit&& visit) const noexcept {
+    const auto around = [&](double root) {
+      // a root may be huge, infinite or NaN
+      if (!(root > 0.0 && root < last + 1.0)) return;
+      const double below = std::floor(root);
+      if (below >= 1.0) visit(below);
+      if (below + 1.0 <= last) visit(below + 1.0);
+    };
+    const double discriminant = c[1] * c[1] - 4.0 * c[2] * c[0];
+    if (!(discriminant >= 0.0)) return;
+    const double q = -0.5 * (c[1] + std::copysign(std::sqrt(discriminant), c[1]));
+    around(q / c[2]);
+    around(c[0] / q);
+  }
+};
+
+}  // namespace
 
 SmoothMotion::SmoothMotion(const Moment& start, double target, std::int64_t iterations) noexcept
     : last_(static_cast<double>(iterations)), target_(target) {
@@ -25,22 +50,6 @@ SmoothMotion::SmoothMotion(const Moment& start, double target, std::int64_t iter
 double SmoothMotion::position(double i) const noexcept {
   const double left = last_ - i;
   return target_ - left * (left + 1.0) * (left + 2.0) * (c0_ + i * (c1_ + (i + 1.0) * c2_));
-}
-
-template <class Visit>
-void SmoothMotion::Quadratic::near_roots(double last, Visit&& visit) const noexcept {
-  const auto around = [&](double root) {
-    // a root may be huge, infinite or NaN
-    if (!(root > 0.0 && root < last + 1.0)) return;
-    const double below = std::floor(root);
-    if (below >= 1.0) visit(below);
-    if (below + 1.0 <= last) visit(below + 1.0);
-  };
-  const double discriminant = c[1] * c[1] - 4.0 * c[2] * c[0];
-  if (!(discriminant >= 0.0)) return;
-  const double q = -0.5 * (c[1] + std::copysign(std::sqrt(discriminant), c[1]));
-  around(q / c[2]);
-  around(c[0] / q);
 }
 
 /// The differences are, like the position, a product of known factors and a quadratic, whose roots

@@ -30,15 +30,6 @@ class SmoothMotion {
   Extremes extremes() const noexcept;
 
  private:
-  /// A polynomial c[0] + c[1] i + c[2] i^2.
-  struct Quadratic {
-    double c[3] = {};
-    double at(double i) const noexcept { return c[0] + i * (c[1] + i * c[2]); }
-    /// Calls `visit` with the iterations from 1 to `last` next to its roots, at most four.
-    template <class Visit>
-    void near_roots(double last, Visit&& visit) const noexcept;
-  };
-
   double last_ = 0.0;  // n
   double target_ = 0.0;
   // position = target + (i - n)(i - n - 1)(i - n - 2) (c0 + c1 i + c2 i (i + 1))

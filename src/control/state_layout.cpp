@@ -68,12 +68,6 @@ StateLayout::StateLayout(const Schema& schema, std::uint32_t type)
   plain_ = plain_ && end == size_;
 }
 
-void StateLayout::copy_numbers(std::byte* to, const std::byte* from) const noexcept {
-  for (const NumberPlace& place : numbers_) {
-    copy_number(to + place.offset, from + place.offset, place.size);
-  }
-}
-
 void StateLayout::copy(std::byte* to, const std::byte* from,
                        const std::uint64_t* mask) const noexcept {
   for (std::size_t i = 0; i < numbers_.size(); ++i) {
@@ -94,16 +88,15 @@ bool StateLayout::same(const std::byte* one, const std::byte* other,
   return true;
 }
 
-void StateLayout::copy_finite(std::byte* to, const std::byte* from,
-                              const std::uint64_t* mask) const noexcept {
-  if (plain_ && mask == nullptr) {
+void StateLayout::copy_finite(std::byte* to, const std::byte* from) const noexcept {
+  if (plain_) {
     for (std::uint32_t at = 0; at < size_; at += sizeof(double)) {
       if (std::isfinite(load<double>(from + at))) std::memcpy(to + at, from + at, sizeof(double));
     }
     return;
   }
   for (std::size_t i = 0; i < numbers_.size(); ++i) {
-    if (!masked(mask, i) || !finite_number(i, from)) continue;
+    if (!finite_number(i, from)) continue;
     copy_number(to + numbers_[i].offset, from + numbers_[i].offset, numbers_[i].size);
   }
 }

@@ -55,7 +55,7 @@ class StateLayout {
   void copy(std::byte* to, const std::byte* from) const noexcept {
     constexpr std::size_t kOne = sizeof(double), kTwo = 2 * sizeof(double);
     if (padded_) {
-      copy_numbers(to, from);
+      copy(to, from, nullptr);
     } else if (size_ == kOne) {  // most states, or those of position and velocity: no call
       std::memcpy(to, from, kOne);
     } else if (size_ == kTwo) {
@@ -70,9 +70,8 @@ class StateLayout {
   /// True if the numbers whose bits are set have the same bytes.
   bool same(const std::byte* one, const std::byte* other, const std::uint64_t* mask) const noexcept;
 
-  /// Copies the numbers whose bits are set and that are finite.
-  void copy_finite(std::byte* to, const std::byte* from,
-                   const std::uint64_t* mask = nullptr) const noexcept;
+  /// Copies the numbers that are finite.
+  void copy_finite(std::byte* to, const std::byte* from) const noexcept;
 
   static constexpr std::uint32_t kNoNumber = 0xFFFFFFFF;
   /// The first number whose bit is set and that is interpolated; or kNoNumber.
@@ -100,7 +99,6 @@ class StateLayout {
     return i < numbers_.size() ? i : kNoNumber;
   }
   bool finite_number(std::size_t number, const std::byte* state) const noexcept;
-  void copy_numbers(std::byte* to, const std::byte* from) const noexcept;
 
   std::vector<NumberPlace> numbers_;
   std::vector<std::int64_t> labels_;
