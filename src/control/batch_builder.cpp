@@ -11,11 +11,13 @@ namespace o80 {
 BatchBuilder::BatchBuilder() : blocks_(1) {}
 
 /// `option`: only_own of a purge, accepts of a resume.
-RecordHead BatchBuilder::head_of(RecordKind kind, std::uint16_t actuator, std::uint8_t option) {
+RecordHead BatchBuilder::head_of(RecordKind kind, std::uint16_t actuator, std::uint8_t option,
+                                 std::uint64_t amount) {
   RecordHead head;
   head.kind = kind;
   head.actuator = actuator;
   head.only_own = option;
+  head.amount = static_cast<std::int64_t>(amount);
   return head;
 }
 
@@ -41,12 +43,6 @@ std::uint32_t BatchBuilder::add(const RecordHead& head, std::span<const std::byt
   std::byte* bytes = open(head, payload.size());
   if (!payload.empty()) std::memcpy(bytes, payload.data(), payload.size());
   return records_ - 1;
-}
-
-std::uint32_t BatchBuilder::resume(std::uint64_t number, bool accept_reading) {
-  RecordHead head = head_of(RecordKind::resume, 0, accept_reading ? 1 : 0);
-  head.amount = static_cast<std::int64_t>(number);
-  return add(head);
 }
 
 std::uint32_t BatchBuilder::command(const RecordHead& head, std::span<const std::uint64_t> mask,

@@ -49,7 +49,9 @@ class BatchBuilder {
   std::uint32_t take_control() { return add(head_of(RecordKind::take_control)); }
   std::uint32_t release_control() { return add(head_of(RecordKind::release_control)); }
   /// Clears halts up to this number.
-  std::uint32_t resume(std::uint64_t number, bool accept_reading = false);
+  std::uint32_t resume(std::uint64_t number, bool accept_reading = false) {
+    return add(head_of(RecordKind::resume, 0, accept_reading ? 1 : 0, number));
+  }
 
   /// Completes the batch. `batch` has id, ticket, at, late_now, burst and flags. A batch of few
   /// purges and control orders, without `at` and without a burst, is marked as express.
@@ -69,7 +71,8 @@ class BatchBuilder {
   std::uint64_t blocks() const noexcept { return blocks_.size(); }
 
  private:
-  static RecordHead head_of(RecordKind kind, std::uint16_t actuator = 0, std::uint8_t option = 0);
+  static RecordHead head_of(RecordKind kind, std::uint16_t actuator = 0, std::uint8_t option = 0,
+                            std::uint64_t amount = 0);
   std::byte* open(const RecordHead& head, std::uint64_t payload_bytes);
   std::uint32_t add(const RecordHead& head, std::span<const std::byte> payload = {});
   void add_command(RecordHead head, RecordKind kind, std::span<const std::uint64_t> mask,

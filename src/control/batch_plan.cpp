@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
+#include <cstddef>
 #include <utility>
 
 namespace o80 {
@@ -12,6 +12,13 @@ namespace {
 constexpr std::uint32_t kBatchWork = 6;
 constexpr std::uint32_t kStepWork = 2;
 constexpr std::uint32_t kRequestWork = 16;  // plus 1 for each actuator: it may make a fresh start
+
+/// The plan of a checked batch, stored over the end of its record, which is not needed any more.
+Plan& stored_plan(BlockPool& pool, BlockIndex batch) noexcept {
+  constexpr std::size_t kAt = offsetof(BatchRecord, blocks);
+  static_assert(kAt + sizeof(Plan) == sizeof(BatchRecord));
+  return *reinterpret_cast<Plan*>(pool.bytes(batch) + kAt);
+}
 
 }  // namespace
 
@@ -27,8 +34,7 @@ struct BatchPlanner::Batch {
   std::uint32_t place = 0;
   std::uint32_t record_blocks = 0;
   std::uint32_t blocks = 1;  // blocks of the batch that are checked
-  Plan plan;
-  std::uint32_t work = kBatchWork;
+  Plan plan{.effort = {.work = kBatchWork, .express = 1}};
   std::uint32_t control_orders = 0;
   std::uint32_t resumes = 0;
   // the group whose members are being checked
@@ -83,19 +89,16 @@ struct BatchPlanner::Lane : Batch {
     begin_part();
   }
 
-  /// Stores the plan in `BatchRecord::own`, and its work in `BatchRecord::blocks`: the pool knows
-  /// the count of blocks as well.
-  void complete(BatchRecord& record) noexcept {
+  void complete(const BatchRecord& record) noexcept {
     if (group != kNoBlock) fail_group();  // incomplete
     end_part();
     const bool bursts = record.burst != 0 || (record.flags & kBurstUntilEnded) != 0;
-    if (place < record.records) plan.express = 0;
-    plan.resumes = resumes > 0 && resumes == record.records && !bursts ? 1 : 0;
+    if (place < record.records) plan.effort.express = 0;
+    plan.effort.resumes = resumes > 0 && resumes == record.records && !bursts ? 1 : 0;
     plan.missing_from = place;
     plan.spare_first = cursor;
     plan.spare_blocks = pool.chain(batch).blocks - blocks;
-    record.own = std::bit_cast<decltype(record.own)>(plan);
-    record.blocks = work;
+    stored_plan(pool, batch) = plan;
     batch = kNoBlock;
   }
 
@@ -197,7 +200,7 @@ struct BatchPlanner::Lane : Batch {
     switch (head.kind) {
       case RecordKind::request:
       case RecordKind::resume:
-        return plan.requests >= kMostRequests;
+        return plan.effort.requests >= kMostRequests;
       case RecordKind::take_control:
       case RecordKind::release_control:
         return ++control_orders > kMostControlOrders;
@@ -238,7 +241,7 @@ struct BatchPlanner::Lane : Batch {
       spend(1);
     }
     group = kNoBlock;
-    ++plan.groups;
+    ++plan.effort.groups;
     ++place;
   }
 
@@ -259,8 +262,8 @@ struct BatchPlanner::Lane : Batch {
     const RecordHead& head = pool.head(record);
     switch (head.kind) {
       case RecordKind::command:
-        plan.express = 0;
-        plan.moves = 1;
+        plan.effort.express = 0;
+        plan.effort.moves = 1;
         return add_command(record);
       case RecordKind::purge:
         return add_purge(record);
@@ -269,21 +272,21 @@ struct BatchPlanner::Lane : Batch {
         if (head.kind == RecordKind::resume) {
           ++resumes;
         } else if (!shared.while_halted[head.actuator]) {
-          plan.moves = 1;
+          plan.effort.moves = 1;
         }
         // a resume makes a fresh start too. It is never express: if it overtook commands that were
         // sent during the halt, they would act instead of being rejected
-        plan.express = 0;
-        ++plan.requests;
+        plan.effort.express = 0;
+        ++plan.effort.requests;
         end_part();
         return add_step(record, kRequestWork + static_cast<std::uint32_t>(targets.size()));
       case RecordKind::release_control:
-        plan.releases = 1;
+        plan.effort.releases = 1;
         [[fallthrough]];
       case RecordKind::take_control:
         return add_step(record, kStepWork);
       default:
-        plan.express = 0;
+        plan.effort.express = 0;
         add_to_end(End::invalid, record);
     }
   }
@@ -384,7 +387,7 @@ struct BatchPlanner::Lane : Batch {
   }
 
   void add_step(BlockIndex record, std::uint32_t step_work) noexcept {
-    work += step_work;
+    plan.effort.work += step_work;
     (last_step == kNoBlock ? plan.steps : pool.head(last_step).own[Own::kNextStep]) = record;
     last_step = record;
   }
@@ -421,7 +424,7 @@ bool BatchPlanner::check(std::uint32_t lane_index, BlockIndex batch,
                          std::uint32_t& budget) noexcept {
   if (known_[batch] != Known::nothing) return true;
   Lane& lane = lanes_[lane_index];
-  BatchRecord& record = shared_.pool.batch(batch);
+  const BatchRecord& record = shared_.pool.batch(batch);
   if (lane.batch != batch) {
     if (record.kind != RecordKind::batch || record.records >= record.blocks ||
         record.blocks != shared_.pool.chain(batch).blocks) {
@@ -445,16 +448,13 @@ bool BatchPlanner::check(std::uint32_t lane_index, BlockIndex batch,
 
 Effort BatchPlanner::effort(BlockIndex batch) const noexcept {
   if (known_[batch] != Known::plan) return {.work = kBatchWork};
-  const BatchRecord& record = shared_.pool.batch(batch);
-  const auto plan = std::bit_cast<Plan>(record.own);
-  return {record.blocks,      plan.requests,   plan.express != 0,
-          plan.releases != 0, plan.moves != 0, plan.resumes != 0};
+  return stored_plan(shared_.pool, batch).effort;
 }
 
 std::optional<Plan> BatchPlanner::plan(BlockIndex batch) noexcept {
   const Known known = std::exchange(known_[batch], Known::nothing);
   if (known != Known::plan) return std::nullopt;
-  return std::bit_cast<Plan>(shared_.pool.batch(batch).own);
+  return stored_plan(shared_.pool, batch);
 }
 
 void BatchPlanner::forget(std::uint32_t lane, BlockIndex batch) noexcept {

@@ -12,29 +12,24 @@
 
 namespace o80 {
 
+/// The cost of taking a checked batch, and the properties that decide when it may be taken.
+struct Effort {
+  std::uint32_t work = 0;          // part of the budget of an iteration; copying a block is 1
+  std::uint32_t requests : 7 = 0;  // number of requests to the driver
+  std::uint32_t express : 1 = 0;   // only purges and control orders
+  std::uint32_t releases : 1 = 0;  // releases exclusive control
+  std::uint32_t moves : 1 = 0;     // has a command, or a request without `while_halted`
+  std::uint32_t resumes : 1 = 0;   // only resumes, and no burst
+  std::uint32_t groups : 21 = 0;   // number of commands of several actuators
+};
+
 /// The steps that take a checked batch.
 struct Plan {
   BlockIndex steps = kNoBlock;        // the first step, linked by Own::kNextStep
   std::uint32_t missing_from = 0;     // index of the first record without blocks
   BlockIndex spare_first = kNoBlock;  // unused blocks, to the end of the batch
   std::uint32_t spare_blocks = 0;
-  // as in Effort
-  std::uint32_t requests : 7 = 0;
-  std::uint32_t express : 1 = 1;
-  std::uint32_t releases : 1 = 0;
-  std::uint32_t moves : 1 = 0;
-  std::uint32_t resumes : 1 = 0;
-  std::uint32_t groups : 21 = 0;  // number of commands of several actuators
-};
-
-/// The cost of taking a checked batch, and the properties that decide when it may be taken.
-struct Effort {
-  std::uint32_t work = 0;      // part of the budget of an iteration; copying a block is 1
-  std::uint32_t requests = 0;  // number of requests to the driver
-  bool express = false;        // only purges and control orders
-  bool releases = false;       // releases exclusive control
-  bool moves = false;          // has a command, or a request without `while_halted`
-  bool resumes = false;        // only resumes, and no burst
+  Effort effort;
 };
 
 /// Checks the records of a batch in the pool, and reduces them to the few steps that take it.

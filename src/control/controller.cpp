@@ -158,7 +158,7 @@ void Controller::take(std::uint32_t lane, BlockIndex batch, BatchHandler& handle
 
   const Taking from{lane, pool_.batch(batch).ticket};
   const BlockChain spare{plan->spare_first, pool_.chain(batch).last, plan->spare_blocks};
-  ledger_.enter(lane, batch, spare, plan->missing_from, plan->groups, taken_at);
+  ledger_.enter(lane, batch, spare, plan->missing_from, plan->effort.groups, taken_at);
   for (BlockIndex step = plan->steps; step != kNoBlock;) {
     const BlockIndex record = step;
     step = pool_.head(record).own[Own::kNextStep];

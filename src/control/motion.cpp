@@ -31,22 +31,6 @@ T to_integer(Real value) noexcept {
   return static_cast<T>(rounded);
 }
 
-/// For integers that a double cannot hold: interpolates in long double.
-template <class T>
-T moved_wide(T from, T to, double share) noexcept {
-  const auto start = static_cast<long double>(from);
-  const auto target = static_cast<long double>(to);
-  return to_integer<T>(start + (target - start) * static_cast<long double>(share));
-}
-
-/// Range of the values of a kind. It also bounds the motion to rest.
-std::pair<double, double> range_of(Kind kind) noexcept {
-  return visit_number(kind, []<class T>(T) {
-    using Range = std::numeric_limits<T>;
-    return std::pair(static_cast<double>(Range::lowest()), static_cast<double>(Range::max()));
-  });
-}
-
 /// The nearest float from `low` to `high`.
 float nearest_float(double value, double low, double high) noexcept {
   auto narrow = static_cast<float>(value);
@@ -81,7 +65,11 @@ Motion::Motion(const Schema& schema, const ActuatorRow& actuator, const StateLay
                       row.jerk * period * period * period};
     const bool limited =
         row.minimum > -kUnlimited || row.maximum < kUnlimited || rates.speed < kUnlimited;
-    const auto [lowest, highest] = range_of(place.kind);
+    // the range of its kind also bounds the motion to rest
+    const auto [lowest, highest] = visit_number(place.kind, []<class T>(T) {
+      using Range = std::numeric_limits<T>;
+      return std::pair(static_cast<double>(Range::lowest()), static_cast<double>(Range::max()));
+    });
     const NumberLimiter guard(std::max(row.minimum, lowest), std::min(row.maximum, highest), rates);
     std::unique_ptr<IntegralBound> integral;
     for (const IntegralRow& each : schema.integrals) {
@@ -230,7 +218,7 @@ Limited Motion::step(Iteration now, std::byte* state) noexcept {
 
 /// Writes one number to the state, rounded to its kind, inward at its bounds. Integers that a
 /// double cannot hold stay exact on a line without limits.
-void Motion::publish(const Number& number, std::byte* state) const noexcept {
+void Motion::publish(const Number& number, std::byte* state) noexcept {
   std::byte* at = state + number.offset;
   const double value = number.motion.position();
   // a number outside its bounds may stay there
@@ -242,8 +230,10 @@ void Motion::publish(const Number& number, std::byte* state) const noexcept {
     } else if (sizeof(T) < 8 || number.is_limited || !number.motion.is_on_line()) {
       store(at, to_integer<T>(nearest_whole(value, low, high)));
     } else {
-      store(at, moved_wide(load<T>(from() + number.offset), load<T>(target() + number.offset),
-                           number.motion.plan().share()));
+      const auto start = static_cast<long double>(load<T>(from() + number.offset));
+      const auto end = static_cast<long double>(load<T>(target() + number.offset));
+      const auto share = static_cast<long double>(number.motion.plan().share());
+      store(at, to_integer<T>(start + (end - start) * share));
     }
   });
 }

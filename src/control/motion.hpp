@@ -165,12 +165,8 @@ class Motion {
     return std::ranges::any_of(numbers_, predicate, &Number::motion);
   }
   std::byte* from() noexcept { return reinterpret_cast<std::byte*>(ends_.data()); }
-  const std::byte* from() const noexcept {
-    return reinterpret_cast<const std::byte*>(ends_.data());
-  }
-  const std::byte* target() const noexcept { return from() + stride_; }
   void blend(Iteration now, std::byte* state) noexcept;
-  void publish(const Number& number, std::byte* state) const noexcept;
+  void publish(const Number& number, std::byte* state) noexcept;
 
   const StateLayout& layout_;
   std::size_t stride_;                   // [bytes]

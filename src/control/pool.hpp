@@ -85,9 +85,6 @@ class BlockPool {
   BatchRecord& batch(BlockIndex block) noexcept {
     return *reinterpret_cast<BatchRecord*>(bytes(block));
   }
-  const BatchRecord& batch(BlockIndex block) const noexcept {
-    return *reinterpret_cast<const BatchRecord*>(bytes(block));
-  }
   RecordHead& head(BlockIndex block) noexcept {
     return *reinterpret_cast<RecordHead*>(bytes(block));
   }

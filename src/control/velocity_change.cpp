@@ -37,21 +37,16 @@ void VelocityChange::plan_without_jerk(double change) noexcept {
   if (change == 0.0) return;
   sign_ = change < 0.0 ? 1.0 : -1.0;
   const double size = std::abs(change);
+  if (!std::isfinite(acceleration_)) acceleration_ = size;
   const double steps =
-      std::isfinite(acceleration_)
-          ? std::min(std::ceil(size / acceleration_ * (1.0 - kChangeRounding)), kMostSteps)
-          : 1.0;
+      std::min(std::ceil(size / acceleration_ * (1.0 - kChangeRounding)), kMostSteps);
   steps_ = static_cast<std::int64_t>(std::max(steps, 1.0));
   shorter_ = steps_ - 1;
-  const double before = steps_ == 1 ? 0.0 : static_cast<double>(shorter_) * acceleration_;
-  share_ = steps_ == 1 && !std::isfinite(acceleration_)
-               ? 0.0
-               : share_between(size, static_cast<double>(steps_) * acceleration_, before);
-  if (!std::isfinite(acceleration_)) acceleration_ = size;
-  // sum over i of v(i) - v(steps)
-  const double rest = size - before;
   const auto n = static_cast<double>(shorter_);
-  displacement_ = sign_ * (acceleration_ * n * (n - 1.0) / 2.0 + rest * n);
+  const double before = n * acceleration_;
+  share_ = share_between(size, static_cast<double>(steps_) * acceleration_, before);
+  // sum over i of v(i) - v(steps)
+  displacement_ = sign_ * (acceleration_ * n * (n - 1.0) / 2.0 + (size - before) * n);
 }
 
 /// The sums of trough(), for its three parts: down, along the limit, up.
