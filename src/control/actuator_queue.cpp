@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "control/limits.hpp"
@@ -46,17 +45,6 @@ void ActuatorQueue::drop(const Outcome& outcome, Iteration iteration) noexcept {
   in_force_ = in_force;
   motion_.release();
   while (!queue_.empty()) ledger_->drop(queue_.take_any(), outcome, iteration);
-}
-
-void ActuatorQueue::drop_lane(std::uint32_t lane, const Outcome& outcome,
-                              Iteration iteration) noexcept {
-  if (is_of(lane)) {
-    if (runs_ == Runs::alone) ledger_->drop(record_, outcome, iteration);
-    end_motion();
-  }
-  if (holder_ == lane) motion_.release();
-  ledger_->drop(queue_.take(lane), outcome, iteration);
-  if (empty()) end_motion();
 }
 
 ActuatorQueue::Moved ActuatorQueue::step(Iteration iteration, const std::byte* observed,
@@ -217,12 +205,6 @@ void ActuatorQueue::arrive(Iteration iteration, std::uint32_t& late_budget) noex
   }
 }
 
-void ActuatorQueue::agree_on_carry(Iteration iteration) noexcept {
-  const RecordHead* head = next_member();
-  if (runs_ != Runs::nothing || head == nullptr || head->pace != Pace::duration) return;
-  if (may_begin(*head, iteration)) carry_.carry(ledger_->groups().agreed(*head));
-}
-
 void ActuatorQueue::plan_with_others(Iteration iteration, const std::byte* observed) noexcept {
   const RecordHead* head = next_member();
   // set-points of each iteration go each by itself
@@ -238,16 +220,6 @@ void ActuatorQueue::plan_with_others(Iteration iteration, const std::byte* obser
   plan_row(iteration);
   ledger_->groups().offer(*head, CommandGroups::Offer::iterations, iteration, row_iterations_);
   planned_ = true;
-}
-
-/// The next row of the command => target.
-void ActuatorQueue::read_row() noexcept {
-  rows_.read(masked_ ? scratch() : motion_.target(), layout_->size());
-  if (masked_) {
-    layout_->copy(motion_.target(), desired_);
-    layout_->copy(motion_.target(), scratch(), mask_.data());
-  }
-  --rows_left_;
 }
 
 /// Begins the planned row; false if the command would take too long and is rejected.

@@ -38,12 +38,24 @@ class ActuatorQueue {
   /// Ends all commands. With Status::overwritten the next command may continue the motion.
   void drop(const Outcome& outcome, Iteration iteration) noexcept;
   /// Ends the commands of one lane, and releases a direct value that this lane has set.
-  void drop_lane(std::uint32_t lane, const Outcome& outcome, Iteration iteration) noexcept;
+  void drop_lane(std::uint32_t lane, const Outcome& outcome, Iteration iteration) noexcept {
+    if (is_of(lane)) {
+      if (runs_ == Runs::alone) ledger_->drop(record_, outcome, iteration);
+      end_motion();
+    }
+    if (holder_ == lane) motion_.release();
+    ledger_->drop(queue_.take(lane), outcome, iteration);
+    if (empty()) end_motion();
+  }
   /// For commands of several actuators (ARCHITECTURE.md, Commands of several actuators); called for
   /// all queues before any step(). Reports that the next command is a member of a group.
   void arrive(Iteration iteration, std::uint32_t& late_budget) noexcept;
   /// Then, if all members have arrived: takes the largest carry of durations.
-  void agree_on_carry(Iteration iteration) noexcept;
+  void agree_on_carry(Iteration iteration) noexcept {
+    const RecordHead* head = next_member();
+    if (runs_ != Runs::nothing || head == nullptr || head->pace != Pace::duration) return;
+    if (may_begin(*head, iteration)) carry_.carry(ledger_->groups().agreed(*head));
+  }
   /// Then, if all members have arrived: proposes its number of iterations. The largest is used.
   void plan_with_others(Iteration iteration, const std::byte* observed) noexcept;
   /// `late_budget`: number of late commands that may still be rejected in this iteration.
@@ -146,7 +158,15 @@ class ActuatorQueue {
   }
   bool begin_row(Iteration iteration) noexcept;
   void plan_row(Iteration iteration) noexcept;
-  void read_row() noexcept;
+  /// The next row of the command => target.
+  void read_row() noexcept {
+    rows_.read(masked_ ? scratch() : motion_.target(), layout_->size());
+    if (masked_) {
+      layout_->copy(motion_.target(), desired_);
+      layout_->copy(motion_.target(), scratch(), mask_.data());
+    }
+    --rows_left_;
+  }
   Motion::Course course(const RecordHead& head, Iteration iteration) noexcept;
   std::int64_t row_of_own_time() noexcept;
   Moved advance(Iteration iteration) noexcept;

@@ -102,8 +102,6 @@ struct BatchPlanner::Lane : Batch {
     batch = kNoBlock;
   }
 
-  // ---------------------------------------------------------------------------- checking
-
   bool check_record() noexcept {
     if (!begun) {
       begin_record();
@@ -209,8 +207,6 @@ struct BatchPlanner::Lane : Batch {
     }
   }
 
-  // ---------------------------------------------------------------------------- groups
-
   /// True if a member has the options of its group, and an actuator that no other member has.
   bool fits_group(const RecordHead& head) noexcept {
     if (head.actuator >= targets.size()) return false;
@@ -254,8 +250,6 @@ struct BatchPlanner::Lane : Batch {
     add(failed);
     ++place;
   }
-
-  // ---------------------------------------------------------------------------- steps
 
   void add(BlockIndex record) noexcept {
     shared.tails[record] = record;

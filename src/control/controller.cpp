@@ -43,16 +43,6 @@ Controller::Controller(const Schema& schema, BlockPool& pool, StatusSink& sink, 
   }
 }
 
-void Controller::restart(const std::byte* observed, const std::byte* wanted,
-                         Iteration row) noexcept {
-  const std::byte* source = wanted != nullptr ? wanted : observed;
-  each(kEveryActuator, [&](std::uint32_t i) {
-    actuators_[i].drop({Status::purged, Reason::fresh_start}, row);
-    actuators_[i].restart(of(i, source));
-  });
-  for (Mask* mask : {&active_mask_, &clamped_mask_, &braking_mask_}) std::ranges::fill(*mask, 0);
-}
-
 /// Begins the commands of several actuators whose members are next in all queues.
 void Controller::step_groups(Iteration iteration, const std::byte* observed,
                              std::uint32_t& late_budget) noexcept {
@@ -124,30 +114,6 @@ void Controller::step_given(Iteration iteration, const std::byte* observed) noex
     set(busy_, i);
   }
 }
-
-double Controller::difference(std::uint32_t offset, std::uint32_t order) const noexcept {
-  const auto behind = std::ranges::upper_bound(offsets_, offset);
-  if (behind == offsets_.begin()) return 0.0;
-  const auto i = static_cast<std::size_t>(behind - offsets_.begin()) - 1;
-  if (!has(active_mask_, i)) return 0.0;
-  return actuators_[i].difference(offset - offsets_[i], order);
-}
-
-std::optional<NotFinite> Controller::not_finite(const std::byte* block) const noexcept {
-  for (std::uint32_t i = 0; i < actuators_.size(); ++i) {
-    const std::uint32_t number = actuators_[i].layout().first_not_finite(of(i, block));
-    if (number != StateLayout::kNoNumber) return NotFinite{i, number};
-  }
-  return std::nullopt;
-}
-
-bool Controller::braking() const noexcept {
-  // in the last step; or in the next one, for an actuator that has just lost its command
-  return std::ranges::any_of(braking_mask_, [](std::uint64_t word) { return word != 0; }) ||
-         any([](const ActuatorQueue& queue) { return queue.empty() && !queue.rests(); });
-}
-
-// ------------------------------------------------------------------------------ taking a batch
 
 void Controller::take(std::uint32_t lane, BlockIndex batch, BatchHandler& handler) noexcept {
   std::uint32_t budget = std::numeric_limits<std::uint32_t>::max();

@@ -82,7 +82,14 @@ class Controller {
 
   /// The first start or a fresh start: sets the desired block to `desired`, or to `observed` if
   /// that is null. All commands end as purged (fresh_start) at iteration `row`.
-  void restart(const std::byte* observed, const std::byte* desired, Iteration row) noexcept;
+  void restart(const std::byte* observed, const std::byte* wanted, Iteration row) noexcept {
+    const std::byte* source = wanted != nullptr ? wanted : observed;
+    each(kEveryActuator, [&](std::uint32_t i) {
+      actuators_[i].drop({Status::purged, Reason::fresh_start}, row);
+      actuators_[i].restart(of(i, source));
+    });
+    for (Mask* mask : {&active_mask_, &clamped_mask_, &braking_mask_}) std::ranges::fill(*mask, 0);
+  }
 
   /// One more iteration, after restart(), of a motion that was made elsewhere: its desired block.
   void trace(const std::byte* desired) noexcept {
@@ -173,10 +180,20 @@ class Controller {
   /// One bit for each actuator: it braked in the last step, without a command.
   const std::uint64_t* braking_mask() const noexcept { return braking_mask_.data(); }
   /// True if an actuator without a command is not at rest; O(actuators).
-  bool braking() const noexcept;
+  bool braking() const noexcept {
+    // in the last step; or in the next one, for an actuator that has just lost its command
+    return std::ranges::any_of(braking_mask_, [](std::uint64_t word) { return word != 0; }) ||
+           any([](const ActuatorQueue& queue) { return queue.empty() && !queue.rests(); });
+  }
   /// First (order 1) or second difference, to the iteration before, of the number at this offset
   /// of the desired block; 0 for an actuator that was not active, and for what does not move.
-  double difference(std::uint32_t offset, std::uint32_t order) const noexcept;
+  double difference(std::uint32_t offset, std::uint32_t order) const noexcept {
+    const auto behind = std::ranges::upper_bound(offsets_, offset);
+    if (behind == offsets_.begin()) return 0.0;
+    const auto i = static_cast<std::size_t>(behind - offsets_.begin()) - 1;
+    if (!has(active_mask_, i)) return 0.0;
+    return actuators_[i].difference(offset - offsets_[i], order);
+  }
   /// Number of 64-bit words of a mask.
   std::uint32_t words() const noexcept { return static_cast<std::uint32_t>(active_mask_.size()); }
 
@@ -192,7 +209,13 @@ class Controller {
     return any([&](const ActuatorQueue& queue) { return queue.acts(lane); });
   }
   /// The first number of a block of states that is infinite or NaN, if any; O(numbers).
-  std::optional<NotFinite> not_finite(const std::byte* block) const noexcept;
+  std::optional<NotFinite> not_finite(const std::byte* block) const noexcept {
+    for (std::uint32_t i = 0; i < actuators_.size(); ++i) {
+      const std::uint32_t number = actuators_[i].layout().first_not_finite(of(i, block));
+      if (number != StateLayout::kNoNumber) return NotFinite{i, number};
+    }
+    return std::nullopt;
+  }
   /// True if end statuses of dropped commands have not been reported yet.
   bool pending() const noexcept { return ledger_.pending(); }
 

@@ -144,13 +144,6 @@ void FastestMotion::mix(double lowest) noexcept {
   share_ = (farther_.distance - distance_) / (farther_.distance - nearer_.distance);
 }
 
-double FastestMotion::distance(double cruise, std::optional<double> before) const noexcept {
-  const VelocityChange to_cruise(cruise - start_speed_, start_acceleration_, rates_);
-  const VelocityChange to_rest(-cruise, 0.0, rates_);
-  return to_cruise.displacement() + (before ? *before : to_cruise.time()) * cruise +
-         to_rest.displacement();
-}
-
 /// The cruising speed with which distance() is that to the target, up to a share of it.
 double FastestMotion::cruise_for(std::optional<double> before, double low, double high,
                                  double tolerance) const noexcept {

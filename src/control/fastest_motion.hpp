@@ -46,7 +46,12 @@ class FastestMotion {
   void mix(double lowest) noexcept;
   /// Distance of a motion that slows down from the speed `cruise` after `before` iterations, or as
   /// soon as it has that speed.
-  double distance(double cruise, std::optional<double> before) const noexcept;
+  double distance(double cruise, std::optional<double> before) const noexcept {
+    const VelocityChange to_cruise(cruise - start_speed_, start_acceleration_, rates_);
+    const VelocityChange to_rest(-cruise, 0.0, rates_);
+    return to_cruise.displacement() + (before ? *before : to_cruise.time()) * cruise +
+           to_rest.displacement();
+  }
   double time_to(double cruise) const noexcept {
     return VelocityChange(cruise - start_speed_, start_acceleration_, rates_).time();
   }

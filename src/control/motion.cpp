@@ -83,27 +83,6 @@ Motion::Motion(const Schema& schema, const ActuatorRow& actuator, const StateLay
   }
 }
 
-void Motion::trace(const std::byte* state) noexcept {
-  for (Number& each : numbers_) {
-    const double position = layout_.number(each.number, state);
-    if (each.kind == Kind::float64 && each.motion.accelerates()) {
-      each.motion.trace(position);
-    } else {
-      each.motion.restart(position);
-    }
-  }
-}
-
-void Motion::begin(const std::uint64_t* mask) noexcept {
-  begun_ = true;
-  observed_ = nullptr;
-  follows_rows_ = false;
-  for (Number& each : numbers_) {
-    each.is_commanded = masked(mask, each.number);
-    each.motion.begin();
-  }
-}
-
 std::int64_t Motion::propose(const Course& course, const std::byte* desired) noexcept {
   profile_ = course.profile;
   is_row_ = course.is_row;
@@ -159,14 +138,6 @@ void Motion::settle(Iteration first, std::int64_t iterations) noexcept {
     } else {
       each.motion.settle(iterations);
     }
-  }
-}
-
-void Motion::follow_as_sent(Iteration first) noexcept {
-  first_ = last_ = first;
-  begun_ = is_row_ = false;
-  for (Number& each : numbers_) {
-    if (each.is_commanded) each.motion.follow_as_sent(layout_.number(each.number, target()));
   }
 }
 

@@ -3,12 +3,9 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
-#include <optional>
 #include <vector>
 
 #include "control/number_motion.hpp"
-#include "control/record.hpp"
 #include "control/state_layout.hpp"
 
 namespace o80 {
@@ -44,7 +41,15 @@ class Motion {
   /// The target of the next plan(); fill it before. Numbers of `mask` (null: all) move to it.
   std::byte* target() noexcept { return from() + stride_; }
   /// A command begins.
-  void begin(const std::uint64_t* mask) noexcept;
+  void begin(const std::uint64_t* mask) noexcept {
+    begun_ = true;
+    observed_ = nullptr;
+    follows_rows_ = false;
+    for (Number& each : numbers_) {
+      each.is_commanded = masked(mask, each.number);
+      each.motion.begin();
+    }
+  }
   /// The last target is where the next row begins.
   void next_row() noexcept { layout_.copy(from(), target()); }
   /// The next plan starts at rest at these values, not where the actuator is.
@@ -56,7 +61,13 @@ class Motion {
   /// Then plans for so many iterations, at least those.
   void settle(Iteration first, std::int64_t iterations) noexcept;
   /// A set-point of a generator at the rate of the loop: no plan, only limits.
-  void follow_as_sent(Iteration first) noexcept;
+  void follow_as_sent(Iteration first) noexcept {
+    first_ = last_ = first;
+    begun_ = is_row_ = false;
+    for (Number& each : numbers_) {
+      if (each.is_commanded) each.motion.follow_as_sent(layout_.number(each.number, target()));
+    }
+  }
   /// The plan goes on until this iteration or later.
   void extend(Iteration last) noexcept { last_ = std::max(last_, last); }
   /// What is followed reaches to this state, too.
@@ -120,7 +131,16 @@ class Motion {
   }
   /// One iteration of a motion that was made elsewhere, after restart(). Numbers whose differences
   /// a command would not use, or whose bytes are rounded, are at rest there.
-  void trace(const std::byte* state) noexcept;
+  void trace(const std::byte* state) noexcept {
+    for (Number& each : numbers_) {
+      const double position = layout_.number(each.number, state);
+      if (each.kind == Kind::float64 && each.motion.accelerates()) {
+        each.motion.trace(position);
+      } else {
+        each.motion.restart(position);
+      }
+    }
+  }
   /// One iteration of braking. Numbers with a rest value go to it, unless they are held; if it
   /// `follows`, the others are at `state`, the observed one. True while a number moves.
   bool brake(std::byte* state, bool follows) noexcept;

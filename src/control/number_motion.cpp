@@ -6,12 +6,6 @@
 
 namespace o80 {
 
-void NumberMotion::restart(double position) noexcept {
-  guard_.restart(position);
-  planned_ = follows_ = held_ = leaves_ = held_back_ = stands_ = false;
-  difference_ = former_difference_ = 0.0;
-}
-
 /// If the shortest stop would leave the bounds, the plan goes on until it stays inside.
 void NumberMotion::end(bool arrived) noexcept {
   if (planned_ && !follows_ && !guard_.stops_inside()) {
@@ -62,17 +56,6 @@ void NumberMotion::settle(std::int64_t iterations) noexcept {
   }
   if (jumps_) guard_.restart(plan_.task().from.position);
   plan_.settle(iterations);
-}
-
-void NumberMotion::line(double start, double target) noexcept {
-  if (!planned_) {
-    Span stop = guard_.stop();
-    stop.include(start);
-    guard_.begin(stop);
-    planned_ = follows_ = true;
-  }
-  guard_.widen(target);
-  plan_.line(start, target);
 }
 
 /// One iteration by `move`, as far as the bounds of the integral allow; returns the one that does

@@ -47,7 +47,11 @@ class NumberMotion {
   bool accelerates() const noexcept { return std::isfinite(guard_.rates().acceleration); }
 
   /// Sets the position, at rest.
-  void restart(double position) noexcept;
+  void restart(double position) noexcept {
+    guard_.restart(position);
+    planned_ = follows_ = held_ = leaves_ = held_back_ = stands_ = false;
+    difference_ = former_difference_ = 0.0;
+  }
   /// One iteration of a motion that was made elsewhere.
   void trace(double position) noexcept { guard_.accept(position); }
   /// A command begins: notes from which motion.
@@ -63,7 +67,16 @@ class NumberMotion {
   void settle(std::int64_t iterations) noexcept;
   /// A straight line to the next row of a trajectory, which is followed; line_for() sets its
   /// length.
-  void line(double start, double target) noexcept;
+  void line(double start, double target) noexcept {
+    if (!planned_) {
+      Span stop = guard_.stop();
+      stop.include(start);
+      guard_.begin(stop);
+      planned_ = follows_ = true;
+    }
+    guard_.widen(target);
+    plan_.line(start, target);
+  }
   void line_for(std::int64_t iterations) noexcept { plan_.line_for(iterations); }
   /// Goes to the target within the limits, whatever they keep it from (Profile::as_sent).
   void follow_as_sent(double target) noexcept {

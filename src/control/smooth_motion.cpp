@@ -47,11 +47,6 @@ SmoothMotion::SmoothMotion(const Moment& start, double target, std::int64_t iter
   c2_ = -(6.0 * d + 3.0 * n * v + n * (n + 1.0) / 2.0 * a) / (three * (n + 3.0) * (n + 4.0));
 }
 
-double SmoothMotion::position(double i) const noexcept {
-  const double left = last_ - i;
-  return target_ - left * (left + 1.0) * (left + 2.0) * (c0_ + i * (c1_ + (i + 1.0) * c2_));
-}
-
 /// The differences are, like the position, a product of known factors and a quadratic, whose roots
 /// are the extremes of the difference below it.
 SmoothMotion::Extremes SmoothMotion::extremes() const noexcept {

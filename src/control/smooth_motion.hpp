@@ -18,7 +18,10 @@ class SmoothMotion {
   SmoothMotion(const Moment& start, double target, std::int64_t iterations) noexcept;
 
   /// The position in iteration i, 1 to n.
-  double position(double i) const noexcept;
+  double position(double i) const noexcept {
+    const double left = last_ - i;
+    return target_ - left * (left + 1.0) * (left + 2.0) * (c0_ + i * (c1_ + (i + 1.0) * c2_));
+  }
 
   /// Largest values from the first iteration to rest.
   struct Extremes {

@@ -10,15 +10,6 @@
 namespace o80 {
 namespace {
 
-/// Copies a number of 1, 2, 4 or 8 bytes.
-void copy_number(std::byte* to, const std::byte* from, std::uint32_t size) noexcept {
-  if (size == sizeof(double)) {  // most numbers: no call
-    std::memcpy(to, from, sizeof(double));
-  } else {
-    std::memcpy(to, from, size);
-  }
-}
-
 /// Throws if an actuator has limits or rest values: they apply to single numbers, which a type with
 /// its own blend() does not interpolate one by one.
 void refuse_limits(const Schema& schema, const ActuatorRow& actuator) {
@@ -68,14 +59,6 @@ StateLayout::StateLayout(const Schema& schema, std::uint32_t type)
   plain_ = plain_ && end == size_;
 }
 
-void StateLayout::copy(std::byte* to, const std::byte* from,
-                       const std::uint64_t* mask) const noexcept {
-  for (std::size_t i = 0; i < numbers_.size(); ++i) {
-    if (!masked(mask, i)) continue;
-    copy_number(to + numbers_[i].offset, from + numbers_[i].offset, numbers_[i].size);
-  }
-}
-
 bool StateLayout::same(const std::byte* one, const std::byte* other,
                        const std::uint64_t* mask) const noexcept {
   if (mask == nullptr && !padded_) return std::memcmp(one, other, size_) == 0;
@@ -99,13 +82,6 @@ void StateLayout::copy_finite(std::byte* to, const std::byte* from) const noexce
     if (!finite_number(i, from)) continue;
     copy_number(to + numbers_[i].offset, from + numbers_[i].offset, numbers_[i].size);
   }
-}
-
-bool StateLayout::finite_number(std::size_t number, const std::byte* state) const noexcept {
-  const std::byte* at = state + numbers_[number].offset;
-  if (numbers_[number].kind == Kind::float64) return std::isfinite(load<double>(at));
-  if (numbers_[number].kind == Kind::float32) return std::isfinite(load<float>(at));
-  return true;
 }
 
 bool StateLayout::proper_number(std::size_t number, const std::byte* state) const noexcept {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -30,6 +31,15 @@ T load(const std::byte* bytes) noexcept {
   T value;
   std::memcpy(&value, bytes, sizeof(T));
   return value;
+}
+
+/// Copies a number of 1, 2, 4 or 8 bytes.
+inline void copy_number(std::byte* to, const std::byte* from, std::uint32_t size) noexcept {
+  if (size == sizeof(double)) {  // most numbers: no call
+    std::memcpy(to, from, sizeof(double));
+  } else {
+    std::memcpy(to, from, size);
+  }
 }
 
 /// True if the bit of a number is set; a null mask means all.
@@ -65,7 +75,12 @@ class StateLayout {
     }
   }
   /// Copies the numbers whose bits are set.
-  void copy(std::byte* to, const std::byte* from, const std::uint64_t* mask) const noexcept;
+  void copy(std::byte* to, const std::byte* from, const std::uint64_t* mask) const noexcept {
+    for (std::size_t i = 0; i < numbers_.size(); ++i) {
+      if (!masked(mask, i)) continue;
+      copy_number(to + numbers_[i].offset, from + numbers_[i].offset, numbers_[i].size);
+    }
+  }
 
   /// True if the numbers whose bits are set have the same bytes.
   bool same(const std::byte* one, const std::byte* other, const std::uint64_t* mask) const noexcept;
@@ -98,7 +113,12 @@ class StateLayout {
     while (i < numbers_.size() && !predicate(i)) ++i;
     return i < numbers_.size() ? i : kNoNumber;
   }
-  bool finite_number(std::size_t number, const std::byte* state) const noexcept;
+  bool finite_number(std::size_t number, const std::byte* state) const noexcept {
+    const std::byte* at = state + numbers_[number].offset;
+    if (numbers_[number].kind == Kind::float64) return std::isfinite(load<double>(at));
+    if (numbers_[number].kind == Kind::float32) return std::isfinite(load<float>(at));
+    return true;
+  }
 
   std::vector<NumberPlace> numbers_;
   std::vector<std::int64_t> labels_;
