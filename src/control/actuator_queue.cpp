@@ -12,9 +12,6 @@ namespace {
 
 // most waypoints of a trajectory that are skipped in one iteration, because they end before it
 constexpr int kMostPassed = 256;
-// waypoints of a trajectory that are read ahead in one iteration, for its span. A motion that
-// speeds up and stops in i iterations each needs the span of i waypoints in iteration i.
-constexpr std::uint32_t kReadAhead = 16;
 
 }  // namespace
 
@@ -47,25 +44,24 @@ void ActuatorQueue::drop(const Outcome& outcome, Iteration iteration) noexcept {
   while (!queue_.empty()) ledger_->drop(queue_.take_any(), outcome, iteration);
 }
 
-ActuatorQueue::Moved ActuatorQueue::step(Iteration iteration, const std::byte* observed,
-                                         std::uint32_t& late_budget) noexcept {
-  motion_.observe(observed);
+/// Begins what runs in this iteration: a row, or a command; false if there is none.
+bool ActuatorQueue::begin(Iteration iteration, const std::byte* observed,
+                          std::uint32_t& late_budget) noexcept {
   if (!planned_ && may_give_way() && end_late(iteration, late_budget)) {
     const RecordHead& next = pool_->head(queue_.front());
     if (may_begin(next, iteration) && gives_way_to(next)) give_way(iteration);
   }
-  if (runs_ != Runs::nothing) {
-    const bool row_is_over = pace_ == Pace::direct || iteration > motion_.last();
-    const bool next_row = planned_ || (row_is_over && rows_left_ > 0);
-    if (next_row && !begin_row(iteration)) return step(iteration, observed, late_budget);
-  } else if (!begin_next(iteration, observed, late_budget)) {
-    // the motion brakes within its limits, and fields with a rest value go to it
-    motion_.end();
-    carry_.reset();
-    const bool moves = follows() ? follow(observed) : motion_.brake(desired_, false);
-    return moves ? Moved::braking : Moved::idle;
+  if (runs_ != Runs::nothing && (!needs_row(iteration) || begin_row(iteration))) return true;
+  while (end_late(iteration, late_budget)) {
+    const RecordHead& head = pool_->head(queue_.front());
+    // while it waits for the others of a group it brakes
+    if (!may_begin(head, iteration)) return false;
+    begin_command(observed);
+    if (begin_row(iteration)) return true;
+    if (late_budget == 0) return false;
+    --late_budget;
   }
-  return advance(iteration);
+  return false;
 }
 
 /// One iteration of what runs, which may be its last.
@@ -124,20 +120,6 @@ void ActuatorQueue::end_running(Iteration iteration) noexcept {
   Outcome outcome;
   if (late_ > 0 && asked_ > 0) outcome = {outcome.status, Reason::limits, reason_.packed(), late_};
   ledger_->end(record, outcome, iteration);
-}
-
-bool ActuatorQueue::begin_next(Iteration iteration, const std::byte* observed,
-                               std::uint32_t& late_budget) noexcept {
-  while (end_late(iteration, late_budget)) {
-    const RecordHead& head = pool_->head(queue_.front());
-    // while it waits for the others of a group it brakes
-    if (!may_begin(head, iteration)) return false;
-    begin_command(observed);
-    if (begin_row(iteration)) return true;
-    if (late_budget == 0) return false;
-    --late_budget;
-  }
-  return false;
 }
 
 /// Rejects commands whose `until` has passed; false if no command is left to begin.

@@ -59,7 +59,13 @@ class ActuatorQueue {
   /// Then, if all members have arrived: proposes its number of iterations. The largest is used.
   void plan_with_others(Iteration iteration, const std::byte* observed) noexcept;
   /// `late_budget`: number of late commands that may still be rejected in this iteration.
-  Moved step(Iteration iteration, const std::byte* observed, std::uint32_t& late_budget) noexcept;
+  Moved step(Iteration iteration, const std::byte* observed, std::uint32_t& late_budget) noexcept {
+    motion_.observe(observed);
+    // mostly the row of a command goes on
+    const bool goes_on = runs_ == Runs::queued && !needs_row(iteration);
+    return goes_on || begin(iteration, observed, late_budget) ? advance(iteration)
+                                                              : come_to_rest(observed);
+  }
   /// True if no command or given target is running or queued.
   bool empty() const noexcept { return has_no_command() && runs_ == Runs::nothing; }
   bool has_no_command() const noexcept { return queue_.empty() && !has_record(); }
@@ -108,6 +114,10 @@ class ActuatorQueue {
   }
 
  private:
+  // waypoints of a trajectory that are read ahead in one iteration, for its span. A motion that
+  // speeds up and stops in i iterations each needs the span of i waypoints in iteration i.
+  static constexpr std::uint32_t kReadAhead = 16;
+
   /// What moves the actuator.
   enum class Runs : std::uint8_t {
     nothing,
@@ -142,8 +152,11 @@ class ActuatorQueue {
     const RecordHead* head = queue_.empty() ? nullptr : &pool_->head(queue_.front());
     return head != nullptr && is_member(*head) ? head : nullptr;
   }
-  bool begin_next(Iteration iteration, const std::byte* observed,
-                  std::uint32_t& late_budget) noexcept;
+  bool begin(Iteration iteration, const std::byte* observed, std::uint32_t& late_budget) noexcept;
+  bool needs_row(Iteration iteration) const noexcept {
+    const bool row_is_over = pace_ == Pace::direct || iteration > motion_.last();
+    return planned_ || (row_is_over && rows_left_ > 0);
+  }
   bool end_late(Iteration iteration, std::uint32_t& late_budget) noexcept;
   void give_way(Iteration iteration) noexcept { end(leave(), {Status::overwritten}, iteration); }
   void begin_command(const std::byte* observed) noexcept;
@@ -170,6 +183,13 @@ class ActuatorQueue {
   Motion::Course course(const RecordHead& head, Iteration iteration) noexcept;
   std::int64_t row_of_own_time() noexcept;
   Moved advance(Iteration iteration) noexcept;
+  /// Without a command the motion brakes within its limits, and fields with a rest value go to it.
+  Moved come_to_rest(const std::byte* observed) noexcept {
+    motion_.end();
+    carry_.reset();
+    const bool moves = follows() ? follow(observed) : motion_.brake(desired_, false);
+    return moves ? Moved::braking : Moved::idle;
+  }
   /// Nothing runs any more; the record of what ran, if it has one.
   BlockIndex leave() noexcept {
     if (runs_ == Runs::queued) queue_.pop();

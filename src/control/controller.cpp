@@ -82,7 +82,8 @@ void Controller::step(Iteration iteration, const std::byte* observed) noexcept {
       const Moved moved = queue.step(iteration, of(i, observed), late_budget);
       // the queue is not empty if late commands have used up their budget
       if (moved == Moved::idle && queue.empty() && queue.at_rest()) busy_[word] &= ~bit;
-      if (moved != Moved::idle) active |= bit;
+      if (moved == Moved::idle) return;
+      active |= bit;
       if (moved == Moved::braking) braking |= bit;
       if (moved == Moved::clamped) clamped |= bit;
     });

@@ -14,7 +14,7 @@ constexpr int kHalvings = 16;
 /// `acceleration` in each iteration. The iteration at that speed is included.
 double speed_for(double room, double acceleration) noexcept {
   if (room <= 0.0) return 0.0;
-  if (!std::isfinite(acceleration) || !std::isfinite(room)) return room;
+  if (!std::isfinite(room)) return room;
   const double k = std::floor((std::sqrt(1.0 + 8.0 * room / acceleration) - 1.0) / 2.0);
   return (room + acceleration * k * (k + 1.0) / 2.0) / (k + 1.0);
 }
@@ -65,17 +65,12 @@ bool NumberLimiter::pass_rounded(double next) noexcept {
   return keeps;
 }
 
-/// Treats a speed within rounding as 0.
-void NumberLimiter::forget_rounding() noexcept {
-  const double nothing = slack() / 100.0 + 2.0 * rounding();
-  const bool steady = !std::isfinite(rates_.jerk) || std::abs(now_.acceleration) <= nothing;
-  if (steady && std::abs(now_.speed) <= nothing) stand();
-}
-
 /// The speeds from which it stops inside its bounds, in both directions.
 Span NumberLimiter::speeds() const noexcept {
-  return {-speed_for(std::max(0.0, now_.position - span_.low), rates_.acceleration),
-          speed_for(std::max(0.0, span_.high - now_.position), rates_.acceleration)};
+  const Span room{-std::max(0.0, now_.position - span_.low),
+                  std::max(0.0, span_.high - now_.position)};
+  if (!std::isfinite(rates_.acceleration)) return room;
+  return {-speed_for(-room.low, rates_.acceleration), speed_for(room.high, rates_.acceleration)};
 }
 
 /// The next accelerations that the limits of acceleration and jerk allow.
@@ -86,16 +81,22 @@ Span NumberLimiter::accelerations() const noexcept {
 
 Limit NumberLimiter::follow_without_jerk(double step, double lag) noexcept {
   // the wanted speed: reach the wanted position, or, from farther away, approach it at the highest
-  // speed from which it can stop there. Without a limit of acceleration it is always within reach
+  // speed from which it can stop there
   const double before = now_.position;
-  const double closing = speed_for(std::abs(lag), rates_.acceleration);
-  const bool within_reach = closing >= std::abs(lag);
-  const double speed = within_reach ? wanted_ - before : step - std::copysign(closing, lag);
+  double speed = wanted_ - before;
+  bool within_reach = true;
+  if (std::isfinite(rates_.acceleration)) {
+    const double closing = speed_for(std::abs(lag), rates_.acceleration);
+    within_reach = closing >= std::abs(lag);
+    if (!within_reach) speed = step - std::copysign(closing, lag);
+  }
 
   // the allowed speeds
   const Span stopping = speeds();
-  const double highest = std::min({now_.speed + rates_.acceleration, rates_.speed, stopping.high});
-  const double lowest = std::max({now_.speed - rates_.acceleration, -rates_.speed, stopping.low});
+  const double highest =
+      std::min(std::min(now_.speed + rates_.acceleration, rates_.speed), stopping.high);
+  const double lowest =
+      std::max(std::max(now_.speed - rates_.acceleration, -rates_.speed), stopping.low);
   const bool is_inside = speed <= highest && speed >= lowest;  // mostly, so no slack is needed
   if (is_inside || (speed <= highest + slack() && speed >= lowest - slack())) {
     move(speed);

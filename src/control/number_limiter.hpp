@@ -169,7 +169,12 @@ class NumberLimiter {
     now_.speed = now_.acceleration = 0.0;
     know_stop({});
   }
-  void forget_rounding() noexcept;
+  /// Treats a speed within rounding as 0.
+  void forget_rounding() noexcept {
+    const double nothing = slack() / 100.0 + 2.0 * rounding();
+    const bool steady = !std::isfinite(rates_.jerk) || std::abs(now_.acceleration) <= nothing;
+    if (steady && std::abs(now_.speed) <= nothing) stand();
+  }
   Span speeds() const noexcept;
   Span accelerations() const noexcept;
   /// Within the span, or no further outside than `before`.

@@ -63,25 +63,23 @@ void NumberMotion::settle(std::int64_t iterations) noexcept {
 template <class Move>
 Limit NumberMotion::move(Move&& move) noexcept {
   const double before = guard_.position();
-  Limit bound = Limit::none;
+  if (integral_) integral_->note(guard_);
+  move();
   stands_ = false;
-  if (!integral_) {
-    move();
-  } else {
-    const NumberLimiter guard = guard_;
-    move();
-    const auto admitted = integral_->admit(guard.moment(), guard_.position());
-    bound = admitted.bound;
-    if (bound != Limit::none) {
-      guard_ = guard;
-      guard_.follow_within_bounds();
-      if (!guard_.pass(admitted.velocity)) guard_.follow(admitted.velocity);
-      follows_ = planned_;
-      held_back_ = true;
-      stands_ = integral_->stands();
-    }
-  }
+  const Limit bound = integral_ ? hold_back() : Limit::none;
   former_difference_ = std::exchange(difference_, guard_.position() - before);
+  return bound;
+}
+
+Limit NumberMotion::hold_back() noexcept {
+  const auto [bound, velocity] = integral_->admit(guard_.position());
+  if (bound == Limit::none) return bound;
+  guard_ = integral_->noted();
+  guard_.follow_within_bounds();
+  if (!guard_.pass(velocity)) guard_.follow(velocity);
+  follows_ = planned_;
+  held_back_ = true;
+  stands_ = integral_->stands();
   return bound;
 }
 

@@ -126,6 +126,7 @@ class NumberMotion {
   }
   template <class Move>
   Limit move(Move&& move) noexcept;
+  Limit hold_back() noexcept;
   std::int64_t plan_for(const Asked& asked) noexcept;
 
   NumberLimiter guard_;

@@ -16,9 +16,11 @@ constexpr int kMostHalvings = 10;
 /// The fraction `share` between `from` and `to`, never outside, despite rounding and overflow.
 double between(double from, double to, double share) noexcept {
   const double distance = to - from;
-  if (std::isfinite(distance)) {
-    return std::clamp(from + distance * share, std::min(from, to), std::max(from, to));
-  }
+  const double value = from + distance * share;
+  const double low = std::min(from, to);
+  const double high = std::max(from, to);
+  if (value >= low && value <= high) return value;
+  if (std::isfinite(distance)) return std::clamp(value, low, high);
   const double weighed = from * (1.0 - share) + to * share;
   return std::isfinite(weighed) ? weighed : to;
 }
