@@ -164,8 +164,9 @@ class Controller {
   /// Reports the end statuses of dropped commands, at most kStatusesPerIteration minus those that
   /// the last step() has reported. False if some are left.
   bool finish_pending() noexcept {
-    const std::uint32_t told = std::min(std::exchange(told_, 0), kStatusesPerIteration);
-    if (ledger_.pending()) ledger_.report_ends(kStatusesPerIteration - told);
+    const std::uint32_t told = std::exchange(told_, 0);
+    if (!ledger_.pending()) return true;
+    ledger_.report_ends(kStatusesPerIteration - std::min(told, kStatusesPerIteration));
     return !ledger_.pending();
   }
 

@@ -25,8 +25,8 @@ NumberLimiter::NumberLimiter(double minimum, double maximum, const Rates& rates)
     : bounds_{minimum, maximum},
       span_(bounds_),
       rates_(rates),
-      unlimited_(minimum <= -kHuge && maximum >= kHuge && !std::isfinite(rates.speed) &&
-                 !std::isfinite(rates.acceleration) && !std::isfinite(rates.jerk)) {
+      has_rates_(std::isfinite(rates.speed) || std::isfinite(rates.acceleration) ||
+                 std::isfinite(rates.jerk)) {
   const double finest = std::min({rates.speed, rates.acceleration, rates.jerk});
   tolerance_ = std::isfinite(finest) ? kLimitRounding * finest : 0.0;
 }

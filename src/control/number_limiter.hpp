@@ -97,7 +97,8 @@ class NumberLimiter {
     const double step = wanted - wanted_;
     const double lag = now_.position - wanted_;
     wanted_ = wanted;
-    if (unlimited_ && std::abs(wanted) < kHuge && std::abs(now_.position) < kHuge) {
+    if (!has_rates_ && wanted >= span_.low && wanted <= span_.high && std::abs(wanted) < kHuge &&
+        std::abs(now_.position) < kHuge) {
       return follow_freely();
     }
     return std::isfinite(rates_.jerk) ? follow_with_jerk(step, lag)
@@ -127,10 +128,10 @@ class NumberLimiter {
   // two numbers below it are not too far apart for a double
   static constexpr double kHuge = 0.25 * std::numeric_limits<double>::max();
 
-  /// What follow_without_jerk() does with a number that has a rest value only.
+  /// What follow_without_jerk() does inside the bounds, if there are no other limits.
   Limit follow_freely() noexcept {
     const double speed = wanted_ - now_.position;
-    scale_ = std::max(scale_, std::abs(now_.position + speed));
+    scale_ = std::max(scale_, std::abs(inside(now_.position + speed, now_.position)));
     now_ = {wanted_, speed, speed - now_.speed};
     if (std::abs(speed) <= slack() / 100.0 + 2.0 * rounding()) now_.speed = now_.acceleration = 0.0;
     return Limit::none;
@@ -191,7 +192,7 @@ class NumberLimiter {
   Span bounds_;
   Span span_;  // the bounds while it follows: also those of what it follows
   Rates rates_;
-  bool unlimited_;    // within the range of its kind
+  bool has_rates_;
   double tolerance_;  // of the finest rate
   Moment now_;
   double wanted_ = 0.0;       // position wanted last

@@ -22,16 +22,6 @@ double share_between(double wanted, double at_zero, double at_one) noexcept {
 
 }  // namespace
 
-VelocityChange::VelocityChange(double change, double acceleration, const Rates& rates) noexcept
-    : start_(acceleration), acceleration_(rates.acceleration), jerk_(rates.jerk) {
-  O80_COUNT(speed_change);
-  if (std::isfinite(jerk_)) {
-    plan_with_jerk(change);
-  } else {
-    plan_without_jerk(change);
-  }
-}
-
 /// Full acceleration, and the remainder in the last iteration.
 void VelocityChange::plan_without_jerk(double change) noexcept {
   if (change == 0.0) return;

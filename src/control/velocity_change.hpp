@@ -1,7 +1,10 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
+
+#include "control/visit_block.hpp"
 
 namespace o80 {
 
@@ -44,7 +47,15 @@ class VelocityChange {
  public:
   VelocityChange() = default;
   /// `acceleration`: the present one, a(0), within its limit.
-  VelocityChange(double change, double acceleration, const Rates& rates) noexcept;
+  VelocityChange(double change, double acceleration, const Rates& rates) noexcept
+      : start_(acceleration), acceleration_(rates.acceleration), jerk_(rates.jerk) {
+    O80_COUNT(speed_change);
+    if (std::isfinite(jerk_)) {
+      plan_with_jerk(change);
+    } else {
+      plan_without_jerk(change);
+    }
+  }
 
   /// Iterations until the change is done; 0 if there is nothing to do.
   std::int64_t steps() const noexcept { return steps_; }
