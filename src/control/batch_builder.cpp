@@ -8,19 +8,6 @@
 
 namespace o80 {
 
-BatchBuilder::BatchBuilder() : blocks_(1) {}
-
-/// `option`: only_own of a purge, accepts of a resume.
-RecordHead BatchBuilder::head_of(RecordKind kind, std::uint16_t actuator, std::uint8_t option,
-                                 std::uint64_t amount) {
-  RecordHead head;
-  head.kind = kind;
-  head.actuator = actuator;
-  head.only_own = option;
-  head.amount = static_cast<std::int64_t>(amount);
-  return head;
-}
-
 std::byte* BatchBuilder::open(const RecordHead& head, std::uint64_t payload_bytes) {
   const std::size_t first = blocks_.size();
   const std::uint64_t all = first + blocks_of(payload_bytes);
@@ -42,13 +29,6 @@ std::byte* BatchBuilder::open(const RecordHead& head, std::uint64_t payload_byte
 std::uint32_t BatchBuilder::add(const RecordHead& head, std::span<const std::byte> payload) {
   std::byte* bytes = open(head, payload.size());
   if (!payload.empty()) std::memcpy(bytes, payload.data(), payload.size());
-  return records_ - 1;
-}
-
-std::uint32_t BatchBuilder::command(const RecordHead& head, std::span<const std::uint64_t> mask,
-                                    std::span<const std::int64_t> times, std::uint32_t rows,
-                                    std::span<const std::byte> states) {
-  add_command(head, RecordKind::command, mask, times, rows, states);
   return records_ - 1;
 }
 
@@ -114,12 +94,6 @@ std::span<const Block> BatchBuilder::seal(const BatchRecord& batch) {
     std::memcpy(bytes, &head, sizeof head);
   }
   return blocks_;
-}
-
-void BatchBuilder::clear() {
-  blocks_.resize(1);
-  records_ = 0;
-  counts_ = {};
 }
 
 }  // namespace o80

@@ -16,14 +16,17 @@ namespace o80 {
 /// the record is `record_id(batch, index)`.
 class BatchBuilder {
  public:
-  BatchBuilder();
+  BatchBuilder() : blocks_(1) {}
 
   /// Adds a command. `head` has actuator, mode, pace, profile, start and amount. `mask` is empty or
   /// has one bit for each number of the state. `times` is empty or has one end time for each row
   /// [ns]. `states` holds `rows` states.
   std::uint32_t command(const RecordHead& head, std::span<const std::uint64_t> mask,
                         std::span<const std::int64_t> times, std::uint32_t rows,
-                        std::span<const std::byte> states);
+                        std::span<const std::byte> states) {
+    add_command(head, RecordKind::command, mask, times, rows, states);
+    return records_ - 1;
+  }
   std::uint32_t command(const RecordHead& head, std::span<const std::byte> state) {
     return command(head, {}, {}, 1, state);
   }
@@ -57,7 +60,11 @@ class BatchBuilder {
   /// purges and control orders, without `at` and without a burst, is marked as express.
   std::span<const Block> seal(const BatchRecord& batch);
 
-  void clear();
+  void clear() {
+    blocks_.resize(1);
+    records_ = 0;
+    counts_ = {};
+  }
   bool empty() const noexcept { return records_ == 0; }
   std::uint32_t records() const noexcept { return records_; }
   bool has_commands() const noexcept { return of(RecordKind::command) + of(RecordKind::group) > 0; }
@@ -71,8 +78,16 @@ class BatchBuilder {
   std::uint64_t blocks() const noexcept { return blocks_.size(); }
 
  private:
+  /// `option`: only_own of a purge, accepts of a resume.
   static RecordHead head_of(RecordKind kind, std::uint16_t actuator = 0, std::uint8_t option = 0,
-                            std::uint64_t amount = 0);
+                            std::uint64_t amount = 0) {
+    RecordHead head;
+    head.kind = kind;
+    head.actuator = actuator;
+    head.only_own = option;
+    head.amount = static_cast<std::int64_t>(amount);
+    return head;
+  }
   std::byte* open(const RecordHead& head, std::uint64_t payload_bytes);
   std::uint32_t add(const RecordHead& head, std::span<const std::byte> payload = {});
   void add_command(RecordHead head, RecordKind kind, std::span<const std::uint64_t> mask,

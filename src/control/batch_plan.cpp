@@ -82,13 +82,6 @@ struct BatchPlanner::Lane : Batch {
   std::vector<std::uint16_t> listed;  // actuators with a list
   std::vector<Target> targets;        // one for each actuator
 
-  void begin(BlockIndex first) noexcept {
-    static_cast<Batch&>(*this) = {};
-    batch = first;
-    cursor = pool.next(first);
-    begin_part();
-  }
-
   void complete(const BatchRecord& record) noexcept {
     if (group != kNoBlock) fail_group();  // incomplete
     end_part();
@@ -134,10 +127,7 @@ struct BatchPlanner::Lane : Batch {
       members_left = head.rows;
       group_blocks = 1;
     } else {
-      if (!valid) reject(head, record_blocks);
-      enter(head);
-      add(cursor);
-      ++place;
+      put(cursor, valid ? 0 : record_blocks);
     }
     cursor = pool.next(last);
     begun = false;
@@ -185,11 +175,19 @@ struct BatchPlanner::Lane : Batch {
     head.own = {kNoBlock, batch, last, kNoBlock};
   }
 
-  /// Makes of so many blocks one invalid record.
-  void reject(RecordHead& head, std::uint32_t count) noexcept {
-    head.kind = RecordKind::invalid_list;
-    head.id = record_id(pool.batch(batch).id, place);
-    head.payload_bytes = static_cast<std::uint32_t>(count * kBlockBytes - sizeof(RecordHead));
+  /// Adds a record of the batch; makes of it and what follows one invalid record of so many blocks,
+  /// if it is invalid.
+  void put(BlockIndex record, std::uint32_t invalid_blocks) noexcept {
+    RecordHead& head = pool.head(record);
+    if (invalid_blocks > 0) {
+      head.kind = RecordKind::invalid_list;
+      head.id = record_id(pool.batch(batch).id, place);
+      head.payload_bytes =
+          static_cast<std::uint32_t>(invalid_blocks * kBlockBytes - sizeof(RecordHead));
+    }
+    enter(head);
+    add(record);
+    ++place;
   }
 
   /// True if the record exceeds the limits of a batch. pulse() refuses such a batch, but a frontend
@@ -242,14 +240,7 @@ struct BatchPlanner::Lane : Batch {
   }
 
   /// Replaces an invalid group by one invalid record with all its blocks read so far.
-  void fail_group() noexcept {
-    const BlockIndex failed = std::exchange(group, kNoBlock);
-    RecordHead& head = pool.head(failed);
-    reject(head, group_blocks);
-    enter(head);
-    add(failed);
-    ++place;
-  }
+  void fail_group() noexcept { put(std::exchange(group, kNoBlock), group_blocks); }
 
   void add(BlockIndex record) noexcept {
     shared.tails[record] = record;
@@ -425,7 +416,10 @@ bool BatchPlanner::check(std::uint32_t lane_index, BlockIndex batch,
       known_[batch] = Known::garbage;
       return true;
     }
-    lane.begin(batch);
+    static_cast<Batch&>(lane) = {};
+    lane.batch = batch;
+    lane.cursor = shared_.pool.next(batch);
+    lane.begin_part();
   }
   lane.budget = budget;
   bool goes_on = true;

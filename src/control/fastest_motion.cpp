@@ -151,14 +151,6 @@ double FastestMotion::cruise_for(std::optional<double> before, double low, doubl
               tolerance * distance_);
 }
 
-void FastestMotion::settle() noexcept {
-  to_cruise_ = VelocityChange(cruise_ - start_speed_, start_acceleration_, rates_);
-  to_rest_ = VelocityChange(-cruise_, 0.0, rates_);
-  speed_ = start_speed_;
-  const std::int64_t cruising = cruises_ ? before_ + to_rest_.steps() : farther_.steps();
-  iterations_ = std::max({std::int64_t{1}, cruising, nearer_.steps()});
-}
-
 void FastestMotion::stretch(std::int64_t iterations) noexcept {
   if (iterations <= iterations_ || before_ == 0) return;
   const FastestMotion shortest = *this;

@@ -57,7 +57,13 @@ class FastestMotion {
   }
   double cruise_for(std::optional<double> before, double low, double high,
                     double tolerance) const noexcept;
-  void settle() noexcept;
+  void settle() noexcept {
+    to_cruise_ = VelocityChange(cruise_ - start_speed_, start_acceleration_, rates_);
+    to_rest_ = VelocityChange(-cruise_, 0.0, rates_);
+    speed_ = start_speed_;
+    const std::int64_t cruising = cruises_ ? before_ + to_rest_.steps() : farther_.steps();
+    iterations_ = std::max({std::int64_t{1}, cruising, nearer_.steps()});
+  }
 
   // mirrored by sign_, so that the target lies beyond the shortest stop
   double sign_ = 1.0;

@@ -4,18 +4,6 @@
 
 namespace o80 {
 
-Ledger::TakenBatch& Ledger::take(std::uint32_t lane, BlockIndex block, const BlockChain& spare,
-                                 std::uint32_t records, Iteration iteration) noexcept {
-  TakenBatch taken;
-  taken.records = taken.told = records;
-  taken.id = pool_.batch(block).id;
-  taken.last_end = taken.taken_at = iteration;
-  taken.open = records + 1;
-  taken.lane = lane;
-  taken.spare = spare;
-  return *new (pool_.bytes(block)) TakenBatch(taken);
-}
-
 void Ledger::enter(std::uint32_t lane, BlockIndex block, const BlockChain& spare,
                    std::uint32_t missing_from, std::uint32_t groups, Iteration iteration) noexcept {
   open_groups_ += groups;

@@ -105,7 +105,16 @@ class Ledger {
     return *std::launder(reinterpret_cast<TakenBatch*>(pool_.bytes(block)));
   }
   TakenBatch& take(std::uint32_t lane, BlockIndex block, const BlockChain& spare,
-                   std::uint32_t records, Iteration iteration) noexcept;
+                   std::uint32_t records, Iteration iteration) noexcept {
+    TakenBatch taken;
+    taken.records = taken.told = records;
+    taken.id = pool_.batch(block).id;
+    taken.last_end = taken.taken_at = iteration;
+    taken.open = records + 1;
+    taken.lane = lane;
+    taken.spare = spare;
+    return *new (pool_.bytes(block)) TakenBatch(taken);
+  }
   void ended(BlockIndex batch, Iteration iteration) noexcept;
   bool is_batch(BlockIndex group) noexcept {
     return static_cast<RecordKind>(*pool_.bytes(group)) == RecordKind::batch;

@@ -68,12 +68,13 @@ Profile usual_profile(const Schema& schema, const ActuatorRow& actuator) noexcep
 TargetLimits::TargetLimits(const Schema& schema, const Layouts& layouts) {
   constexpr double kLargest = std::numeric_limits<double>::max();
   for (const ActuatorRow& row : schema.actuators) {
-    actuators_.push_back({&*layouts.at(row.type), ranges_.size()});
+    Actuator& actuator = actuators_.emplace_back(Actuator{&*layouts.at(row.type), {}});
     for (std::uint32_t i = 0; i < row.limits; ++i) {
       const LimitRow& limit = schema.limits.at(row.first_limit + i);
-      ranges_.push_back(
-          {std::fmax(limit.minimum, -kLargest), std::fmin(limit.maximum, kLargest),
-           !layouts[row.type]->numbers()[i].moves() || std::isfinite(limit.acceleration)});
+      const bool moves = actuator.layout->numbers()[i].moves();
+      actuator.ranges.push_back({std::fmax(limit.minimum, -kLargest),
+                                 std::fmin(limit.maximum, kLargest),
+                                 !moves || std::isfinite(limit.acceleration)});
     }
   }
 }
@@ -81,7 +82,7 @@ TargetLimits::TargetLimits(const Schema& schema, const Layouts& layouts) {
 bool TargetLimits::admit(std::uint32_t actuator, const std::byte* state,
                          const std::uint64_t* mask) const noexcept {
   const StateLayout& layout = *actuators_[actuator].layout;
-  const Range* ranges = ranges_.data() + actuators_[actuator].first_range;
+  const Range* ranges = actuators_[actuator].ranges.data();
   const std::size_t numbers = layout.numbers().size();
   if (layout.plain() && mask == nullptr) {
     bool all = true;
@@ -99,15 +100,6 @@ bool TargetLimits::admit(std::uint32_t actuator, const std::byte* state,
     if (!(value >= ranges[i].lowest && value <= ranges[i].highest)) return false;
   }
   return true;
-}
-
-std::uint32_t TargetLimits::first_without_acceleration(std::uint32_t actuator,
-                                                       const std::uint64_t* mask) const noexcept {
-  const auto [layout, first_range] = actuators_[actuator];
-  for (std::uint32_t i = 0; i < layout->numbers().size(); ++i) {
-    if (masked(mask, i) && !ranges_[first_range + i].accelerates) return i;
-  }
-  return StateLayout::kNoNumber;
 }
 
 CommandCheck::CommandCheck(const Schema& schema)

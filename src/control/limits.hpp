@@ -32,7 +32,13 @@ class TargetLimits {
              const std::uint64_t* mask) const noexcept;
   /// The first number whose bit is set, and that moves without a limit of acceleration.
   std::uint32_t first_without_acceleration(std::uint32_t actuator,
-                                           const std::uint64_t* mask) const noexcept;
+                                           const std::uint64_t* mask) const noexcept {
+    const auto& ranges = actuators_[actuator].ranges;
+    for (std::uint32_t i = 0; i < ranges.size(); ++i) {
+      if (masked(mask, i) && !ranges[i].accelerates) return i;
+    }
+    return StateLayout::kNoNumber;
+  }
 
  private:
   struct Range {
@@ -42,10 +48,9 @@ class TargetLimits {
   };
   struct Actuator {
     const StateLayout* layout;
-    std::size_t first_range;  // of its numbers
+    std::vector<Range> ranges;  // of its numbers
   };
   std::vector<Actuator> actuators_;
-  std::vector<Range> ranges_;
 };
 
 /// Checks a command when it is added to a batch.

@@ -31,23 +31,6 @@ NumberLimiter::NumberLimiter(double minimum, double maximum, const Rates& rates)
   tolerance_ = std::isfinite(finest) ? kLimitRounding * finest : 0.0;
 }
 
-bool NumberLimiter::stays() const noexcept {
-  if (!std::isfinite(rates_.acceleration)) return true;
-  const double tolerance = slack();
-  return std::abs(now_.speed) <= rates_.acceleration + tolerance &&
-         std::abs(now_.speed) <= rates_.jerk + tolerance &&
-         std::abs(now_.speed + now_.acceleration) <= rates_.jerk + tolerance;
-}
-
-Span NumberLimiter::stop() const noexcept {
-  Span visited{now_.position, now_.position};
-  if (stays()) return visited;
-  const VelocityChange stop(-now_.speed, now_.acceleration, rates_);
-  visited.include(now_.position + stop.run_before_turn(now_.speed));
-  visited.include(now_.position + stop.displacement());
-  return visited;
-}
-
 /// Limits and bounds may be exceeded by rounding.
 bool NumberLimiter::pass_rounded(double next) noexcept {
   const double speed = next - now_.position;
@@ -71,12 +54,6 @@ Span NumberLimiter::speeds() const noexcept {
                   std::max(0.0, span_.high - now_.position)};
   if (!std::isfinite(rates_.acceleration)) return room;
   return {-speed_for(-room.low, rates_.acceleration), speed_for(room.high, rates_.acceleration)};
-}
-
-/// The next accelerations that the limits of acceleration and jerk allow.
-Span NumberLimiter::accelerations() const noexcept {
-  return {std::max(now_.acceleration - rates_.jerk, -rates_.acceleration),
-          std::min(now_.acceleration + rates_.jerk, rates_.acceleration)};
 }
 
 Limit NumberLimiter::follow_without_jerk(double step, double lag) noexcept {
@@ -223,18 +200,6 @@ Limit NumberLimiter::nearest_speed(double wanted) noexcept {
   move(std::clamp(wanted, lowest, highest));
   if (wanted > highest + slack()) return Limit::maximum;
   return wanted < lowest - slack() ? Limit::minimum : Limit::none;
-}
-
-void NumberLimiter::brake() noexcept {
-  if (!std::isfinite(rates_.acceleration)) {
-    rest();
-  } else if (stays()) {
-    now_ = {now_.position, 0.0, -now_.speed};
-    stop_known_ = false;
-  } else {
-    slow_down();
-  }
-  wanted_ = now_.position;
 }
 
 void NumberLimiter::slow_down() noexcept {

@@ -35,9 +35,22 @@ class NumberLimiter {
   /// True if braking would change nothing.
   bool at_rest() const noexcept { return now_.speed == 0.0 && now_.acceleration == 0.0; }
   /// True if braking would not move it: it may stop at once.
-  bool stays() const noexcept;
+  bool stays() const noexcept {
+    if (!std::isfinite(rates_.acceleration)) return true;
+    const double tolerance = slack();
+    return std::abs(now_.speed) <= rates_.acceleration + tolerance &&
+           std::abs(now_.speed) <= rates_.jerk + tolerance &&
+           std::abs(now_.speed + now_.acceleration) <= rates_.jerk + tolerance;
+  }
   /// Positions that the shortest stop visits.
-  Span stop() const noexcept;
+  Span stop() const noexcept {
+    Span visited{now_.position, now_.position};
+    if (stays()) return visited;
+    const VelocityChange stop(-now_.speed, now_.acceleration, rates_);
+    visited.include(now_.position + stop.run_before_turn(now_.speed));
+    visited.include(now_.position + stop.displacement());
+    return visited;
+  }
   /// True if these lie between minimum and maximum.
   bool stops_inside() const noexcept {
     const Span visited = stop();
@@ -105,7 +118,17 @@ class NumberLimiter {
                                       : follow_without_jerk(step, lag);
   }
   /// One iteration of braking, as fast as the limits allow.
-  void brake() noexcept;
+  void brake() noexcept {
+    if (!std::isfinite(rates_.acceleration)) {
+      rest();
+    } else if (stays()) {
+      now_ = {now_.position, 0.0, -now_.speed};
+      stop_known_ = false;
+    } else {
+      slow_down();
+    }
+    wanted_ = now_.position;
+  }
 
   /// For a motion that something else keeps: it is here now, wherever the last iteration led.
   void place(const Moment& now) noexcept {
@@ -177,7 +200,11 @@ class NumberLimiter {
     if (steady && std::abs(now_.speed) <= nothing) stand();
   }
   Span speeds() const noexcept;
-  Span accelerations() const noexcept;
+  /// The next accelerations that the limits of acceleration and jerk allow.
+  Span accelerations() const noexcept {
+    return {std::max(now_.acceleration - rates_.jerk, -rates_.acceleration),
+            std::min(now_.acceleration + rates_.jerk, rates_.acceleration)};
+  }
   /// Within the span, or no further outside than `before`.
   double inside(double position, double before) const noexcept {
     return std::clamp(position, std::min(span_.low, before), std::max(span_.high, before));

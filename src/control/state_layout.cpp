@@ -95,12 +95,6 @@ bool StateLayout::proper_number(std::size_t number, const std::byte* state) cons
   return std::find(first, first + place.labels, value) != first + place.labels;
 }
 
-double StateLayout::number(std::size_t number, const std::byte* state) const noexcept {
-  const std::byte* at = state + numbers_[number].offset;
-  return visit_number(numbers_[number].kind,
-                      [&]<class T>(T) { return static_cast<double>(load<T>(at)); });
-}
-
 const StateLayout& layout_of(const Schema& schema, std::uint32_t type, Layouts& layouts) {
   auto& layout = layouts.at(type);
   return layout ? *layout : layout.emplace(schema, type);

@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "describe/visit_number.hpp"
 #include "o80/describe/hooks.hpp"
 #include "o80/describe/schema.hpp"
 
@@ -104,7 +105,11 @@ class StateLayout {
   }
   bool proper_number(std::size_t number, const std::byte* state) const noexcept;
   /// A number as double (large integers are rounded).
-  double number(std::size_t number, const std::byte* state) const noexcept;
+  double number(std::size_t number, const std::byte* state) const noexcept {
+    const std::byte* at = state + numbers_[number].offset;
+    return visit_number(numbers_[number].kind,
+                        [&]<class T>(T) { return static_cast<double>(load<T>(at)); });
+  }
 
  private:
   template <class Predicate>
