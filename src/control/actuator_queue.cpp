@@ -40,7 +40,7 @@ void ActuatorQueue::drop(const Outcome& outcome, Iteration iteration) noexcept {
   if (!is_overwritten) motion_.end();
   stop();
   in_force_ = in_force;
-  motion_.release();
+  motion_.hold(false);
   while (!queue_.empty()) ledger_->drop(queue_.take_any(), outcome, iteration);
 }
 
@@ -110,9 +110,9 @@ ActuatorQueue::Moved ActuatorQueue::go_to(Iteration iteration, const std::byte* 
 
 void ActuatorQueue::end_running(Iteration iteration) noexcept {
   in_force_ = pace_ == Pace::direct;
-  if (in_force_) motion_.hold();
+  if (in_force_) motion_.hold(true);
   late_ += iteration - motion_.last();
-  motion_.complete();
+  motion_.end(true);
   const BlockIndex record = leave();
   if (record == kNoBlock) return;
   if (late_ > 0) carry_.reset();
@@ -169,7 +169,7 @@ void ActuatorQueue::begin_command(const std::byte* observed) noexcept {
   reason_ = {};
   in_force_ = pace_ == Pace::direct;
   set_point_ = next;
-  motion_.release();
+  motion_.hold(false);
   if (keeps_plan_ || streams) return;
   motion_.begin(mask());
   if (head.start == Start::observed) motion_.start_at(observed);

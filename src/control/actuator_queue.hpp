@@ -43,7 +43,7 @@ class ActuatorQueue {
       if (runs_ == Runs::alone) ledger_->drop(record_, outcome, iteration);
       end_motion();
     }
-    if (holder_ == lane) motion_.release();
+    if (holder_ == lane) motion_.hold(false);
     ledger_->drop(queue_.take(lane), outcome, iteration);
     if (empty()) end_motion();
   }
@@ -72,7 +72,7 @@ class ActuatorQueue {
   /// For targets that are given without a command, to a queue that has none: begins a row of them.
   void begin_given(Mode mode) noexcept {
     if (mode == Mode::overwrite) carry_.reset();
-    motion_.release();
+    motion_.hold(false);
   }
   /// Then, in each iteration: goes to the next one, as a direct command would. The last one stays
   /// in force.

@@ -193,16 +193,11 @@ struct BatchPlanner::Lane : Batch {
   /// True if the record exceeds the limits of a batch. pulse() refuses such a batch, but a frontend
   /// can write its lane directly.
   bool is_one_too_many(const RecordHead& head) noexcept {
-    switch (head.kind) {
-      case RecordKind::request:
-      case RecordKind::resume:
-        return plan.effort.requests >= kMostRequests;
-      case RecordKind::take_control:
-      case RecordKind::release_control:
-        return ++control_orders > kMostControlOrders;
-      default:
-        return false;
-    }
+    using enum RecordKind;
+    const bool is_request = head.kind == request || head.kind == resume;
+    const bool is_order = head.kind == take_control || head.kind == release_control;
+    return (is_request && plan.effort.requests >= kMostRequests) ||
+           (is_order && ++control_orders > kMostControlOrders);
   }
 
   /// True if a member has the options of its group, and an actuator that no other member has.
@@ -225,9 +220,7 @@ struct BatchPlanner::Lane : Batch {
     if (--members_left > 0) return;
 
     // the members of a complete group go to their queues like other commands
-    CommandGroup whole;
-    whole.open = static_cast<std::uint16_t>(pool.head(group).rows);
-    CommandGroups(pool).at(group) = whole;
+    CommandGroups(pool).begin(group);
     for (BlockIndex member = first_member; member != kNoBlock;) {
       const BlockIndex record = member;
       member = std::exchange(pool.head(record).own[Own::kNextStep], kNoBlock);

@@ -105,7 +105,7 @@ void Controller::step_given(Iteration iteration, const std::byte* observed) noex
     const std::size_t size = actuators_[i].layout().size();
     const std::byte* target = states + step * size;
     states += given_.steps * size;
-    if (has(dropped_, i)) continue;
+    if (masked(dropped_.data(), i)) continue;
     if (first) actuators_[i].begin_given(given_.mode);
     clamped_mask_[i / 64] &= ~(std::uint64_t{1} << (i % 64));
     if (actuators_[i].go_to(iteration, of(i, observed), target) == ActuatorQueue::Moved::clamped) {

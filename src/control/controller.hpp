@@ -80,7 +80,7 @@ class Controller {
   Controller(const Controller&) = delete;
   Controller& operator=(const Controller&) = delete;
 
-  /// The first start or a fresh start: sets the desired block to `desired`, or to `observed` if
+  /// The first start or a fresh start: sets the desired block to `wanted`, or to `observed` if
   /// that is null. All commands end as purged (fresh_start) at iteration `row`.
   void restart(const std::byte* observed, const std::byte* wanted, Iteration row) noexcept {
     const std::byte* source = wanted != nullptr ? wanted : observed;
@@ -192,7 +192,7 @@ class Controller {
     const auto behind = std::ranges::upper_bound(offsets_, offset);
     if (behind == offsets_.begin()) return 0.0;
     const auto i = static_cast<std::size_t>(behind - offsets_.begin()) - 1;
-    if (!has(active_mask_, i)) return 0.0;
+    if (!masked(active_mask_.data(), i)) return 0.0;
     return actuators_[i].difference(offset - offsets_[i], order);
   }
   /// Number of 64-bit words of a mask.
@@ -256,9 +256,6 @@ class Controller {
 
   /// One bit for each actuator.
   using Mask = std::vector<std::uint64_t>;
-  static bool has(const Mask& mask, std::size_t i) noexcept {
-    return (mask[i / 64] >> (i % 64) & 1) != 0;
-  }
   static void set(Mask& mask, std::size_t i) noexcept {
     mask[i / 64] |= std::uint64_t{1} << (i % 64);
   }

@@ -122,8 +122,7 @@ void FastestMotion::mix(double lowest) noexcept {
   mixed_ = true;
   cruise_ = lowest;
   nearer_ = stop_after(0);
-  const double size = start_acceleration_ < 0.0 ? -start_acceleration_ : 0.0;
-  auto most = size > 0.0 ? static_cast<std::int64_t>(size / rates_.jerk) : std::int64_t{0};
+  auto most = static_cast<std::int64_t>(std::max(0.0, -start_acceleration_) / rates_.jerk);
   farther_ = stop_after(most);
   cruises_ = farther_.distance <= distance_;
   if (cruises_) {

@@ -87,11 +87,7 @@ class Motion {
   /// Where the robot is: before step() or brake().
   void observe(const std::byte* observed) noexcept {
     if (!has_integrals_) return;
-    for (Number& each : numbers_) {
-      if (const IntegralBound* moved = each.motion.integral()) {
-        each.motion.observe(layout_.number(moved->number(), observed));
-      }
-    }
+    for (Number& each : numbers_) each.motion.observe(layout_, observed);
   }
   /// One iteration of the motion; the limit that changed it, if any.
   Limited step(Iteration now, std::byte* state) noexcept;
@@ -117,12 +113,9 @@ class Motion {
   }
   /// The limit because of which plan() took more iterations than asked.
   Limited slowest() const noexcept { return slowest_; }
-  /// The command has ended, at its target if it is complete().
-  void end() noexcept {
-    for (Number& each : numbers_) each.motion.end();
-  }
-  void complete() noexcept {
-    for (Number& each : numbers_) each.motion.end(each.is_commanded);
+  /// The command has ended, at its target if that is `arrived`.
+  void end(bool arrived = false) noexcept {
+    for (Number& each : numbers_) each.motion.end(arrived && each.is_commanded);
   }
 
   /// Sets all numbers to this state, at rest.
@@ -144,12 +137,9 @@ class Motion {
   /// One iteration of braking. Numbers with a rest value go to it, unless they are held; if it
   /// `follows`, the others are at `state`, the observed one. True while a number moves.
   bool brake(std::byte* state, bool follows) noexcept;
-  /// Holds the commanded numbers that have a rest value where they are, until release().
-  void hold() noexcept {
-    for (Number& each : numbers_) each.motion.hold(each.is_commanded);
-  }
-  void release() noexcept {
-    for (Number& each : numbers_) each.motion.hold(false);
+  /// Holds the commanded numbers that have a rest value where they are, until hold(false).
+  void hold(bool holds) noexcept {
+    for (Number& each : numbers_) each.motion.hold(holds && each.is_commanded);
   }
   /// True if a number is held away from its rest value.
   bool holds() const noexcept {

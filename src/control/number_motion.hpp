@@ -8,6 +8,7 @@
 #include "control/integral_bound.hpp"
 #include "control/number_limiter.hpp"
 #include "control/number_plan.hpp"
+#include "control/state_layout.hpp"
 
 namespace o80 {
 
@@ -22,10 +23,10 @@ class NumberMotion {
                std::unique_ptr<IntegralBound> integral = nullptr) noexcept
       : guard_(guard), rest_(rest), integral_(std::move(integral)) {}
 
-  /// The number of the observed state that it moves, if that has bounds.
-  const IntegralBound* integral() const noexcept { return integral_.get(); }
-  /// Where that is: before each step() or brake().
-  void observe(double position) noexcept { integral_->observe(position); }
+  /// Where what it moves is: before each step() or brake().
+  void observe(const StateLayout& layout, const std::byte* observed) noexcept {
+    if (integral_) integral_->observe(layout.number(integral_->number(), observed));
+  }
   /// True if these bounds have changed its motion since begin().
   bool was_held_back() const noexcept { return held_back_; }
   /// True if they hold it back in this iteration, and it stands.
