@@ -74,8 +74,7 @@ class ActuatorQueue {
     if (mode == Mode::overwrite) carry_.reset();
     motion_.hold(false);
   }
-  /// Then, in each iteration: goes to the next one, as a direct command would. The last one stays
-  /// in force.
+  /// Then, in each iteration: goes to the next one, like a direct command. The last stays in force.
   Moved go_to(Iteration iteration, const std::byte* observed, const std::byte* target) noexcept;
   /// True if a direct value keeps a number away from its rest value.
   bool holds() const noexcept { return motion_.holds(); }
@@ -125,8 +124,7 @@ class ActuatorQueue {
     alone,   // a command that may give way to its successor: taken out of the queue
     given    // a given target, without a record
   };
-  /// What a direct command, or a given target, is, besides its mask and its target: an equal one
-  /// behind it changes nothing.
+  /// A direct command or a given target, besides its mask and target: an equal one changes nothing.
   struct SetPoint {
     Profile profile = Profile::linear;
     Start start = Start::desired;
@@ -139,8 +137,7 @@ class ActuatorQueue {
     return has_record() && ledger_->lane_of(record_) == lane;
   }
   bool may_give_way() const noexcept { return runs_ == Runs::alone || runs_ == Runs::given; }
-  /// A set-point gives way to the next direct command. A trajectory whose rows have ended gives way
-  /// to any.
+  /// A set-point gives way to a direct command, a trajectory whose rows have ended to any command.
   bool gives_way_to(const RecordHead& next) const noexcept {
     return pace_ != Pace::direct || next.pace == Pace::direct;
   }

@@ -175,8 +175,7 @@ struct BatchPlanner::Lane : Batch {
     head.own = {kNoBlock, batch, last, kNoBlock};
   }
 
-  /// Adds a record of the batch; makes of it and what follows one invalid record of so many blocks,
-  /// if it is invalid.
+  /// Adds a record of the batch. If it is invalid, so many blocks become one invalid record.
   void put(BlockIndex record, std::uint32_t invalid_blocks) noexcept {
     RecordHead& head = pool.head(record);
     if (invalid_blocks > 0) {

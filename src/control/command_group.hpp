@@ -52,8 +52,7 @@ class CommandGroups {
     const auto members = static_cast<std::uint16_t>(std::exchange(pool_->head(head).rows, 0));
     at(head) = {.open = members};
   }
-  /// Notes that a member is the next command of its queue. All queues call it before any calls
-  /// is_complete().
+  /// Notes that a member is next in its queue. All queues call it before any calls is_complete().
   void arrive(const RecordHead& member, Iteration iteration) noexcept {
     const BlockIndex head = head_of(member);
     CommandGroup& group = at(head);
@@ -81,8 +80,7 @@ class CommandGroups {
     group.offered = static_cast<std::uint8_t>(kind) & 3U;
     stamp(head, kOffers) = low(iteration);
   }
-  /// Notes by how much a member was late, if their times are decided: `rows` of the head keeps the
-  /// most.
+  /// Notes by how much a member was late, if their times are decided; `rows` of the head has it.
   void note_late(BlockIndex head, std::int64_t late) noexcept {
     std::uint32_t& most = pool_->head(head).rows;
     if (at(head).decided == 0 || late <= most) return;

@@ -178,8 +178,7 @@ void Controller::take_step(const Taking& from, BlockIndex record, BatchHandler& 
   }
 }
 
-/// Appends a list of commands to the queue of its actuator, unless a purge or their own batch has
-/// ended them.
+/// Appends a list of commands to its queue, unless a purge or their own batch has ended them.
 void Controller::take_commands(const Taking& from, BlockIndex first, Iteration iteration) noexcept {
   const RecordHead& head = pool_.head(first);
   if (purge_tickets_.cover(from.lane, head.actuator, from.ticket)) {

@@ -105,8 +105,7 @@ class Controller {
   /// The cost of taking a checked batch.
   Effort effort(BlockIndex batch) const noexcept { return planner_.effort(batch); }
   /// Takes a whole batch at `handler.iteration()`. This overwrites the batch record in the pool:
-  /// copy `burst` and `flags` before. A purge also ends commands with lower tickets that are taken
-  /// later.
+  /// copy `burst` and `flags` before. A purge also ends later commands with lower tickets.
   void take(std::uint32_t lane, BlockIndex batch, BatchHandler& handler) noexcept;
   /// Rejects a whole batch instead of taking it. finish_pending() ends its records with `status`.
   void reject(std::uint32_t lane, BlockIndex batch, Reason reason, std::uint8_t detail,
@@ -126,8 +125,7 @@ class Controller {
                                [&](std::uint32_t i) { return actuators_[i].has_no_command(); });
   }
   /// Gives targets to the next iterations, as if a batch with a trajectory for each actuator were
-  /// taken in iteration `targets.first`. Their memory must outlive those iterations, or
-  /// take_back().
+  /// taken in iteration `targets.first`. Their memory must outlive these iterations or take_back().
   void give(const DirectTargets& targets) noexcept {
     given_ = targets;
     was_given_ = false;
@@ -141,8 +139,7 @@ class Controller {
   void purge(std::uint32_t actuator, Iteration iteration, Reason reason = Reason::none) noexcept {
     drop(actuator, {Status::purged, reason}, iteration);
   }
-  /// Ends the commands that one lane has sent to an actuator, or to kEveryActuator; O(lanes) for
-  /// each actuator.
+  /// Ends the commands of one lane for an actuator or kEveryActuator; O(lanes) for each actuator.
   void purge_lane(std::uint32_t lane, std::uint32_t actuator, Iteration iteration,
                   Reason reason = Reason::none) noexcept {
     each(actuator, [&](std::uint32_t i) {
@@ -204,8 +201,7 @@ class Controller {
   }
   /// True if a direct value keeps a number away from its rest value; O(actuators).
   bool holds() const noexcept { return any(&ActuatorQueue::holds); }
-  /// True if a command of this lane is running or queued, or its direct value is still held;
-  /// O(actuators).
+  /// True if a command of this lane runs or waits, or its direct value is held; O(actuators).
   bool acts(std::uint32_t lane) const noexcept {
     return any([&](const ActuatorQueue& queue) { return queue.acts(lane); });
   }
@@ -241,8 +237,7 @@ class Controller {
   bool any(Predicate predicate) const noexcept {
     return std::ranges::any_of(actuators_, predicate);
   }
-  /// Calls `visit(index)` for one actuator or kEveryActuator, drops commands of it, and marks it as
-  /// busy.
+  /// Calls `visit(index)`, which drops commands, for one actuator or kEveryActuator: now busy.
   template <class Visit>
   void each(std::uint32_t actuator, Visit&& visit) noexcept {
     const auto last = static_cast<std::uint32_t>(actuators_.size());

@@ -19,8 +19,7 @@ class DurationCarry {
     carry_ += duration - std::max<std::int64_t>(1, rounded) * period_;
     return std::max<std::int64_t>(1, rounded);
   }
-  /// True if the duration ends before the next iteration. It is then added to the carry and takes
-  /// no iteration.
+  /// True if the duration ends before the next iteration: it joins the carry, without an iteration.
   bool pass(std::int64_t duration) noexcept {
     if (whole(duration) >= 1) return false;
     carry_ += duration;

@@ -22,8 +22,7 @@ class FastestMotion {
 
   /// Number of iterations until it rests at the target, at least 1.
   std::int64_t iterations() const noexcept { return iterations_; }
-  /// Stretches the motion to `iterations`. No effect if that is shorter, or if the motion is only a
-  /// stop.
+  /// Stretches the motion to `iterations`, unless that is shorter or the motion is only a stop.
   void stretch(std::int64_t iterations) noexcept;
   /// The position in the next iteration; from the last iteration on the exact target.
   double next() noexcept;

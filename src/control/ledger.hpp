@@ -33,8 +33,7 @@ class Ledger {
 
   /// Number of commands of several actuators that were taken and have not ended.
   std::uint32_t open_groups() const noexcept { return open_groups_; }
-  /// Number of those whose members still have to agree on their begin, or on the iterations of a
-  /// waypoint.
+  /// Those whose members still have to agree on their begin or the iterations of a waypoint.
   std::uint32_t undecided_groups() const noexcept { return undecided_groups_; }
   CommandGroups& groups() noexcept { return groups_; }
 
@@ -45,8 +44,7 @@ class Ledger {
              std::uint32_t missing_from, std::uint32_t groups, Iteration iteration) noexcept;
   /// Call it after the last step of the batch.
   void close(BlockIndex batch, Iteration iteration) noexcept { ended(batch, iteration); }
-  /// Rejects a whole batch that was not taken; report_ends() reports its records with the status of
-  /// `outcome`.
+  /// Rejects a whole batch that was not taken; its records get the status of `outcome`.
   void reject(std::uint32_t lane, BlockIndex batch, const Outcome& outcome,
               Iteration iteration) noexcept;
 

@@ -74,8 +74,7 @@ class CommandCheck {
   /// Checks one or several targets, one state after the other.
   void targets(std::uint32_t actuator, std::span<const std::byte> states,
                std::span<const std::uint64_t> mask = {}) const;
-  /// True if targets() admits all targets of these actuators: for each `steps` states, one actuator
-  /// after the other.
+  /// True if targets() admits `steps` states for each of these actuators, one after the other.
   bool admits(std::span<const std::uint32_t> actuators, std::uint32_t steps,
               const std::byte* states) const noexcept;
   /// Checks a direct target: in real time without a watchdog, it must not move a number away from

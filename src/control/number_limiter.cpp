@@ -155,8 +155,8 @@ Limit NumberLimiter::follow_with_jerk(double step, double lag) noexcept {
                             : goal(step, lag, allowed));
 }
 
-/// Takes the acceleration nearest to `best` that the limits allow; the stop from the last state is
-/// always possible.
+/// Takes the allowed acceleration nearest to `best`. The stop from the last state always is
+/// allowed.
 Limit NumberLimiter::accelerate(double best) noexcept {
   know_stop();
   Candidate next = candidate(best);

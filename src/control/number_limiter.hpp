@@ -68,8 +68,7 @@ class NumberLimiter {
     now_.speed = now_.acceleration = 0.0;
     stop_known_ = false;
   }
-  /// A motion begins at the present position. Whatever it follows, it stays inside the bounds and
-  /// inside `span`.
+  /// A motion begins here. Whatever it follows, it stays inside the bounds and inside `span`.
   void begin(const Span& span) noexcept {
     wanted_ = now_.position;
     scale_ = std::abs(now_.position);

@@ -58,8 +58,8 @@ void NumberMotion::settle(std::int64_t iterations) noexcept {
   plan_.settle(iterations);
 }
 
-/// One iteration by `move`, as far as the bounds of the integral allow; returns the one that does
-/// not.
+/// One iteration by `move`, as far as the bounds of the integral allow; returns that which stops
+/// it.
 template <class Move>
 Limit NumberMotion::move(Move&& move) noexcept {
   const double before = guard_.position();

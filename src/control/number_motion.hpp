@@ -17,8 +17,7 @@ namespace o80 {
 /// Realtime: yes.
 class NumberMotion {
  public:
-  /// `rest`: the value that it goes to without a command, if it has one. `integral`: bounds of what
-  /// it moves, if any.
+  /// `rest`: its value without a command, if any. `integral`: bounds of what it moves, if any.
   NumberMotion(const NumberLimiter& guard, std::optional<double> rest,
                std::unique_ptr<IntegralBound> integral = nullptr) noexcept
       : guard_(guard), rest_(rest), integral_(std::move(integral)) {}
@@ -66,8 +65,7 @@ class NumberMotion {
   std::int64_t propose(const Asked& asked) noexcept;
   /// Then plans it for `iterations`, at least those.
   void settle(std::int64_t iterations) noexcept;
-  /// A straight line to the next row of a trajectory, which is followed; line_for() sets its
-  /// length.
+  /// A straight line to the next row of a trajectory, to be followed; line_for() sets its length.
   void line(double start, double target) noexcept {
     if (!planned_) {
       Span stop = guard_.stop();
@@ -90,8 +88,7 @@ class NumberMotion {
     if (follows_) guard_.widen(position);
   }
 
-  /// One iteration of the plan; returns the limit that changed it. `low`, `high`: range of its
-  /// kind.
+  /// One iteration of the plan, in the range of its kind; returns the limit that changed it.
   Limit step(double low, double high) noexcept;
   /// True if nothing of the plan, which is over, is left to follow.
   bool arrived() const noexcept {
@@ -100,8 +97,7 @@ class NumberMotion {
   bool follows() const noexcept { return follows_; }
   /// The plan ends, at its target if that is `arrived`: what follows is another command, or none.
   void end(bool arrived = false) noexcept;
-  /// One iteration without a command: towards rest, as fast as the limits allow. True while it
-  /// moves.
+  /// One iteration without a command: to rest, as fast as the limits allow. True while it moves.
   bool brake() noexcept;
 
   bool has_rest() const noexcept { return rest_.has_value(); }
@@ -139,8 +135,7 @@ class NumberMotion {
   bool jumps_at_once_ = false;  // propose() needed no plan
   Asked asked_;                 // then
   bool jumps_ = false;          // the plan begins at its start
-  // a stop from where it was would leave the bounds: goes on with the former plan until it would
-  // not
+  // goes on with the former plan, until a stop would stay inside the bounds
   bool leaves_ = false;
   NumberPlan former_;
   double former_target_ = 0.0;

@@ -21,8 +21,7 @@ class PurgeTickets {
         actuators_(actuators),
         highest_((lanes + 1) * (std::size_t{actuators} + 1)) {}
 
-  /// Stores the ticket of a purge of the commands of one lane or of kEveryLane, for one actuator or
-  /// for kEveryActuator.
+  /// Stores the ticket of a purge: of one lane or kEveryLane, of one actuator or kEveryActuator.
   void raise(std::uint32_t lane, std::uint32_t actuator, std::uint64_t ticket) noexcept {
     std::uint64_t& highest = highest_[index(lane, actuator)];
     highest = std::max(highest, ticket);

@@ -63,8 +63,7 @@ class VelocityChange {
   double time() const noexcept { return static_cast<double>(steps_) - (crest_ ? 0.0 : share_); }
   /// The acceleration of iteration i, 1 to `steps()`; 0 after.
   double acceleration(std::int64_t i) const noexcept;
-  /// Displacement within steps() minus that of the final speed: the sum over i of
-  /// v(i) - v(steps).
+  /// Displacement within steps() minus that of the final speed: the sum of v(i) - v(steps).
   double displacement() const noexcept { return displacement_; }
   /// Largest change of the speed away from its target, in the direction of the present
   /// acceleration, signed; 0 if there is none.
@@ -81,8 +80,7 @@ class VelocityChange {
 
   void plan_without_jerk(double change) noexcept;
   void plan_with_jerk(double change) noexcept;
-  /// The acceleration of iteration i on the deepest trapezoid from `start` that ends at 0 after so
-  /// many steps.
+  /// Acceleration of iteration i on the deepest trapezoid from `start` to 0 in so many steps.
   double trough(double start, double i, double steps) const noexcept {
     return i >= steps ? 0.0 : std::max({-acceleration_, start - i * jerk_, -(steps - i) * jerk_});
   }
