@@ -125,16 +125,16 @@ void ActuatorQueue::end_running(Iteration iteration) noexcept {
 /// Rejects commands whose `until` has passed; false if no command is left to begin.
 bool ActuatorQueue::end_late(Iteration iteration, std::uint32_t& late_budget) noexcept {
   while (!queue_.empty()) {
-    const RecordHead& late = pool_->head(queue_.front());
-    if (late.pace != Pace::until || late.amount >= iteration) break;
+    const BlockIndex record = queue_.front();
+    const RecordHead& late = pool_->head(record);
+    if (late.pace != Pace::until || late.amount >= iteration) return true;
     if (late_budget == 0) return false;
     --late_budget;
     carry_.reset();
-    const BlockIndex record = queue_.front();
     queue_.pop();
     ledger_->end(record, {Status::rejected, Reason::late}, iteration);
   }
-  return !queue_.empty();
+  return false;
 }
 
 void ActuatorQueue::begin_command(const std::byte* observed) noexcept {

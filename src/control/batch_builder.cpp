@@ -45,7 +45,7 @@ std::uint32_t BatchBuilder::group(std::span<const Member> members,
   add(head);
   try {
     for (const Member& member : members) {
-      add_command(member.head, RecordKind::member, member.mask, times, rows, member.states);
+      add_command(member, RecordKind::member, times, rows);
     }
   } catch (...) {
     // remove the incomplete group
@@ -57,11 +57,11 @@ std::uint32_t BatchBuilder::group(std::span<const Member> members,
   return records_ - 1;
 }
 
-void BatchBuilder::add_command(RecordHead head, RecordKind kind,
-                               std::span<const std::uint64_t> mask,
-                               std::span<const std::int64_t> times, std::uint32_t rows,
-                               std::span<const std::byte> states) {
-  assert(times.empty() || (times.size() == rows && head.pace == Pace::duration));
+void BatchBuilder::add_command(const Member& member, RecordKind kind,
+                               std::span<const std::int64_t> times, std::uint32_t rows) {
+  const auto& [of, mask, states] = member;
+  assert(times.empty() || (times.size() == rows && of.pace == Pace::duration));
+  RecordHead head = of;
   head.kind = kind;
   head.masked = mask.empty() ? 0 : 1;
   head.rows = rows;

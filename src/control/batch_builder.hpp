@@ -18,13 +18,19 @@ class BatchBuilder {
  public:
   BatchBuilder() : blocks_(1) {}
 
+  struct Member {
+    RecordHead head;
+    std::span<const std::uint64_t> mask;
+    std::span<const std::byte> states;
+  };
+
   /// Adds a command. `head` has actuator, mode, pace, profile, start and amount. `mask` is empty or
   /// has one bit for each number of the state. `times` is empty or has one end time for each row
   /// [ns]. `states` holds `rows` states.
   std::uint32_t command(const RecordHead& head, std::span<const std::uint64_t> mask,
                         std::span<const std::int64_t> times, std::uint32_t rows,
                         std::span<const std::byte> states) {
-    add_command(head, RecordKind::command, mask, times, rows, states);
+    add_command({head, mask, states}, RecordKind::command, times, rows);
     return records_ - 1;
   }
   std::uint32_t command(const RecordHead& head, std::span<const std::byte> state) {
@@ -32,11 +38,6 @@ class BatchBuilder {
   }
   /// Adds one command for several actuators. The heads (as above) differ only in the actuator;
   /// `times` and `rows` apply to each member.
-  struct Member {
-    RecordHead head;
-    std::span<const std::uint64_t> mask;
-    std::span<const std::byte> states;
-  };
   std::uint32_t group(std::span<const Member> members, std::span<const std::int64_t> times = {},
                       std::uint32_t rows = 1);
   std::uint32_t purge(std::uint16_t actuator_or_every) {
@@ -90,9 +91,8 @@ class BatchBuilder {
   }
   std::byte* open(const RecordHead& head, std::uint64_t payload_bytes);
   std::uint32_t add(const RecordHead& head, std::span<const std::byte> payload = {});
-  void add_command(RecordHead head, RecordKind kind, std::span<const std::uint64_t> mask,
-                   std::span<const std::int64_t> times, std::uint32_t rows,
-                   std::span<const std::byte> states);
+  void add_command(const Member& member, RecordKind kind, std::span<const std::int64_t> times,
+                   std::uint32_t rows);
   std::uint32_t of(RecordKind kind) const noexcept {
     return counts_[static_cast<std::size_t>(kind)];
   }

@@ -76,8 +76,7 @@ struct BatchPlanner::Lane : Batch {
   std::uint32_t budget = 0;
   // the present part
   std::uint64_t epoch = 0;
-  enum class End : std::uint8_t { invalid, overwritten, purged, completed };
-  std::array<BlockIndex, 4> ends{};   // for each End the first record of its list
+  std::array<BlockIndex, 4> ends{};   // first records of the lists with an end status
   Done all;                           // effect on every queue
   std::vector<std::uint16_t> listed;  // actuators with a list
   std::vector<Target> targets;        // one for each actuator
@@ -264,7 +263,7 @@ struct BatchPlanner::Lane : Batch {
         return add_step(record, kStepWork);
       default:
         plan.effort.express = 0;
-        add_to_end(End::invalid, record);
+        add_to_end(RecordKind::invalid_list, record);
     }
   }
 
@@ -278,7 +277,7 @@ struct BatchPlanner::Lane : Batch {
       to.list_is_step = false;
       return;
     }
-    drop_list(to, End::overwritten);
+    drop_list(to, RecordKind::overwritten_list);
     to.list = record;
     to.list_is_step = !to.done.empty;
     if (to.list_is_step) add_step(record, kStepWork);
@@ -290,7 +289,7 @@ struct BatchPlanner::Lane : Batch {
     const bool own = head.only_own != 0;
     const bool every = head.actuator == kEveryActuator;
     if (!(every ? purge_all(own) : purge_one(head.actuator, own))) {
-      return add_to_end(End::completed, record);
+      return add_to_end(RecordKind::completed_list, record);
     }
     add_step(record, kStepWork + (every ? static_cast<std::uint32_t>(targets.size()) : 0));
   }
@@ -298,7 +297,7 @@ struct BatchPlanner::Lane : Batch {
   /// True if the purge affects the queue, besides dropping commands that this part would append.
   bool purge_one(std::uint32_t actuator, bool own) noexcept {
     Target& to = target(actuator);
-    drop_list(to, End::purged);
+    drop_list(to, RecordKind::purged_list);
     const Done before = to.done;
     if (!own) {
       to.done = {.empty = true, .empty_own = true, .at_rest = true, .purged = true};
@@ -344,22 +343,20 @@ struct BatchPlanner::Lane : Batch {
     ends.fill(kNoBlock);
   }
 
-  void drop_list(Target& to, End end) noexcept {
+  void drop_list(Target& to, RecordKind end) noexcept {
     const BlockIndex list = std::exchange(to.list, kNoBlock);
     if (list == kNoBlock) return;
     if (!to.list_is_step) return add_to_end(end, list);
-    pool.head(list).kind = end == End::overwritten ? RecordKind::overwriter_overwritten
-                                                   : RecordKind::overwriter_purged;
+    pool.head(list).kind = end == RecordKind::overwritten_list ? RecordKind::overwriter_overwritten
+                                                               : RecordKind::overwriter_purged;
   }
 
-  void add_to_end(End end, BlockIndex list) noexcept {
-    constexpr std::array<RecordKind, 4> kKinds = {
-        RecordKind::invalid_list, RecordKind::overwritten_list, RecordKind::purged_list,
-        RecordKind::completed_list};
-    BlockIndex& first = ends[static_cast<std::size_t>(end)];
+  void add_to_end(RecordKind end, BlockIndex list) noexcept {
+    constexpr auto kFirst = static_cast<std::size_t>(RecordKind::overwritten_list);
+    BlockIndex& first = ends[static_cast<std::size_t>(end) - kFirst];
     if (first != kNoBlock) return join(first, list);
     first = list;
-    pool.head(list).kind = kKinds[static_cast<std::size_t>(end)];
+    pool.head(list).kind = end;
     add_step(list, kStepWork);
   }
 

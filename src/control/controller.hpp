@@ -78,7 +78,6 @@ class Controller {
 
   Controller(const Schema& schema, BlockPool& pool, StatusSink& sink, std::uint32_t lanes = 8);
   Controller(const Controller&) = delete;
-  Controller& operator=(const Controller&) = delete;
 
   /// The first start or a fresh start: sets the desired block to `wanted`, or to `observed` if
   /// that is null. All commands end as purged (fresh_start) at iteration `row`.

@@ -101,20 +101,6 @@ void Ledger::ended(BlockIndex block, Iteration iteration) noexcept {
   pool_.release(block, block, 1);
 }
 
-bool Ledger::tell_rejected(BlockIndex block, std::uint32_t& budget) noexcept {
-  TakenBatch& taken = batch(block);
-  const auto of =
-      taken.end == Status::rejected ? StatusChange::Of::of_rejected : StatusChange::Of::record;
-  while (taken.told < taken.records && budget > 0) {
-    tell(taken.lane, record_id(taken.id, taken.told), {taken.told_as, taken.reason, taken.detail},
-         taken.taken_at, of);
-    ++taken.told;
-    --taken.open;
-    --budget;
-  }
-  return taken.told == taken.records;
-}
-
 std::uint32_t Ledger::report_ends(std::uint32_t most) noexcept {
   std::uint32_t budget = most;
   while (true) {
@@ -132,11 +118,18 @@ std::uint32_t Ledger::report_ends(std::uint32_t most) noexcept {
     // the next list: records without blocks of a batch, or dropped records
     const BlockIndex group = first_;
     if (is_batch(group)) {
+      TakenBatch& taken = batch(group);
+      const auto of =
+          taken.end == Status::rejected ? StatusChange::Of::of_rejected : StatusChange::Of::record;
+      for (; taken.told < taken.records && budget > 0; ++taken.told, --taken.open, --budget) {
+        tell(taken.lane, record_id(taken.id, taken.told),
+             {taken.told_as, taken.reason, taken.detail}, taken.taken_at, of);
+      }
       // keeps the batch open until all are reported
-      if (!tell_rejected(group, budget)) return most - budget;
+      if (taken.told < taken.records) return most;
       first_ = link(group);
-      ++batch(group).open;
-      ended(group, batch(group).taken_at);
+      ++taken.open;
+      ended(group, taken.taken_at);
     } else {
       first_ = link(group);
       const RecordHead& head = pool_.head(group);

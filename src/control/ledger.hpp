@@ -126,7 +126,6 @@ class Ledger {
     last_ = group;
   }
   void member_ended(BlockIndex group, const Outcome& outcome, Iteration iteration) noexcept;
-  bool tell_rejected(BlockIndex batch, std::uint32_t& budget) noexcept;
   void tell(std::uint32_t lane, CommandId id, const Outcome& outcome, Iteration iteration,
             StatusChange::Of of) noexcept {
     // as much of a delay as a status can tell

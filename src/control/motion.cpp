@@ -21,13 +21,10 @@ void store(std::byte* out, T value) noexcept {
 
 template <class T, class Real>
 T to_integer(Real value) noexcept {
+  using Range = std::numeric_limits<T>;
   const Real rounded = std::round(value);
-  if (!(rounded > static_cast<Real>(std::numeric_limits<T>::min()))) {
-    return std::numeric_limits<T>::min();
-  }
-  if (!(rounded < static_cast<Real>(std::numeric_limits<T>::max()))) {
-    return std::numeric_limits<T>::max();
-  }
+  if (!(rounded > static_cast<Real>(Range::min()))) return Range::min();
+  if (!(rounded < static_cast<Real>(Range::max()))) return Range::max();
   return static_cast<T>(rounded);
 }
 

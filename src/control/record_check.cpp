@@ -6,11 +6,6 @@
 namespace o80 {
 namespace {
 
-bool known_enums(const RecordHead& head) noexcept {
-  return head.mode <= Mode::overwrite && head.pace <= Pace::fastest &&
-         head.profile <= Profile::as_sent && head.start <= Start::observed && head.masked <= 1;
-}
-
 bool sane_pace(const RecordHead& head) noexcept {
   switch (head.pace) {
     case Pace::fastest:
@@ -73,8 +68,11 @@ RecordCheck::Verdict RecordCheck::begin(const BlockPool& pool, BlockIndex block,
 RecordCheck::Verdict RecordCheck::begin_command(const RecordHead& head,
                                                 Progress& progress) noexcept {
   const bool as_sent = head.profile == Profile::as_sent;
-  if (head.actuator >= targets_.actuators() || head.rows == 0 || !known_enums(head) ||
-      !sane_pace(head) || (as_sent && (head.pace != Pace::direct || head.rows > 1))) {
+  const bool is_known = head.mode <= Mode::overwrite && head.pace <= Pace::fastest &&
+                        head.profile <= Profile::as_sent && head.start <= Start::observed &&
+                        head.masked <= 1;
+  if (head.actuator >= targets_.actuators() || head.rows == 0 || !is_known || !sane_pace(head) ||
+      (as_sent && (head.pace != Pace::direct || head.rows > 1))) {
     return Verdict::invalid;
   }
   const StateLayout& layout = targets_.layout(head.actuator);

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "control/visit_block.hpp"
-
 namespace o80 {
 namespace {
 
