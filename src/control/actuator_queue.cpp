@@ -175,18 +175,6 @@ void ActuatorQueue::begin_command(const std::byte* observed) noexcept {
   if (head.start == Start::observed) motion_.start_at(observed);
 }
 
-void ActuatorQueue::arrive(Iteration iteration, std::uint32_t& late_budget) noexcept {
-  if (runs_ == Runs::queued || !end_late(iteration, late_budget)) return;
-  const RecordHead* head = next_member();
-  // a running set-point counts as having reached a direct command
-  if (head == nullptr || (runs_ != Runs::nothing && !gives_way_to(*head))) return;
-  ledger_->groups().arrive(*head, iteration);
-  // all members use the largest rounding carry
-  if (head->pace == Pace::duration) {
-    ledger_->groups().offer(*head, CommandGroups::Offer::carry, iteration, carry_.carried());
-  }
-}
-
 void ActuatorQueue::plan_with_others(Iteration iteration, const std::byte* observed) noexcept {
   const RecordHead* head = next_member();
   // set-points of each iteration go each by itself

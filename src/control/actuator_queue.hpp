@@ -49,7 +49,17 @@ class ActuatorQueue {
   }
   /// For commands of several actuators (ARCHITECTURE.md, Commands of several actuators); called for
   /// all queues before any step(). Reports that the next command is a member of a group.
-  void arrive(Iteration iteration, std::uint32_t& late_budget) noexcept;
+  void arrive(Iteration iteration, std::uint32_t& late_budget) noexcept {
+    if (runs_ == Runs::queued || !end_late(iteration, late_budget)) return;
+    const RecordHead* head = next_member();
+    // a running set-point counts as having reached a direct command
+    if (head == nullptr || (runs_ != Runs::nothing && !gives_way_to(*head))) return;
+    ledger_->groups().arrive(*head, iteration);
+    // all members use the largest rounding carry
+    if (head->pace == Pace::duration) {
+      ledger_->groups().offer(*head, CommandGroups::Offer::carry, iteration, carry_.carried());
+    }
+  }
   /// Then, if all members have arrived: takes the largest carry of durations.
   void agree_on_carry(Iteration iteration) noexcept {
     const RecordHead* head = next_member();

@@ -36,8 +36,7 @@ class BatchBuilder {
   std::uint32_t command(const RecordHead& head, std::span<const std::byte> state) {
     return command(head, {}, {}, 1, state);
   }
-  /// Adds one command for several actuators. The heads (as above) differ only in the actuator;
-  /// `times` and `rows` apply to each member.
+  /// Adds one command for several actuators, whose heads (as above) differ only in the actuator.
   std::uint32_t group(std::span<const Member> members, std::span<const std::int64_t> times = {},
                       std::uint32_t rows = 1);
   std::uint32_t purge(std::uint16_t actuator_or_every) {

@@ -188,8 +188,7 @@ struct BatchPlanner::Lane : Batch {
     ++place;
   }
 
-  /// True if the record exceeds the limits of a batch. pulse() refuses such a batch, but a frontend
-  /// can write its lane directly.
+  /// True beyond the limits of a batch: pulse() refuses it, but a lane can be written directly.
   bool is_one_too_many(const RecordHead& head) noexcept {
     using enum RecordKind;
     const bool is_request = head.kind == request || head.kind == resume;

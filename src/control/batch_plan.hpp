@@ -4,7 +4,6 @@
 #include <optional>
 #include <vector>
 
-#include "control/command_group.hpp"
 #include "control/ledger.hpp"
 #include "control/pool.hpp"
 #include "control/record.hpp"
@@ -49,8 +48,7 @@ class BatchPlanner {
   BatchPlanner(const BatchPlanner&) = delete;
   ~BatchPlanner();
 
-  /// Continues the check of a batch for about `budget` blocks, and reduces `budget` by them. True
-  /// when the whole batch is checked.
+  /// Checks about `budget` more blocks, and reduces `budget` by them. True when all are checked.
   bool check(std::uint32_t lane, BlockIndex batch, std::uint32_t& budget) noexcept;
   /// The cost of taking a checked batch.
   Effort effort(BlockIndex batch) const noexcept;

@@ -92,8 +92,7 @@ class CommandGroups {
   }
 
  private:
-  // words of RecordHead::own for iterations (low 32 bits). They are unused in a group record,
-  // because it is in no queue.
+  // words of RecordHead::own for iterations (low 32 bits); a group record is in no queue
   static constexpr std::size_t kArrivals = 0;
   static constexpr std::size_t kOffers = 3;
 

@@ -15,9 +15,9 @@ class DurationCarry {
 
   /// Number of iterations of the next duration [ns], at least 1.
   std::int64_t iterations(std::int64_t duration) noexcept {
-    const std::int64_t rounded = whole(duration);
-    carry_ += duration - std::max<std::int64_t>(1, rounded) * period_;
-    return std::max<std::int64_t>(1, rounded);
+    const std::int64_t rounded = std::max<std::int64_t>(1, whole(duration));
+    carry_ += duration - rounded * period_;
+    return rounded;
   }
   /// True if the duration ends before the next iteration: it joins the carry, without an iteration.
   bool pass(std::int64_t duration) noexcept {

@@ -173,11 +173,9 @@ void FastestMotion::stretch(std::int64_t iterations) noexcept {
 double FastestMotion::next() noexcept {
   ++done_;
   if (done_ >= iterations_) return target_;
-  double acceleration = farther_.acceleration(done_);
-  if (cruises_) {
-    acceleration =
-        done_ <= before_ ? to_cruise_.acceleration(done_) : to_rest_.acceleration(done_ - before_);
-  }
+  double acceleration = !cruises_          ? farther_.acceleration(done_)
+                        : done_ <= before_ ? to_cruise_.acceleration(done_)
+                                           : to_rest_.acceleration(done_ - before_);
   if (mixed_) {
     acceleration = (1.0 - share_) * acceleration + share_ * nearer_.acceleration(done_);
   }

@@ -43,8 +43,7 @@ class FastestMotion {
 
   Stop stop_after(std::int64_t eased) const noexcept;
   void mix(double lowest) noexcept;
-  /// Distance of a motion that slows down from the speed `cruise` after `before` iterations, or as
-  /// soon as it has that speed.
+  /// Distance of a motion that slows down from `cruise` after `before` iterations, or at once.
   double distance(double cruise, std::optional<double> before) const noexcept {
     const VelocityChange to_cruise(cruise - start_speed_, start_acceleration_, rates_);
     const VelocityChange to_rest(-cruise, 0.0, rates_);

@@ -25,8 +25,7 @@ struct Own {
 
 /// Tracks taken batches: reports each end status exactly once, and returns the blocks to the pool.
 ///
-/// Realtime: everything but construction. drop() is O(1); report_ends() reports the statuses in
-/// bounded portions.
+/// Realtime: everything but construction. drop() is O(1), report_ends() goes in bounded portions.
 class Ledger {
  public:
   Ledger(BlockPool& pool, StatusSink& sink) : pool_(pool), sink_(sink), groups_(pool) {}
@@ -38,8 +37,7 @@ class Ledger {
   CommandGroups& groups() noexcept { return groups_; }
 
   /// Enters a batch as taken. It ends after close() and the end of all its records. `spare`: its
-  /// unused blocks. The records from index `missing_from` on, which have no blocks, are rejected;
-  /// reported by report_ends().
+  /// unused blocks. Records from index `missing_from` on have none: report_ends() rejects them.
   void enter(std::uint32_t lane, BlockIndex batch, const BlockChain& spare,
              std::uint32_t missing_from, std::uint32_t groups, Iteration iteration) noexcept;
   /// Call it after the last step of the batch.

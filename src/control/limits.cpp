@@ -102,9 +102,6 @@ bool TargetLimits::admit(std::uint32_t actuator, const std::byte* state,
   return true;
 }
 
-CommandCheck::CommandCheck(const Schema& schema)
-    : schema_(schema), layouts_(layouts_of_types(schema, false)), targets_(schema, layouts_) {}
-
 std::uint32_t CommandCheck::actuator(std::string_view name) const {
   const std::vector<std::string> known = names_of(schema_.actuators);
   const auto found = std::ranges::find(known, name);
@@ -123,17 +120,6 @@ std::uint32_t CommandCheck::actuator(std::int64_t index) const {
 void CommandCheck::refuse_actuator(const std::string& which) const {
   const std::string robot = "'" + schema_.head.robot.str() + "' has no actuator";
   throw InvalidArgument(schema_.actuators.empty() ? robot + "s" : robot + " " + which);
-}
-
-bool CommandCheck::admits(std::span<const std::uint32_t> actuators, std::uint32_t steps,
-                          const std::byte* states) const noexcept {
-  for (const std::uint32_t actuator : actuators) {
-    const std::size_t size = targets_.layout(actuator).size();
-    for (std::uint32_t step = 0; step < steps; ++step, states += size) {
-      if (!targets_.admit(actuator, states, nullptr)) return false;
-    }
-  }
-  return true;
 }
 
 void CommandCheck::targets(std::uint32_t index, std::span<const std::byte> states,
@@ -163,21 +149,21 @@ void CommandCheck::refuse(std::uint32_t actuator, const std::byte* state,
   for (std::uint32_t i = 0; i < row.limits; ++i) {
     if (!masked(mask, i)) continue;
     const NumberName name = name_at(schema_, row.type, layout.numbers()[i].offset);
+    const std::string number = of_number(schema_, actuator, name);
     if (!layout.proper_number(i, state)) {
-      throw InvalidArgument("the target of " + of_number(schema_, actuator, name) +
+      throw InvalidArgument("the target of " + number +
                             " must be one of: " + labels_of(schema_, *name.field));
     }
     if (!layout.numbers()[i].moves()) continue;
     const double value = layout.number(i, state);
     const LimitRow& limit = schema_.limits[row.first_limit + i];
     if (!std::isfinite(value)) {
-      throw InvalidArgument("target " + text_of(value) + " for " +
-                            of_number(schema_, actuator, name) + " is not a finite number");
+      throw InvalidArgument("target " + text_of(value) + " for " + number +
+                            " is not a finite number");
     }
     if (value < limit.minimum || value > limit.maximum) {
-      throw InvalidArgument("target " + with_unit(text_of(value), name.field) + " for " +
-                            of_number(schema_, actuator, name) + " is outside its limits: from " +
-                            text_of(limit.minimum) + " to " +
+      throw InvalidArgument("target " + with_unit(text_of(value), name.field) + " for " + number +
+                            " is outside its limits: from " + text_of(limit.minimum) + " to " +
                             with_unit(text_of(limit.maximum), name.field));
     }
   }
@@ -191,14 +177,12 @@ void CommandCheck::direct(std::uint32_t actuator, std::span<const std::byte> sta
   const StateLayout& layout = targets_.layout(actuator);
   for (std::uint32_t i = 0; i < row.limits; ++i) {
     const LimitRow& limit = schema_.limits[row.first_limit + i];
-    if (limit.resting == 0 || !masked(bits_of(mask), i) ||
-        layout.number(i, state.data()) == limit.rest)
-      continue;
+    const double value = layout.number(i, state.data());
+    if (limit.resting == 0 || !masked(bits_of(mask), i) || value == limit.rest) continue;
     ShortText<200> name;
     name_number(schema_, actuator, i, name);
     throw InvalidArgument(
-        "a direct target of " + text_of(layout.number(i, state.data())) + " for the " +
-        std::string(name.view()) +
+        "a direct target of " + text_of(value) + " for the " + std::string(name.view()) +
         " would stay if this program hung: start the backend with a watchdog (--silence N, with "
         "--stale purge, halt or stop), or give the command a duration, a speed or iterations");
   }

@@ -56,11 +56,11 @@ class TargetLimits {
 /// Checks a command when it is added to a batch.
 ///
 /// Each function throws InvalidArgument with the actuator, the field, the value and the allowed
-/// values. The schema must outlive it. `mask` is empty (all numbers) or has one bit for each
-/// number.
+/// values. The schema must outlive it. `mask` is empty (all numbers) or has a bit for each number.
 class CommandCheck {
  public:
-  explicit CommandCheck(const Schema& schema);
+  explicit CommandCheck(const Schema& schema)
+      : schema_(schema), layouts_(layouts_of_types(schema, false)), targets_(schema, layouts_) {}
   CommandCheck(const CommandCheck&) = delete;
 
   /// Index of an actuator by its name.
@@ -76,9 +76,16 @@ class CommandCheck {
                std::span<const std::uint64_t> mask = {}) const;
   /// True if targets() admits `steps` states for each of these actuators, one after the other.
   bool admits(std::span<const std::uint32_t> actuators, std::uint32_t steps,
-              const std::byte* states) const noexcept;
-  /// Checks a direct target: in real time without a watchdog, it must not move a number away from
-  /// its rest value.
+              const std::byte* states) const noexcept {
+    for (const std::uint32_t actuator : actuators) {
+      const std::size_t size = targets_.layout(actuator).size();
+      for (std::uint32_t step = 0; step < steps; ++step, states += size) {
+        if (!targets_.admit(actuator, states, nullptr)) return false;
+      }
+    }
+    return true;
+  }
+  /// Checks that a direct target keeps rest values, in real time without a watchdog.
   void direct(std::uint32_t actuator, std::span<const std::byte> state,
               std::span<const std::uint64_t> mask = {}) const;
   /// Checks the pace of a command: the speed of the first commanded number [1/s].

@@ -125,19 +125,6 @@ std::int64_t Motion::propose(const Course& course, const std::byte* desired) noe
   return longest;
 }
 
-void Motion::settle(Iteration first, std::int64_t iterations) noexcept {
-  first_ = first;
-  last_ = first + (iterations - 1);
-  for (Number& each : numbers_) {
-    if (!each.is_commanded) continue;
-    if (is_row_) {
-      each.motion.line_for(iterations);
-    } else {
-      each.motion.settle(iterations);
-    }
-  }
-}
-
 /// Types that blend by themselves: by the share of the time, from rest to rest.
 void Motion::blend(Iteration now, std::byte* state) noexcept {
   if (now >= last_) return layout_.copy(state, target());
@@ -204,20 +191,6 @@ void Motion::publish(const Number& number, std::byte* state) noexcept {
       store(at, to_integer<T>(start + (end - start) * share));
     }
   });
-}
-
-bool Motion::brake(std::byte* state, bool follows) noexcept {
-  bool moves = false;
-  for (Number& each : numbers_) {
-    if (follows && !each.motion.has_rest()) {
-      each.motion.restart(layout_.number(each.number, state));
-      continue;
-    }
-    const double before = each.motion.position();
-    moves = each.motion.brake() || moves;
-    if (follows || each.motion.position() != before) publish(each, state);
-  }
-  return moves;
 }
 
 }  // namespace o80

@@ -59,7 +59,18 @@ class Motion {
   /// The part of it that the cruising speed needs.
   std::int64_t asked_by_speed() const noexcept { return asked_by_speed_; }
   /// Then plans for so many iterations, at least those.
-  void settle(Iteration first, std::int64_t iterations) noexcept;
+  void settle(Iteration first, std::int64_t iterations) noexcept {
+    first_ = first;
+    last_ = first + (iterations - 1);
+    for (Number& each : numbers_) {
+      if (!each.is_commanded) continue;
+      if (is_row_) {
+        each.motion.line_for(iterations);
+      } else {
+        each.motion.settle(iterations);
+      }
+    }
+  }
   /// A set-point of a generator at the rate of the loop: no plan, only limits.
   void follow_as_sent(Iteration first) noexcept {
     first_ = last_ = first;
@@ -105,8 +116,7 @@ class Motion {
   bool was_held_back() const noexcept {
     return has_integrals_ && any([](auto& each) { return each.was_held_back(); });
   }
-  /// Difference of the number at this offset to the iteration before: first (order 1) or second; 0
-  /// for what does not move.
+  /// First (order 1) or second difference of the number at this offset; 0 for what does not move.
   double difference(std::uint32_t offset, std::uint32_t order) const noexcept {
     const auto found = std::ranges::find(numbers_, offset, &Number::offset);
     return found == numbers_.end() ? 0.0 : found->motion.difference(order);
@@ -136,7 +146,19 @@ class Motion {
   }
   /// One iteration of braking. Numbers with a rest value go to it, unless they are held; if it
   /// `follows`, the others are at `state`, the observed one. True while a number moves.
-  bool brake(std::byte* state, bool follows) noexcept;
+  bool brake(std::byte* state, bool follows) noexcept {
+    bool moves = false;
+    for (Number& each : numbers_) {
+      if (follows && !each.motion.has_rest()) {
+        each.motion.restart(layout_.number(each.number, state));
+        continue;
+      }
+      const double before = each.motion.position();
+      moves = each.motion.brake() || moves;
+      if (follows || each.motion.position() != before) publish(each, state);
+    }
+    return moves;
+  }
   /// Holds the commanded numbers that have a rest value where they are, until hold(false).
   void hold(bool holds) noexcept {
     for (Number& each : numbers_) each.motion.hold(holds && each.is_commanded);

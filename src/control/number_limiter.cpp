@@ -155,8 +155,7 @@ Limit NumberLimiter::follow_with_jerk(double step, double lag) noexcept {
                             : goal(step, lag, allowed));
 }
 
-/// Takes the allowed acceleration nearest to `best`. The stop from the last state always is
-/// allowed.
+/// Takes the allowed acceleration nearest to `best`; that of the last state's stop always is one.
 Limit NumberLimiter::accelerate(double best) noexcept {
   know_stop();
   Candidate next = candidate(best);

@@ -109,9 +109,13 @@ class NumberLimiter {
     const double step = wanted - wanted_;
     const double lag = now_.position - wanted_;
     wanted_ = wanted;
-    if (!has_rates_ && wanted >= span_.low && wanted <= span_.high && std::abs(wanted) < kHuge &&
-        std::abs(now_.position) < kHuge) {
-      return follow_freely();
+    const double speed = wanted - now_.position;
+    if (!has_rates_ && wanted >= span_.low && wanted <= span_.high && std::isfinite(speed)) {
+      // what follow_without_jerk() does inside the bounds, if there are no other limits
+      scale_ = std::max(scale_, std::abs(inside(now_.position + speed, now_.position)));
+      now_ = {wanted, speed, speed - now_.speed};
+      if (std::abs(speed) <= slack() / 100.0 + 2.0 * rounding()) rest();
+      return Limit::none;
     }
     return std::isfinite(rates_.jerk) ? follow_with_jerk(step, lag)
                                       : follow_without_jerk(step, lag);
@@ -147,17 +151,6 @@ class NumberLimiter {
     VelocityChange stop;
   };
 
-  // two numbers below it are not too far apart for a double
-  static constexpr double kHuge = 0.25 * std::numeric_limits<double>::max();
-
-  /// What follow_without_jerk() does inside the bounds, if there are no other limits.
-  Limit follow_freely() noexcept {
-    const double speed = wanted_ - now_.position;
-    scale_ = std::max(scale_, std::abs(inside(now_.position + speed, now_.position)));
-    now_ = {wanted_, speed, speed - now_.speed};
-    if (std::abs(speed) <= slack() / 100.0 + 2.0 * rounding()) now_.speed = now_.acceleration = 0.0;
-    return Limit::none;
-  }
   bool pass_rounded(double next) noexcept;
   Limit follow_without_jerk(double step, double lag) noexcept;
   Limit follow_with_jerk(double step, double lag) noexcept;

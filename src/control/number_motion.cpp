@@ -1,31 +1,9 @@
 #include "control/number_motion.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 namespace o80 {
-
-/// If the shortest stop would leave the bounds, the plan goes on until it stays inside.
-void NumberMotion::end(bool arrived) noexcept {
-  if (planned_ && !follows_ && !guard_.stops_inside()) {
-    former_ = plan_;
-    leaves_ = true;
-  }
-  planned_ = follows_ = false;
-  guard_.follow_within_bounds();
-  // a jump is no speed
-  if (arrived && !accelerates()) guard_.rest();
-}
-
-std::int64_t NumberMotion::propose(const Asked& asked) noexcept {
-  // mostly nothing limits a set-point: it needs no plan
-  jumps_at_once_ =
-      !has_rates() && asked.iterations <= 1 && !asked.start && !std::isfinite(asked.cruise);
-  if (!jumps_at_once_) return plan_for(asked);
-  asked_ = asked;
-  return 1;
-}
 
 std::int64_t NumberMotion::plan_for(const Asked& asked) noexcept {
   PlanTask task{asked, asked.start ? Moment{*asked.start} : guard_.moment(), guard_.stop(),
@@ -58,8 +36,7 @@ void NumberMotion::settle(std::int64_t iterations) noexcept {
   plan_.settle(iterations);
 }
 
-/// One iteration by `move`, as far as the bounds of the integral allow; returns that which stops
-/// it.
+/// One iteration by `move`, as far as bounds of the integral allow; returns the one that stops it.
 template <class Move>
 Limit NumberMotion::move(Move&& move) noexcept {
   const double before = guard_.position();

@@ -62,7 +62,14 @@ class NumberMotion {
   }
 
   /// Proposes a number of iterations for a plan to rest at the target.
-  std::int64_t propose(const Asked& asked) noexcept;
+  std::int64_t propose(const Asked& asked) noexcept {
+    // mostly nothing limits a set-point: it needs no plan
+    jumps_at_once_ =
+        !has_rates() && asked.iterations <= 1 && !asked.start && !std::isfinite(asked.cruise);
+    if (!jumps_at_once_) return plan_for(asked);
+    asked_ = asked;
+    return 1;
+  }
   /// Then plans it for `iterations`, at least those.
   void settle(std::int64_t iterations) noexcept;
   /// A straight line to the next row of a trajectory, to be followed; line_for() sets its length.
@@ -96,7 +103,17 @@ class NumberMotion {
   }
   bool follows() const noexcept { return follows_; }
   /// The plan ends, at its target if that is `arrived`: what follows is another command, or none.
-  void end(bool arrived = false) noexcept;
+  /// If the shortest stop would leave the bounds, the plan goes on until it stays inside.
+  void end(bool arrived = false) noexcept {
+    if (planned_ && !follows_ && !guard_.stops_inside()) {
+      former_ = plan_;
+      leaves_ = true;
+    }
+    planned_ = follows_ = false;
+    guard_.follow_within_bounds();
+    // a jump is no speed
+    if (arrived && !accelerates()) guard_.rest();
+  }
   /// One iteration without a command: to rest, as fast as the limits allow. True while it moves.
   bool brake() noexcept;
 

@@ -172,13 +172,4 @@ double NumberPlan::next() noexcept {
   return fastest_.next();
 }
 
-Limit NumberPlan::slowest() const noexcept {
-  const double distance = std::abs(task_.target - task_.from.position);
-  const double by_speed = distance / task_.rates.speed;
-  const double by_acceleration = 2.0 * std::sqrt(distance / task_.rates.acceleration);
-  const double by_jerk = std::cbrt(32.0 * distance / task_.rates.jerk);
-  if (by_jerk > std::max(by_speed, by_acceleration)) return Limit::jerk;
-  return by_acceleration > by_speed ? Limit::acceleration : Limit::speed;
-}
-
 }  // namespace o80

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -41,8 +43,8 @@ struct Asked {
 /// What a plan is for: one number, from its present motion to rest at a target.
 struct PlanTask : Asked {
   Moment from;
-  // a smooth motion stays in it: position, shortest stop (without a limit of acceleration: former
-  // target), and target
+  // where a smooth motion stays: position, target, and shortest stop (without a limit of
+  // acceleration: former target)
   Span span;
   Rates rates{};
   bool stays = true;  // it may stop at once
@@ -81,7 +83,14 @@ class NumberPlan {
   }
   bool is_line() const noexcept { return shape_ == Shape::line; }
   /// The limit that makes the motion long.
-  Limit slowest() const noexcept;
+  Limit slowest() const noexcept {
+    const double distance = std::abs(task_.target - task_.from.position);
+    const double by_speed = distance / task_.rates.speed;
+    const double by_acceleration = 2.0 * std::sqrt(distance / task_.rates.acceleration);
+    const double by_jerk = std::cbrt(32.0 * distance / task_.rates.jerk);
+    if (by_jerk > std::max(by_speed, by_acceleration)) return Limit::jerk;
+    return by_acceleration > by_speed ? Limit::acceleration : Limit::speed;
+  }
 
  private:
   enum class Shape : std::uint8_t { line, smooth, stop_first, fastest };

@@ -132,13 +132,4 @@ RecordCheck::Verdict RecordCheck::go_on(const BlockPool& pool, BlockIndex block,
   return progress.rows_left > 0 ? Verdict::unfinished : Verdict::valid;
 }
 
-bool RecordCheck::is_request(const RecordHead& head, Cursor& payload) noexcept {
-  if (head.actuator >= requests_.size()) return false;
-  const StateLayout* layout = requests_[head.actuator];
-  if (layout == nullptr) return head.payload_bytes == 0;
-  auto* state = reinterpret_cast<std::byte*>(state_.data());
-  return head.payload_bytes == layout->size() && payload.read(state, layout->size()) &&
-         layout->proper(state);
-}
-
 }  // namespace o80

@@ -53,7 +53,14 @@ class RecordCheck {
 
  private:
   Verdict begin_command(const RecordHead& head, Progress& progress) noexcept;
-  bool is_request(const RecordHead& head, Cursor& payload) noexcept;
+  bool is_request(const RecordHead& head, Cursor& payload) noexcept {
+    if (head.actuator >= requests_.size()) return false;
+    const StateLayout* layout = requests_[head.actuator];
+    if (layout == nullptr) return head.payload_bytes == 0;
+    auto* state = reinterpret_cast<std::byte*>(state_.data());
+    return head.payload_bytes == layout->size() && payload.read(state, layout->size()) &&
+           layout->proper(state);
+  }
 
   TargetLimits targets_;
   std::vector<const StateLayout*> requests_;  // null: no payload

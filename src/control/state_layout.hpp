@@ -137,8 +137,7 @@ class StateLayout {
 using Layouts = std::vector<std::optional<StateLayout>>;
 /// The layout of a type, which is made when it is first asked for.
 const StateLayout& layout_of(const Schema& schema, std::uint32_t type, Layouts& layouts);
-/// The layouts of the types of actuators and requests. If they are `controlled` here, throws
-/// InvalidArgument if an actuator cannot be.
+/// The layouts of actuators and requests. `controlled`: throws InvalidArgument if one cannot be.
 Layouts layouts_of_types(const Schema& schema, bool controlled = true);
 
 }  // namespace o80
