@@ -91,13 +91,13 @@ std::int64_t Motion::propose(const Course& course, const std::byte* desired) noe
 
   std::int64_t longest = std::max<std::int64_t>(1, course.iterations);
   slowest_ = {};
-  if ((is_row_ || numbers_.empty()) && std::isfinite(course.cruise)) {
+  const bool by_speed = (is_row_ || numbers_.empty()) && std::isfinite(course.cruise);
+  if (by_speed) longest = 1;
+  if (by_speed && course.first != StateLayout::kNoNumber) {
     // a row, or a type that blends by itself, at the speed asked for
     constexpr double kPeakFromRest = 1.875;  // of a minimum-jerk motion, to its mean speed
-    const bool has_first = course.first != StateLayout::kNoNumber;
     const double distance =
-        has_first ? layout_.number(course.first, target()) - layout_.number(course.first, from())
-                  : 0.0;
+        layout_.number(course.first, target()) - layout_.number(course.first, from());
     const bool is_smooth = course.profile == Profile::minimum_jerk;
     longest = iterations_of(is_smooth ? kPeakFromRest * distance : distance, course.cruise);
   }
