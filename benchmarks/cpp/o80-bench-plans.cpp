@@ -38,7 +38,7 @@ struct Joint {
 constexpr Joint kJoints[] = {{2.0, 15.0, 500.0, 500.0}, {2.6, 10.0, 5000.0, 1000.0}};
 
 std::int64_t start(NumberMotion& motion, double target, std::int64_t least = 0) {
-  NumberMotion::Asked asked;
+  Asked asked;
   asked.target = target;
   asked.iterations = least;
   motion.begin();

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "bindings.hpp"
-#include "control/motion_rules.hpp"
+#include "control/record.hpp"
 #include "frontend.hpp"
 
 namespace nb = nanobind;

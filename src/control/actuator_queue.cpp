@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "control/limits.hpp"
@@ -13,9 +12,6 @@ namespace {
 
 // most waypoints of a trajectory that are skipped in one iteration, because they end before it
 constexpr int kMostPassed = 256;
-// waypoints of a trajectory that are read ahead in one iteration, for its span. A motion that
-// speeds up and stops in i iterations each needs the span of i waypoints in iteration i.
-constexpr std::uint32_t kReadAhead = 16;
 
 }  // namespace
 
@@ -32,184 +28,34 @@ ActuatorQueue::ActuatorQueue(const Schema& schema, const ActuatorRow& row,
       usual_profile_(usual_profile(schema, row)),
       when_idle_(row.when_idle),
       queue_(pool, lanes),
-      mask_(mask_words(static_cast<std::uint32_t>(layout.numbers().size()))),
+      mask_(layout.mask_words()),
       next_mask_(mask_.size()),
       scratch_((layout.size() + 7) / 8) {}
 
-void ActuatorQueue::drop(Status status, Reason reason, Iteration iteration) noexcept {
-  const bool in_force = in_force_ && status == Status::overwritten;
-  if (alone_ != kNoBlock) {
-    pool_->head(alone_).own[Own::kNext] = kNoBlock;
-    ledger_->drop(std::exchange(alone_, kNoBlock), status, reason, iteration);
-  }
+void ActuatorQueue::drop(const Outcome& outcome, Iteration iteration) noexcept {
+  const bool is_overwritten = outcome.status == Status::overwritten;
+  const bool in_force = in_force_ && is_overwritten;
+  if (runs_ == Runs::alone) ledger_->drop(record_, outcome, iteration);
   // the motion of an overwritten command goes on until its successor begins
-  if (status == Status::overwritten) {
-    running_ = planned_ = false;
-    carry_.reset();
-  } else {
-    end_motion();
-  }
+  if (!is_overwritten) motion_.end();
+  stop();
   in_force_ = in_force;
-  motion_.release();
-  while (!queue_.empty()) ledger_->drop(queue_.take_any(), status, reason, iteration);
+  motion_.hold(false);
+  while (!queue_.empty()) ledger_->drop(queue_.take_any(), outcome, iteration);
 }
 
-void ActuatorQueue::end_motion() noexcept {
-  motion_.end();
-  carry_.reset();
-  running_ = planned_ = in_force_ = given_ = false;
-}
-
-void ActuatorQueue::drop_lane(std::uint32_t lane, Status status, Reason reason,
-                              Iteration iteration) noexcept {
-  if (alone_ != kNoBlock) {
-    if (ledger_->lane_of(alone_) == lane) {
-      pool_->head(alone_).own[Own::kNext] = kNoBlock;
-      ledger_->drop(std::exchange(alone_, kNoBlock), status, reason, iteration);
-      end_motion();
-    }
-  } else if (running_ && !given_ && queue_.front_lane() == lane) {
-    end_motion();
-  }
-  if (holder_ == lane) motion_.release();
-  ledger_->drop(queue_.take(lane), status, reason, iteration);
-  if (empty()) end_motion();
-}
-
-void ActuatorQueue::restart(const std::byte* state) noexcept {
-  layout_->copy_finite(desired_, state);
-  motion_.restart(desired_);
-  in_force_ = false;
-}
-
-bool ActuatorQueue::follow(const std::byte* observed) noexcept {
-  layout_->copy_finite(desired_, observed);
-  in_force_ = false;
-  return motion_.brake_resting(desired_);
-}
-
-ActuatorQueue::Moved ActuatorQueue::step(Iteration iteration, const std::byte* observed,
-                                         std::uint32_t& late_budget) noexcept {
-  motion_.observe(observed);
+/// Begins what runs in this iteration: a row, or a command; false if there is none.
+bool ActuatorQueue::begin(Iteration iteration, const std::byte* observed,
+                          std::uint32_t& late_budget) noexcept {
   if (!planned_ && may_give_way() && end_late(iteration, late_budget)) {
     const RecordHead& next = pool_->head(queue_.front());
-    const bool may_begin = !is_member(next) || ledger_->groups().is_complete(next, iteration);
-    if (may_begin && gives_way_to(next)) give_way(iteration);
+    if (may_begin(next, iteration) && gives_way_to(next)) give_way(iteration);
   }
-  if (running_) {
-    const bool row_is_over = pace_ == Pace::direct || iteration > motion_.last();
-    const bool next_row = planned_ || (row_is_over && rows_left_ > 0);
-    if (next_row && !begin_row(iteration)) return step(iteration, observed, late_budget);
-  } else if (!begin_next(iteration, observed, late_budget)) {
-    return come_to_rest(observed);
-  }
-  if (ahead_left_ > 0) look_ahead();
-  const Limited limited = motion_.step(iteration, desired_);
-  if (limited.limit != Limit::none && late_ == 0) reason_ = limited;
-  if (iteration >= motion_.last() && rows_left_ == 0) {
-    if (motion_.stands()) {
-      end_held_back(iteration, limited);
-    } else if (motion_.arrived()) {
-      end_running(iteration);
-    } else if (is_trajectory_ && alone_ == kNoBlock) {
-      take_out();
-    }
-  }
-  return limited.limit == Limit::none ? Moved::active : Moved::clamped;
-}
-
-void ActuatorQueue::begin_given(Mode mode) noexcept {
-  if (mode == Mode::overwrite) carry_.reset();
-  motion_.release();
-}
-
-ActuatorQueue::Moved ActuatorQueue::go_to(Iteration iteration, const std::byte* observed,
-                                          const std::byte* target) noexcept {
-  motion_.observe(observed);
-  const SetPoint set_point{usual_profile_};
-  const bool same = in_force_ && !motion_.was_held_back() && set_point_ == set_point &&
-                    layout_->same(target, motion_.target(), nullptr);
-  if (!same) {
-    motion_.begin(nullptr);
-    layout_->copy(motion_.target(), target);
-    motion_.settle(iteration, motion_.propose({.profile = usual_profile_}, desired_));
-  }
-  set_point_ = set_point;
-  pace_ = Pace::direct;
-  masked_ = is_trajectory_ = planned_ = false;
-  rows_left_ = ahead_left_ = 0;
-  in_force_ = given_ = running_ = true;
-  const Limited limited = motion_.step(iteration, desired_);
-  if (iteration >= motion_.last() && motion_.stands()) {
-    end_held_back(iteration, limited);
-  } else if (iteration >= motion_.last() && motion_.arrived()) {
-    end_running(iteration);
-  }
-  return limited.limit == Limit::none ? Moved::active : Moved::clamped;
-}
-
-/// The running command leaves the queue; it ends when it has arrived, or gives way to the next one.
-void ActuatorQueue::take_out() noexcept {
-  alone_ = queue_.front();
-  queue_.pop();
-}
-
-/// A set-point gives way to the next direct command. A trajectory whose rows have ended gives way
-/// to any.
-bool ActuatorQueue::gives_way_to(const RecordHead& next) const noexcept {
-  return pace_ != Pace::direct || next.pace == Pace::direct;
-}
-
-void ActuatorQueue::give_way(Iteration iteration) noexcept {
-  running_ = false;
-  if (alone_ == kNoBlock) return;
-  ledger_->end(std::exchange(alone_, kNoBlock), Status::overwritten, Reason::none, 0, iteration);
-}
-
-void ActuatorQueue::end_running(Iteration iteration) noexcept {
-  running_ = false;
-  const bool is_set_point = pace_ == Pace::direct;
-  in_force_ = is_set_point;
-  if (is_set_point) motion_.hold();
-  late_ += iteration - motion_.last();
-  motion_.complete();
-  if (std::exchange(given_, false)) return;
-  if (late_ > 0) carry_.reset();
-  const BlockIndex record = running_record();
-  holder_ = ledger_->lane_of(record);
-  if (std::exchange(alone_, kNoBlock) == kNoBlock) queue_.pop();
-  if (late_ > 0 && asked_ > 0) {
-    ledger_->end(record, Status::completed, Reason::limits, reason_.packed(), iteration, late_);
-  } else {
-    ledger_->end(record, Status::completed, Reason::none, 0, iteration);
-  }
-}
-
-/// Bounds of an integral hold the running command back, and it stands: it ends where it is.
-void ActuatorQueue::end_held_back(Iteration iteration, const Limited& bound) noexcept {
-  const bool given = given_;
-  const BlockIndex record = given ? kNoBlock : running_record();
-  end_motion();
-  if (given) return;
-  if (std::exchange(alone_, kNoBlock) == kNoBlock) queue_.pop();
-  ledger_->end(record, Status::interrupted, Reason::limits, bound.packed(), iteration);
-}
-
-/// Without a command: the motion brakes within its limits, and fields with a rest value go to it.
-ActuatorQueue::Moved ActuatorQueue::come_to_rest(const std::byte* observed) noexcept {
-  motion_.end();
-  given_ = false;
-  carry_.reset();
-  const bool moves = follows() ? follow(observed) : motion_.brake(desired_);
-  return moves ? Moved::braking : Moved::idle;
-}
-
-bool ActuatorQueue::begin_next(Iteration iteration, const std::byte* observed,
-                               std::uint32_t& late_budget) noexcept {
+  if (runs_ != Runs::nothing && (!needs_row(iteration) || begin_row(iteration))) return true;
   while (end_late(iteration, late_budget)) {
     const RecordHead& head = pool_->head(queue_.front());
     // while it waits for the others of a group it brakes
-    if (is_member(head) && !ledger_->groups().is_complete(head, iteration)) return false;
+    if (!may_begin(head, iteration)) return false;
     begin_command(observed);
     if (begin_row(iteration)) return true;
     if (late_budget == 0) return false;
@@ -218,141 +64,137 @@ bool ActuatorQueue::begin_next(Iteration iteration, const std::byte* observed,
   return false;
 }
 
+/// One iteration of what runs, which may be its last.
+ActuatorQueue::Moved ActuatorQueue::advance(Iteration iteration) noexcept {
+  // rows of a trajectory widen the span in which the limiter follows it
+  for (std::uint32_t i = 0; i < kReadAhead && ahead_left_ > 0; ++i, --ahead_left_) {
+    ahead_.read(scratch(), layout_->size());
+    motion_.widen(scratch());
+  }
+  const Limited limited = motion_.step(iteration, desired_);
+  if (limited.limit != Limit::none && late_ == 0) reason_ = limited;
+  if (iteration >= motion_.last() && rows_left_ == 0) {
+    if (motion_.stands()) {
+      // bounds of an integral hold it back: it ends where it is
+      const BlockIndex record = leave();
+      end_motion();
+      end(record, {Status::interrupted, Reason::limits, limited.packed()}, iteration);
+    } else if (motion_.arrived()) {
+      end_running(iteration);
+    } else if (runs_ == Runs::queued && pool_->head(record_).rows > 1) {
+      take_out();
+    }
+  }
+  return limited.limit == Limit::none ? Moved::active : Moved::clamped;
+}
+
+ActuatorQueue::Moved ActuatorQueue::go_to(Iteration iteration, const std::byte* observed,
+                                          const std::byte* target) noexcept {
+  motion_.observe(observed);
+  const SetPoint set_point{usual_profile_};
+  if (masked_ || !is_in_force(set_point) || !layout_->same(target, motion_.target(), nullptr)) {
+    motion_.begin(nullptr);
+    layout_->copy(motion_.target(), target);
+    Motion::Course course;
+    course.profile = usual_profile_;
+    motion_.settle(iteration, motion_.propose(course, desired_));
+  }
+  set_point_ = set_point;
+  pace_ = Pace::direct;
+  masked_ = planned_ = false;
+  rows_left_ = ahead_left_ = 0;
+  in_force_ = true;
+  runs_ = Runs::given;
+  return advance(iteration);
+}
+
+void ActuatorQueue::end_running(Iteration iteration) noexcept {
+  in_force_ = pace_ == Pace::direct;
+  if (in_force_) motion_.hold(true);
+  late_ += iteration - motion_.last();
+  motion_.end(true);
+  const BlockIndex record = leave();
+  if (record == kNoBlock) return;
+  if (late_ > 0) carry_.reset();
+  holder_ = ledger_->lane_of(record);
+  Outcome outcome;
+  if (late_ > 0 && asked_ > 0) outcome = {outcome.status, Reason::limits, reason_.packed(), late_};
+  ledger_->end(record, outcome, iteration);
+}
+
 /// Rejects commands whose `until` has passed; false if no command is left to begin.
 bool ActuatorQueue::end_late(Iteration iteration, std::uint32_t& late_budget) noexcept {
   while (!queue_.empty()) {
-    const RecordHead& late = pool_->head(queue_.front());
-    if (late.pace != Pace::until || late.amount >= iteration) break;
+    const BlockIndex record = queue_.front();
+    const RecordHead& late = pool_->head(record);
+    if (late.pace != Pace::until || late.amount >= iteration) return true;
     if (late_budget == 0) return false;
     --late_budget;
     carry_.reset();
-    const BlockIndex record = queue_.front();
     queue_.pop();
-    ledger_->end(record, Status::rejected, Reason::late, 0, iteration);
+    ledger_->end(record, {Status::rejected, Reason::late}, iteration);
   }
-  return !queue_.empty();
-}
-
-/// True for a direct command that is equal to the set-point in force.
-bool ActuatorQueue::is_in_force(const RecordHead& head, BlockIndex record) noexcept {
-  const SetPoint next{head.profile, head.start, head.amount, head.masked != 0};
-  if (!in_force_ || motion_.was_held_back() || head.pace != Pace::direct || !(next == set_point_))
-    return false;
-  Cursor cursor(*pool_, record, sizeof(RecordHead), head.payload_bytes);
-  if (next.masked) {
-    cursor.read(next_mask_.data(), next_mask_.size() * sizeof next_mask_.front());
-    if (next_mask_ != mask_) return false;
-  }
-  auto* row = reinterpret_cast<std::byte*>(scratch_.data());
-  cursor.read(row, layout_->size());
-  return layout_->same(row, motion_.target(), next.masked ? mask_.data() : nullptr);
+  return false;
 }
 
 void ActuatorQueue::begin_command(const std::byte* observed) noexcept {
   // head => mask, times, rows
-  const BlockIndex record = queue_.front();
-  const RecordHead& head = pool_->head(record);
-  keeps_plan_ = is_in_force(head, record);
-  rows_ = Cursor(*pool_, record, sizeof(RecordHead), head.payload_bytes);
-  bool same_mask = masked_ == (head.masked != 0);
-  masked_ = head.masked != 0;
+  record_ = queue_.front();
+  const RecordHead& head = pool_->head(record_);
+  rows_ = Cursor(*pool_, record_, sizeof(RecordHead), head.payload_bytes);
+  bool same_mask = std::exchange(masked_, head.masked != 0) == (head.masked != 0);
   if (masked_) {
     rows_.read(next_mask_.data(), next_mask_.size() * sizeof next_mask_.front());
     same_mask = same_mask && mask_ == next_mask_;
     mask_.swap(next_mask_);
   }
+  const SetPoint next{head.profile, head.start, head.amount};
+  keeps_plan_ = same_mask && head.pace == Pace::direct && is_in_force(next) && is_next_row_target();
   // targets of a generator are one motion
   const bool streams = same_mask && in_force_ && set_point_.profile == Profile::as_sent &&
                        head.profile == Profile::as_sent;
-  timed_ = head.pace == Pace::duration && head.rows > 1;
   time_ = 0;
-  if (timed_) {
+  if (is_timed(head)) {
     // the check has stored the position of the rows
     times_ = rows_;
     rows_ = rows_of_timed(*pool_, head, layout_->size());
   }
   pace_ = head.pace;
   rows_left_ = head.rows;
-  is_trajectory_ = head.rows > 1;
   ahead_ = rows_;
   ahead_left_ = 0;
-  running_ = true;
-  given_ = begun_ = false;
+  runs_ = Runs::queued;
+  begun_ = false;
   late_ = 0;
   reason_ = {};
   in_force_ = pace_ == Pace::direct;
-  set_point_ = {head.profile, head.start, head.amount, masked_};
-  motion_.release();
+  set_point_ = next;
+  motion_.hold(false);
   if (keeps_plan_ || streams) return;
   motion_.begin(mask());
   if (head.start == Start::observed) motion_.start_at(observed);
 }
 
-void ActuatorQueue::arrive(Iteration iteration, std::uint32_t& late_budget) noexcept {
-  if (running_ && !may_give_way()) return;
-  if (!end_late(iteration, late_budget)) return;
-  const RecordHead& head = pool_->head(queue_.front());
-  // a running set-point counts as having reached a direct command
-  if (!is_member(head) || (running_ && !gives_way_to(head))) return;
-  ledger_->groups().arrive(head, iteration);
-  // all members use the largest rounding carry
-  if (head.pace == Pace::duration) {
-    ledger_->groups().offer(head, CommandGroups::Offer::carry, iteration, carry_.carried());
-  }
-}
-
-void ActuatorQueue::agree_on_carry(Iteration iteration) noexcept {
-  if (running_ || queue_.empty()) return;
-  const RecordHead& head = pool_->head(queue_.front());
-  if (!is_member(head) || head.pace != Pace::duration) return;
-  if (ledger_->groups().is_complete(head, iteration)) {
-    carry_.carry(ledger_->groups().agreed(head));
-  }
-}
-
 void ActuatorQueue::plan_with_others(Iteration iteration, const std::byte* observed) noexcept {
-  if (queue_.empty()) return;
-  const RecordHead& head = pool_->head(queue_.front());
-  if (!is_member(head)) return;
+  const RecordHead* head = next_member();
   // set-points of each iteration go each by itself
-  if (head.pace == Pace::direct && head.rows > 1) return;
-  if (running_ && !may_give_way()) {
+  if (head == nullptr || (head->pace == Pace::direct && head->rows > 1)) return;
+  if (runs_ == Runs::queued) {
     if (iteration <= motion_.last() || rows_left_ == 0) return;
   } else {
-    if (running_ && !gives_way_to(head)) return;
-    if (!ledger_->groups().is_complete(head, iteration)) return;
-    if (running_) give_way(iteration);
+    if (runs_ != Runs::nothing && !gives_way_to(*head)) return;
+    if (!may_begin(*head, iteration)) return;
+    if (runs_ != Runs::nothing) give_way(iteration);
     begin_command(observed);
   }
   plan_row(iteration);
-  ledger_->groups().offer(head, CommandGroups::Offer::iterations, iteration, row_iterations_);
+  ledger_->groups().offer(*head, CommandGroups::Offer::iterations, iteration, row_iterations_);
   planned_ = true;
-}
-
-/// The next row of the command => target.
-void ActuatorQueue::read_row() noexcept {
-  auto* row = reinterpret_cast<std::byte*>(scratch_.data());
-  rows_.read(masked_ ? row : motion_.target(), layout_->size());
-  if (masked_) {
-    layout_->copy(motion_.target(), desired_);
-    layout_->copy(motion_.target(), row, mask_.data());
-  }
-  --rows_left_;
-}
-
-/// A set-point of a row of them: it replaces the one before, or is equal to it.
-void ActuatorQueue::next_set_point() noexcept {
-  auto* row = reinterpret_cast<std::byte*>(scratch_.data());
-  Cursor next = rows_;
-  next.read(row, layout_->size());
-  keeps_plan_ = layout_->same(row, motion_.target(), mask());
-  if (!keeps_plan_) motion_.begin(mask());
 }
 
 /// Begins the planned row; false if the command would take too long and is rejected.
 bool ActuatorQueue::begin_row(Iteration iteration) noexcept {
-  const BlockIndex record = queue_.front();
-  const RecordHead& head = pool_->head(record);
+  const RecordHead& head = pool_->head(record_);
   if (std::exchange(planned_, false)) {
     row_iterations_ = ledger_->groups().agreed(head);
   } else {
@@ -360,9 +202,9 @@ bool ActuatorQueue::begin_row(Iteration iteration) noexcept {
   }
   const bool is_asked = pace_ != Pace::speed && row_iterations_ <= asked_;
   if (row_iterations_ > kLongestPlan && !is_asked) {
-    end_motion();
     queue_.pop();
-    ledger_->end(record, Status::rejected, Reason::invalid, Limited{Limit::speed, 0}.packed(),
+    end_motion();
+    ledger_->end(record_, {Status::rejected, Reason::invalid, Limited{Limit::speed, 0}.packed()},
                  iteration);
     return false;
   }
@@ -379,10 +221,10 @@ bool ActuatorQueue::begin_row(Iteration iteration) noexcept {
     carry_.reset();
   }
   if (!std::exchange(begun_, true)) {
-    const bool is_late = late_ > 0;
-    ledger_->activate(record, iteration, is_late ? Reason::limits : Reason::none,
-                      is_late ? reason_.packed() : std::uint8_t{0}, late_);
-    if (is_trajectory_ && motion_.follows_rows()) ahead_left_ = head.rows;
+    Outcome outcome{Status::active};
+    if (late_ > 0) outcome = {Status::active, Reason::limits, reason_.packed(), late_};
+    ledger_->activate(record_, iteration, outcome);
+    if (head.rows > 1 && motion_.follows_rows()) ahead_left_ = head.rows;
   }
   if (pace_ == Pace::direct && rows_left_ == 0) take_out();
   return true;
@@ -391,46 +233,39 @@ bool ActuatorQueue::begin_row(Iteration iteration) noexcept {
 /// Reads the next waypoint: its target and number of iterations.
 void ActuatorQueue::plan_row(Iteration iteration) noexcept {
   if (begun_ && pace_ == Pace::direct) {
-    next_set_point();
+    // a set-point of a row of them: it replaces the one before, or is equal to it
+    keeps_plan_ = is_next_row_target();
+    if (!keeps_plan_) motion_.begin(mask());
   } else if (begun_) {
     motion_.next_row();
   }
   if (keeps_plan_) {
-    rows_.read(scratch_.data(), layout_->size());
+    rows_.read(scratch(), layout_->size());
     --rows_left_;
     asked_ = 0;
     row_iterations_ = std::max<std::int64_t>(1, motion_.last() - iteration + 1);
     return;
   }
   read_row();
-  const RecordHead& head = pool_->head(queue_.front());
+  const RecordHead& head = pool_->head(record_);
   const Motion::Course next = course(head, iteration);
   const bool is_as_sent = head.profile == Profile::as_sent;
   row_iterations_ = is_as_sent ? 1 : motion_.propose(next, desired_);
-  asked_ = next.asked;
+  asked_ = next.iterations;
   // of several actuators, others may be slower
   if (head.pace == Pace::speed && !is_member(head)) asked_ = motion_.asked_by_speed();
-}
-
-/// Rows of a trajectory widen the span in which the limiter follows it.
-void ActuatorQueue::look_ahead() noexcept {
-  auto* row = reinterpret_cast<std::byte*>(scratch_.data());
-  for (std::uint32_t i = 0; i < kReadAhead && ahead_left_ > 0; ++i, --ahead_left_) {
-    ahead_.read(row, layout_->size());
-    motion_.widen(row);
-  }
 }
 
 Motion::Course ActuatorQueue::course(const RecordHead& head, Iteration iteration) noexcept {
   Motion::Course next;
   next.profile = head.profile;
   next.first = layout_->first_commanded(mask());
-  next.is_row = is_trajectory_ && head.profile == Profile::linear && head.pace != Pace::fastest &&
+  next.is_row = head.rows > 1 && head.profile == Profile::linear && head.pace != Pace::fastest &&
                 head.pace != Pace::direct;
   switch (head.pace) {
     case Pace::direct:
       if (head.amount > 0 && motion_.accelerates()) {
-        next.asked = std::max<std::int64_t>(
+        next.iterations = std::max<std::int64_t>(
             1, std::llround(2e-9 * static_cast<double>(head.amount) / period_));
       }
       break;
@@ -438,17 +273,17 @@ Motion::Course ActuatorQueue::course(const RecordHead& head, Iteration iteration
       next.profile = Profile::linear;
       break;
     case Pace::iterations:
-      next.asked = std::max<std::int64_t>(1, head.amount);
+      next.iterations = std::max<std::int64_t>(1, head.amount);
       break;
     case Pace::until:
       carry_.reset();
-      next.asked = head.amount - iteration + 1;
+      next.iterations = head.amount - iteration + 1;
       break;
     case Pace::speed:
       next.cruise = head.speed * period_;
       break;
     case Pace::duration:
-      next.asked = timed_ ? row_of_own_time() : carry_.iterations(head.amount);
+      next.iterations = is_timed(head) ? row_of_own_time() : carry_.iterations(head.amount);
       break;
   }
   return next;

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "control/duration.hpp"
@@ -35,42 +36,73 @@ class ActuatorQueue {
     queue_.append(first, last, lane);
   }
   /// Ends all commands. With Status::overwritten the next command may continue the motion.
-  void drop(Status status, Reason reason, Iteration iteration) noexcept;
+  void drop(const Outcome& outcome, Iteration iteration) noexcept;
   /// Ends the commands of one lane, and releases a direct value that this lane has set.
-  void drop_lane(std::uint32_t lane, Status status, Reason reason, Iteration iteration) noexcept;
+  void drop_lane(std::uint32_t lane, const Outcome& outcome, Iteration iteration) noexcept {
+    if (is_of(lane)) {
+      if (runs_ == Runs::alone) ledger_->drop(record_, outcome, iteration);
+      end_motion();
+    }
+    if (holder_ == lane) motion_.hold(false);
+    ledger_->drop(queue_.take(lane), outcome, iteration);
+    if (empty()) end_motion();
+  }
   /// For commands of several actuators (ARCHITECTURE.md, Commands of several actuators); called for
   /// all queues before any step(). Reports that the next command is a member of a group.
-  void arrive(Iteration iteration, std::uint32_t& late_budget) noexcept;
+  void arrive(Iteration iteration, std::uint32_t& late_budget) noexcept {
+    if (runs_ == Runs::queued || !end_late(iteration, late_budget)) return;
+    const RecordHead* head = next_member();
+    // a running set-point counts as having reached a direct command
+    if (head == nullptr || (runs_ != Runs::nothing && !gives_way_to(*head))) return;
+    ledger_->groups().arrive(*head, iteration);
+    // all members use the largest rounding carry
+    if (head->pace == Pace::duration) {
+      ledger_->groups().offer(*head, CommandGroups::Offer::carry, iteration, carry_.carried());
+    }
+  }
   /// Then, if all members have arrived: takes the largest carry of durations.
-  void agree_on_carry(Iteration iteration) noexcept;
+  void agree_on_carry(Iteration iteration) noexcept {
+    const RecordHead* head = next_member();
+    if (runs_ != Runs::nothing || head == nullptr || head->pace != Pace::duration) return;
+    if (may_begin(*head, iteration)) carry_.carry(ledger_->groups().agreed(*head));
+  }
   /// Then, if all members have arrived: proposes its number of iterations. The largest is used.
   void plan_with_others(Iteration iteration, const std::byte* observed) noexcept;
   /// `late_budget`: number of late commands that may still be rejected in this iteration.
-  Moved step(Iteration iteration, const std::byte* observed, std::uint32_t& late_budget) noexcept;
+  Moved step(Iteration iteration, const std::byte* observed, std::uint32_t& late_budget) noexcept {
+    motion_.observe(observed);
+    // mostly the row of a command goes on
+    const bool goes_on = runs_ == Runs::queued && !needs_row(iteration);
+    return goes_on || begin(iteration, observed, late_budget) ? advance(iteration)
+                                                              : come_to_rest(observed);
+  }
   /// True if no command or given target is running or queued.
-  bool empty() const noexcept { return queue_.empty() && !running_; }
-  bool has_no_command() const noexcept { return queue_.empty() && (!running_ || is_given()); }
+  bool empty() const noexcept { return has_no_command() && runs_ == Runs::nothing; }
+  bool has_no_command() const noexcept { return queue_.empty() && !has_record(); }
   /// For targets that are given without a command, to a queue that has none: begins a row of them.
-  void begin_given(Mode mode) noexcept;
-  /// Then, in each iteration: goes to the next one, as a direct command would. The last one stays
-  /// in force.
+  void begin_given(Mode mode) noexcept {
+    if (mode == Mode::overwrite) carry_.reset();
+    motion_.hold(false);
+  }
+  /// Then, in each iteration: goes to the next one, like a direct command. The last stays in force.
   Moved go_to(Iteration iteration, const std::byte* observed, const std::byte* target) noexcept;
   /// True if a direct value keeps a number away from its rest value.
   bool holds() const noexcept { return motion_.holds(); }
   /// True if an iteration without a command would change nothing.
-  bool at_rest() const noexcept {
-    return follows() ? motion_.resting_at_rest() : motion_.at_rest();
-  }
+  bool at_rest() const noexcept { return motion_.at_rest(follows()); }
   /// True if nothing moves.
-  bool rests() const noexcept { return follows() ? motion_.resting_at_rest() : motion_.rests(); }
+  bool rests() const noexcept { return follows() ? at_rest() : motion_.rests(); }
   /// True if a command of this lane is queued or running, or its direct value is still held.
   bool acts(std::uint32_t lane) const noexcept {
-    return queue_.has(lane) || (alone_ != kNoBlock && ledger_->lane_of(alone_) == lane) ||
-           (holder_ == lane && holds());
+    return queue_.has(lane) || is_of(lane) || (holder_ == lane && holds());
   }
 
   /// Sets the desired state, at rest. Numbers that are not finite keep their last desired value.
-  void restart(const std::byte* state) noexcept;
+  void restart(const std::byte* state) noexcept {
+    layout_->copy_finite(desired_, state);
+    motion_.restart(desired_);
+    in_force_ = false;
+  }
   /// One more iteration, after restart(), of a motion that was made elsewhere.
   void trace(const std::byte* state) noexcept {
     layout_->copy_finite(desired_, state);
@@ -78,7 +110,12 @@ class ActuatorQueue {
   }
   /// For an idle actuator that follows: the observed state becomes the desired one, except for
   /// numbers with a rest value, which go to it. True while one of these moves.
-  bool follow(const std::byte* observed) noexcept;
+  bool follow(const std::byte* observed) noexcept {
+    layout_->copy_finite(desired_, observed);
+    in_force_ = false;
+    return motion_.brake(desired_, true);
+  }
+  const StateLayout& layout() const noexcept { return *layout_; }
   bool follows() const noexcept { return when_idle_ == WhenIdle::follow; }
   /// As Motion::difference().
   double difference(std::uint32_t offset, std::uint32_t order) const noexcept {
@@ -86,40 +123,106 @@ class ActuatorQueue {
   }
 
  private:
-  /// What a direct command, or a given target, is: an equal one behind it changes nothing.
+  // waypoints of a trajectory that are read ahead in one iteration, for its span. A motion that
+  // speeds up and stops in i iterations each needs the span of i waypoints in iteration i.
+  static constexpr std::uint32_t kReadAhead = 16;
+
+  /// What moves the actuator.
+  enum class Runs : std::uint8_t {
+    nothing,
+    queued,  // the command at the front of the queue
+    alone,   // a command that may give way to its successor: taken out of the queue
+    given    // a given target, without a record
+  };
+  /// A direct command or a given target, besides its mask and target: an equal one changes nothing.
   struct SetPoint {
     Profile profile = Profile::linear;
     Start start = Start::desired;
     std::int64_t every = 0;  // [ns]
-    bool masked = false;
     bool operator==(const SetPoint&) const = default;
   };
 
-  bool begin_next(Iteration iteration, const std::byte* observed,
-                  std::uint32_t& late_budget) noexcept;
+  bool has_record() const noexcept { return runs_ == Runs::queued || runs_ == Runs::alone; }
+  bool is_of(std::uint32_t lane) const noexcept {
+    return has_record() && ledger_->lane_of(record_) == lane;
+  }
+  bool may_give_way() const noexcept { return runs_ == Runs::alone || runs_ == Runs::given; }
+  /// A set-point gives way to a direct command, a trajectory whose rows have ended to any command.
+  bool gives_way_to(const RecordHead& next) const noexcept {
+    return pace_ != Pace::direct || next.pace == Pace::direct;
+  }
+  bool may_begin(const RecordHead& next, Iteration iteration) noexcept {
+    return !is_member(next) || ledger_->groups().is_complete(next, iteration);
+  }
+  /// The next command of the queue, if it is a member of a group.
+  const RecordHead* next_member() const noexcept {
+    const RecordHead* head = queue_.empty() ? nullptr : &pool_->head(queue_.front());
+    return head != nullptr && is_member(*head) ? head : nullptr;
+  }
+  bool begin(Iteration iteration, const std::byte* observed, std::uint32_t& late_budget) noexcept;
+  bool needs_row(Iteration iteration) const noexcept {
+    const bool row_is_over = pace_ == Pace::direct || iteration > motion_.last();
+    return planned_ || (row_is_over && rows_left_ > 0);
+  }
   bool end_late(Iteration iteration, std::uint32_t& late_budget) noexcept;
-  bool may_give_way() const noexcept { return running_ && (alone_ != kNoBlock || given_); }
-  bool gives_way_to(const RecordHead& next) const noexcept;
-  void give_way(Iteration iteration) noexcept;
-  bool is_in_force(const RecordHead& head, BlockIndex record) noexcept;
+  void give_way(Iteration iteration) noexcept { end(leave(), {Status::overwritten}, iteration); }
   void begin_command(const std::byte* observed) noexcept;
+  bool is_in_force(const SetPoint& next) const noexcept {
+    return in_force_ && !motion_.was_held_back() && next == set_point_;
+  }
+  /// True if the next row is the target already.
+  bool is_next_row_target() noexcept {
+    Cursor next = rows_;
+    next.read(scratch(), layout_->size());
+    return layout_->same(scratch(), motion_.target(), mask());
+  }
   bool begin_row(Iteration iteration) noexcept;
   void plan_row(Iteration iteration) noexcept;
-  void read_row() noexcept;
-  void next_set_point() noexcept;
-  void look_ahead() noexcept;
+  /// The next row of the command => target.
+  void read_row() noexcept {
+    rows_.read(masked_ ? scratch() : motion_.target(), layout_->size());
+    if (masked_) {
+      layout_->copy(motion_.target(), desired_);
+      layout_->copy(motion_.target(), scratch(), mask_.data());
+    }
+    --rows_left_;
+  }
   Motion::Course course(const RecordHead& head, Iteration iteration) noexcept;
   std::int64_t row_of_own_time() noexcept;
-  void end_running(Iteration iteration) noexcept;
-  void end_held_back(Iteration iteration, const Limited& bound) noexcept;
-  void take_out() noexcept;
-  BlockIndex running_record() const noexcept {
-    return alone_ != kNoBlock ? alone_ : queue_.front();
+  Moved advance(Iteration iteration) noexcept;
+  /// Without a command the motion brakes within its limits, and fields with a rest value go to it.
+  Moved come_to_rest(const std::byte* observed) noexcept {
+    motion_.end();
+    carry_.reset();
+    const bool moves = follows() ? follow(observed) : motion_.brake(desired_, false);
+    return moves ? Moved::braking : Moved::idle;
   }
-  bool is_given() const noexcept { return running_ && given_; }
-  Moved come_to_rest(const std::byte* observed) noexcept;
-  void end_motion() noexcept;
+  /// Nothing runs any more; the record of what ran, if it has one.
+  BlockIndex leave() noexcept {
+    if (runs_ == Runs::queued) queue_.pop();
+    return std::exchange(runs_, Runs::nothing) == Runs::given ? kNoBlock : record_;
+  }
+  void end_running(Iteration iteration) noexcept;
+  void end(BlockIndex record, const Outcome& outcome, Iteration iteration) noexcept {
+    if (record != kNoBlock) ledger_->end(record, outcome, iteration);
+  }
+  /// The running command leaves the queue; it ends when it has arrived, or gives way to the next.
+  void take_out() noexcept {
+    queue_.pop();
+    pool_->head(record_).own[Own::kNext] = kNoBlock;
+    runs_ = Runs::alone;
+  }
+  void stop() noexcept {
+    carry_.reset();
+    runs_ = Runs::nothing;
+    planned_ = in_force_ = false;
+  }
+  void end_motion() noexcept {
+    motion_.end();
+    stop();
+  }
   const std::uint64_t* mask() const noexcept { return masked_ ? mask_.data() : nullptr; }
+  std::byte* scratch() noexcept { return reinterpret_cast<std::byte*>(scratch_.data()); }
 
   const StateLayout* layout_;
   BlockPool* pool_;
@@ -131,12 +234,10 @@ class ActuatorQueue {
   Profile usual_profile_;
   WhenIdle when_idle_;
 
-  LaneLists queue_;  // the front is the running command, if `running_` and not `alone_` or `given_`
-  bool running_ = false;
-  // the running command that may give way to its successor: taken out of the queue
-  BlockIndex alone_ = kNoBlock;
-  bool given_ = false;        // a given target is in force, without a record
-  std::uint32_t holder_ = 0;  // lane that gave the direct value that stays
+  LaneLists queue_;
+  Runs runs_ = Runs::nothing;
+  BlockIndex record_ = kNoBlock;  // the running command
+  std::uint32_t holder_ = 0;      // lane that gave the direct value that stays
 
   // the set-point in force: of the running command, or of the last one if nothing came after it
   bool in_force_ = false;
@@ -146,8 +247,6 @@ class ActuatorQueue {
   Pace pace_ = Pace::direct;
   std::uint32_t rows_left_ = 0;
   bool masked_ = false;
-  bool timed_ = false;
-  bool is_trajectory_ = false;
   bool keeps_plan_ = false;          // a set-point equal to the one in force
   bool begun_ = false;               // reported as active
   bool planned_ = false;             // plan_with_others() has planned its next waypoint

@@ -1,13 +1,9 @@
 #pragma once
 
-#include <algorithm>
-#include <array>
 #include <cstdint>
 #include <optional>
-#include <span>
 #include <vector>
 
-#include "control/command_group.hpp"
 #include "control/ledger.hpp"
 #include "control/pool.hpp"
 #include "control/record.hpp"
@@ -15,22 +11,24 @@
 
 namespace o80 {
 
-/// The steps that take a checked batch.
-struct Plan {
-  BlockIndex steps = kNoBlock;     // the first step, linked by Own::kNextStep
-  std::uint32_t missing_from = 0;  // index of the first record without blocks
-  BlockChain spare;                // unused blocks
-  std::uint32_t groups = 0;        // number of commands of several actuators
-};
-
 /// The cost of taking a checked batch, and the properties that decide when it may be taken.
 struct Effort {
-  std::uint32_t work = 0;      // part of the budget of an iteration; copying a block is 1
-  std::uint32_t requests = 0;  // number of requests to the driver
-  bool express = false;        // only purges and control orders
-  bool releases = false;       // releases exclusive control
-  bool moves = false;          // has a command, or a request without `while_halted`
-  bool free = false;           // only resumes and marks, which need no control, and no burst
+  std::uint32_t work = 0;          // part of the budget of an iteration; copying a block is 1
+  std::uint32_t requests : 7 = 0;  // number of requests to the driver
+  std::uint32_t express : 1 = 0;   // only purges and control orders
+  std::uint32_t releases : 1 = 0;  // releases exclusive control
+  std::uint32_t moves : 1 = 0;     // has a command, or a request without `while_halted`
+  std::uint32_t free : 1 = 0;      // only resumes and marks, which need no control, and no burst
+  std::uint32_t groups : 21 = 0;   // number of commands of several actuators
+};
+
+/// The steps that take a checked batch.
+struct Plan {
+  BlockIndex steps = kNoBlock;        // the first step, linked by Own::kNextStep
+  std::uint32_t missing_from = 0;     // index of the first record without blocks
+  BlockIndex spare_first = kNoBlock;  // unused blocks, to the end of the batch
+  std::uint32_t spare_blocks = 0;
+  Effort effort;
 };
 
 /// Checks the records of a batch in the pool, and reduces them to the few steps that take it.
@@ -46,11 +44,11 @@ struct Effort {
 /// Realtime: everything but construction.
 class BatchPlanner {
  public:
-  BatchPlanner(const Schema& schema, RecordCheck::Layouts layouts, BlockPool& pool,
-               std::uint32_t lanes);
+  BatchPlanner(const Schema& schema, const Layouts& layouts, BlockPool& pool, std::uint32_t lanes);
+  BatchPlanner(const BatchPlanner&) = delete;
+  ~BatchPlanner();
 
-  /// Continues the check of a batch for about `budget` blocks, and reduces `budget` by them. True
-  /// when the whole batch is checked.
+  /// Checks about `budget` more blocks, and reduces `budget` by them. True when all are checked.
   bool check(std::uint32_t lane, BlockIndex batch, std::uint32_t& budget) noexcept;
   /// The cost of taking a checked batch.
   Effort effort(BlockIndex batch) const noexcept;
@@ -59,105 +57,23 @@ class BatchPlanner {
   /// Forgets a batch that will not be taken.
   void forget(std::uint32_t lane, BlockIndex batch) noexcept;
   /// The last record of the list of a step.
-  BlockIndex tail(BlockIndex step) const noexcept { return tails_[step]; }
+  BlockIndex tail(BlockIndex step) const noexcept { return shared_.tails[step]; }
 
  private:
-  static constexpr std::size_t kFirstStep = 0;  // of BatchRecord::own
-
+  struct Batch;
+  struct Lane;
   enum class Known : std::uint8_t { nothing, plan, garbage };
-  /// Effect of the present part of a batch on one queue, before its own commands are appended.
-  struct Done {
-    bool empty = false;      // all commands are dropped
-    bool empty_own = false;  // all commands of this lane are dropped
-    bool at_rest = false;    // the actuator brakes
-    bool purged = false;     // all commands are purged
+  /// What all lanes use.
+  struct Shared {
+    BlockPool& pool;
+    RecordCheck check;
+    std::vector<BlockIndex> tails;   // one for each block
+    std::vector<bool> while_halted;  // one for each request
   };
-  /// One actuator in the present part of the batch of a lane.
-  struct Target {
-    std::uint64_t epoch = 0;      // valid while it equals Lane::epoch
-    BlockIndex list = kNoBlock;   // commands that will be appended, unless they are dropped
-    bool list_is_step = false;    // its first command overwrites, and is a step already
-    bool listed = false;          // is in `listed_`
-    BlockIndex group = kNoBlock;  // the last group with a member of this actuator
-    Done done;
-  };
-  struct Lane {
-    BlockIndex batch = kNoBlock;   // being checked
-    BlockIndex cursor = kNoBlock;  // first block of the record being checked
-    bool begun = false;            // the check of the record has begun
-    RecordCheck::Verdict verdict = RecordCheck::Verdict::unfinished;
-    BlockIndex last = kNoBlock;  // last block of the record that was reached
-    std::uint32_t to_walk = 0;   // blocks from `last` to the end of the record
-    BlockIndex last_step = kNoBlock;
-    std::uint32_t place = 0;
-    std::uint32_t record_blocks = 0;
-    std::uint32_t blocks = 0;  // blocks of the batch that are checked
-    std::uint64_t epoch = 0;
-    RecordCheck::Progress progress;
-    Effort effort;
-    std::uint32_t control_orders = 0;
-    std::uint32_t free = 0;  // resumes and marks
-    // the group whose members are being checked
-    BlockIndex group = kNoBlock;
-    BlockIndex first_member = kNoBlock;
-    BlockIndex last_member = kNoBlock;
-    std::uint32_t members_left = 0;
-    std::uint32_t group_blocks = 0;
-    std::uint32_t groups = 0;  // groups of the batch so far
-    // the present part
-    std::array<BlockIndex, 4> ends{};  // for each End the first record of its list
-    Done all;                          // effect on every queue
-    std::uint32_t listed = 0;
-  };
-  /// Index into Lane::ends.
-  enum class End : std::uint8_t { invalid, overwritten, purged, completed };
 
-  void begin(Lane& lane, BlockIndex batch) noexcept;
-  void begin_record(Lane& lane) noexcept;
-  static void stop_reading(Lane& lane) noexcept;
-  bool check_record(std::uint32_t lane, std::uint32_t& budget) noexcept;
-  void go_on_behind(Lane& lane) noexcept;
-  bool is_one_too_many(Lane& lane, const RecordHead& head) const noexcept;
-  void complete(std::uint32_t lane, std::uint32_t& budget) noexcept;
-
-  // groups
-  bool fits_group(std::uint32_t lane, const RecordHead& head) noexcept;
-  void begin_group(Lane& lane) noexcept;
-  void add_member(Lane& lane) noexcept;
-  void complete_group(std::uint32_t lane, std::uint32_t& budget) noexcept;
-  void fail_group(std::uint32_t lane, std::uint32_t& budget) noexcept;
-
-  // a checked record => steps
-  void add(std::uint32_t lane, BlockIndex record, std::uint32_t& budget) noexcept;
-  void add_command(std::uint32_t lane, BlockIndex record) noexcept;
-  void add_purge(std::uint32_t lane, BlockIndex record, std::uint32_t& budget) noexcept;
-  bool purge_one(std::uint32_t lane, std::uint32_t actuator, bool own) noexcept;
-  bool purge_all(std::uint32_t lane, bool own, std::uint32_t& budget) noexcept;
-  void end_part(std::uint32_t lane, std::uint32_t& budget) noexcept;
-  void begin_part(Lane& lane) noexcept;
-  void drop_list(Lane& lane, Target& target, End end) noexcept;
-  void add_to_end(Lane& lane, End end, BlockIndex list) noexcept;
-  void add_step(Lane& lane, BlockIndex record, std::uint32_t work) noexcept;
-  void join(BlockIndex list, BlockIndex first, BlockIndex last) noexcept;
-
-  static void spend(std::uint32_t& budget, std::uint32_t work) noexcept {
-    budget -= std::min(budget, work);
-  }
-  Target& target(std::uint32_t lane, std::uint32_t actuator) noexcept;
-  void list(std::uint32_t lane, std::uint32_t actuator) noexcept;
-  std::span<std::uint16_t> listed(std::uint32_t lane) noexcept {
-    return {listed_.data() + std::size_t{lane} * actuators_, lanes_[lane].listed};
-  }
-
-  BlockPool& pool_;
-  RecordCheck check_;
-  std::uint32_t actuators_;
+  Shared shared_;
   std::vector<Lane> lanes_;
-  std::vector<Target> targets_;        // one for each lane and actuator
-  std::vector<std::uint16_t> listed_;  // for each lane: actuators of its present part
-  std::vector<BlockIndex> tails_;      // one for each block
-  std::vector<Known> known_;           // one for each block
-  std::vector<bool> while_halted_;     // one for each request
+  std::vector<Known> known_;  // one for each block
 };
 
 }  // namespace o80

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <utility>
 
 #include "control/pool.hpp"
 #include "control/record.hpp"
@@ -24,10 +25,9 @@ struct CommandGroup {
   Status end = Status::none;  // the first end status of a member that is not completed
   Reason reason = Reason::none;
   std::uint8_t detail = 0;
-  std::uint8_t active : 1 = 0;    // reported as active
-  std::uint8_t offered : 2 = 0;   // a CommandGroups::Offer
-  std::uint8_t decided : 1 = 0;   // its members have nothing left to agree on
-  std::uint8_t was_late : 1 = 0;  // kOffers is the delay of the latest member that has ended
+  std::uint8_t active : 1 = 0;   // reported as active
+  std::uint8_t offered : 2 = 0;  // a CommandGroups::Offer
+  std::uint8_t decided : 1 = 0;  // its members have nothing left to agree on
 };
 static_assert(sizeof(CommandGroup) == kBlockBytes - sizeof(RecordHead));
 
@@ -47,8 +47,12 @@ class CommandGroups {
     return *reinterpret_cast<CommandGroup*>(pool_->bytes(head) + sizeof(RecordHead));
   }
 
-  /// Notes that a member is the next command of its queue. All queues call it before any calls
-  /// is_complete().
+  /// The group is complete.
+  void begin(BlockIndex head) noexcept {
+    const auto members = static_cast<std::uint16_t>(std::exchange(pool_->head(head).rows, 0));
+    at(head) = {.open = members};
+  }
+  /// Notes that a member is next in its queue. All queues call it before any calls is_complete().
   void arrive(const RecordHead& member, Iteration iteration) noexcept {
     const BlockIndex head = head_of(member);
     CommandGroup& group = at(head);
@@ -76,25 +80,19 @@ class CommandGroups {
     group.offered = static_cast<std::uint8_t>(kind) & 3U;
     stamp(head, kOffers) = low(iteration);
   }
-  /// A decided group needs no offers: their word keeps by how much its members are late.
+  /// Notes by how much a member was late, if their times are decided; `rows` of the head has it.
   void note_late(BlockIndex head, std::int64_t late) noexcept {
-    CommandGroup& group = at(head);
-    if (late <= 0 || group.decided == 0) return;
-    const std::uint32_t known = group.was_late != 0 ? stamp(head, kOffers) : 0;
-    group.was_late = 1;
-    stamp(head, kOffers) = static_cast<std::uint32_t>(
-        std::max<std::int64_t>(known, std::min<std::int64_t>(late, 0xFFFF)));
+    std::uint32_t& most = pool_->head(head).rows;
+    if (at(head).decided == 0 || late <= most) return;
+    most = static_cast<std::uint32_t>(std::min<std::int64_t>(late, 0xFFFF));
   }
-  std::int64_t late(BlockIndex head) noexcept {
-    return at(head).was_late != 0 ? stamp(head, kOffers) : 0;
-  }
+  std::int64_t late(BlockIndex head) const noexcept { return pool_->head(head).rows; }
   std::int64_t agreed(const RecordHead& member) const noexcept {
     return pool_->head(head_of(member)).amount;
   }
 
  private:
-  // words of RecordHead::own for iterations (low 32 bits). They are unused in a group record,
-  // because it is in no queue.
+  // words of RecordHead::own for iterations (low 32 bits); a group record is in no queue
   static constexpr std::size_t kArrivals = 0;
   static constexpr std::size_t kOffers = 3;
 

@@ -2,18 +2,11 @@
 
 #include <algorithm>
 #include <bit>
+#include <limits>
 #include <utility>
-
-#include "control/layouts_of_types.hpp"
 
 namespace o80 {
 namespace {
-
-RecordCheck::Layouts pointers_to(const std::vector<std::optional<StateLayout>>& layouts) {
-  RecordCheck::Layouts pointers;
-  for (const auto& layout : layouts) pointers.push_back(layout ? &*layout : nullptr);
-  return pointers;
-}
 
 /// Calls `visit(index)` for each bit set.
 template <class Visit>
@@ -29,44 +22,24 @@ Controller::Controller(const Schema& schema, BlockPool& pool, StatusSink& sink, 
     : pool_(pool),
       ledger_(pool, sink),
       layouts_(layouts_of_types(schema)),
-      planner_(schema, pointers_to(layouts_), pool, lanes),
+      planner_(schema, layouts_, pool, lanes),
       purge_tickets_(lanes, static_cast<std::uint32_t>(schema.actuators.size())),
       desired_((schema.head.block + kBlockBytes - 1) / kBlockBytes) {
   const auto count = static_cast<std::uint32_t>(schema.actuators.size());
   const std::uint32_t words = mask_words(count);
-  active_mask_.resize(words);
-  clamped_mask_.resize(words);
-  braking_mask_.resize(words);
-  busy_.resize(words);
-  stepped_.resize(words);
-  dropped_.resize(words);
-  follow_.resize(words);
+  for (Mask* mask :
+       {&active_mask_, &clamped_mask_, &braking_mask_, &busy_, &stepped_, &follow_, &dropped_}) {
+    mask->resize(words);
+  }
   actuators_.reserve(count);
   auto* block = reinterpret_cast<std::byte*>(desired_.data());
   for (std::uint32_t i = 0; i < count; ++i) {
     const ActuatorRow& row = schema.actuators[i];
     offsets_.push_back(row.offset);
-    types_.push_back(&*layouts_[row.type]);
     actuators_.emplace_back(schema, row, *layouts_[row.type], pool_, ledger_, block + row.offset,
                             lanes);
-    busy_[i / 64] |= std::uint64_t{1} << (i % 64);
-    if (row.when_idle == WhenIdle::follow) follow_[i / 64] |= std::uint64_t{1} << (i % 64);
-  }
-}
-
-void Controller::restart(const std::byte* observed, const std::byte* wanted,
-                         Iteration row) noexcept {
-  const std::byte* source = wanted != nullptr ? wanted : observed;
-  for (std::uint32_t i = 0; i < actuators_.size(); ++i) {
-    O80_COUNT(queue_dropped);
-    actuators_[i].drop(Status::purged, Reason::fresh_start, row);
-    actuators_[i].restart(of(i, source));
-    busy_[i / 64] |= std::uint64_t{1} << (i % 64);
-  }
-  for (std::size_t word = 0; word < busy_.size(); ++word) {
-    active_mask_[word] = 0;
-    clamped_mask_[word] = 0;
-    braking_mask_[word] = 0;
+    set(busy_, i);
+    if (row.when_idle == WhenIdle::follow) set(follow_, i);
   }
 }
 
@@ -103,34 +76,22 @@ void Controller::step(Iteration iteration, const std::byte* observed) noexcept {
     each_bit(follow_[word] & ~busy_[word], base,
              [&](std::uint32_t i) { actuators_[i].follow(of(i, observed)); });
     each_bit(busy_[word] & ~stepped, base, [&](std::uint32_t i) {
+      using Moved = ActuatorQueue::Moved;
       ActuatorQueue& queue = actuators_[i];
       const std::uint64_t bit = std::uint64_t{1} << (i % 64);
-      switch (queue.step(iteration, of(i, observed), late_budget)) {
-        case ActuatorQueue::Moved::idle:
-          // the queue is not empty if late commands have used up their budget
-          if (queue.empty() && queue.at_rest()) busy_[word] &= ~bit;
-          break;
-        case ActuatorQueue::Moved::braking:
-          braking |= bit;
-          active |= bit;
-          break;
-        case ActuatorQueue::Moved::clamped:
-          clamped |= bit;
-          [[fallthrough]];
-        case ActuatorQueue::Moved::active:
-          active |= bit;
-      }
+      const Moved moved = queue.step(iteration, of(i, observed), late_budget);
+      // the queue is not empty if late commands have used up their budget
+      if (moved == Moved::idle && queue.empty() && queue.at_rest()) busy_[word] &= ~bit;
+      if (moved == Moved::idle) return;
+      active |= bit;
+      if (moved == Moved::braking) braking |= bit;
+      if (moved == Moved::clamped) clamped |= bit;
     });
     active_mask_[word] = active;
     clamped_mask_[word] = clamped;
     braking_mask_[word] = braking;
   }
   told_ += kStatusesPerIteration - late_budget;
-}
-
-bool Controller::has_no_command(std::span<const std::uint32_t> actuators) const noexcept {
-  return std::ranges::all_of(actuators,
-                             [&](std::uint32_t i) { return actuators_[i].has_no_command(); });
 }
 
 /// The targets of this iteration => desired.
@@ -141,90 +102,100 @@ void Controller::step_given(Iteration iteration, const std::byte* observed) noex
   const auto step = static_cast<std::size_t>(iteration - given_.first);
   const std::byte* states = given_.states;
   for (const std::uint32_t i : given_.actuators) {
-    const std::size_t size = types_[i]->size();
+    const std::size_t size = actuators_[i].layout().size();
     const std::byte* target = states + step * size;
     states += given_.steps * size;
-    const std::uint64_t bit = std::uint64_t{1} << (i % 64);
-    if ((dropped_[i / 64] & bit) != 0) continue;
+    if (masked(dropped_.data(), i)) continue;
     if (first) actuators_[i].begin_given(given_.mode);
-    const bool clamped =
-        actuators_[i].go_to(iteration, of(i, observed), target) == ActuatorQueue::Moved::clamped;
-    stepped_[i / 64] |= bit;
-    busy_[i / 64] |= bit;
-    clamped_mask_[i / 64] = clamped ? clamped_mask_[i / 64] | bit : clamped_mask_[i / 64] & ~bit;
+    clamped_mask_[i / 64] &= ~(std::uint64_t{1} << (i % 64));
+    if (actuators_[i].go_to(iteration, of(i, observed), target) == ActuatorQueue::Moved::clamped) {
+      set(clamped_mask_, i);
+    }
+    set(stepped_, i);
+    set(busy_, i);
   }
 }
 
-/// Ends targets that have begun: they no longer reach this actuator.
-void Controller::forget_given(std::uint32_t actuator) noexcept {
-  if (was_given_) dropped_[actuator / 64] |= std::uint64_t{1} << (actuator % 64);
-}
+void Controller::take(std::uint32_t lane, BlockIndex batch, BatchHandler& handler) noexcept {
+  std::uint32_t budget = std::numeric_limits<std::uint32_t>::max();
+  planner_.check(lane, batch, budget);
+  const std::optional<Plan> plan = planner_.plan(batch);
+  const Iteration taken_at = handler.iteration();
+  if (!plan) return ledger_.reject(lane, batch, {Status::rejected, Reason::invalid}, taken_at);
 
-bool Controller::finish_all_pending() noexcept {
-  const std::uint32_t told = std::min(std::exchange(told_, 0), kStatusesPerIteration);
-  ledger_.report_ends(kStatusesPerIteration - told);
-  return !ledger_.pending();
-}
-
-bool Controller::acts(std::uint32_t lane) const noexcept {
-  return std::ranges::any_of(actuators_,
-                             [&](const ActuatorQueue& queue) { return queue.acts(lane); });
-}
-
-double Controller::difference(std::uint32_t offset, std::uint32_t order) const noexcept {
-  const auto behind = std::ranges::upper_bound(offsets_, offset);
-  if (behind == offsets_.begin()) return 0.0;
-  const auto i = static_cast<std::size_t>(behind - offsets_.begin()) - 1;
-  if ((active_mask_[i / 64] >> (i % 64) & 1) == 0) return 0.0;
-  return actuators_[i].difference(offset - offsets_[i], order);
-}
-
-std::optional<NotFinite> Controller::not_finite(const std::byte* block) const noexcept {
-  for (std::uint32_t i = 0; i < actuators_.size(); ++i) {
-    const std::uint32_t number = types_[i]->first_not_finite(of(i, block));
-    if (number != StateLayout::kNoNumber) return NotFinite{i, number};
+  const Taking from{lane, pool_.batch(batch).ticket};
+  const BlockChain spare{plan->spare_first, pool_.chain(batch).last, plan->spare_blocks};
+  ledger_.enter(lane, batch, spare, plan->missing_from, plan->effort.groups, taken_at);
+  for (BlockIndex step = plan->steps; step != kNoBlock;) {
+    const BlockIndex record = step;
+    step = pool_.head(record).own[Own::kNextStep];
+    take_step(from, record, handler);
   }
-  return std::nullopt;
+  ledger_.close(batch, taken_at);
 }
 
-bool Controller::active() const noexcept {
-  for (const ActuatorQueue& queue : actuators_) {
-    if (!queue.empty()) return true;
+void Controller::take_step(const Taking& from, BlockIndex record, BatchHandler& handler) noexcept {
+  const RecordHead& head = pool_.head(record);
+  // read before the request: a fresh start in it increases the iteration
+  const Iteration now = handler.iteration();
+  const auto end = [&](const Outcome& outcome) { ledger_.end(record, outcome, now); };
+  switch (head.kind) {
+    case RecordKind::command:
+    case RecordKind::overwriter_overwritten:
+    case RecordKind::overwriter_purged:
+      return take_commands(from, record, now);
+    case RecordKind::purge: {
+      const bool own = head.only_own != 0;
+      purge_tickets_.raise(own ? from.lane : PurgeTickets::kEveryLane, head.actuator, from.ticket);
+      if (own) {
+        purge_lane(from.lane, head.actuator, now);
+      } else {
+        purge(head.actuator, now);
+      }
+      return end({});
+    }
+    case RecordKind::request: {
+      const Cursor payload(pool_, record, sizeof(RecordHead), head.payload_bytes);
+      const Outcome outcome = handler.request(from.lane, head.id, record, head.actuator, payload);
+      if (outcome.status == Status::active) return ledger_.activate(record, now);
+      return end(outcome);
+    }
+    case RecordKind::take_control:
+      return end(handler.take_control(from.lane));
+    case RecordKind::release_control:
+      return end(handler.release_control(from.lane));
+    case RecordKind::resume:
+      return end(handler.resume(from.lane, head.id, static_cast<std::uint64_t>(head.amount),
+                                head.accepts != 0));
+    case RecordKind::overwritten_list:
+      return ledger_.drop(record, {Status::overwritten}, now);
+    case RecordKind::purged_list:
+      return ledger_.drop(record, {Status::purged}, now);
+    case RecordKind::completed_list:
+      return ledger_.drop(record, {Status::completed}, now);
+    default:
+      ledger_.drop(record, {Status::rejected, Reason::invalid}, now);
   }
-  return false;
 }
 
-void Controller::purge(std::uint32_t actuator, Iteration iteration, Reason reason) noexcept {
-  each(actuator, [&](ActuatorQueue& queue) { queue.drop(Status::purged, reason, iteration); });
-}
-
-void Controller::purge_lane(std::uint32_t lane, std::uint32_t actuator, Iteration iteration,
-                            Reason reason) noexcept {
-  each(actuator,
-       [&](ActuatorQueue& queue) { queue.drop_lane(lane, Status::purged, reason, iteration); });
-}
-
-void Controller::halt(Iteration iteration) noexcept {
-  each(kEveryActuator,
-       [&](ActuatorQueue& queue) { queue.drop(Status::halted, Reason::halted, iteration); });
-}
-
-void Controller::interrupt(std::uint32_t actuator, Iteration iteration) noexcept {
-  forget_given(actuator);
-  each(actuator,
-       [&](ActuatorQueue& queue) { queue.drop(Status::interrupted, Reason::none, iteration); });
-}
-
-bool Controller::braking() const noexcept {
-  // in the last step; or in the next one, for an actuator that has just lost its command
-  return std::ranges::any_of(braking_mask_, [](std::uint64_t word) { return word != 0; }) ||
-         std::ranges::any_of(actuators_, [](const ActuatorQueue& queue) {
-           return queue.empty() && !queue.rests();
-         });
-}
-
-bool Controller::holds() const noexcept {
-  return std::ranges::any_of(actuators_, [](const ActuatorQueue& queue) { return queue.holds(); });
+/// Appends a list of commands to its queue, unless a purge or their own batch has ended them.
+void Controller::take_commands(const Taking& from, BlockIndex first, Iteration iteration) noexcept {
+  const RecordHead& head = pool_.head(first);
+  if (purge_tickets_.cover(from.lane, head.actuator, from.ticket)) {
+    // purged commands must not overwrite commands that were sent after the purge
+    return ledger_.drop(first, {Status::purged}, iteration);
+  }
+  ActuatorQueue& queue = actuators_[head.actuator];
+  if (head.mode == Mode::overwrite) {
+    O80_COUNT(queue_dropped);
+    queue.drop({Status::overwritten}, iteration);
+  }
+  if (head.kind != RecordKind::command) {
+    const bool overwritten = head.kind == RecordKind::overwriter_overwritten;
+    return ledger_.drop(first, {overwritten ? Status::overwritten : Status::purged}, iteration);
+  }
+  queue.append(first, planner_.tail(first), from.lane);
+  set(busy_, head.actuator);
 }
 
 }  // namespace o80

@@ -1,14 +1,15 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include "control/actuator_queue.hpp"
-#include "control/batch_handler.hpp"
 #include "control/batch_plan.hpp"
-#include "control/direct_targets.hpp"
 #include "control/ledger.hpp"
 #include "control/pool.hpp"
 #include "control/purge_tickets.hpp"
@@ -18,6 +19,43 @@
 #include "o80/describe/schema.hpp"
 
 namespace o80 {
+
+/// Called by the controller while it takes a batch.
+class BatchHandler {
+ public:
+  /// The iteration about to run; a fresh start inside request() may increase it.
+  virtual Iteration iteration() const noexcept = 0;
+  /// Serves a request; may call `Controller::restart`. `payload` holds the whole struct. The
+  /// request ends with the iteration at which it began: that of the fresh row, if it made one. If
+  /// the outcome is active, `Controller::end` ends the record later.
+  virtual Outcome request(std::uint32_t lane, CommandId id, BlockIndex record, std::uint32_t index,
+                          Cursor payload) noexcept = 0;
+  virtual Outcome take_control(std::uint32_t lane) noexcept = 0;
+  virtual Outcome release_control(std::uint32_t lane) noexcept = 0;
+  /// Clears halts up to this number; may call `Controller::restart`, as a request may.
+  /// `accepts`: whatever the readings are.
+  virtual Outcome resume(std::uint32_t /*lane*/, CommandId /*id*/, std::uint64_t /*number*/,
+                         bool /*accepts*/) noexcept {
+    return {};
+  }
+
+ protected:
+  ~BatchHandler() = default;
+};
+
+/// Targets of consecutive iterations that reach the desired states without a batch: what an inline
+/// group sends in a burst. They act as one trajectory with a target in each iteration.
+struct DirectTargets {
+  std::span<const std::uint32_t> actuators;  // each once
+  std::uint32_t steps = 0;                   // targets of each actuator
+  const std::byte* states = nullptr;  // those of the first actuator, then those of the second, ...
+  Mode mode = Mode::queue;
+  Iteration first = 0;  // the iteration of the first target
+
+  bool acts(Iteration iteration) const noexcept {
+    return iteration >= first && iteration - first < static_cast<Iteration>(steps);
+  }
+};
 
 /// Position of a number in a block of states that is NaN or infinite.
 struct NotFinite {
@@ -40,11 +78,17 @@ class Controller {
 
   Controller(const Schema& schema, BlockPool& pool, StatusSink& sink, std::uint32_t lanes = 8);
   Controller(const Controller&) = delete;
-  Controller& operator=(const Controller&) = delete;
 
-  /// The first start or a fresh start: sets the desired block to `desired`, or to `observed` if
+  /// The first start or a fresh start: sets the desired block to `wanted`, or to `observed` if
   /// that is null. All commands end as purged (fresh_start) at iteration `row`.
-  void restart(const std::byte* observed, const std::byte* desired, Iteration row) noexcept;
+  void restart(const std::byte* observed, const std::byte* wanted, Iteration row) noexcept {
+    const std::byte* source = wanted != nullptr ? wanted : observed;
+    each(kEveryActuator, [&](std::uint32_t i) {
+      actuators_[i].drop({Status::purged, Reason::fresh_start}, row);
+      actuators_[i].restart(of(i, source));
+    });
+    for (Mask* mask : {&active_mask_, &clamped_mask_, &braking_mask_}) std::ranges::fill(*mask, 0);
+  }
 
   /// One more iteration, after restart(), of a motion that was made elsewhere: its desired block.
   void trace(const std::byte* desired) noexcept {
@@ -60,23 +104,27 @@ class Controller {
   /// The cost of taking a checked batch.
   Effort effort(BlockIndex batch) const noexcept { return planner_.effort(batch); }
   /// Takes a whole batch at `handler.iteration()`. This overwrites the batch record in the pool:
-  /// copy `burst` and `flags` before. A purge also ends commands with lower tickets that are taken
-  /// later.
+  /// copy `burst` and `flags` before. A purge also ends later commands with lower tickets.
   void take(std::uint32_t lane, BlockIndex batch, BatchHandler& handler) noexcept;
   /// Rejects a whole batch instead of taking it. finish_pending() ends its records with `status`.
   void reject(std::uint32_t lane, BlockIndex batch, Reason reason, std::uint8_t detail,
-              Iteration iteration, Status status = Status::rejected) noexcept;
+              Iteration iteration, Status status = Status::rejected) noexcept {
+    planner_.forget(lane, batch);
+    ledger_.reject(lane, batch, {status, reason, detail}, iteration);
+  }
 
   /// Ends a request that was active after take().
   void end(BlockIndex request, const Outcome& outcome, Iteration iteration) noexcept {
-    ledger_.end(request, outcome.status, outcome.reason, outcome.detail, iteration);
+    ledger_.end(request, outcome, iteration);
   }
 
   /// True if none of these actuators has a command: give() may be called.
-  bool has_no_command(std::span<const std::uint32_t> actuators) const noexcept;
+  bool has_no_command(std::span<const std::uint32_t> actuators) const noexcept {
+    return std::ranges::all_of(actuators,
+                               [&](std::uint32_t i) { return actuators_[i].has_no_command(); });
+  }
   /// Gives targets to the next iterations, as if a batch with a trajectory for each actuator were
-  /// taken in iteration `targets.first`. Their memory must outlive those iterations, or
-  /// take_back().
+  /// taken in iteration `targets.first`. Their memory must outlive these iterations or take_back().
   void give(const DirectTargets& targets) noexcept {
     given_ = targets;
     was_given_ = false;
@@ -87,24 +135,35 @@ class Controller {
   void step(Iteration iteration, const std::byte* observed) noexcept;
 
   /// Ends all commands of an actuator, or of kEveryActuator; O(1) for each actuator.
-  void purge(std::uint32_t actuator, Iteration iteration, Reason reason = Reason::none) noexcept;
-  /// Ends the commands that one lane has sent to an actuator, or to kEveryActuator; O(lanes) for
-  /// each actuator.
+  void purge(std::uint32_t actuator, Iteration iteration, Reason reason = Reason::none) noexcept {
+    drop(actuator, {Status::purged, reason}, iteration);
+  }
+  /// Ends the commands of one lane for an actuator or kEveryActuator; O(lanes) for each actuator.
   void purge_lane(std::uint32_t lane, std::uint32_t actuator, Iteration iteration,
-                  Reason reason = Reason::none) noexcept;
+                  Reason reason = Reason::none) noexcept {
+    each(actuator, [&](std::uint32_t i) {
+      actuators_[i].drop_lane(lane, {Status::purged, reason}, iteration);
+    });
+  }
   /// Earlier purges no longer end commands that are taken later; for an invalid ticket counter.
   void forget_tickets() noexcept { purge_tickets_.forget(); }
   /// Ends all commands as halted; each actuator then brakes within its limits.
-  void halt(Iteration iteration) noexcept;
-  /// Ends all commands of an actuator as interrupted.
-  void interrupt(std::uint32_t actuator, Iteration iteration) noexcept;
+  void halt(Iteration iteration) noexcept {
+    drop(kEveryActuator, {Status::halted, Reason::halted}, iteration);
+  }
+  /// Ends all commands of an actuator as interrupted. Targets that have begun no longer reach it.
+  void interrupt(std::uint32_t actuator, Iteration iteration) noexcept {
+    if (was_given_) set(dropped_, actuator);
+    drop(actuator, {Status::interrupted}, iteration);
+  }
 
   /// Reports the end statuses of dropped commands, at most kStatusesPerIteration minus those that
   /// the last step() has reported. False if some are left.
   bool finish_pending() noexcept {
-    if (ledger_.pending()) return finish_all_pending();
-    told_ = 0;
-    return true;
+    const std::uint32_t told = std::exchange(told_, 0);
+    if (!ledger_.pending()) return true;
+    ledger_.report_ends(kStatusesPerIteration - std::min(told, kStatusesPerIteration));
+    return !ledger_.pending();
   }
 
   /// The desired block, in the layout of the schema.
@@ -118,22 +177,41 @@ class Controller {
   /// One bit for each actuator: it braked in the last step, without a command.
   const std::uint64_t* braking_mask() const noexcept { return braking_mask_.data(); }
   /// True if an actuator without a command is not at rest; O(actuators).
-  bool braking() const noexcept;
+  bool braking() const noexcept {
+    // in the last step; or in the next one, for an actuator that has just lost its command
+    return std::ranges::any_of(braking_mask_, [](std::uint64_t word) { return word != 0; }) ||
+           any([](const ActuatorQueue& queue) { return queue.empty() && !queue.rests(); });
+  }
   /// First (order 1) or second difference, to the iteration before, of the number at this offset
   /// of the desired block; 0 for an actuator that was not active, and for what does not move.
-  double difference(std::uint32_t offset, std::uint32_t order) const noexcept;
+  double difference(std::uint32_t offset, std::uint32_t order) const noexcept {
+    const auto behind = std::ranges::upper_bound(offsets_, offset);
+    if (behind == offsets_.begin()) return 0.0;
+    const auto i = static_cast<std::size_t>(behind - offsets_.begin()) - 1;
+    if (!masked(active_mask_.data(), i)) return 0.0;
+    return actuators_[i].difference(offset - offsets_[i], order);
+  }
   /// Number of 64-bit words of a mask.
   std::uint32_t words() const noexcept { return static_cast<std::uint32_t>(active_mask_.size()); }
 
   /// True if a command is running or queued; O(actuators).
-  bool active() const noexcept;
+  bool active() const noexcept {
+    return any([](const ActuatorQueue& queue) { return !queue.empty(); });
+  }
   /// True if a direct value keeps a number away from its rest value; O(actuators).
-  bool holds() const noexcept;
-  /// True if a command of this lane is running or queued, or its direct value is still held;
-  /// O(actuators).
-  bool acts(std::uint32_t lane) const noexcept;
+  bool holds() const noexcept { return any(&ActuatorQueue::holds); }
+  /// True if a command of this lane runs or waits, or its direct value is held; O(actuators).
+  bool acts(std::uint32_t lane) const noexcept {
+    return any([&](const ActuatorQueue& queue) { return queue.acts(lane); });
+  }
   /// The first number of a block of states that is infinite or NaN, if any; O(numbers).
-  std::optional<NotFinite> not_finite(const std::byte* block) const noexcept;
+  std::optional<NotFinite> not_finite(const std::byte* block) const noexcept {
+    for (std::uint32_t i = 0; i < actuators_.size(); ++i) {
+      const std::uint32_t number = actuators_[i].layout().first_not_finite(of(i, block));
+      if (number != StateLayout::kNoNumber) return NotFinite{i, number};
+    }
+    return std::nullopt;
+  }
   /// True if end statuses of dropped commands have not been reported yet.
   bool pending() const noexcept { return ledger_.pending(); }
 
@@ -145,46 +223,55 @@ class Controller {
   };
   void take_step(const Taking& from, BlockIndex record, BatchHandler& handler) noexcept;
   void take_commands(const Taking& from, BlockIndex first, Iteration iteration) noexcept;
-  void take_purge(const Taking& from, const RecordHead& head, Iteration iteration) noexcept;
   void step_groups(Iteration iteration, const std::byte* observed,
                    std::uint32_t& late_budget) noexcept;
-  bool finish_all_pending() noexcept;
   void step_given(Iteration iteration, const std::byte* observed) noexcept;
-  void forget_given(std::uint32_t actuator) noexcept;
+  void drop(std::uint32_t actuator, const Outcome& outcome, Iteration iteration) noexcept {
+    each(actuator, [&](std::uint32_t i) { actuators_[i].drop(outcome, iteration); });
+  }
   const std::byte* of(std::uint32_t actuator, const std::byte* block) const noexcept {
     return block + offsets_[actuator];
   }
-  /// Calls `visit(ActuatorQueue&)` for one actuator or kEveryActuator, and marks them as busy.
+  template <class Predicate>
+  bool any(Predicate predicate) const noexcept {
+    return std::ranges::any_of(actuators_, predicate);
+  }
+  /// Calls `visit(index)`, which drops commands, for one actuator or kEveryActuator: now busy.
   template <class Visit>
   void each(std::uint32_t actuator, Visit&& visit) noexcept {
     const auto last = static_cast<std::uint32_t>(actuators_.size());
     for (std::uint32_t i = actuator == kEveryActuator ? 0 : actuator; i < last; ++i) {
       O80_COUNT(queue_dropped);
-      visit(actuators_[i]);
-      busy_[i / 64] |= std::uint64_t{1} << (i % 64);
+      visit(i);
+      set(busy_, i);
       if (actuator != kEveryActuator) return;
     }
   }
 
+  /// One bit for each actuator.
+  using Mask = std::vector<std::uint64_t>;
+  static void set(Mask& mask, std::size_t i) noexcept {
+    mask[i / 64] |= std::uint64_t{1} << (i % 64);
+  }
+
   BlockPool& pool_;
   Ledger ledger_;
-  std::vector<std::optional<StateLayout>> layouts_;  // one for each type of the schema
+  Layouts layouts_;
   BatchPlanner planner_;
   PurgeTickets purge_tickets_;
   std::vector<Block> desired_;
-  std::vector<std::uint64_t> active_mask_;
-  std::vector<std::uint64_t> clamped_mask_;
-  std::vector<std::uint64_t> braking_mask_;
-  std::vector<std::uint32_t> offsets_;     // offset of each actuator in a block of states [bytes]
-  std::vector<const StateLayout*> types_;  // layout of each actuator
+  Mask active_mask_;
+  Mask clamped_mask_;
+  Mask braking_mask_;
+  std::vector<std::uint32_t> offsets_;  // offset of each actuator in a block of states [bytes]
   std::vector<ActuatorQueue> actuators_;
-  std::vector<std::uint64_t> busy_;     // mask: has commands, or is not known to be at rest
-  std::vector<std::uint64_t> stepped_;  // mask: has its desired state from given_ already
-  std::vector<std::uint64_t> follow_;   // mask: follows the observed state when idle
+  Mask busy_;     // has commands, or is not known to be at rest
+  Mask stepped_;  // has its desired state from given_ already
+  Mask follow_;   // follows the observed state when idle
   DirectTargets given_;
-  std::vector<std::uint64_t> dropped_;  // mask: no longer gets its targets
-  bool was_given_ = false;              // the first target of given_
-  std::uint32_t told_ = 0;              // statuses reported by the last step()
+  Mask dropped_;            // no longer gets its targets
+  bool was_given_ = false;  // the first target of given_
+  std::uint32_t told_ = 0;  // statuses reported by the last step()
 };
 
 }  // namespace o80

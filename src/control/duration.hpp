@@ -15,12 +15,11 @@ class DurationCarry {
 
   /// Number of iterations of the next duration [ns], at least 1.
   std::int64_t iterations(std::int64_t duration) noexcept {
-    const std::int64_t rounded = whole(duration);
-    carry_ += duration - std::max<std::int64_t>(1, rounded) * period_;
-    return std::max<std::int64_t>(1, rounded);
+    const std::int64_t rounded = std::max<std::int64_t>(1, whole(duration));
+    carry_ += duration - rounded * period_;
+    return rounded;
   }
-  /// True if the duration ends before the next iteration. It is then added to the carry and takes
-  /// no iteration.
+  /// True if the duration ends before the next iteration: it joins the carry, without an iteration.
   bool pass(std::int64_t duration) noexcept {
     if (whole(duration) >= 1) return false;
     carry_ += duration;
@@ -35,14 +34,8 @@ class DurationCarry {
  private:
   /// Iterations until the exact end of a duration, rounded; 0 or less if that has passed.
   std::int64_t whole(std::int64_t duration) const noexcept {
-    const std::int64_t exact = carry_ + duration;
-    std::int64_t rounded = exact / period_;
-    std::int64_t rest = exact % period_;
-    if (rest < 0) {
-      rest += period_;
-      --rounded;
-    }
-    return rest >= period_ - rest ? rounded + 1 : rounded;
+    const std::int64_t shifted = carry_ + duration + period_ / 2;
+    return shifted / period_ - (shifted % period_ < 0 ? 1 : 0);
   }
 
   std::int64_t period_;     // [ns]

@@ -10,7 +10,9 @@ namespace {
 // rounding must not add an iteration
 constexpr double kTimeRounding = 1e-12;
 constexpr int kMostTries = 60;
+// tolerances of a root, as shares of the distance
 constexpr double kRootForTime = 1e-6;
+constexpr double kExact = 1e-16;
 constexpr double kBracket = 1e-3;
 constexpr int kMostCorrections = 8;
 
@@ -47,17 +49,16 @@ double root(Function&& function, double low, double high, double tolerance) noex
 
 }  // namespace
 
-FastestMotion::FastestMotion(double position, double speed, double acceleration, double target,
-                             const Rates& rates) noexcept
-    : start_speed_(speed),
-      start_acceleration_(std::isfinite(rates.jerk) ? acceleration : 0.0),
-      distance_(target - position),
+FastestMotion::FastestMotion(const Moment& start, double target, const Rates& rates) noexcept
+    : start_speed_(start.speed),
+      start_acceleration_(std::isfinite(rates.jerk) ? start.acceleration : 0.0),
+      distance_(target - start.position),
       rates_(rates),
       target_(target),
-      position_(position) {
+      position_(start.position) {
   const VelocityChange stop(-start_speed_, start_acceleration_, rates_);
-  const double rounding =
-      4.0 * std::numeric_limits<double>::epsilon() * std::max(std::abs(position), std::abs(target));
+  const double rounding = 4.0 * std::numeric_limits<double>::epsilon() *
+                          std::max(std::abs(start.position), std::abs(target));
   const double beyond = distance_ - stop.displacement();
   if (std::abs(beyond) <= rounding) {
     to_rest_ = stop;
@@ -88,21 +89,15 @@ FastestMotion::FastestMotion(double position, double speed, double acceleration,
                                         std::ceil(-at_most / rates_.speed * (1.0 - kTimeRounding)));
   } else {
     // the target is nearer: reduce the cruising speed until there is no time to cruise
-    const auto beyond_at = [&](double cruise) {
-      const VelocityChange to_cruise(cruise - start_speed_, start_acceleration_, rates_);
-      const VelocityChange to_rest(-cruise, 0.0, rates_);
-      return to_cruise.displacement() + to_cruise.time() * cruise + to_rest.displacement() -
-             distance_;
-    };
     // for the number of iterations; the speed that fits them is found below, a little beyond it
-    cruise_ = root(beyond_at, lowest, rates_.speed, kRootForTime * distance_);
+    cruise_ = cruise_for({}, lowest, rates_.speed, kRootForTime);
     before_ = static_cast<std::int64_t>(std::ceil(time_to(cruise_) * (1.0 - kTimeRounding)));
   }
   if (distance(lowest, static_cast<double>(before_)) > distance_) {
     mix(lowest);
   } else {
     const double highest = std::min(rates_.speed, cruise_ * (1.0 + kBracket));
-    cruise_ = cruise_for(static_cast<double>(before_), lowest, highest);
+    cruise_ = cruise_for(static_cast<double>(before_), lowest, highest, kExact);
   }
   settle();
 }
@@ -127,8 +122,7 @@ void FastestMotion::mix(double lowest) noexcept {
   mixed_ = true;
   cruise_ = lowest;
   nearer_ = stop_after(0);
-  const double size = start_acceleration_ < 0.0 ? -start_acceleration_ : 0.0;
-  auto most = size > 0.0 ? static_cast<std::int64_t>(size / rates_.jerk) : std::int64_t{0};
+  auto most = static_cast<std::int64_t>(std::max(0.0, -start_acceleration_) / rates_.jerk);
   farther_ = stop_after(most);
   cruises_ = farther_.distance <= distance_;
   if (cruises_) {
@@ -149,31 +143,11 @@ void FastestMotion::mix(double lowest) noexcept {
   share_ = (farther_.distance - distance_) / (farther_.distance - nearer_.distance);
 }
 
-double FastestMotion::time_to(double cruise) const noexcept {
-  return VelocityChange(cruise - start_speed_, start_acceleration_, rates_).time();
-}
-
-std::int64_t FastestMotion::steps_to(double cruise) const noexcept {
-  return VelocityChange(cruise - start_speed_, start_acceleration_, rates_).steps();
-}
-
-double FastestMotion::distance(double cruise, double before) const noexcept {
-  const VelocityChange to_cruise(cruise - start_speed_, start_acceleration_, rates_);
-  const VelocityChange to_rest(-cruise, 0.0, rates_);
-  return to_cruise.displacement() + before * cruise + to_rest.displacement();
-}
-
-double FastestMotion::cruise_for(double before, double low, double high) const noexcept {
-  const auto beyond = [&](double cruise) { return distance(cruise, before) - distance_; };
-  return root(beyond, low, high, 1e-16 * distance_);
-}
-
-void FastestMotion::settle() noexcept {
-  to_cruise_ = VelocityChange(cruise_ - start_speed_, start_acceleration_, rates_);
-  to_rest_ = VelocityChange(-cruise_, 0.0, rates_);
-  speed_ = start_speed_;
-  const std::int64_t cruising = cruises_ ? before_ + to_rest_.steps() : farther_.steps();
-  iterations_ = std::max({std::int64_t{1}, cruising, nearer_.steps()});
+/// The cruising speed with which distance() is that to the target, up to a share of it.
+double FastestMotion::cruise_for(std::optional<double> before, double low, double high,
+                                 double tolerance) const noexcept {
+  return root([&](double cruise) { return distance(cruise, before) - distance_; }, low, high,
+              tolerance * distance_);
 }
 
 void FastestMotion::stretch(std::int64_t iterations) noexcept {
@@ -189,7 +163,7 @@ void FastestMotion::stretch(std::int64_t iterations) noexcept {
     exact = true;
     before_ += iterations - iterations_;
     if (before_ < 0) break;
-    cruise_ = cruise_for(static_cast<double>(before_), 0.0, cruise_);
+    cruise_ = cruise_for(static_cast<double>(before_), 0.0, cruise_, kExact);
     settle();
   }
   // keep the shortest motion if the stretched one is too long or has no time to get to its cruise
@@ -199,11 +173,9 @@ void FastestMotion::stretch(std::int64_t iterations) noexcept {
 double FastestMotion::next() noexcept {
   ++done_;
   if (done_ >= iterations_) return target_;
-  double acceleration = farther_.acceleration(done_);
-  if (cruises_) {
-    acceleration =
-        done_ <= before_ ? to_cruise_.acceleration(done_) : to_rest_.acceleration(done_ - before_);
-  }
+  double acceleration = !cruises_          ? farther_.acceleration(done_)
+                        : done_ <= before_ ? to_cruise_.acceleration(done_)
+                                           : to_rest_.acceleration(done_ - before_);
   if (mixed_) {
     acceleration = (1.0 - share_) * acceleration + share_ * nearer_.acceleration(done_);
   }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "control/velocity_change.hpp"
 
@@ -16,15 +17,12 @@ namespace o80 {
 class FastestMotion {
  public:
   FastestMotion() = default;
-  /// `position`, `speed` and `acceleration` are the present ones. The limits of speed and
-  /// acceleration must be finite.
-  FastestMotion(double position, double speed, double acceleration, double target,
-                const Rates& rates) noexcept;
+  /// `start` is the present motion. The limits of speed and acceleration must be finite.
+  FastestMotion(const Moment& start, double target, const Rates& rates) noexcept;
 
   /// Number of iterations until it rests at the target, at least 1.
   std::int64_t iterations() const noexcept { return iterations_; }
-  /// Stretches the motion to `iterations`. No effect if that is shorter, or if the motion is only a
-  /// stop.
+  /// Stretches the motion to `iterations`, unless that is shorter or the motion is only a stop.
   void stretch(std::int64_t iterations) noexcept;
   /// The position in the next iteration; from the last iteration on the exact target.
   double next() noexcept;
@@ -45,12 +43,25 @@ class FastestMotion {
 
   Stop stop_after(std::int64_t eased) const noexcept;
   void mix(double lowest) noexcept;
-  /// Distance of a motion that slows down from the speed `cruise` after `before` iterations.
-  double distance(double cruise, double before) const noexcept;
-  std::int64_t steps_to(double cruise) const noexcept;
-  double time_to(double cruise) const noexcept;
-  double cruise_for(double before, double low, double high) const noexcept;
-  void settle() noexcept;
+  /// Distance of a motion that slows down from `cruise` after `before` iterations, or at once.
+  double distance(double cruise, std::optional<double> before) const noexcept {
+    const VelocityChange to_cruise(cruise - start_speed_, start_acceleration_, rates_);
+    const VelocityChange to_rest(-cruise, 0.0, rates_);
+    return to_cruise.displacement() + (before ? *before : to_cruise.time()) * cruise +
+           to_rest.displacement();
+  }
+  double time_to(double cruise) const noexcept {
+    return VelocityChange(cruise - start_speed_, start_acceleration_, rates_).time();
+  }
+  double cruise_for(std::optional<double> before, double low, double high,
+                    double tolerance) const noexcept;
+  void settle() noexcept {
+    to_cruise_ = VelocityChange(cruise_ - start_speed_, start_acceleration_, rates_);
+    to_rest_ = VelocityChange(-cruise_, 0.0, rates_);
+    speed_ = start_speed_;
+    const std::int64_t cruising = cruises_ ? before_ + to_rest_.steps() : farther_.steps();
+    iterations_ = std::max({std::int64_t{1}, cruising, nearer_.steps()});
+  }
 
   // mirrored by sign_, so that the target lies beyond the shortest stop
   double sign_ = 1.0;

@@ -24,7 +24,8 @@ class IntegralBound {
         reaction_(row.reaction),
         guard_(row.minimum, row.maximum,
                {std::numeric_limits<double>::infinity(), rates.speed * period,
-                rates.acceleration * period}) {}
+                rates.acceleration * period}),
+        moving_(guard_) {}
 
   /// The number, in the observed state, that is moved.
   std::uint32_t number() const noexcept { return number_; }
@@ -32,13 +33,16 @@ class IntegralBound {
     if (std::isfinite(position)) observed_ = position;
   }
 
+  /// The limiter of the velocity, before its next iteration.
+  void note(const NumberLimiter& moving) noexcept { moving_ = moving; }
+  const NumberLimiter& noted() const noexcept { return moving_; }
+
   /// Which bound, if any, the velocity `wanted` would pass, and the nearest one that passes none.
-  /// `now`: the velocity and its differences.
   struct Admitted {
     Limit bound;
     double velocity;
   };
-  Admitted admit(const Moment& now, double wanted) noexcept {
+  Admitted admit(double wanted) noexcept {
     if (!std::isfinite(guard_.rates().acceleration)) {
       // so slow that a robot with this reaction, a delay or a lag, does not overshoot
       const double time = period_ + 4.0 * reaction_;
@@ -49,6 +53,7 @@ class IntegralBound {
       return wanted < lowest ? Admitted{Limit::below_integral, lowest}
                              : Admitted{Limit::none, wanted};
     }
+    const Moment& now = moving_.moment();
     // while the velocity changes, a robot is late by half of the change in its reaction
     const double change = now.speed / period_ * reaction_ / 2.0;
     const double ahead = now.position * period_ + (now.position - change) * reaction_;
@@ -70,6 +75,7 @@ class IntegralBound {
   double period_;    // [s]
   double reaction_;  // [s]
   NumberLimiter guard_;
+  NumberLimiter moving_;
   double observed_ = 0.0;
   bool stands_ = false;
 };

@@ -1,104 +1,41 @@
 #include "control/ledger.hpp"
 
 #include <algorithm>
-#include <new>
-#include <utility>
 
 namespace o80 {
 
-/// Replaces the BatchRecord in the first block of a batch that was taken.
-struct Ledger::TakenBatch {
-  RecordKind kind = RecordKind::batch;
-  Status end = Status::completed;  // end status of the batch
-  Reason reason = Reason::none;    // reason for the records without blocks
-  std::uint8_t detail = 0;
-  std::uint32_t records = 0;
-  CommandId id = 0;
-  Iteration last_end = 0;
-  Iteration rejected_at = 0;
-  std::uint32_t open = 0;  // records that have not ended, plus 1 until close()
-  std::uint32_t told = 0;  // index of the next record without blocks to report
-  BlockIndex next_group = kNoBlock;
-  std::uint32_t lane = 0;
-  BlockChain spare;
-  Status told_as = Status::rejected;  // end status of the records without blocks
-};
-
-namespace {
-
-/// As much of a delay as a status can tell.
-std::uint16_t told(std::int64_t late) noexcept {
-  return static_cast<std::uint16_t>(std::min<std::int64_t>(late, 0xFFFF));
-}
-
-}  // namespace
-
-Ledger::TakenBatch& Ledger::batch(BlockIndex block) noexcept {
-  static_assert(sizeof(TakenBatch) <= kBlockBytes);
-  return *std::launder(reinterpret_cast<TakenBatch*>(pool_.bytes(block)));
-}
-
-std::uint32_t Ledger::lane_of(BlockIndex record) const noexcept {
-  const BlockIndex block = pool_.head(record).own[Own::kBatch];
-  return std::launder(reinterpret_cast<const TakenBatch*>(pool_.bytes(block)))->lane;
-}
-
 void Ledger::enter(std::uint32_t lane, BlockIndex block, const BlockChain& spare,
-                   std::uint32_t groups, Iteration iteration) noexcept {
+                   std::uint32_t missing_from, std::uint32_t groups, Iteration iteration) noexcept {
   open_groups_ += groups;
   undecided_groups_ += groups;
-  const BatchRecord record = pool_.batch(block);
-  TakenBatch taken;
-  taken.records = record.records;
-  taken.id = record.id;
-  taken.last_end = iteration;
-  taken.open = record.records + 1;
-  taken.told = record.records;
-  taken.lane = lane;
-  taken.spare = spare;
-  new (pool_.bytes(block)) TakenBatch(taken);
-  sink_.changed(
-      {lane, taken.id, Status::active, Reason::none, 0, iteration, StatusChange::Of::batch});
-}
-
-void Ledger::reject_from(BlockIndex block, std::uint32_t place, Reason reason, std::uint8_t detail,
-                         Iteration iteration) noexcept {
-  TakenBatch& taken = batch(block);
-  if (place >= taken.records) return;
-  taken.told = place;
-  taken.reason = reason;
-  taken.detail = detail;
-  taken.rejected_at = iteration;
+  TakenBatch& taken = take(lane, block, spare, pool_.batch(block).records, iteration);
+  tell(lane, taken.id, {Status::active}, iteration, StatusChange::Of::batch);
+  if (missing_from >= taken.records) return;
+  taken.told = missing_from;
+  taken.reason = Reason::invalid;
   append(block);
 }
 
-void Ledger::reject(std::uint32_t lane, BlockIndex block, Reason reason, std::uint8_t detail,
-                    Iteration iteration, Status status) noexcept {
+void Ledger::reject(std::uint32_t lane, BlockIndex block, const Outcome& outcome,
+                    Iteration iteration) noexcept {
   // do not trust the count of records: there are at most as many as blocks
   BlockChain spare = pool_.chain(block);
   spare.first = pool_.next(block);
   --spare.blocks;
-  const BatchRecord record = pool_.batch(block);
-  TakenBatch taken;
+  const std::uint32_t records = std::min(pool_.batch(block).records, spare.blocks);
+  TakenBatch& taken = take(lane, block, spare, records, iteration);
   taken.end = Status::rejected;
-  taken.reason = reason;
-  taken.detail = detail;
-  taken.records = std::min(record.records, spare.blocks);
-  taken.id = record.id;
-  taken.last_end = iteration;
-  taken.open = taken.records + 1;
-  taken.lane = lane;
-  taken.spare = spare;
-  taken.told_as = status;
-  new (pool_.bytes(block)) TakenBatch(taken);
-  sink_.changed(
-      {lane, taken.id, Status::rejected, reason, detail, iteration, StatusChange::Of::batch});
-  reject_from(block, 0, reason, detail, iteration);
+  taken.reason = outcome.reason;
+  taken.detail = outcome.detail;
+  taken.told_as = outcome.status;
+  taken.told = 0;
+  tell(lane, taken.id, {Status::rejected, outcome.reason, outcome.detail}, iteration,
+       StatusChange::Of::batch);
+  if (records > 0) append(block);
   close(block, iteration);
 }
 
-void Ledger::activate(BlockIndex record, Iteration iteration, Reason reason, std::uint8_t detail,
-                      std::int64_t late) noexcept {
+void Ledger::activate(BlockIndex record, Iteration iteration, const Outcome& outcome) noexcept {
   const RecordHead& head = pool_.head(record);
   CommandId id = head.id;
   if (is_member(head)) {
@@ -111,12 +48,10 @@ void Ledger::activate(BlockIndex record, Iteration iteration, Reason reason, std
       --undecided_groups_;
     }
   }
-  sink_.changed({lane_of(record), id, Status::active, reason, detail, iteration,
-                 StatusChange::Of::record, told(late)});
+  tell(lane_of(record), id, outcome, iteration, StatusChange::Of::record);
 }
 
-void Ledger::end(BlockIndex record, Status status, Reason reason, std::uint8_t detail,
-                 Iteration iteration, std::int64_t late) noexcept {
+void Ledger::end(BlockIndex record, const Outcome& outcome, Iteration iteration) noexcept {
   const RecordHead& head = pool_.head(record);
   const CommandId id = head.id;
   const bool of_group = is_member(head);
@@ -124,38 +59,33 @@ void Ledger::end(BlockIndex record, Status status, Reason reason, std::uint8_t d
   const BlockIndex block = head.own[Own::kBatch];
   const auto blocks = static_cast<std::uint32_t>(blocks_of(head.payload_bytes));
   const std::uint32_t lane = batch(block).lane;
-  if (!of_group) {
-    sink_.changed(
-        {lane, id, status, reason, detail, iteration, StatusChange::Of::record, told(late)});
-  }
+  if (!of_group) tell(lane, id, outcome, iteration, StatusChange::Of::record);
   pool_.release(record, head.own[Own::kLast], blocks);
   sink_.freed(lane, blocks);
-  if (of_group) return member_ended(group, status, reason, detail, iteration, late);
+  if (of_group) return member_ended(group, outcome, iteration);
   ended(block, iteration);
 }
 
-void Ledger::member_ended(BlockIndex record, Status status, Reason reason, std::uint8_t detail,
-                          Iteration iteration, std::int64_t late) noexcept {
+void Ledger::member_ended(BlockIndex record, const Outcome& outcome, Iteration iteration) noexcept {
   CommandGroup& group = groups_.at(record);
   group.last_end = std::max(group.last_end, iteration);
-  if (status != Status::completed && group.end == Status::none) {
-    group.end = status;
-    group.reason = reason;
-    group.detail = detail;
+  // the first end that is not completed; else the limit that a member took longer for, if it knows
+  const bool is_completed = outcome.status == Status::completed;
+  if (group.end == Status::none &&
+      (!is_completed || (outcome.reason == Reason::limits && (group.detail & 7U) == 0))) {
+    if (!is_completed) group.end = outcome.status;
+    group.reason = outcome.reason;
+    group.detail = outcome.detail;
   }
-  // longer than asked: keep which limit it was, if a member knows
-  if (status == Status::completed && reason == Reason::limits && group.end == Status::none &&
-      (group.detail & 7U) == 0) {
-    group.reason = reason;
-    group.detail = detail;
-  }
-  groups_.note_late(record, late);
+  groups_.note_late(record, outcome.late);
   if (--group.open > 0) return;
   --open_groups_;
   const CommandGroup of = group;
   if (of.decided == 0) --undecided_groups_;
-  end(record, of.end == Status::none ? Status::completed : of.end, of.reason, of.detail,
-      of.last_end, groups_.late(record));
+  end(record,
+      {of.end == Status::none ? Status::completed : of.end, of.reason, of.detail,
+       groups_.late(record)},
+      of.last_end);
 }
 
 void Ledger::ended(BlockIndex block, Iteration iteration) noexcept {
@@ -163,49 +93,12 @@ void Ledger::ended(BlockIndex block, Iteration iteration) noexcept {
   taken.last_end = std::max(taken.last_end, iteration);
   if (--taken.open > 0) return;
 
-  const Reason reason = taken.end == Status::rejected ? taken.reason : Reason::none;
-  const std::uint8_t detail = taken.end == Status::rejected ? taken.detail : std::uint8_t{0};
-  sink_.changed({taken.lane, taken.id + 1, taken.end, reason, detail, taken.last_end,
-                 StatusChange::Of::batch_end});
+  Outcome outcome{taken.end};
+  if (taken.end == Status::rejected) outcome = {taken.end, taken.reason, taken.detail};
+  tell(taken.lane, taken.id + 1, outcome, taken.last_end, StatusChange::Of::batch_end);
   sink_.freed(taken.lane, 1 + taken.spare.blocks);
   pool_.release(taken.spare);
   pool_.release(block, block, 1);
-}
-
-BlockIndex& Ledger::link(BlockIndex group) noexcept {
-  const auto kind = static_cast<RecordKind>(*pool_.bytes(group));
-  return kind == RecordKind::batch ? batch(group).next_group
-                                   : pool_.head(group).own[Own::kNextDropped];
-}
-
-void Ledger::append(BlockIndex group) noexcept {
-  link(group) = kNoBlock;
-  (first_ == kNoBlock ? first_ : link(last_)) = group;
-  last_ = group;
-}
-
-void Ledger::drop(BlockIndex first, Status status, Reason reason, Iteration iteration) noexcept {
-  if (first == kNoBlock) return;
-  // store the common end in the first record, whose command is not needed any more: amount =
-  // iteration, rows = status << 8 | reason
-  RecordHead& head = pool_.head(first);
-  head.amount = iteration;
-  head.rows = static_cast<std::uint32_t>(status) << 8 | static_cast<std::uint32_t>(reason);
-  append(first);
-}
-
-bool Ledger::tell_rejected(BlockIndex block, std::uint32_t& budget) noexcept {
-  TakenBatch& taken = batch(block);
-  const auto of =
-      taken.end == Status::rejected ? StatusChange::Of::of_rejected : StatusChange::Of::record;
-  while (taken.told < taken.records && budget > 0) {
-    sink_.changed({taken.lane, record_id(taken.id, taken.told), taken.told_as, taken.reason,
-                   taken.detail, taken.rejected_at, of});
-    ++taken.told;
-    --taken.open;
-    --budget;
-  }
-  return taken.told == taken.records;
 }
 
 std::uint32_t Ledger::report_ends(std::uint32_t most) noexcept {
@@ -216,7 +109,7 @@ std::uint32_t Ledger::report_ends(std::uint32_t most) noexcept {
       if (budget == 0) return most;
       const BlockIndex record = group_.record;
       group_.record = pool_.head(record).own[Own::kNext];
-      end(record, group_.status, group_.reason, 0, group_.iteration);
+      end(record, group_.outcome, group_.iteration);
       --budget;
     }
     if (first_ == kNoBlock) return most - budget;
@@ -224,16 +117,24 @@ std::uint32_t Ledger::report_ends(std::uint32_t most) noexcept {
 
     // the next list: records without blocks of a batch, or dropped records
     const BlockIndex group = first_;
-    if (static_cast<RecordKind>(*pool_.bytes(group)) == RecordKind::batch) {
+    if (is_batch(group)) {
+      TakenBatch& taken = batch(group);
+      const auto of =
+          taken.end == Status::rejected ? StatusChange::Of::of_rejected : StatusChange::Of::record;
+      for (; taken.told < taken.records && budget > 0; ++taken.told, --taken.open, --budget) {
+        tell(taken.lane, record_id(taken.id, taken.told),
+             {taken.told_as, taken.reason, taken.detail}, taken.taken_at, of);
+      }
       // keeps the batch open until all are reported
-      if (!tell_rejected(group, budget)) return most - budget;
+      if (taken.told < taken.records) return most;
       first_ = link(group);
-      ++batch(group).open;
-      ended(group, batch(group).rejected_at);
+      ++taken.open;
+      ended(group, taken.taken_at);
     } else {
       first_ = link(group);
       const RecordHead& head = pool_.head(group);
-      group_ = {group, static_cast<Status>(head.rows >> 8), static_cast<Reason>(head.rows & 0xFF),
+      group_ = {group,
+                {static_cast<Status>(head.rows >> 8), static_cast<Reason>(head.rows & 0xFF)},
                 head.amount};
     }
   }

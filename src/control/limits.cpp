@@ -1,5 +1,6 @@
 #include "control/limits.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <limits>
@@ -7,7 +8,7 @@
 #include <vector>
 
 #include "base/short_text.hpp"
-#include "control/number_name.hpp"
+#include "describe/number_name.hpp"
 #include "o80/base/nearest_name.hpp"
 
 namespace o80 {
@@ -20,41 +21,9 @@ std::string text_of(double value) {
   return std::string(text, end);
 }
 
-/// The name of a number of a state for messages: its path of field names, and its field.
-struct NumberName {
-  std::string path;  // empty for a plain number
-  const FieldRow* field = nullptr;
-};
-
-/// The name of the number at `offset` of a type.
-NumberName name_at(const Schema& schema, std::uint32_t type, std::uint32_t offset) {
-  const TypeRow& row = schema.types.at(type);
-  for (std::uint32_t i = 0; i < row.fields; ++i) {
-    const FieldRow& field = schema.fields.at(row.first_field + i);
-    const std::uint32_t end = field.offset + field.size * field.count();
-    if (offset < field.offset || offset >= end) continue;
-
-    const std::uint32_t element = (offset - field.offset) / field.size;
-    NumberName name{field.name.str(), &field};
-    if (field.columns != 0) {
-      name.path += "[" + std::to_string(element / field.columns) + "][" +
-                   std::to_string(element % field.columns) + "]";
-    } else if (field.rows != 0) {
-      name.path += "[" + std::to_string(element) + "]";
-    }
-    if (field.kind != Kind::structure) return name;
-    const std::uint32_t inside = offset - field.offset - element * field.size;
-    const NumberName inner = name_at(schema, field.type, inside);
-    if (!inner.path.empty()) name.path += (name.path.empty() ? "" : ".") + inner.path;
-    name.field = inner.field;
-    return name;
-  }
-  return {};
-}
-
 std::string with_unit(const std::string& text, const FieldRow* field) {
-  const bool has_unit = field != nullptr && !field->unit.view().empty();
-  return has_unit ? text + " [" + field->unit.str() + "]" : text;
+  if (field == nullptr || field->unit.view().empty()) return text;
+  return text + " [" + field->unit.str() + "]";
 }
 
 std::string of_actuator(const Schema& schema, std::uint32_t actuator) {
@@ -64,6 +33,17 @@ std::string of_actuator(const Schema& schema, std::uint32_t actuator) {
 
 std::string of_number(const Schema& schema, std::uint32_t actuator, const NumberName& name) {
   return (name.path.empty() ? "" : "'" + name.path + "' of ") + of_actuator(schema, actuator);
+}
+
+template <class Row>
+std::vector<std::string> names_of(const std::vector<Row>& rows) {
+  std::vector<std::string> names;
+  for (const Row& row : rows) names.push_back(row.name.str());
+  return names;
+}
+
+const std::uint64_t* bits_of(std::span<const std::uint64_t> mask) {
+  return mask.empty() ? nullptr : mask.data();
 }
 
 std::string labels_of(const Schema& schema, const FieldRow& field) {
@@ -79,71 +59,40 @@ std::string labels_of(const Schema& schema, const FieldRow& field) {
 }  // namespace
 
 Profile usual_profile(const Schema& schema, const ActuatorRow& actuator) noexcept {
-  for (std::uint32_t i = 0; i < actuator.limits; ++i) {
-    if (std::isfinite(schema.limits[actuator.first_limit + i].acceleration)) {
-      return Profile::minimum_jerk;
+  const auto limits = std::span(schema.limits).subspan(actuator.first_limit, actuator.limits);
+  const bool accelerates = std::ranges::any_of(
+      limits, [](const LimitRow& limit) { return std::isfinite(limit.acceleration); });
+  return accelerates ? Profile::minimum_jerk : Profile::linear;
+}
+
+TargetLimits::TargetLimits(const Schema& schema, const Layouts& layouts) {
+  constexpr double kLargest = std::numeric_limits<double>::max();
+  for (const ActuatorRow& row : schema.actuators) {
+    Actuator& actuator = actuators_.emplace_back(Actuator{&*layouts.at(row.type), {}});
+    for (std::uint32_t i = 0; i < row.limits; ++i) {
+      const LimitRow& limit = schema.limits.at(row.first_limit + i);
+      const bool moves = actuator.layout->numbers()[i].moves();
+      actuator.ranges.push_back({std::fmax(limit.minimum, -kLargest),
+                                 std::fmin(limit.maximum, kLargest),
+                                 !moves || std::isfinite(limit.acceleration)});
     }
   }
-  return Profile::linear;
 }
 
-CommandCheck::CommandCheck(const Schema& schema) : schema_(schema), layouts_(schema.types.size()) {
-  for (const ActuatorRow& actuator : schema.actuators) {
-    auto& layout = layouts_.at(actuator.type);
-    if (!layout) layout.emplace(schema, actuator.type);
-  }
-  for (const RequestRow& request : schema.requests) {
-    if (request.type == kNoType) continue;
-    auto& layout = layouts_.at(request.type);
-    if (!layout) layout.emplace(schema, request.type);
-  }
-  constexpr double kLargest = std::numeric_limits<double>::max();
-  for (const LimitRow& limit : schema.limits) {
-    ranges_.push_back({std::fmax(limit.minimum, -kLargest), std::fmin(limit.maximum, kLargest)});
-  }
-}
-
-std::uint32_t CommandCheck::actuator(std::string_view name) const {
-  for (std::size_t i = 0; i < schema_.actuators.size(); ++i) {
-    if (schema_.actuators[i].name.view() == name) return static_cast<std::uint32_t>(i);
-  }
-  std::vector<std::string> known;
-  known.reserve(schema_.actuators.size());
-  for (const ActuatorRow& row : schema_.actuators) known.push_back(row.name.str());
-  refuse_actuator("'" + std::string(name) + "'" + names_instead(name, known));
-}
-
-std::uint32_t CommandCheck::actuator(std::int64_t index) const {
-  const auto count = static_cast<std::int64_t>(schema_.actuators.size());
-  if (index >= 0 && index < count) return static_cast<std::uint32_t>(index);
-  std::vector<std::string> known;
-  known.reserve(schema_.actuators.size());
-  for (std::int64_t i = 0; i < count; ++i) {
-    known.push_back(schema_.actuators[static_cast<std::size_t>(i)].name.str() + " (" +
-                    std::to_string(i) + ")");
-  }
-  refuse_actuator(std::to_string(index) + names_instead("", known));
-}
-
-void CommandCheck::refuse_actuator(const std::string& which) const {
-  const std::string robot = "'" + schema_.head.robot.str() + "' has no actuator";
-  throw InvalidArgument(schema_.actuators.empty() ? robot + "s" : robot + " " + which);
-}
-
-bool CommandCheck::within(std::uint32_t actuator, const std::byte* state,
-                          const std::uint64_t* mask) const noexcept {
-  const ActuatorRow& row = schema_.actuators[actuator];
-  const StateLayout& layout = *layouts_[row.type];
-  const Range* ranges = ranges_.data() + row.first_limit;
+bool TargetLimits::admit(std::uint32_t actuator, const std::byte* state,
+                         const std::uint64_t* mask) const noexcept {
+  const StateLayout& layout = *actuators_[actuator].layout;
+  const Range* ranges = actuators_[actuator].ranges.data();
+  const std::size_t numbers = layout.numbers().size();
   if (layout.plain() && mask == nullptr) {
     bool all = true;
-    for (std::uint32_t i = 0; i < row.limits; ++i) {
+    for (std::size_t i = 0; i < numbers; ++i) {
       const double value = load<double>(state + i * sizeof(double));
       all = all && value >= ranges[i].lowest && value <= ranges[i].highest;
     }
     return all;
   }
-  for (std::uint32_t i = 0; i < row.limits; ++i) {
+  for (std::size_t i = 0; i < numbers; ++i) {
     if (!masked(mask, i)) continue;
     if (!layout.proper_number(i, state)) return false;
     if (!layout.numbers()[i].moves()) continue;
@@ -153,64 +102,68 @@ bool CommandCheck::within(std::uint32_t actuator, const std::byte* state,
   return true;
 }
 
-bool CommandCheck::admits(std::span<const std::uint32_t> actuators, std::uint32_t steps,
-                          const std::byte* states) const noexcept {
-  for (const std::uint32_t actuator : actuators) {
-    const std::size_t size = layouts_[schema_.actuators[actuator].type]->size();
-    for (std::uint32_t step = 0; step < steps; ++step, states += size) {
-      if (!within(actuator, states, nullptr)) return false;
-    }
-  }
-  return true;
+std::uint32_t CommandCheck::actuator(std::string_view name) const {
+  const std::vector<std::string> known = names_of(schema_.actuators);
+  const auto found = std::ranges::find(known, name);
+  if (found != known.end()) return static_cast<std::uint32_t>(found - known.begin());
+  refuse_actuator("'" + std::string(name) + "'" + names_instead(name, known));
 }
 
-std::uint32_t CommandCheck::words_of_mask(std::uint32_t actuator) const {
-  const StateLayout& layout = *layouts_[schema_.actuators[actuator].type];
-  return mask_words(static_cast<std::uint32_t>(layout.numbers().size()));
+std::uint32_t CommandCheck::actuator(std::int64_t index) const {
+  const auto count = static_cast<std::int64_t>(schema_.actuators.size());
+  if (index >= 0 && index < count) return static_cast<std::uint32_t>(index);
+  std::vector<std::string> known = names_of(schema_.actuators);
+  for (std::size_t i = 0; i < known.size(); ++i) known[i] += " (" + std::to_string(i) + ")";
+  refuse_actuator(std::to_string(index) + names_instead("", known));
+}
+
+void CommandCheck::refuse_actuator(const std::string& which) const {
+  const std::string robot = "'" + schema_.head.robot.str() + "' has no actuator";
+  throw InvalidArgument(schema_.actuators.empty() ? robot + "s" : robot + " " + which);
 }
 
 void CommandCheck::targets(std::uint32_t index, std::span<const std::byte> states,
                            std::span<const std::uint64_t> mask) const {
   const std::uint32_t known = actuator(std::int64_t{index});
-  const StateLayout& layout = *layouts_[schema_.actuators[known].type];
+  const StateLayout& layout = targets_.layout(known);
   if (states.empty() || states.size() % layout.size() != 0) {
     throw InvalidArgument("targets of " + of_actuator(schema_, known) + " must be a multiple of " +
                           std::to_string(layout.size()) + " bytes, got " +
                           std::to_string(states.size()));
   }
-  const std::size_t words = mask_words(static_cast<std::uint32_t>(layout.numbers().size()));
-  if (!mask.empty() && mask.size() != words) {
+  if (!mask.empty() && mask.size() != layout.mask_words()) {
     throw InvalidArgument("a mask for " + of_actuator(schema_, known) + " must have " +
-                          std::to_string(words) + " words, got " + std::to_string(mask.size()));
+                          std::to_string(layout.mask_words()) + " words, got " +
+                          std::to_string(mask.size()));
   }
-  const std::uint64_t* bits = mask.empty() ? nullptr : mask.data();
-  for (std::size_t at = 0; at < states.size(); at += layout.size()) {
-    if (!within(known, states.data() + at, bits)) refuse(known, states.data() + at, bits);
+  for (const std::byte* state = states.data(); state != states.data() + states.size();
+       state += layout.size()) {
+    if (!targets_.admit(known, state, bits_of(mask))) refuse(known, state, bits_of(mask));
   }
 }
 
 void CommandCheck::refuse(std::uint32_t actuator, const std::byte* state,
                           const std::uint64_t* mask) const {
   const ActuatorRow& row = schema_.actuators[actuator];
-  const StateLayout& layout = *layouts_[row.type];
+  const StateLayout& layout = targets_.layout(actuator);
   for (std::uint32_t i = 0; i < row.limits; ++i) {
     if (!masked(mask, i)) continue;
     const NumberName name = name_at(schema_, row.type, layout.numbers()[i].offset);
+    const std::string number = of_number(schema_, actuator, name);
     if (!layout.proper_number(i, state)) {
-      throw InvalidArgument("the target of " + of_number(schema_, actuator, name) +
+      throw InvalidArgument("the target of " + number +
                             " must be one of: " + labels_of(schema_, *name.field));
     }
     if (!layout.numbers()[i].moves()) continue;
     const double value = layout.number(i, state);
     const LimitRow& limit = schema_.limits[row.first_limit + i];
     if (!std::isfinite(value)) {
-      throw InvalidArgument("target " + text_of(value) + " for " +
-                            of_number(schema_, actuator, name) + " is not a finite number");
+      throw InvalidArgument("target " + text_of(value) + " for " + number +
+                            " is not a finite number");
     }
     if (value < limit.minimum || value > limit.maximum) {
-      throw InvalidArgument("target " + with_unit(text_of(value), name.field) + " for " +
-                            of_number(schema_, actuator, name) + " is outside its limits: from " +
-                            text_of(limit.minimum) + " to " +
+      throw InvalidArgument("target " + with_unit(text_of(value), name.field) + " for " + number +
+                            " is outside its limits: from " + text_of(limit.minimum) + " to " +
                             with_unit(text_of(limit.maximum), name.field));
     }
   }
@@ -221,16 +174,15 @@ void CommandCheck::direct(std::uint32_t actuator, std::span<const std::byte> sta
                           std::span<const std::uint64_t> mask) const {
   if (schema_.head.bursting != 0 || schema_.head.silence > 0) return;
   const ActuatorRow& row = schema_.actuators[actuator];
-  const StateLayout& layout = *layouts_[row.type];
+  const StateLayout& layout = targets_.layout(actuator);
   for (std::uint32_t i = 0; i < row.limits; ++i) {
     const LimitRow& limit = schema_.limits[row.first_limit + i];
-    const bool given = mask.empty() || (mask[i / 64] >> (i % 64) & 1) != 0;
-    if (limit.resting == 0 || !given || layout.number(i, state.data()) == limit.rest) continue;
+    const double value = layout.number(i, state.data());
+    if (limit.resting == 0 || !masked(bits_of(mask), i) || value == limit.rest) continue;
     ShortText<200> name;
     name_number(schema_, actuator, i, name);
     throw InvalidArgument(
-        "a direct target of " + text_of(layout.number(i, state.data())) + " for the " +
-        std::string(name.view()) +
+        "a direct target of " + text_of(value) + " for the " + std::string(name.view()) +
         " would stay if this program hung: start the backend with a watchdog (--silence N, with "
         "--stale purge, halt or stop), or give the command a duration, a speed or iterations");
   }
@@ -240,9 +192,9 @@ void CommandCheck::speed(std::uint32_t index, double speed,
                          std::span<const std::uint64_t> mask) const {
   const std::uint32_t known = actuator(std::int64_t{index});
   const ActuatorRow& row = schema_.actuators[known];
-  const StateLayout& layout = *layouts_[row.type];
+  const StateLayout& layout = targets_.layout(known);
   if (row.limits == 0) return;
-  const std::uint32_t first = layout.first_commanded(mask.empty() ? nullptr : mask.data());
+  const std::uint32_t first = layout.first_commanded(bits_of(mask));
   const std::uint32_t number = first == StateLayout::kNoNumber ? 0 : first;
   const double highest = schema_.limits[row.first_limit + number].speed;
   const bool positive = std::isfinite(speed) && speed > 0.0;
@@ -259,25 +211,19 @@ void CommandCheck::speed(std::uint32_t index, double speed,
 
 void CommandCheck::fastest(std::uint32_t index, std::span<const std::uint64_t> mask) const {
   const std::uint32_t known = actuator(std::int64_t{index});
-  const ActuatorRow& row = schema_.actuators[known];
-  const StateLayout& layout = *layouts_[row.type];
-  for (std::uint32_t i = 0; i < row.limits; ++i) {
-    if (!masked(mask.empty() ? nullptr : mask.data(), i) || !layout.numbers()[i].moves()) continue;
-    if (std::isfinite(schema_.limits[row.first_limit + i].acceleration)) continue;
-    const NumberName name = name_at(schema_, row.type, layout.numbers()[i].offset);
-    throw InvalidArgument("the fastest motion of " + of_number(schema_, known, name) +
-                          " is unknown: its driver sets no limits of speed and acceleration. Give "
-                          "a duration or a speed instead, or leave that field out.");
-  }
+  const std::uint32_t number = targets_.first_without_acceleration(known, bits_of(mask));
+  if (number == StateLayout::kNoNumber) return;
+  const std::uint32_t offset = targets_.layout(known).numbers()[number].offset;
+  const NumberName name = name_at(schema_, schema_.actuators[known].type, offset);
+  throw InvalidArgument("the fastest motion of " + of_number(schema_, known, name) +
+                        " is unknown: its driver sets no limits of speed and acceleration. Give "
+                        "a duration or a speed instead, or leave that field out.");
 }
 
 void CommandCheck::request(std::uint32_t index, std::span<const std::byte> payload) const {
   if (index >= schema_.requests.size()) {
-    std::vector<std::string> known;
-    known.reserve(schema_.requests.size());
-    for (const RequestRow& row : schema_.requests) known.push_back(row.name.str());
     throw InvalidArgument("'" + schema_.head.robot.str() + "' has no request " +
-                          std::to_string(index) + names_instead("", known));
+                          std::to_string(index) + names_instead("", names_of(schema_.requests)));
   }
   const RequestRow& row = schema_.requests[index];
   const std::size_t size = row.type == kNoType ? 0 : layouts_[row.type]->size();

@@ -12,6 +12,8 @@
 namespace o80 {
 namespace {
 
+constexpr double kUnlimited = std::numeric_limits<double>::infinity();
+
 template <class T>
 void store(std::byte* out, T value) noexcept {
   std::memcpy(out, &value, sizeof value);
@@ -19,30 +21,11 @@ void store(std::byte* out, T value) noexcept {
 
 template <class T, class Real>
 T to_integer(Real value) noexcept {
+  using Range = std::numeric_limits<T>;
   const Real rounded = std::round(value);
-  if (!(rounded > static_cast<Real>(std::numeric_limits<T>::min()))) {
-    return std::numeric_limits<T>::min();
-  }
-  if (!(rounded < static_cast<Real>(std::numeric_limits<T>::max()))) {
-    return std::numeric_limits<T>::max();
-  }
+  if (!(rounded > static_cast<Real>(Range::min()))) return Range::min();
+  if (!(rounded < static_cast<Real>(Range::max()))) return Range::max();
   return static_cast<T>(rounded);
-}
-
-/// For integers that a double cannot hold: interpolates in long double.
-template <class T>
-T moved_wide(T from, T to, double share) noexcept {
-  const auto start = static_cast<long double>(from);
-  const auto target = static_cast<long double>(to);
-  return to_integer<T>(start + (target - start) * static_cast<long double>(share));
-}
-
-/// Range of the values of a kind. It also bounds the motion to rest.
-std::pair<double, double> range_of(Kind kind) noexcept {
-  return visit_number(kind, []<class T>(T) {
-    using Range = std::numeric_limits<T>;
-    return std::pair(static_cast<double>(Range::lowest()), static_cast<double>(Range::max()));
-  });
 }
 
 /// The nearest float from `low` to `high`.
@@ -66,7 +49,6 @@ Motion::Motion(const Schema& schema, const ActuatorRow& actuator, const StateLay
     : layout_(layout),
       stride_((layout.size() + 15) / 16 * 16),
       ends_(3 * stride_ / sizeof(std::uint64_t)) {
-  constexpr double kUnlimited = std::numeric_limits<double>::infinity();
   const double period = static_cast<double>(schema.head.period) / 1e9;
   for (std::uint32_t i = 0; i < layout.numbers().size(); ++i) {
     const NumberPlace& place = layout.numbers()[i];
@@ -80,58 +62,22 @@ Motion::Motion(const Schema& schema, const ActuatorRow& actuator, const StateLay
                       row.jerk * period * period * period};
     const bool limited =
         row.minimum > -kUnlimited || row.maximum < kUnlimited || rates.speed < kUnlimited;
-    const auto [lowest, highest] = range_of(place.kind);
+    // the range of its kind also bounds the motion to rest
+    const auto [lowest, highest] = visit_number(place.kind, []<class T>(T) {
+      using Range = std::numeric_limits<T>;
+      return std::pair(static_cast<double>(Range::lowest()), static_cast<double>(Range::max()));
+    });
     const NumberLimiter guard(std::max(row.minimum, lowest), std::min(row.maximum, highest), rates);
-    numbers_.push_back(
-        {i, place.offset, lowest, highest, place.kind, limited || row.resting != 0,
-         NumberMotion(guard, row.resting != 0 ? std::optional(row.rest) : std::nullopt)});
-    for (const IntegralRow& integral : schema.integrals) {
-      if (integral.limit != actuator.first_limit + i) continue;
-      numbers_.back().motion.bound_integral(
-          std::make_unique<IntegralBound>(integral, rates, period));
+    std::unique_ptr<IntegralBound> integral;
+    for (const IntegralRow& each : schema.integrals) {
+      if (each.limit != actuator.first_limit + i) continue;
+      integral = std::make_unique<IntegralBound>(each, rates, period);
       has_integrals_ = true;
     }
+    const auto rest = row.resting != 0 ? std::optional(row.rest) : std::nullopt;
+    numbers_.push_back({i, place.offset, lowest, highest, place.kind, limited || rest,
+                        NumberMotion(guard, rest, std::move(integral))});
   }
-}
-
-void Motion::restart(const std::byte* state) noexcept {
-  for (Number& each : numbers_) each.motion.restart(layout_.number(each.number, state));
-}
-
-void Motion::trace(const std::byte* state) noexcept {
-  for (Number& each : numbers_) {
-    const double position = layout_.number(each.number, state);
-    if (each.kind == Kind::float64 && each.motion.accelerates()) {
-      each.motion.trace(position);
-    } else {
-      each.motion.restart(position);
-    }
-  }
-}
-
-void Motion::begin(const std::uint64_t* mask) noexcept {
-  begun_ = true;
-  observed_ = nullptr;
-  follows_rows_ = false;
-  for (Number& each : numbers_) {
-    each.is_commanded = masked(mask, each.number);
-    each.motion.begin();
-  }
-}
-
-bool Motion::accelerates() const noexcept {
-  return std::ranges::any_of(
-      numbers_, [](const Number& each) { return each.is_commanded && each.motion.accelerates(); });
-}
-
-/// Iterations of a row, or of a type that blends by itself, at the speed asked for.
-std::int64_t Motion::iterations_at(const Course& course) const noexcept {
-  if (course.first == StateLayout::kNoNumber) return 1;
-  constexpr double kPeakFromRest = 1.875;  // of a minimum-jerk motion, to its mean speed
-  const double distance =
-      layout_.number(course.first, target()) - layout_.number(course.first, from());
-  const bool is_smooth = course.profile == Profile::minimum_jerk;
-  return iterations_of(is_smooth ? kPeakFromRest * distance : distance, course.cruise);
 }
 
 std::int64_t Motion::propose(const Course& course, const std::byte* desired) noexcept {
@@ -143,15 +89,22 @@ std::int64_t Motion::propose(const Course& course, const std::byte* desired) noe
   const std::byte* observed = first_row ? std::exchange(observed_, nullptr) : nullptr;
   if (observed != nullptr) layout_.copy_finite(from(), observed);
 
-  std::int64_t longest = std::max<std::int64_t>(1, course.asked);
+  std::int64_t longest = std::max<std::int64_t>(1, course.iterations);
   slowest_ = {};
-  if ((is_row_ || numbers_.empty()) && std::isfinite(course.cruise)) {
-    longest = iterations_at(course);
+  const bool by_speed = (is_row_ || numbers_.empty()) && std::isfinite(course.cruise);
+  if (by_speed) longest = 1;
+  if (by_speed && course.first != StateLayout::kNoNumber) {
+    // a row, or a type that blends by itself, at the speed asked for
+    constexpr double kPeakFromRest = 1.875;  // of a minimum-jerk motion, to its mean speed
+    const double distance =
+        layout_.number(course.first, target()) - layout_.number(course.first, from());
+    const bool is_smooth = course.profile == Profile::minimum_jerk;
+    longest = iterations_of(is_smooth ? kPeakFromRest * distance : distance, course.cruise);
   }
   asked_by_speed_ = longest;
   for (Number& each : numbers_) {
     if (!each.is_commanded) continue;
-    NumberMotion::Asked asked;
+    Asked asked = course;
     asked.target = layout_.number(each.number, target());
     const bool at_published = observed != nullptr || !each.is_limited || !(first_row || !is_row_);
     asked.line_start = at_published ? layout_.number(each.number, from()) : each.motion.position();
@@ -162,9 +115,7 @@ std::int64_t Motion::propose(const Course& course, const std::byte* desired) noe
     }
     if (!first_row) each.motion.begin();
     if (observed != nullptr) asked.start = asked.line_start;
-    asked.iterations = course.asked;
-    asked.profile = course.profile;
-    if (each.number == course.first) asked.cruise = course.cruise;
+    if (each.number != course.first) asked.cruise = kUnlimited;
     const std::int64_t fewest = each.motion.propose(asked);
     if (each.number == course.first) asked_by_speed_ = fewest;
     if (fewest <= longest) continue;
@@ -174,54 +125,25 @@ std::int64_t Motion::propose(const Course& course, const std::byte* desired) noe
   return longest;
 }
 
-void Motion::settle(Iteration first, std::int64_t iterations) noexcept {
-  first_ = first;
-  last_ = first + (iterations - 1);
-  iterations_ = static_cast<double>(iterations);
-  for (Number& each : numbers_) {
-    if (!each.is_commanded) continue;
-    if (is_row_) {
-      each.motion.line_for(iterations);
-    } else {
-      each.motion.settle(iterations);
-    }
-  }
-}
-
-void Motion::follow_as_sent(Iteration first) noexcept {
-  first_ = last_ = first;
-  iterations_ = 1.0;
-  begun_ = is_row_ = false;
-  for (Number& each : numbers_) {
-    if (each.is_commanded) each.motion.follow_as_sent(layout_.number(each.number, target()));
-  }
-}
-
-void Motion::widen(const std::byte* row) noexcept {
-  for (Number& each : numbers_) {
-    if (each.is_commanded) each.motion.widen(layout_.number(each.number, row));
-  }
-}
-
 /// Types that blend by themselves: by the share of the time, from rest to rest.
-void Motion::blend(std::byte* state) noexcept {
-  if (now_ >= last_) return layout_.copy(state, target());
-  const auto i = static_cast<double>(now_ - first_ + 1);
-  const double share =
-      profile_ == Profile::minimum_jerk
-          ? SmoothMotion({}, 1.0, static_cast<std::int64_t>(iterations_)).position(i)
-          : i / iterations_;
+void Motion::blend(Iteration now, std::byte* state) noexcept {
+  if (now >= last_) return layout_.copy(state, target());
+  const auto i = static_cast<double>(now - first_ + 1);
+  const std::int64_t iterations = last_ - first_ + 1;
+  const double share = profile_ == Profile::minimum_jerk
+                           ? SmoothMotion({}, 1.0, iterations).position(i)
+                           : i / static_cast<double>(iterations);
   std::byte* blended = target() + stride_;
   layout_.hooks().blend(blended, from(), target(), share);
   // a blend() that divides by zero gives an invalid state: keep the last one
-  if (layout_.finite(blended)) layout_.copy(state, blended);
+  const bool is_finite = layout_.first_not_finite(blended) == StateLayout::kNoNumber;
+  if (is_finite && layout_.proper(blended)) layout_.copy(state, blended);
 }
 
 Limited Motion::step(Iteration now, std::byte* state) noexcept {
-  now_ = now;
   Limited result;
   if (layout_.hooks().blend != nullptr) {
-    blend(state);
+    blend(now, state);
     return result;
   }
   for (const std::uint32_t i : switches_) {
@@ -242,98 +164,33 @@ Limited Motion::step(Iteration now, std::byte* state) noexcept {
       std::memcpy(state + each.offset, target() + each.offset, layout_.numbers()[each.number].size);
     } else if (each.kind == Kind::float64) {
       store(state + each.offset, each.motion.position());
-    } else if (each.is_limited) {
-      publish(each, state);
     } else {
-      publish_exact(each, state);
+      publish(each, state);
     }
   }
   return result;
 }
 
-/// Writes one number to the state, rounded to its kind, inward at its bounds.
-void Motion::publish(const Number& number, std::byte* state) const noexcept {
+/// Writes one number to the state, rounded to its kind, inward at its bounds. Integers that a
+/// double cannot hold stay exact on a line without limits.
+void Motion::publish(const Number& number, std::byte* state) noexcept {
   std::byte* at = state + number.offset;
   const double value = number.motion.position();
   // a number outside its bounds may stay there
   const double low = std::min(number.motion.guard().minimum(), value);
   const double high = std::max(number.motion.guard().maximum(), value);
   visit_number(number.kind, [&]<class T>(T) {
-    if constexpr (std::is_integral_v<T>) {
+    if constexpr (std::is_floating_point_v<T>) {
+      store(at, static_cast<T>(sizeof(T) < 8 ? nearest_float(value, low, high) : value));
+    } else if (sizeof(T) < 8 || number.is_limited || !number.motion.is_on_line()) {
       store(at, to_integer<T>(nearest_whole(value, low, high)));
     } else {
-      store(at, static_cast<T>(sizeof(T) < 8 ? nearest_float(value, low, high) : value));
+      const auto start = static_cast<long double>(load<T>(from() + number.offset));
+      const auto end = static_cast<long double>(load<T>(target() + number.offset));
+      const auto share = static_cast<long double>(number.motion.plan().share());
+      store(at, to_integer<T>(start + (end - start) * share));
     }
   });
-}
-
-/// The same for a number without limits; integers that a double cannot hold stay exact on a line.
-void Motion::publish_exact(const Number& number, std::byte* state) const noexcept {
-  std::byte* at = state + number.offset;
-  const double value = number.motion.position();
-  visit_number(number.kind, [&]<class T>(T) {
-    if constexpr (std::is_floating_point_v<T>) {
-      store(at, static_cast<T>(value));
-    } else if (sizeof(T) < 8) {
-      store(at, to_integer<T>(value));
-    } else if (!number.motion.plan().is_line()) {
-      store(at, to_integer<T>(static_cast<long double>(value)));
-    } else {
-      store(at, moved_wide(load<T>(from() + number.offset), load<T>(target() + number.offset),
-                           number.motion.plan().share()));
-    }
-  });
-}
-
-void Motion::end() noexcept {
-  for (Number& each : numbers_) each.motion.end();
-}
-
-void Motion::complete() noexcept {
-  for (Number& each : numbers_) {
-    if (each.is_commanded) {
-      each.motion.complete();
-    } else {
-      each.motion.end();
-    }
-  }
-}
-
-bool Motion::brake(std::byte* state) noexcept {
-  bool moves = false;
-  for (Number& each : numbers_) {
-    const double before = each.motion.position();
-    moves = each.motion.brake() || moves;
-    if (each.motion.position() != before) publish(each, state);
-  }
-  return moves;
-}
-
-bool Motion::brake_resting(std::byte* state) noexcept {
-  bool moves = false;
-  for (Number& each : numbers_) {
-    if (each.motion.has_rest()) {
-      moves = each.motion.brake() || moves;
-      publish(each, state);
-    } else {
-      each.motion.restart(layout_.number(each.number, state));
-    }
-  }
-  return moves;
-}
-
-void Motion::hold() noexcept {
-  for (Number& each : numbers_) {
-    if (each.is_commanded) {
-      each.motion.hold();
-    } else {
-      each.motion.release();
-    }
-  }
-}
-
-void Motion::release() noexcept {
-  for (Number& each : numbers_) each.motion.release();
 }
 
 }  // namespace o80

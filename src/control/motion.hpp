@@ -3,12 +3,9 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
-#include <optional>
 #include <vector>
 
 #include "control/number_motion.hpp"
-#include "control/record.hpp"
 #include "control/state_layout.hpp"
 
 namespace o80 {
@@ -36,18 +33,23 @@ class Motion {
   Motion(const Schema& schema, const ActuatorRow& actuator, const StateLayout& layout);
 
   /// How a command gets to its target, or to the next row of a trajectory.
-  struct Course {
-    Profile profile = Profile::linear;
-    std::int64_t asked = 0;  // iterations; 0: as few as the limits allow
-    double cruise = std::numeric_limits<double>::infinity();  // of `first` [1/iteration]
+  struct Course : Asked {
     std::uint32_t first = 0;  // the number that the cruising speed is for
-    bool is_row = false;      // of a trajectory in straight lines: it has `asked` iterations
+    bool is_row = false;      // of a trajectory in straight lines: it has `iterations`
   };
 
   /// The target of the next plan(); fill it before. Numbers of `mask` (null: all) move to it.
   std::byte* target() noexcept { return from() + stride_; }
   /// A command begins.
-  void begin(const std::uint64_t* mask) noexcept;
+  void begin(const std::uint64_t* mask) noexcept {
+    begun_ = true;
+    observed_ = nullptr;
+    follows_rows_ = false;
+    for (Number& each : numbers_) {
+      each.is_commanded = masked(mask, each.number);
+      each.motion.begin();
+    }
+  }
   /// The last target is where the next row begins.
   void next_row() noexcept { layout_.copy(from(), target()); }
   /// The next plan starts at rest at these values, not where the actuator is.
@@ -57,91 +59,121 @@ class Motion {
   /// The part of it that the cruising speed needs.
   std::int64_t asked_by_speed() const noexcept { return asked_by_speed_; }
   /// Then plans for so many iterations, at least those.
-  void settle(Iteration first, std::int64_t iterations) noexcept;
+  void settle(Iteration first, std::int64_t iterations) noexcept {
+    first_ = first;
+    last_ = first + (iterations - 1);
+    for (Number& each : numbers_) {
+      if (!each.is_commanded) continue;
+      if (is_row_) {
+        each.motion.line_for(iterations);
+      } else {
+        each.motion.settle(iterations);
+      }
+    }
+  }
   /// A set-point of a generator at the rate of the loop: no plan, only limits.
-  void follow_as_sent(Iteration first) noexcept;
+  void follow_as_sent(Iteration first) noexcept {
+    first_ = last_ = first;
+    begun_ = is_row_ = false;
+    for (Number& each : numbers_) {
+      if (each.is_commanded) each.motion.follow_as_sent(layout_.number(each.number, target()));
+    }
+  }
   /// The plan goes on until this iteration or later.
   void extend(Iteration last) noexcept { last_ = std::max(last_, last); }
   /// What is followed reaches to this state, too.
-  void widen(const std::byte* row) noexcept;
+  void widen(const std::byte* row) noexcept {
+    for (Number& each : numbers_) {
+      if (each.is_commanded) each.motion.widen(layout_.number(each.number, row));
+    }
+  }
   /// True if a limit can keep the actuator from a row.
   bool follows_rows() const noexcept { return follows_rows_; }
   /// True if a commanded number has a limit of acceleration.
-  bool accelerates() const noexcept;
+  bool accelerates() const noexcept {
+    return std::ranges::any_of(
+        numbers_, [](auto& each) { return each.is_commanded && each.motion.accelerates(); });
+  }
 
   /// Where the robot is: before step() or brake().
   void observe(const std::byte* observed) noexcept {
     if (!has_integrals_) return;
-    for (Number& each : numbers_) {
-      if (const IntegralBound* moved = each.motion.integral()) {
-        each.motion.observe(layout_.number(moved->number(), observed));
-      }
-    }
+    for (Number& each : numbers_) each.motion.observe(layout_, observed);
   }
   /// One iteration of the motion; the limit that changed it, if any.
   Limited step(Iteration now, std::byte* state) noexcept;
   Iteration last() const noexcept { return last_; }
   /// True if the state of the last step() was the target: nothing is left to follow.
   bool arrived() const noexcept {
-    return std::ranges::all_of(numbers_, [](const Number& each) { return each.motion.arrived(); });
+    return all([](auto& each) { return each.arrived(); });
   }
   /// True if bounds of an integral hold a number back, which stands, and the others have arrived.
   bool stands() const noexcept {
-    return has_integrals_ &&
-           std::ranges::all_of(
-               numbers_,
-               [](const Number& each) { return each.motion.stands() || each.motion.arrived(); }) &&
-           std::ranges::any_of(numbers_, [](const Number& each) { return each.motion.stands(); });
+    return has_integrals_ && any([](auto& each) { return each.stands(); }) &&
+           all([](auto& each) { return each.stands() || each.arrived(); });
   }
   /// True if such bounds have changed the motion since begin().
   bool was_held_back() const noexcept {
-    return has_integrals_ && std::ranges::any_of(numbers_, [](const Number& each) {
-             return each.motion.was_held_back();
-           });
+    return has_integrals_ && any([](auto& each) { return each.was_held_back(); });
   }
-  /// Difference of the number at this offset to the iteration before: first (order 1) or second; 0
-  /// for what does not move.
+  /// First (order 1) or second difference of the number at this offset; 0 for what does not move.
   double difference(std::uint32_t offset, std::uint32_t order) const noexcept {
     const auto found = std::ranges::find(numbers_, offset, &Number::offset);
     return found == numbers_.end() ? 0.0 : found->motion.difference(order);
   }
   /// The limit because of which plan() took more iterations than asked.
   Limited slowest() const noexcept { return slowest_; }
-  /// The command has ended, at its target if it is complete().
-  void end() noexcept;
-  void complete() noexcept;
+  /// The command has ended, at its target if that is `arrived`.
+  void end(bool arrived = false) noexcept {
+    for (Number& each : numbers_) each.motion.end(arrived && each.is_commanded);
+  }
 
   /// Sets all numbers to this state, at rest.
-  void restart(const std::byte* state) noexcept;
+  void restart(const std::byte* state) noexcept {
+    for (Number& each : numbers_) each.motion.restart(layout_.number(each.number, state));
+  }
   /// One iteration of a motion that was made elsewhere, after restart(). Numbers whose differences
   /// a command would not use, or whose bytes are rounded, are at rest there.
-  void trace(const std::byte* state) noexcept;
-  /// One iteration of braking. Numbers with a rest value go to it, unless they are held. True while
-  /// a number moves.
-  bool brake(std::byte* state) noexcept;
-  /// The same, but only for numbers with a rest value; the others are at `state`, the observed one.
-  bool brake_resting(std::byte* state) noexcept;
-  /// Holds the commanded numbers that have a rest value where they are, until release().
-  void hold() noexcept;
-  void release() noexcept;
+  void trace(const std::byte* state) noexcept {
+    for (Number& each : numbers_) {
+      const double position = layout_.number(each.number, state);
+      if (each.kind == Kind::float64 && each.motion.accelerates()) {
+        each.motion.trace(position);
+      } else {
+        each.motion.restart(position);
+      }
+    }
+  }
+  /// One iteration of braking. Numbers with a rest value go to it, unless they are held; if it
+  /// `follows`, the others are at `state`, the observed one. True while a number moves.
+  bool brake(std::byte* state, bool follows) noexcept {
+    bool moves = false;
+    for (Number& each : numbers_) {
+      if (follows && !each.motion.has_rest()) {
+        each.motion.restart(layout_.number(each.number, state));
+        continue;
+      }
+      const double before = each.motion.position();
+      moves = each.motion.brake() || moves;
+      if (follows || each.motion.position() != before) publish(each, state);
+    }
+    return moves;
+  }
+  /// Holds the commanded numbers that have a rest value where they are, until hold(false).
+  void hold(bool holds) noexcept {
+    for (Number& each : numbers_) each.motion.hold(holds && each.is_commanded);
+  }
   /// True if a number is held away from its rest value.
   bool holds() const noexcept {
-    return std::ranges::any_of(numbers_,
-                               [](const Number& each) { return each.motion.is_held_away(); });
+    return any([](auto& each) { return each.is_held_away(); });
   }
   /// True if braking would change nothing.
-  bool at_rest() const noexcept {
-    return std::ranges::all_of(numbers_, [](const Number& each) { return each.motion.at_rest(); });
+  bool at_rest(bool follows) const noexcept {
+    return all([&](auto& each) { return (follows && !each.has_rest()) || each.at_rest(); });
   }
   /// True if nothing moves, as far as limits of acceleration tell.
   bool rests() const noexcept {
-    return std::ranges::all_of(numbers_, [](const Number& each) { return each.motion.rests(); });
-  }
-  /// The same as at_rest(), for numbers with a rest value.
-  bool resting_at_rest() const noexcept {
-    return std::ranges::all_of(numbers_, [](const Number& each) {
-      return !each.motion.has_rest() || each.motion.at_rest();
-    });
+    return all([](auto& each) { return each.rests(); });
   }
 
  private:
@@ -156,15 +188,17 @@ class Motion {
     bool is_commanded = true;
   };
 
-  std::byte* from() noexcept { return reinterpret_cast<std::byte*>(ends_.data()); }
-  const std::byte* from() const noexcept {
-    return reinterpret_cast<const std::byte*>(ends_.data());
+  template <class Predicate>
+  bool all(Predicate&& predicate) const noexcept {
+    return std::ranges::all_of(numbers_, predicate, &Number::motion);
   }
-  const std::byte* target() const noexcept { return from() + stride_; }
-  std::int64_t iterations_at(const Course& course) const noexcept;
-  void blend(std::byte* state) noexcept;
-  void publish(const Number& number, std::byte* state) const noexcept;
-  void publish_exact(const Number& number, std::byte* state) const noexcept;
+  template <class Predicate>
+  bool any(Predicate&& predicate) const noexcept {
+    return std::ranges::any_of(numbers_, predicate, &Number::motion);
+  }
+  std::byte* from() noexcept { return reinterpret_cast<std::byte*>(ends_.data()); }
+  void blend(Iteration now, std::byte* state) noexcept;
+  void publish(const Number& number, std::byte* state) noexcept;
 
   const StateLayout& layout_;
   std::size_t stride_;                   // [bytes]
@@ -173,8 +207,6 @@ class Motion {
   std::vector<std::uint32_t> switches_;  // numbers that switch at the start
   Iteration first_ = 0;
   Iteration last_ = 0;
-  Iteration now_ = 0;
-  double iterations_ = 1.0;
   Profile profile_ = Profile::linear;
   const std::byte* observed_ = nullptr;
   bool has_integrals_ = false;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 namespace o80 {
 namespace {
@@ -15,189 +14,109 @@ constexpr int kHalvings = 16;
 /// `acceleration` in each iteration. The iteration at that speed is included.
 double speed_for(double room, double acceleration) noexcept {
   if (room <= 0.0) return 0.0;
-  if (!std::isfinite(acceleration) || !std::isfinite(room)) return room;
+  if (!std::isfinite(room)) return room;
   const double k = std::floor((std::sqrt(1.0 + 8.0 * room / acceleration) - 1.0) / 2.0);
   return (room + acceleration * k * (k + 1.0) / 2.0) / (k + 1.0);
 }
 
 }  // namespace
 
-/// A possible next state and its shortest stop.
-struct NumberLimiter::Candidate {
-  double position;
-  double speed;
-  double acceleration;
-  VelocityChange stop;
-};
-
-void NumberLimiter::restart(double position) noexcept {
-  position_ = position;
-  begin();
-  speed_ = acceleration_ = 0.0;
-  stop_ = {};
-  stopped_ = 0;
-  stop_known_ = true;
-}
-
-void NumberLimiter::begin(const Span& span) noexcept {
-  wanted_ = position_;
-  scale_ = std::abs(position_);
-  low_ = std::max(minimum_, span.low);
-  high_ = std::min(maximum_, span.high);
-}
-
-bool NumberLimiter::stays() const noexcept {
-  if (!std::isfinite(rates_.acceleration)) return true;
-  const double tolerance = slack();
-  if (std::abs(speed_) > rates_.acceleration + tolerance) return false;
-  return std::abs(speed_) <= rates_.jerk + tolerance &&
-         std::abs(speed_ + acceleration_) <= rates_.jerk + tolerance;
-}
-
-NumberLimiter::Span NumberLimiter::stop() noexcept {
-  if (stays()) return {position_, position_};
-  const VelocityChange stop(-speed_, acceleration_, rates_);
-  const double end = position_ + stop.displacement();
-  const double turn = position_ + stop.run_before_turn(speed_);
-  return {std::min({position_, turn, end}), std::max({position_, turn, end})};
-}
-
-bool NumberLimiter::stops_inside() noexcept {
-  const Span visited = stop();
-  return visited.low >= minimum_ - rounding() && visited.high <= maximum_ + rounding();
+NumberLimiter::NumberLimiter(double minimum, double maximum, const Rates& rates) noexcept
+    : bounds_{minimum, maximum},
+      span_(bounds_),
+      rates_(rates),
+      has_rates_(std::isfinite(rates.speed) || std::isfinite(rates.acceleration) ||
+                 std::isfinite(rates.jerk)) {
+  const double finest = std::min({rates.speed, rates.acceleration, rates.jerk});
+  tolerance_ = std::isfinite(finest) ? kLimitRounding * finest : 0.0;
 }
 
 /// Limits and bounds may be exceeded by rounding.
 bool NumberLimiter::pass_rounded(double next) noexcept {
-  const double speed = next - position_;
-  const double acceleration = speed - speed_;
+  const double speed = next - now_.position;
+  const double acceleration = speed - now_.speed;
   const double room = rounding();
   const auto within = [&](double value, double limit) {
     return std::abs(value) <= limit * (1.0 + kLimitRounding) + room;
   };
-  const double highest = std::max(maximum_, position_);
-  const double lowest = std::min(minimum_, position_);
+  Span allowed = bounds_;
+  allowed.include(now_.position);
   const bool keeps = within(speed, rates_.speed) && within(acceleration, rates_.acceleration) &&
-                     within(acceleration - acceleration_, rates_.jerk) && next <= highest + room &&
-                     next >= lowest - room;
-  if (keeps) accept(std::clamp(next, lowest, highest));
+                     within(acceleration - now_.acceleration, rates_.jerk) &&
+                     next <= allowed.high + room && next >= allowed.low - room;
+  if (keeps) accept(std::clamp(next, allowed.low, allowed.high));
   return keeps;
 }
 
-double NumberLimiter::tolerance_of(const Rates& rates) noexcept {
-  const double finest = std::min({rates.speed, rates.acceleration, rates.jerk});
-  return std::isfinite(finest) ? kLimitRounding * finest : 0.0;
+/// The speeds from which it stops inside its bounds, in both directions.
+Span NumberLimiter::speeds() const noexcept {
+  const Span room{-std::max(0.0, now_.position - span_.low),
+                  std::max(0.0, span_.high - now_.position)};
+  if (!std::isfinite(rates_.acceleration)) return room;
+  return {-speed_for(-room.low, rates_.acceleration), speed_for(room.high, rates_.acceleration)};
 }
 
-/// Within the bounds, or no further outside than `before`.
-double NumberLimiter::inside(double position, double before) const noexcept {
-  return std::clamp(position, std::min(low_, before), std::max(high_, before));
-}
-
-void NumberLimiter::move(double speed) noexcept {
-  position_ = inside(position_ + speed, position_);
-  scale_ = std::max(scale_, std::abs(position_));
-  acceleration_ = speed - speed_;
-  speed_ = speed;
-}
-
-/// Treats a speed within rounding as 0.
-void NumberLimiter::forget_rounding() noexcept {
-  const double nothing = slack() / 100.0 + 2.0 * rounding();
-  const bool steady = !std::isfinite(rates_.jerk) || std::abs(acceleration_) <= nothing;
-  if (steady && std::abs(speed_) <= nothing) {
-    speed_ = acceleration_ = 0.0;
-    stop_ = {};
-    stopped_ = 0;
-    stop_known_ = true;
+Limit NumberLimiter::follow_without_jerk(double step, double lag) noexcept {
+  // the wanted speed: reach the wanted position, or, from farther away, approach it at the highest
+  // speed from which it can stop there
+  const double before = now_.position;
+  double speed = wanted_ - before;
+  bool within_reach = true;
+  if (std::isfinite(rates_.acceleration)) {
+    const double closing = speed_for(std::abs(lag), rates_.acceleration);
+    within_reach = closing >= std::abs(lag);
+    if (!within_reach) speed = step - std::copysign(closing, lag);
   }
-}
 
-/// Without an acceleration limit: reaches the wanted position in this iteration, as far as speed
-/// and bounds allow. The same results as follow_with_acceleration(), bit for bit, with less work:
-/// most actuators have bounds only.
-Limit NumberLimiter::follow_at_once() noexcept {
-  const double before = position_;
-  const double speed = wanted_ - before;
-  const double up = std::max(0.0, high_ - before);
-  const double down = std::max(0.0, before - low_);
-  const double highest = std::min(rates_.speed, up);
-  const double lowest = std::max(-rates_.speed, -down);
+  // the allowed speeds
+  const Span stopping = speeds();
+  const double highest =
+      std::min(std::min(now_.speed + rates_.acceleration, rates_.speed), stopping.high);
+  const double lowest =
+      std::max(std::max(now_.speed - rates_.acceleration, -rates_.speed), stopping.low);
   const bool is_inside = speed <= highest && speed >= lowest;  // mostly, so no slack is needed
   if (is_inside || (speed <= highest + slack() && speed >= lowest - slack())) {
     move(speed);
-    position_ = inside(wanted_, before);
-    if (std::abs(speed_) <= slack() / 100.0 + 2.0 * rounding()) speed_ = acceleration_ = 0.0;
-    return position_ == wanted_ ? Limit::none : Limit::acceleration;
+    if (within_reach) {
+      now_.position = inside(wanted_, before);
+      forget_rounding();
+    }
+    return now_.position == wanted_ ? Limit::none : Limit::acceleration;
   }
   const bool upward = speed > highest;
   const double bound = upward ? highest : lowest;
   move(upward ? std::max(highest, lowest) : std::min(highest, lowest));
-  if (bound == (upward ? up : -down)) return upward ? Limit::maximum : Limit::minimum;
-  return Limit::speed;
-}
-
-Limit NumberLimiter::follow_with_acceleration(double step, double lag) noexcept {
-  // the wanted speed: reach the wanted position, or, from farther away, approach it at the highest
-  // speed from which it can stop there
-  const double closing = speed_for(std::abs(lag), rates_.acceleration);
-  const bool within_reach = closing >= std::abs(lag);
-  const double speed = within_reach ? wanted_ - position_ : step - std::copysign(closing, lag);
-  const bool exact = within_reach;
-
-  // the allowed speeds
-  const double up = speed_for(std::max(0.0, high_ - position_), rates_.acceleration);
-  const double down = speed_for(std::max(0.0, position_ - low_), rates_.acceleration);
-  const double highest = std::min({speed_ + rates_.acceleration, rates_.speed, up});
-  const double lowest = std::max({speed_ - rates_.acceleration, -rates_.speed, -down});
-  if (speed <= highest + slack() && speed >= lowest - slack()) {
-    const double before = position_;
-    move(speed);
-    if (exact) position_ = inside(wanted_, before);
-    if (exact) forget_rounding();
-    return position_ == wanted_ ? Limit::none : Limit::acceleration;
-  }
-  const bool upward = speed > highest;
-  const double bound = upward ? highest : lowest;
-  move(upward ? std::max(highest, lowest) : std::min(highest, lowest));
-  if (bound == (upward ? up : -down)) return upward ? Limit::maximum : Limit::minimum;
+  if (upward && bound == stopping.high) return Limit::maximum;
+  if (!upward && bound == stopping.low) return Limit::minimum;
   return std::abs(bound) == rates_.speed ? Limit::speed : Limit::acceleration;
-}
-
-NumberLimiter::Candidate NumberLimiter::candidate(double acceleration) const noexcept {
-  const double speed = speed_ + acceleration;
-  return {position_ + speed, speed, acceleration, VelocityChange(-speed, acceleration, rates_)};
 }
 
 /// The limit that a candidate or its stop violates.
 Limit NumberLimiter::violated(const Candidate& next) const noexcept {
-  const double tolerance = slack();
-  const double fastest = std::max(std::abs(next.speed), std::abs(next.speed + next.stop.detour()));
-  if (fastest > rates_.speed + tolerance) return Limit::speed;
-  const double end = next.position + next.stop.displacement();
-  const double turn = next.position + next.stop.run_before_turn(next.speed);
+  const auto [position, speed, acceleration] = next.moment;
+  const double fastest = std::max(std::abs(speed), std::abs(speed + next.stop.detour()));
+  if (fastest > rates_.speed + slack()) return Limit::speed;
+  const double end = position + next.stop.displacement();
+  const double turn = position + next.stop.run_before_turn(speed);
   const double rounding = this->rounding();
-  // outside the bounds it must not turn outward again
-  const double highest = std::max(high_, std::min(next.position, turn));
-  const double lowest = std::min(low_, std::max(next.position, turn));
-  if (next.position > std::max(high_, position_) + rounding ||
-      std::max(end, turn) > std::max(highest, next.position) + rounding ||
-      (end > turn && end > highest + rounding)) {
-    return Limit::maximum;
-  }
-  if (next.position < std::min(low_, position_) - rounding ||
-      std::min(end, turn) < std::min(lowest, next.position) - rounding ||
-      (end < turn && end < lowest - rounding)) {
-    return Limit::minimum;
-  }
-  return Limit::none;
+  // `side`: 1 above, -1 below. Outside the bounds it must not turn outward again
+  const auto leaves = [&](double side, double bound) {
+    const double next_to = side * position;
+    const double inner = std::max(bound, std::min(next_to, side * turn));
+    return next_to > std::max(bound, side * now_.position) + rounding ||
+           std::max(side * end, side * turn) > std::max(inner, next_to) + rounding ||
+           (side * end > side * turn && side * end > inner + rounding);
+  };
+  if (leaves(1.0, span_.high)) return Limit::maximum;
+  return leaves(-1.0, -span_.low) ? Limit::minimum : Limit::none;
 }
 
 /// The acceleration that approaches the wanted position as fast as possible without overshoot,
 /// computed in the frame that moves with the wanted position (by `step` in each iteration).
-double NumberLimiter::goal(double step, double lag, double low, double high) const noexcept {
+double NumberLimiter::goal(double step, double lag, const Span& accelerations) const noexcept {
+  auto [low, high] = accelerations;
   const auto overshoot = [&](double acceleration) {
-    const double speed = speed_ + acceleration - step;
+    const double speed = now_.speed + acceleration - step;
     return lag + speed + VelocityChange(-speed, acceleration, rates_).displacement();
   };
   if (overshoot(low) >= 0.0) return low;
@@ -209,51 +128,34 @@ double NumberLimiter::goal(double step, double lag, double low, double high) con
   return low;
 }
 
-void NumberLimiter::accept(const Candidate& next) noexcept {
-  move(next.speed);
-  acceleration_ = next.acceleration;
-  stop_ = next.stop;
-  stopped_ = 0;
-  stop_known_ = true;
-}
-
-/// The shortest stop from the present state => stop_.
-void NumberLimiter::know_stop() noexcept {
-  if (std::exchange(stop_known_, true)) return;
-  stop_ = std::isfinite(rates_.jerk) ? VelocityChange(-speed_, acceleration_, rates_)
-                                     : VelocityChange();
-  stopped_ = 0;
-}
-
 Limit NumberLimiter::follow_with_jerk(double step, double lag) noexcept {
   know_stop();
   const double tolerance = slack();
-  const double low = std::max(acceleration_ - rates_.jerk, -rates_.acceleration);
-  const double high = std::min(acceleration_ + rates_.jerk, rates_.acceleration);
+  const Span allowed = accelerations();
 
   // reach the wanted position exactly, if it can stay there
-  const double wanted = wanted_ - position_ - speed_;
-  const double relative = wanted_ - position_ - step;
+  const double wanted = wanted_ - now_.position - now_.speed;
+  const double relative = wanted_ - now_.position - step;
   const bool tracked = lag == 0.0;
   const bool stays =
       tracked || (std::abs(relative) <= rates_.jerk && std::abs(relative + wanted) <= rates_.jerk);
-  if (stays && wanted >= low - tolerance && wanted <= high + tolerance) {
+  if (stays && wanted >= allowed.low - tolerance && wanted <= allowed.high + tolerance) {
     const Candidate exact = candidate(wanted);
     if (violated(exact) == Limit::none) {
-      const double before = position_;
+      const double before = now_.position;
       accept(exact);
-      position_ = inside(wanted_, before);
+      now_.position = inside(wanted_, before);
       forget_rounding();
-      return position_ == wanted_ ? Limit::none : Limit::jerk;
+      return now_.position == wanted_ ? Limit::none : Limit::jerk;
     }
   }
 
   // else come as near as the limits allow
-  return accelerate(tracked ? std::clamp(wanted, low, high) : goal(step, lag, low, high));
+  return accelerate(tracked ? std::clamp(wanted, allowed.low, allowed.high)
+                            : goal(step, lag, allowed));
 }
 
-/// Takes the acceleration nearest to `best` that the limits allow; the stop from the last state is
-/// always possible.
+/// Takes the allowed acceleration nearest to `best`; that of the last state's stop always is one.
 Limit NumberLimiter::accelerate(double best) noexcept {
   know_stop();
   Candidate next = candidate(best);
@@ -285,57 +187,34 @@ Limit NumberLimiter::accelerate(double best) noexcept {
   return reason;
 }
 
-void NumberLimiter::place(const Moment& now) noexcept {
-  position_ = wanted_ = now.position;
-  speed_ = now.speed;
-  acceleration_ = now.acceleration;
-  scale_ = std::abs(position_);
-  stop_known_ = false;
-}
-
 Limit NumberLimiter::nearest_speed(double wanted) noexcept {
   if (std::isfinite(rates_.jerk)) {
-    const double low = std::max(acceleration_ - rates_.jerk, -rates_.acceleration);
-    const double high = std::min(acceleration_ + rates_.jerk, rates_.acceleration);
-    const Limit reason = accelerate(std::clamp(wanted - speed_, low, high));
+    const auto [low, high] = accelerations();
+    const Limit reason = accelerate(std::clamp(wanted - now_.speed, low, high));
     return reason == Limit::minimum || reason == Limit::maximum ? reason : Limit::none;
   }
-  const double up = speed_for(std::max(0.0, high_ - position_), rates_.acceleration);
-  const double down = speed_for(std::max(0.0, position_ - low_), rates_.acceleration);
-  const double highest = std::max(up, speed_ - rates_.acceleration);
-  const double lowest = std::min(-down, speed_ + rates_.acceleration);
+  const Span stopping = speeds();
+  const double highest = std::max(stopping.high, now_.speed - rates_.acceleration);
+  const double lowest = std::min(stopping.low, now_.speed + rates_.acceleration);
   move(std::clamp(wanted, lowest, highest));
   if (wanted > highest + slack()) return Limit::maximum;
   return wanted < lowest - slack() ? Limit::minimum : Limit::none;
 }
 
-void NumberLimiter::brake() noexcept {
-  if (!std::isfinite(rates_.acceleration)) {
-    rest();
-  } else if (stays()) {
-    acceleration_ = -speed_;
-    speed_ = 0.0;
-    stop_known_ = false;
-  } else {
-    slow_down();
-  }
-  wanted_ = position_;
-}
-
 void NumberLimiter::slow_down() noexcept {
   if (!std::isfinite(rates_.jerk)) {
     const double less =
-        std::isfinite(rates_.acceleration) ? std::abs(speed_) - rates_.acceleration : 0.0;
-    move(std::copysign(std::max(0.0, less), speed_));
-    if (speed_ == 0.0) speed_ = acceleration_ = 0.0;
+        std::isfinite(rates_.acceleration) ? std::abs(now_.speed) - rates_.acceleration : 0.0;
+    move(std::copysign(std::max(0.0, less), now_.speed));
+    if (now_.speed == 0.0) now_.speed = now_.acceleration = 0.0;
     return;
   }
   know_stop();
   ++stopped_;
   const bool last = stopped_ >= stop_.steps();
   const double acceleration = last ? 0.0 : stop_.acceleration(stopped_);
-  move(last ? 0.0 : speed_ + acceleration);
-  acceleration_ = acceleration;
+  move(last ? 0.0 : now_.speed + acceleration);
+  now_.acceleration = acceleration;
   if (last) stop_ = {};
 }
 

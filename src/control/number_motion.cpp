@@ -1,174 +1,91 @@
 #include "control/number_motion.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 namespace o80 {
 
-void NumberMotion::restart(double position) noexcept {
-  guard_.restart(position);
-  planned_ = follows_ = held_ = leaves_ = held_back_ = stands_ = false;
-  difference_ = former_difference_ = 0.0;
-}
-
-void NumberMotion::begin() noexcept {
-  former_target_ = planned_ ? plan_.target() : guard_.position();
-  held_back_ = false;
-  end();
-}
-
-/// If the shortest stop would leave the bounds, the plan goes on until it stays inside.
-void NumberMotion::end() noexcept {
-  if (planned_ && !follows_ && !guard_.stops_inside()) {
-    former_ = plan_;
-    leaves_ = true;
-  }
-  planned_ = follows_ = false;
-  guard_.follow_within_bounds();
-}
-
-std::int64_t NumberMotion::propose(const Asked& asked) noexcept {
-  // mostly nothing limits a set-point: it needs no plan
-  jumps_at_once_ =
-      !has_rates() && asked.iterations <= 1 && !asked.start && !std::isfinite(asked.cruise);
-  if (!jumps_at_once_) return plan_for(asked);
-  asked_ = asked;
-  return 1;
-}
-
 std::int64_t NumberMotion::plan_for(const Asked& asked) noexcept {
-  const NumberLimiter::Span stop = guard_.stop();
-  NumberLimiter::Span span = stop;
-  span.low = std::min(span.low, asked.target);
-  span.high = std::max(span.high, asked.target);
-  const double from = asked.start.value_or(guard_.position());
-  span.low = std::min(span.low, from);
-  span.high = std::max(span.high, from);
-  guard_.begin(span);
+  PlanTask task{asked, asked.start ? Moment{*asked.start} : guard_.moment(), guard_.stop(),
+                guard_.rates(), asked.start || guard_.stays()};
+  task.span.include(asked.target);
+  task.span.include(task.from.position);
+  guard_.begin(task.span);
+  if (!accelerates()) task.span.include(former_target_);
 
-  PlanTask task;
-  task.start = asked.start ? Moment{*asked.start, 0.0, 0.0} : guard_.moment();
-  task.line_start = asked.line_start;
-  task.target = asked.target;
-  task.low = span.low;
-  task.high = span.high;
-  if (!accelerates()) {
-    task.low = std::min(task.low, former_target_);
-    task.high = std::max(task.high, former_target_);
-  }
-  task.rates = guard_.rates();
-  task.cruise = asked.cruise;
-  task.profile = asked.profile;
-  task.stays = asked.start || guard_.stays();
   planned_ = true;
   // without limits it jumps to where it starts, which is no speed
-  jumps_ = asked.start && !has_rates() && from >= guard_.minimum() && from <= guard_.maximum();
-  start_ = from;
+  const double from = task.from.position;
+  jumps_ = asked.start && !has_rates() && guard_.admits(from);
   const bool starts_elsewhere =
       asked.start && !jumps_ && (from != guard_.position() || !guard_.at_rest());
-  follows_ = leaves_ || starts_elsewhere || guard_.position() < guard_.minimum() ||
-             guard_.position() > guard_.maximum();
-  return plan_.propose(task, asked.iterations);
+  follows_ = leaves_ || starts_elsewhere || !guard_.admits(guard_.position());
+  return plan_.propose(task);
 }
 
 void NumberMotion::settle(std::int64_t iterations) noexcept {
   if (std::exchange(jumps_at_once_, false)) {
     if (iterations == 1) {
       planned_ = true;
-      follows_ = guard_.position() < guard_.minimum() || guard_.position() > guard_.maximum();
+      follows_ = !guard_.admits(guard_.position());
       return plan_.line(asked_.target, asked_.target);
     }
     plan_for(asked_);
   }
-  if (jumps_) guard_.restart(start_);
+  if (jumps_) guard_.restart(plan_.task().from.position);
   plan_.settle(iterations);
 }
 
-void NumberMotion::line(double start, double target) noexcept {
-  if (!planned_) {
-    const NumberLimiter::Span stop = guard_.stop();
-    guard_.begin({std::min(stop.low, start), std::max(stop.high, start)});
-    planned_ = true;
-    follows_ = true;
-  }
-  guard_.widen(target);
-  plan_.line(start, target);
-}
-
-void NumberMotion::follow_as_sent(double target) noexcept {
-  if (!planned_) guard_.begin();
-  planned_ = true;
-  follows_ = true;
-  plan_.line(target, target);
-}
-
-/// One iteration of the former plan, if a stop would leave the bounds.
-bool NumberMotion::leave() noexcept {
-  if (!leaves_) return false;
-  leaves_ = !guard_.stops_inside();
-  return leaves_ && guard_.pass(former_.next());
-}
-
-/// One iteration by `move`, as far as the bounds of the integral allow; returns the one that does
-/// not.
+/// One iteration by `move`, as far as bounds of the integral allow; returns the one that stops it.
 template <class Move>
 Limit NumberMotion::move(Move&& move) noexcept {
   const double before = guard_.position();
-  Limit bound = Limit::none;
+  if (integral_) integral_->note(guard_);
+  move();
   stands_ = false;
-  if (!integral_) {
-    move();
-  } else {
-    const NumberLimiter guard = guard_;
-    move();
-    const auto admitted = integral_->admit(guard.moment(), guard_.position());
-    bound = admitted.bound;
-    if (bound != Limit::none) {
-      guard_ = guard;
-      guard_.follow_within_bounds();
-      if (!guard_.pass(admitted.velocity)) guard_.follow(admitted.velocity);
-      follows_ = planned_;
-      held_back_ = true;
-      stands_ = integral_->stands();
-    }
-  }
+  const Limit bound = integral_ ? hold_back() : Limit::none;
   former_difference_ = std::exchange(difference_, guard_.position() - before);
+  return bound;
+}
+
+Limit NumberMotion::hold_back() noexcept {
+  const auto [bound, velocity] = integral_->admit(guard_.position());
+  if (bound == Limit::none) return bound;
+  guard_ = integral_->noted();
+  guard_.follow_within_bounds();
+  if (!guard_.pass(velocity)) guard_.follow(velocity);
+  follows_ = planned_;
+  held_back_ = true;
+  stands_ = integral_->stands();
   return bound;
 }
 
 Limit NumberMotion::step(double low, double high) noexcept {
   Limit limit = Limit::none;
-  const Limit bound = move([&] { limit = step_freely(low, high); });
+  const Limit bound = move([&] {
+    const double wanted = std::clamp(plan_.next(), low, high);
+    if (!follows_ && guard_.pass(wanted)) return;
+    follows_ = true;
+    limit = leave() ? Limit::acceleration : guard_.follow(wanted);
+  });
   return bound != Limit::none ? bound : limit;
 }
 
-Limit NumberMotion::step_freely(double low, double high) noexcept {
-  const double wanted = std::clamp(plan_.next(), low, high);
-  if (!follows_ && guard_.pass(wanted)) return Limit::none;
-  follows_ = true;
-  if (leave()) return Limit::acceleration;
-  return guard_.follow(wanted);
-}
-
 bool NumberMotion::brake() noexcept {
-  bool moves = false;
-  const Limit bound = move([&] { moves = brake_freely(); });
+  bool moves = is_away();
+  const Limit bound = move([&] {
+    const double before = guard_.position();
+    if (moves) {
+      guard_.widen(*rest_);
+      guard_.follow(*rest_);
+    } else if (!leave()) {
+      guard_.brake();
+    }
+    moves = moves || guard_.position() != before || !stays();
+  });
   // what stands at a bound is no longer held away from rest
   if (stands_) held_ = false;
   return moves || bound != Limit::none;
-}
-
-bool NumberMotion::brake_freely() noexcept {
-  const double before = guard_.position();
-  const bool was_away = is_away();
-  if (was_away) {
-    guard_.widen(*rest_);
-    guard_.follow(*rest_);
-  } else if (!leave()) {
-    guard_.brake();
-  }
-  return was_away || guard_.position() != before || !stays();
 }
 
 }  // namespace o80

@@ -20,9 +20,7 @@ double between(double from, double to, double share) noexcept {
   const double low = std::min(from, to);
   const double high = std::max(from, to);
   if (value >= low && value <= high) return value;
-  if (value < low && std::isfinite(distance)) return low;
-  if (value > high && std::isfinite(distance)) return high;
-  // the distance has overflowed, or `from` is not finite
+  if (std::isfinite(distance)) return std::clamp(value, low, high);
   const double weighed = from * (1.0 - share) + to * share;
   return std::isfinite(weighed) ? weighed : to;
 }
@@ -36,16 +34,10 @@ std::int64_t iterations_of(double distance, double speed) noexcept {
   return std::max<std::int64_t>(1, static_cast<std::int64_t>(up));
 }
 
-void NumberPlan::line(double start, double target) noexcept {
-  task_.line_start = start;
-  task_.target = target;
-  shape_ = Shape::line;
-  line_for(1);
-}
-
-std::int64_t NumberPlan::propose(const PlanTask& task, std::int64_t asked) noexcept {
+std::int64_t NumberPlan::propose(const PlanTask& task) noexcept {
   task_ = task;
   has_fastest_ = false;
+  const std::int64_t asked = task.iterations;
   const bool is_smooth = task.profile == Profile::minimum_jerk;
   if (asked > 0 && is_smooth && std::isfinite(task.rates.acceleration) && smooth(asked)) {
     return asked;
@@ -61,18 +53,17 @@ std::int64_t NumberPlan::propose(const PlanTask& task, std::int64_t asked) noexc
 std::int64_t NumberPlan::fewest() noexcept {
   Rates rates = task_.rates;
   rates.speed = std::min(rates.speed, task_.cruise);
-  const double distance = std::abs(task_.target - task_.start.position);
+  const double distance = std::abs(task_.target - task_.from.position);
   if (!std::isfinite(rates.acceleration)) {
     return iterations_of(task_.target - task_.line_start, rates.speed);
   }
   // no motion is shorter; beyond the range of the plan nothing is computed
   const double least =
       std::max({distance / rates.speed, std::sqrt(distance / rates.acceleration),
-                std::cbrt(distance / rates.jerk), std::abs(task_.start.speed) / rates.acceleration,
+                std::cbrt(distance / rates.jerk), std::abs(task_.from.speed) / rates.acceleration,
                 rates.acceleration / rates.jerk / 2.0});
   if (!(least <= static_cast<double>(kLongestPlan))) return kLongestPlan + 1;
-  fastest_ = FastestMotion(task_.start.position, task_.start.speed, task_.start.acceleration,
-                           task_.target, rates);
+  fastest_ = FastestMotion(task_.from, task_.target, rates);
   has_fastest_ = true;
   return fastest_.iterations();
 }
@@ -97,41 +88,36 @@ std::int64_t NumberPlan::fewest_smooth(std::int64_t least) noexcept {
 bool NumberPlan::fits(const SmoothMotion& motion) const noexcept {
   const SmoothMotion::Extremes most = motion.extremes();
   const double speed =
-      std::min(task_.rates.speed, std::max(task_.cruise, std::abs(task_.start.speed)));
+      std::min(task_.rates.speed, std::max(task_.cruise, std::abs(task_.from.speed)));
   const auto within = [](double value, double limit) {
     return value <= limit * (1.0 + kPlanRounding / 2.0);
   };
   const double rounding = 4.0 * std::numeric_limits<double>::epsilon() *
-                          std::max(std::abs(task_.low), std::abs(task_.high));
-  return most.low >= task_.low - rounding && most.high <= task_.high + rounding &&
-         within(most.speed, speed) && within(most.acceleration, task_.rates.acceleration) &&
-         within(most.jerk, task_.rates.jerk);
-}
-
-/// A number that may stop at once can begin as from rest, if the step from its present speed to the
-/// first one keeps the limits too.
-bool NumberPlan::fits_after_stop(const SmoothMotion& motion) const noexcept {
-  const double first = motion.position(1.0) - task_.start.position;
-  const double second = motion.position(2.0) - motion.position(1.0);
-  const double a1 = first - task_.start.speed;
-  const double a2 = second - first;
-  return std::abs(a1) <= task_.rates.acceleration &&
-         std::abs(a1 - task_.start.acceleration) <= task_.rates.jerk &&
-         std::abs(a2 - a1) <= task_.rates.jerk && fits(motion);
+                          std::max(std::abs(task_.span.low), std::abs(task_.span.high));
+  return most.positions.low >= task_.span.low - rounding &&
+         most.positions.high <= task_.span.high + rounding && within(most.speed, speed) &&
+         within(most.acceleration, task_.rates.acceleration) && within(most.jerk, task_.rates.jerk);
 }
 
 /// Plans a smooth motion; false if none keeps all limits in this number of iterations.
 bool NumberPlan::smooth(std::int64_t iterations) noexcept {
   smooth_for_ = iterations;
   shape_ = Shape::smooth;
-  smooth_ = SmoothMotion(task_.start, task_.target, iterations);
+  smooth_ = SmoothMotion(task_.from, task_.target, iterations);
   if (fits(smooth_)) return true;
-  const bool moves = task_.start.speed != 0.0 || task_.start.acceleration != 0.0;
+  const bool moves = task_.from.speed != 0.0 || task_.from.acceleration != 0.0;
   if (!std::isfinite(task_.rates.acceleration) && moves && stop_then_smooth(iterations))
     return true;
   if (!task_.stays || !moves) return false;
-  smooth_ = SmoothMotion({task_.start.position, 0.0, 0.0}, task_.target, iterations);
-  return fits_after_stop(smooth_);
+  // it can begin as from rest, if the step from its present speed to the first one keeps the limits
+  smooth_ = SmoothMotion({task_.from.position}, task_.target, iterations);
+  const double first = smooth_.position(1.0) - task_.from.position;
+  const double second = smooth_.position(2.0) - smooth_.position(1.0);
+  const double a1 = first - task_.from.speed;
+  const double a2 = second - first;
+  return std::abs(a1) <= task_.rates.acceleration &&
+         std::abs(a1 - task_.from.acceleration) <= task_.rates.jerk &&
+         std::abs(a2 - a1) <= task_.rates.jerk && fits(smooth_);
 }
 
 /// Without a limit of acceleration: comes to rest in a half, a quarter, ... of the iterations, the
@@ -140,12 +126,12 @@ bool NumberPlan::stop_then_smooth(std::int64_t iterations) noexcept {
   stop_ = iterations / 2;
   for (int i = 0; i < kMostHalvings && stop_ > 0; ++i, stop_ /= 2) {
     const auto r = static_cast<double>(stop_);
-    const double rest = task_.start.position + r * task_.start.speed / 2.0 +
-                        r * r * task_.start.acceleration / 12.0;
-    if (!(rest >= task_.low && rest <= task_.high)) continue;
-    to_stop_ = SmoothMotion(task_.start, rest, stop_);
+    const double rest =
+        task_.from.position + r * task_.from.speed / 2.0 + r * r * task_.from.acceleration / 12.0;
+    if (!(rest >= task_.span.low && rest <= task_.span.high)) continue;
+    to_stop_ = SmoothMotion(task_.from, rest, stop_);
     if (!fits(to_stop_)) continue;
-    smooth_ = SmoothMotion({rest, 0.0, 0.0}, task_.target, iterations - stop_);
+    smooth_ = SmoothMotion({rest}, task_.target, iterations - stop_);
     if (!fits(smooth_)) continue;
     shape_ = Shape::stop_first;
     return true;
@@ -157,18 +143,13 @@ void NumberPlan::settle(std::int64_t iterations) noexcept {
   done_ = 0;
   iterations_ = iterations;
   const bool accelerates = std::isfinite(task_.rates.acceleration);
-  if (!accelerates && iterations == 1) {
-    shape_ = Shape::line;
-    return;
-  }
-  const std::int64_t proposed = task_.profile == Profile::minimum_jerk ? smooth_for_ : 0;
-  if (task_.profile == Profile::minimum_jerk && smooth(iterations)) return;
-  if (!accelerates) {
-    shape_ = Shape::line;
-    return;
-  }
+  const bool is_smooth = task_.profile == Profile::minimum_jerk && (accelerates || iterations > 1);
+  const std::int64_t proposed = smooth_for_;
+  if (is_smooth && smooth(iterations)) return;
+  shape_ = Shape::line;
+  if (!accelerates) return;
   if (!has_fastest_) fewest();
-  if (fastest_.iterations() > iterations && proposed > 0 && smooth(proposed)) return;
+  if (fastest_.iterations() > iterations && is_smooth && proposed > 0 && smooth(proposed)) return;
   fastest_.stretch(iterations);
   shape_ = Shape::fastest;
 }
@@ -189,15 +170,6 @@ double NumberPlan::next() noexcept {
       break;
   }
   return fastest_.next();
-}
-
-Limit NumberPlan::slowest() const noexcept {
-  const double distance = std::abs(task_.target - task_.start.position);
-  const double by_speed = distance / task_.rates.speed;
-  const double by_acceleration = 2.0 * std::sqrt(distance / task_.rates.acceleration);
-  const double by_jerk = std::cbrt(32.0 * distance / task_.rates.jerk);
-  if (by_jerk > std::max(by_speed, by_acceleration)) return Limit::jerk;
-  return by_acceleration > by_speed ? Limit::acceleration : Limit::speed;
 }
 
 }  // namespace o80

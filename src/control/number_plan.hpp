@@ -1,7 +1,10 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <limits>
+#include <optional>
 
 #include "control/fastest_motion.hpp"
 #include "control/smooth_motion.hpp"
@@ -27,18 +30,23 @@ inline constexpr std::int64_t kLongestPlan = std::int64_t{1} << 31;
 /// The iterations of a distance at a speed [1/iteration], at least 1. Rounding adds none.
 std::int64_t iterations_of(double distance, double speed) noexcept;
 
-/// What a plan is for: one number, from its present motion to rest at a target.
-struct PlanTask {
-  Moment start;
-  double line_start = 0.0;  // where a straight line begins
+/// How a command asks for the target of one number.
+struct Asked {
   double target = 0.0;
-  // a smooth motion stays between these: position, shortest stop (without a limit of acceleration:
-  // former target), and target
-  double low = 0.0;
-  double high = 0.0;
-  Rates rates{};
+  double line_start = 0.0;      // where a straight line begins
+  std::optional<double> start;  // a place to start from at rest, instead of its own
+  std::int64_t iterations = 0;  // 0: as few as the limits allow
   double cruise = std::numeric_limits<double>::infinity();  // speed asked for [1/iteration]
   Profile profile = Profile::linear;
+};
+
+/// What a plan is for: one number, from its present motion to rest at a target.
+struct PlanTask : Asked {
+  Moment from;
+  // where a smooth motion stays: position, target, and shortest stop (without a limit of
+  // acceleration: former target)
+  Span span;
+  Rates rates{};
   bool stays = true;  // it may stop at once
 };
 
@@ -48,13 +56,18 @@ struct PlanTask {
 /// Realtime: yes, bounded time.
 class NumberPlan {
  public:
-  /// Returns the number of iterations that it takes: `asked` (0: none), or the fewest that the
-  /// limits allow. More than kLongestPlan: it cannot be planned.
-  std::int64_t propose(const PlanTask& task, std::int64_t asked) noexcept;
+  /// Returns the number of iterations that it takes: those asked for, or the fewest that the limits
+  /// allow. More than kLongestPlan: it cannot be planned.
+  std::int64_t propose(const PlanTask& task) noexcept;
   /// Plans the motion for `iterations`, at least those of propose().
   void settle(std::int64_t iterations) noexcept;
   /// A straight line that no limit changes; line_for() sets its length.
-  void line(double start, double target) noexcept;
+  void line(double start, double target) noexcept {
+    task_.line_start = start;
+    task_.target = target;
+    shape_ = Shape::line;
+    line_for(1);
+  }
   void line_for(std::int64_t iterations) noexcept {
     iterations_ = iterations;
     done_ = 0;
@@ -62,6 +75,7 @@ class NumberPlan {
 
   /// The position in the next iteration; from the last one on the exact target.
   double next() noexcept;
+  const PlanTask& task() const noexcept { return task_; }
   double target() const noexcept { return task_.target; }
   /// For a straight line: the share of the way that is done.
   double share() const noexcept {
@@ -69,7 +83,14 @@ class NumberPlan {
   }
   bool is_line() const noexcept { return shape_ == Shape::line; }
   /// The limit that makes the motion long.
-  Limit slowest() const noexcept;
+  Limit slowest() const noexcept {
+    const double distance = std::abs(task_.target - task_.from.position);
+    const double by_speed = distance / task_.rates.speed;
+    const double by_acceleration = 2.0 * std::sqrt(distance / task_.rates.acceleration);
+    const double by_jerk = std::cbrt(32.0 * distance / task_.rates.jerk);
+    if (by_jerk > std::max(by_speed, by_acceleration)) return Limit::jerk;
+    return by_acceleration > by_speed ? Limit::acceleration : Limit::speed;
+  }
 
  private:
   enum class Shape : std::uint8_t { line, smooth, stop_first, fastest };
@@ -78,7 +99,6 @@ class NumberPlan {
   std::int64_t fewest_smooth(std::int64_t least) noexcept;
   bool smooth(std::int64_t iterations) noexcept;
   bool fits(const SmoothMotion& motion) const noexcept;
-  bool fits_after_stop(const SmoothMotion& motion) const noexcept;
   bool stop_then_smooth(std::int64_t iterations) noexcept;
 
   PlanTask task_;

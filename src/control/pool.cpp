@@ -1,11 +1,8 @@
 #include "control/pool.hpp"
 
-#include <sys/mman.h>
-
 #include <algorithm>
 #include <cerrno>
 #include <string>
-#include <utility>
 
 #include "o80/base/error.hpp"
 
@@ -23,25 +20,12 @@ BlockPool::BlockPool(std::uint32_t blocks)
     throw Error("no memory for " + std::to_string(blocks) + " blocks of queued commands (" +
                 std::strerror(errno) + "): start the backend with fewer or smaller lanes");
   }
-  blocks_ = static_cast<std::byte*>(mapped);
+  blocks_ = {static_cast<Block*>(mapped), Unmap{blocks}};
 
   // write all pages now, so that the loop has no page faults; link the blocks in their order
-  std::memset(blocks_, 0, std::size_t{blocks} * kBlockBytes);
+  std::memset(mapped, 0, std::size_t{blocks} * kBlockBytes);
   for (BlockIndex block = 0; block < blocks; ++block) next_[block] = block + 1;
   next_[blocks - 1] = kNoBlock;
-  free_ = 0;
-}
-
-BlockPool::BlockPool(BlockPool&& other) noexcept
-    : blocks_(std::exchange(other.blocks_, nullptr)),
-      size_(std::exchange(other.size_, 0)),
-      available_(std::exchange(other.available_, 0)),
-      free_(std::exchange(other.free_, kNoBlock)),
-      next_(std::move(other.next_)),
-      ends_(std::move(other.ends_)) {}
-
-BlockPool::~BlockPool() {
-  if (blocks_ != nullptr) munmap(blocks_, std::size_t{size_} * kBlockBytes);
 }
 
 /// Reads bytes that cross a block boundary or the end.

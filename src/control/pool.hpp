@@ -1,9 +1,11 @@
 #pragma once
 
+#include <sys/mman.h>
+
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <span>
+#include <memory>
 #include <vector>
 
 #include "control/record.hpp"
@@ -27,9 +29,6 @@ struct BlockChain {
 class BlockPool {
  public:
   explicit BlockPool(std::uint32_t blocks);
-  BlockPool(BlockPool&& other) noexcept;
-  BlockPool& operator=(BlockPool&&) = delete;
-  ~BlockPool();
 
   std::uint32_t size() const noexcept { return size_; }
   std::uint32_t available() const noexcept { return available_; }
@@ -73,21 +72,17 @@ class BlockPool {
   BlockChain chain(BlockIndex first) const noexcept {
     return {first, ends_[first].last, ends_[first].blocks};
   }
-  void link(BlockIndex block, BlockIndex next) noexcept { next_[block] = next; }
   std::byte* bytes(BlockIndex block) noexcept {
     O80_VISIT_BLOCK(block);
-    return blocks_ + std::size_t{block} * kBlockBytes;
+    return blocks_[block].bytes.data();
   }
   const std::byte* bytes(BlockIndex block) const noexcept {
     O80_VISIT_BLOCK(block);
-    return blocks_ + std::size_t{block} * kBlockBytes;
+    return blocks_[block].bytes.data();
   }
   /// The batch record in the first block of a chain.
   BatchRecord& batch(BlockIndex block) noexcept {
     return *reinterpret_cast<BatchRecord*>(bytes(block));
-  }
-  const BatchRecord& batch(BlockIndex block) const noexcept {
-    return *reinterpret_cast<const BatchRecord*>(bytes(block));
   }
   RecordHead& head(BlockIndex block) noexcept {
     return *reinterpret_cast<RecordHead*>(bytes(block));
@@ -102,10 +97,15 @@ class BlockPool {
     std::uint32_t blocks;
   };
 
-  std::byte* blocks_ = nullptr;
-  std::uint32_t size_ = 0;
-  std::uint32_t available_ = 0;
-  BlockIndex free_ = kNoBlock;
+  struct Unmap {
+    std::size_t blocks;
+    void operator()(Block* mapped) const noexcept { munmap(mapped, blocks * kBlockBytes); }
+  };
+
+  std::uint32_t size_;
+  std::uint32_t available_;
+  std::unique_ptr<Block[], Unmap> blocks_;
+  BlockIndex free_ = 0;
   std::vector<BlockIndex> next_;
   std::vector<End> ends_;  // for each block: the end of the chain that begins there
 };

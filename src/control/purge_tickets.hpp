@@ -8,42 +8,43 @@
 
 namespace o80 {
 
-/// The highest ticket of a purge, for each actuator. Commands with lower tickets end as purged,
-/// even if they are taken later (ARCHITECTURE.md, Express batches and purges).
+/// The highest ticket of a purge, for each lane and actuator. Commands with lower tickets end as
+/// purged, even if they are taken later (ARCHITECTURE.md, Express batches and purges).
 ///
 /// Realtime: everything but construction.
 class PurgeTickets {
  public:
-  PurgeTickets(std::uint32_t lanes, std::uint32_t actuators)
-      : one_(actuators), own_all_(lanes), own_one_(std::size_t{lanes} * actuators) {}
+  static constexpr std::uint32_t kEveryLane = 0xFFFFFFFF;
 
-  /// Stores the ticket of a purge of one actuator or of all.
-  void raise(std::uint32_t actuator, std::uint64_t ticket) noexcept {
-    std::uint64_t& highest = actuator == kEveryActuator ? all_ : one_[actuator];
-    highest = std::max(highest, ticket);
-  }
-  /// The same for a purge of the commands of one lane.
-  void raise_own(std::uint32_t lane, std::uint32_t actuator, std::uint64_t ticket) noexcept {
-    std::uint64_t& highest =
-        actuator == kEveryActuator ? own_all_[lane] : own_one_[lane * one_.size() + actuator];
+  PurgeTickets(std::uint32_t lanes, std::uint32_t actuators)
+      : lanes_(lanes),
+        actuators_(actuators),
+        highest_((lanes + 1) * (std::size_t{actuators} + 1)) {}
+
+  /// Stores the ticket of a purge: of one lane or kEveryLane, of one actuator or kEveryActuator.
+  void raise(std::uint32_t lane, std::uint32_t actuator, std::uint64_t ticket) noexcept {
+    std::uint64_t& highest = highest_[index(lane, actuator)];
     highest = std::max(highest, ticket);
   }
   /// True if a stored purge ends a command of this lane with this ticket.
   bool cover(std::uint32_t lane, std::uint32_t actuator, std::uint64_t ticket) const noexcept {
-    return ticket < all_ || ticket < one_[actuator] || ticket < own_all_[lane] ||
-           ticket < own_one_[lane * one_.size() + actuator];
+    return ticket < highest_[index(kEveryLane, kEveryActuator)] ||
+           ticket < highest_[index(kEveryLane, actuator)] ||
+           ticket < highest_[index(lane, kEveryActuator)] ||
+           ticket < highest_[index(lane, actuator)];
   }
   /// Forgets all purges, because tickets start again from 0.
-  void forget() noexcept {
-    all_ = 0;
-    for (auto* tickets : {&one_, &own_all_, &own_one_}) std::ranges::fill(*tickets, 0);
-  }
+  void forget() noexcept { std::ranges::fill(highest_, 0); }
 
  private:
-  std::uint64_t all_ = 0;
-  std::vector<std::uint64_t> one_;
-  std::vector<std::uint64_t> own_all_;
-  std::vector<std::uint64_t> own_one_;
+  /// The last row and the last column are those of every lane and of every actuator.
+  std::size_t index(std::uint32_t lane, std::uint32_t actuator) const noexcept {
+    return std::min(lane, lanes_) * (std::size_t{actuators_} + 1) + std::min(actuator, actuators_);
+  }
+
+  std::uint32_t lanes_;
+  std::uint32_t actuators_;
+  std::vector<std::uint64_t> highest_;
 };
 
 }  // namespace o80

@@ -3,73 +3,41 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <utility>
 
 namespace o80 {
 namespace {
 
-bool known_enums(const RecordHead& head) noexcept {
-  return head.mode <= Mode::overwrite && head.pace <= Pace::fastest &&
-         head.profile <= Profile::as_sent && head.start <= Start::observed && head.masked <= 1;
-}
-
 bool sane_pace(const RecordHead& head) noexcept {
   switch (head.pace) {
-    case Pace::direct:
-      return head.amount >= 0 && head.amount <= kLongestDuration;
     case Pace::fastest:
       return true;
-    case Pace::duration:
-      return head.rows > 1 || (head.amount >= 0 && head.amount <= kLongestDuration);
     case Pace::speed:
       return std::isfinite(head.speed) && head.speed > 0.0;
     case Pace::until:
       return head.rows == 1 && head.amount <= kMostIterations;
     case Pace::iterations:
       return head.amount >= 0 && head.amount <= kMostIterations;
+    default:
+      return (head.pace == Pace::duration && head.rows > 1) ||
+             (head.amount >= 0 && head.amount <= kLongestDuration);
   }
-  return false;
 }
 
 }  // namespace
 
-void note_rows(RecordHead& head, const Cursor& rows) noexcept {
-  head.amount = static_cast<std::int64_t>(std::uint64_t{rows.offset()} << 32 | rows.block());
-}
-
-Cursor rows_of_timed(const BlockPool& pool, const RecordHead& head,
-                     std::uint32_t row_bytes) noexcept {
-  const auto noted = static_cast<std::uint64_t>(head.amount);
-  return {pool, static_cast<BlockIndex>(noted & 0xFFFFFFFF),
-          static_cast<std::uint32_t>(noted >> 32), std::uint64_t{head.rows} * row_bytes};
-}
-
-RecordCheck::RecordCheck(const Schema& schema, Layouts layouts) : layouts_(std::move(layouts)) {
-  std::uint32_t size = 0;
-  std::size_t numbers = 0;
-  for (const ActuatorRow& actuator : schema.actuators) {
-    actuator_types_.push_back(actuator.type);
-    first_limits_.push_back(static_cast<std::uint32_t>(has_acceleration_.size()));
-    const StateLayout& layout = *layouts_[actuator.type];
-    bool is_bounded = false;
-    for (std::uint32_t i = 0; i < actuator.limits; ++i) {
-      const bool moves = layout.numbers()[i].moves();
-      const LimitRow& limit = schema.limits.at(actuator.first_limit + i);
-      has_acceleration_.push_back(!moves || std::isfinite(limit.acceleration));
-      minima_.push_back(limit.minimum);
-      maxima_.push_back(limit.maximum);
-      is_bounded = is_bounded || std::isfinite(limit.minimum) || std::isfinite(limit.maximum);
-    }
-    is_bounded_.push_back(is_bounded ? 1 : 0);
+RecordCheck::RecordCheck(const Schema& schema, const Layouts& layouts) : targets_(schema, layouts) {
+  for (const RequestRow& request : schema.requests) {
+    requests_.push_back(request.type == kNoType ? nullptr : &*layouts[request.type]);
   }
-  for (const RequestRow& request : schema.requests) request_types_.push_back(request.type);
-  for (const StateLayout* layout : layouts_) {
-    if (layout == nullptr) continue;
-    size = std::max(size, layout->size());
-    numbers = std::max(numbers, layout->numbers().size());
+  std::size_t size = 0;
+  std::size_t words = 0;
+  for (const auto& layout : layouts) {
+    if (!layout) continue;
+    size = std::max<std::size_t>(size, layout->size());
+    words = std::max(words, layout->mask_words());
   }
   state_.resize((size + 7) / 8);
-  mask_.resize(mask_words(static_cast<std::uint32_t>(numbers)));
+  mask_.resize(words);
 }
 
 RecordCheck::Verdict RecordCheck::begin(const BlockPool& pool, BlockIndex block,
@@ -82,13 +50,12 @@ RecordCheck::Verdict RecordCheck::begin(const BlockPool& pool, BlockIndex block,
     case RecordKind::member:
       return begin_command(head, progress);
     case RecordKind::group:
-      return verdict(head.payload_bytes == 0 && head.rows > 0 &&
-                     head.rows <= actuator_types_.size());
+      return verdict(head.payload_bytes == 0 && head.rows > 0 && head.rows <= targets_.actuators());
     case RecordKind::request:
-      return check_request(head, progress.payload);
+      return verdict(is_request(head, progress.payload));
     case RecordKind::purge:
       return verdict(head.payload_bytes == 0 && head.only_own <= 1 &&
-                     (head.actuator == kEveryActuator || head.actuator < actuator_types_.size()));
+                     (head.actuator == kEveryActuator || head.actuator < targets_.actuators()));
     case RecordKind::take_control:
     case RecordKind::release_control:
       return verdict(head.payload_bytes == 0);
@@ -106,33 +73,31 @@ RecordCheck::Verdict RecordCheck::begin(const BlockPool& pool, BlockIndex block,
 
 RecordCheck::Verdict RecordCheck::begin_command(const RecordHead& head,
                                                 Progress& progress) noexcept {
-  if (head.actuator >= actuator_types_.size() || head.rows == 0 || !known_enums(head) ||
-      !sane_pace(head)) {
+  const bool as_sent = head.profile == Profile::as_sent;
+  const bool is_known = head.mode <= Mode::overwrite && head.pace <= Pace::fastest &&
+                        head.profile <= Profile::as_sent && head.start <= Start::observed &&
+                        head.masked <= 1;
+  if (head.actuator >= targets_.actuators() || head.rows == 0 || !is_known || !sane_pace(head) ||
+      (as_sent && (head.pace != Pace::direct || head.rows > 1))) {
     return Verdict::invalid;
   }
-  if (head.profile == Profile::as_sent && (head.pace != Pace::direct || head.rows > 1)) {
-    return Verdict::invalid;
-  }
-  const StateLayout& layout = *layouts_[actuator_types_[head.actuator]];
-  const auto numbers = static_cast<std::uint32_t>(layout.numbers().size());
+  const StateLayout& layout = targets_.layout(head.actuator);
   const bool timed = head.pace == Pace::duration && head.rows > 1;
-  const std::uint64_t mask_bytes = head.masked != 0 ? 8 * mask_words(numbers) : 0;
+  const std::uint64_t mask_bytes = head.masked != 0 ? 8 * layout.mask_words() : 0;
   const std::uint64_t time_bytes = timed ? 8 * std::uint64_t{head.rows} : 0;
   const std::uint64_t row_bytes = std::uint64_t{head.rows} * layout.size();
   if (head.payload_bytes != mask_bytes + time_bytes + row_bytes) return Verdict::invalid;
 
   // no bit of the mask is beyond the last number
-  if (head.masked != 0) {
+  const std::uint64_t* mask = head.masked != 0 ? mask_.data() : nullptr;
+  const std::size_t numbers = layout.numbers().size();
+  if (mask != nullptr) {
     progress.payload.read(mask_.data(), mask_bytes);
     if (numbers % 64 != 0 && mask_[numbers / 64] >> (numbers % 64) != 0) return Verdict::invalid;
   }
-  // every commanded number has limits of speed and acceleration
-  if (head.pace == Pace::fastest) {
-    const std::uint32_t first = first_limits_[head.actuator];
-    for (std::uint32_t i = 0; i < numbers; ++i) {
-      const bool commanded = masked(head.masked != 0 ? mask_.data() : nullptr, i);
-      if (commanded && !has_acceleration_[first + i]) return Verdict::invalid;
-    }
+  if (head.pace == Pace::fastest &&
+      targets_.first_without_acceleration(head.actuator, mask) != StateLayout::kNoNumber) {
+    return Verdict::invalid;
   }
   progress.times_left = timed ? head.rows : 0;
   progress.rows_left = head.rows;
@@ -142,13 +107,11 @@ RecordCheck::Verdict RecordCheck::begin_command(const RecordHead& head,
 RecordCheck::Verdict RecordCheck::go_on(const BlockPool& pool, BlockIndex block, Progress& progress,
                                         std::uint32_t& budget) noexcept {
   const RecordHead& head = pool.head(block);
-  const StateLayout& layout = *layouts_[actuator_types_[head.actuator]];
-  const std::uint64_t* mask = nullptr;
-  if (head.masked != 0) {
-    const std::size_t mask_bytes =
-        sizeof(std::uint64_t) * mask_words(static_cast<std::uint32_t>(layout.numbers().size()));
-    Cursor(pool, block, sizeof(RecordHead), head.payload_bytes).read(mask_.data(), mask_bytes);
-    mask = mask_.data();
+  const StateLayout& layout = targets_.layout(head.actuator);
+  const std::uint64_t* mask = head.masked != 0 ? mask_.data() : nullptr;
+  if (mask != nullptr) {
+    Cursor(pool, block, sizeof(RecordHead), head.payload_bytes)
+        .read(mask_.data(), 8 * layout.mask_words());
   }
   // payload in the block of the head is free
   constexpr std::int64_t kWithHead = kBlockBytes - sizeof(RecordHead);
@@ -166,38 +129,13 @@ RecordCheck::Verdict RecordCheck::go_on(const BlockPool& pool, BlockIndex block,
   auto* state = reinterpret_cast<std::byte*>(state_.data());
   for (; progress.rows_left > 0 && bytes_left > 0; --progress.rows_left) {
     progress.payload.read(state, layout.size());
-    if (!layout.finite(state, mask) || !within_bounds(head, state, mask)) return Verdict::invalid;
+    // a target beyond the bounds would never be reached
+    if (!targets_.admit(head.actuator, state, mask)) return Verdict::invalid;
     bytes_left -= layout.size();
   }
   budget = std::min(
       budget, static_cast<std::uint32_t>(std::max<std::int64_t>(bytes_left, 0) / kBlockBytes));
   return progress.rows_left > 0 ? Verdict::unfinished : Verdict::valid;
-}
-
-/// A target beyond the bounds would never be reached.
-bool RecordCheck::within_bounds(const RecordHead& head, const std::byte* state,
-                                const std::uint64_t* mask) const noexcept {
-  if (is_bounded_[head.actuator] == 0) return true;
-  const StateLayout& layout = *layouts_[actuator_types_[head.actuator]];
-  const std::uint32_t first = first_limits_[head.actuator];
-  for (std::uint32_t i = 0; i < layout.numbers().size(); ++i) {
-    if (!masked(mask, i) || !layout.numbers()[i].moves()) continue;
-    const double value = layout.number(i, state);
-    if (value < minima_[first + i] || value > maxima_[first + i]) return false;
-  }
-  return true;
-}
-
-RecordCheck::Verdict RecordCheck::check_request(const RecordHead& head, Cursor& payload) noexcept {
-  if (head.actuator >= request_types_.size()) return Verdict::invalid;
-  const std::uint32_t type = request_types_[head.actuator];
-  const StateLayout* layout = type == kNoType ? nullptr : layouts_[type];
-  const std::uint32_t size = layout == nullptr ? 0 : layout->size();
-  if (head.payload_bytes != size) return Verdict::invalid;
-  if (layout == nullptr) return Verdict::valid;
-  auto* state = reinterpret_cast<std::byte*>(state_.data());
-  payload.read(state, size);
-  return layout->proper(state) ? Verdict::valid : Verdict::invalid;
 }
 
 }  // namespace o80

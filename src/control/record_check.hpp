@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "control/limits.hpp"
 #include "control/pool.hpp"
 #include "control/record.hpp"
 #include "control/state_layout.hpp"
@@ -15,19 +16,23 @@ inline bool is_timed(const RecordHead& head) noexcept {
   return head.kind == RecordKind::command && head.pace == Pace::duration && head.rows > 1;
 }
 /// For such a command: stores the position of its first row in `amount`, which it does not use.
-void note_rows(RecordHead& head, const Cursor& rows) noexcept;
+inline void note_rows(RecordHead& head, const Cursor& rows) noexcept {
+  head.amount = static_cast<std::int64_t>(std::uint64_t{rows.offset()} << 32 | rows.block());
+}
 /// A cursor at that position, so that the times need not be skipped one by one.
-Cursor rows_of_timed(const BlockPool& pool, const RecordHead& head,
-                     std::uint32_t row_bytes) noexcept;
+inline Cursor rows_of_timed(const BlockPool& pool, const RecordHead& head,
+                            std::uint32_t row_bytes) noexcept {
+  const auto noted = static_cast<std::uint64_t>(head.amount);
+  return {pool, static_cast<BlockIndex>(noted), static_cast<std::uint32_t>(noted >> 32),
+          std::uint64_t{head.rows} * row_bytes};
+}
 
 /// Validates records from a lane. Arbitrary bytes are safe.
 ///
 /// Realtime: everything but construction.
 class RecordCheck {
  public:
-  /// One layout for each type of an actuator or a request; null for other types.
-  using Layouts = std::vector<const StateLayout*>;
-  RecordCheck(const Schema& schema, Layouts layouts);
+  RecordCheck(const Schema& schema, const Layouts& layouts);
 
   enum class Verdict : std::uint8_t { unfinished, valid, invalid };
   /// The unchecked rest of a record.
@@ -48,18 +53,17 @@ class RecordCheck {
 
  private:
   Verdict begin_command(const RecordHead& head, Progress& progress) noexcept;
-  bool within_bounds(const RecordHead& head, const std::byte* state,
-                     const std::uint64_t* mask) const noexcept;
-  Verdict check_request(const RecordHead& head, Cursor& payload) noexcept;
+  bool is_request(const RecordHead& head, Cursor& payload) noexcept {
+    if (head.actuator >= requests_.size()) return false;
+    const StateLayout* layout = requests_[head.actuator];
+    if (layout == nullptr) return head.payload_bytes == 0;
+    auto* state = reinterpret_cast<std::byte*>(state_.data());
+    return head.payload_bytes == layout->size() && payload.read(state, layout->size()) &&
+           layout->proper(state);
+  }
 
-  Layouts layouts_;
-  std::vector<std::uint32_t> actuator_types_;
-  std::vector<std::uint32_t> first_limits_;     // for each actuator its index in the next vector
-  std::vector<std::uint8_t> has_acceleration_;  // for each number; 1 also if not interpolated
-  std::vector<double> minima_;                  // for each number
-  std::vector<double> maxima_;
-  std::vector<std::uint8_t> is_bounded_;  // for each actuator: a number has a bound
-  std::vector<std::uint32_t> request_types_;
+  TargetLimits targets_;
+  std::vector<const StateLayout*> requests_;  // null: no payload
   std::vector<std::uint64_t> state_;
   std::vector<std::uint64_t> mask_;
 };

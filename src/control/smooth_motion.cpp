@@ -6,6 +6,31 @@
 #include "control/visit_block.hpp"
 
 namespace o80 {
+namespace {
+
+/// A polynomial c[0] + c[1] i + c[2] i^2.
+struct Quadratic {
+  double c[3];
+  double at(double i) const noexcept { return c[0] + i * (c[1] + i * c[2]); }
+  /// Calls `visit` with the iterations from 1 to `last` next to its roots, at most four.
+  template <class Visit>
+  void near_roots(double last, Visit&& visit) const noexcept {
+    const auto around = [&](double root) {
+      // a root may be huge, infinite or NaN
+      if (!(root > 0.0 && root < last + 1.0)) return;
+      const double below = std::floor(root);
+      if (below >= 1.0) visit(below);
+      if (below + 1.0 <= last) visit(below + 1.0);
+    };
+    const double discriminant = c[1] * c[1] - 4.0 * c[2] * c[0];
+    if (!(discriminant >= 0.0)) return;
+    const double q = -0.5 * (c[1] + std::copysign(std::sqrt(discriminant), c[1]));
+    around(q / c[2]);
+    around(c[0] / q);
+  }
+};
+
+}  // namespace
 
 SmoothMotion::SmoothMotion(const Moment& start, double target, std::int64_t iterations) noexcept
     : last_(static_cast<double>(iterations)), target_(target) {
@@ -22,27 +47,6 @@ SmoothMotion::SmoothMotion(const Moment& start, double target, std::int64_t iter
   c2_ = -(6.0 * d + 3.0 * n * v + n * (n + 1.0) / 2.0 * a) / (three * (n + 3.0) * (n + 4.0));
 }
 
-double SmoothMotion::position(double i) const noexcept {
-  const double left = last_ - i;
-  return target_ - left * (left + 1.0) * (left + 2.0) * (c0_ + i * (c1_ + (i + 1.0) * c2_));
-}
-
-template <class Visit>
-void SmoothMotion::Quadratic::near_roots(double last, Visit&& visit) const noexcept {
-  const auto around = [&](double root) {
-    // a root may be huge, infinite or NaN
-    if (!(root > 0.0 && root < last + 1.0)) return;
-    const double below = std::floor(root);
-    if (below >= 1.0) visit(below);
-    if (below + 1.0 <= last) visit(below + 1.0);
-  };
-  const double discriminant = c[1] * c[1] - 4.0 * c[2] * c[0];
-  if (!(discriminant >= 0.0)) return;
-  const double q = -0.5 * (c[1] + std::copysign(std::sqrt(discriminant), c[1]));
-  around(q / c[2]);
-  around(c[0] / q);
-}
-
 /// The differences are, like the position, a product of known factors and a quadratic, whose roots
 /// are the extremes of the difference below it.
 SmoothMotion::Extremes SmoothMotion::extremes() const noexcept {
@@ -54,19 +58,12 @@ SmoothMotion::Extremes SmoothMotion::extremes() const noexcept {
   const auto [h0, h1, h2] = h.c;
   const Quadratic k{{(n + 3.0) * (h1 - h2) - h0, h2 * (2.0 * n + 7.0) - 2.0 * h1, -3.0 * h2}};
 
-  Extremes all{target_, target_, 0.0, 0.0, 0.0};
-  const auto place = [&](double i) {
-    const double at = position(i);
-    all.low = std::min(all.low, at);
-    all.high = std::max(all.high, at);
-  };
-  const auto speed = [&](double i) {
-    all.speed = std::max(all.speed, std::abs((n - i + 1.0) * (n - i + 2.0) * u.at(i)));
-  };
-  const auto acceleration = [&](double i) {
-    all.acceleration = std::max(all.acceleration, std::abs((n - i + 2.0) * h.at(i)));
-  };
-  const auto jerk = [&](double i) { all.jerk = std::max(all.jerk, std::abs(k.at(i))); };
+  Extremes all{{target_, target_}, 0.0, 0.0, 0.0};
+  const auto widen = [](double& most, double value) { most = std::max(most, std::abs(value)); };
+  const auto place = [&](double i) { all.positions.include(position(i)); };
+  const auto speed = [&](double i) { widen(all.speed, (n - i + 1.0) * (n - i + 2.0) * u.at(i)); };
+  const auto acceleration = [&](double i) { widen(all.acceleration, (n - i + 2.0) * h.at(i)); };
+  const auto jerk = [&](double i) { widen(all.jerk, k.at(i)); };
 
   place(1.0);
   u.near_roots(n, place);

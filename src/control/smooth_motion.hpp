@@ -6,13 +6,6 @@
 
 namespace o80 {
 
-/// Position of one number and its differences: v(i) = p(i) - p(i-1), a(i) = v(i) - v(i-1).
-struct Moment {
-  double position = 0.0;
-  double speed = 0.0;
-  double acceleration = 0.0;
-};
-
 /// The minimum-jerk motion of one number to rest at a target in n iterations: the polynomial of
 /// degree 5 through the last three positions (iterations -2, -1, 0) and, in the iterations n, n + 1
 /// and n + 2, the target. Of all motions in n iterations from there to rest it has the least sum of
@@ -25,12 +18,14 @@ class SmoothMotion {
   SmoothMotion(const Moment& start, double target, std::int64_t iterations) noexcept;
 
   /// The position in iteration i, 1 to n.
-  double position(double i) const noexcept;
+  double position(double i) const noexcept {
+    const double left = last_ - i;
+    return target_ - left * (left + 1.0) * (left + 2.0) * (c0_ + i * (c1_ + (i + 1.0) * c2_));
+  }
 
   /// Largest values from the first iteration to rest.
   struct Extremes {
-    double low;  // positions
-    double high;
+    Span positions;
     double speed;  // sizes of the differences
     double acceleration;
     double jerk;
@@ -38,15 +33,6 @@ class SmoothMotion {
   Extremes extremes() const noexcept;
 
  private:
-  /// A polynomial c[0] + c[1] i + c[2] i^2.
-  struct Quadratic {
-    double c[3] = {};
-    double at(double i) const noexcept { return c[0] + i * (c[1] + i * c[2]); }
-    /// Calls `visit` with the iterations from 1 to `last` next to its roots, at most four.
-    template <class Visit>
-    void near_roots(double last, Visit&& visit) const noexcept;
-  };
-
   double last_ = 0.0;  // n
   double target_ = 0.0;
   // position = target + (i - n)(i - n - 1)(i - n - 2) (c0 + c1 i + c2 i (i + 1))

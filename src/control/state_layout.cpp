@@ -1,6 +1,7 @@
 #include "control/state_layout.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <string>
 
@@ -9,12 +10,20 @@
 namespace o80 {
 namespace {
 
-/// Copies a number of 1, 2, 4 or 8 bytes.
-void copy_number(std::byte* to, const std::byte* from, std::uint32_t size) noexcept {
-  if (size == sizeof(double)) {  // most numbers: no call
-    std::memcpy(to, from, sizeof(double));
-  } else {
-    std::memcpy(to, from, size);
+/// Throws if an actuator has limits or rest values: they apply to single numbers, which a type with
+/// its own blend() does not interpolate one by one.
+void refuse_limits(const Schema& schema, const ActuatorRow& actuator) {
+  for (std::uint32_t i = 0; i < actuator.limits; ++i) {
+    const LimitRow& limit = schema.limits.at(actuator.first_limit + i);
+    const bool limited = std::isfinite(limit.minimum) || std::isfinite(limit.maximum) ||
+                         std::isfinite(limit.speed);  // the other limits need one of speed
+    if (limited || limit.resting != 0) {
+      const std::string type =
+          ", but its type '" + schema.types[actuator.type].name.str() + "' has its own blend(): ";
+      throw InvalidArgument("actuator '" + actuator.name.str() + "' has " +
+                            (limited ? "limits" + type + "limit it in the driver"
+                                     : "a rest value" + type + "bring it to rest in the driver"));
+    }
   }
 }
 
@@ -31,8 +40,10 @@ StateLayout::StateLayout(const Schema& schema, std::uint32_t type)
                             schema.types[type].name.str() +
                             "' must be a number, a boolean or an enumeration");
     }
-    NumberPlace place{offset, size, field.kind, field.is_signed != 0, 0, 0};
+    NumberPlace place{.offset = offset, .size = size, .kind = field.kind};
     if (field.kind == Kind::enumeration) {
+      const auto narrowest = static_cast<int>(field.is_signed != 0 ? Kind::int8 : Kind::uint8);
+      place.integer = static_cast<Kind>(narrowest + std::countr_zero(size));
       place.first_label = static_cast<std::uint32_t>(labels_.size());
       place.labels = field.labels;
       for (std::uint32_t i = 0; i < field.labels; ++i) {
@@ -48,20 +59,6 @@ StateLayout::StateLayout(const Schema& schema, std::uint32_t type)
   plain_ = plain_ && end == size_;
 }
 
-void StateLayout::copy_numbers(std::byte* to, const std::byte* from) const noexcept {
-  for (const NumberPlace& place : numbers_) {
-    copy_number(to + place.offset, from + place.offset, place.size);
-  }
-}
-
-void StateLayout::copy(std::byte* to, const std::byte* from,
-                       const std::uint64_t* mask) const noexcept {
-  for (std::size_t i = 0; i < numbers_.size(); ++i) {
-    if (!masked(mask, i)) continue;
-    copy_number(to + numbers_[i].offset, from + numbers_[i].offset, numbers_[i].size);
-  }
-}
-
 bool StateLayout::same(const std::byte* one, const std::byte* other,
                        const std::uint64_t* mask) const noexcept {
   if (mask == nullptr && !padded_) return std::memcmp(one, other, size_) == 0;
@@ -74,39 +71,17 @@ bool StateLayout::same(const std::byte* one, const std::byte* other,
   return true;
 }
 
-void StateLayout::copy_finite(std::byte* to, const std::byte* from,
-                              const std::uint64_t* mask) const noexcept {
-  if (plain_ && mask == nullptr) {
+void StateLayout::copy_finite(std::byte* to, const std::byte* from) const noexcept {
+  if (plain_) {
     for (std::uint32_t at = 0; at < size_; at += sizeof(double)) {
       if (std::isfinite(load<double>(from + at))) std::memcpy(to + at, from + at, sizeof(double));
     }
     return;
   }
   for (std::size_t i = 0; i < numbers_.size(); ++i) {
-    if (!masked(mask, i) || !finite_number(i, from)) continue;
+    if (!finite_number(i, from)) continue;
     copy_number(to + numbers_[i].offset, from + numbers_[i].offset, numbers_[i].size);
   }
-}
-
-std::uint32_t StateLayout::first_commanded(const std::uint64_t* mask) const noexcept {
-  for (std::uint32_t i = 0; i < numbers_.size(); ++i) {
-    if (masked(mask, i) && numbers_[i].moves()) return i;
-  }
-  return kNoNumber;
-}
-
-std::uint32_t StateLayout::first_not_finite(const std::byte* state) const noexcept {
-  for (std::uint32_t i = 0; i < numbers_.size(); ++i) {
-    if (!finite_number(i, state)) return i;
-  }
-  return kNoNumber;
-}
-
-bool StateLayout::finite_number(std::size_t number, const std::byte* state) const noexcept {
-  const std::byte* at = state + numbers_[number].offset;
-  if (numbers_[number].kind == Kind::float64) return std::isfinite(load<double>(at));
-  if (numbers_[number].kind == Kind::float32) return std::isfinite(load<float>(at));
-  return true;
 }
 
 bool StateLayout::proper_number(std::size_t number, const std::byte* state) const noexcept {
@@ -114,59 +89,38 @@ bool StateLayout::proper_number(std::size_t number, const std::byte* state) cons
   const std::byte* at = state + place.offset;
   if (place.kind == Kind::boolean) return load<std::uint8_t>(at) <= 1;
   if (place.kind != Kind::enumeration || place.labels == 0) return true;
-  std::int64_t value = 0;
-  switch (place.size) {
-    case 1:
-      value = place.is_signed ? load<std::int8_t>(at) : std::int64_t{load<std::uint8_t>(at)};
-      break;
-    case 2:
-      value = place.is_signed ? load<std::int16_t>(at) : std::int64_t{load<std::uint16_t>(at)};
-      break;
-    case 4:
-      value = place.is_signed ? load<std::int32_t>(at) : std::int64_t{load<std::uint32_t>(at)};
-      break;
-    default:
-      value = load<std::int64_t>(at);
-  }
+  const std::int64_t value = visit_number(
+      place.integer, [&]<class T>(T) { return static_cast<std::int64_t>(load<T>(at)); });
   const auto first = labels_.begin() + place.first_label;
   return std::find(first, first + place.labels, value) != first + place.labels;
 }
 
-bool StateLayout::proper(const std::byte* state, const std::uint64_t* mask) const noexcept {
-  if (plain_) return true;
-  for (std::size_t i = 0; i < numbers_.size(); ++i) {
-    if (masked(mask, i) && !proper_number(i, state)) return false;
-  }
-  return true;
+const StateLayout& layout_of(const Schema& schema, std::uint32_t type, Layouts& layouts) {
+  auto& layout = layouts.at(type);
+  return layout ? *layout : layout.emplace(schema, type);
 }
 
-bool StateLayout::finite(const std::byte* state, const std::uint64_t* mask) const noexcept {
-  if (plain_ && mask == nullptr) {
-    bool all = true;
-    for (std::uint32_t at = 0; at < size_; at += sizeof(double)) {
-      all = all && std::isfinite(load<double>(state + at));
+Layouts layouts_of_types(const Schema& schema, bool controlled) {
+  Layouts layouts(schema.types.size());
+  for (const ActuatorRow& actuator : schema.actuators) {
+    const StateLayout& layout = layout_of(schema, actuator.type, layouts);
+    if (!controlled) continue;
+    if (layout.numbers().empty()) {
+      throw InvalidArgument("actuator '" + actuator.name.str() +
+                            "' has a state without numbers: describe at least one field of '" +
+                            schema.types[actuator.type].name.str() + "'");
     }
-    return all;
-  }
-  for (std::size_t i = 0; i < numbers_.size(); ++i) {
-    if (!masked(mask, i)) continue;
-    const std::byte* at = state + numbers_[i].offset;
-    const Kind kind = numbers_[i].kind;
-    if (kind == Kind::float64) {
-      if (!std::isfinite(load<double>(at))) return false;
-    } else if (kind == Kind::float32) {
-      if (!std::isfinite(load<float>(at))) return false;
-    } else if (!proper_number(i, state)) {
-      return false;
+    if (layout.hooks().blend != nullptr) refuse_limits(schema, actuator);
+    if (actuator.offset + layout.size() > schema.head.block) {
+      throw InvalidArgument("actuator '" + actuator.name.str() +
+                            "' lies outside the robot's block of " +
+                            std::to_string(schema.head.block) + " bytes");
     }
   }
-  return true;
-}
-
-double StateLayout::number(std::size_t number, const std::byte* state) const noexcept {
-  const std::byte* at = state + numbers_[number].offset;
-  return visit_number(numbers_[number].kind,
-                      [&]<class T>(T) { return static_cast<double>(load<T>(at)); });
+  for (const RequestRow& request : schema.requests) {
+    if (request.type != kNoType) layout_of(schema, request.type, layouts);
+  }
+  return layouts;
 }
 
 }  // namespace o80

@@ -6,6 +6,14 @@
 
 namespace o80 {
 
+/// How a record ends, or begins.
+struct Outcome {
+  Status status = Status::completed;  // of a request that ends later, active
+  Reason reason = Reason::none;
+  std::uint8_t detail = 0;
+  std::int64_t late = 0;  // for `limits`: iterations more than asked
+};
+
 /// A change of the status of a record or a batch.
 struct StatusChange {
   /// batch: it was taken or rejected; batch_end: its last record has ended; of_rejected: a record

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "control/visit_block.hpp"
-
 namespace o80 {
 namespace {
 
@@ -22,42 +20,21 @@ double share_between(double wanted, double at_zero, double at_one) noexcept {
 
 }  // namespace
 
-VelocityChange::VelocityChange(double change, double acceleration, const Rates& rates) noexcept
-    : start_(acceleration), acceleration_(rates.acceleration), jerk_(rates.jerk) {
-  O80_COUNT(speed_change);
-  if (std::isfinite(jerk_)) {
-    plan_with_jerk(change);
-  } else {
-    plan_without_jerk(change);
-  }
-}
-
 /// Full acceleration, and the remainder in the last iteration.
 void VelocityChange::plan_without_jerk(double change) noexcept {
   if (change == 0.0) return;
   sign_ = change < 0.0 ? 1.0 : -1.0;
   const double size = std::abs(change);
+  if (!std::isfinite(acceleration_)) acceleration_ = size;
   const double steps =
-      std::isfinite(acceleration_)
-          ? std::min(std::ceil(size / acceleration_ * (1.0 - kChangeRounding)), kMostSteps)
-          : 1.0;
+      std::min(std::ceil(size / acceleration_ * (1.0 - kChangeRounding)), kMostSteps);
   steps_ = static_cast<std::int64_t>(std::max(steps, 1.0));
   shorter_ = steps_ - 1;
-  const double before = steps_ == 1 ? 0.0 : static_cast<double>(shorter_) * acceleration_;
-  share_ = steps_ == 1 && !std::isfinite(acceleration_)
-               ? 0.0
-               : share_between(size, static_cast<double>(steps_) * acceleration_, before);
-  if (!std::isfinite(acceleration_)) acceleration_ = size;
-  // sum over i of v(i) - v(steps)
-  const double rest = size - before;
   const auto n = static_cast<double>(shorter_);
-  displacement_ = sign_ * (acceleration_ * n * (n - 1.0) / 2.0 + rest * n);
-}
-
-/// The acceleration of iteration i on the deepest trapezoid that ends at 0 after so many steps.
-double VelocityChange::trough(double i, double steps) const noexcept {
-  if (i >= steps) return 0.0;
-  return std::max({-acceleration_, start_ - i * jerk_, -(steps - i) * jerk_});
+  const double before = n * acceleration_;
+  share_ = share_between(size, static_cast<double>(steps_) * acceleration_, before);
+  // sum over i of v(i) - v(steps)
+  displacement_ = sign_ * (acceleration_ * n * (n - 1.0) / 2.0 + (size - before) * n);
 }
 
 /// The sums of trough(), for its three parts: down, along the limit, up.
@@ -153,20 +130,12 @@ double VelocityChange::acceleration(std::int64_t i) const noexcept {
   if (i < 1 || i > steps_) return 0.0;
   const auto at = static_cast<double>(i);
   if (!std::isfinite(jerk_)) {
-    const double own = acceleration_;
-    return -sign_ * (i <= shorter_ ? own : (1.0 - share_) * own);
+    return -sign_ * (i <= shorter_ ? acceleration_ : (1.0 - share_) * acceleration_);
   }
-  const double own = trough(at, static_cast<double>(steps_));
-  double other = 0.0;
-  if (crest_) {
-    // the mirror image of a trough from -a(0)
-    other = at >= static_cast<double>(steps_)
-                ? 0.0
-                : std::min({acceleration_, start_ + at * jerk_,
-                            (static_cast<double>(steps_) - at) * jerk_});
-  } else {
-    other = trough(at, static_cast<double>(shorter_));
-  }
+  const double own = trough(start_, at, static_cast<double>(steps_));
+  // the crest is the mirror image of a trough from -a(0)
+  const double other = crest_ ? -trough(-start_, at, static_cast<double>(steps_))
+                              : trough(start_, at, static_cast<double>(shorter_));
   return sign_ * ((1.0 - share_) * own + share_ * other);
 }
 

@@ -1,6 +1,10 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
+
+#include "control/visit_block.hpp"
 
 namespace o80 {
 
@@ -9,6 +13,23 @@ struct Rates {
   double speed;         // limit of v(i) = p(i) - p(i-1)
   double acceleration;  // limit of a(i) = v(i) - v(i-1)
   double jerk;          // limit of a(i) - a(i-1)
+};
+
+/// Position of one number and its differences: v(i) = p(i) - p(i-1), a(i) = v(i) - v(i-1).
+struct Moment {
+  double position = 0.0;
+  double speed = 0.0;
+  double acceleration = 0.0;
+};
+
+/// Positions from `low` to `high`.
+struct Span {
+  double low = 0.0;
+  double high = 0.0;
+  void include(double position) noexcept {
+    low = std::min(low, position);
+    high = std::max(high, position);
+  }
 };
 
 /// The shortest change of a speed by `change` that ends with acceleration 0, in whole iterations.
@@ -26,7 +47,15 @@ class VelocityChange {
  public:
   VelocityChange() = default;
   /// `acceleration`: the present one, a(0), within its limit.
-  VelocityChange(double change, double acceleration, const Rates& rates) noexcept;
+  VelocityChange(double change, double acceleration, const Rates& rates) noexcept
+      : start_(acceleration), acceleration_(rates.acceleration), jerk_(rates.jerk) {
+    O80_COUNT(speed_change);
+    if (std::isfinite(jerk_)) {
+      plan_with_jerk(change);
+    } else {
+      plan_without_jerk(change);
+    }
+  }
 
   /// Iterations until the change is done; 0 if there is nothing to do.
   std::int64_t steps() const noexcept { return steps_; }
@@ -34,8 +63,7 @@ class VelocityChange {
   double time() const noexcept { return static_cast<double>(steps_) - (crest_ ? 0.0 : share_); }
   /// The acceleration of iteration i, 1 to `steps()`; 0 after.
   double acceleration(std::int64_t i) const noexcept;
-  /// Displacement within steps() minus that of the final speed: the sum over i of
-  /// v(i) - v(steps).
+  /// Displacement within steps() minus that of the final speed: the sum of v(i) - v(steps).
   double displacement() const noexcept { return displacement_; }
   /// Largest change of the speed away from its target, in the direction of the present
   /// acceleration, signed; 0 if there is none.
@@ -52,7 +80,10 @@ class VelocityChange {
 
   void plan_without_jerk(double change) noexcept;
   void plan_with_jerk(double change) noexcept;
-  double trough(double i, double steps) const noexcept;
+  /// Acceleration of iteration i on the deepest trapezoid from `start` to 0 in so many steps.
+  double trough(double start, double i, double steps) const noexcept {
+    return i >= steps ? 0.0 : std::max({-acceleration_, start - i * jerk_, -(steps - i) * jerk_});
+  }
   Sums sums(double steps) const noexcept;
 
   // mirrored by sign_, so that the trough is negative

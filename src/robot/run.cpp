@@ -17,7 +17,7 @@
 #include <thread>
 
 #include "base/printable.hpp"
-#include "control/number_name.hpp"
+#include "describe/number_name.hpp"
 #include "memory/owned_segment.hpp"
 #include "o80/base/error.hpp"
 #include "o80/robot/real_time.hpp"

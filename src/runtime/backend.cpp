@@ -10,8 +10,8 @@
 #include <string>
 
 #include "base/crash_point.hpp"
-#include "control/motion_rules.hpp"
-#include "control/number_name.hpp"
+#include "control/record.hpp"
+#include "describe/number_name.hpp"
 #include "describe/table.hpp"
 #include "o80/base/version.hpp"
 #include "runtime/backend_body.hpp"

@@ -11,8 +11,6 @@
 
 #include "base/short_text.hpp"
 #include "control/controller.hpp"
-#include "control/error_watch.hpp"
-#include "control/reading_watch.hpp"
 #include "memory/fork.hpp"
 #include "memory/halt_word.hpp"
 #include "memory/history.hpp"
@@ -28,7 +26,9 @@
 #include "runtime/burst_grant.hpp"
 #include "runtime/control_holder.hpp"
 #include "runtime/decision_journal.hpp"
+#include "runtime/error_watch.hpp"
 #include "runtime/overrun_limit.hpp"
+#include "runtime/reading_watch.hpp"
 #include "runtime/running_requests.hpp"
 #include "runtime/schedule.hpp"
 #include "runtime/staging.hpp"

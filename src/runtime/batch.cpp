@@ -4,8 +4,8 @@
 #include <unordered_map>
 
 #include "base/printable.hpp"
-#include "control/number_name.hpp"
 #include "control/number_plan.hpp"
+#include "describe/number_name.hpp"
 #include "memory/atomic_words.hpp"
 #include "memory/running_slot.hpp"
 #include "o80/base/error.hpp"

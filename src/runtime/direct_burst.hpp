@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "control/direct_targets.hpp"
+#include "control/controller.hpp"
 
 namespace o80 {
 

@@ -52,10 +52,10 @@ class PlansTest : public testing::Test {
     const double bound = one_in(3) ? magnitude(-2, 2) : kNoLimit;
     return number_at(real(-1, 1) * std::min(bound, 1.0), bound, rates);
   }
-  NumberMotion::Asked any_target(const NumberMotion& number) {
+  Asked any_target(const NumberMotion& number) {
     const double far = one_in(20) ? magnitude(4, 300) : magnitude(-8, 3);
     const double near = number.guard().moment().speed * real(0, 20);  // about where it can stop
-    NumberMotion::Asked asked;
+    Asked asked;
     asked.target = number.position() + (one_in(4) ? near : real(-1, 1) * far);
     if (one_in(3)) asked.profile = Profile::minimum_jerk;
     if (one_in(3)) asked.cruise = number.guard().rates().speed * magnitude(-3, 0.2);
@@ -122,7 +122,7 @@ TEST_F(PlansTest, OfAnArmUsuallyNeedFewChangesOfSpeed) {
   for (int round = 0; round < 3'000; ++round) {
     NumberMotion number = number_at(0.0, kNoLimit, arm);
     const auto start = [&](std::int64_t more) {
-      NumberMotion::Asked asked;
+      Asked asked;
       asked.target = number.position() + real(-1, 1);
       work_since_last_asked();
       number.begin();

@@ -603,7 +603,7 @@ class RandomArrival {
       if (sent.head.pace == Pace::speed && n == 0) {
         rates.speed = std::min(rates.speed, sent.head.speed * 1e-3);
       }
-      const FastestMotion fastest(m.position, m.speed, m.acceleration, sent.target[n], rates);
+      const FastestMotion fastest(m, sent.target[n], rates);
       fewest_ = std::max(fewest_, fastest.iterations());
       if (is_equal) continue;
       const double limit = rates.acceleration * (1.0 - 1e-12);

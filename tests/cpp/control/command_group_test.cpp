@@ -327,5 +327,22 @@ TEST(CommandGroup, BesideSingleCommandsEveryRecordEndsOnceAndAllBlocksComeBack) 
   }
 }
 
+TEST(CommandGroups, ALaterOfferLeavesTheDelayOfItsMembers) {
+  BlockPool pool(1);
+  BlockChain chain;
+  const Block block{};
+  pool.append(chain, &block);
+  RecordHead member;
+  member.id = kMemberMark | chain.first;
+  CommandGroups groups(pool);
+  groups.begin(chain.first);
+  groups.at(chain.first).decided = 1;
+  groups.note_late(chain.first, 3);
+
+  groups.offer(member, CommandGroups::Offer::iterations, 116, 5);
+
+  EXPECT_EQ(groups.late(chain.first), 3);
+}
+
 }  // namespace
 }  // namespace o80::test

@@ -37,8 +37,7 @@ TEST_F(FastestMotionTest, IsFollowedByALimiterThatNeverHoldsItBackFromWhereverIt
     for (int part = 0; part < 4; ++part) {
       const double target =
           real(0, 1) < 0.1 ? limiter.position() : real(-1, 1) * magnitude(-3, 0.5);
-      FastestMotion motion(limiter.position(), limiter.moment().speed,
-                           limiter.moment().acceleration, target, rates);
+      FastestMotion motion(limiter.moment(), target, rates);
       limiter.begin();
       const auto n = motion.iterations();
       longest = std::max(longest, n);
@@ -67,12 +66,12 @@ TEST_F(FastestMotionTest, IsFollowedByALimiterThatNeverHoldsItBackFromWhereverIt
 TEST_F(FastestMotionTest, FromRestToRestTakesTheKnownTime) {
   // 100 iterations up to full speed, 900 at it, 100 down
   const Rates rates{0.1, 0.001, std::numeric_limits<double>::infinity()};
-  EXPECT_EQ(FastestMotion(0.0, 0.0, 0.0, 100.0, rates).iterations(), 1100);
+  EXPECT_EQ(FastestMotion({}, 100.0, rates).iterations(), 1100);
   // acceleration, no cruise: 2 sqrt(d / a)
-  EXPECT_EQ(FastestMotion(0.0, 0.0, 0.0, 2.5, rates).iterations(), 100);
+  EXPECT_EQ(FastestMotion({}, 2.5, rates).iterations(), 100);
   // jerk only: 4 (d / 2 j)^(1/3)
-  EXPECT_EQ(FastestMotion(0.0, 0.0, 0.0, -0.25, {10.0, 10.0, 1e-6}).iterations(), 200);
-  EXPECT_EQ(FastestMotion(1.0, 0.0, 0.0, 1.0, rates).iterations(), 1);
+  EXPECT_EQ(FastestMotion({}, -0.25, {10.0, 10.0, 1e-6}).iterations(), 200);
+  EXPECT_EQ(FastestMotion({1.0}, 1.0, rates).iterations(), 1);
 }
 
 TEST_F(FastestMotionTest, LetsGoOfTheBrakeForATargetJustBeyondTheWayToRest) {
@@ -80,12 +79,11 @@ TEST_F(FastestMotionTest, LetsGoOfTheBrakeForATargetJustBeyondTheWayToRest) {
   const Rates rates{0.00357, 1.756e-4, 8.529e-6};
   NumberLimiter limiter(-1.0, 1.0, rates);
   limiter.restart(0.0);
-  FastestMotion first(0.0, 0.0, 0.0, 0.115629, rates);
+  FastestMotion first({}, 0.115629, rates);
   limiter.begin();
   for (int i = 0; i < 49; ++i) limiter.follow(first.next());
 
-  FastestMotion second(limiter.position(), limiter.moment().speed, limiter.moment().acceleration,
-                       0.136052, rates);
+  FastestMotion second(limiter.moment(), 0.136052, rates);
 
   EXPECT_LE(second.iterations(), 38);
   limiter.begin();
@@ -101,14 +99,13 @@ TEST_F(FastestMotionTest, StretchesToEndWithASlowerOne) {
     NumberLimiter limiter(-std::numeric_limits<double>::infinity(),
                           std::numeric_limits<double>::infinity(), rates);
     limiter.restart(0.0);
-    FastestMotion first(0.0, 0.0, 0.0, real(-1, 1), rates);
+    FastestMotion first({}, real(-1, 1), rates);
     limiter.begin();
     for (auto i = static_cast<std::int64_t>(real(0, 1) * static_cast<double>(first.iterations()));
          i > 0; --i)
       limiter.follow(first.next());
     const double target = real(-1, 1);
-    FastestMotion motion(limiter.position(), limiter.moment().speed, limiter.moment().acceleration,
-                         target, rates);
+    FastestMotion motion(limiter.moment(), target, rates);
     const auto n =
         static_cast<std::int64_t>(static_cast<double>(motion.iterations()) * real(1, 3)) + 1;
     motion.stretch(n);

@@ -1,4 +1,4 @@
-#include "control/layouts_of_types.hpp"
+#include "control/state_layout.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,11 +1,11 @@
-#include "control/reading_watch.hpp"
+#include "runtime/reading_watch.hpp"
 
 #include <array>
 #include <cmath>
 #include <cstdio>
 #include <utility>
 
-#include "control/number_name.hpp"
+#include "describe/number_name.hpp"
 
 namespace o80 {
 

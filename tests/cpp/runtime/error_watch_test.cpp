@@ -1,4 +1,4 @@
-#include "control/error_watch.hpp"
+#include "runtime/error_watch.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,8 +1,8 @@
-#include "control/error_watch.hpp"
+#include "runtime/error_watch.hpp"
 
 #include <cmath>
 
-#include "control/number_name.hpp"
+#include "describe/number_name.hpp"
 
 namespace o80 {
 
