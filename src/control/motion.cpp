@@ -181,9 +181,10 @@ void Motion::publish(const Number& number, std::byte* state) noexcept {
   const double high = std::max(number.motion.guard().maximum(), value);
   visit_number(number.kind, [&]<class T>(T) {
     if constexpr (std::is_floating_point_v<T>) {
-      store(at, static_cast<T>(sizeof(T) < 8 ? nearest_float(value, low, high) : value));
+      const bool is_cut = sizeof(T) < 8 && number.is_limited;
+      store(at, static_cast<T>(is_cut ? nearest_float(value, low, high) : value));
     } else if (sizeof(T) < 8 || number.is_limited || !number.motion.is_on_line()) {
-      store(at, to_integer<T>(nearest_whole(value, low, high)));
+      store(at, to_integer<T>(number.is_limited ? nearest_whole(value, low, high) : value));
     } else {
       const auto start = static_cast<long double>(load<T>(from() + number.offset));
       const auto end = static_cast<long double>(load<T>(target() + number.offset));
