@@ -1,6 +1,6 @@
 # One test program for each folder of tests/cpp, and for the folder tests/cpp of each robot and
-# simulator, which is named after the robot. A test finds the built programs and robots below
-# O80_TEST_PREFIX, laid out as when installed.
+# simulator, which is named after the robot. A test finds the built programs and robots beside itself
+# (tests/cpp/places.hpp), laid out as when installed.
 include(cmake/googletest.cmake)
 include(GoogleTest)
 
@@ -47,6 +47,7 @@ target_link_libraries(o80_bounded PRIVATE o80_private_headers o80_warnings)
 file(GLOB memory_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/memory/*.cpp)
 add_library(o80_killed OBJECT EXCLUDE_FROM_ALL ${memory_sources})
 target_compile_definitions(o80_killed PUBLIC O80_CRASH_POINTS)
+target_compile_options(o80_killed PRIVATE ${test_options})
 target_link_libraries(o80_killed PRIVATE o80_private_headers o80_warnings)
 
 foreach(folder IN LISTS test_folders)
@@ -67,8 +68,7 @@ foreach(folder IN LISTS test_folders)
   target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/tests/cpp ${PROJECT_SOURCE_DIR})
   target_compile_definitions(
     ${target}
-    PRIVATE O80_TEST_PREFIX="${PROJECT_BINARY_DIR}" O80_TEST_SOURCE="${PROJECT_SOURCE_DIR}"
-            O80_TEST_COMPILER="${CMAKE_CXX_COMPILER}"
+    PRIVATE O80_TEST_SOURCE="${PROJECT_SOURCE_DIR}" O80_TEST_COMPILER="${CMAKE_CXX_COMPILER}"
   )
   if(O80_SANITIZE)
     target_compile_definitions(${target} PRIVATE O80_TEST_SANITIZED)
