@@ -77,7 +77,8 @@ install_build_tools() {
 install_tools() {
   say "installing what running ${1:+and testing }needs"
   .venv/bin/python tools/build_requirements.py run record $extras > build/requirements.txt
-  pip install -r build/requirements.txt --group build ${1:+--group "$1"}
+  # conflicts: with packages that are being installed meanwhile
+  pip install --no-warn-conflicts -r build/requirements.txt --group build ${1:+--group "$1"}
   say "installed what running ${1:+and testing }needs"
 }
 
@@ -177,7 +178,7 @@ esac
 case $purpose in
   demo) extras=rendering ;;
   bench) extras="rendering zeromq cameras" ;;
-  test | tools) extras="zeromq cameras motioncapture" ;;
+  test | tools) extras="zeromq motioncapture" ;;
   check) extras="rendering learn zeromq cameras motioncapture" ;;
   *) extras="rendering learn" ;;
 esac
