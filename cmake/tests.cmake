@@ -116,7 +116,7 @@ foreach(folder IN LISTS test_folders)
       DISCOVERY_MODE PRE_TEST
       TEST_PREFIX "${folder}."
       TEST_FILTER "-${elsewhere}:*WithTools.*"
-      PROPERTIES TIMEOUT 120
+      PROPERTIES TIMEOUT 300
     )
     if(folder IN_LIST folders_with_tools)
       gtest_discover_tests(
@@ -125,7 +125,7 @@ foreach(folder IN LISTS test_folders)
         TEST_PREFIX "${folder}."
         TEST_FILTER "*WithTools.*"
         TEST_LIST ${target}_WITH_TOOLS
-        PROPERTIES TIMEOUT 120 LABELS check
+        PROPERTIES TIMEOUT 300 LABELS check
       )
     endif()
   endif()
