@@ -40,7 +40,7 @@ file(GLOB counted_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/control/*.
 )
 add_library(o80_bounded OBJECT EXCLUDE_FROM_ALL ${counted_sources})
 target_compile_definitions(o80_bounded PUBLIC O80_COUNT_BLOCKS)
-target_compile_options(o80_bounded PRIVATE -ffp-contract=off)
+target_compile_options(o80_bounded PRIVATE -ffp-contract=off -O1)
 target_link_libraries(o80_bounded PRIVATE o80_private_headers o80_warnings)
 
 # the memory layer once more, with labelled points at which a process can be killed
