@@ -213,6 +213,7 @@ def test_missing_numbers_are_counted_over_their_wrap(numbers: tuple[int, ...], l
 # ---------------------------------------------------------------------- colours
 
 
+@pytest.mark.check  # needs OpenCV
 @pytest.mark.parametrize("pixel_format", ["BayerRG8", "BayerGB8", "BayerGR8", "BayerBG8"])
 def test_the_colours_of_a_pattern_are_found(pixel_format: PixelFormat) -> None:
     colour = {"R": 240, "G": 130, "B": 30}
