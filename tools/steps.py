@@ -45,6 +45,7 @@ def use_tools() -> None:
     # presets share what they compile alike
     os.environ.setdefault("CCACHE_NOHASHDIR", "1")
     os.environ.setdefault("CCACHE_BASEDIR", str(ROOT))
+    os.environ.setdefault("CCACHE_ABSSTDERR", "1")  # paths in errors stay whole
     LOGS.mkdir(parents=True, exist_ok=True)
 
 
