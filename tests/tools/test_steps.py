@@ -54,7 +54,9 @@ def test_two_lanes_run_two_chains_at_the_same_time() -> None:
         "pathlib.Path('made_{}').touch()\n"
         "while not pathlib.Path('made_{}').exists(): time.sleep(0.01)\n"
     )
-    assert not run_beside([[step("a", wait.format("a", "b"))], [step("b", wait.format("b", "a"))]], 2)
+    assert not run_beside(
+        [[step("a", wait.format("a", "b"))], [step("b", wait.format("b", "a"))]], 2
+    )
 
 
 @pytest.mark.parametrize(

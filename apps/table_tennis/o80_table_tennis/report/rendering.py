@@ -96,7 +96,9 @@ def write_film(path: Path, pictures: Iterable[Image], *, frames_per_second: floa
 
     Needs the extra `rendering`; raises o80.MissingExtra.
     """
-    imageio_ffmpeg: Any = needed("imageio_ffmpeg", "rendering", "a film", package="o80-table-tennis")
+    imageio_ffmpeg: Any = needed(
+        "imageio_ffmpeg", "rendering", "a film", package="o80-table-tennis"
+    )
     writer: Any = None
     frames = 0
     try:
