@@ -177,6 +177,7 @@ esac
 # libraries of learning and drawing, clients of devices: for those that use or test them
 case $purpose in
   demo) extras=rendering ;;
+  wheels) extras= ;;
   bench) extras="rendering zeromq cameras" ;;
   test | tools) extras="zeromq motioncapture" ;;
   check) extras="rendering learn zeromq cameras motioncapture" ;;
