@@ -5,8 +5,8 @@ export PYTHONDONTWRITEBYTECODE := 1
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 
 demo:
-	@tools/setup.sh demo
-	@.venv/bin/python -m o80_table_tennis.demo $(ARGS)
+	@export O80_SINCE=$$(date +%s) && tools/setup.sh demo && \
+		.venv/bin/python -m o80_table_tennis.demo $(ARGS)
 
 # one seed of table tennis from scratch, about ten minutes on one processor: build/learn/report.json
 learn:
@@ -15,7 +15,7 @@ learn:
 
 # what a change can break; ARGS chooses tests: make test ARGS=control, ARGS=tests/python/test_bursts.py
 test:
-	@tools/setup.sh tools
+	@tools/setup.sh environment
 	@.venv/bin/python tools/test.py $(ARGS)
 
 # everything; ARGS chooses steps: make check ARGS="ruff mypy asan"

@@ -11,6 +11,8 @@ from typing import Any, TypeVar
 
 import pytest
 
+from sources import all_left_to_check
+
 os.environ.setdefault("HYPOTHESIS_STORAGE_DIRECTORY", "build/hypothesis")
 # a run in the background may have been started with interrupts ignored, and would pass it on
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -44,6 +46,18 @@ def pytest_unconfigure() -> None:
 # names of tests that were left out: for their mark or name, and for want of recordings
 deselected: set[str] = set()
 without_recordings: set[str] = set()
+# files of which all tests have the mark `check`
+left_files: set[str] = set()
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """`make test` does not read such a file: it may import what only `make check` installs."""
+    if config.option.markexpr != "not check" or not collection_path.match("test_*.py"):
+        return None
+    if all_left_to_check(collection_path):
+        left_files.add(str(collection_path))
+        return True
+    return None
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -68,6 +82,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     if hasattr(session.config, "workeroutput"):
         session.config.workeroutput["deselected"] = sorted(deselected)
         session.config.workeroutput["without_recordings"] = sorted(without_recordings)
+        session.config.workeroutput["left_files"] = sorted(left_files)
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -75,12 +90,14 @@ def pytest_testnodedown(node: Any) -> None:
     output = getattr(node, "workeroutput", {})
     deselected.update(output.get("deselected", ()))
     without_recordings.update(output.get("without_recordings", ()))
+    left_files.update(output.get("left_files", ()))
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
     say = terminalreporter.write_line
     if terminalreporter.config.option.markexpr == "not check":
-        say(f"left to make check: {len(deselected - without_recordings)} tests in Python")
+        count = len(deselected - without_recordings)
+        say(f"left to make check: {count} tests in Python, and {len(left_files)} whole files")
     if without_recordings:
         count = len(without_recordings)
         say(f"left out: {count} tests of recordings, which are not in {DATA} (O80_DATA)")

@@ -16,9 +16,12 @@ add_custom_command(
   DEPENDS ${PROJECT_SOURCE_DIR}/python/bindings/verbs.py ${frontend_sources}
   COMMENT "Writing the signatures of compiled verbs"
 )
+# a target of its own: a command of _core would wait until the library is linked, and the compiler for it
+add_custom_target(o80_verbs DEPENDS ${verb_texts})
 
 file(GLOB binding_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/python/bindings/*.cpp)
-nanobind_add_module(_core NOMINSIZE NB_SUPPRESS_WARNINGS ${binding_sources} ${verb_texts})
+nanobind_add_module(_core NOMINSIZE NB_SUPPRESS_WARNINGS ${binding_sources})
+add_dependencies(_core o80_verbs)
 target_include_directories(_core PRIVATE ${PROJECT_SOURCE_DIR}/python/bindings ${PROJECT_BINARY_DIR}/python)
 target_link_libraries(_core PRIVATE o80 o80_private_headers o80_warnings)
 set_target_properties(

@@ -39,6 +39,7 @@ else()
   add_library(o80 SHARED ${o80_sources})
 endif()
 add_library(o80::o80 ALIAS o80)
+set_target_properties(o80 PROPERTIES DEFINE_SYMBOL "") # shared and static compile alike
 target_link_libraries(
   o80 PUBLIC o80_headers Threads::Threads PRIVATE ${CMAKE_DL_LIBS} o80_private_headers o80_warnings
 )

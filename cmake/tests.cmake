@@ -1,6 +1,6 @@
 # One test program for each folder of tests/cpp, and for the folder tests/cpp of each robot and
-# simulator, which is named after the robot. A test finds the built programs and robots below
-# O80_TEST_PREFIX, laid out as when installed.
+# simulator, which is named after the robot. A test finds the built programs and robots beside itself
+# (tests/cpp/places.hpp), laid out as when installed.
 include(cmake/googletest.cmake)
 include(GoogleTest)
 
@@ -40,13 +40,14 @@ file(GLOB counted_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/control/*.
 )
 add_library(o80_bounded OBJECT EXCLUDE_FROM_ALL ${counted_sources})
 target_compile_definitions(o80_bounded PUBLIC O80_COUNT_BLOCKS)
-target_compile_options(o80_bounded PRIVATE -ffp-contract=off)
+target_compile_options(o80_bounded PRIVATE -ffp-contract=off -O1)
 target_link_libraries(o80_bounded PRIVATE o80_private_headers o80_warnings)
 
 # the memory layer once more, with labelled points at which a process can be killed
 file(GLOB memory_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/memory/*.cpp)
 add_library(o80_killed OBJECT EXCLUDE_FROM_ALL ${memory_sources})
 target_compile_definitions(o80_killed PUBLIC O80_CRASH_POINTS)
+target_compile_options(o80_killed PRIVATE ${test_options})
 target_link_libraries(o80_killed PRIVATE o80_private_headers o80_warnings)
 
 foreach(folder IN LISTS test_folders)
@@ -67,8 +68,7 @@ foreach(folder IN LISTS test_folders)
   target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/tests/cpp ${PROJECT_SOURCE_DIR})
   target_compile_definitions(
     ${target}
-    PRIVATE O80_TEST_PREFIX="${PROJECT_BINARY_DIR}" O80_TEST_SOURCE="${PROJECT_SOURCE_DIR}"
-            O80_TEST_COMPILER="${CMAKE_CXX_COMPILER}"
+    PRIVATE O80_TEST_SOURCE="${PROJECT_SOURCE_DIR}" O80_TEST_COMPILER="${CMAKE_CXX_COMPILER}"
   )
   if(O80_SANITIZE)
     target_compile_definitions(${target} PRIVATE O80_TEST_SANITIZED)
@@ -116,7 +116,7 @@ foreach(folder IN LISTS test_folders)
       DISCOVERY_MODE PRE_TEST
       TEST_PREFIX "${folder}."
       TEST_FILTER "-${elsewhere}:*WithTools.*"
-      PROPERTIES TIMEOUT 120
+      PROPERTIES TIMEOUT 300
     )
     if(folder IN_LIST folders_with_tools)
       gtest_discover_tests(
@@ -125,7 +125,7 @@ foreach(folder IN LISTS test_folders)
         TEST_PREFIX "${folder}."
         TEST_FILTER "*WithTools.*"
         TEST_LIST ${target}_WITH_TOOLS
-        PROPERTIES TIMEOUT 120 LABELS check
+        PROPERTIES TIMEOUT 300 LABELS check
       )
     endif()
   endif()

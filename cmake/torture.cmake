@@ -2,7 +2,7 @@
 if(NOT O80_SANITIZE AND NOT CMAKE_CROSSCOMPILING)
   add_library(o80_crash_points STATIC EXCLUDE_FROM_ALL ${o80_sources})
   target_compile_definitions(o80_crash_points PUBLIC O80_CRASH_POINTS)
-  target_compile_options(o80_crash_points PRIVATE -ffp-contract=off)
+  target_compile_options(o80_crash_points PRIVATE -ffp-contract=off -O1) # built for one campaign
   target_link_libraries(
     o80_crash_points PUBLIC o80_headers Threads::Threads ${CMAKE_DL_LIBS} PRIVATE o80_private_headers o80_warnings
   )

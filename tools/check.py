@@ -12,7 +12,18 @@ from collections.abc import Callable
 from checkout_state import PassedSteps
 from outcomes import Outcomes, of_ctest, of_log, of_pytest, of_real_time_machine
 from sources import ROOT
-from steps import LOGS, PASSED, PYTHON, Step, build, cpp, processor_time, pytest, run, use_tools
+from steps import (
+    LOGS,
+    PASSED,
+    PYTHON,
+    Step,
+    build,
+    cpp,
+    processor_time,
+    pytest,
+    run_beside,
+    use_tools,
+)
 
 PROOF = [sys.executable, "tests/proofs/run.py"]
 PACKAGES = ("o80", "o80_mujoco", "o80_pam", "o80_devices", "o80_table_tennis")
@@ -65,7 +76,7 @@ STEPS: dict[str, Callable[[], Step]] = {
     "cpp": lambda: cpp("dev", report="cpp"),
     "python": lambda: pytest(report="python"),
     "torture": torture,
-    "tidy": lambda: Step("tidy", [[sys.executable, "tools/tidy.py"]]),
+    "tidy": lambda: Step("tidy", [["cmake", "--preset", "dev"], [sys.executable, "tools/tidy.py"]]),
     "models": lambda: Step("models", [[*PROOF, "models"]]),
     "asan": lambda: cpp("asan"),
     "tsan": lambda: cpp("tsan"),
@@ -74,6 +85,21 @@ STEPS: dict[str, Callable[[], Step]] = {
     "arm64": lambda: cpp("arm64"),
 }
 ON_DEMAND = {"arm64"}  # an emulator's minutes
+# Two chains of steps run at the same time: many steps wait, or keep one processor busy. Those of a
+# chain use the same build folder. The longest come first.
+QUICK = ("format", "ruff")
+CHAINS = (
+    ("python",),
+    ("asan", "fuzz"),
+    ("rt",),
+    ("models",),
+    ("tsan",),
+    ("cpp", "torture", "tidy"),
+    ("mypy",),
+    ("arm64",),
+)
+LANES = 2
+NEED_DEV = {"cpp", "python"}  # they use what the preset dev built, each in a chain of its own
 # what is left of a step that `make test` passed on these files, and what was reported then
 REST: dict[str, tuple[Callable[[], Step], Callable[[], Outcomes]]] = {
     "cpp": (
@@ -87,18 +113,30 @@ REST: dict[str, tuple[Callable[[], Step], Callable[[], Outcomes]]] = {
 }
 
 
-def planned(names: list[str], passed: PassedSteps, found: Outcomes) -> list[Step]:
+def planned(names: list[str], passed: PassedSteps, found: Outcomes) -> dict[str, Step]:
     """The steps to run; outcomes of what passed before are added to those found."""
-    steps = []
+    steps = {}
     for name in names:
         if name in REST and passed.contains(name):
             rest, outcomes = REST[name]
             print(f"== {name}: passed by make test on these files; left are the tests marked check")
             found.add(outcomes())
-            steps.append(rest())
+            steps[name] = rest()
         else:
-            steps.append(STEPS[name]())
+            steps[name] = STEPS[name]()
     return steps
+
+
+def run_all(steps: dict[str, Step], *, keep_going: bool) -> set[str]:
+    """Runs all steps; the names of those that failed."""
+    first = [steps[name] for name in QUICK if name in steps]
+    if NEED_DEV & set(steps):
+        first.append(Step("build", build("dev")))
+    failed = run_beside([first], 1, keep_going=keep_going)
+    if failed and not keep_going:
+        return failed
+    chains = [[steps[name] for name in chain if name in steps] for chain in CHAINS]
+    return failed | run_beside(chains, LANES, keep_going=keep_going)
 
 
 def main() -> int:
@@ -116,27 +154,25 @@ def main() -> int:
 
     use_tools()
     begin = time.monotonic()
-    found, failed = Outcomes(), []
+    found = Outcomes()
     names = arguments.steps or [name for name in STEPS if name not in ON_DEMAND]
-    for step in planned(names, PassedSteps(PASSED), found):
-        if run(step):
-            found.add(step.outcomes())
-            continue
-        failed.append(step.name)
-        if not arguments.keep_going:
-            break
+    steps = planned(names, PassedSteps(PASSED), found)
+    failed = run_all(steps, keep_going=arguments.keep_going)
+    if failed:
+        print(f"failed: {', '.join(sorted(failed))} (build/test)")
+        return 1
+    for step in steps.values():
+        found.add(step.outcomes())
     gaps = found.gaps()
     for name, why in gaps.items():
         print(f"skipped: {name}: {why}")
     # some steps alone cannot know what the others pass
-    if gaps and not arguments.steps and not failed and not arguments.allow_skips:
+    if gaps and not arguments.steps and not arguments.allow_skips:
         print(f'failed: {len(gaps)} skipped; install what is missing, or ARGS="--allow-skips"')
         return 1
     how_long = f"in {time.monotonic() - begin:.0f} s ({processor_time():.0f} s of processor time)"
-    print(
-        f"failed: {', '.join(failed)} (build/test)" if failed else f"all checks passed {how_long}"
-    )
-    return int(bool(failed))
+    print(f"all checks passed {how_long}")
+    return 0
 
 
 if __name__ == "__main__":

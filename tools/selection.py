@@ -71,6 +71,10 @@ class Selection:
         """Whether all that was asked for in Python are files, or tests in them."""
         return all(".py" in path for path in self.python)
 
+    def files(self) -> list[Path]:
+        """The files among what was asked for in Python."""
+        return [ROOT / path.partition("::")[0] for path in self.python if ".py" in path]
+
 
 def select(words: Iterable[str]) -> Selection:
     """Folders by name, folders and files by path, and single tests as pytest names them."""

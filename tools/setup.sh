@@ -1,17 +1,22 @@
 #!/usr/bin/env bash
-# Sets up what a make target needs: tools/setup.sh demo|learn|tools|test|check|wheels|bench|systemd
-# `tools` is `test` without the packages of this repository: C++ tests do not use them installed.
-# Nothing is done twice; stamps of what was done lie in .venv/stamps.
+# Sets up what a make target needs: tools/setup.sh PURPOSE, of
+#   environment   .venv, nothing in it
+#   tools         what testing needs but the packages of this repository, which C++ tests do not use
+#   test, check   what testing and checking needs
+#   demo, learn, bench, wheels, systemd
+# Nothing is done twice; stamps of what was done lie in .venv/stamps. What is said begins with the
+# time since the set-up, or since O80_SINCE, if that is given (seconds of the epoch).
 set -euo pipefail
 cd "$(dirname "$0")/.."
 PATH=$PATH:/usr/sbin:/sbin # ldconfig, for users whose path lacks them
-purpose=${1:?demo, learn, tools, test, check, wheels, bench or systemd}
+purpose=${1:?environment, demo, learn, tools, test, check, wheels, bench or systemd}
+since=${O80_SINCE:-$(date +%s)}
 
 mkdir -p build
 exec 9> build/setup.lock
 flock 9
 
-say() { printf '== %s\n' "$*" >&2; }
+say() { printf '== %3d s: %s\n' $(($(date +%s) - since)) "$*" >&2; }
 
 # Debian packages that are missing: asked for as root, named otherwise
 need_packages() {
@@ -61,41 +66,84 @@ make_environment() {
   "$python" -m venv --clear .venv
 }
 
-install_tools() {
-  say "installing what building, running ${1:+and testing }needs"
+# what building needs is small: packages are compiled while the rest is installed
+install_build_tools() {
+  say "installing what building needs"
   pip install 'pip>=25.1'
-  .venv/bin/python tools/build_requirements.py build > build/requirements.txt
-  .venv/bin/python tools/build_requirements.py run rendering record $extras >> build/requirements.txt
-  pip install -r build/requirements.txt --group build ${1:+--group "$1"}
+  .venv/bin/python tools/build_requirements.py build > build/build_requirements.txt
+  pip install -r build/build_requirements.txt --group build
 }
 
-# install_package NAME FOLDER: one of the five packages, whose requirements are there
+install_tools() {
+  say "installing what running ${1:+and testing }needs"
+  .venv/bin/python tools/build_requirements.py run record $extras > build/requirements.txt
+  # conflicts: with packages that are being installed meanwhile
+  pip install --no-warn-conflicts -r build/requirements.txt --group build ${1:+--group "$1"}
+  say "installed what running ${1:+and testing }needs"
+}
+
+# install_package NAME FOLDER [DEFINITION...]: one of the five packages, whose requirements are there
 install_package() {
-  say "building and installing $1"
-  pip install --no-build-isolation --no-deps "-Cbuild-dir=$PWD/build/pip/$1" "$2"
+  local name=$1 folder=$2
+  shift 2
+  say "building $name"
+  pip install --no-build-isolation --no-deps "-Cbuild-dir=$PWD/build/pip/$name" \
+    "${@/#/-Ccmake.define.}" "$folder"
+  say "installed $name"
 }
 
-install_packages() {
+install_core() {
   once o80 "$(state_of pyproject.toml CMakeLists.txt README.md LICENSE cmake include src python \
     robots/two_joints)" install_package o80 .
-  # what the others are compiled against
-  local headers
-  headers=$(state_of include cmake/o80_add_robot.cmake cmake/o80Config.cmake.in)
-  once pam "$headers $(package_state robots/pam)" install_package o80-pam ./robots/pam
-  once mujoco "$headers $(package_state simulators/mujoco)" install_package o80-mujoco ./simulators/mujoco
-  once devices "$(package_state devices)" install_package o80-devices ./devices
+}
+
+# they are compiled against the headers of the checkout, and wait for nothing; those with bindings come
+# last: ccache then has those of the core
+install_others() {
+  local headers checkout=o80_DIR=$PWD/cmake/checkout
+  headers=$(state_of include cmake/o80_add_robot.cmake cmake/checkout)
   once table_tennis "$(package_state apps/table_tennis)" \
     install_package o80-table-tennis ./apps/table_tennis
+  once pam "$headers $(package_state robots/pam)" install_package o80-pam ./robots/pam "$checkout"
+  once mujoco "$headers $(package_state simulators/mujoco)" \
+    install_package o80-mujoco ./simulators/mujoco "$checkout"
+  case $purpose in
+    demo | learn) ;;
+    *) once devices "$(package_state devices)" install_package o80-devices ./devices ;;
+  esac
+}
+
+# says from time to time how far the compilers are
+watch_compilers() {
+  local all made never
+  exec {never}<> <(:) # nothing is ever read from it: a way to sleep without a process
+  while ! read -rt 15 -u "$never"; do
+    all=$(cat build/pip/*/build.ninja 2> /dev/null | grep -c '^build [^ ]*\.o:') || continue
+    made=$(find build/pip -path '*.dir/*.o' ! -path '*LTOTest*' -newer build/setup.lock | wc -l)
+    [ "$made" -eq 0 ] || say "compiled $made of $all files"
+  done
+}
+
+# all at the same time: each of them leaves a processor idle for a while
+install_everything() {
+  touch build/setup.lock
+  watch_compilers &
+  local watch=$! job jobs=() failed=0
+  for job in install_core install_others install_rest install_programs; do
+    $job &
+    jobs+=($!)
+  done
+  for job in "${jobs[@]}"; do
+    wait "$job" || failed=1
+  done
+  kill "$watch"
+  return $failed
 }
 
 case $purpose in
-  demo | learn) ;;
-  tools | test) need_packages g++ ccache libgtest-dev libgmock-dev libaravis-0.8-0 aravis-tools ;;
-  check) # compilers of the sanitizers and of another machine, model checkers, emulators, stress, browser
-    need_packages g++ ccache libgtest-dev libgmock-dev libaravis-0.8-0 aravis-tools googletest \
-      clang-19 libclang-rt-19-dev \
-      llvm-19 g++-aarch64-linux-gnu qemu-user-static relacy-dev spin strace stress-ng rt-tests \
-      qemu-system-x86 busybox-static cpio chromium
+  environment | demo | learn) ;;
+  tools | test | check)
+    need_packages g++ ccache libgtest-dev libgmock-dev libaravis-0.8-0 aravis-tools
     ;;
   wheels) need_packages g++ ;;
   bench) need_packages g++ rt-tests stress-ng libaravis-0.8-0 aravis-tools ;;
@@ -106,22 +154,42 @@ case $purpose in
   *) say "unknown purpose '$purpose'"; exit 2 ;;
 esac
 # pictures without a screen, where EGL cannot make them; refused, only the film is missing
-case $purpose in
-  demo | check) ldconfig -p | grep -q libEGL_mesa || need_packages libosmesa6 || true ;;
-esac
+need_renderer() { ldconfig -p | grep -q libEGL_mesa || need_packages libosmesa6 || true; }
+install_programs() {
+  case $purpose in
+    demo) need_renderer ;;
+    check) # compilers of the sanitizers and of another machine, model checkers, emulators, stress, browser
+      need_packages googletest clang-19 libclang-rt-19-dev llvm-19 g++-aarch64-linux-gnu \
+        qemu-user-static relacy-dev spin strace stress-ng rt-tests qemu-system-x86 busybox-static \
+        cpio chromium
+      need_renderer
+      ;;
+  esac
+}
 
 .venv/bin/python -c '' 2> /dev/null || make_environment
+[ "$purpose" = environment ] && exit
 case $purpose in
   tools | test) group=test ;;
   check | wheels) group=$purpose ;;
   *) group= ;;
 esac
-# torch and the rest that learning needs, clients of devices: for those that use or test them
+# libraries of learning and drawing, clients of devices: for those that use or test them
 case $purpose in
-  demo) extras= ;;
-  bench) extras="zeromq cameras" ;;
-  test | tools | check) extras="learn zeromq cameras motioncapture" ;;
-  *) extras=learn ;;
+  demo) extras=rendering ;;
+  wheels) extras= ;;
+  bench) extras="rendering zeromq cameras" ;;
+  test | tools) extras="zeromq motioncapture" ;;
+  check) extras="rendering learn zeromq cameras motioncapture" ;;
+  *) extras="rendering learn" ;;
 esac
-once "tools-${group:-build$extras}" "$(state_of pyproject.toml ./*/pyproject.toml ./*/*/pyproject.toml)" install_tools "$group"
-[ "$purpose" = tools ] || install_packages
+requirements=$(state_of pyproject.toml ./*/pyproject.toml ./*/*/pyproject.toml)
+# compile what was compiled before, or in another package, no more
+if command -v ccache > /dev/null; then
+  export CMAKE_CXX_COMPILER_LAUNCHER=ccache
+  export CCACHE_DIR=${CCACHE_DIR:-$PWD/build/ccache}
+  export CCACHE_NOHASHDIR=${CCACHE_NOHASHDIR:-1} CCACHE_BASEDIR=${CCACHE_BASEDIR:-$PWD}
+fi
+install_rest() { once "tools-${group:-build$extras}" "$requirements" install_tools "$group"; }
+once build-tools "$requirements" install_build_tools
+if [ "$purpose" = tools ]; then install_rest; else install_everything; fi

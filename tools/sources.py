@@ -1,5 +1,6 @@
 """Which files of the tree are ours to format and to check."""
 
+import re
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -26,3 +27,8 @@ def cpp_files() -> list[str]:
         for suffix in ("hpp", "cpp")
         for file in (ROOT / folder).rglob(f"*.{suffix}")
     )
+
+
+def all_left_to_check(tests: Path) -> bool:
+    """Whether all tests of a file in Python have the mark `check`: `make test` does not read it."""
+    return re.search(r"^pytestmark = \[?pytest\.mark\.check\b", tests.read_text(), re.M) is not None

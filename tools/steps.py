@@ -6,7 +6,7 @@ import subprocess
 import sys
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +14,7 @@ from pathlib import Path
 from outcomes import Outcomes, of_ctest, of_pytest
 from sources import ROOT
 
+BEGIN = time.monotonic()
 JOBS = len(os.sched_getaffinity(0))
 LOGS = ROOT / "build" / "test"
 PASSED = LOGS / "passed.json"  # what `make test` passed, on which files
@@ -41,7 +42,10 @@ def use_tools() -> None:
     tools = Path(sys.executable).parent
     os.environ["PATH"] = f"{tools}{os.pathsep}{os.environ['PATH']}"
     os.environ.setdefault("CCACHE_DIR", str(ROOT / "build" / "ccache"))
-    os.environ.setdefault("CCACHE_NOHASHDIR", "1")  # presets share what they compile alike
+    # presets share what they compile alike
+    os.environ.setdefault("CCACHE_NOHASHDIR", "1")
+    os.environ.setdefault("CCACHE_BASEDIR", str(ROOT))
+    os.environ.setdefault("CCACHE_ABSSTDERR", "1")  # paths in errors stay whole
     LOGS.mkdir(parents=True, exist_ok=True)
 
 
@@ -65,26 +69,49 @@ def closing_lines(step: Step) -> list[str]:
 
 def run(step: Step) -> bool:
     """Runs a step; shows its closing lines, or most of its log when it fails."""
-    print(f"== {step.name}", flush=True)
-    begin = time.monotonic()
+    begin, used = time.monotonic(), 0.0
+    print(f"== {begin - BEGIN:3.0f} s: {step.name}", flush=True)
     returned = 0
     with step.log.open("w") as output:
         for command in step.commands:
-            result = subprocess.run(command, cwd=ROOT, stdout=output, stderr=subprocess.STDOUT)
-            returned = result.returncode
+            process = subprocess.Popen(command, cwd=ROOT, stdout=output, stderr=subprocess.STDOUT)
+            _, status, usage = os.wait4(process.pid, 0)
+            returned = process.returncode = os.waitstatus_to_exitcode(status)
+            used += usage.ru_utime + usage.ru_stime
             if returned != 0:
                 break
-    seconds = time.monotonic() - begin
+    now = time.monotonic()
     verdict = "passed" if returned == 0 else f"FAILED ({step.log.relative_to(ROOT)})"
     shown = closing_lines(step) if returned == 0 else last_lines(step, 400)
-    print(f"{''.join(shown)}== {step.name}: {verdict} in {seconds:.0f} s", flush=True)
+    took = f"{now - begin:.0f} s ({used:.0f} s of processor time)"
+    text = f"{''.join(shown)}== {now - BEGIN:3.0f} s: {step.name}: {verdict} in {took}"
+    print(text, flush=True)
     return returned == 0
 
 
-def run_beside(steps: list[Step]) -> bool:
-    """Runs steps at the same time, of which each waits a lot."""
-    with ThreadPoolExecutor(len(steps)) as pool:
-        return all(list(pool.map(run, steps)))
+def run_beside(chains: Iterable[list[Step]], lanes: int, *, keep_going: bool = False) -> set[str]:
+    """Runs chains of steps, as many of them at the same time as there are lanes; what failed.
+
+    The steps of a chain run one after the other. After a failure no further step begins, unless
+    `keep_going` is set.
+    """
+    failed: set[str] = set()
+    interrupted = False
+
+    def run_chain(chain: list[Step]) -> None:
+        for step in chain:
+            if interrupted or (failed and not keep_going):
+                return
+            if not run(step):
+                failed.add(step.name)
+
+    with ThreadPoolExecutor(lanes) as pool:
+        try:
+            list(pool.map(run_chain, chains))
+        except KeyboardInterrupt:
+            interrupted = True
+            raise
+    return failed
 
 
 def build(preset: str, *targets: str) -> list[list[str]]:

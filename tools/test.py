@@ -12,13 +12,16 @@ import time
 from checkout_state import PassedSteps
 from outcomes import Outcomes
 from selection import NoSuchTestsError, Selection, names, select
-from sources import ROOT
+from sources import ROOT, all_left_to_check
 from steps import PASSED, Step, build, ctest, processor_time, pytest, run, run_beside, use_tools
 
 
-def install() -> bool:
-    """Builds and installs the packages that changed."""
-    return subprocess.run(["tools/setup.sh", "test"], cwd=ROOT).returncode == 0
+def set_up(chosen: Selection, *, everything: bool) -> bool:
+    """Installs what the tests need: those in Python the packages too, those marked `check` more."""
+    purpose = "test" if everything or chosen.python else "tools"
+    if chosen.names_files and any(all_left_to_check(file) for file in chosen.files()):
+        purpose = "check"
+    return subprocess.run(["tools/setup.sh", purpose], cwd=ROOT).returncode == 0
 
 
 def test_everything() -> bool:
@@ -30,7 +33,7 @@ def test_everything() -> bool:
     passed, found = PassedSteps(PASSED), Outcomes()
     for step in tests:
         passed.forget(step.name)
-    if not run(Step("build", build("dev"))) or not run_beside(tests):
+    if not run(Step("build", build("dev"))) or run_beside([[test] for test in tests], len(tests)):
         return False
     for step in tests:
         passed.add(step.name)
@@ -101,7 +104,7 @@ def main() -> int:
     everything = not arguments.tests and not arguments.keyword
     if not arguments.tests and arguments.keyword:
         chosen = select(["cpp", "python", "processes", "consumer"])
-    if (everything or chosen.python) and not install():
+    if not set_up(chosen, everything=everything):
         return 1
 
     begin, used = time.monotonic(), processor_time()

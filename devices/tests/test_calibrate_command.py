@@ -22,6 +22,8 @@ from o80_devices.ball_tracking.lenses import Lens
 from o80_devices.ball_tracking.scene import Scene
 from o80_devices.ball_tracking.waved_ball import WavedBall
 
+pytestmark = pytest.mark.check  # needs OpenCV, which only `make check` installs
+
 FloatArray = NDArray[np.float64]
 LENS = without_place(four_cameras().cameras[0])
 # four cameras with one lens, so that its pictures need to be drawn once

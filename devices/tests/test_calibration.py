@@ -14,6 +14,8 @@ from o80_devices.ball_tracking.calibration import (
     without_place,
 )
 
+pytestmark = pytest.mark.check  # needs OpenCV, which only `make check` installs
+
 FloatArray = NDArray[np.float64]
 RIG = four_cameras()
 

@@ -68,6 +68,7 @@ def row_where(cameras: Any, condition: Callable[[Any], Any]) -> Any:
     raise AssertionError(f"no such row within {WAIT} s; reasons: {row.reasons}")
 
 
+@pytest.mark.check  # needs OpenCV
 def test_images_come_with_the_stamps_of_the_camera(segment: str) -> None:
     with ROBOT.inline(segment, frequency=1000, history=4, sources="Fake_1", rate=100) as cameras:
         rows = [row_where(cameras, lambda row: row.valid[0]) for _ in range(20)]
@@ -81,6 +82,7 @@ def test_images_come_with_the_stamps_of_the_camera(segment: str) -> None:
     assert rows[-1].images.reshape(480, 640, 3).std() > 10  # the test image of the camera
 
 
+@pytest.mark.check  # needs OpenCV
 def test_the_tracker_reads_its_images_with_the_error_of_their_time(segment: str) -> None:
     camera = RigCamera("one", (640, 480), (500.0, 500.0), (320.0, 240.0))
     source = ImageSource([segment], Rig((camera,)), 0.01)
@@ -97,6 +99,7 @@ def test_the_tracker_reads_its_images_with_the_error_of_their_time(segment: str)
     assert images.error == row.errors[0] > 0
 
 
+@pytest.mark.check  # needs OpenCV
 def test_a_row_without_a_new_image_has_none(segment: str) -> None:
     with ROBOT.inline(segment, frequency=1000, history=4, sources="Fake_1", rate=20) as cameras:
         row_where(cameras, lambda row: row.valid[0])
@@ -108,6 +111,7 @@ def test_a_row_without_a_new_image_has_none(segment: str) -> None:
         assert not row.images.any()
 
 
+@pytest.mark.check  # needs OpenCV
 def test_a_camera_that_is_not_there_is_a_marked_gap_beside_another_one(
     segment: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -133,6 +137,7 @@ def test_the_cameras_that_answer_are_listed(wire_camera: WireCamera) -> None:
         assert time.monotonic() < end
 
 
+@pytest.mark.check  # needs OpenCV
 def test_a_camera_on_the_wire_that_is_unplugged_is_a_gap_and_comes_back(
     wire_camera: WireCamera, segment: str
 ) -> None:
@@ -145,6 +150,7 @@ def test_a_camera_on_the_wire_that_is_unplugged_is_a_gap_and_comes_back(
         row_where(cameras, lambda row: row.valid[0])
 
 
+@pytest.mark.check  # needs OpenCV
 def test_a_camera_on_the_wire_that_starts_again_is_opened_again(
     wire_camera: WireCamera, segment: str
 ) -> None:
@@ -169,6 +175,7 @@ def test_an_image_with_lost_packets_is_damaged_and_counted(
         assert row.lost[0] > 0
 
 
+@pytest.mark.check  # needs OpenCV
 def test_it_paces_the_loop_in_a_process_of_its_own(segment: str) -> None:
     with ROBOT.start(segment, frequency=50, history=4, sources="Fake_1", rate=50) as process:
         cameras = process.frontend()
@@ -213,6 +220,7 @@ def test_missing_numbers_are_counted_over_their_wrap(numbers: tuple[int, ...], l
 # ---------------------------------------------------------------------- colours
 
 
+@pytest.mark.check  # needs OpenCV
 @pytest.mark.parametrize("pixel_format", ["BayerRG8", "BayerGB8", "BayerGR8", "BayerBG8"])
 def test_the_colours_of_a_pattern_are_found(pixel_format: PixelFormat) -> None:
     colour = {"R": 240, "G": 130, "B": 30}

@@ -11,6 +11,8 @@ from o80_devices.ball_tracking import BallTracker, Reason, VideoCameras, four_ca
 from o80_devices.ball_tracking.scene import Scene
 from o80_devices.ball_tracking.throws import Throws
 
+pytestmark = pytest.mark.check  # needs OpenCV, which only `make check` installs
+
 RATE = 180
 
 

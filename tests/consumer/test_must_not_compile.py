@@ -1,6 +1,8 @@
 """Mistakes in a driver class are errors with a sentence, when the driver is compiled."""
 
 import subprocess
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -14,13 +16,26 @@ HEADERS = Path(o80.__file__).parent / "include"
 LANGUAGE = ("-std=c++20", f"-I{HEADERS}")
 
 
+Flags = Callable[[str], tuple[str, ...]]
+
+
 @pytest.fixture(scope="module")
-def compiled_headers(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, ...]:
-    """Flags that give g++ what all programs include, compiled once."""
-    header = tmp_path_factory.mktemp("headers") / "robot.hpp"
+def compiled_headers(tmp_path_factory: pytest.TempPathFactory) -> Flags:
+    """Flags that give a compiler what all programs include, compiled once."""
+    folder = tmp_path_factory.mktemp("headers")
+    header = folder / "robot.hpp"
     header.write_text('#include "o80/robot/make_table.hpp"\n')
-    subprocess.run(["g++", *LANGUAGE, "-x", "c++-header", header], check=True)
-    return ("-Winvalid-pch", "-Werror=invalid-pch", "-include", str(header))
+
+    @cache
+    def flags(compiler: str) -> tuple[str, ...]:
+        compiled = folder / f"robot.hpp.{'gch' if compiler == 'g++' else 'pch'}"
+        command = [compiler, *LANGUAGE, "-x", "c++-header", header, "-o", compiled]
+        subprocess.run(command, check=True)
+        if compiler == "g++":
+            return ("-Winvalid-pch", "-Werror=invalid-pch", "-include", str(header))
+        return ("-include-pch", str(compiled))
+
+    return flags
 
 
 def errors(compiler: str, program: Path, *flags: str) -> list[str]:
@@ -37,14 +52,13 @@ def errors(compiler: str, program: Path, *flags: str) -> list[str]:
 @pytest.mark.parametrize("program", PROGRAMS, ids=lambda program: program.stem)
 @pytest.mark.parametrize("compiler", COMPILERS)
 def test_the_first_error_says_what_is_wrong(
-    compiler: str, program: Path, compiled_headers: tuple[str, ...]
+    compiler: str, program: Path, compiled_headers: Flags
 ) -> None:
     expected = program.read_text().splitlines()[0].removeprefix("// error: ")
-    flags = compiled_headers if compiler == "g++" else ()
 
-    assert expected in errors(compiler, program, *flags)[0]
+    assert expected in errors(compiler, program, *compiled_headers(compiler))[0]
 
 
 @pytest.mark.parametrize("program", PROGRAMS, ids=lambda program: program.stem)
-def test_without_the_mistake_it_compiles(program: Path, compiled_headers: tuple[str, ...]) -> None:
-    assert errors("g++", program, *compiled_headers, "-DRIGHT") == []
+def test_without_the_mistake_it_compiles(program: Path, compiled_headers: Flags) -> None:
+    assert errors("g++", program, *compiled_headers("g++"), "-DRIGHT") == []

@@ -20,12 +20,20 @@ class Environment:
     """An empty virtual environment. Its programs find no compiler unless `compiler` is set."""
 
     def __init__(self, folder: Path, *, compiler: bool = False) -> None:
-        subprocess.run([sys.executable, "-m", "venv", folder], check=True)
+        subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder], check=True)
         self.folder = folder
         self.compiler = compiler
 
     def run(self, program: str, *words: str | Path, fails: bool = False) -> str:
         """Runs a program of the environment; returns what it prints."""
+        return self.run_path(self.folder / "bin" / program, *words, fails=fails)
+
+    def pip(self, *words: str | Path) -> str:
+        """Runs our pip for the environment, which has none of its own: making one takes long."""
+        python = self.folder / "bin" / "python"
+        return self.run_path(Path(sys.executable), "-m", "pip", "--python", python, *words)
+
+    def run_path(self, program: Path, *words: str | Path, fails: bool = False) -> str:
         path = str(self.folder / "bin")
         given = {
             name: value
@@ -39,8 +47,9 @@ class Environment:
             if shutil.which("ccache", path=os.defpath):
                 given |= {"CMAKE_CXX_COMPILER_LAUNCHER": "ccache", "CCACHE_BASEDIR": "/"}
                 given.setdefault("CCACHE_DIR", str(ROOT / "build" / "ccache"))
+            given["SKBUILD_CMAKE_BUILD_TYPE"] = "None"  # not optimised: what is shipped was built
         done = subprocess.run(
-            [self.folder / "bin" / program, *words],
+            [program, *words],
             env=given | {"PATH": path},
             cwd=self.folder,
             stdout=subprocess.PIPE,
@@ -56,11 +65,11 @@ class Environment:
 
     def install(self, *words: str | Path) -> None:
         """Installs wheels, with what they need from the package index."""
-        self.run("python", "-m", "pip", "-q", "install", *words)
+        self.pip("-q", "install", "--no-compile", *words)
 
     def packages(self) -> set[str]:
         """Names of all that is installed."""
-        listed = self.run("python", "-m", "pip", "list", "--format=json")
+        listed = self.pip("list", "--format=json")
         return {each["name"] for each in json.loads(listed)}
 
     def megabytes(self) -> float:
@@ -167,7 +176,7 @@ def test_the_application_without_its_robots_says_what_to_install(
     try:
         text = core.python("import o80_table_tennis", fails=True)
     finally:
-        core.run("python", "-m", "pip", "-q", "uninstall", "-y", "o80-table-tennis")
+        core.pip("-q", "uninstall", "-y", "o80-table-tennis")
 
     assert 'pip install "o80-mujoco"' in text
 
@@ -178,7 +187,7 @@ def test_the_first_minute_of_a_package_runs_where_no_compiler_is(
 ) -> None:
     assert everything.python("import shutil; print(shutil.which('c++'))") == "None"
     assert everything.python(readme_program(package))
-    everything.run("python", "-m", "pip", "check")
+    everything.pip("check")
 
 
 def test_the_simulator_loads_the_mujoco_of_its_wheel_and_no_other(everything: Environment) -> None:
@@ -234,7 +243,7 @@ def test_a_source_distribution_becomes_a_wheel(built: Path, tmp_path: Path, pack
     # outside a checkout the build needs a release of o80: the wheel stands for it
     found = f"--find-links={built / 'wheels'}"
     made = tmp_path / "made"
-    builder.run("python", "-m", "pip", "-q", "wheel", "--no-deps", found, f"-w{made}", sdist)
+    builder.pip("-q", "wheel", "--no-deps", found, f"-w{made}", sdist)
 
     (wheel,) = made.iterdir()
     (shipped,) = (built / "wheels").glob(f"{package}-[0-9]*.whl")

@@ -7,7 +7,7 @@ import sys
 import threading
 import warnings
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,15 @@ def held() -> dict[str, int]:
         "threads": len(os.listdir("/proc/self/task")),
         "maps of segments": Path("/proc/self/maps").read_text().count("/o80-"),
     }
+
+
+@pytest.fixture(autouse=True)
+def _frozen() -> Iterator[None]:
+    """The collector leaves out what was there before: all modules of a session take it long."""
+    gc.collect()
+    gc.freeze()
+    yield
+    gc.unfreeze()
 
 
 @pytest.fixture

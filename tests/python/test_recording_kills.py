@@ -60,7 +60,7 @@ def recorded_iterations(path: Path, name: str) -> "np.ndarray[tuple[int], np.dty
 
 
 @pytest.mark.check
-@pytest.mark.timeout(120 + KILLS // 2)
+@pytest.mark.timeout(300 + KILLS // 2)
 @pytest.mark.parametrize("split", [None, "30k"])
 def test_nothing_is_lost_and_nothing_is_written_twice(split: str | None, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"

@@ -23,6 +23,8 @@ import o80
 from o80.learning.rollouts import LocalWorkers, Rollout
 from o80.learning.rollouts.ppo import RolloutPPO, WorkersEnv
 
+pytestmark = pytest.mark.check  # needs torch, which only `make check` installs
+
 STEPS = 16
 
 

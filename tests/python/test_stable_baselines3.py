@@ -31,6 +31,7 @@ def plain(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
+@pytest.mark.check
 @pytest.mark.parametrize("task", [Reach, Goal])
 def test_does_what_a_dummy_vec_env_of_monitored_environments_does(task: type[Reach]) -> None:
     from stable_baselines3.common.monitor import Monitor
@@ -56,6 +57,7 @@ def test_does_what_a_dummy_vec_env_of_monitored_environments_does(task: type[Rea
     singles.close()
 
 
+@pytest.mark.check
 def test_gives_infos_of_ended_episodes_only_if_told_so() -> None:
     copies = adapted(Reach(COPIES, most_steps=3), infos="ends")
     copies.seed(1)
@@ -69,6 +71,7 @@ def test_gives_infos_of_ended_episodes_only_if_told_so() -> None:
     copies.close()
 
 
+@pytest.mark.check
 def test_options_attributes_methods_and_pictures_are_those_of_the_task() -> None:
     task = Reach(COPIES)
     copies = adapted(task, render_mode="rgb_array")
@@ -90,6 +93,7 @@ def test_options_attributes_methods_and_pictures_are_those_of_the_task() -> None
     copies.close()
 
 
+@pytest.mark.check
 def test_another_autoreset_mode_is_refused() -> None:
     with (
         VectorEnvironment(Reach(2)) as vector,

@@ -135,7 +135,6 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-@pytest.mark.timeout(240)
 def test_a_type_checker_accepts_names_of_the_robot_and_refuses_others(folder: Path) -> None:
     said = mypy(GOOD, folder)
     assert said.startswith("Success"), said

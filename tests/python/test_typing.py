@@ -1,5 +1,6 @@
 """What a type checker says of users' programs."""
 
+import fcntl
 import subprocess
 import sys
 from pathlib import Path
@@ -85,14 +86,18 @@ def mypy(program: str, folder: Path) -> str:
     file.write_text(program)
     cache = Path(__file__).parents[2] / "build" / "mypy-users"
     command = [sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(cache)]
-    # no settings of this repository: a user has others
-    run = subprocess.run(
-        [*command, "--config-file", "", str(file)],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    cache.parent.mkdir(exist_ok=True)
+    # one at a time: the first reads NumPy, which takes long, and leaves what it read to the others
+    with cache.with_suffix(".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        # no settings of this repository: a user has others
+        run = subprocess.run(
+            [*command, "--config-file", "", str(file)],
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
     return run.stdout + run.stderr
 
 

@@ -43,7 +43,7 @@ def played(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
         demo(output, *arguments), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
     try:
-        text, errors = process.communicate(timeout=110)
+        text, errors = process.communicate(timeout=290)
     finally:
         process.kill()
     assert process.returncode == 0, errors

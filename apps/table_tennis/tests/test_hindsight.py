@@ -18,6 +18,8 @@ from o80_table_tennis.learning.virtual.hindsight import (
 )
 from o80_table_tennis.learning.virtual.motions import Motion
 
+pytestmark = pytest.mark.check  # needs torch, which only `make check` installs
+
 BOX = spaces.Box(-np.inf, np.inf, (2,), np.float32)
 ACTIONS = spaces.Box(-1, 1, (8,), np.float32)
 

@@ -24,6 +24,8 @@ from o80_table_tennis.learning.visible_numbers import BALL_PARTS
 from o80_table_tennis.players.learned_policy import LearnedPolicy
 from o80_table_tennis.task.full_observation import FullObservation
 
+pytestmark = pytest.mark.check  # needs torch, which only `make check` installs
+
 SMALL = LearningSettings(
     ppo=PpoSettings(environments=2, steps=32, batch=32, epochs=2, hidden=8),
     decisions=128,

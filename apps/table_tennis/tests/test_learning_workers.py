@@ -19,6 +19,8 @@ from o80_table_tennis.learning.curve import CURVE
 from o80_table_tennis.learning.settings import LearningSettings, PpoSettings
 from o80_table_tennis.learning.training import POLICY, Training
 
+pytestmark = pytest.mark.check  # needs torch, which only `make check` installs
+
 SMALL = LearningSettings(
     ppo=PpoSettings(environments=4, steps=48, batch=64, epochs=2, hidden=8),
     decisions=3 * 192,

@@ -14,6 +14,8 @@ from o80_table_tennis.learning.restarts import stuck
 from o80_table_tennis.learning.settings import WAYS, LearningSettings, PpoSettings, RestartSettings
 from o80_table_tennis.learning.training import Training
 
+pytestmark = pytest.mark.check  # needs torch, which only `make check` installs
+
 UPDATE = 256
 """Decisions, in which at least one episode ends."""
 SMALL = LearningSettings(

@@ -29,6 +29,8 @@ from o80_table_tennis.learning.virtual.fast_sac import FastSac
 from o80_table_tennis.learning.virtual.settings import WAYS, SacSettings, VirtualSettings
 from o80_table_tennis.learning.virtual.training import train
 
+pytestmark = pytest.mark.check  # needs torch, which only `make check` installs
+
 SMALL = VirtualSettings(
     motions=4,
     random_motions=2,

@@ -82,7 +82,7 @@ TEST_F(LibraryTest, RefusesWhatIsNoRobot) {
   EXPECT_THAT(message_of<DriverError>([&] { RobotLibrary::load(text); }),
               HasSubstr("cannot be loaded"));
   // a library indeed, but not of a robot
-  EXPECT_THAT(message_of<DriverError>([] { RobotLibrary::load(O80_TEST_PREFIX "/lib/libo80.so"); }),
+  EXPECT_THAT(message_of<DriverError>([] { RobotLibrary::load(kPrefix + "/lib/libo80.so"); }),
               HasSubstr("have no O80_ROBOT(name, Driver)"));
 }
 

@@ -29,7 +29,7 @@ class PrivilegedTest : public testing::Test {
     char name[] = "/tmp/o80-privileges-XXXXXX";
     folder_ = mkdtemp(name);
     fs::permissions(folder_, fs::perms(0755));
-    fs::copy(O80_TEST_PREFIX "/bin/o80-run", folder_ / "o80-run");
+    fs::copy(kPrefix + "/bin/o80-run", folder_ / "o80-run");
     fs::permissions(folder_ / "o80-run", fs::perms(04755));
     fs::copy(kTwoJoints, folder_ / "joints.so");
     if (run({"--help"}) != 0) GTEST_SKIP() << "the file system ignores set-user-ID: " << said_;

@@ -16,6 +16,7 @@
 
 #include "o80/robot/make_table.hpp"
 #include "o80/robot/plant_requests.hpp"
+#include "places.hpp"
 #include "runtime/station.hpp"
 
 namespace o80::test {
@@ -178,7 +179,7 @@ class Program {
     }
 #ifdef O80_TEST_EMULATOR
     // of another instruction set: run by what runs this test
-    if (words[0].starts_with(O80_TEST_PREFIX)) {
+    if (words[0].starts_with(kPrefix)) {
       std::istringstream emulator(O80_TEST_EMULATOR);
       words.insert(words.begin(), std::istream_iterator<std::string>(emulator), {});
     }
@@ -257,7 +258,7 @@ class Program {
   std::string out_;
 };
 
-inline const std::string kRunProgram = O80_TEST_PREFIX "/bin/o80-run";
-inline const std::string kTwoJoints = O80_TEST_PREFIX "/lib/o80/robots/two_joints.so";
+inline const std::string kRunProgram = kPrefix + "/bin/o80-run";
+inline const std::string kTwoJoints = kPrefix + "/lib/o80/robots/two_joints.so";
 
 }  // namespace o80::test

@@ -53,13 +53,18 @@ LEFT_OUT_OF_SHORT = (
     "DirectoryTest.*",
     "ExpressTest.*",
     "FileOwnerTest.*",
+    "FollowerTest.IsCommandedOnlyFromWhereItCanBe",
     "ForeignFileTest.*",
+    "GroupEqualityTest.*",
     "HaltSuccessorTest.*",
     "Hostile*",
     "IdsInFlight.*",
     "LyingOwnerTest.*",
     "MakeTableTest.*",
     "OwnedSegmentTest.*",
+    "PreviewTest.IsWhatTheBackendThenDoesBitForBit",
+    "ReadingTest.AResumeRefusesOneThatCannotBe",
+    "ReadingTest.ARobotThatIsRightIsNeverRefused",
     "*ReplayTest.*",
     "RunOptionsTest.*",
     "StartRaceTest.*",
@@ -88,8 +93,8 @@ def main() -> int:
     parser.add_argument("--build", type=Path, help="folder of programs that are built already")
     parser.add_argument("--frequency", type=int, default=1000, help="of the loop [Hz]")
     parser.add_argument("--iterations", type=int, help="of the loop (default: 3000)")
-    parser.add_argument("--limit", type=float, default=240, help="of one suite [s]")
-    parser.add_argument("--timeout", type=float, default=900, help="of the machine [s]")
+    parser.add_argument("--limit", type=float, default=600, help="of one suite [s]")
+    parser.add_argument("--timeout", type=float, default=2700, help="of the machine [s]")
     parser.add_argument("--filter", default="*", help="of the tests, as GoogleTest takes it")
     parser.add_argument(
         "--short", action="store_true", help=f"only {', '.join(SHORT)}, and 1000 iterations"

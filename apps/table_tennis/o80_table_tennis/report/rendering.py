@@ -92,9 +92,13 @@ class Scene(AbstractContextManager["Scene"]):
 
 
 def write_film(path: Path, pictures: Iterable[Image], *, frames_per_second: float = 25.0) -> int:
-    """Writes pictures (height, width, 3) as an MP4 film; returns how many frames it has."""
-    import imageio_ffmpeg
+    """Writes pictures (height, width, 3) as an MP4 film; returns how many frames it has.
 
+    Needs the extra `rendering`; raises o80.MissingExtra.
+    """
+    imageio_ffmpeg: Any = needed(
+        "imageio_ffmpeg", "rendering", "a film", package="o80-table-tennis"
+    )
     writer: Any = None
     frames = 0
     try:

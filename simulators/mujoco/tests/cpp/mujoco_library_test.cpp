@@ -10,6 +10,7 @@
 
 #include "engine/version.hpp"
 #include "memory/private_directory.hpp"
+#include "places.hpp"
 #include "robot/library.hpp"
 
 namespace o80::mujoco {
@@ -25,7 +26,7 @@ class MujocoLibraryTest : public testing::Test {
 };
 
 TEST_F(MujocoLibraryTest, IsARobotLibraryThatNamesItsMujoco) {
-  const RobotLibrary library = RobotLibrary::load(O80_TEST_PREFIX "/lib/o80/robots/mujoco.so");
+  const RobotLibrary library = RobotLibrary::load(test::kPrefix + "/lib/o80/robots/mujoco.so");
 
   EXPECT_STREQ(library.table->name, "mujoco");
   EXPECT_THAT(library.table->built_with, HasSubstr(built_with()));
@@ -38,7 +39,7 @@ TEST_F(MujocoLibraryTest, SaysBothVersionsAndTheCureIfItsMujocoIsNotInstalled) {
   fs::create_directories(site / "o80/lib/o80/robots");
   fs::create_directories(site / "mujoco");
   std::ofstream(site / "mujoco/libmujoco.so.4.0.1") << "there";
-  std::ifstream in(O80_TEST_PREFIX "/lib/o80/robots/mujoco.so", std::ios::binary);
+  std::ifstream in(test::kPrefix + "/lib/o80/robots/mujoco.so", std::ios::binary);
   std::string bytes{std::istreambuf_iterator<char>(in), {}};
   const std::string wanted = "libmujoco.so.4.0.1";
   std::size_t replaced = 0;
