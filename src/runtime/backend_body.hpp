@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -71,6 +72,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
 
   std::byte* row() noexcept { return reinterpret_cast<std::byte*>(row_.data()); }
   bool has_begun() const noexcept { return begun_; }
+  bool is_in_forked_child() noexcept;
   bool publish_first() noexcept;
   bool watches_readings() const noexcept { return !readings_.empty(); }
   bool judge_first(bool again) noexcept;
@@ -196,6 +198,19 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   enum class Judged : std::uint8_t { none, readings, all };  // of a fresh start
   bool read_again(FreshReading& reading, Judged judged, ShortText<248>& why) noexcept;
   Outcome begin_afresh(std::uint32_t lane, const FreshReading& reading) noexcept;
+
+  /// Calls a function of the program that serves this backend, which may fork.
+  template <class Call>
+  auto asks(std::string_view function, Call&& call) const noexcept {
+    const auto answer = std::invoke(call, *server_);
+    if (guard_.forked()) end_forked_child(schema.head.robot.view(), function);
+    return answer;
+  }
+
+  bool reads_fresh(FreshReading& reading) const noexcept {
+    return asks("the reading of a fresh start",
+                [&](RequestServer& server) { return server.read_fresh(reading); });
+  }
 
   ForkGuard guard_;
   RequestServer* server_;

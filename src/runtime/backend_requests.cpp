@@ -36,7 +36,9 @@ Outcome UntypedBackend::Body::request(std::uint32_t lane, CommandId id, BlockInd
   ShortText<248> why;
   if (!running.may_begin(index, why)) return reject_request(lane, id, why.view());
 
-  const Served served = server_->serve(index, {payload_.data(), size});
+  const Served served = asks("the handler of a request", [&](RequestServer& server) {
+    return server.serve(index, {payload_.data(), size});
+  });
   switch (served.kind) {
     case Served::Kind::done:
       if (journal.is_on()) {
@@ -81,7 +83,7 @@ Outcome UntypedBackend::Body::start_afresh(std::uint32_t lane, CommandId id) noe
     lanes[lane].set_message(id, why.view());
     return {Status::rejected, Reason::reading, 0};
   }
-  bool reads = server_->read_fresh(reading);
+  bool reads = reads_fresh(reading);
   if (!reads) note_failure("the robot could not be read in a fresh start");
   reads = reads && can_begin(reading.observed, "the reading of a fresh start");
   if (reads && reading.has_desired) {
@@ -100,7 +102,7 @@ bool UntypedBackend::Body::read_again(FreshReading& reading, Judged judged,
                                       ShortText<248>& why) noexcept {
   keep_reading();
   reading.may_fail = true;
-  if (!server_->read_fresh(reading)) {
+  if (!reads_fresh(reading)) {
     why.add(reading.why.empty() ? "the robot could not be read" : reading.why);
   } else if (!name_not_finite(reading.observed, "the reading of a fresh start", why) &&
              (!reading.has_desired ||
