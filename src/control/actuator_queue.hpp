@@ -41,6 +41,12 @@ class ActuatorQueue {
   /// For commands of several actuators (ARCHITECTURE.md, Commands of several actuators); called for
   /// all queues before any step(). Reports that the next command is a member of a group.
   void arrive(Iteration iteration, std::uint32_t& late_budget) noexcept;
+  /// Then: true if its members begin in this iteration, and this actuator has no motion.
+  bool begins_group(Iteration iteration) const noexcept {
+    if (running_ || queue_.empty()) return false;
+    const RecordHead& head = pool_->head(queue_.front());
+    return is_member(head) && ledger_->groups().is_complete(head, iteration);
+  }
   /// Then, if all members have arrived: takes the largest carry of durations.
   void agree_on_carry(Iteration iteration) noexcept;
   /// Then, if all members have arrived: proposes its number of iterations. The largest is used.

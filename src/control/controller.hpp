@@ -167,6 +167,7 @@ class Controller {
   }
 
   BlockPool& pool_;
+  StatusSink& sink_;
   Ledger ledger_;
   std::vector<std::optional<StateLayout>> layouts_;  // one for each type of the schema
   BatchPlanner planner_;

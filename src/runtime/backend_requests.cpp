@@ -11,6 +11,7 @@ namespace o80 {
 namespace {
 // a robot that moves at its highest speed may be read to be faster, because of noise
 constexpr double kInMotion = 2.0;
+constexpr std::string_view kToFollow = "halt the robot and resume with --accept-reading";
 }  // namespace
 
 void UntypedBackend::Body::interrupt(std::uint32_t actuator) noexcept {
@@ -169,12 +170,27 @@ void UntypedBackend::Body::watch_followers(bool fresh) noexcept {
 /// moves.
 bool UntypedBackend::Body::suits_followers(const StagedBatch& sent) noexcept {
   if (followed_.empty() || !controller.effort(sent.batch).moves) return true;
-  const auto fault = followed_.find_idle(controller.active_mask());
+  const auto fault = followed_.find_idle(controller.active_mask(), controller.braking_mask());
   if (!fault) return true;
   ShortText<248> why;
-  describe_reading(schema, *fault, "halt the robot and resume with --accept-reading", why);
+  describe_reading(schema, *fault, kToFollow, why);
   lanes[sent.lane].set_message(pool.batch(sent.batch).id, why.view());
   return reject(sent, Reason::reading);
+}
+
+/// The same for a member of a group that has waited for the others, when they begin.
+bool UntypedBackend::Body::may_begin(std::uint32_t actuator) noexcept {
+  if (recorded_ != nullptr) {
+    if (recorded_->interrupt_due(current) != actuator) return true;
+    recorded_->interrupt(current, static_cast<std::uint16_t>(actuator), {});
+  } else {
+    const auto fault = followed_.find_of(actuator);
+    if (!fault) return true;
+    misread_ = {};
+    describe_reading(schema, *fault, kToFollow, misread_);
+  }
+  journal.interrupted(actuator, true);
+  return false;
 }
 
 /// The time since the last reading, at least a period: a backend may run ahead of its clock [s].
