@@ -81,7 +81,8 @@ def test_a_limit_that_is_no_number_is_named(field: str, value: Any) -> None:
     with pytest.raises(o80.InvalidArgument) as raised:
         o80.Limits(**{field: value})
     assert str(raised.value) == f"{field} of o80.Limits must be a number, got {value!r}"
-    assert o80.Limits(**{field: np.float32(1)}) == o80.Limits(**{field: 1})
+    limits: Any = o80.Limits
+    assert limits(**{field: np.float32(1)}) == limits(**{field: 1})
 
 
 def test_so_is_whatever_else_a_robot_is_described_with(segment: str) -> None:

@@ -17,13 +17,14 @@ from o80 import notebook
 @pytest.fixture
 def shell() -> Iterator[InteractiveShell]:
     """A shell of its own, in which o80 has been imported."""
-    made = InteractiveShell()
+    made = InteractiveShell()  # type: ignore[no-untyped-call]
     made.Completer.use_jedi = False
     notebook.load_ipython_extension(made)
     made.user_ns["o80"] = o80
     try:
         yield made
     finally:
+        assert made.history_manager is not None
         made.history_manager.end_session()
         InteractiveShell.clear_instance()
 
@@ -139,7 +140,9 @@ def test_import_turns_it_on_only_where_ipython_runs() -> None:
 
 def shown(shell: InteractiveShell, value: Any) -> str:
     """The table that a notebook shows."""
-    data, _ = shell.display_formatter.format(value, include=["text/html"])
+    assert shell.display_formatter is not None
+    show = shell.display_formatter.format
+    data, _ = show(value, include=["text/html"])  # type: ignore[no-untyped-call]
     assert "<table>" in data["text/html"]
     return str(data["text/html"])
 

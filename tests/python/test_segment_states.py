@@ -313,9 +313,8 @@ def test_root_believes_a_segment_of_a_user_only_if_it_is_told_to(
         said = here.o80("stop", "arm", fails=True)
         assert f"it is unknown whether 'arm' of user {user} runs" in said
         assert "1 unknown: not removed" in here.o80("clean")
-        trusts = {"O80_TRUST": user}
-        assert "arm, running, rows" in here.o80("info", "arm", **trusts)
-        assert "arm has stopped" in here.o80("stop", "arm", **trusts)
+        assert "arm, running, rows" in here.o80("info", "arm", O80_TRUST=user)
+        assert "arm has stopped" in here.o80("stop", "arm", O80_TRUST=user)
         process.wait(timeout=WAIT)
     finally:
         end(process)
