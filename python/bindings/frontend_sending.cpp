@@ -117,9 +117,11 @@ nb::tuple preview(const Frontend& self, nb::handle named, nb::handle target, nb:
 }
 
 /// Adds one trajectory for several actuators. `states` holds all rows of the first, then all rows
-/// of the second, and so on; `times` are the ends of rows [ns].
+/// of the second, and so on; `mask` has a bit for each number of a state that is given, or is
+/// empty; `times` are the ends of rows [ns].
 std::uint32_t add_trajectories(const Frontend& self, const std::vector<std::uint32_t>& actuators,
-                               std::uint32_t rows, nb::handle states, nb::handle times,
+                               std::uint32_t rows, nb::handle states,
+                               const std::vector<std::uint64_t>& mask, nb::handle times,
                                nb::handle speed, nb::handle iterations, nb::handle mode,
                                nb::handle profile, nb::handle start) {
   const auto frontend = self.shared();
@@ -134,7 +136,7 @@ std::uint32_t add_trajectories(const Frontend& self, const std::vector<std::uint
     std::memcpy(ends.data(), bytes.span().data(), ends.size() * sizeof(std::int64_t));
   }
   const Bytes all(states);
-  return frontend->add_trajectories(actuators, rows, all.span(), options, ends);
+  return frontend->add_trajectories(actuators, rows, all.span(), options, ends, mask);
 }
 
 Batch pulse(const Frontend& self, nb::handle at, nb::handle late) {
@@ -327,7 +329,7 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
            "check"_a.none() = true);
 
   frontend
-      .def("_add_trajectories", &add_trajectories, "actuators"_a, "rows"_a, "states"_a,
+      .def("_add_trajectories", &add_trajectories, "actuators"_a, "rows"_a, "states"_a, "mask"_a,
            "times"_a.none(), "speed"_a.none(), "iterations"_a.none(), "mode"_a.none(),
            "profile"_a.none(), "start"_a.none())
       .def("_purge_own",

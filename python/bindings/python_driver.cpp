@@ -342,7 +342,7 @@ o80::RobotLibrary library_of(const nb::object& described, const std::string& pat
   table.stop = &stop;
   table.destroy = &destroy;
   classes[class_count++] = made;
-  o80::name_library(table, path);
+  o80::name_library(table, path, nb::cast<std::string>(described.attr("source")));
   return {nb::cast<std::string>(described.attr("path")), &table};
 }
 

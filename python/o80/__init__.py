@@ -1,6 +1,7 @@
 """Connects learning code, real-time control and simulators through shared memory."""
 
 import importlib
+import sys
 from typing import TYPE_CHECKING, Any
 
 # imported first, so that exit handlers registered after `import o80` run before its own
@@ -245,3 +246,8 @@ __all__ = [
     "version",
     "wait_for_first",
 ]
+
+if "IPython" in sys.modules:
+    from o80 import notebook as _notebook
+
+    _notebook.enable()

@@ -421,7 +421,7 @@ class Server:
     def halt(self) -> None:
         """Called when a halt begins."""
         if handler := self._halt_handlers.get("halt"):
-            handler()
+            nothing(handler(), "the handler of on_halt")
 
     def resume(self) -> str | None:
         """Called before a halt is cleared; returns the reason to keep it, or None."""

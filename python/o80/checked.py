@@ -27,6 +27,16 @@ def whole_or_none(value: Any, name: str, least: int | None = None) -> int | None
     return None if value is None else whole(value, name, least)
 
 
+def number(value: Any, name: str) -> float:
+    """A number, of Python or NumPy. Raises InvalidArgument."""
+    try:
+        if not isinstance(value, (bool, np.bool_, str, bytes)):
+            return float(value)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise InvalidArgument(f"{name} must be a number, got {value!r}")
+
+
 def text(value: Any, name: str) -> str:
     """A text. Raises InvalidArgument."""
     if not isinstance(value, str):

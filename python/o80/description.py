@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from o80 import _core
+from o80 import _core, checked
 from o80.errors import InvalidArgument
 from o80.limits import Limits
 
@@ -92,16 +92,15 @@ class SchemaWriter:
                     field,
                     list(given_limits.numbers()),
                     integral.field if integral else "",
-                    [integral.minimum, integral.maximum, integral.reaction]
-                    if integral
-                    else [0] * 3,
+                    integral.numbers() if integral else [0.0] * 3,
                 )
 
     def set_rests(self, rests: Mapping[Any, Mapping[str, float]]) -> None:
         """Sets the values to which fields of actuators go without a command."""
         for named, fields in rests.items():
             for field, value in fields.items():
-                self.builder.rests_at(self._index(named), field, value)
+                rest = checked.number(value, f"rests_at of {field!r} of actuator {named!r}")
+                self.builder.rests_at(self._index(named), field, rest)
 
     def set_idle(self, when_idle: str | Mapping[Any, str]) -> None:
         """Sets "hold" or "follow" for all actuators, or for each."""

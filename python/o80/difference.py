@@ -17,6 +17,10 @@ OF_THE_CLOCK = ("time", "lateness", "overruns", "skipped")
 """Columns that differ from run to run if the robot runs in real time."""
 
 
+class RobotsDifferError(InvalidArgument):
+    """Two histories are of robots with different descriptions."""
+
+
 @dataclass(frozen=True)
 class Difference:
     """Where two histories differ first."""
@@ -50,7 +54,7 @@ def first_difference(
     Raises InvalidArgument if the robots differ, or a column is unknown.
     """
     if one.schema["actuators"] != other.schema["actuators"]:
-        raise InvalidArgument("the robots differ: they have different actuators or limits")
+        raise RobotsDifferError("the robots differ: they have different actuators or limits")
     mine, others = columns_in(one), columns_in(other)
     every = dict.fromkeys([*mine, *others])
     for named in [*ignore, *(tolerances or {})]:
@@ -60,7 +64,9 @@ def first_difference(
             raise InvalidArgument(f"there is no column '{named}'{instead}")
     for column in every:
         if (column in mine) != (column in others) and not any(_belongs(column, n) for n in ignore):
-            raise InvalidArgument(f"the robots differ in their fields: {column} is in one of them")
+            raise RobotsDifferError(
+                f"the robots differ in their fields: {column} is in one of them"
+            )
 
     first, second, lacking = _rows_of_both(mine["iteration"], others["iteration"])
     found = [] if lacking is None else [lacking]
@@ -103,7 +109,7 @@ def _rows_of_both(
 
 def _differs(a: NDArray[Any], b: NDArray[Any], tolerance: float | None) -> NDArray[np.bool_]:
     if a.dtype != b.dtype:
-        raise InvalidArgument(
+        raise RobotsDifferError(
             f"the robots differ: a number is {a.dtype} in one, {b.dtype} in other"
         )
     if tolerance is not None:

@@ -13,6 +13,7 @@ from o80.layout import with_padding
 from o80.record import Record
 from o80.selection import Selection
 from o80.states import States
+from o80.tables import history_html
 
 if TYPE_CHECKING:
     import pandas
@@ -243,6 +244,10 @@ class History:
     def _contiguous(self) -> NDArray[Any]:
         """The rows without rows between them, which a slice may leave out."""
         return np.ascontiguousarray(with_padding(self.rows)).view(self.rows.dtype)
+
+    def _repr_html_(self) -> str:
+        """As a table of a notebook: the first and the last rows."""
+        return history_html(self)
 
     def __repr__(self) -> str:
         if not len(self):

@@ -2,8 +2,9 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 
+from o80 import checked
 from o80.errors import InvalidArgument
 
 
@@ -19,6 +20,18 @@ class IntegralBounds:
     minimum: float = -math.inf
     maximum: float = math.inf
     reaction: float = 0.0  #: time from the desired velocity to the observed one [s]
+
+    def __post_init__(self) -> None:
+        checked.text(self.field, "field of o80.IntegralBounds")
+        for name in ("minimum", "maximum", "reaction"):
+            checked.number(getattr(self, name), f"{name} of o80.IntegralBounds")
+
+    def numbers(self) -> list[float]:
+        """Minimum, maximum and reaction."""
+        return [float(self.minimum), float(self.maximum), float(self.reaction)]
+
+
+NUMBERS = ("minimum", "maximum", "speed", "acceleration", "jerk", "error", "noise")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,19 +50,26 @@ class Limits:
     noise: float = 0.0  #: largest difference of two readings at rest; 0: a tenth of `error`
     integral: IntegralBounds | None = None  #: what the number moves, if it is a velocity
 
+    def __post_init__(self) -> None:
+        for name in NUMBERS:
+            checked.number(getattr(self, name), f"{name} of o80.Limits")
+        if not isinstance(self.integral, IntegralBounds | None):
+            raise InvalidArgument(
+                f"integral of o80.Limits must be o80.IntegralBounds(...), got {self.integral!r}"
+            )
+
     @classmethod
     def of(cls, given: "Limits | Sequence[float | None]") -> "Limits":
         """Limits from Limits, or from (minimum, maximum, ...) in the order of the fields."""
         if isinstance(given, Limits):
             return given
-        names = ("minimum", "maximum", "speed", "acceleration", "jerk", "error", "noise")
-        if not isinstance(given, (tuple, list)) or len(given) > len(names):
+        if not isinstance(given, (tuple, list)) or len(given) > len(NUMBERS):
             raise InvalidArgument(
-                f"limits must be o80.Limits({', '.join(n + '=' for n in names)}), got {given!r}"
+                f"limits must be o80.Limits({', '.join(n + '=' for n in NUMBERS)}), got {given!r}"
             )
-        pairs = zip(names, given, strict=False)
+        pairs = zip(NUMBERS, given, strict=False)
         return cls(**{name: value for name, value in pairs if value is not None})
 
     def numbers(self) -> tuple[float, ...]:
         """All limits but those of the integral, in the order of the fields."""
-        return astuple(self)[:7]
+        return tuple(float(getattr(self, name)) for name in NUMBERS)

@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any, Self
 
+from o80.tables import provenance_html
+
 _TEXTS = ("robot", "version", "source_hash", "library", "library_sha256", "built_with")
 
 
@@ -32,13 +34,17 @@ class Provenance:
     #: A row's time plus this is wall-clock time, in ns since 1970. As of the start: the clocks may
     #: drift apart, or be set, while the backend runs.
     wall_clock_offset: int
-    library: str = ""  #: absolute path of the robot's library or program; empty: none
+    library: str = ""  #: absolute path of the robot's library, program or FILE.py:Class
     library_sha256: str = ""  #: of its content
     built_with: str = ""  #: versions of what the robot was built with
     files: tuple[ProvenanceFile, ...] = ()  #: that the robot's options name
     #: Version of the rules that make desired states of commands; see `o80 replay`. Recordings that
     #: do not say it were made under version 1.
     motion_rules: int = 1
+
+    def _repr_html_(self) -> str:
+        """As a table of a notebook."""
+        return provenance_html(self)
 
     def as_json(self) -> str:
         """As one line of JSON, which `from_json` reads. Pure ASCII."""

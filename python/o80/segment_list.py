@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from o80 import _core
+from o80.tables import Segments
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,7 +32,7 @@ class Segment:
 
 def segments() -> list[Segment]:
     """All segments, alive and dead, sorted by name."""
-    return [
+    return Segments(
         Segment(
             name=entry.name,
             life=entry.life,
@@ -48,7 +49,7 @@ def segments() -> list[Segment]:
             problem=entry.problem,
         )
         for entry in _core.list_segments()
-    ]
+    )
 
 
 def clean(name: str | None = None) -> list[str]:

@@ -28,6 +28,8 @@ def stop(name: str, timeout: float = 5.0) -> None:
             f"it is unknown whether '{name}' of user {unseen[name].user} runs: "
             f"{unseen[name].problem}. Its user and root can stop it"
         )
+    if not entries and (problem := _core.directory_problem()):
+        raise SegmentError(problem)
     if name not in running:
         there = "; nothing that this user can see runs" if unseen else "; nothing runs"
         if running:

@@ -16,12 +16,19 @@ def states_of(
     actuators: Sequence[int],
     single: bool,
     layout: Layout,
-) -> tuple[NDArray[np.uint8], int]:
-    """Bytes of all rows of the first actuator, then of the second, and so on; number of rows."""
+) -> tuple[NDArray[np.uint8], int, list[int]]:
+    """Bytes of all rows of the first actuator, then of the second, and so on; number of rows;
+    words with a bit for each number of a state that is given, empty if all are.
+    """
     kind = common_type(actuators, layout)
     labels = common_labels(actuators, layout)
+    if not isinstance(targets, Mapping) and _are_first_fields(targets, kind):
+        assert kind.names is not None
+        targets = {kind.names[0]: targets}
+    given: Sequence[str] = kind.names or ()
     if isinstance(targets, Mapping):
         array = _from_fields(targets, kind, labels)
+        given = list(targets)
     else:
         array = states_from(numbers_of(labels, targets), kind)
     if single and array.ndim == 1:
@@ -33,7 +40,7 @@ def states_of(
         )
     states = np.zeros(array.T.shape, kind)  # a copy would hold anything in its padding
     states[...] = array.T
-    return states.reshape(-1).view(np.uint8), len(array)
+    return states.reshape(-1).view(np.uint8), len(array), _mask_of(given, kind)
 
 
 def states_from(targets: ArrayLike, kind: np.dtype[Any]) -> NDArray[Any]:
@@ -45,7 +52,7 @@ def states_from(targets: ArrayLike, kind: np.dtype[Any]) -> NDArray[Any]:
         array = np.asarray(targets, kind)
     except (TypeError, ValueError) as error:
         raise InvalidArgument(f"the targets cannot be read as {kind}: {error}") from error
-    if kind.names is not None and sum(count for _, _, count in runs_of(kind, 0)) > 1:
+    if kind.names is not None and _numbers_in(kind) > 1:
         try:
             given = np.asarray(targets)
         except ValueError:  # of mixed lengths: states in tuples
@@ -56,6 +63,38 @@ def states_from(targets: ArrayLike, kind: np.dtype[Any]) -> NDArray[Any]:
                 f"a mapping from each field to an array, or a structured array"
             )
     return array
+
+
+def _are_first_fields(targets: ArrayLike, kind: np.dtype[Any]) -> bool:
+    """True for numbers, or labels, where a state has several fields: each is the first one."""
+    if kind.names is None or _numbers_in(kind) == 1:
+        return False
+    try:
+        array = np.asarray(targets)
+    except ValueError:  # of mixed lengths: states in tuples
+        return False
+    try:
+        return array.dtype.names is None and array.shape == np.asarray(targets, kind).shape
+    except (TypeError, ValueError):
+        return array.dtype.kind == "U"
+
+
+def _numbers_in(kind: np.dtype[Any]) -> int:
+    return sum(count for _, _, count in runs_of(kind, 0))
+
+
+def _mask_of(given: Sequence[str], kind: np.dtype[Any]) -> list[int]:
+    """A bit for each number of a state that is given, in words of 64; empty for all."""
+    if set(given) == set(kind.names or ()):
+        return []
+    assert kind.fields is not None
+    bits, place = 0, 0
+    for name in kind.names or ():
+        count = _numbers_in(kind.fields[name][0])
+        if name in given:
+            bits |= (1 << count) - 1 << place
+        place += count
+    return [bits >> word & 2**64 - 1 for word in range(0, place, 64)]
 
 
 def state_types(actuators: Sequence[int], layout: Layout) -> list[np.dtype[Any]]:
@@ -93,18 +132,18 @@ def _type_of(actuator: int, layout: Layout) -> dict[str, Any]:
 def _from_fields(
     targets: Mapping[str, ArrayLike], kind: np.dtype[Any], labels: Any
 ) -> NDArray[Any]:
-    """One structured array from an array for each field."""
+    """One structured array from an array for each field; 0 in fields that are left out."""
     names = kind.names or ()
-    if set(targets) != set(names):
+    if not targets or not set(targets) <= set(names):
         there = ", ".join(names) or "none, it is a plain number"
         raise InvalidArgument(
-            f"a trajectory needs every field of the state ({there}), not {', '.join(targets)}"
+            f"a trajectory needs fields of the state ({there}), not {', '.join(targets) or 'none'}"
         )
     columns = {
         name: np.asarray(numbers_of(labels.get(name), values)) for name, values in targets.items()
     }
     assert kind.fields is not None
-    inner = {name: len(kind.fields[name][0].shape) for name in names}
+    inner = {name: len(kind.fields[name][0].shape) for name in targets}
     shapes = {column.shape[: column.ndim - inner[name]] for name, column in columns.items()}
     if len(shapes) != 1:
         raise InvalidArgument(f"the fields have different numbers of targets: {sorted(shapes)}")

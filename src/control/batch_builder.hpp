@@ -102,8 +102,7 @@ class BatchBuilder {
 
   std::vector<Block> blocks_;  // the first is the BatchRecord
   std::uint32_t records_ = 0;  // without members
-  std::array<std::uint32_t, static_cast<std::size_t>(RecordKind::mark) + 1>
-      counts_{};  // of a kind
+  std::array<std::uint32_t, static_cast<std::size_t>(RecordKind::mark) + 1> counts_{};  // of a kind
 };
 
 }  // namespace o80

@@ -20,6 +20,7 @@ void each_bit(std::uint64_t word, std::uint32_t base, Visit&& visit) noexcept {
 
 Controller::Controller(const Schema& schema, BlockPool& pool, StatusSink& sink, std::uint32_t lanes)
     : pool_(pool),
+      sink_(sink),
       ledger_(pool, sink),
       layouts_(layouts_of_types(schema)),
       planner_(schema, layouts_, pool, lanes),
@@ -55,6 +56,11 @@ void Controller::step_groups(Iteration iteration, const std::byte* observed,
     }
   };
   each_busy([&](std::uint32_t i) { actuators_[i].arrive(iteration, late_budget); });
+  each_busy([&](std::uint32_t i) {
+    if (actuators_[i].follows() && actuators_[i].begins_group(iteration) && !sink_.may_begin(i)) {
+      actuators_[i].drop({Status::interrupted, Reason::reading}, iteration);
+    }
+  });
   each_busy([&](std::uint32_t i) { actuators_[i].agree_on_carry(iteration); });
   each_busy([&](std::uint32_t i) { actuators_[i].plan_with_others(iteration, of(i, observed)); });
 }

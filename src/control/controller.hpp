@@ -255,6 +255,7 @@ class Controller {
   }
 
   BlockPool& pool_;
+  StatusSink& sink_;
   Ledger ledger_;
   Layouts layouts_;
   BatchPlanner planner_;

@@ -36,6 +36,9 @@ class StatusSink {
   virtual void changed(const StatusChange& change) noexcept = 0;
   /// Blocks of a lane were returned to the pool, by a record or a batch.
   virtual void freed(std::uint32_t lane, std::uint32_t blocks) noexcept = 0;
+  /// Asked before an actuator that has followed while it waited for others begins their command.
+  /// False: its commands end as interrupted, with the reason `reading`.
+  virtual bool may_begin([[maybe_unused]] std::uint32_t actuator) noexcept { return true; }
 
  protected:
   ~StatusSink() = default;

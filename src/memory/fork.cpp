@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "base/short_text.hpp"
 #include "memory/file_lock.hpp"
 #include "o80/base/error.hpp"
 
@@ -64,6 +65,17 @@ void ForkGuard::check(std::string_view what) const {
     throw UsedAfterFork(std::string(what) +
                         " was opened before this process was forked: open it again in this "
                         "process");
+}
+
+void end_forked_child(std::string_view robot, std::string_view function) noexcept {
+  ShortText<400> text;
+  text.add("o80: '").add(robot).add("' forked in ").add(function);
+  text.add(", and the child (pid ").add(std::int64_t{getpid()});
+  text.add(") returned from it: the child ends here, the robot belongs to its parent. ");
+  text.add("End a child before it returns, by _exit (in Python os._exit) or exec\n");
+  [[maybe_unused]] const ssize_t said =
+      ::write(STDERR_FILENO, text.view().data(), text.view().size());
+  _exit(1);
 }
 
 int open_for_this_process(const char* path, int flags, mode_t permission) {

@@ -20,6 +20,10 @@ int open_for_this_process(const char* path, int flags, mode_t permission);
 /// Closes such a file in this process.
 void close_in_this_process(int descriptor) noexcept;
 
+/// Ends a child that was forked inside a function of the user and returned from it: the robot and
+/// the segment belong to its parent. `robot`: its name; `function`: for example "write".
+[[noreturn]] void end_forked_child(std::string_view robot, std::string_view function) noexcept;
+
 /// Remembers the process in which an object was constructed.
 class ForkGuard {
  public:

@@ -2,6 +2,7 @@
 
 #include <dirent.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <charconv>
@@ -36,7 +37,12 @@ std::string segment_directory() {
 std::string directory_problem() {
   const std::string directory = segment_directory();
   struct stat found{};
-  if (stat(directory.c_str(), &found) == 0 && S_ISDIR(found.st_mode)) return {};
+  if (stat(directory.c_str(), &found) == 0 && S_ISDIR(found.st_mode)) {
+    // who may not read it cannot say what is in it
+    if (access(directory.c_str(), R_OK | X_OK) == 0) return {};
+    return "The directory " + directory +
+           " cannot be read by this user, so its segments are not seen";
+  }
   const bool given = secure_getenv("O80_DIRECTORY") != nullptr && directory != kDirectory;
   return "The directory " + directory + (given ? ", which O80_DIRECTORY names, " : " ") +
          "does not exist: " + (given ? "create it, or unset O80_DIRECTORY" : "mount a tmpfs there");

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "memory/fork.hpp"
 #include "o80/base/version.hpp"
 
 namespace o80 {
@@ -68,11 +69,13 @@ OptionValues effective_options(const RobotTable& table, const OptionValues& give
 
 DriverInstance::DriverInstance(const RobotTable& table, const OptionValues& options)
     : table_(table) {
+  const ForkGuard guard;
   check_table(table, table.name);
   check_options(table, options);
   options_ = effective_options(table, options);
   const std::vector<OptionValue> values = plain(options_);
   driver_ = table.create(values.data(), static_cast<std::uint32_t>(values.size()), &fault_);
+  if (guard.forked()) end_forked_child(table.name, "its constructor");
   if (driver_ == nullptr) {
     throw DriverError("robot '" + std::string(table.name) +
                       "' cannot be constructed: " + fault_.text);
@@ -85,6 +88,7 @@ DriverInstance::~DriverInstance() {
 }
 
 Schema DriverInstance::describe(std::int64_t period) const {
+  const ForkGuard guard;
   Schema schema;
   FaultText fault{};
   const auto copy = [](void* context, const SchemaRows* rows) {
@@ -105,7 +109,9 @@ Schema DriverInstance::describe(std::int64_t period) const {
                  .file = rows->mjcf_file,
                  .values = {rows->shown, rows->shown + rows->shown_count}};
   };
-  if (table_.describe(driver_, period, &schema, copy, &fault) != 0) {
+  const int failed = table_.describe(driver_, period, &schema, copy, &fault);
+  if (guard.forked()) end_forked_child(table_.name, "describe");
+  if (failed != 0) {
     throw DriverError("robot '" + std::string(table_.name) + "' cannot be started: " + fault.text);
   }
   return schema;

@@ -287,6 +287,7 @@ void InlineGroup::for_each(std::span<const std::uint32_t> chosen, Timeout timeou
   };
   const auto look = [this]() noexcept { look_around(); };
   pool_->run(static_cast<std::uint32_t>(chosen.size()), task, look);
+  if (guard_.forked()) check_usable();
   if (failed_.load(std::memory_order_relaxed) || cancelled_.load(std::memory_order_relaxed)) {
     throw_failures();
   }

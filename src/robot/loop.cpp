@@ -1,7 +1,5 @@
 #include "robot/loop.hpp"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <bit>
 
@@ -229,19 +227,6 @@ void Loop::note_requests(const ReadingView& view) noexcept {
       failed(backend_.schema().requests[i].name.chars.data(), how.why());
     }
   }
-}
-
-/// Ends a child that was forked in a function of the driver and returned from it: the robot and the
-/// segment belong to the parent.
-void Loop::end_child(Verb verb) const noexcept {
-  ShortText<400> text;
-  text.add("o80: '").add(robot_->table().name).add("' forked in ").add(to_text(verb));
-  text.add(", and the child (pid ").add(std::int64_t{getpid()});
-  text.add(") returned from it: the child ends here, the robot belongs to its parent. ");
-  text.add("End a child in the driver, by _exit (in Python os._exit) or exec\n");
-  [[maybe_unused]] const ssize_t said =
-      ::write(STDERR_FILENO, text.view().data(), text.view().size());
-  _exit(1);
 }
 
 /// Reports ticks that came so fast that speed limits, which count iterations, no longer hold.

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "memory/fork.hpp"
+#include "memory/verb_word.hpp"
 #include "o80/runtime/backend.hpp"
 #include "robot/driver_instance.hpp"
 #include "robot/pacer.hpp"
@@ -93,11 +94,10 @@ class Loop final : public RequestServer {
   auto calls(Verb verb, Call&& call) noexcept {
     backend_.enter(verb);
     const auto result = call();
-    if (guard_.forked()) end_child(verb);
+    if (guard_.forked()) end_forked_child(robot_->table().name, to_text(verb));
     backend_.leave();
     return result;
   }
-  [[noreturn]] void end_child(Verb verb) const noexcept;
   bool failed(const char* verb) noexcept;
   bool failed(const char* verb, std::string_view why) noexcept;
   bool failed_to_wait() noexcept;

@@ -68,14 +68,14 @@ std::pair<std::string, std::string> library_of(const RobotTable& table) {
     if (found != known_libraries().end()) return found->second;
   }
   const std::string path = holder_of(table).string();
-  name_library(table, path);
+  name_library(table, path, path);
   return library_of(table);
 }
 
 }  // namespace
 
-void name_library(const RobotTable& table, const std::string& path) {
-  const std::pair<std::string, std::string> library{path, sha256_of(path)};
+void name_library(const RobotTable& table, const std::string& path, const std::string& name) {
+  const std::pair<std::string, std::string> library{name, sha256_of(path)};
   const std::scoped_lock lock(fork_mutex());
   known_libraries()[&table] = library;
 }

@@ -38,7 +38,8 @@ class WorkerPool {
 
   /// Calls task(i) once for each i below `count`, in all threads; returns when all have returned.
   /// `look_around` is called in the calling thread between its tasks, and about every 50 ms while
-  /// it waits for the workers. Neither may throw.
+  /// it waits for the workers. Neither may throw. In a child that was forked inside one of them it
+  /// returns at once, because the workers exist in the parent only.
   template <class Task, class Look>
   void run(std::uint32_t count, const Task& task, const Look& look_around) noexcept {
     const auto call = [](const void* object, std::uint32_t i) {
@@ -46,12 +47,12 @@ class WorkerPool {
     };
     begin(count, call, &task);
     std::uint32_t i = 0;
-    while (take(round_.load(std::memory_order_relaxed), 0, i)) {
+    while (!guard_.forked() && take(round_.load(std::memory_order_relaxed), 0, i)) {
       task(i);
       finished();
       look_around();
     }
-    while (!wait_for_workers(count)) look_around();
+    while (!guard_.forked() && !wait_for_workers(count)) look_around();
   }
 
  private:

@@ -309,6 +309,13 @@ bool UntypedBackend::Body::can_begin(const std::byte* states, std::string_view w
   return why.view().empty();
 }
 
+/// True in a child that was forked since: the robot and the segment belong to its parent.
+bool UntypedBackend::Body::is_in_forked_child() noexcept {
+  if (!guard_.forked()) return false;
+  note_failure("this process was forked: the backend belongs to its parent");
+  return true;
+}
+
 bool UntypedBackend::Body::publish_first() noexcept {
   if (!can_begin(row() + layout.observed, "the first reading")) return false;
   if (!agrees_with_first()) return false;
@@ -409,6 +416,7 @@ std::byte* UntypedBackend::extended() noexcept { return body_->row() + body_->la
 bool UntypedBackend::watches_readings() const noexcept { return body_->watches_readings(); }
 bool UntypedBackend::judge_first(bool again) noexcept { return body_->judge_first(again); }
 bool UntypedBackend::publish() noexcept {
+  if (body_->is_in_forked_child()) return false;
   if (!body_->has_begun()) return body_->publish_first();
   if (!body_->agrees_with_first()) return false;
   body_->publish(false);
@@ -417,9 +425,10 @@ bool UntypedBackend::publish() noexcept {
 
 void UntypedBackend::begin_at(Iteration first) noexcept { body_->current = first; }
 
-Step UntypedBackend::step() noexcept { return body_->step(kForEver); }
-Step UntypedBackend::try_step() noexcept { return body_->step(0); }
+Step UntypedBackend::step() noexcept { return step_within(kForEver); }
+Step UntypedBackend::try_step() noexcept { return step_within(0); }
 Step UntypedBackend::step_within(std::int64_t at_most) noexcept {
+  if (body_->is_in_forked_child()) return Step::ended;
   return body_->step(std::max<std::int64_t>(at_most, 0));
 }
 void UntypedBackend::cut_burst() noexcept { body_->stop_burst(); }
@@ -436,7 +445,9 @@ const std::uint64_t* UntypedBackend::braking() const noexcept {
 Iteration UntypedBackend::iteration() const noexcept { return body_->current; }
 std::int64_t UntypedBackend::time() const noexcept { return body_->time(); }
 void UntypedBackend::set_timing(const Timing& timing) noexcept { body_->set_timing(timing); }
-Step UntypedBackend::brake() noexcept { return body_->brake(); }
+Step UntypedBackend::brake() noexcept {
+  return body_->is_in_forked_child() ? Step::ended : body_->brake();
+}
 bool UntypedBackend::acts() const noexcept { return body_->acts(); }
 void UntypedBackend::enter(Verb verb) noexcept { body_->verbs.enter(verb); }
 void UntypedBackend::leave() noexcept { body_->verbs.leave(); }

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -68,9 +69,11 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   // StatusSink
   void changed(const StatusChange& change) noexcept override;
   void freed(std::uint32_t lane, std::uint32_t blocks) noexcept override;
+  bool may_begin(std::uint32_t actuator) noexcept override;
 
   std::byte* row() noexcept { return reinterpret_cast<std::byte*>(row_.data()); }
   bool has_begun() const noexcept { return begun_; }
+  bool is_in_forked_child() noexcept;
   bool publish_first() noexcept;
   bool watches_readings() const noexcept { return !readings_.empty(); }
   bool judge_first(bool again) noexcept;
@@ -197,6 +200,19 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   bool read_again(FreshReading& reading, Judged judged, ShortText<248>& why) noexcept;
   Outcome begin_afresh(std::uint32_t lane, const FreshReading& reading) noexcept;
 
+  /// Calls a function of the program that serves this backend, which may fork.
+  template <class Call>
+  auto asks(std::string_view function, Call&& call) const noexcept {
+    const auto answer = std::invoke(call, *server_);
+    if (guard_.forked()) end_forked_child(schema.head.robot.view(), function);
+    return answer;
+  }
+
+  bool reads_fresh(FreshReading& reading) const noexcept {
+    return asks("the reading of a fresh start",
+                [&](RequestServer& server) { return server.read_fresh(reading); });
+  }
+
   ForkGuard guard_;
   RequestServer* server_;
   RecordedDecisions* recorded_;  // a replay obeys them; else null
@@ -233,6 +249,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   ReadingWatch readings_;
   ReadingWatch followed_;  // of actuators that follow
   std::int64_t followed_at_ = 0;
+  ShortText<248> misread_;               // of an actuator that may not begin
   bool judges_first_;                    // an embedded backend, until the second reading
   std::int64_t read_at_ = 0;             // time of the last row whose reading was not missed
   std::vector<std::uint64_t> last_row_;  // or observed states, while a fresh reading is judged

@@ -121,7 +121,8 @@ void UntypedBackend::Body::begin_halt() noexcept {
   drop_running({Status::halted, Reason::halted});
   stop_burst(BurstEnd::cut);
   if (!driver_halted_ && !readings_.empty()) begin_to_watch();
-  if (!driver_halted_ && server_ != nullptr && !server_->halt()) {
+  if (!driver_halted_ && server_ != nullptr &&
+      !asks("the handler of a halt", &RequestServer::halt)) {
     fail("the robot failed in the call that begins a halt");
   }
   driver_halted_ = true;
@@ -193,7 +194,7 @@ Outcome UntypedBackend::Body::resume(std::uint32_t lane, CommandId id, std::uint
 
   // the robot may refuse; a halt requested meanwhile stays
   if (server_ != nullptr) {
-    Served served = server_->resume();
+    Served served = asks("the handler of a resume", &RequestServer::resume);
     if (served.kind == Served::Kind::running) {
       served = Served::rejected("the robot is not ready: resume it again when it is");
     }

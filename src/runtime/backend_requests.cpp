@@ -11,6 +11,7 @@ namespace o80 {
 namespace {
 // a robot that moves at its highest speed may be read to be faster, because of noise
 constexpr double kInMotion = 2.0;
+constexpr std::string_view kToFollow = "halt the robot and resume with --accept-reading";
 }  // namespace
 
 void UntypedBackend::Body::interrupt(std::uint32_t actuator) noexcept {
@@ -36,7 +37,9 @@ Outcome UntypedBackend::Body::request(std::uint32_t lane, CommandId id, BlockInd
   ShortText<248> why;
   if (!running.may_begin(index, why)) return reject_request(lane, id, why.view());
 
-  const Served served = server_->serve(index, {payload_.data(), size});
+  const Served served = asks("the handler of a request", [&](RequestServer& server) {
+    return server.serve(index, {payload_.data(), size});
+  });
   switch (served.kind) {
     case Served::Kind::done:
       if (journal.is_on()) {
@@ -81,7 +84,7 @@ Outcome UntypedBackend::Body::start_afresh(std::uint32_t lane, CommandId id) noe
     lanes[lane].set_message(id, why.view());
     return {Status::rejected, Reason::reading, 0};
   }
-  bool reads = server_->read_fresh(reading);
+  bool reads = reads_fresh(reading);
   if (!reads) note_failure("the robot could not be read in a fresh start");
   reads = reads && can_begin(reading.observed, "the reading of a fresh start");
   if (reads && reading.has_desired) {
@@ -100,7 +103,7 @@ bool UntypedBackend::Body::read_again(FreshReading& reading, Judged judged,
                                       ShortText<248>& why) noexcept {
   keep_reading();
   reading.may_fail = true;
-  if (!server_->read_fresh(reading)) {
+  if (!reads_fresh(reading)) {
     why.add(reading.why.empty() ? "the robot could not be read" : reading.why);
   } else if (!name_not_finite(reading.observed, "the reading of a fresh start", why) &&
              (!reading.has_desired ||
@@ -167,12 +170,27 @@ void UntypedBackend::Body::watch_followers(bool fresh) noexcept {
 /// moves.
 bool UntypedBackend::Body::suits_followers(const StagedBatch& sent) noexcept {
   if (followed_.empty() || !controller.effort(sent.batch).moves) return true;
-  const auto fault = followed_.find_idle(controller.active_mask());
+  const auto fault = followed_.find_idle(controller.active_mask(), controller.braking_mask());
   if (!fault) return true;
   ShortText<248> why;
-  describe_reading(schema, *fault, "halt the robot and resume with --accept-reading", why);
+  describe_reading(schema, *fault, kToFollow, why);
   lanes[sent.lane].set_message(pool.batch(sent.batch).id, why.view());
   return reject(sent, Reason::reading);
+}
+
+/// The same for a member of a group that has waited for the others, when they begin.
+bool UntypedBackend::Body::may_begin(std::uint32_t actuator) noexcept {
+  if (recorded_ != nullptr) {
+    if (recorded_->interrupt_due(current) != actuator) return true;
+    recorded_->interrupt(current, static_cast<std::uint16_t>(actuator), {});
+  } else {
+    const auto fault = followed_.find_of(actuator);
+    if (!fault) return true;
+    misread_ = {};
+    describe_reading(schema, *fault, kToFollow, misread_);
+  }
+  journal.interrupted(actuator, true);
+  return false;
 }
 
 /// The time since the last reading, at least a period: a backend may run ahead of its clock [s].

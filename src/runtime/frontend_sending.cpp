@@ -178,11 +178,12 @@ std::uint32_t UntypedFrontend::add_commands_to(BatchBuilder& builder,
 CommandOptions UntypedFrontend::checked_trajectory(std::uint32_t actuator, std::uint32_t rows,
                                                    std::span<const std::byte> states,
                                                    const CommandOptions& options,
-                                                   std::span<const std::int64_t> times) const {
+                                                   std::span<const std::int64_t> times,
+                                                   std::span<const std::uint64_t> mask) const {
   const std::uint32_t index = link_->command_check.actuator(std::int64_t{actuator});
   if (rows == 0) throw InvalidArgument("the trajectory has no row");
   check_options(options);
-  link_->command_check.targets(index, states);
+  link_->command_check.targets(index, states, mask);
   CommandOptions paced = options;
   // a trajectory always has a pace
   if (paced.pace.pace == Pace::direct) paced.pace = iterations(1);
@@ -193,8 +194,9 @@ CommandOptions UntypedFrontend::checked_trajectory(std::uint32_t actuator, std::
     throw InvalidArgument("a trajectory at a duration needs the times of its rows");
   }
   check_pace(paced.pace, rows);
-  if (paced.pace.pace == Pace::speed) link_->command_check.speed(index, paced.pace.per_second);
-  if (paced.pace.pace == Pace::fastest) link_->command_check.fastest(index);
+  if (paced.pace.pace == Pace::speed)
+    link_->command_check.speed(index, paced.pace.per_second, mask);
+  if (paced.pace.pace == Pace::fastest) link_->command_check.fastest(index, mask);
   return paced;
 }
 
@@ -220,22 +222,27 @@ std::uint32_t UntypedFrontend::add_trajectories(std::span<const std::uint32_t> a
                                                 std::uint32_t rows,
                                                 std::span<const std::byte> states,
                                                 const CommandOptions& options,
-                                                std::span<const std::int64_t> times) {
+                                                std::span<const std::int64_t> times,
+                                                std::span<const std::uint64_t> mask) {
   for (const std::uint32_t actuator : actuators) {
-    link_->command_check.actuator(std::int64_t{actuator});
+    const std::uint32_t index = link_->command_check.actuator(std::int64_t{actuator});
+    if (!mask.empty() && mask.size() != link_->command_check.words_of_mask(index)) {
+      throw InvalidArgument("the mask does not fit actuator '" +
+                            schema().actuators[index].name.str() + "'");
+    }
   }
   refuse_twice(actuators);
   CommandOptions paced = options;
   std::size_t at = 0;
   for (const std::uint32_t actuator : actuators) {
     const std::size_t size = size_of_rows(actuator, rows, states.size() - at, actuators);
-    paced = checked_trajectory(actuator, rows, states.subspan(at, size), options, times);
+    paced = checked_trajectory(actuator, rows, states.subspan(at, size), options, times, mask);
     at += size;
   }
   const std::span<const std::int64_t> ends = rows > 1 ? times : std::span<const std::int64_t>{};
   const auto lock = link_->lock_to_add();
   if (actuators.size() == 1) {
-    return link_->builder.command(head_of(actuators[0], paced, Profile::linear), {}, ends, rows,
+    return link_->builder.command(head_of(actuators[0], paced, Profile::linear), mask, ends, rows,
                                   states);
   }
   link_->members.clear();
@@ -243,7 +250,7 @@ std::uint32_t UntypedFrontend::add_trajectories(std::span<const std::uint32_t> a
   for (const std::uint32_t actuator : actuators) {
     const std::size_t size = size_of_rows(actuator, rows, states.size() - at, actuators);
     link_->members.push_back(
-        {head_of(actuator, paced, Profile::linear), {}, states.subspan(at, size)});
+        {head_of(actuator, paced, Profile::linear), mask, states.subspan(at, size)});
     at += size;
   }
   return link_->builder.group(link_->members, ends, rows);

@@ -73,16 +73,28 @@ std::optional<ReadingWatch::Fault> ReadingWatch::find(const std::byte* observed,
   return std::nullopt;
 }
 
-std::optional<ReadingWatch::Fault> ReadingWatch::find_idle(
-    const std::uint64_t* active) const noexcept {
+std::optional<ReadingWatch::Fault> ReadingWatch::fault_of(const Watched& each) noexcept {
+  if (each.is_outside(each.before)) return each.outside(each.before);
+  if (each.is_outside(each.last)) return each.outside(each.last);
+  if (!each.is_wrong && !each.was_wrong) return std::nullopt;
+  const double read = each.is_wrong ? each.before : each.last;
+  return Fault{each.actuator, each.number, each.good, read, each.reach(0.0), false};
+}
+
+std::optional<ReadingWatch::Fault> ReadingWatch::find_of(std::uint32_t actuator) const noexcept {
   for (const Watched& each : watched_) {
-    if ((active[each.actuator / 64] >> (each.actuator % 64) & 1) != 0) continue;
-    if (each.is_outside(each.before)) return each.outside(each.before);
-    if (each.is_outside(each.last)) return each.outside(each.last);
-    if (each.is_wrong || each.was_wrong) {
-      const double read = each.is_wrong ? each.before : each.last;
-      return Fault{each.actuator, each.number, each.good, read, each.reach(0.0), false};
-    }
+    if (each.actuator != actuator) continue;
+    if (const auto fault = fault_of(each)) return fault;
+  }
+  return std::nullopt;
+}
+
+std::optional<ReadingWatch::Fault> ReadingWatch::find_idle(
+    const std::uint64_t* active, const std::uint64_t* braking) const noexcept {
+  for (const Watched& each : watched_) {
+    const std::size_t word = each.actuator / 64;
+    if (((active[word] & ~braking[word]) >> (each.actuator % 64) & 1) != 0) continue;
+    if (const auto fault = fault_of(each)) return fault;
   }
   return std::nullopt;
 }

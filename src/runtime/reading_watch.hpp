@@ -46,9 +46,11 @@ class ReadingWatch {
   void add(const std::byte* observed, double elapsed) noexcept;
   /// The first number that is wrong since begin(), or would be with this reading; bounds included.
   std::optional<Fault> find(const std::byte* observed, double elapsed) const noexcept;
-  /// Among actuators whose bit is 0: the first number that is wrong now, or was wrong one reading
-  /// before.
-  std::optional<Fault> find_idle(const std::uint64_t* active) const noexcept;
+  /// The first number of this actuator, or of all, that is wrong now, or was wrong one reading
+  /// before. Of all: those that have a command and do not brake follow nothing.
+  std::optional<Fault> find_of(std::uint32_t actuator) const noexcept;
+  std::optional<Fault> find_idle(const std::uint64_t* active,
+                                 const std::uint64_t* braking) const noexcept;
 
  private:
   struct Watched {
@@ -77,6 +79,7 @@ class ReadingWatch {
       return speed * elapsed * (1.0 + kRounding) + noise + kRounding * std::abs(good);
     }
   };
+  static std::optional<Fault> fault_of(const Watched& each) noexcept;
   double value(const Watched& each, const std::byte* block) const noexcept {
     return layouts_[each.type]->number(each.number, block + each.offset);
   }

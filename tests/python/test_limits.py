@@ -72,6 +72,40 @@ def test_the_fastest_way_keeps_every_limit_and_ends_on_its_target(loop: Loop) ->
     assert np.abs(jerk).max() <= 2000.0 * (1 + 1e-3)
 
 
+NUMBERS = ("minimum", "maximum", "speed", "acceleration", "jerk", "error", "noise")
+
+
+@pytest.mark.parametrize("field", NUMBERS)
+@pytest.mark.parametrize("value", ["x", "1", None, True, [1.0, 2.0], 1j])
+def test_a_limit_that_is_no_number_is_named(field: str, value: Any) -> None:
+    with pytest.raises(o80.InvalidArgument) as raised:
+        o80.Limits(**{field: value})
+    assert str(raised.value) == f"{field} of o80.Limits must be a number, got {value!r}"
+    limits: Any = o80.Limits
+    assert limits(**{field: np.float32(1)}) == limits(**{field: 1})
+
+
+def test_so_is_whatever_else_a_robot_is_described_with(segment: str) -> None:
+    bounds: Any = o80.IntegralBounds
+    limits: Any = o80.Limits
+    for make, text in (
+        (lambda: bounds(5), "field of o80.IntegralBounds must be a text, got 5"),
+        (lambda: bounds("x", minimum="low"), "minimum of o80.IntegralBounds must be a number"),
+        (lambda: bounds("x", reaction=None), "reaction of o80.IntegralBounds must be a number"),
+        (lambda: limits(integral="position"), "integral of o80.Limits must be o80.IntegralBounds"),
+        (
+            lambda: o80.Backend(segment, 1, limits={0: (None, "high")}),  # type: ignore[dict-item]
+            "maximum of o80.Limits must be a number, got 'high'",
+        ),
+        (
+            lambda: o80.Backend(segment, 1, JOINT, rests_at={0: {"velocity": "0"}}),  # type: ignore[dict-item]
+            "rests_at of 'velocity' of actuator 0 must be a number, got '0'",
+        ),
+    ):
+        with pytest.raises(o80.InvalidArgument, match=text):
+            make()
+
+
 def test_a_purged_motion_brakes(loop: Loop) -> None:
     loop.frontend.add_command("joint", {"position": 0.9}, duration=0.8)
     loop.frontend.pulse()

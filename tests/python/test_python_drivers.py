@@ -65,7 +65,7 @@ def test_every_option_reaches_the_driver_and_the_provenance(segment: str) -> Non
         "seed": "7",
     }
     assert told.robot == "room"
-    assert told.library == str(Path(room_sensor.__file__).resolve())
+    assert told.library == f"{Path(room_sensor.__file__).resolve()}:RoomSensor"
     assert len(told.library_sha256) == 64
 
 
@@ -447,6 +447,63 @@ def test_a_recording_cannot_name_a_class_to_import(segment: str, tmp_path: Path)
     assert o80.replay(tmp_path / "run.mcap").identical  # by its readings, without the driver
     with pytest.raises(o80.DriverError, match="joint"):
         o80.replay(tmp_path / "simulated.mcap")
+
+
+CART = """
+import numpy as np
+import o80
+
+class Cart:
+    of_the_world = False
+    actuators = ("x",)
+    requests = {
+        "reset": {"seed": np.uint64},
+        "snapshot": {"slot": np.uint32},
+        "restore": {"slot": np.uint32},
+    }
+
+    def __init__(self):
+        self.x, self.kept = 0.0, {}
+
+    def write(self, desired):
+        self.x += 0.3 * (desired[0] - self.x)
+
+    def read(self, reading):
+        reading.observed[0] = self.x
+
+    def on_reset(self, fields):
+        self.x = float(fields.seed)
+        return o80.StartAfresh()
+
+    def on_snapshot(self, fields):
+        self.kept[int(fields.slot)] = self.x
+
+    def on_restore(self, fields):
+        self.x = self.kept[int(fields.slot)]
+        return o80.StartAfresh()
+"""
+
+
+def test_a_simulation_in_python_is_replayed_from_its_segment(segment: str, tmp_path: Path) -> None:
+    file = tmp_path / "cart_of_the_replay.py"
+    file.write_text(CART)
+    cart = o80.robots.load(f"{file}:Cart")
+    with cart.inline(segment) as frontend:
+        frontend.add_command("x", 1.0, iterations=10)
+        frontend.burst(20)
+        (run,) = o80.replay(frontend)
+        assert run.identical
+        assert not any("No driver was started" in note for note in run.notes)
+        assert frontend.provenance.library == f"{file}:Cart"
+        # a process that has not loaded the class
+        said = subprocess.run(
+            [sys.executable, "-c", f"import o80; print(o80.replay(o80.Frontend({segment!r})))"],
+            capture_output=True,
+            text=True,
+            timeout=WAIT,
+            check=True,
+        )
+        assert said.stdout == f"{segment}: 21 rows, identical\n"
 
 
 def test_the_thermometer_of_the_page_runs(segment: str, tmp_path: Path) -> None:

@@ -48,6 +48,22 @@ def test_a_recording_of_an_earlier_version_is_read(name: str, make: ModuleType) 
             assert epoch.provenance.motion_rules == 1
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_a_replay_of_an_earlier_version_says_how_far_it_goes(name: str) -> None:
+    path = RECORDINGS / f"{name}.mcap"
+    report = o80.replay(path, driver=False)
+    assert not report.difference
+    for run in report:
+        assert f"which motion rules {_core.MOTION_RULES} may move otherwise" in run.gap
+        assert f"{run.name}: 1 row, identical up to row 0; then row " in str(run)
+    with pytest.raises(o80.InvalidArgument) as raised:
+        o80.replay(path, segment="joints")
+    text = str(raised.value)
+    assert text.startswith("robot 'two_joints' is not described as when segment 'joints' was")
+    assert "extended.homing is in one of them" in text
+    assert "driver=False" in text
+
+
 @pytest.mark.parametrize("name", [name for name in NAMES if name != "format_1"])
 def test_the_recordings_hold_what_a_journal_can_tell(name: str) -> None:
     """Except what only a race or damage brings about: the tests of the codec have that."""

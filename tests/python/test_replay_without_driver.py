@@ -132,6 +132,36 @@ def drive(arm: o80.Frontend, seed: int, actions: int = 100) -> None:
         arm.wait_for(arm.published + choose.randrange(1, 30), timeout=WAIT)
 
 
+def test_an_actuator_that_left_a_command_because_of_its_reading_leaves_it_again(
+    segment: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "run.mcap"
+    limits = {"follower": o80.Limits(speed=2.0, noise=0.03)}
+    with o80.Backend(
+        segment, ["follower", "other"], limits=limits, when_idle={"follower": "follow"}
+    ) as backend:
+
+        def run(iterations: int, place: float = 0.0) -> None:
+            for _ in range(iterations):
+                assert backend.step() is not None
+                backend.publish([place, 0.0])
+
+        backend.publish([0.0, 0.0])
+        with o80.Frontend(segment) as arm, o80.Recording(path, arm, whole=True):
+            run(3)
+            arm.add_command("other", 1.0, iterations=10)
+            arm.add_command(["follower", "other"], [0.004, 2.0], iterations=5)
+            batch = arm.pulse()
+            run(9)
+            run(1, 1e6)
+            run(10)
+            assert batch.statuses == [o80.Status.COMPLETED, o80.Status.INTERRUPTED]
+            assert "'follower' was read at 1e+06" in batch[1].text
+            assert arm.latest().desired.tolist() == [0.0, 2.0]
+    report = o80.replay(path)
+    assert report.identical, report
+
+
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of a robot of the world."""

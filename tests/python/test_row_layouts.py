@@ -144,5 +144,5 @@ def test_padding_of_targets_is_zero(segment: str) -> None:
             targets = np.zeros((count, 2), [("on", bool), ("position", float)])
             for given in (targets, {name: targets[name] for name in ("on", "position")}):
                 copied = partial(states_of, given, [0, 1], False, backend._layout)
-                states, _ = after_other_values(copied)
+                states, *_ = after_other_values(copied)
                 assert not states.any()

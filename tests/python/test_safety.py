@@ -410,6 +410,25 @@ def test_an_embedded_backend_halts_and_resumes(segment: str) -> None:
             assert arm.latest().desired.tolist() == [0.5, 0.5]
 
 
+@pytest.mark.parametrize("value", [False, "no", 7])
+@pytest.mark.parametrize("verb", ["on_halt", "on_resume"])
+def test_what_a_handler_of_a_halt_returns_is_checked(
+    segment: str, verb: str, value: object
+) -> None:
+    with o80.Backend(segment, 1) as backend:
+        getattr(backend, verb)(lambda: value)
+        backend.publish([0.0])
+        backend.halt("test")
+        text = rf"the handler of {verb} must return None.*got {value!r}"
+        if verb == "on_resume":
+            backend.step()
+            backend.publish()
+            with o80.Frontend(segment) as arm, pytest.raises(o80.TimeoutError):
+                arm.resume(timeout=0)
+        with pytest.raises(o80.InvalidArgument, match=text):
+            backend.step()
+
+
 def test_a_halt_may_be_resumed_at_once_while_the_robot_moves_and_another_has_control(
     process: o80.robots.Process,
 ) -> None:

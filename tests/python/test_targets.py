@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 import pytest
@@ -360,17 +361,45 @@ def test_a_trajectory_of_states_with_fields(robot: Robot) -> None:
     assert last.joints["gains"].tolist() == [[1.0, 1.0], [1.0, 1.0]]
 
 
-@pytest.mark.parametrize("targets", [np.zeros((3, 2)), [[0.1, 0.2]], 0.5])
-def test_numbers_are_no_trajectory_of_states_with_fields(robot: Robot, targets: object) -> None:
-    """NumPy would give each field the same number."""
-    with pytest.raises(o80.InvalidArgument, match=r"numbers alone.*position, gains, count"):
-        robot.frontend.add_trajectory(targets, ["a", "b"])  # type: ignore[arg-type]
+@pytest.mark.parametrize("single", [False, True])
+def test_a_trajectory_takes_the_forms_of_a_command(robot: Robot, single: bool) -> None:
+    """Each row does what a command with the same target does; other fields keep their values."""
+    named = "a" if single else ["a", "b"]
+    count = () if single else (2,)
+    robot.frontend.add_command("a", {"gains": [3.0, 4.0], "count": 5, "on": True})
+    robot.frontend.pulse()
+    robot.step()
+    forms: list[Any] = [0.25, {"position": 0.5}, {"count": 7}, {"position": 0.5, "on": False}]
+    for form in forms:
+        rows = (
+            {name: np.full((3, *count), value) for name, value in form.items()}
+            if isinstance(form, dict)
+            else np.full((3, *count), form).tolist()
+        )
+        robot.frontend.add_trajectory(rows, named)
+        robot.frontend.pulse()
+        for _ in range(3):
+            last = robot.step()
+        by_trajectory = last.joints[["position", "gains", "count", "on"]].copy()
+        robot.frontend.add_command(named, form if single else [form, form], iterations=3)
+        robot.frontend.pulse()
+        for _ in range(3):
+            last = robot.step()
+        assert np.array_equal(by_trajectory, last.joints[["position", "gains", "count", "on"]])
+        expected = form if isinstance(form, dict) else {"position": form}
+        for name, value in expected.items():
+            assert by_trajectory[name][0] == value
+    assert by_trajectory["gains"][0].tolist() == [3.0, 4.0]
+    assert not by_trajectory["gains"][1].any()
+
+
+def test_a_trajectory_names_fields_that_there_are(robot: Robot) -> None:
+    for targets in ({"positoin": np.zeros((3, 2))}, {}):
+        with pytest.raises(o80.InvalidArgument, match=r"fields of the state \(position, gains"):
+            robot.frontend.add_trajectory(targets, ["a", "b"])
+    with pytest.raises(o80.InvalidArgument, match=r"\(T, 2\), not \(\)"):
+        robot.frontend.add_trajectory(0.5, ["a", "b"])
     assert robot.frontend.added == 0
-
-
-def test_a_trajectory_from_a_mapping_needs_every_field(robot: Robot) -> None:
-    with pytest.raises(o80.InvalidArgument, match="every field"):
-        robot.frontend.add_trajectory({"position": np.zeros((3, 2))}, ["a", "b"])
 
 
 def test_a_trajectory_across_types_is_refused(robot: Robot) -> None:

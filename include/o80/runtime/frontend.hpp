@@ -123,11 +123,12 @@ class UntypedFrontend {
                                const CommandOptions& options = {.pace = iterations(1)},
                                std::span<const std::int64_t> times = {});
   /// The same for several actuators; `states` holds all rows of the first actuator, then all rows
-  /// of the second, and so on.
+  /// of the second, and so on. `mask` as in add_command(), for all rows of all of them.
   std::uint32_t add_trajectories(std::span<const std::uint32_t> actuators, std::uint32_t rows,
                                  std::span<const std::byte> states,
                                  const CommandOptions& options = {.pace = iterations(1)},
-                                 std::span<const std::int64_t> times = {});
+                                 std::span<const std::int64_t> times = {},
+                                 std::span<const std::uint64_t> mask = {});
   /// Adds a row of set-points for each of several actuators, one an iteration; the last one stays
   /// in force. `states` as in add_trajectories().
   void add_set_points(std::span<const std::uint32_t> actuators, std::uint32_t rows,
@@ -262,7 +263,8 @@ class UntypedFrontend {
   CommandOptions checked_trajectory(std::uint32_t actuator, std::uint32_t rows,
                                     std::span<const std::byte> states,
                                     const CommandOptions& options,
-                                    std::span<const std::int64_t> times) const;
+                                    std::span<const std::int64_t> times,
+                                    std::span<const std::uint64_t> mask) const;
   Batch pulse(const PulseOptions& options, std::uint16_t flags);
   void wait_for_rest(std::uint64_t number, const Deadline& deadline,
                      const KeepWaiting& keep_waiting);

@@ -29,6 +29,8 @@ def clean(
     if removed:
         return
     there = o80.segments()
+    if not there and (problem := _core.directory_problem()):
+        raise o80.SegmentError(problem)
     counts = {
         "running": sum(entry.alive for entry in there),
         "unknown": sum(entry.life == "unknown" for entry in there),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -15,6 +14,7 @@ from o80.cli.attach import attach
 from o80.cli.condition import halt_text, pace_text, running_texts, watchdog_text
 from o80.cli.screen import Column, print_json, print_table, style
 from o80.cli.started_with import started_with
+from o80.tables import ACTUATOR_HEADS, actuator_rows, field_text
 
 
 def info(
@@ -53,7 +53,8 @@ def info(
                 print(said)
         if schema["actuators"]:
             print()
-            _print_actuators(schema)
+            heads = [Column("", right=True), *(Column(name) for name in ACTUATOR_HEADS[1:])]
+            print_table(heads, actuator_rows(schema))
         if "extended" in schema:
             print(style("\nsensor values", "bold"))
             for line in _fields(schema["extended"], ""):
@@ -74,29 +75,6 @@ def info(
             print(f"  {line}")
 
 
-def _print_actuators(schema: dict[str, Any]) -> None:
-    rows = []
-    for index, actuator in enumerate(schema["actuators"]):
-        fields = schema["groups"][actuator["group"]]["type"]["fields"]
-        rows.append(
-            [
-                str(index),
-                actuator["name"],
-                ", ".join(_field(field) for field in fields),
-                "; ".join(_limit(limit) for limit in actuator["limits"]),
-                actuator["when_idle"],
-            ]
-        )
-    names = ("actuator", "state", "limits", "idle")
-    print_table([Column("", right=True), *(Column(name) for name in names)], rows)
-
-
-def _field(field: dict[str, Any]) -> str:
-    unit = f" [{field['unit']}]" if field["unit"] else ""
-    shape = f"({', '.join(str(n) for n in field['shape'])})" if field["shape"] else ""
-    return f"{field['name'] or field['kind']}{shape}{unit}"
-
-
 def _argument(field: dict[str, Any]) -> str:
     """A field of a request, with its default if it has one."""
     if "default" not in field:
@@ -106,28 +84,6 @@ def _argument(field: dict[str, Any]) -> str:
         if value == default:
             default = label
     return f"{field['name']}={default}"
-
-
-def _limit(limit: dict[str, Any]) -> str:
-    low, high = limit["minimum"], limit["maximum"]
-    parts = []
-    if low is not None or high is not None:
-        ends = "-inf" if low is None else f"{low:g}", "inf" if high is None else f"{high:g}"
-        parts.append(" to ".join(ends))
-    for name, unit in (("speed", "/s"), ("acceleration", "/s²"), ("jerk", "/s³")):
-        if limit[name] is not None:
-            parts.append(f"{limit[name]:g}{unit}")
-    if limit["error"] is not None:
-        parts.append(f"error {limit['error']:g}")
-    if "noise" in limit:
-        parts.append(f"noise {limit['noise']:g}")
-    if "rest" in limit:
-        parts.append(f"rests at {limit['rest']:g}")
-    if moved := limit.get("integral"):
-        low = -math.inf if moved["minimum"] is None else moved["minimum"]
-        high = math.inf if moved["maximum"] is None else moved["maximum"]
-        parts.append(f"its integral {low:g} to {high:g}, reaction {moved['reaction']:g} s")
-    return ", ".join(parts) or "-"
 
 
 def _enumerations(enums: Mapping[str, Any]) -> list[str]:
@@ -143,7 +99,7 @@ def _enumerations(enums: Mapping[str, Any]) -> list[str]:
 def _fields(described: dict[str, Any], prefix: str) -> list[str]:
     lines: list[str] = []
     for field in described["fields"]:
-        text = f"{prefix}{_field(field)}"
+        text = f"{prefix}{field_text(field)}"
         lines.append(f"{text}  {style(field['help'], 'dim')}" if field["help"] else text)
         if field["kind"] == "struct":
             lines += _fields(field["type"], prefix + "  ")

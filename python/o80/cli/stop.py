@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 import o80
+from o80 import _core
 from o80.cli.screen import complain
 
 
@@ -23,6 +24,8 @@ def stop(
         complain(f"not stopped, because it is unknown whether they run: {', '.join(unseen[:5])}")
     if not names:
         if every:
+            if not there and (problem := _core.directory_problem()):
+                raise o80.SegmentError(problem)
             print("Nothing that this user can see runs." if unseen else "Nothing runs.")
             return
         raise o80.InvalidArgument("name the segments to stop (see `o80 list`), or give --all")

@@ -68,6 +68,20 @@ def place_of(driver: type[Any]) -> str:
     return f"{driver.__module__}:{driver.__qualname__}"
 
 
+def source_of(driver: type[Any]) -> str:
+    """ "file.py:Class", as the provenance names it; empty if it has no file."""
+    try:
+        file = inspect.getsourcefile(driver)
+    except (OSError, TypeError):
+        file = None
+    return f"{Path(file).resolve()}:{driver.__qualname__}" if file else ""
+
+
+def loaded(source: str) -> type[Any] | None:
+    """The class of this source that this process has loaded as a robot."""
+    return next((driver for driver in _libraries if source_of(driver) == source), None)
+
+
 class DriverClass:
     """A driver class as the compiled loop sees it."""
 
@@ -77,6 +91,7 @@ class DriverClass:
         self._driver = driver
         self._options = Options.of(driver)
         self.path = place
+        self.source = source_of(driver)
         name = getattr(driver, "name", None)
         self.name: str = name if isinstance(name, str) else _words(driver.__name__)
         self.built_with = f"o80 {_core.version()}; Python {platform.python_version()}"
@@ -101,11 +116,7 @@ class DriverClass:
 
     def library(self) -> _core.RobotLibrary:
         """The class as a robot."""
-        try:
-            file = inspect.getsourcefile(self._driver) or ""
-        except TypeError:
-            file = ""
-        return _core.python_library(self, file)
+        return _core.python_library(self, self.source.rpartition(":")[0])
 
 
 _libraries: dict[type[Any], _core.RobotLibrary] = {}

@@ -146,8 +146,9 @@ class Commanding(Observing):
     ) -> int:
         """Adds one command through many states, for one or several actuators.
 
-        targets: (T, actuators), or (T,) for a single actuator. Numbers for states of one number;
-            otherwise all fields, in a structured array or a mapping from each field to an array.
+        targets: (T, actuators), or (T,) for a single actuator. As in add_command, a number is the
+            first field of a state; otherwise a structured array, or a mapping from fields to
+            arrays. Fields that are left out keep their desired value.
         actuators: indices or names (None: all).
         iterations: number of iterations for each row (default: 1).
         times: when each row is reached, since the start [s]: (T,), not decreasing.
@@ -164,11 +165,12 @@ class Commanding(Observing):
         if times is None and speed is None and iterations is None:
             iterations = 1
         chosen, single = self._chosen(actuators)
-        states, rows = states_of(targets, chosen, single, self._layout)
+        states, rows, mask = states_of(targets, chosen, single, self._layout)
         return self._add_trajectories(
             chosen,
             rows,
             states,
+            mask,
             None if times is None else times_of(times),
             speed,
             iterations,

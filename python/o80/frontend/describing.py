@@ -7,6 +7,7 @@ from o80.actuator import Actuator, actuators_of
 from o80.cached import cached
 from o80.layout import Layout
 from o80.provenance import Provenance
+from o80.tables import Actuators
 from o80.words import LifeWord
 
 
@@ -68,7 +69,7 @@ class Describing(_core.Frontend):
     @cached
     def actuators(self) -> list[Actuator]:
         """The actuators: index, name, unit, limits."""
-        return actuators_of(self.schema)
+        return Actuators(actuators_of(self.schema), self.schema)
 
     @property
     def requests(self) -> dict[str, str]:

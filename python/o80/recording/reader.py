@@ -14,6 +14,7 @@ from o80.recording.journal_channel import CONTENT as JOURNAL
 from o80.recording.marks import Mark, marks_in
 from o80.recording.recorded_epoch import EpochPart, RecordedEpoch
 from o80.recording.scan import MAGIC, NotARecordingError, Scan, scan
+from o80.tables import Marks
 
 
 class RecordingFile:
@@ -49,7 +50,7 @@ class RecordingFile:
     @property
     def marks(self) -> list[Mark]:
         """The notes in the recording, in their order. Raises RecordingError."""
-        marks = []
+        marks = Marks()
         for path, found in self._files:
             try:
                 with path.open("rb") as file:

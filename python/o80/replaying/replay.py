@@ -16,7 +16,7 @@ import numpy as np
 
 from o80 import _core
 from o80.columns import columns_of
-from o80.difference import Difference, first_difference
+from o80.difference import Difference, RobotsDifferError, first_difference
 from o80.errors import DriverError, InvalidArgument
 from o80.frontend import Frontend
 from o80.replaying.conditions import (
@@ -188,7 +188,7 @@ class _RunReplay:
             for block in self._chain(first, blocks):
                 runner.native.add(feed.read(int(block.iteration[-1])))
                 if int(block.iteration[-1]) > feed.until:
-                    block = block.select(until=feed.until)
+                    block = _settled(block.select(until=feed.until))
                     self._gap = feed.gap
                 if not len(block) or int(block.iteration[0]) > feed.until:
                     return None
@@ -258,12 +258,11 @@ class _RunReplay:
             expected = int(block.iteration[-1]) + 1
             whole = block if held is None else _joined(held, block)
             held = None
-            settled = np.flatnonzero(whole.rows["fresh"] == 0)
-            cut = int(settled[-1]) + 1 if len(settled) else 0
-            if cut < len(whole):
-                held = whole[cut:]
-            if cut:
-                yield whole[:cut]
+            settled = _settled(whole)
+            if len(settled) < len(whole):
+                held = whole[len(settled) :]
+            if len(settled):
+                yield settled
         if held is not None:
             yield held
 
@@ -296,7 +295,15 @@ class _RunReplay:
             replayed = frontend.history(since=first, until=last)
             if first == self._start.row:
                 self._note_changes(frontend)
-        found = self._first_difference(block[: len(replayed)], replayed)
+        try:
+            found = self._first_difference(block[: len(replayed)], replayed)
+        except RobotsDifferError as error:
+            raise InvalidArgument(
+                f"robot '{self._run.schema['robot']}' is not described as when segment "
+                f"'{self._run.segment}' was recorded: {error}. Give the robot of then "
+                f"(--robot FILE.so, in Python robot=), or compare only desired states "
+                f"(--without-driver, in Python driver=False)"
+            ) from None
         decided = native.mismatch
         if decided is not None and (found is None or decided[0] < found.iteration):
             found = Difference(decided[0], decided[1], (decided[2], decided[3]))
@@ -340,6 +347,12 @@ class _RunReplay:
         self._times[1] = int(compared.time[-1])
         if self._progress is not None:
             self._progress(self._run.segment, self._rows, self._run.rows)
+
+
+def _settled(block: History) -> History:
+    """Without rows of fresh starts at its end: the decisions after them are of the same step."""
+    settled = np.flatnonzero(block.rows["fresh"] == 0)
+    return block[: int(settled[-1]) + 1 if len(settled) else 0]
 
 
 def _joined(one: History, other: History) -> History:

@@ -34,7 +34,7 @@ class RunReport:
             return f"{self.name}: {self.difference}"
         if not self.rows:
             return f"{self.name}: not replayed: {self.gap}"
-        text = f"{self.name}: {self.rows} rows, identical"
+        text = f"{self.name}: {self.rows} row{'' if self.rows == 1 else 's'}, identical"
         return f"{text} up to row {self.rows - 1}; then {self.gap}" if self.gap else text
 
 

@@ -11,7 +11,7 @@ import hashlib
 import stat
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from o80 import robots
 from o80.errors import DriverError, InvalidArgument
@@ -23,9 +23,15 @@ if TYPE_CHECKING:
 _LARGEST_HASHED = 64 << 20  # [bytes], as when it was recorded
 
 
-def library_of(run: RecordedRun) -> Path:
-    """The library of a recorded robot. Raises DriverError if it is not known here by name."""
+def library_of(run: RecordedRun) -> Path | str | type[Any]:
+    """The library of a recorded robot, or its class. Raises DriverError if it is not known here by
+    name.
+    """
     recorded = run.provenance.library
+    if run.is_own and robots.is_place(recorded) and Path(recorded.rpartition(":")[0]).exists():
+        from o80.drivers.driver_class import loaded
+
+        return loaded(recorded) or recorded
     if run.is_own and recorded and Path(recorded).exists():
         return Path(recorded)
     name = run.schema["robot"]
@@ -36,7 +42,8 @@ def library_of(run: RecordedRun) -> Path:
     raise DriverError(
         f"segment '{run.segment}' is of robot {name!r}{ran}. No robot of this name is found here. "
         f"A recording may name any library, so it is not loaded: if you trust a library, give "
-        f"--robot FILE.so, in Python robot=. Or compare only desired states, with --without-driver"
+        f"--robot FILE.so or FILE.py:Class, in Python robot=. Or compare only desired states, with "
+        f"--without-driver"
     )
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import o80
+from o80 import _core
 from o80.view.live_source import LiveSource
 from o80.view.source import Source
 
@@ -46,7 +47,10 @@ class SourceList:
     def waiting(self) -> str:
         """What a page says while there is nothing to show."""
         if self._patterns == ["*"]:
-            return "No robot runs. Start one, for example with: o80 run two_joints"
+            return (
+                _core.directory_problem()
+                or "No robot runs. Start one, for example with: o80 run two_joints"
+            )
         return f"No segment matches {', '.join(self._patterns)} yet."
 
     def now(self) -> list[Source]:

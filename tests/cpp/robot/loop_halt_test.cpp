@@ -17,6 +17,7 @@
 #include <thread>
 
 #include "memory/verb_word.hpp"
+#include "readings_played.hpp"
 #include "robot/loop.hpp"
 #include "robot/puppet.hpp"
 
@@ -271,7 +272,7 @@ TEST_F(ReadingTest, AResumeRefusesOneThatCannotBe) {
   };
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const double period = 1e-3;
-  for (int i = 0; i < 63; ++i) {
+  for (int i = 0; i < readings_played(63); ++i) {
     Limits limits{.minimum = -5.0, .maximum = 5.0, .speed = uniform(0.5, 4.0)};
     if (i % 2 == 0) limits.error = uniform(0.1, 1.0);
     begin(limits);
@@ -343,7 +344,7 @@ TEST_F(ReadingTest, ARobotThatIsRightIsNeverRefused) {
   const auto uniform = [&](double low, double high) {
     return std::uniform_real_distribution(low, high)(random);
   };
-  for (int i = 0; i < 20; ++i) {
+  for (int i = 0; i < readings_played(20); ++i) {
     const Limits limits{.speed = uniform(0.5, 4.0), .error = uniform(0.1, 1.0)};
     begin(limits);
     double place = 0.0;

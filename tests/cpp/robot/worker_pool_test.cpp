@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <thread>
 #include <vector>
 
 namespace o80::test {
@@ -113,6 +114,26 @@ TEST(WorkerPoolTest, LeavesSignalsToTheThreadsOfTheProgram) {
   };
   pool.run(2, task, kNothing);
   EXPECT_EQ(open_signals, 0);
+}
+
+TEST(WorkerPoolTest, WaitsForNoWorkerInAChildThatWasForkedWithinACall) {
+  WorkerPool pool(2);
+  const std::thread::id caller = std::this_thread::get_id();
+  std::atomic<pid_t> child{-1};
+  const auto task = [&](std::uint32_t) {
+    // the workers still run when the caller looks around
+    while (std::this_thread::get_id() != caller && child == -1) std::this_thread::yield();
+  };
+  const auto look = [&] {
+    if (child != -1) return;
+    child = fork();
+    if (child == 0) alarm(20);  // ends a child that waits
+  };
+  pool.run(3, task, look);
+  if (child == 0) _exit(7);
+  int status = -1;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  EXPECT_EQ(status, W_EXITCODE(7, 0));
 }
 
 TEST(WorkerPoolTest, LeavesItsThreadsToTheParentInAForkedChild) {

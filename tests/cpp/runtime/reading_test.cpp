@@ -9,6 +9,7 @@
 #include "control/batch_builder.hpp"
 #include "o80/base/error.hpp"
 #include "o80/runtime/typed_backend.hpp"
+#include "readings_played.hpp"
 #include "runtime/station.hpp"
 
 namespace o80::test {
@@ -107,7 +108,7 @@ TEST_F(FollowerTest, IsCommandedOnlyFromWhereItCanBe) {
   const auto uniform = [&](double low, double high) {
     return std::uniform_real_distribution(low, high)(random);
   };
-  for (int i = 0; i < 60; ++i) {
+  for (int i = 0; i < readings_played(60); ++i) {
     Limits limits{.speed = uniform(0.5, 4.0)};
     limits.noise = uniform(0.01, 0.1);
     Follower follower(limits);
@@ -171,6 +172,95 @@ TEST_F(FollowerTest, OneTurnOffInEveryRowIsAcceptedByAResumeOnly) {
   const Batch taken = send(frontend, 0, 6.283e5, {.pace = iterations(5)});
   follower.run(6);
   EXPECT_EQ(taken.handle(0).status, Status::completed) << taken.handle(0).text;
+}
+
+TEST_F(FollowerTest, OfACommandOfSeveralIsJudgedWhenTheyBegin) {
+  constexpr std::array<std::uint32_t, 2> kBoth{0, 1};
+  constexpr std::array<double, 2> kTargets{0.004, 2.0};
+  for (const double wrong : {0.0, 1e5, -1e300, kInfinity, std::nan("")}) {
+    for (const bool while_waiting : {true, false}) {
+      Follower follower({.speed = 2.0, .noise = 0.03});
+      UntypedFrontend frontend("pair");
+      follower.run(3);
+      add(frontend, 1, 1.0, {.pace = iterations(10)});
+      frontend.add_commands(kBoth, std::as_bytes(std::span(kTargets)), {.pace = iterations(5)});
+      add(frontend, 0, 0.0, {.pace = iterations(5)});
+      const Batch batch = frontend.pulse();
+      follower.run(4);
+      if (while_waiting) {
+        // it has come back when they begin
+        follower.offset = wrong;
+        follower.run(1);
+        follower.offset = 0.0;
+        follower.run(5);
+      } else {
+        follower.run(5);
+        follower.offset = wrong;
+        follower.run(1);
+      }
+      EXPECT_EQ(batch.handle(0).status, Status::completed);
+      EXPECT_EQ(batch.handle(1).status, Status::queued);
+      follower.offset = 0.0;
+      follower.run(1);
+      const bool begins = while_waiting || wrong == 0.0;
+      EXPECT_EQ(follower.written == 0.0008, begins) << wrong << while_waiting;
+      follower.run(400);
+      for (const std::size_t place : {std::size_t{1}, std::size_t{2}}) {
+        const Handle handle = batch.handle(place);
+        EXPECT_EQ(handle.status, begins ? Status::completed : Status::interrupted) << wrong;
+        EXPECT_EQ(handle.reason, begins ? Reason::none : Reason::reading);
+        if (begins) continue;
+        EXPECT_THAT(handle.text, AllOf(HasSubstr("actuator 'shoulder' was read at"),
+                                       HasSubstr("resume with --accept-reading")));
+      }
+      EXPECT_EQ(unpack<double>(follower.backend.desired() + sizeof(double)), 2.0)
+          << "the others go on";
+    }
+  }
+}
+
+/// An arm whose position follows while its torque goes to rest.
+struct Held {
+  double position = 0;
+  double torque = 0;
+};
+
+TEST_F(FollowerTest, IsJudgedWhileItsTorqueGoesToRest) {
+  Schema schema;
+  schema.head.robot = NameText("held");
+  schema.add_actuators("arm",
+                       schema.add_type("Held", {scalar_field("position", Kind::float64),
+                                                scalar_field("torque", Kind::float64)}),
+                       1);
+  schema.actuator(0).when_idle(WhenIdle::follow);
+  schema.actuator(0).limits("position", {.speed = 2.0, .noise = 0.03});
+  schema.actuator(0).limits("torque", {.speed = 1.0}).rests_at("torque", 0.0);
+  UntypedBackend backend(std::move(schema), {.segment = "held", .period = 1'000'000});
+  std::optional<UntypedFrontend> frontend;
+  const auto publish = [&](double position) {
+    pack(Held{position, 0.0}, backend.observed());
+    ASSERT_TRUE(backend.publish());
+  };
+  const auto send = [&](const Held& target, const CommandOptions& options) {
+    frontend->add_command(0, std::as_bytes(std::span(&target, 1)), options);
+    return frontend->pulse();
+  };
+  publish(0.0);
+  frontend.emplace("held");
+  const Batch first = send({0.0, 0.5}, {.pace = iterations(500)});
+  for (int i = 0; i < 500; ++i) {
+    ASSERT_EQ(backend.try_step(), Step::run);
+    publish(0.0);
+  }
+  ASSERT_EQ(first.handle(0).status, Status::completed);
+  ASSERT_EQ(backend.try_step(), Step::run);
+  publish(1e5);
+  ASSERT_EQ(backend.braking()[0], 1U);
+  const Batch next = send({0.0, 0.0}, {.pace = iterations(5)});
+  ASSERT_EQ(backend.try_step(), Step::run);
+  publish(0.0);
+  EXPECT_EQ(next.handle(0).status, Status::rejected);
+  EXPECT_EQ(next.handle(0).reason, Reason::reading);
 }
 
 }  // namespace
