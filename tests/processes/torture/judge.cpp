@@ -16,6 +16,7 @@ using o80::Status;
 
 /// A straight line takes up to 20 iterations.
 constexpr std::int64_t kLongestStop = 40;
+constexpr std::int64_t kShortStop = 4;
 
 struct Done {
   std::uint64_t value;
@@ -283,9 +284,12 @@ class Judge {
       return add(Fault::falsely_told, slot, batch, command, "no target was outside of the limits");
     // within limits of acceleration a motion may rest on its target before its last iteration; a
     // smooth motion that overwrites a straight line may stop where that would have ended: in twice
-    // as many iterations as it had left
-    const bool stops_there =
-        status == Status::overwritten && !done.empty() && done[0].iteration < at + kLongestStop;
+    // as many iterations as it had left. So may one that begins where a line was purged, which is
+    // told apart from a purge that did nothing only shortly before the line's end
+    const std::int64_t longest = status == Status::overwritten ? kLongestStop
+                                 : status == Status::purged    ? kShortStop
+                                                               : 0;
+    const bool stops_there = !done.empty() && done[0].iteration < at + longest;
     const bool early = command.arrives_early != 0 || is_limited(batch, command) || stops_there;
     if (!done.empty() && !early && status != Status::limited)
       add(Fault::falsely_told, slot, batch, command,
