@@ -37,8 +37,8 @@ std::string of_number(const Schema& schema, std::uint32_t actuator, const Number
 
 template <class Row>
 std::vector<std::string> names_of(const std::vector<Row>& rows) {
-  std::vector<std::string> names;
-  for (const Row& row : rows) names.push_back(row.name.str());
+  std::vector<std::string> names(rows.size());
+  std::ranges::transform(rows, names.begin(), [](const Row& row) { return row.name.str(); });
   return names;
 }
 
