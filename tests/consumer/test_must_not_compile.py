@@ -29,7 +29,7 @@ def compiled_headers(tmp_path_factory: pytest.TempPathFactory) -> Flags:
     @cache
     def flags(compiler: str) -> tuple[str, ...]:
         compiled = folder / f"robot.hpp.{'gch' if compiler == 'g++' else 'pch'}"
-        command = [compiler, *LANGUAGE, "-x", "c++-header", header, "-o", compiled]
+        command = [compiler, *LANGUAGE, "-x", "c++-header", str(header), "-o", str(compiled)]
         subprocess.run(command, check=True)
         if compiler == "g++":
             return ("-Winvalid-pch", "-Werror=invalid-pch", "-include", str(header))
