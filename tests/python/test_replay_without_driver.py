@@ -147,7 +147,7 @@ def test_an_actuator_that_left_a_command_because_of_its_reading_leaves_it_again(
                 backend.publish([place, 0.0])
 
         backend.publish([0.0, 0.0])
-        with o80.Frontend(segment) as arm, o80.Recording(path, arm, whole=True):
+        with o80.Frontend(segment) as arm, o80.Recording(path, arm):
             run(3)
             arm.add_command("other", 1.0, iterations=10)
             arm.add_command(["follower", "other"], [0.004, 2.0], iterations=5)
