@@ -465,7 +465,7 @@ class RandomArrival {
     for (std::uint32_t i = 0; i < numbers; ++i) {
       schema.actuator(0).limits(numbers == 1 ? "" : "x" + std::to_string(i), any_limits());
     }
-    Rig rig(schema);
+    Rig rig(schema, 64);  // a larger pool takes longer than a script
     for (std::uint32_t i = 0; i < numbers; ++i) rows_.emplace_back(rates_of(rig.schema, i));
     const int commands = whole(1, 5);
     for (int i = 0; i < commands; ++i) {
