@@ -619,9 +619,10 @@ class RandomArrival {
              : head.pace == Pace::direct   ? 2 * head.amount / kMillisecond
                                            : 0;
     if (is_equal) asked_ = 0;
-    // a smooth motion at a speed takes up to twice as long, and equal set-points go on
+    // a smooth motion at a speed takes up to twice as long, and longer if it turns first; equal
+    // set-points go on
     if (is_equal) fewest_ = 1000;
-    if (head.pace == Pace::speed && head.profile == Profile::minimum_jerk) fewest_ *= 3;
+    if (head.pace == Pace::speed && head.profile == Profile::minimum_jerk) fewest_ *= 5;
   }
 
   std::mt19937_64 random_;
