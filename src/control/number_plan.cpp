@@ -82,7 +82,7 @@ std::int64_t NumberPlan::fewest_smooth(std::int64_t least) noexcept {
     const std::int64_t middle = few + (enough - few) / 2;
     (smooth(middle) ? enough : few) = middle;
   }
-  return enough;
+  return smooth_for_ = enough;
 }
 
 bool NumberPlan::fits(const SmoothMotion& motion) const noexcept {

@@ -657,6 +657,11 @@ TEST_P(RandomArrivals, CommandsArriveWithinTheirLimits) {
     if (HasFailure()) FAIL() << "seed " << seed;
   }
 }
+
+/// One smooth motion waits for another, in more iterations than the fewest that fit, which do not
+/// fit again: it is as short as it proposed.
+TEST(RandomArrival, TheOneOfTenMillionThatEndedInMotionArrives) { RandomArrival(502395550).run(); }
+
 INSTANTIATE_TEST_SUITE_P(Seeds, RandomArrivals, testing::Range(std::uint64_t{0}, kParts));
 
 }  // namespace
