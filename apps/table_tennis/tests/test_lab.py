@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 import o80
+from o80_table_tennis.lab.environment_row import Phase
 from o80_table_tennis.lab.kill_table import KILLS, SUPERVISOR, as_markdown
-from o80_table_tennis.lab.kills import Killer
+from o80_table_tennis.lab.kills import Killer, wait_until
 from o80_table_tennis.lab.parts import (
     ARM,
     COUNTERPARTS,
@@ -22,7 +23,7 @@ from o80_table_tennis.lab.parts import (
 )
 from o80_table_tennis.lab.picture import BOXES, drawn
 from o80_table_tennis.lab.real_time import Lab
-from o80_table_tennis.lab.report import not_measured
+from o80_table_tennis.lab.report import not_measured, not_played
 
 PAGE = Path(__file__).parents[3] / "docs" / "lab.md"
 LONGEST = 300.0
@@ -65,6 +66,16 @@ def test_a_killed_process_is_missed_within_200_ms_and_joins_again(tmp_path: Path
     # the arm was started twice; its recorder was killed while the second one ran
     runs = o80.open(recording)[lab.settings.segment(ARM)].epochs
     assert [len(run.gaps) for run in runs] == [0, 0]
+
+
+@pytest.mark.check
+def test_a_supervisor_that_looks_late_misses_nothing(tmp_path: Path) -> None:
+    with Lab(settings(tmp_path, balls=1)) as lab:
+        observer = o80.Frontend(lab.settings.segment(ENVIRONMENT), timeout=LONGEST)
+        wait_until(lambda: observer.latest().extended.phase == Phase.over, "all balls are played")
+        assert not lab.look(0.0)
+        assert set(lab.loops()) == set(NINE) - {"recorder", "view"}
+    assert "has played all balls" in (tmp_path / "events.jsonl").read_text()
 
 
 @pytest.mark.check
@@ -111,6 +122,15 @@ def test_a_figure_that_no_row_gives_is_told_with_what_was_missed() -> None:
     assert "tracker 71 % missed" in tracking
     assert "environment did not run" in tracking
     assert not_measured({**report, "latency_ms": {}, "tracking_error_mm": good}) == []
+
+
+def test_balls_that_were_not_played_are_told() -> None:
+    whole = {"played": 12, "given_up": 0, "launches_failed": 3}
+    assert not_played(whole, 12) == not_played(whole, 0) == []
+    (fewer,) = not_played({**whole, "played": 11, "given_up": 1}, 12)
+    assert fewer.startswith("balls: 11 of 12 were played; 1 were given up")
+    assert fewer.endswith("3 launches failed")
+    assert not_played({}, 2)[0].startswith("balls: 0 of 2")
 
 
 def test_the_page_shows_the_picture_that_the_command_draws() -> None:

@@ -2,7 +2,8 @@
 
 Every 10 ms it publishes a row: by the clock of the arm while arm and world are there, else by its
 own. It waits for what it needs, and says in each row what is missing; a ball during which arm or
-world end is given up.
+world end is given up. When all balls were played its rows say so until it is asked to end: who
+looks late misses nothing.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ class EndRequestedError(Exception):
 
 
 class EnvironmentProcess:
-    """Plays balls until so many were played (0: without end) or it is asked to end."""
+    """Plays so many balls (0: without end), and stays until it is asked to end."""
 
     def __init__(self, settings: LabSettings, backend: o80.Backend) -> None:
         self._settings, self._backend = settings, backend
@@ -98,14 +99,17 @@ class EnvironmentProcess:
     # ------------------------------------------------------------------ balls
 
     def run(self) -> None:
-        """Until all balls were played."""
+        """Until it is asked to end."""
         self._backend.publish(extended=self.row | {"missing": dict.fromkeys(WATCHED, True)})
         self._backend.step()
         try:
             while not self._settings.balls or self.row["balls_played"] < self._settings.balls:
                 self._try_ball()
+            self._close_environment()
             self._set(Phase.over)
-            self.publish()
+            self.row["late"] = 0
+            while True:
+                self._by_own_clock()
         except EndRequestedError:
             pass
         finally:

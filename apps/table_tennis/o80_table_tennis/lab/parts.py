@@ -150,7 +150,7 @@ def lab_parts(settings: LabSettings) -> dict[str, Part]:
                 *(o80_command(), "record", *(of(part) for part in RECORDED), of(LAUNCHES)),
                 *("-o", str(settings.recording), "--continue"),
             ),
-            says="",
+            says=f"'{of(ENVIRONMENT)}' ",  # what becomes of its rows
             needs=RECORDED,
             output=settings.recording,
         ),

@@ -21,6 +21,7 @@ import o80
 
 from .cyclictest import Cyclictest
 from .ending import ends_in_order
+from .environment_row import Phase
 from .loops import Loop, loop_of
 from .parts import COUNTERPARTS, ENVIRONMENT, LabSettings, lab_parts
 from .processes import Part, Processes, processor_seconds
@@ -104,20 +105,21 @@ class Lab:
     def look(self, timeout: float) -> bool:
         """Waits so long for a process to end; False: the environment has played all balls.
 
-        Raises PartEndedError for a process that ends otherwise, unless they are started again.
+        Raises PartEndedError for a process that ends, unless they are started again.
         """
         for name in self.processes.ended(timeout):
             ended = self.processes.collected(name)
-            if name == ENVIRONMENT and ended.code == 0:
-                self.events.add(name, "has played all balls")
-                return False
             self.events.add(name, str(ended))
             if not self._restart:
                 raise ended
             self.ended.append(name)
             self.processes.start((name,))
             self.events.add(name, "started again")
-        return True
+        row = self.row_of_environment()
+        if row is None or row.phase != Phase.over:
+            return True
+        self.events.add(ENVIRONMENT, "has played all balls")
+        return False
 
     def row_of_environment(self) -> Any:
         """Its newest row, or the last one that was seen; None: it was never there."""
@@ -151,7 +153,9 @@ def play_in_real_time(
             beside = Cyclictest(enabled=cyclictest)
             loops: dict[str, Loop] = {}
             with beside, Live(console=console, auto_refresh=False) as live:
-                while lab.look(SHOWN_EVERY):
+                playing = True
+                while playing:
+                    playing = lab.look(SHOWN_EVERY)
                     now = lab.loops().items()
                     loops |= {name: loop.since(at_begin.get(name)) for name, loop in now}
                     last = {**last, **_usage(lab.processes)}

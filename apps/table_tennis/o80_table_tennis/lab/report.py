@@ -51,8 +51,9 @@ def write_report(
     """Writes the report, and returns what it holds."""
     rows = _Rows(settings)
     processes = {name: _process(name, loop, rows, usage.get(name)) for name, loop in loops.items()}
+    balls = _balls(rows)
     report = {
-        "balls": _balls(rows),
+        "balls": balls,
         "processes": processes,
         "processor_percent": {name: round(used, 1) for name, used in usage.items()},
         "processors": os.cpu_count(),
@@ -67,7 +68,7 @@ def write_report(
         "wall_clock": time.strftime("%Y-%m-%d %H:%M:%S"),
         "kernel": os.uname().version,
     }
-    report["not_measured"] = not_measured(report)
+    report["not_measured"] = [*not_played(balls, settings.balls), *not_measured(report)]
     path = settings.folder / REPORT
     if (bursting := _told_before(path)) is not None:
         report[BURSTING] = bursting
@@ -161,7 +162,8 @@ def _balls(rows: _Rows) -> dict[str, int]:
         return {}
     last = history.extended
     names = ("played", "touched", "returned", "given_up")
-    return {name: int(last[f"balls_{name}"][-1]) for name in names}
+    found = {name: int(last[f"balls_{name}"][-1]) for name in names}
+    return found | {"launches_failed": int(last.launches_failed[-1])}
 
 
 def _latencies(rows: _Rows) -> dict[str, Any]:
@@ -258,6 +260,22 @@ SOURCES = {
     "motion_capture_error_mm": (MOTION_CAPTURE, ARM),
 }
 """Figures of the report, with the processes whose rows they are computed from."""
+
+
+def not_played(balls: Mapping[str, int], asked: int) -> list[str]:
+    """A sentence if fewer balls were played than asked for (0: no number), or some were given up.
+
+    balls: as `_balls` counts them; empty: the environment left no rows.
+    """
+    played, given_up = balls.get("played", 0), balls.get("given_up", 0)
+    if played >= asked and not given_up:
+        return []
+    failed = balls.get("launches_failed", 0)
+    of = f"{played} of {asked}" if asked else f"{played}"
+    return [
+        f"balls: {of} were played; {given_up} were given up because the arm or the world ended or "
+        f"stood, {failed} launches failed"
+    ]
 
 
 def not_measured(report: Mapping[str, Any]) -> list[str]:
