@@ -16,8 +16,8 @@ constexpr double kExact = 1e-16;
 constexpr double kBracket = 1e-3;
 constexpr int kMostCorrections = 8;
 
-/// The root of an increasing function between `low` and `high`, up to a function value of
-/// `tolerance`; by the Illinois method, with a bisection in every eighth step.
+/// The root of an increasing function between `low` and `high`, up to a value of `tolerance`: by
+/// the Illinois method, with a bisection in every eighth step and, after it failed, in all.
 template <class Function>
 double root(Function&& function, double low, double high, double tolerance) noexcept {
   double at_low = function(low);
@@ -25,11 +25,11 @@ double root(Function&& function, double low, double high, double tolerance) noex
   double at_high = function(high);
   if (at_high <= 0.0) return high;
   int side = 0;
-  for (int i = 0; i < kMostTries; ++i) {
+  for (int i = 0; i < 2 * kMostTries; ++i) {
     const double width = high - low;
     if (!(width > 1e-15 * std::abs(high))) break;
-    double tried = i % 8 == 7 ? low + width / 2.0 : high - at_high * width / (at_high - at_low);
-    if (!(tried > low && tried < high)) tried = low + width / 2.0;
+    double tried = high - at_high * width / (at_high - at_low);
+    if (i % 8 == 7 || i >= kMostTries || !(tried > low && tried < high)) tried = low + width / 2.0;
     const double value = function(tried);
     if (std::abs(value) <= tolerance) return tried;
     if (value < 0.0) {
