@@ -259,6 +259,14 @@ ROWS = (
         limit=(1.5, "import_numpy"),
     ),
     Row(
+        name="attached-first",
+        row="frontend attached in a process that has not loaded NumPy",
+        budget="10 ms more than import numpy",
+        program="import",
+        measured="first_attach",
+        limit=(1.0, "import_numpy_and_10_ms"),
+    ),
+    Row(
         name="list",
         row="o80 list, the whole command",
         budget="0.3 s",

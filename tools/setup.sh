@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
 # Sets up what a make target needs: tools/setup.sh PURPOSE, of
-#   environment   .venv, nothing in it
+#   environment   an empty .venv
 #   tools         what testing needs but the packages of this repository, which C++ tests do not use
 #   test, check   what testing and checking needs
 #   demo, learn, bench, wheels, systemd
-# Nothing is done twice; stamps of what was done lie in .venv/stamps. What is said begins with the
-# time since the set-up, or since O80_SINCE, if that is given (seconds of the epoch).
+# Nothing is done twice; stamps of what was done lie in .venv/stamps. Each message begins with the
+# seconds since the start, or since O80_SINCE (seconds of the epoch) if that is set.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 PATH=$PATH:/usr/sbin:/sbin # ldconfig, for users whose path lacks them
@@ -174,7 +174,7 @@ case $purpose in
   check | wheels) group=$purpose ;;
   *) group= ;;
 esac
-# libraries of learning and drawing, clients of devices: for those that use or test them
+# extras for the purposes that use or test them
 case $purpose in
   demo) extras=rendering ;;
   wheels) extras= ;;
@@ -184,7 +184,7 @@ case $purpose in
   *) extras="rendering learn" ;;
 esac
 requirements=$(state_of pyproject.toml ./*/pyproject.toml ./*/*/pyproject.toml)
-# compile what was compiled before, or in another package, no more
+# reuse objects that were compiled before or for another package
 if command -v ccache > /dev/null; then
   export CMAKE_CXX_COMPILER_LAUNCHER=ccache
   export CCACHE_DIR=${CCACHE_DIR:-$PWD/build/ccache}

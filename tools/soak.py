@@ -110,7 +110,7 @@ def order(this: Round) -> Iterator[None]:
 
 @contextlib.contextmanager
 def user(this: Round) -> Iterator[None]:
-    """An ordinary user; what the runners write beside the folder of the round is theirs too."""
+    """Runs as an ordinary user, who owns the folders that the runners write."""
     this.prefix += NOBODY
     home = tempfile.mkdtemp(prefix="soak-home-")
     this.environment |= {"HOME": home, "PYTHONPYCACHEPREFIX": home}

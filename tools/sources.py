@@ -30,5 +30,5 @@ def cpp_files() -> list[str]:
 
 
 def all_left_to_check(tests: Path) -> bool:
-    """Whether all tests of a file in Python have the mark `check`: `make test` does not read it."""
+    """True if all tests of a Python file are marked `check`; `make test` does not import it."""
     return re.search(r"^pytestmark = \[?pytest\.mark\.check\b", tests.read_text(), re.M) is not None

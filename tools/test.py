@@ -17,7 +17,7 @@ from steps import PASSED, Step, build, ctest, processor_time, pytest, run, run_b
 
 
 def set_up(chosen: Selection, *, everything: bool) -> bool:
-    """Installs what the tests need: those in Python the packages too, those marked `check` more."""
+    """Installs what these tests need: packages for Python, all tools for those marked `check`."""
     purpose = "test" if everything or chosen.python else "tools"
     if chosen.names_files and any(all_left_to_check(file) for file in chosen.files()):
         purpose = "check"

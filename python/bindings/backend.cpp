@@ -100,7 +100,7 @@ class Backend final : public o80::RequestServer {
     o80::Step step = stepping.backend->try_step();
     if (step == o80::Step::standing) step = wait(*stepping.backend, timeout);
     if (raised_) std::rethrow_exception(std::exchange(raised_, nullptr));
-    if (guard_.forked()) checked();  // in a handler of a signal
+    if (guard_.forked()) checked();  // a signal handler may have forked: raises in the child
     if (!backend_) {
       throw o80::Closed("the backend of segment '" + name_ + "' was closed while it was in step");
     }

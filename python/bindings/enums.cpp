@@ -59,7 +59,8 @@ o80::Profile profile_of(nb::handle word) {
       PyUnicode_Check(word.ptr()) && PyUnicode_CompareWithASCIIString(word.ptr(), "fastest") == 0;
   if (is_pace) {
     throw o80::InvalidArgument(
-        "'fastest' is a pace, no profile: give fastest=True, without duration, speed and the like");
+        "'fastest' is a pace, not a profile: give fastest=True instead of a duration, speed or "
+        "iterations");
   }
   return parse(word, std::array{linear, minimum_jerk, as_sent}, "profile");
 }

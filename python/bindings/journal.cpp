@@ -81,12 +81,12 @@ nb::object text_of(const std::string& bytes) {
 }
 
 /// Bytes, number of the first entry, number after the last one, whether there may be more, and
-/// iteration and text of the marks in them.
+/// text and iteration of the marks in them.
 nb::tuple read_raw(o80::RawJournal& journal, std::size_t most) {
   const o80::RawJournal::Entries entries = journal.read(most);
   nb::list marks;
   for (const auto& mark : entries.marks)
-    marks.append(nb::make_tuple(mark.iteration, text_of(mark.text)));
+    marks.append(nb::make_tuple(text_of(mark.text), mark.iteration));
   return nb::make_tuple(bytes_of(entries.bytes), entries.first, entries.next, entries.more, marks);
 }
 
@@ -109,7 +109,7 @@ void bind_raw(nb::module_& m) {
       .def_prop_ro("exists", &o80::RawJournal::exists)
       .def("read", &read_raw, "most"_a,
            nb::sig("def read(self, most: int) "
-                   "-> tuple[bytes, int, int, bool, list[tuple[int, str]]]"));
+                   "-> tuple[bytes, int, int, bool, list[tuple[str, int]]]"));
   nb::class_<o80::RecordedJournal>(m, "RecordedJournal")
       .def(nb::init<std::shared_ptr<const o80::Description>, std::uint64_t>(), "description"_a,
            "first"_a)

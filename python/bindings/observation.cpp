@@ -10,6 +10,7 @@
 #include "describe/table.hpp"
 #include "interpreter.hpp"
 #include "o80/base/error.hpp"
+#include "schema_tables.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -85,7 +86,9 @@ std::shared_ptr<o80::Description> description_from(nb::bytes schema) {
 void bind_observation(nb::module_& m) {
   nb::class_<o80::Description>(m, "Description", "A robot as its segment describes it.")
       .def(nb::new_(&description_from), "schema"_a)
-      .def("json", [](const o80::Description& self) { return o80::to_json(self.schema); })
+      .def(
+          "schema", [](const o80::Description& self) { return o80::tables_of(self.schema); },
+          nb::sig("def schema(self) -> dict[str, typing.Any]"))
       .def("table", &table_of)
       .def("model", [](const o80::Description& self) { return self.schema.shown.mjcf; })
       .def("hash", [](const o80::Description& self) { return o80::hash(self.schema); });

@@ -110,7 +110,7 @@ def _rows_of_both(
 def _differs(a: NDArray[Any], b: NDArray[Any], tolerance: float | None) -> NDArray[np.bool_]:
     if a.dtype != b.dtype:
         raise RobotsDifferError(
-            f"the robots differ: a number is {a.dtype} in one, {b.dtype} in other"
+            f"the robots differ: a number is {a.dtype} in one, {b.dtype} in the other"
         )
     if tolerance is not None:
         near = np.isclose(a.astype(float), b.astype(float), rtol=0, atol=tolerance, equal_nan=True)

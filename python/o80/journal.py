@@ -1,6 +1,6 @@
 """The journal of a backend: what it decided, in its order."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -109,6 +109,17 @@ class Journal:
             entries = self._core.read(_MOST)
             found += [self._decoder.entry(entry) for entry in entries]
         return found
+
+
+def marks_in(entries: Iterable[JournalEntry]) -> list[tuple[str, int]]:
+    """Text and iteration of the marks that were taken."""
+    return [
+        (command.text, entry.iteration)
+        for entry in entries
+        if entry.kind == "taken"
+        for command in entry.commands
+        if command.kind == "mark"
+    ]
 
 
 class EntryDecoder:

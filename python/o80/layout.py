@@ -1,6 +1,5 @@
 """Conversion of a robot's rows to NumPy arrays."""
 
-import json
 from collections.abc import Iterator
 from functools import lru_cache
 from typing import Any
@@ -157,7 +156,7 @@ class Layout:
     """Reads the rows of one robot."""
 
     def __init__(self, description: _core.Description) -> None:
-        schema: dict[str, Any] = json.loads(description.json())
+        schema = description.schema()
         row = schema["row"]
         self.schema = schema
         self._description = description

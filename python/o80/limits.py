@@ -24,11 +24,12 @@ class IntegralBounds:
     def __post_init__(self) -> None:
         checked.text(self.field, "field of o80.IntegralBounds")
         for name in ("minimum", "maximum", "reaction"):
-            checked.number(getattr(self, name), f"{name} of o80.IntegralBounds")
+            number = checked.number(getattr(self, name), f"{name} of o80.IntegralBounds")
+            object.__setattr__(self, name, number)
 
     def numbers(self) -> list[float]:
         """Minimum, maximum and reaction."""
-        return [float(self.minimum), float(self.maximum), float(self.reaction)]
+        return [self.minimum, self.maximum, self.reaction]
 
 
 NUMBERS = ("minimum", "maximum", "speed", "acceleration", "jerk", "error", "noise")
@@ -52,7 +53,8 @@ class Limits:
 
     def __post_init__(self) -> None:
         for name in NUMBERS:
-            checked.number(getattr(self, name), f"{name} of o80.Limits")
+            number = checked.number(getattr(self, name), f"{name} of o80.Limits")
+            object.__setattr__(self, name, number)
         if not isinstance(self.integral, IntegralBounds | None):
             raise InvalidArgument(
                 f"integral of o80.Limits must be o80.IntegralBounds(...), got {self.integral!r}"
@@ -72,4 +74,4 @@ class Limits:
 
     def numbers(self) -> tuple[float, ...]:
         """All limits but those of the integral, in the order of the fields."""
-        return tuple(float(getattr(self, name)) for name in NUMBERS)
+        return tuple(getattr(self, name) for name in NUMBERS)

@@ -1,6 +1,6 @@
-"""Names that IPython and Jupyter complete inside the strings of a call.
+"""Completion of names inside the strings of a call, in IPython and Jupyter.
 
-`import o80` turns it on where IPython runs; `%load_ext o80.notebook` where it was imported before.
+`import o80` enables it if IPython was imported before; otherwise run `%load_ext o80.notebook`.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def load_ipython_extension(ip: Any) -> None:
 
 
 def names_at(text: str, namespace: dict[str, Any]) -> tuple[list[str], str] | None:
-    """Names that may stand in the string that is open at the end of a text, and their begin there.
+    """Completions for the string that is open at the end of `text`, and the part that is typed.
 
     None if the string names nothing of o80.
     """
@@ -86,8 +86,8 @@ def names_at(text: str, namespace: dict[str, Any]) -> tuple[list[str], str] | No
 
 
 def _call_around(text: str) -> tuple[str, int, str | None]:
-    """The function whose call is open at the end of a text, and the argument: its place and, if it
-    is given by one, its keyword. An empty name if there is none.
+    """Name of the function whose call is open at the end of `text` (empty: none), place of the
+    argument, and its keyword if it has one.
     """
     depth, commas, begin = 0, 0, len(text)
     for i in range(len(text) - 1, -1, -1):

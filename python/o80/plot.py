@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 MOST_PANELS = 24
 PANEL = (9.0, 1.9)  # width and height [inch]
+MOST_OF_MARK = 36  # characters that fit in a panel
 PARTS = ("desired", "observed", "extended")
 END_STYLES = {"COMPLETED": ("|", "tab:green"), "OVERWRITTEN": ("|", "tab:purple")}
 STYLES = {"desired": "--", "observed": "-", "extended": "-"}
@@ -194,7 +195,8 @@ def _draw_marks(
             ax.axvline(at, color="tab:olive", linewidth=1.0)
             place: dict[str, Any] = {"rotation": 90, "fontsize": 6, "va": "top", "ha": "right"}
             # a mark holds any text: none of it is a formula
-            ax.text(at, 0.98, text, transform=_shares(ax), parse_math=False, **place)
+            short = text if len(text) <= MOST_OF_MARK else text[: MOST_OF_MARK - 1] + "\u2026"
+            ax.text(at, 0.98, short, transform=_shares(ax), parse_math=False, **place)
 
 
 def _is_of(panel: str, actuator: str) -> bool:

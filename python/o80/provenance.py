@@ -1,6 +1,5 @@
 """How a backend was started."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any, Self
@@ -48,6 +47,8 @@ class Provenance:
 
     def as_json(self) -> str:
         """As one line of JSON, which `from_json` reads. Pure ASCII."""
+        import json  # late: most processes that attach never ask
+
         return json.dumps(asdict(self), sort_keys=True)
 
     @classmethod
@@ -56,6 +57,8 @@ class Provenance:
 
         Raises ValueError, TypeError, KeyError, RecursionError if it is damaged.
         """
+        import json
+
         found = json.loads(text)
         known = {field.name for field in fields(cls)}
         provenance = cls.from_fields({name: found[name] for name in found if name in known})

@@ -9,7 +9,6 @@ with o80.robots.load("two_joints").inline() as arm:
 
 import builtins
 import inspect
-import json
 import numbers
 import os
 import sys
@@ -193,8 +192,7 @@ class Robot:
 
         config: the robot's own options, see `options`. Raises DriverError, InvalidArgument.
         """
-        schema: dict[str, Any] = json.loads(self._library.describe(self._config(config, ())).json())
-        return schema
+        return self._library.describe(self._config(config, ())).schema()
 
     @property
     def _program(self) -> builtins.list[str | Path]:

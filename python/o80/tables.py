@@ -1,11 +1,10 @@
-"""What the command line prints as tables, as tables of a notebook."""
+"""Tables for notebooks (HTML), and the texts that `o80 info` shares with them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
 from datetime import datetime
-from html import escape
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -21,7 +20,9 @@ _COLUMNS = 16  # most numbers of its rows
 
 
 def html(heads: Sequence[str], rows: Iterable[Sequence[Any]], above: str = "") -> str:
-    """An HTML table; what it holds may come from a stranger, and is escaped."""
+    """An HTML table; all texts are escaped, because other users may have written them."""
+    from html import escape  # late: every process that attaches loads this module
+
     lines = [f"<p>{escape(above)}</p>"] if above else []
     cells = "".join(f"<th>{escape(head)}</th>" for head in heads)
     lines.append(f"<table><thead><tr>{cells}</tr></thead><tbody>")
@@ -75,7 +76,7 @@ class Marks(list["Mark"]):
 
 def provenance_html(provenance: Provenance) -> str:
     """How a backend was started, as `o80 info` says it."""
-    from o80.cli.started_with import started_with
+    from o80.started_with import started_with
 
     lines = [line.partition(" ") for line in started_with(provenance)]
     return html(("started with", ""), [(what, text.strip()) for what, _, text in lines])

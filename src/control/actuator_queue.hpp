@@ -60,10 +60,10 @@ class ActuatorQueue {
       ledger_->groups().offer(*head, CommandGroups::Offer::carry, iteration, carry_.carried());
     }
   }
-  /// Then: true if its members begin in this iteration, and this actuator has no motion.
-  bool begins_group(Iteration iteration) noexcept {
+  /// Then: the group that begins in this iteration while the actuator has no motion, or kNoBlock.
+  BlockIndex beginning_group(Iteration iteration) noexcept {
     const RecordHead* head = runs_ == Runs::nothing ? next_member() : nullptr;
-    return head != nullptr && may_begin(*head, iteration);
+    return head && may_begin(*head, iteration) ? CommandGroups::head_of(*head) : kNoBlock;
   }
   /// Then, if all members have arrived: takes the largest carry of durations.
   void agree_on_carry(Iteration iteration) noexcept {

@@ -57,9 +57,11 @@ void Controller::step_groups(Iteration iteration, const std::byte* observed,
   };
   each_busy([&](std::uint32_t i) { actuators_[i].arrive(iteration, late_budget); });
   each_busy([&](std::uint32_t i) {
-    if (actuators_[i].follows() && actuators_[i].begins_group(iteration) && !sink_.may_begin(i)) {
-      actuators_[i].drop({Status::interrupted, Reason::reading}, iteration);
-    }
+    if (!actuators_[i].follows()) return;
+    const BlockIndex group = actuators_[i].beginning_group(iteration);
+    if (group == kNoBlock) return;
+    if (sink_.may_begin(i, ledger_.lane_of(group), pool_.head(group).id)) return;
+    actuators_[i].drop({Status::interrupted, Reason::reading}, iteration);
   });
   each_busy([&](std::uint32_t i) { actuators_[i].agree_on_carry(iteration); });
   each_busy([&](std::uint32_t i) { actuators_[i].plan_with_others(iteration, of(i, observed)); });

@@ -38,7 +38,7 @@ class Motion {
     bool is_row = false;      // of a trajectory in straight lines: it has `iterations`
   };
 
-  /// The target of the next plan(); fill it before. Numbers of `mask` (null: all) move to it.
+  /// The target of the next propose(); fill it before. Numbers of `mask` (null: all) move to it.
   std::byte* target() noexcept { return from() + stride_; }
   /// A command begins.
   void begin(const std::uint64_t* mask) noexcept {
@@ -121,7 +121,7 @@ class Motion {
     const auto found = std::ranges::find(numbers_, offset, &Number::offset);
     return found == numbers_.end() ? 0.0 : found->motion.difference(order);
   }
-  /// The limit because of which plan() took more iterations than asked.
+  /// The limit because of which propose() gave more iterations than asked.
   Limited slowest() const noexcept { return slowest_; }
   /// The command has ended, at its target if that is `arrived`.
   void end(bool arrived = false) noexcept {

@@ -114,7 +114,7 @@ class NumberLimiter {
       // what follow_without_jerk() does inside the bounds, if there are no other limits
       scale_ = std::max(scale_, std::abs(inside(now_.position + speed, now_.position)));
       now_ = {wanted, speed, speed - now_.speed};
-      if (std::abs(speed) <= slack() / 100.0 + 2.0 * rounding()) rest();
+      forget_rounding();
       return Limit::none;
     }
     return std::isfinite(rates_.jerk) ? follow_with_jerk(step, lag)

@@ -12,6 +12,13 @@
 
 namespace o80 {
 
+/// Version of the rules that make desired states of commands. It grows when the same commands give
+/// other desired states; recordings say under which rules they were made.
+///
+/// 1: a profile that the limiter follows.
+/// 2: each command is planned to rest at its target within the limits; set-points.
+inline constexpr std::int64_t kMotionRules = 2;
+
 /// The limit that kept a number from its wanted position, or that makes a motion long.
 enum class Limit : std::uint8_t {
   none,

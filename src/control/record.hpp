@@ -10,13 +10,6 @@
 
 namespace o80 {
 
-/// Version of the rules that make desired states of commands. It grows when the same commands give
-/// other desired states; recordings say under which rules they were made.
-///
-/// 1: a profile that the limiter follows.
-/// 2: each command is planned to rest at its target within the limits; set-points.
-inline constexpr std::int64_t kMotionRules = 2;
-
 /// A lane transports blocks of 64 bytes; every record starts at a block.
 inline constexpr std::size_t kBlockBytes = 64;
 struct alignas(kBlockBytes) Block {

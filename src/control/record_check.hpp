@@ -45,7 +45,7 @@ class RecordCheck {
   };
 
   /// Checks the record at `block` except for its times and rows. All its blocks must be in the
-  /// pool. The payload of a valid record was read to its end.
+  /// pool. The planner walks over what was not read of a payload.
   Verdict begin(const BlockPool& pool, BlockIndex block, Progress& progress) noexcept;
   /// Continues with times and rows for about `budget` blocks, and reduces `budget` by them.
   Verdict go_on(const BlockPool& pool, BlockIndex block, Progress& progress,

@@ -30,15 +30,18 @@ struct StatusChange {
   std::uint16_t late = 0;  // for `limits`: iterations more than asked, at most 65535
 };
 
-/// Receives status changes from the controller.
+/// Receives status changes from the controller, and decides whether a follower may begin.
 class StatusSink {
  public:
   virtual void changed(const StatusChange& change) noexcept = 0;
   /// Blocks of a lane were returned to the pool, by a record or a batch.
   virtual void freed(std::uint32_t lane, std::uint32_t blocks) noexcept = 0;
-  /// Asked before an actuator that has followed while it waited for others begins their command.
-  /// False: its commands end as interrupted, with the reason `reading`.
-  virtual bool may_begin([[maybe_unused]] std::uint32_t actuator) noexcept { return true; }
+  /// Asked before an actuator that has followed while it waited for others begins their command
+  /// `id` of `lane`. False: all its commands end as interrupted, with the reason `reading`.
+  virtual bool may_begin(std::uint32_t /*actuator*/, std::uint32_t /*lane*/,
+                         CommandId /*id*/) noexcept {
+    return true;
+  }
 
  protected:
   ~StatusSink() = default;

@@ -22,7 +22,7 @@ struct Moment {
   double acceleration = 0.0;
 };
 
-/// Positions from `low` to `high`.
+/// Values from `low` to `high`: positions, speeds or accelerations.
 struct Span {
   double low = 0.0;
   double high = 0.0;

@@ -31,7 +31,4 @@ std::string difference(const Schema& expected, const Schema& found);
 /// numbers in the actuators' states, the sensor values and the requests of `expected`.
 std::string layout_difference(const Schema& expected, const Schema& found);
 
-/// The schema as JSON, for Python and other tools.
-std::string to_json(const Schema& schema);
-
 }  // namespace o80

@@ -38,10 +38,11 @@ std::string directory_problem() {
   const std::string directory = segment_directory();
   struct stat found{};
   if (stat(directory.c_str(), &found) == 0 && S_ISDIR(found.st_mode)) {
-    // who may not read it cannot say what is in it
+    // without permission every listing would be empty
     if (access(directory.c_str(), R_OK | X_OK) == 0) return {};
     return "The directory " + directory +
-           " cannot be read by this user, so its segments are not seen";
+           " cannot be read by this user, so its segments are not seen: ask its owner, or set "
+           "O80_DIRECTORY to another one";
   }
   const bool given = secure_getenv("O80_DIRECTORY") != nullptr && directory != kDirectory;
   return "The directory " + directory + (given ? ", which O80_DIRECTORY names, " : " ") +

@@ -10,7 +10,7 @@ namespace o80 {
 
 /// The directory of all segments: the environment variable O80_DIRECTORY, else /dev/shm.
 std::string segment_directory();
-/// Why nobody can say which segments lie there, and what to do; empty if the directory can be read.
+/// Why segments there cannot be listed, and what to do; empty if the directory can be read.
 std::string directory_problem();
 
 /// 1 to 64 of [A-Za-z0-9_.-], not starting with '.', without ".new-" and ".commanders-".

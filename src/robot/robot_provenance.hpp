@@ -10,7 +10,8 @@ namespace o80 {
 /// files that they name. `options`: as effective_options() gives them.
 Provenance provenance_of(const RobotTable& table, const OptionValues& options);
 
-/// Says which file holds the driver of a table that is in no library, and how to name it.
+/// For a table that is in no library. `path`: the file that holds its driver; `name`: what the
+/// provenance calls it (FILE.py:Class).
 void name_library(const RobotTable& table, const std::string& path, const std::string& name);
 
 /// The real-time options of a robot's process, as names and texts of loop options.

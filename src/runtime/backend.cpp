@@ -10,7 +10,7 @@
 #include <string>
 
 #include "base/crash_point.hpp"
-#include "control/record.hpp"
+#include "control/number_plan.hpp"
 #include "describe/number_name.hpp"
 #include "describe/table.hpp"
 #include "o80/base/version.hpp"

@@ -15,9 +15,6 @@ void UntypedBackend::Body::changed(const StatusChange& change) noexcept {
   if (change.of == StatusChange::Of::batch && deciding_ != nullptr) {
     journal.decided(*deciding_, change);
   }
-  if (change.status == Status::interrupted && change.reason == Reason::reading) {
-    lanes[change.lane].set_message(change.id, misread_.view());
-  }
   outbox_.put(change);
   // a burst that runs until its batch has ended (pulse_to_end)
   if (burst_.ends_with(change.lane, change.id)) stop_burst();

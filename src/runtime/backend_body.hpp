@@ -69,7 +69,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   // StatusSink
   void changed(const StatusChange& change) noexcept override;
   void freed(std::uint32_t lane, std::uint32_t blocks) noexcept override;
-  bool may_begin(std::uint32_t actuator) noexcept override;
+  bool may_begin(std::uint32_t actuator, std::uint32_t lane, CommandId id) noexcept override;
 
   std::byte* row() noexcept { return reinterpret_cast<std::byte*>(row_.data()); }
   bool has_begun() const noexcept { return begun_; }
@@ -249,7 +249,6 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   ReadingWatch readings_;
   ReadingWatch followed_;  // of actuators that follow
   std::int64_t followed_at_ = 0;
-  ShortText<248> misread_;               // of an actuator that may not begin
   bool judges_first_;                    // an embedded backend, until the second reading
   std::int64_t read_at_ = 0;             // time of the last row whose reading was not missed
   std::vector<std::uint64_t> last_row_;  // or observed states, while a fresh reading is judged

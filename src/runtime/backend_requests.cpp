@@ -178,16 +178,19 @@ bool UntypedBackend::Body::suits_followers(const StagedBatch& sent) noexcept {
   return reject(sent, Reason::reading);
 }
 
-/// The same for a member of a group that has waited for the others, when they begin.
-bool UntypedBackend::Body::may_begin(std::uint32_t actuator) noexcept {
+/// Judges the reading of a member of a group that has followed while it waited, when the group
+/// begins. A replay obeys the recorded decision.
+bool UntypedBackend::Body::may_begin(std::uint32_t actuator, std::uint32_t lane,
+                                     CommandId id) noexcept {
   if (recorded_ != nullptr) {
     if (recorded_->interrupt_due(current) != actuator) return true;
     recorded_->interrupt(current, static_cast<std::uint16_t>(actuator), {});
   } else {
     const auto fault = followed_.find_of(actuator);
     if (!fault) return true;
-    misread_ = {};
-    describe_reading(schema, *fault, kToFollow, misread_);
+    ShortText<248> why;
+    describe_reading(schema, *fault, kToFollow, why);
+    lanes[lane].set_message(id, why.view());
   }
   journal.interrupted(actuator, true);
   return false;

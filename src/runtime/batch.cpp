@@ -132,6 +132,10 @@ Handle Batch::ask(CommandId id) const {
   const bool has_message = handle.reason == Reason::driver || handle.reason == Reason::halted ||
                            handle.reason == Reason::reading;
   if (has_message) handle.text = lane_->message(id).value_or("");
+  if (handle.text.empty() && handle.reason == Reason::reading &&
+      handle.status == Status::interrupted) {
+    handle.text = "an implausible reading ended all commands of its actuator";
+  }
   const bool is_of_batch = handle.reason == Reason::reading && handle.text.empty();
   if (is_of_batch) handle.text = lane_->message(id_).value_or("");
   if (handle.text.empty())

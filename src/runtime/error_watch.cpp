@@ -12,8 +12,7 @@ ErrorWatch::ErrorWatch(const Schema& schema) : layouts_(schema.types.size()) {
     for (std::uint32_t number = 0; number < row.limits; ++number) {
       const double limit = schema.limits[row.first_limit + number].error;
       if (!std::isfinite(limit)) continue;
-      auto& layout = layouts_[row.type];
-      if (!layout) layout.emplace(schema, row.type);
+      layout_of(schema, row.type, layouts_);
       watched_.push_back({i, number, row.offset, row.type, limit});
     }
   }

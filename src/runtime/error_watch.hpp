@@ -45,7 +45,7 @@ class ErrorWatch {
   };
 
   std::vector<Watched> watched_;
-  std::vector<std::optional<StateLayout>> layouts_;  // one for each type; empty: not watched
+  Layouts layouts_;  // empty: not watched
 };
 
 /// "position of actuator 'elbow' is observed at 0.1, desired at 0.5: further apart than its error

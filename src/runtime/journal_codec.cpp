@@ -15,8 +15,8 @@ namespace {
 // Blocks are built from the parts of a record that stand in one entry, so records must take as many
 // blocks in memory as where they were recorded. With a larger head, the decoder must count the
 // blocks itself (`what` of an entry, `blocks` of a batch).
-static_assert(static_cast<std::uint16_t>(RecordKind::mark) == journal_format::kMark);
 static_assert(sizeof(RecordHead) == 48 && sizeof(BatchRecord) == kBlockBytes);
+static_assert(static_cast<std::uint16_t>(RecordKind::mark) == journal_format::kMark);
 
 template <class Struct>
 void append(std::vector<std::byte>& to, const Struct& value) {

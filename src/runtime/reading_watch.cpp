@@ -19,8 +19,7 @@ ReadingWatch::ReadingWatch(const Schema& schema, Of of) : layouts_(schema.types.
       const bool is_bound =
           std::isfinite(limit.speed) || std::isfinite(width) || limit.noise > 0.0F;
       if (limit.resting != 0 || !is_bound) continue;
-      auto& layout = layouts_[row.type];
-      if (!layout) layout.emplace(schema, row.type);
+      layout_of(schema, row.type, layouts_);
       const double by_error = std::isfinite(limit.error) ? limit.error / 10.0 : 0.0;
       const double noise = limit.noise > 0.0F ? static_cast<double>(limit.noise) : by_error;
       const bool is_slow = std::isfinite(limit.speed) || limit.noise == 0.0F;

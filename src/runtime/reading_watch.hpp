@@ -46,9 +46,9 @@ class ReadingWatch {
   void add(const std::byte* observed, double elapsed) noexcept;
   /// The first number that is wrong since begin(), or would be with this reading; bounds included.
   std::optional<Fault> find(const std::byte* observed, double elapsed) const noexcept;
-  /// The first number of this actuator, or of all, that is wrong now, or was wrong one reading
-  /// before. Of all: those that have a command and do not brake follow nothing.
+  /// The first number of this actuator that is wrong now, or was wrong one reading before.
   std::optional<Fault> find_of(std::uint32_t actuator) const noexcept;
+  /// The same for all actuators that are idle or brake: only these follow their readings.
   std::optional<Fault> find_idle(const std::uint64_t* active,
                                  const std::uint64_t* braking) const noexcept;
 
@@ -59,7 +59,7 @@ class ReadingWatch {
     std::uint32_t offset;  // of the actuator in the block [bytes]
     std::uint32_t type;
     double speed;  // [unit/s]
-    double noise;  // a tenth of the error limit
+    double noise;  // the described noise, else a tenth of the error limit
     double low;    // bounds, with their tolerance
     double high;
     double before = 0.0;
@@ -85,7 +85,7 @@ class ReadingWatch {
   }
 
   std::vector<Watched> watched_;
-  std::vector<std::optional<StateLayout>> layouts_;  // one for each type; empty: not watched
+  Layouts layouts_;  // empty: not watched
 };
 
 /// "position of actuator 'elbow' was read at 1 after 0.1: farther than its speed limit allows

@@ -5,8 +5,8 @@
 
 namespace o80::test {
 
-/// Where what a test starts and loads lies, from bin/o80_test_<folder> of the same build: no path
-/// is compiled in, so that presets share what they compile alike.
+/// The prefix of this build: tests start programs and load robots below it. It is found from
+/// /proc/self/exe, because presets share compiled objects.
 inline const std::string kPrefix =
     std::filesystem::read_symlink("/proc/self/exe").parent_path().parent_path();
 

@@ -232,7 +232,7 @@ def test_a_damaged_description_is_told() -> None:
         for _ in range(choose.randrange(1, 4)):
             damaged[choose.randrange(len(table))] = choose.choice([0, 255, choose.randrange(256)])
         try:
-            _core.Description(bytes(damaged)).json()
+            _core.Description(bytes(damaged)).schema()
         except o80.Error:
             told += 1
     assert told > 0

@@ -20,6 +20,16 @@ def test_import_and_list_load_neither_numpy_nor_a_parser() -> None:
     assert in_a_fresh_interpreter(f"import sys; {listing}; {loaded}").endswith("[]")
 
 
+def test_the_first_attach_loads_little_beyond_numpy(segment: str) -> None:
+    attach = f"import o80; o80.Frontend({segment!r}).latest()"
+    late = "{'json', 'html', 'inspect', 'datetime', 'o80.journal', 'o80.robots'}"
+    program = f"import sys, numpy; had = set(sys.modules); {attach}; "
+    program += f"print(sorted({late} & (set(sys.modules) - had)))"
+    with o80.Backend(segment, ["joint"]) as backend:
+        backend.publish([0.0])
+        assert in_a_fresh_interpreter(program) == "[]"
+
+
 def test_every_public_name_is_there_and_listed() -> None:
     for name in o80.__all__:
         assert getattr(o80, name) is not None

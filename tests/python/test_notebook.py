@@ -13,6 +13,9 @@ from IPython.core.interactiveshell import InteractiveShell
 import o80
 from o80 import notebook
 
+# IPython calls its own completers provisional
+pytestmark = pytest.mark.filterwarnings("ignore::Warning:IPython", "ignore:.*provisional")
+
 
 @pytest.fixture
 def shell() -> Iterator[InteractiveShell]:

@@ -80,7 +80,7 @@ struct FieldNote {
 
   constexpr FieldNote(std::string_view said) : text(said) {}  // NOLINT(google-explicit-constructor)
   constexpr FieldNote(const char* said) : text(said) {}       // NOLINT(google-explicit-constructor)
-  /// One text has both: "[m] height of the table".
+  /// Deleted: give unit and help in one text, "[m] height of the table".
   constexpr FieldNote(std::string_view unit, std::string_view help) = delete;
   constexpr FieldNote(std::string_view said, RestsAt where) : text(said), rest(where) {}
   constexpr FieldNote(RestsAt where) : rest(where) {}  // NOLINT(google-explicit-constructor)

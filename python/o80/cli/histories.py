@@ -9,7 +9,7 @@ from pathlib import Path
 
 import o80
 from o80.cli.attach import attach
-from o80.journal import JournalEntry
+from o80.journal import JournalEntry, marks_in
 
 
 @dataclass(frozen=True)
@@ -37,14 +37,7 @@ def histories(source: str, only: str | None, *, seconds: float | None = None) ->
             real_time = frontend.schema["clock"] == "monotonic"
             offset = time.time_ns() - time.monotonic_ns() if real_time else None
             entries = frontend.journal()
-            marks = [
-                (command.text, entry.iteration)
-                for entry in entries
-                if entry.kind == "taken"
-                for command in entry.commands
-                if command.kind == "mark"
-            ]
-            yield Named(source, 0, history, offset, lambda: entries, marks)
+            yield Named(source, 0, history, offset, lambda: entries, marks_in(entries))
         return
     recording = o80.open(Path(source))
     if only is not None and only not in recording.segments:

@@ -13,7 +13,7 @@ from o80 import _core
 from o80.cli.attach import attach
 from o80.cli.condition import halt_text, pace_text, running_texts, watchdog_text
 from o80.cli.screen import Column, print_json, print_table, style
-from o80.cli.started_with import started_with
+from o80.started_with import started_with
 from o80.tables import ACTUATOR_HEADS, actuator_rows, field_text
 
 

@@ -16,7 +16,7 @@ def mark(
         float, typer.Option(help="Seconds to wait until the robot has taken it.")
     ] = 5.0,
 ) -> None:
-    """Note a text at this moment of a run: recordings list it, plot and view show it."""
+    """Leave a mark in a run: a line of text that recordings, `o80 plot` and `o80 view` show."""
     with attach(segment, read_only=False) as frontend:
         batch = frontend.mark(text)
         batch.wait(timeout)

@@ -104,7 +104,7 @@ def record(
 
 
 def _replay_text(source: Source, frontend: Frontend, from_now: bool) -> str:
-    """From where on a run is recorded, and from where on that can be replayed."""
+    """From which row on a run is recorded, and from where it can be replayed."""
     from o80.replaying.conditions import reads_the_world
 
     if source.journal_begin is None:
@@ -138,7 +138,7 @@ class _Report:
         self._rows = 0
         self._missed = 0
         self._absent: set[str] = set()
-        self._told: dict[str, int] = {}  # the run of a segment
+        self._told: dict[str, int] = {}  # for each segment the run that was reported
         self._terminal = sys.stderr.isatty()
 
     def show(self, last: bool = False) -> None:

@@ -11,7 +11,7 @@ import o80
 from o80 import _core
 from o80.cli.condition import age_text
 from o80.cli.screen import Column, bytes_text, plain, print_json, print_table, style
-from o80.cli.started_with import started_with
+from o80.started_with import started_with
 
 if TYPE_CHECKING:
     from o80.recording.marks import Mark

@@ -1,8 +1,14 @@
 """How a frontend tells whether the loop of its backend keeps up."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from o80 import _core
 from o80.frontend.describing import Describing
-from o80.journal import Journal, JournalEntry
+
+if TYPE_CHECKING:
+    from o80.journal import JournalEntry
 
 
 class Watching(Describing):
@@ -16,6 +22,8 @@ class Watching(Describing):
 
         Also for a read-only frontend, and after the end of the backend. Raises Closed.
         """
+        from o80.journal import Journal  # late: most processes that attach never ask
+
         return Journal(self, since).read()
 
     @property

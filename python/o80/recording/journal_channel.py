@@ -75,7 +75,7 @@ class JournalWriter:
         self.missed = 0  #: entries that were overwritten before they were read
         self.begin = 0  #: number of the first entry; of a journal that is continued, 0
         self.drained = False  #: nothing was left at the last read
-        self.marks: list[tuple[int, str]] = []  #: iteration and text, in the last read
+        self.marks: list[tuple[str, int]] = []  #: text and iteration, in the last read
         self._core = _core.RawJournal(frontend, first)
         self._next = first if first > 0 else None  # None: begins with the oldest entry
 

@@ -106,7 +106,7 @@ class Recorder:
             if blocks:
                 self.file.add_chunk(blocks)
             for source in self.sources.values():
-                for iteration, text in source.marks:
+                for text, iteration in source.marks:
                     mark = Mark(text, time.time_ns(), {source.name: iteration})
                     add_mark(self.file, mark, source.log_time(iteration))
                 source.marks.clear()

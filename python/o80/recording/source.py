@@ -30,8 +30,8 @@ class Source:
         self.rows = 0  #: recorded so far
         self.missed = 0  #: overwritten before they were read
         self.behind = 0  #: published and not read, at the last look
-        #: Iteration and text of those of frontends, read and not taken by the recorder.
-        self.marks: list[tuple[int, str]] = []
+        #: Marks of frontends that were read and not written yet: text and iteration.
+        self.marks: list[tuple[str, int]] = []
         self._file = file
         self._written = dict(written)
         self._from_now = from_now
@@ -70,7 +70,7 @@ class Source:
 
     @property
     def frontend(self) -> Frontend | None:
-        """Of the backend that is read; None: there is none."""
+        """The frontend of the backend that is read; None if there is none."""
         return self._frontend
 
     @property
@@ -228,7 +228,7 @@ class Source:
 
 
 def _oldest_safe(frontend: Frontend) -> int:
-    """The oldest row that a living backend does not overwrite while it is read."""
+    """The oldest row to read; of a living backend that overwrites rows, 2 % of them later."""
     oldest = frontend.oldest
     if oldest == 0 or not frontend.alive:
         return oldest

@@ -300,7 +300,7 @@ class _RunReplay:
         except RobotsDifferError as error:
             raise InvalidArgument(
                 f"robot '{self._run.schema['robot']}' is not described as when segment "
-                f"'{self._run.segment}' was recorded: {error}. Give the robot of then "
+                f"'{self._run.segment}' was recorded: {error}. Give the robot as it was then "
                 f"(--robot FILE.so, in Python robot=), or compare only desired states "
                 f"(--without-driver, in Python driver=False)"
             ) from None
@@ -350,7 +350,7 @@ class _RunReplay:
 
 
 def _settled(block: History) -> History:
-    """Without rows of fresh starts at its end: the decisions after them are of the same step."""
+    """The block without fresh starts at its end: later decisions belong to the same step."""
     settled = np.flatnonzero(block.rows["fresh"] == 0)
     return block[: int(settled[-1]) + 1 if len(settled) else 0]
 

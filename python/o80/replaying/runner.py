@@ -12,7 +12,7 @@ import numpy as np
 from o80 import _core, robots
 from o80.loop_options import text_of
 from o80.replaying.start import Start, times_from
-from o80.replaying.trust import library_of, options_of
+from o80.replaying.trust import options_of, robot_of
 
 if TYPE_CHECKING:
     from o80.history import History
@@ -57,7 +57,7 @@ def with_driver(
     history: rows that the replay keeps. Raises DriverError, InvalidArgument.
     """
     chosen = robot.get(run.schema["robot"]) if isinstance(robot, Mapping) else robot
-    loaded = robots.load(chosen or library_of(run))
+    loaded = robots.load(chosen or robot_of(run))
     own = options_of(run, loaded, {name: text_of(value) for name, value in options.items()})
     name = _core.unused_segment_name(loaded.name)
     period = run.schema["period"]

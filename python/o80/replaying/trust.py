@@ -23,9 +23,10 @@ if TYPE_CHECKING:
 _LARGEST_HASHED = 64 << 20  # [bytes], as when it was recorded
 
 
-def library_of(run: RecordedRun) -> Path | str | type[Any]:
-    """The library of a recorded robot, or its class. Raises DriverError if it is not known here by
-    name.
+def robot_of(run: RecordedRun) -> Path | str | type[Any]:
+    """The recorded robot: its library, or its class in Python.
+
+    Raises DriverError if no robot of this name is known here.
     """
     recorded = run.provenance.library
     if run.is_own and robots.is_place(recorded) and Path(recorded.rpartition(":")[0]).exists():

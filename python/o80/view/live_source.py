@@ -96,7 +96,7 @@ class LiveSource(Source):
             journal, more = self._journal, True
             while journal is not None and journal.exists and more:
                 *_, more, found = journal.read(JOURNAL_BYTES)
-                self._marks += [(text, iteration) for iteration, text in found]
+                self._marks += found
             del self._marks[:-MOST_MARKS]
             return list(self._marks)
 

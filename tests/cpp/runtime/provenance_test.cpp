@@ -3,7 +3,7 @@
 #include <fstream>
 #include <random>
 
-#include "control/record.hpp"
+#include "control/number_plan.hpp"
 #include "memory/segment_name.hpp"
 #include "o80/base/version.hpp"
 #include "runtime/provenance_bytes.hpp"

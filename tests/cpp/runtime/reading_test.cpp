@@ -210,12 +210,53 @@ TEST_F(FollowerTest, OfACommandOfSeveralIsJudgedWhenTheyBegin) {
         EXPECT_EQ(handle.status, begins ? Status::completed : Status::interrupted) << wrong;
         EXPECT_EQ(handle.reason, begins ? Reason::none : Reason::reading);
         if (begins) continue;
-        EXPECT_THAT(handle.text, AllOf(HasSubstr("actuator 'shoulder' was read at"),
-                                       HasSubstr("resume with --accept-reading")));
+        EXPECT_THAT(handle.text, place == 1
+                                     ? AllOf(HasSubstr("actuator 'shoulder' was read at"),
+                                             HasSubstr("resume with --accept-reading"))
+                                     : AllOf(HasSubstr("an implausible reading ended all commands"),
+                                             HasSubstr("of its actuator")));
       }
       EXPECT_EQ(unpack<double>(follower.backend.desired() + sizeof(double)), 2.0)
           << "the others go on";
     }
+  }
+}
+
+TEST_F(FollowerTest, TwoThatAreMisreadAtOnceAreToldEachItsOwnReading) {
+  Schema schema;
+  schema.head.robot = NameText("arm");
+  schema.add_actuators("joint", schema.add_type("double", {scalar_field("", Kind::float64)}), 4);
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    schema.actuator(i).limits({.speed = 2.0, .noise = 0.03});
+    if (i < 2) schema.actuator(i).when_idle(WhenIdle::follow);
+  }
+  UntypedBackend backend(std::move(schema), {.segment = "arm", .period = 1'000'000});
+  const auto run = [&](std::array<double, 4> read) {
+    ASSERT_EQ(backend.try_step(), Step::run);
+    pack(read, backend.observed());
+    ASSERT_TRUE(backend.publish());
+  };
+  pack(std::array<double, 4>{}, backend.observed());
+  ASSERT_TRUE(backend.publish());
+  UntypedFrontend frontend("arm");
+  run({});
+  // each follower waits for an actuator that still moves
+  constexpr std::array<double, 2> kTargets{0.004, 0.004};
+  for (std::uint32_t i = 2; i < 4; ++i) add(frontend, i, 0.01, {.pace = iterations(10)});
+  for (std::uint32_t i = 0; i < 2; ++i) {
+    frontend.add_commands(std::array{i, i + 2}, std::as_bytes(std::span(kTargets)),
+                          {.pace = iterations(5)});
+  }
+  const Batch batch = frontend.pulse();
+  for (int i = 0; i < 9; ++i) run({});
+  run({1e5, -2e5, 0.0, 0.0});
+  for (int i = 0; i < 20; ++i) run({});
+  for (const std::size_t i : {std::size_t{0}, std::size_t{1}}) {
+    const Handle handle = batch.handle(2 + i);
+    EXPECT_EQ(handle.status, Status::interrupted);
+    EXPECT_EQ(handle.reason, Reason::reading);
+    EXPECT_THAT(handle.text,
+                HasSubstr(i == 0 ? "'joint_0' was read at 1e+05" : "'joint_1' was read at -2e+05"));
   }
 }
 

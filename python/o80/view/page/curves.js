@@ -95,7 +95,8 @@ class Chart {
     pen.rotate(-Math.PI / 2);
     pen.font = "10px system-ui, sans-serif";
     pen.textAlign = "right";
-    pen.fillText(text, 0, 0, bottom - 8);
+    const most = Math.floor(bottom / 6); // characters that fit
+    pen.fillText(text.length > most ? `${text.slice(0, most - 1)}\u2026` : text, 0, 0, bottom - 8);
     pen.restore();
   }
 
