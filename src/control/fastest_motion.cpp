@@ -4,48 +4,19 @@
 #include <cmath>
 #include <limits>
 
+#include "base/root.hpp"
+
 namespace o80 {
 namespace {
 
 // rounding must not add an iteration
 constexpr double kTimeRounding = 1e-12;
-constexpr int kMostTries = 60;
 // tolerances of a root, as shares of the distance
 constexpr double kRootForTime = 1e-6;
 constexpr double kExact = 1e-16;
 constexpr double kBracket = 1e-3;
 constexpr int kMostCorrections = 8;
-
-/// The root of an increasing function between `low` and `high`, up to a value of `tolerance`: by
-/// the Illinois method, with a bisection in every eighth step and, after it failed, in all.
-template <class Function>
-double root(Function&& function, double low, double high, double tolerance) noexcept {
-  double at_low = function(low);
-  if (at_low >= 0.0) return low;
-  double at_high = function(high);
-  if (at_high <= 0.0) return high;
-  int side = 0;
-  for (int i = 0; i < 2 * kMostTries; ++i) {
-    const double width = high - low;
-    if (!(width > 1e-15 * std::abs(high))) break;
-    double tried = high - at_high * width / (at_high - at_low);
-    if (i % 8 == 7 || i >= kMostTries || !(tried > low && tried < high)) tried = low + width / 2.0;
-    const double value = function(tried);
-    if (std::abs(value) <= tolerance) return tried;
-    if (value < 0.0) {
-      low = tried;
-      at_low = value;
-      if (side == -1) at_high /= 2.0;
-      side = -1;
-    } else {
-      high = tried;
-      at_high = value;
-      if (side == 1) at_low /= 2.0;
-      side = 1;
-    }
-  }
-  return high;
-}
+constexpr double kMissed = 1e-9;  // beyond rounding; a share of the distance and of a step
 
 }  // namespace
 
@@ -99,6 +70,14 @@ FastestMotion::FastestMotion(const Moment& start, double target, const Rates& ra
     const double highest = std::min(rates_.speed, cruise_ * (1.0 + kBracket));
     cruise_ = cruise_for(static_cast<double>(before_), lowest, highest, kExact);
   }
+  settle();
+  if (mixed_ || to_cruise_.steps() <= before_) return;
+  // it cannot get to this speed in that time: to a lower one, or it takes an iteration more
+  const auto time = static_cast<double>(before_);
+  const double reached = root([&](double v) { return time_to(v) - time; }, lowest, cruise_, 0.0);
+  const bool is_enough = distance(reached, time) >= distance_;
+  if (!is_enough) ++before_;
+  cruise_ = cruise_for(static_cast<double>(before_), lowest, is_enough ? reached : cruise_, kExact);
   settle();
 }
 
@@ -166,8 +145,13 @@ void FastestMotion::stretch(std::int64_t iterations) noexcept {
     cruise_ = cruise_for(static_cast<double>(before_), 0.0, cruise_, kExact);
     settle();
   }
-  // keep the shortest motion if the stretched one is too long or has no time to get to its cruise
-  if (iterations_ > iterations || to_cruise_.steps() > before_) *this = shortest;
+  // keep the shortest motion if the stretched one is too long, has no time to get to its cruise, or
+  // does not get to the target
+  const double missing = distance_ - distance(cruise_, static_cast<double>(before_));
+  if (iterations_ > iterations || to_cruise_.steps() > before_ ||
+      missing > kMissed * (std::abs(distance_) + cruise_)) {
+    *this = shortest;
+  }
 }
 
 double FastestMotion::next() noexcept {

@@ -89,9 +89,9 @@ class NumberLimiter {
     const double speed = next - now_.position;
     const double acceleration = speed - now_.speed;
     const bool keeps = next <= bounds_.high && next >= bounds_.low &&
-                       std::abs(speed) <= rates_.speed &&
-                       std::abs(acceleration) <= rates_.acceleration &&
-                       std::abs(acceleration - now_.acceleration) <= rates_.jerk;
+                       (!has_rates_ || (std::abs(speed) <= rates_.speed &&
+                                        std::abs(acceleration) <= rates_.acceleration &&
+                                        std::abs(acceleration - now_.acceleration) <= rates_.jerk));
     scale_ = std::max(scale_, std::abs(next));
     if (!keeps) return pass_rounded(next);
     accept(next);

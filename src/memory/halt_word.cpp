@@ -73,13 +73,10 @@ void put_halt(const SegmentView& view, std::uint64_t number, HaltCause cause, st
 
 HaltLatch::HaltLatch(const SegmentView& view) noexcept : view_(view) {}
 
-bool HaltLatch::look() noexcept {
-  const std::uint64_t asked = view_.bell().halts.load(std::memory_order_seq_cst);  // sync halts
-  if (asked == seen_) return false;
+void HaltLatch::latch(std::uint64_t asked) noexcept {
   seen_ = asked;
   halt_ = Halt{};
   halt_.number = std::max<std::uint64_t>(asked, 1);
-  return true;
 }
 
 bool HaltLatch::show(Iteration iteration) noexcept {

@@ -40,7 +40,12 @@ class HaltLatch {
   explicit HaltLatch(const SegmentView& view) noexcept;
 
   /// True if a halt was requested since the last call; it is in force from now on.
-  bool look() noexcept;
+  bool look() noexcept {
+    const std::uint64_t asked = view_.bell().halts.load(std::memory_order_seq_cst);  // sync halts
+    if (asked == seen_) return false;
+    latch(asked);
+    return true;
+  }
   /// The halt in force; its number is 0 if there is none.
   const Halt& halt() const noexcept { return halt_; }
   bool acts() const noexcept { return halt_.number != 0; }
@@ -51,6 +56,8 @@ class HaltLatch {
   bool clear() noexcept;
 
  private:
+  void latch(std::uint64_t asked) noexcept;
+
   SegmentView view_;
   std::uint64_t seen_ = 0;  // the counter at the last look()
   Halt halt_;

@@ -7,12 +7,13 @@
 
 namespace o80 {
 
-LaneReceiver::LaneReceiver(const SegmentView& view, std::uint32_t lane) noexcept
+LaneReceiver::LaneReceiver(const SegmentView& view, std::uint32_t lane, bool* any_news) noexcept
     : page_(&view.lane(lane)),
       feedback_(&view.feedback(lane)),
       statuses_(view.statuses(lane)),
       transport_(view.transport(lane)),
-      mask_(view.shape.lane_blocks - 1) {}
+      mask_(view.shape.lane_blocks - 1),
+      any_news_(any_news) {}
 
 std::uint32_t LaneReceiver::available() noexcept {
   committed_ = page_->committed.load(std::memory_order_acquire);  // sync lane
@@ -49,9 +50,7 @@ void LaneReceiver::reset() noexcept {
   flag();
 }
 
-void LaneReceiver::meet_owner() noexcept {
-  const std::uint64_t owner = incarnation();
-  if (owner == owner_) return;
+void LaneReceiver::meet(std::uint64_t owner) noexcept {
   owner_ = owner;
   feedback_->incarnation.store(owner, std::memory_order_release);  // sync met
   first_ = page_->owner_begin.load(std::memory_order_relaxed);
@@ -61,12 +60,12 @@ void LaneReceiver::meet_owner() noexcept {
 void LaneReceiver::move_to(std::uint64_t cursor) noexcept {
   freed_ = cursor - in_flight();
   cursor_ = cursor;
-  has_news_ = true;
+  note_news();
 }
 
 void LaneReceiver::free(std::uint32_t blocks) noexcept {
   freed_ += std::min<std::uint64_t>(blocks, in_flight());
-  has_news_ = true;
+  note_news();
 }
 
 void LaneReceiver::set_status_word(std::uint64_t id, std::uint64_t word,
@@ -127,8 +126,7 @@ void LaneReceiver::set_burst_done(std::uint64_t id, Iteration row, BurstEnd end)
   flag();
 }
 
-bool LaneReceiver::is_cancelled(std::uint64_t id) const noexcept {
-  if (page_->cancels.load(std::memory_order_relaxed) == 0) return false;
+bool LaneReceiver::is_among_cancelled(std::uint64_t id) const noexcept {
   return std::ranges::any_of(page_->cancelled, [&](const std::atomic<std::uint64_t>& cancelled) {
     return cancelled.load(std::memory_order_acquire) == id;  // sync cancelled
   });
@@ -155,22 +153,6 @@ bool LaneReceiver::flush() noexcept {
   return sleepers || waiting.load(std::memory_order_seq_cst) != 0;  // sync waiting
 }
 
-std::uint64_t LaneReceiver::incarnation() const noexcept {
-  return possible_incarnation(
-      page_->incarnation.load(std::memory_order_acquire),  // sync incarnation
-      owner_);
-}
-
-std::uint64_t LaneReceiver::closed() const noexcept {
-  return page_->closed.load(std::memory_order_acquire);  // sync closed
-}
-
-std::uint64_t LaneReceiver::dead_predecessor() noexcept {
-  meet_owner();
-  const std::uint64_t dead = page_->dead_incarnation.load(std::memory_order_relaxed);
-  return dead < owner_ ? dead : 0;
-}
-
 bool LaneReceiver::next_is_of_dead() noexcept {
   // blocks before `successor_begin` were committed by the dead owner
   const std::uint64_t begin = page_->successor_begin.load(std::memory_order_relaxed);
@@ -180,7 +162,7 @@ bool LaneReceiver::next_is_of_dead() noexcept {
 LaneReceivers::LaneReceivers(const SegmentView& view, std::size_t ticket_offset)
     : view_(view), ticket_offset_(ticket_offset) {
   lanes_.reserve(view.shape.lanes);
-  for (std::uint32_t i = 0; i < view.shape.lanes; ++i) lanes_.emplace_back(view, i);
+  for (std::uint32_t i = 0; i < view.shape.lanes; ++i) lanes_.emplace_back(view, i, &any_news_);
 }
 
 bool LaneReceivers::look() noexcept {
@@ -229,7 +211,7 @@ std::optional<std::uint32_t> LaneReceivers::next(std::span<const std::uint64_t> 
   return first;
 }
 
-bool LaneReceivers::announce() noexcept {
+bool LaneReceivers::flush() noexcept {
   bool sleepers = false;
   for (LaneReceiver& lane : lanes_)
     if (lane.has_news()) sleepers = lane.flush() || sleepers;

@@ -25,7 +25,7 @@ namespace o80 {
 /// Realtime: yes.
 class LaneReceiver {
  public:
-  LaneReceiver(const SegmentView& view, std::uint32_t lane) noexcept;
+  LaneReceiver(const SegmentView& view, std::uint32_t lane, bool* any_news = nullptr) noexcept;
 
   /// True if all committed blocks were taken: one load.
   bool is_quiet() const noexcept {
@@ -50,7 +50,10 @@ class LaneReceiver {
   void reset() noexcept;
   /// Reads whether the lane has a new owner. Moves the cursor back to its first batch if a former
   /// owner has decreased `committed`.
-  void meet_owner() noexcept;
+  void meet_owner() noexcept {
+    const std::uint64_t owner = incarnation();
+    if (owner != owner_) meet(owner);
+  }
   /// Number of resets so far.
   std::uint64_t resets() const noexcept { return resets_; }
 
@@ -77,9 +80,14 @@ class LaneReceiver {
   void set_burst_done(std::uint64_t id, Iteration row, BurstEnd end = BurstEnd::done) noexcept;
   /// True if the sender has cancelled the burst of the batch `id`. Only the newest kCancelsKept
   /// cancellations are known.
-  bool is_cancelled(std::uint64_t id) const noexcept;
+  bool is_cancelled(std::uint64_t id) const noexcept {
+    return page_->cancels.load(std::memory_order_relaxed) != 0 && is_among_cancelled(id);
+  }
   /// Wakes the waiters of the lane at the next flush.
-  void flag() noexcept { flagged_ = has_news_ = true; }
+  void flag() noexcept {
+    flagged_ = true;
+    note_news();
+  }
   /// True if flush() has something to do.
   bool has_news() const noexcept { return has_news_; }
   /// Publishes freed blocks, and changes `events` if the lane was flagged. Call it once in each
@@ -89,11 +97,21 @@ class LaneReceiver {
   /// The newest row when the owner last gave a sign of life, as the owner wrote it.
   Iteration life() const noexcept { return page_->life.load(std::memory_order_relaxed); }
   /// Incarnation of the present owner; 0: the lane was never acquired.
-  std::uint64_t incarnation() const noexcept;
+  std::uint64_t incarnation() const noexcept {
+    return possible_incarnation(
+        page_->incarnation.load(std::memory_order_acquire),  // sync incarnation
+        owner_);
+  }
   /// Incarnation of the last owner that closed the lane.
-  std::uint64_t closed() const noexcept;
+  std::uint64_t closed() const noexcept {
+    return page_->closed.load(std::memory_order_acquire);  // sync closed
+  }
   /// Incarnation of the last owner that died and was replaced, else 0. Calls meet_owner().
-  std::uint64_t dead_predecessor() noexcept;
+  std::uint64_t dead_predecessor() noexcept {
+    meet_owner();
+    const std::uint64_t dead = page_->dead_incarnation.load(std::memory_order_relaxed);
+    return dead < owner_ ? dead : 0;
+  }
   /// True if the next batch was sent by the dead owner of dead_predecessor().
   bool next_is_of_dead() noexcept;
   /// Incarnation of the owner that sent the next block; 0 if it is not the present owner. Call it
@@ -104,6 +122,12 @@ class LaneReceiver {
 
  private:
   bool is_possible(std::uint64_t cursor) const noexcept;
+  bool is_among_cancelled(std::uint64_t id) const noexcept;
+  void meet(std::uint64_t owner) noexcept;
+  void note_news() noexcept {
+    has_news_ = true;
+    if (any_news_ != nullptr) *any_news_ = true;
+  }
   /// Moves the cursor; taken blocks stay in flight.
   void move_to(std::uint64_t cursor) noexcept;
 
@@ -124,6 +148,7 @@ class LaneReceiver {
   std::uint64_t first_ = 0;  // blocks that were committed before that owner
   bool flagged_ = false;
   bool has_news_ = false;
+  bool* any_news_;  // set too; or null
 };
 
 /// Stands for the absence of a ticket.
@@ -136,6 +161,8 @@ class LaneReceivers {
  public:
   /// `ticket_offset`: offset of the ticket in the first block of a batch [bytes].
   LaneReceivers(const SegmentView& view, std::size_t ticket_offset);
+  LaneReceivers(const LaneReceivers&) = delete;  // lanes point to it
+  LaneReceivers& operator=(const LaneReceivers&) = delete;
 
   std::uint32_t size() const noexcept { return static_cast<std::uint32_t>(lanes_.size()); }
   LaneReceiver& operator[](std::uint32_t lane) noexcept { return lanes_[lane]; }
@@ -178,11 +205,12 @@ class LaneReceivers {
   /// The value of the bell at the last look(), for BellWaiter::wait().
   std::uint32_t bell_seen() const noexcept { return bell_seen_; }
   /// Flushes every lane; true if a thread sleeps on `lane_wake`. The caller wakes it.
-  bool announce() noexcept;
+  bool announce() noexcept { return std::exchange(any_news_, false) && flush(); }
 
  private:
   /// True for a ticket below the stored counter, and for 0, which replaces invalid tickets.
   bool is_seen(std::uint64_t ticket) const noexcept { return ticket < below_ || ticket == 0; }
+  bool flush() noexcept;
   /// Ticket of the next batch of the lane; kNoTicket if there is none.
   std::uint64_t ticket_of(std::uint32_t lane) noexcept;
 
@@ -191,6 +219,7 @@ class LaneReceivers {
   std::vector<LaneReceiver> lanes_;
   std::uint32_t bell_seen_ = 0;
   std::uint64_t below_ = 0;
+  bool any_news_ = false;  // of a lane
   bool put_back_ = false;
   bool pending_ = true;
   bool others_wait_ = true;  // next() found batches in other lanes than the one it returned

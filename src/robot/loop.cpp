@@ -45,6 +45,8 @@ Loop::Loop(std::unique_ptr<DriverInstance> robot, const BackendOptions& options,
       reports_(backend_.schema().requests.size()),
       snapshot_(snapshot_of(backend_.schema())) {
   fault_.reserve(1024);
+  view_.interrupted = interrupted_.data();
+  view_.requests = reports_.data();
 }
 
 Loop::~Loop() {
@@ -138,7 +140,7 @@ Step Loop::replay(Iteration last) noexcept {
 }
 
 bool Loop::iterate() noexcept {
-  if (!write() || !pace() || !read()) return false;
+  if (!write() || (paced_ && !pace()) || !read()) return false;
   backend_.publish();
   return true;
 }
@@ -159,7 +161,6 @@ bool Loop::write() noexcept {
 
 /// In real time: waits for the end of the period, or in the driver's wait() for the robot's tick.
 bool Loop::pace() noexcept {
-  if (!paced_) return true;
   const bool in_time = pacer_.in_time(monotonic_now());
   if (robot_->table().paces_itself != 0) {
     if (!calls(Verb::wait, [&] { return robot_->wait(pacer_.due()); })) return failed("wait");
@@ -185,6 +186,7 @@ bool Loop::read() noexcept {
   if (!read_into_view()) return false;
   if (paced_ && view_.missed != 0) backend_.set_timing(pacer_.missed());
   for (std::uint32_t word = 0; word < interrupted_.size(); ++word) {
+    if (interrupted_[word] == 0) continue;
     for (std::uint64_t bits = std::exchange(interrupted_[word], 0); bits != 0; bits &= bits - 1) {
       const auto actuator = word * 64 + static_cast<std::uint32_t>(std::countr_zero(bits));
       if (actuator < backend_.schema().actuators.size()) backend_.interrupt(actuator);
@@ -195,10 +197,8 @@ bool Loop::read() noexcept {
 
 /// Reads into the places that `view_` names. `interrupted_` is zero before.
 bool Loop::read_into_view() noexcept {
-  view_.interrupted = interrupted_.data();
   view_.iteration = backend_.iteration();
   view_.time = backend_.time();
-  view_.requests = reports_.data();
   view_.finished = view_.has_desired = view_.missed = view_.halted = view_.reported = 0;
   view_.halt_text.text[0] = 0;
   // reports change only while requests run, and by drivers that say so

@@ -356,7 +356,7 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
   }
   history.publish(current, row());
   // before a fresh start the robot may be away from its desired states
-  if (begun_ && !fresh && !will_start_afresh()) watch_errors();
+  if (!errors_.empty() && begun_ && !fresh && !will_start_afresh()) watch_errors();
   watch_readings();
   if (!followed_.empty()) watch_followers(fresh);
   if (gaps_.is_on()) watch_gaps(fresh);

@@ -56,7 +56,7 @@ Outcome UntypedBackend::Body::release_control(std::uint32_t lane) noexcept {
 // ------------------------------------------------------------------------------ batches in
 
 /// Batches sent for this iteration, or for one that a fresh start jumped over.
-void UntypedBackend::Body::take_due() noexcept {
+void UntypedBackend::Body::take_all_due() noexcept {
   while (!schedule.empty() && schedule.next().at <= current) {
     const StagedBatch due = schedule.next();
     const Effort effort = controller.effort(due.batch);

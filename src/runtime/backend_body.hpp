@@ -77,7 +77,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   bool publish_first() noexcept;
   bool watches_readings() const noexcept { return !readings_.empty(); }
   bool judge_first(bool again) noexcept;
-  bool agrees_with_first() noexcept;
+  bool agrees_with_first() noexcept { return !judges_first_ || judge_against_first(); }
   void publish(bool fresh) noexcept;
   Step step(std::int64_t at_most) noexcept;
   bool begin_direct(const DirectBurst& burst) noexcept;
@@ -118,7 +118,10 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
 
  private:
   // batches => controller
-  void take_due() noexcept;
+  void take_due() noexcept {
+    if (!schedule.empty()) take_all_due();
+  }
+  void take_all_due() noexcept;
   void take_batches() noexcept;
   bool take_in_order() noexcept;
   void take_express() noexcept;
@@ -136,7 +139,9 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   void reject_all(Reason reason) noexcept;
   void grant(const StagedBatch& sent, const BatchRecord& batch) noexcept;
   bool is_called_off() const noexcept;
-  void count_burst() noexcept;
+  void count_burst() noexcept {
+    if (burst_.count()) end_burst(current);
+  }
   void end_burst(Iteration row, BurstEnd end = BurstEnd::done) noexcept;
 
   // direct bursts
@@ -154,7 +159,15 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   void take_recorded(const JournalEntry& entry) noexcept;
 
   // halts
-  void watch_halt() noexcept;
+  void watch_halt() noexcept {
+    if (halts.look()) {
+      begin_halt();
+    } else if (reason_missing_) {
+      complete_reason();
+    }
+    if (schedule.has_aside()) end_scheduled();
+  }
+  void complete_reason() noexcept;
   void purge_to_stop() noexcept;
   void show_acts() noexcept;
   void watch_errors() noexcept;
@@ -194,6 +207,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   void watch_followers(bool fresh) noexcept;
   bool suits_followers(const StagedBatch& sent) noexcept;
   double since_reading() const noexcept;
+  bool judge_against_first() noexcept;
   bool is_misread(const std::byte* observed, std::string_view cure,
                   ShortText<248>& why) const noexcept;
   enum class Judged : std::uint8_t { none, readings, all };  // of a fresh start

@@ -20,10 +20,6 @@ bool UntypedBackend::Body::is_called_off() const noexcept {
   return lane.is_cancelled(burst_.batch()) || lane.closed() >= burst_.incarnation();
 }
 
-void UntypedBackend::Body::count_burst() noexcept {
-  if (burst_.count()) end_burst(current);
-}
-
 void UntypedBackend::Body::end_burst(Iteration row, BurstEnd end) noexcept {
   if (burst_.is_direct()) {
     controller.take_back();

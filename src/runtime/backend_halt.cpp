@@ -31,14 +31,9 @@ void UntypedBackend::Body::ask_to_halt(HaltCause cause, std::string_view text) n
   ask_for_halt(segment.view(), cause, {}, text);
 }
 
-void UntypedBackend::Body::watch_halt() noexcept {
-  if (halts.look()) {
-    begin_halt();
-  } else if (reason_missing_) {
-    reason_missing_ = !halts.show(halts.halt().iteration);
-    if (!reason_missing_) journal.halt(JournalKind::halt_reason, halts.halt());
-  }
-  end_scheduled();
+void UntypedBackend::Body::complete_reason() noexcept {
+  reason_missing_ = !halts.show(halts.halt().iteration);
+  if (!reason_missing_) journal.halt(JournalKind::halt_reason, halts.halt());
 }
 
 /// Updates Counters::acts before the desired states are written. If this backend is killed while
@@ -57,7 +52,7 @@ void UntypedBackend::Body::show_acts() noexcept {
 
 /// Halts if the published row exceeds an error limit.
 void UntypedBackend::Body::watch_errors() noexcept {
-  if (halts.acts() || errors_.empty()) return;
+  if (halts.acts()) return;
   const auto excess = errors_.find(controller.desired(), row() + layout.observed);
   if (!excess) return;
   ShortText<248> text;

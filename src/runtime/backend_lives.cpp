@@ -35,7 +35,8 @@ void UntypedBackend::Body::stale(std::uint32_t lane, Reason reason) noexcept {
 void UntypedBackend::Body::look_at_lives() noexcept {
   const bool has_sender = burst_.runs() && !burst_.is_direct();
   if (has_sender) {
-    on_owner_death(burst_.lane(), lanes[burst_.lane()].dead_predecessor());
+    const std::uint64_t dead = lanes[burst_.lane()].dead_predecessor();
+    if (dead > handled_deaths_[burst_.lane()]) on_owner_death(burst_.lane(), dead);
     if (burst_.runs() && is_called_off()) stop_burst();
   }
   // any frontend can corrupt the bell, so all lanes are scanned after each round of the helper

@@ -222,8 +222,8 @@ bool UntypedBackend::Body::judge_first(bool again) noexcept {
 
 /// Judges the first two readings of an embedded backend: row 0 by its bounds, the next by how far
 /// the robot can have come. If the second is wrong, the backend ends.
-bool UntypedBackend::Body::agrees_with_first() noexcept {
-  if (!judges_first_ || (begun_ && timing.missed)) return true;
+bool UntypedBackend::Body::judge_against_first() noexcept {
+  if (begun_ && timing.missed) return true;
   if (begun_) {
     judges_first_ = false;
   } else {

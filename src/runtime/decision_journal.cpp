@@ -87,8 +87,7 @@ void DecisionJournal::statuses(std::uint32_t lane, JournalStatusRun run) noexcep
   }
 }
 
-void DecisionJournal::flush() noexcept {
-  if (statuses_ == 0) return;
+void DecisionJournal::write_statuses() noexcept {
   writer_.write(head(JournalKind::statuses, status_lane_, 0, statuses_), runs_.data(),
                 runs_used_ * sizeof(JournalStatusRun));
   statuses_ = runs_used_ = 0;

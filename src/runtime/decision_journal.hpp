@@ -84,7 +84,9 @@ class DecisionJournal {
   /// Statuses of one lane are gathered in one entry, which ends with the next other entry, or with
   /// flush().
   void statuses(std::uint32_t lane, JournalStatusRun run) noexcept;
-  void flush() noexcept;
+  void flush() noexcept {
+    if (statuses_ != 0) write_statuses();
+  }
 
   // halts
   void halt(JournalKind halt_or_reason, const Halt& halt) noexcept;
@@ -146,6 +148,7 @@ class DecisionJournal {
     flush();
     writer_.write(head, payload, bytes);
   }
+  void write_statuses() noexcept;
   void name_owner(std::uint32_t lane, std::uint64_t incarnation) noexcept;
   void name_again(std::uint32_t lane, std::uint64_t incarnation) noexcept;
   bool is_far(const Named& named) const noexcept {

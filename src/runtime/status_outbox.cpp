@@ -43,7 +43,7 @@ void StatusOutbox::report_now(const Run& run, bool ends) noexcept {
   tell(run, ends);
 }
 
-void StatusOutbox::report_row() noexcept {
+void StatusOutbox::report_waiting() noexcept {
   // first the journal: it has each end that a frontend sees
   for (const Run& end : waiting_) note(end);
   journal_.flush();

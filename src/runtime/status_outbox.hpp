@@ -33,7 +33,9 @@ class StatusOutbox {
   }
   void put(const StatusChange& change) noexcept;
   /// Reports the ends of the last step. Call it after the row is published.
-  void report_row() noexcept;
+  void report_row() noexcept {
+    if (!waiting_.empty()) report_waiting();
+  }
   /// Reports them if the row will never be published: completed commands as purged (stopped).
   void report_no_row() noexcept;
 
@@ -49,6 +51,7 @@ class StatusOutbox {
   };
 
   void wait(const Run& end) noexcept;
+  void report_waiting() noexcept;
   void report_begin() noexcept {
     if (begun_.count != 0) report_the_begin();
   }

@@ -560,7 +560,7 @@ class RandomArrival {
     for (std::size_t n = 0; n < rows_.size(); ++n) {
       const double position = rig.desired(static_cast<std::uint32_t>(n));
       rows_[n].add(position);
-      const double rounding = 1e-13 * (1.0 + std::abs(position));
+      const double rounding = 1e-12 * (1.0 + std::abs(position));  // of sums over hundreds of them
       ASSERT_LE(low_[n] - position, rounding);
       ASSERT_LE(position - high_[n], rounding);
     }
@@ -658,13 +658,17 @@ TEST_P(RandomArrivals, CommandsArriveWithinTheirLimits) {
   }
 }
 
-/// One smooth motion waits for another, in more iterations than the fewest that fit, which do not
-/// fit again: it is as short as it proposed.
-TEST(RandomArrival, TheOneOfTenMillionThatEndedInMotionArrives) { RandomArrival(502395550).run(); }
-
-/// The cruising speed lies just below speeds that all lead to almost the same place.
-TEST(RandomArrival, TheOneOfTenMillionThatLeftItsSpanStaysInside) {
-  RandomArrival(702417663).run();
+TEST(RandomArrival, ThoseOfManyMillionsThatFailedArrive) {
+  for (const std::uint64_t seed : {
+           502395550,   // a smooth motion that waits is longer than it proposed
+           702417663,   // speeds just above its cruising speed lead to almost the same place
+           1001878575,  // it needs an iteration more to get to that speed
+           1103195080,  // the same, to a lower speed
+           1002301276,  // stretched by one iteration, it would end before its target
+       }) {
+    RandomArrival(seed).run();
+    if (HasFailure()) FAIL() << "seed " << seed;
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, RandomArrivals, testing::Range(std::uint64_t{0}, kParts));
