@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from programs import Samples
-from rows import Row
+from rows import USUAL, Row
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,7 +29,7 @@ class Result:
 
 
 def result_of(row: Row, samples: dict[str, Samples]) -> Result:
-    """Holds the medians of a program against the budget of a row."""
+    """Holds the medians of a program, and of plain loops beside it, against the budget of a row."""
     measured = samples.get(row.measured)
     if measured is None:
         return Result(row=row.row, budget=row.budget, not_measured=f"no '{row.measured}' was given")
@@ -42,6 +42,9 @@ def result_of(row: Row, samples: dict[str, Samples]) -> Result:
         limit = factor * baseline[name]
     else:
         limit = row.limit
+        if row.plain is not None and row.plain in samples:
+            baseline[row.plain] = samples[row.plain].median
+            limit *= baseline[row.plain] / USUAL[row.plain]
     value = measured.median
     return Result(
         row=row.row,

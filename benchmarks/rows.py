@@ -5,6 +5,9 @@ from dataclasses import dataclass
 Limit = float | tuple[float, str]
 """A fixed one, or a factor of a baseline that the same program measures."""
 
+USUAL = {"plain_cpp": 16.0, "plain_python": 90.0}
+"""Of a plain loop, on the machine for which fixed limits are meant [ns]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
@@ -16,6 +19,7 @@ class Row:
     program: str  # of programs.py
     measured: str  # name of its sample
     limit: Limit
+    plain: str | None = None  # of USUAL: scales a fixed limit of time by what it takes here
     at_least: bool = False  # more is better
 
 
@@ -38,6 +42,7 @@ ROWS = (
         program="frontend",
         measured="python_burst_1",
         limit=1.5,
+        plain="plain_python",
     ),
     Row(
         name="iteration-2",
@@ -46,6 +51,7 @@ ROWS = (
         program="iterations",
         measured="iteration_2_empty",
         limit=100.0,
+        plain="plain_cpp",
     ),
     Row(
         name="iteration-8",
@@ -54,6 +60,7 @@ ROWS = (
         program="iterations",
         measured="iteration_8_moving",
         limit=200.0,
+        plain="plain_cpp",
     ),
     Row(
         name="journal",
@@ -70,6 +77,7 @@ ROWS = (
         program="worst-iteration",
         measured="worst_iteration_8",
         limit=100.0,
+        plain="plain_cpp",
     ),
     Row(
         name="worst-64",
@@ -78,6 +86,7 @@ ROWS = (
         program="worst-iteration",
         measured="worst_iteration_64",
         limit=250.0,
+        plain="plain_cpp",
     ),
     Row(
         name="worst-plans",
@@ -86,6 +95,7 @@ ROWS = (
         program="worst-iteration",
         measured="worst_iteration_plans",
         limit=400.0,
+        plain="plain_cpp",
     ),
     Row(
         name="plan-rest",
@@ -94,6 +104,7 @@ ROWS = (
         program="plans",
         measured="plan_from_rest",
         limit=2.0,
+        plain="plain_cpp",
     ),
     Row(
         name="plan-moving",
@@ -102,6 +113,7 @@ ROWS = (
         program="plans",
         measured="plan_moving",
         limit=4.0,
+        plain="plain_cpp",
     ),
     Row(
         name="plan-stretched",
@@ -110,6 +122,7 @@ ROWS = (
         program="plans",
         measured="plan_stretched",
         limit=6.0,
+        plain="plain_cpp",
     ),
     Row(
         name="plan-iteration",
@@ -118,6 +131,7 @@ ROWS = (
         program="plans",
         measured="plan_iteration",
         limit=20.0,
+        plain="plain_cpp",
     ),
     Row(
         name="latest",
@@ -126,6 +140,7 @@ ROWS = (
         program="frontend",
         measured="python_latest",
         limit=0.15,
+        plain="plain_python",
     ),
     Row(
         name="history",
@@ -161,6 +176,7 @@ ROWS = (
         program="frontend",
         measured="python_add_command",
         limit=0.3,
+        plain="plain_python",
     ),
     Row(
         name="pulse",
@@ -169,6 +185,7 @@ ROWS = (
         program="frontend",
         measured="python_pulse_1000",
         limit=40.0,
+        plain="plain_python",
     ),
     Row(
         name="trajectory",
@@ -177,6 +194,7 @@ ROWS = (
         program="frontend",
         measured="python_trajectory",
         limit=1.0,
+        plain="plain_python",
     ),
     Row(
         name="wake-sleeping",
@@ -217,6 +235,7 @@ ROWS = (
         program="readers",
         measured="paced_writer_with_64_waiters",
         limit=100.0,  # of 1000 us
+        plain="plain_cpp",
     ),
     Row(
         name="ready",
@@ -225,6 +244,7 @@ ROWS = (
         program="start",
         measured="backend_ready",
         limit=50.0,
+        plain="plain_cpp",
     ),
     Row(
         name="attached",
@@ -233,6 +253,7 @@ ROWS = (
         program="start",
         measured="frontend_attached",
         limit=1.0,
+        plain="plain_cpp",
     ),
     Row(
         name="ready-python",
@@ -241,6 +262,7 @@ ROWS = (
         program="frontend",
         measured="python_backend_ready",
         limit=50.0,
+        plain="plain_python",
     ),
     Row(
         name="attached-python",
@@ -249,6 +271,7 @@ ROWS = (
         program="frontend",
         measured="python_frontend_attached",
         limit=1.0,
+        plain="plain_python",
     ),
     Row(
         name="import",
@@ -273,6 +296,7 @@ ROWS = (
         program="import",
         measured="o80_list",
         limit=0.3,
+        plain="plain_python",
     ),
     Row(
         name="memory-reserved",
@@ -297,6 +321,7 @@ ROWS = (
         program="recording",
         measured="recording_1",
         limit=5.0,
+        plain="plain_python",
     ),
     Row(
         name="recording-4",
@@ -305,6 +330,7 @@ ROWS = (
         program="recording",
         measured="recording_4",
         limit=25.0,
+        plain="plain_python",
     ),
     Row(
         name="recording-16",
@@ -313,6 +339,7 @@ ROWS = (
         program="recording",
         measured="recording_16",
         limit=25.0,
+        plain="plain_python",
     ),
     Row(
         name="recording-missed",
@@ -453,6 +480,7 @@ ROWS = (
         program="ball-tracking",
         measured="ball_tracking",
         limit=50.0,
+        plain="plain_python",
     ),
     Row(
         name="gap-motion-capture",

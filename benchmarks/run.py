@@ -26,12 +26,21 @@ def arguments() -> argparse.Namespace:
     return parser.parse_args()
 
 
+def plain(rows: Sequence[Row], program: str, built: Path) -> dict[str, Samples]:
+    """The plain loops by which limits of the rows of a program are scaled, measured after it."""
+    names = sorted({row.plain for row in rows if row.program == program and row.plain is not None})
+    found: dict[str, Samples] = {}
+    for name in names:
+        found |= run(name.replace("_", "-"), ROUNDS, built)
+    return found
+
+
 def measure(rows: Sequence[Row], rounds: int, built: Path, console: Console) -> list[Result]:
     measured: dict[str, dict[str, Samples] | str] = {}
     for program in dict.fromkeys(row.program for row in rows):
         with console.status(f"measuring: {program}"):
             try:
-                measured[program] = run(program, rounds, built)
+                measured[program] = run(program, rounds, built) | plain(rows, program, built)
             except NotMeasuredError as reason:
                 measured[program] = str(reason)
     results = []

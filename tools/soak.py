@@ -241,12 +241,17 @@ def commands_of(this: Round, chosen: argparse.Namespace) -> dict[str, list[str]]
     cpp += ["--output-junit", str(this.folder / "cpp.xml")]
     if chosen.cpp:
         cpp += ["-R", chosen.cpp]
+    one_of = max(1, round(1.0 / chosen.share))
+    if one_of > 1:
+        cpp += ["-I", f"{this.random.randint(1, one_of)},,{one_of}"]
     python = [*PYTHON, "pytest", "-n", str(JOBS + 1), "--dist", "loadfile", "-m", "not check"]
     python += [f"--junit-xml={this.folder / 'python.xml'}"]
     files = list(chosen.python)
+    if not files and (this.shuffled or one_of > 1):
+        files = python_files()
+        files = sorted(this.random.sample(files, max(1, len(files) // one_of)))
     if this.shuffled:
         cpp += ["--schedule-random"]
-        files = files or python_files()
         this.random.shuffle(files)
     runners = {"cpp": cpp, "python": [*python, *files]}
     if bool(chosen.cpp) != bool(chosen.python):  # only the tests that were named
@@ -295,7 +300,10 @@ def main() -> int:
     parser.add_argument("--conditions", nargs="+", choices=CONDITIONS, help="all of these at once")
     parser.add_argument("--cpp", metavar="PATTERN", help="tests in C++ whose name matches")
     parser.add_argument("--python", nargs="+", default=[], metavar="FILE", help="tests in Python")
+    parser.add_argument("--share", type=float, default=1.0, help="part of the tests in each round")
     chosen = parser.parse_args()
+    if not 0.0 < chosen.share <= 1.0:
+        parser.error(f"--share must lie above 0 and be at most 1, got {chosen.share:g}")
     use_tools()
     # ctest lists the tests, which an ordinary user may not write
     if not run(Step("build", [*build("dev"), ["ctest", "--preset", "dev", "-N"]])):

@@ -26,7 +26,27 @@ std::string string_of(nb::handle value, const char* name) {
     throw InvalidArgument(std::string(name) + " must be a string, got " +
                           nb::cast<std::string>(nb::repr(value)));
   }
-  return nb::cast<std::string>(value);
+  Py_ssize_t size = 0;
+  const char* text = PyUnicode_AsUTF8AndSize(value.ptr(), &size);
+  if (text == nullptr) {  // a lone surrogate
+    PyErr_Clear();
+    throw InvalidArgument(std::string(name) + " must be valid Unicode, got " +
+                          nb::cast<std::string>(nb::repr(value)));
+  }
+  return {text, static_cast<std::size_t>(size)};
+}
+
+std::string shown_text(nb::handle value) noexcept {
+  const nb::object text = nb::steal(PyObject_Str(value.ptr()));
+  const nb::object bytes =
+      text.is_valid()
+          ? nb::steal(PyUnicode_AsEncodedString(text.ptr(), "utf-8", "backslashreplace"))
+          : nb::object();
+  if (!bytes.is_valid()) {
+    PyErr_Clear();
+    return "(no text)";
+  }
+  return {PyBytes_AS_STRING(bytes.ptr()), static_cast<std::size_t>(PyBytes_GET_SIZE(bytes.ptr()))};
 }
 
 double number_of(nb::handle value, const char* name) {

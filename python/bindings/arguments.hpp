@@ -12,6 +12,8 @@
 
 bool truth_of(nanobind::handle value, const char* name);
 std::string string_of(nanobind::handle value, const char* name);
+/// str() of any object as UTF-8, with escapes for what has none; for texts that are only shown.
+std::string shown_text(nanobind::handle value) noexcept;
 double number_of(nanobind::handle value, const char* name);
 std::int64_t count_of(nanobind::handle value, const char* name);
 

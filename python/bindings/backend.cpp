@@ -18,6 +18,7 @@
 #include <thread>
 #include <utility>
 
+#include "arguments.hpp"
 #include "bindings.hpp"
 #include "loop_options.hpp"
 #include "memory/fork.hpp"
@@ -200,16 +201,16 @@ class Backend final : public o80::RequestServer {
           [&] { return serve_with(request, nb::bytes(payload.data(), payload.size())); });
       if (answer.is_none()) return o80::Served::done();
       if (nb::isinstance<nb::str>(answer)) {
-        return o80::Served::rejected(nb::cast<std::string>(answer));
+        return o80::Served::rejected(shown_text(answer));
       }
       if (nb::isinstance<nb::tuple>(answer)) {
-        return o80::Served::running(nb::cast<std::string>(answer[0]));
+        return o80::Served::running(shown_text(answer[0]));
       }
       return o80::Served::start_afresh();
     } catch (nb::python_error& error) {
       raised_ = std::current_exception();
-      const auto type = nb::cast<std::string>(error.type().attr("__name__"));
-      return o80::Served::failed(type + ": " + nb::cast<std::string>(nb::str(error.value())));
+      const std::string type = shown_text(error.type().attr("__name__"));
+      return o80::Served::failed(type + ": " + shown_text(error.value()));
     } catch (std::exception& error) {
       raised_ = std::current_exception();
       return o80::Served::failed(error.what());
@@ -232,7 +233,7 @@ class Backend final : public o80::RequestServer {
     try {
       const nb::object answer = call_python([&] { return serve_with.attr("resume")(); });
       if (answer.is_none()) return o80::Served::done();
-      return o80::Served::rejected(nb::cast<std::string>(answer));
+      return o80::Served::rejected(shown_text(answer));
     } catch (std::exception& error) {
       raised_ = std::current_exception();
       return o80::Served::failed(error.what());
@@ -353,7 +354,10 @@ void bind_backend(nb::module_& m) {
           },
           "text"_a)
       .def("ask_to_stop", [](const Backend& self) { self.checked().ask_to_stop(); })
-      .def("end", &Backend::end, "failed"_a, "text"_a)
+      .def(
+          "end",
+          [](Backend& self, bool failed, nb::handle text) { self.end(failed, shown_text(text)); },
+          "failed"_a, "text"_a, nb::sig("def end(self, failed: bool, text: str) -> None"))
       .def_prop_ro("failure", &Backend::failure)
       .def_prop_ro("iteration", [](const Backend& self) { return self.checked().iteration(); })
       .def_prop_ro("time", [](const Backend& self) { return self.checked().time(); });

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <vector>
 
+#include "arguments.hpp"
 #include "bindings.hpp"
 #include "describe/table.hpp"
 #include "runtime/link.hpp"
@@ -54,7 +55,7 @@ std::uint32_t Frontend::actuator(nb::handle named) const {
   if (PyUnicode_Check(named.ptr())) {
     PyObject* found = PyDict_GetItemWithError(indices_.ptr(), named.ptr());
     if (found != nullptr) return static_cast<std::uint32_t>(PyLong_AsLong(found));
-    return frontend->actuator(nb::cast<std::string_view>(named));
+    return frontend->actuator(string_of(named, "the name of an actuator"));
   }
   const nb::object index = nb::steal(PyNumber_Index(named.ptr()));
   std::int64_t number = 0;

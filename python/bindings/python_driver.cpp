@@ -17,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include "arguments.hpp"
 #include "bindings.hpp"
 #include "buffer.hpp"
 #include "interpreter.hpp"
@@ -57,7 +58,7 @@ Result guarded(FaultText* fault, Result failed, Call&& call) noexcept {
     try {
       const nb::object said =
           nb::module_::import_("o80.drivers.adapter").attr("fault_of")(error.value());
-      set_text(fault, nb::cast<std::string>(said));
+      set_text(fault, shown_text(said));
     } catch (...) {
       set_text(fault, error.what());
     }
@@ -233,7 +234,7 @@ void take_report(PythonDriver& self, nb::handle told, o80::ReadingView* reading)
   }
   if (!report[3].is_none()) {
     reading->halted = 1;
-    set_text(&reading->halt_text, nb::cast<std::string>(report[3]));
+    set_text(&reading->halt_text, shown_text(report[3]));
   }
   for (nb::handle actuator : report[4]) {
     const auto index = nb::cast<std::size_t>(actuator);

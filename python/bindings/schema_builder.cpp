@@ -9,6 +9,7 @@
 #include <iterator>
 #include <utility>
 
+#include "arguments.hpp"
 #include "o80/base/error.hpp"
 
 namespace nb = nanobind;
@@ -38,14 +39,14 @@ std::uint32_t SchemaBuilder::add_type(const std::string& name, const nb::list& f
 }
 
 o80::FieldRow SchemaBuilder::member(const nb::tuple& row) {
-  const auto name = nb::cast<std::string>(row[0]);
+  const std::string name = string_of(row[0], "the name of a field");
   const auto shape = nb::cast<std::vector<std::uint32_t>>(row[2]);
   if (shape.size() > 2) {
     throw InvalidArgument("field '" + name + "' has " + std::to_string(shape.size()) +
                           " dimensions: at most 2 can be described");
   }
   o80::FieldRow field = o80::scalar_field(name, kind_of(nb::cast<std::string>(row[1])),
-                                          nb::cast<std::string>(row[3]));
+                                          string_of(row[3], "the unit of a field"));
   if (!shape.empty()) field.rows = shape[0];
   if (shape.size() == 2) field.columns = shape[1];
   if (field.kind == o80::Kind::structure) field.type = nb::cast<std::uint32_t>(row[5]);
@@ -60,7 +61,7 @@ void SchemaBuilder::add_labels(o80::FieldRow& field, const nb::dict& labels) {
   field.labels = static_cast<std::uint32_t>(labels.size());
   for (const auto& [name, value] : labels) {
     schema.labels.push_back(
-        {o80::NameText(nb::cast<std::string>(name)), nb::cast<std::int64_t>(value)});
+        {o80::NameText(string_of(name, "a label")), nb::cast<std::int64_t>(value)});
   }
 }
 

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <type_traits>
 
+#include "arguments.hpp"
 #include "control/record.hpp"
 #include "describe/visit_number.hpp"
 #include "o80/base/error.hpp"
@@ -98,7 +99,7 @@ void write_label(const Schema& schema, const FieldRow& field, nb::handle value, 
   std::int64_t number = 0;
   bool known = false;
   if (PyUnicode_Check(value.ptr())) {
-    const auto text = nb::cast<std::string>(value);
+    const std::string text = string_of(value, "a label");
     for (std::uint32_t i = 0; i < field.labels; ++i) {
       const o80::LabelRow& label = schema.labels[field.first_label + i];
       if (label.name.view() != text) continue;

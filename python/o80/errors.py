@@ -10,6 +10,15 @@ if TYPE_CHECKING:
     from o80.command_ends import CommandEnd
 
 
+def text_of(error: BaseException) -> str:
+    """Type and text of any exception, also of one whose text cannot be had."""
+    try:
+        text = str(error)
+    except Exception:
+        text = ""
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
 class Error(Exception):
     """Base class of all exceptions of o80."""
 

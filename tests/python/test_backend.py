@@ -83,7 +83,7 @@ class Running:
             loop(self.backend)
         except Exception as error:
             self.raised = error
-            self.backend.close(str(error))
+            self.backend.__exit__(type(error), error, None)
 
     def __enter__(self) -> "Running":
         self._thread.start()
@@ -335,17 +335,32 @@ def test_a_handler_may_start_afresh(segment: str) -> None:
             assert frontend.latest().desired.tolist() == [1.0, 2.0]
 
 
-def test_a_handler_that_fails_ends_the_backend(segment: str) -> None:
+class Untellable(ZeroDivisionError):
+    def __str__(self) -> str:
+        raise KeyError("no text")
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        (ZeroDivisionError("no such home"), "ZeroDivisionError: no such home"),
+        (ZeroDivisionError("no such \ud800"), r"no such \\ud800"),  # it has no UTF-8
+        (Untellable(), "Untellable"),
+    ],
+)
+def test_a_handler_that_fails_ends_the_backend(
+    segment: str, error: ZeroDivisionError, told: str
+) -> None:
     def home(_: o80.Record) -> None:
-        raise ZeroDivisionError("no such home")
+        raise error
 
     with o80.Backend(segment, ["a"], requests=REQUESTS, bursting=True) as backend:
         backend.on("home", home)
         backend.publish([0.0])
         with Running(backend) as running, o80.Frontend(segment) as frontend:
-            with pytest.raises(o80.Error, match="no such home"):
+            with pytest.raises(o80.Error, match=told):
                 frontend.request("home", timeout=WAIT)
-            with pytest.raises(o80.BackendFailed, match="no such home"):
+            with pytest.raises(o80.BackendFailed, match=told):
                 frontend.wait_for(10**6, timeout=WAIT)
 
     assert isinstance(running.raised, ZeroDivisionError)

@@ -187,6 +187,7 @@ def test_a_mark_is_taken_while_the_robot_is_halted(arm: o80.Frontend) -> None:
     ("text", "said"),
     [
         (3, "the text of a mark must be a string, got 3"),
+        ("\ud800", r"the text of a mark must be valid Unicode, got '\\ud800'"),
         ("", "1 to 976 bytes of text, got 0"),
         ("x" * 977, "1 to 976 bytes of text, got 977"),
         ("two\nlines", r"one line of printable text, got 'two\\nlines'"),
