@@ -335,7 +335,7 @@ def test_a_handler_may_start_afresh(segment: str) -> None:
             assert frontend.latest().desired.tolist() == [1.0, 2.0]
 
 
-class Untellable(ZeroDivisionError):
+class UntellableError(ZeroDivisionError):
     def __str__(self) -> str:
         raise KeyError("no text")
 
@@ -345,7 +345,7 @@ class Untellable(ZeroDivisionError):
     [
         (ZeroDivisionError("no such home"), "ZeroDivisionError: no such home"),
         (ZeroDivisionError("no such \ud800"), r"no such \\ud800"),  # it has no UTF-8
-        (Untellable(), "Untellable"),
+        (UntellableError(), "UntellableError"),
     ],
 )
 def test_a_handler_that_fails_ends_the_backend(

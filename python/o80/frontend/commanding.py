@@ -1,17 +1,23 @@
 """How a frontend adds commands, requests and purges to a batch, and sends it."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, SupportsIndex
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from o80 import _core
 from o80.errors import BackendHalted, InvalidArgument, RequestRejected, TimeoutError
 from o80.frontend.observing import Observing
-from o80.running_request import RunningRequest
 from o80.trajectory import states_of, times_of
-from o80.words import LateWord, ModeWord, ProfileWord, StartWord, Status
+from o80.words import Status
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from o80.running_request import RunningRequest
+    from o80.words import LateWord, ModeWord, ProfileWord, StartWord
 
 
 class Commanding(Observing):
@@ -226,4 +232,6 @@ class Commanding(Observing):
     @property
     def running_requests(self) -> list[RunningRequest]:
         """The requests that take time and have not ended, oldest first, whoever sent them."""
+        from o80.running_request import RunningRequest
+
         return [RunningRequest(*fields) for fields in self._running_requests]

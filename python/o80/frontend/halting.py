@@ -1,10 +1,14 @@
 """How a frontend halts its backend and resumes it."""
 
+from __future__ import annotations
+
 from typing import TYPE_CHECKING
 
 from o80.checked import whole
 from o80.frontend.controlling import Controlling
-from o80.halts import Halt
+
+if TYPE_CHECKING:
+    from o80.halts import Halt
 
 
 class Halting(Controlling):
@@ -31,6 +35,8 @@ class Halting(Controlling):
         fields = self._halted
         if fields is None:
             return None
+        from o80.halts import Halt
+
         number, cause, iteration, who, text = fields
         return Halt(number, cause, None if iteration < 0 else iteration, who, text)
 

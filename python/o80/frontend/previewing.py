@@ -1,13 +1,17 @@
 """How a frontend computes what a command would do."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
-from typing import Any, SupportsIndex
+from typing import TYPE_CHECKING, Any, SupportsIndex
 
 import numpy as np
 
 from o80.frontend.commanding import Commanding
-from o80.preview import Preview
-from o80.words import ProfileWord, StartWord
+
+if TYPE_CHECKING:
+    from o80.preview import Preview
+    from o80.words import ProfileWord, StartWord
 
 
 class Previewing(Commanding):
@@ -60,4 +64,6 @@ class Previewing(Commanding):
             every,
         )
         rows = np.frombuffer(desired, np.dtype([("desired", self._layout.states)]))
+        from o80.preview import Preview
+
         return Preview(len(rows), late, text, self._layout.many(rows, "desired"))
