@@ -374,8 +374,7 @@ class Backend:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        failed = isinstance(error, Exception)
-        self.close(text_of(error) if failed else None)
+        self.close(text_of(error) if isinstance(error, Exception) else None)
 
     def __repr__(self) -> str:
         return f"<o80.Backend of '{self._segment}'{', closed' if self._native is None else ''}>"

@@ -3,12 +3,14 @@
 A halt must come through whatever else connects. So one thread, which never waits for a connection,
 reads the heads of all requests. A connection is a stranger until it has sent a head with the token.
 Then it is a holder, and a thread reads the body and sends the answer. Each kind has a budget of
-its own: too many strangers cost the oldest stranger its connection, never a holder.
+its own: too many strangers cost the oldest stranger its connection, never a holder. In each round
+holders are read first, then a few of those who connect, and of the strangers.
 """
 
 import contextlib
 import errno
 import resource
+import select
 import selectors
 import socket
 import threading
@@ -21,7 +23,8 @@ from o80.view.reply import Reply
 
 MOST_STRANGERS = 1024
 MOST_HOLDERS = 100
-ACCEPTED_AT_ONCE = 16  # before the others are read again
+ACCEPTED_AT_ONCE = 16  # in a round
+READ_AT_ONCE = 8  # strangers, in a round
 
 HEAD_WITHIN = 5.0  # all of it, however its bytes are spread [s]
 BODY_WITHIN = 10.0  # [s]
@@ -68,6 +71,9 @@ class Gate:
             watched.setblocking(False)
         self._selector.register(listener, selectors.EVENT_READ)
         self._selector.register(self._woken, selectors.EVENT_READ)
+        self._ready_strangers = select.epoll()  # gives those first that waited longest
+        self._selector.register(self._ready_strangers, selectors.EVENT_READ)
+        self._watched_strangers: dict[int, _Connection] = {}  # by descriptor
 
     def serve(self) -> None:
         """Returns after `close`, which another thread calls."""
@@ -78,7 +84,10 @@ class Gate:
                 if isinstance(key.data, _Connection):
                     self._read(key.data)
             self._take_back()
-            self._accept()  # last, so that those who came earlier were read
+            self._accept()
+            for descriptor, _ in self._ready_strangers.poll(0, READ_AT_ONCE):
+                if descriptor in self._watched_strangers:  # still
+                    self._read(self._watched_strangers[descriptor])
             now = time.monotonic()
             if now >= expired_at + TICK:
                 self._expire(now)
@@ -233,9 +242,14 @@ class Gate:
             self._consider(connection)
 
     def _watch(self, connection: "_Connection") -> None:
-        if not connection.watched:
+        if connection.watched:
+            return
+        if connection in self._holders:
             self._selector.register(connection.socket, selectors.EVENT_READ, connection)
-            connection.watched = True
+        else:
+            self._ready_strangers.register(connection.socket, select.EPOLLIN)
+            self._watched_strangers[connection.socket.fileno()] = connection
+        connection.watched = True
 
     def _try_to_watch(self, connection: "_Connection") -> None:
         """Drops it if the user may watch no more: that costs this connection, not the others."""
@@ -245,9 +259,13 @@ class Gate:
             self._drop(connection)
 
     def _unwatch(self, connection: "_Connection") -> None:
-        if connection.watched:
+        if not connection.watched:
+            return
+        if self._watched_strangers.pop(connection.socket.fileno(), None) is connection:
+            self._ready_strangers.unregister(connection.socket)
+        else:
             self._selector.unregister(connection.socket)
-            connection.watched = False
+        connection.watched = False
 
     def _drop(self, connection: "_Connection") -> None:
         self._strangers.pop(connection, None)
@@ -269,6 +287,7 @@ class Gate:
         for connection in [*self._strangers, *self._holders, *self._answered]:
             self._drop(connection)
         self._selector.close()
+        self._ready_strangers.close()
         for each in (self._listener, self._wake, self._woken):
             each.close()
 
