@@ -271,7 +271,11 @@ def play(this: Round, names: list[str], chosen: argparse.Namespace) -> list[str]
                 this.runners.append(
                     subprocess.Popen(command, cwd=ROOT, env=environment, stdout=log, stderr=log)
                 )
-        returned = [runner.wait() for runner in this.runners]
+        try:
+            returned = [runner.wait() for runner in this.runners]
+        finally:
+            for runner in this.runners:
+                runner.terminate()
     failed = [each for name in commands for each in failures(this.folder / f"{name}.xml")]
     for name, status in zip(commands, returned, strict=True):
         if status != 0 and not failures(this.folder / f"{name}.xml"):
@@ -305,6 +309,7 @@ def main() -> int:
     if not 0.0 < chosen.share <= 1.0:
         parser.error(f"--share must lie above 0 and be at most 1, got {chosen.share:g}")
     use_tools()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # ends what runs beside the tests, too
     # ctest lists the tests, which an ordinary user may not write
     if not run(Step("build", [*build("dev"), ["ctest", "--preset", "dev", "-N"]])):
         return 1
