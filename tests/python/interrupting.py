@@ -2,6 +2,7 @@
 
 import itertools
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from types import FrameType
 from typing import Any
@@ -11,12 +12,14 @@ def interrupted(block: Callable[[], object], moment: int) -> BaseException | Non
     """Calls it, interrupted before its instruction of that number; None if it ended before.
 
     Python's own modules may raise another exception instead, such as a lock that is not locked.
+    Not in `threading`: between the last instruction of a `with` and its end, where no signal is
+    handled, an interrupt would leave the lock of all threads taken.
     """
     left = moment
 
     def trace(frame: FrameType, event: str, _: object) -> Any:
         nonlocal left
-        frame.f_trace_opcodes = True
+        frame.f_trace_opcodes = frame.f_code.co_filename != threading.__file__
         left -= event == "opcode"
         if left == 0:
             raise KeyboardInterrupt

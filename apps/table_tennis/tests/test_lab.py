@@ -12,6 +12,7 @@ import o80
 from o80_table_tennis.lab.environment_row import Phase
 from o80_table_tennis.lab.kill_table import KILLS, SUPERVISOR, as_markdown
 from o80_table_tennis.lab.kills import Killer, wait_until
+from o80_table_tennis.lab.lacking import not_measured, not_played
 from o80_table_tennis.lab.parts import (
     ARM,
     COUNTERPARTS,
@@ -23,7 +24,6 @@ from o80_table_tennis.lab.parts import (
 )
 from o80_table_tennis.lab.picture import BOXES, drawn
 from o80_table_tennis.lab.real_time import Lab
-from o80_table_tennis.lab.report import not_measured, not_played
 
 PAGE = Path(__file__).parents[3] / "docs" / "lab.md"
 LONGEST = 300.0
