@@ -309,7 +309,7 @@ def main() -> int:
     if not 0.0 < chosen.share <= 1.0:
         parser.error(f"--share must lie above 0 and be at most 1, got {chosen.share:g}")
     use_tools()
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # ends what runs beside the tests, too
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # and what runs beside the tests ends
     # ctest lists the tests, which an ordinary user may not write
     if not run(Step("build", [*build("dev"), ["ctest", "--preset", "dev", "-N"]])):
         return 1

@@ -242,11 +242,11 @@ void take_report(PythonDriver& self, nb::handle told, o80::ReadingView* reading)
   }
   for (nb::handle each : report[5]) {
     const auto [index, answer, text] =
-        nb::cast<std::tuple<std::size_t, std::uint32_t, std::string>>(each);
+        nb::cast<std::tuple<std::size_t, std::uint32_t, nb::object>>(each);
     o80::RequestReport& request = reading->requests[index];
     request.changed = 1;
     request.answer = static_cast<RequestAnswer>(answer);
-    set_text(request.text, sizeof request.text, text);
+    set_text(request.text, sizeof request.text, shown_text(text));
     reading->reported = 1;
   }
 }
@@ -271,8 +271,8 @@ int read(void* robot, o80::ReadingView* reading, FaultText* fault) {
 
 /// (answer, text) of a handler.
 RequestAnswer answer_of(nb::handle told, FaultText* text) {
-  const auto [answer, said] = nb::cast<std::pair<std::uint32_t, std::string>>(told);
-  set_text(text, said);
+  const auto [answer, said] = nb::cast<std::pair<std::uint32_t, nb::object>>(told);
+  set_text(text, shown_text(said));
   return static_cast<RequestAnswer>(answer);
 }
 

@@ -13,7 +13,7 @@ from o80 import _core, at_exit, checked
 from o80.checked import mapping, nothing
 from o80.description import Described, Limit, SchemaWriter
 from o80.enumerations import numbers_of
-from o80.errors import Closed, InvalidArgument, RequestRejected, text_of
+from o80.errors import Closed, InvalidArgument, RequestRejected, exception_text
 from o80.layout import Layout, record_of
 from o80.loop_options import loop_texts
 from o80.record import Record
@@ -374,7 +374,7 @@ class Backend:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self.close(text_of(error) if isinstance(error, Exception) else None)
+        self.close(exception_text(error) if isinstance(error, Exception) else None)
 
     def __repr__(self) -> str:
         return f"<o80.Backend of '{self._segment}'{', closed' if self._native is None else ''}>"

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from o80.command_ends import CommandEnd
 
 
-def text_of(error: BaseException) -> str:
+def exception_text(error: BaseException) -> str:
     """Type and text of any exception, also of one whose text cannot be had."""
     try:
         text = str(error)

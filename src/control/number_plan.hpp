@@ -16,7 +16,8 @@ namespace o80 {
 /// other desired states; recordings say under which rules they were made.
 ///
 /// 1: a profile that the limiter follows.
-/// 2: each command is planned to rest at its target within the limits; set-points.
+/// 2: each command is planned to rest at its target within the limits; set-points. Faults that were
+///    mended since, of about one motion in a million, have not raised it.
 inline constexpr std::int64_t kMotionRules = 2;
 
 /// The limit that kept a number from its wanted position, or that makes a motion long.

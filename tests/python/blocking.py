@@ -15,10 +15,18 @@ import o80
 from o80.process import start_process
 
 WAIT = 60.0  # [s] longer than any wait should take
-# what calls import late: an interrupt of an import of dataclasses, which exec texts, tells Python
-# that nobody caught it
-for _late in ("actuator", "halts", "journal", "preview", "provenance", "running_request", "tables"):
-    importlib.import_module(f"o80.{_late}")
+# what calls import when they are first used: an interrupt during `exec` of a text, of which
+# dataclasses are made, makes Python end with the status of an interrupt that nobody caught
+for _module in (
+    "actuator",
+    "halts",
+    "journal",
+    "preview",
+    "provenance",
+    "running_request",
+    "tables",
+):
+    importlib.import_module(f"o80.{_module}")
 
 
 @dataclass(frozen=True)

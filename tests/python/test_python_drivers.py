@@ -264,6 +264,40 @@ def test_what_a_reading_reports_reaches_the_loop(segment: str) -> None:
         joint.burst(5)
 
 
+def test_texts_without_utf_8_are_shown_and_end_nothing(segment: str) -> None:
+    """A lone surrogate, as in a file name that Python could not decode."""
+
+    def refuse(self: Joint, fields: object) -> None:
+        raise o80.RequestRejected("no \ud800")
+
+    def begin(self: Joint, fields: object) -> o80.Running:
+        self.homing = 0
+        return o80.Running("begins \ud800")
+
+    def read(self: Joint, reading: Reading) -> None:
+        Joint.read(self, reading)
+        if self.homing > 0:
+            reading.progress("calibrate", "at \ud800")
+        if self.homing > 1:
+            reading.halt("hot \ud800")
+
+    verbs = {"on_home": refuse, "on_calibrate": begin, "resume": refuse, "read": read}
+    verbs["resume"] = lambda self: refuse(self, None)
+    with o80.robots.load(type("Joint", (Joint,), verbs)).inline(segment) as joint:
+        with pytest.raises(o80.RequestRejected, match=r"no \\ud800"):
+            joint.request("home", place=0.0)
+        joint.add_request("calibrate")
+        batch = joint.pulse()
+        joint.burst(1)
+        assert batch[0].progress == "at \\ud800"
+        joint.burst(1)
+        assert joint.halted
+        assert joint.halted.text == "hot \\ud800"
+        with pytest.raises(o80.BackendHalted, match=r"no \\ud800"):
+            joint.resume()
+        assert joint.life == "running"
+
+
 def test_an_exception_in_stop_is_printed_and_ends_nothing_else(
     segment: str, capfd: pytest.CaptureFixture[str]
 ) -> None:

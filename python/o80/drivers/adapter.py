@@ -15,7 +15,7 @@ from o80.backend import KEEPS
 from o80.checked import mapping, nothing
 from o80.description import SchemaWriter
 from o80.drivers.reading import Answer, Desired, Differences, DriverFaultError, Reading
-from o80.errors import Error, InvalidArgument, RequestRejected, text_of
+from o80.errors import Error, InvalidArgument, RequestRejected, exception_text
 from o80.layout import Layout, dtype_of_type, record_of
 
 NANOSECOND = 1e-9
@@ -25,7 +25,7 @@ def fault_of(error: BaseException) -> str:
     """The text that frontends read of an exception of a driver."""
     if isinstance(error, (DriverFaultError, Error)):
         return str(error)
-    text = text_of(error)
+    text = exception_text(error)
     frames = traceback.extract_tb(error.__traceback__)
     if frames:
         where = frames[-1]

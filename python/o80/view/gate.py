@@ -3,8 +3,8 @@
 A halt must come through whatever else connects. So one thread, which never waits for a connection,
 reads the heads of all requests. A connection is a stranger until it has sent a head with the token.
 Then it is a holder, and a thread reads the body and sends the answer. Each kind has a budget of
-its own: too many strangers cost the oldest stranger its connection, never a holder. In each round
-holders are read first, then a few of those who connect, and of the strangers.
+its own: too many strangers cost the oldest stranger its connection, never a holder. Each round
+reads all holders, then lets a few new connections in, then reads a few strangers.
 """
 
 import contextlib
@@ -71,7 +71,7 @@ class Gate:
             watched.setblocking(False)
         self._selector.register(listener, selectors.EVENT_READ)
         self._selector.register(self._woken, selectors.EVENT_READ)
-        self._ready_strangers = select.epoll()  # gives those first that waited longest
+        self._ready_strangers = select.epoll()  # the kernel gives them in turn
         self._selector.register(self._ready_strangers, selectors.EVENT_READ)
         self._watched_strangers: dict[int, _Connection] = {}  # by descriptor
 

@@ -1,4 +1,4 @@
-"""What the report of a lab lacks, in sentences: balls that were not played, figures of no row."""
+"""Sentences about what a report lacks: balls that were not played, figures without any row."""
 
 from __future__ import annotations
 
