@@ -281,8 +281,10 @@ def test_texts_without_utf_8_are_shown_and_end_nothing(segment: str) -> None:
         if self.homing > 1:
             reading.halt("hot \ud800")
 
-    verbs = {"on_home": refuse, "on_calibrate": begin, "resume": refuse, "read": read}
-    verbs["resume"] = lambda self: refuse(self, None)
+    def resume(self: Joint) -> None:
+        refuse(self, None)
+
+    verbs = {"on_home": refuse, "on_calibrate": begin, "resume": resume, "read": read}
     with o80.robots.load(type("Joint", (Joint,), verbs)).inline(segment) as joint:
         with pytest.raises(o80.RequestRejected, match=r"no \\ud800"):
             joint.request("home", place=0.0)
