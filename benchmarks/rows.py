@@ -6,7 +6,7 @@ Limit = float | tuple[float, str]
 """A fixed one, or a factor of a baseline that the same program measures."""
 
 USUAL = {"plain_cpp": 12.0, "plain_python": 34.0}
-"""Of a plain loop on the machine of README.md, "One result", for which fixed limits are meant [ns].
+"""Times of a plain loop on the machine for which fixed limits are meant [ns].
 
 Found in proportion: on another machine, where the copies took 22 ns and the calls 63.5 ns, the
 copies of whole histories (baseline of `history`) took 1.9 times as long, and so did `latest`.

@@ -1,4 +1,4 @@
-"""What the pages of documentation point to is there: links, sections, sources."""
+"""Links, sections and sources that the pages of documentation point to exist."""
 
 import re
 from pathlib import Path

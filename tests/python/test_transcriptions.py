@@ -1,4 +1,4 @@
-"""Every file and function that a model names after "Transcribed from" is in the product."""
+"""Models name what is in the product: each file and function after "Transcribed from" exists."""
 
 import re
 from pathlib import Path
@@ -11,6 +11,12 @@ MODELS = [
     for path in sorted((ROOT / "tests" / "proofs" / "models").rglob("*.*"))
     if path.suffix in {".pml", ".cpp", ".hpp"} and "Transcribed from" in path.read_text()
 ]
+TESTS = [
+    path
+    for path in (ROOT / "tests").rglob("*.*")
+    if path.suffix in {".pml", ".cpp", ".hpp", ".py"} and path != Path(__file__)
+]
+OLD_WORDS = re.compile(r"mourn|\bheirs?\b|offend|offence", re.IGNORECASE)
 TOKEN = re.compile(r"([\w/]+\.[ch]pp)|\(([^)]*)\)")
 
 
@@ -22,14 +28,19 @@ def sentence(model: Path) -> str:
 
 def words(source: Path) -> set[str]:
     """Words of a source and of its header, without comments."""
-    headers = [*ROOT.glob(f"src/*/{source.stem}.hpp"), *ROOT.glob(f"include/o80/*/{source.stem}.hpp")]
+    headers = [
+        *ROOT.glob(f"src/*/{source.stem}.hpp"),
+        *ROOT.glob(f"include/o80/*/{source.stem}.hpp"),
+    ]
     code = "\n".join(file.read_text() for file in (source, *headers))
     return set(re.findall(r"\w+", re.sub(r"//.*", "", code)))
 
 
 def missing(model: Path) -> list[str]:
     """Files and names of a model's sentence that do not exist."""
-    gone, files, folder, complete = [], [], Path(), True
+    gone: list[str] = []
+    files: list[Path] = []
+    folder, complete = Path(), True
     for file, names in TOKEN.findall(sentence(model)):
         if file:
             folder = (ROOT / file).parent if "/" in file else folder
@@ -40,7 +51,7 @@ def missing(model: Path) -> list[str]:
             complete = False
         else:
             complete = True
-            there = set().union(*map(words, files))
+            there = set[str]().union(*map(words, files))
             gone += [name for name in re.findall(r"\w+", names) if name not in there]
     return gone
 
@@ -53,3 +64,7 @@ def test_there_are_transcriptions() -> None:
 def test_a_model_names_what_exists(model: Path) -> None:
     assert TOKEN.search(sentence(model))
     assert not missing(model)
+
+
+def test_old_words_of_the_protocols_are_gone() -> None:
+    assert not [path for path in TESTS if OLD_WORDS.search(path.read_text())]

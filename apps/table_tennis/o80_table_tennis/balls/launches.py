@@ -21,7 +21,7 @@ from .trajectories import BallTrajectory
 FloatArray = NDArray[np.float64]
 
 DURATION = 1.28
-"""Of a simulated shot as cameras would see it: the mean of the recorded ones [s]."""
+"""Duration of a simulated shot as cameras would see it: the mean of the recorded ones [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ class Launch:
 
 
 class LaunchDistribution(Protocol):
-    """What launches are drawn from."""
+    """Distribution that launches are drawn from."""
 
     def draw(self, rng: np.random.Generator) -> Launch:
         """Another launch; the same `rng` gives the same one."""

@@ -26,7 +26,7 @@ WITHIN = 60.0
 SAYS_WITHIN = 0.2
 """From the last row of the killed process to the first one that says that it is missing [s]."""
 ROWS_ON = 20
-"""That each process which goes on must still publish."""
+"""Rows that every surviving process must still publish."""
 LOOK = 0.005
 """[s]"""
 
@@ -49,7 +49,7 @@ class Said:
 
 @dataclass
 class Outcome:
-    """What was seen after a kill."""
+    """Observations after a kill."""
 
     killed: str
     ended_at: int = 0

@@ -36,7 +36,7 @@ SHOWN_EVERY = 0.5
 
 @dataclass
 class Events:
-    """What happened to the processes: a file of JSON lines, and the lines themselves."""
+    """Log of the processes: a file of JSON lines, and the lines themselves."""
 
     settings: LabSettings
 
@@ -183,7 +183,7 @@ def _usage(processes: Processes) -> Mapping[str, float]:
 
 
 def table_of(lab: Lab, loops: Mapping[str, Loop]) -> Table:
-    """What each process does now."""
+    """Table of what each process does now."""
     row = lab.row_of_environment()
     table = Table(title=title_of(row))
     for column in ("process", "rate [1/s]", "asked", "missed", "scheduling", "state"):

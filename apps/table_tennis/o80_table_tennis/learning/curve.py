@@ -18,7 +18,7 @@ class CurvePoint:
     decisions: int
     episodes: int
     motions: int
-    """Of the arm: each episode is one, with a ball of its own."""
+    """Motions of the arm so far: one an episode, with a ball of its own."""
     minutes: float
     """Since the start, on the clock [min]."""
     processor_minutes: float

@@ -77,7 +77,7 @@ def begin_anew(model: PPO) -> None:
 
 
 def set_exploration(model: PPO, settings: LearningSettings) -> None:
-    """That of the decisions made so far, unless it is learned; call it before each rollout."""
+    """Sets the scheduled exploration, unless it is learned; call it before each rollout."""
     value = settings.ppo.log_exploration_at(model.num_timesteps / settings.decisions)
     if value is not None:
         policy: Any = model.policy
@@ -86,7 +86,7 @@ def set_exploration(model: PPO, settings: LearningSettings) -> None:
 
 
 def learning_rate(settings: LearningSettings) -> Callable[[float], float]:
-    """Of the share of the training that is left."""
+    """Learning rate as a function of the share of the training that is left."""
     first, last = settings.ppo.learning_rate, settings.ppo.last_rate
     return lambda left: first * (last + (1.0 - last) * max(float(left), 0.0))
 

@@ -13,10 +13,10 @@ from ..players.conditions import Conditions
 
 @dataclass(frozen=True)
 class PpoSettings:
-    """Of Stable-Baselines3's PPO. `python -m o80_table_tennis.learning.search` tries others."""
+    """Settings of Stable-Baselines3's PPO; `o80_table_tennis.learning.search` tries others."""
 
     environments: int = 32
-    """That are stepped side by side."""
+    """Copies that are stepped side by side."""
     steps: int = 64
     """Decisions of each environment between two updates."""
     batch: int = 512
@@ -91,8 +91,8 @@ class LearningSettings:
     evaluated: int = 100
     """Balls of such an evaluation."""
     actors: int = 0
-    """Of Ray that collect the rollouts, each with its share of the environments; 0: this process
-    does."""
+    """Actors of Ray that collect the rollouts, each with its share of the environments; 0: this
+    process does."""
 
     def __post_init__(self) -> None:
         whole(self.seed, "seed", 0)

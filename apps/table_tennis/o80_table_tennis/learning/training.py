@@ -178,7 +178,7 @@ class Training:
 
 
 class _Updates(BaseCallback):
-    """What happens beside learning: counting, the curve, checkpoints, the end in time."""
+    """Callback for all that is not learning: counting, the curve, checkpoints, the end in time."""
 
     def __init__(self, training: Training, told: Told) -> None:
         super().__init__()

@@ -1,0 +1,95 @@
+"""Docstrings begin with the noun or the verb that they are about.
+
+A docstring such as "Of the motors [1/min]" leaves out the one word that the reader needs. Checked
+are docstrings of modules, classes, functions and attributes, comments of attributes (`#:`), and the
+`///` comments of the installed headers.
+"""
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+FIRST_WORDS = re.compile(r"(Of|That|Those|What|In which) ")
+MARKED = re.compile(r"^(?P<indent>.*?)(?P<mark>#:|///) (?P<text>.*)$")
+FOLDERS = (
+    "apps",
+    "benchmarks",
+    "devices",
+    "examples",
+    "python",
+    "robots",
+    "simulators",
+    "tests",
+    "tools",
+)
+LEFT_OUT = (  # these files are being removed or moved: their docstrings are rewritten there
+    "apps/table_tennis/o80_table_tennis/balls/bounce_fit.py",
+    "apps/table_tennis/o80_table_tennis/balls/launch_fit.py",
+    "apps/table_tennis/o80_table_tennis/learning/search.py",
+    "apps/table_tennis/o80_table_tennis/search.py",
+    "apps/table_tennis/tests/test_launch_fit.py",
+    "apps/table_tennis/tests/test_launcher_shots.py",
+    "benchmarks/growth.py",
+    "benchmarks/stress.py",
+    "benchmarks/vector_parts.py",
+    "python/o80/learning/rollouts/",
+    "tests/python/rollout_ppo.py",
+    "tests/python/test_ray_rollouts.py",
+)
+SOURCES = sorted(
+    path
+    for path in [ROOT / "conftest.py", *(p for f in FOLDERS for p in (ROOT / f).rglob("*.py"))]
+    if "build" not in path.relative_to(ROOT).parts
+    and not str(path.relative_to(ROOT)).startswith(LEFT_OUT)
+)
+DESCRIBED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+HEADERS = sorted((ROOT / "include").rglob("*.hpp"))
+
+
+def docstrings(source: Path) -> Iterator[tuple[int, str]]:
+    """Line and text of each docstring, also of those below attributes."""
+    for node in ast.walk(ast.parse(source.read_text())):
+        before: ast.stmt | None = None
+        for line in getattr(node, "body", []) if isinstance(node, DESCRIBED) else []:
+            described = before is None or isinstance(before, (ast.Assign, ast.AnnAssign))
+            match line:
+                case ast.Expr(value=ast.Constant(value=str(text))) if described:
+                    yield line.lineno, text
+            before = line
+
+
+def comments(source: Path) -> Iterator[tuple[int, str]]:
+    """Line and text of the first line of each `#:` or `///` comment."""
+    before = ""
+    for number, line in enumerate(source.read_text().splitlines(), 1):
+        found = MARKED.match(line)
+        if found and not (before and not found["indent"].strip()):
+            yield number, found["text"]
+        before = found["mark"] if found else ""
+
+
+def wrong(source: Path) -> list[str]:
+    texts = [*comments(source), *(docstrings(source) if source.suffix == ".py" else ())]
+    name = source.relative_to(ROOT)
+    return [f"{name}:{line}: {text}" for line, text in texts if FIRST_WORDS.match(text.lstrip())]
+
+
+def test_there_are_sources() -> None:
+    assert len(SOURCES) > 400
+    assert len(HEADERS) > 50
+
+
+@pytest.mark.parametrize("folder", [*FOLDERS, "conftest.py"])
+def test_docstrings_begin_with_their_noun_or_verb(folder: str) -> None:
+    found = [source for source in SOURCES if source.relative_to(ROOT).parts[0] == folder]
+
+    assert found
+    assert not [text for source in found for text in wrong(source)]
+
+
+def test_comments_of_headers_begin_with_their_noun_or_verb() -> None:
+    assert not [text for header in HEADERS for text in wrong(header)]
