@@ -81,9 +81,7 @@ class Recorder:
         self._infos.append({name: _entry(infos["final_info"], name)[over] for name in self._names})
         sums.restart(over)
 
-    def rollout(
-        self, observations: NDArray[Any], *, worker: int, iteration: int, begun: int
-    ) -> Rollout:
+    def rollout(self, observations: NDArray[Any]) -> Rollout:
         """The rollout; `observations` are those after its last step."""
         self._observations[-1] = observations
         steps, copies, rewards, lengths, last = (
@@ -96,9 +94,6 @@ class Recorder:
             for name in self._names
         }
         rollout = Rollout(
-            worker,
-            iteration,
-            begun,
             self._observations,
             self._actions,
             self._log_probabilities,
@@ -108,7 +103,7 @@ class Recorder:
             Ends(steps, copies, rewards, lengths, last, infos),
         )
         for _, array in arrays_of(rollout):
-            array.flags.writeable = False  # as Ray's are, so that both behave alike
+            array.flags.writeable = False  # as arrays that come from Ray are
         return rollout
 
 
