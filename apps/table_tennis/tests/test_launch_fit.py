@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 from recorded_rows import ball_gun_shots
 
-from o80_table_tennis.balls.launch_fit import (
+from launch_fit import (
     LAUNCH,
     NAMES,
     fitted,

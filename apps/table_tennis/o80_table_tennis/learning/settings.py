@@ -13,7 +13,7 @@ from ..players.conditions import Conditions
 
 @dataclass(frozen=True)
 class PpoSettings:
-    """Of Stable-Baselines3's PPO. `python -m o80_table_tennis.learning.search` tries others."""
+    """Of Stable-Baselines3's PPO; studies/search_settings.py tries others."""
 
     environments: int = 32
     """That are stepped side by side."""

@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..physics.aerodynamics import AERODYNAMICS, Aerodynamics
-from ..physics.impact import bounced
-from ..world.table import TABLE, Table
-from .flight_fit import FlightFit
+from o80_table_tennis.balls.flight_fit import FlightFit
+from o80_table_tennis.physics.aerodynamics import AERODYNAMICS, Aerodynamics
+from o80_table_tennis.physics.impact import bounced
+from o80_table_tennis.world.table import TABLE, Table
 
 FloatArray = NDArray[np.float64]
 

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..physics.prediction import predict, predict_crossing
-from .flight_fit import FlightFit
-from .launches import Launch
-from .trajectories import BallTrajectory
+from o80_table_tennis.balls.flight_fit import FlightFit
+from o80_table_tennis.balls.launches import Launch
+from o80_table_tennis.balls.trajectories import BallTrajectory
+from o80_table_tennis.physics.prediction import predict, predict_crossing
 
 FloatArray = NDArray[np.float64]
 
