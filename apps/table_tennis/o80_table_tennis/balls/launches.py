@@ -102,7 +102,7 @@ NARROW = NormalLaunches(
     ),
 )
 """Like the recorded shots of the ball gun: fitted to 40 of them, tested on the other 40, by
-`python -m o80_table_tennis.fit_launches`."""
+studies/fit_launches.py."""
 
 
 @dataclass(frozen=True)

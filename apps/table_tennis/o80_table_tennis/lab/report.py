@@ -46,7 +46,6 @@ def write_report(
     settings: LabSettings,
     loops: Mapping[str, Loop],
     usage: Mapping[str, float],
-    cyclictest: Mapping[str, Any],
     seconds: float,
 ) -> dict[str, Any]:
     """Writes the report, and returns what it holds."""
@@ -62,7 +61,6 @@ def write_report(
         "tracking_error_mm": _tracking_error(rows),
         "motion_capture_error_mm": _motion_capture_error(rows),
         "launcher": _launcher(rows),
-        "cyclictest": dict(cyclictest),
         "seconds": round(seconds, 1),
         "settings": {"policy": settings.policy, "seed": settings.seed, "balls": settings.balls},
         "wanted": _wanted(processes),

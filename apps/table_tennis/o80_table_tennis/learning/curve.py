@@ -32,8 +32,7 @@ class CurvePoint:
     restarts: int
     """Networks that were replaced by new ones, because they had got stuck."""
     environment: float
-    """Share of the processor time that the environments took, without evaluations; NaN if actors
-    stepped them."""
+    """Share of the processor time that the environments took, without evaluations."""
     evaluated_touched: float = NOT_EVALUATED
     """The same without exploration, on balls of their own; not in every row."""
     evaluated_returned: float = NOT_EVALUATED

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 import o80
 from o80_devices.ball_tracking.ball_row import Reason as TrackerReason
 from o80_devices.motion_capture.sensor import Reason as CaptureReason
-
-from .parts import (
+from o80_table_tennis.lab.parts import (
     ARM,
     CAMERAS,
     ENVIRONMENT,
