@@ -216,7 +216,7 @@ class _Visible:
             self._infos.setdefault(step, {})[copy] = info
 
     def infos(self, step: int) -> list[Info]:
-        """Infos of all copies as Stable-Baselines3 wants them, with entries where an episode ended."""
+        """Infos of all copies, for Stable-Baselines3: with entries where an episode ended."""
         ended = self._infos.get(step, {})
         return [ended.get(copy, {}) for copy in range(self.rewards.shape[1])]
 
