@@ -111,8 +111,8 @@ void bind_raw(nb::module_& m) {
            nb::sig("def read(self, most: int) "
                    "-> tuple[bytes, int, int, bool, list[tuple[str, int]]]"));
   nb::class_<o80::RecordedJournal>(m, "RecordedJournal")
-      .def(nb::init<std::shared_ptr<const o80::Description>, std::uint64_t>(), "description"_a,
-           "first"_a)
+      .def(nb::init<std::shared_ptr<const o80::Description>, std::uint64_t, bool>(),
+           "description"_a, "first"_a, "rests"_a = false)
       .def("decode", &decoded, "entries"_a, "codec"_a);
   m.attr("JOURNAL_CODEC") = o80::kJournalCodec;
 }

@@ -81,6 +81,9 @@ void bind_replay(nb::module_& m) {
                       "Repeats a recorded run without its driver: see o80.replaying.")
       .def("__init__", &make_without_driver, "description"_a, "segment"_a, "loop"_a, "period"_a)
       .def(
+          "begin_at_rest",
+          [](WithoutDriver& self, std::int64_t row) { self.open().begin_at_rest(row); }, "row"_a)
+      .def(
           "run",
           [](WithoutDriver& self, nb::handle rows) {
             o80::DriverlessReplay& replay = self.open();

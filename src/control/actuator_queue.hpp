@@ -95,6 +95,11 @@ class ActuatorQueue {
   bool holds() const noexcept { return motion_.holds(); }
   /// True if an iteration without a command would change nothing.
   bool at_rest() const noexcept { return motion_.at_rest(follows()); }
+  /// True without a command, if the next one depends on nothing but the desired state.
+  bool shows_all() noexcept {
+    return empty() && !holds() && motion_.is_published(desired_) &&
+           (!in_force_ || layout_->same(desired_, motion_.target(), mask()));
+  }
   /// True if nothing moves.
   bool rests() const noexcept { return follows() ? at_rest() : motion_.rests(); }
   /// True if a command of this lane is queued or running, or its direct value is still held.
@@ -113,8 +118,8 @@ class ActuatorQueue {
     layout_->copy_finite(desired_, state);
     motion_.trace(desired_);
   }
-  /// For an idle actuator that follows: the observed state becomes the desired one, except for
-  /// numbers with a rest value, which go to it. True while one of these moves.
+  /// For an idle actuator that follows: numbers without a rest value become the observed ones, the
+  /// others go to it. True while one of these moves.
   bool follow(const std::byte* observed) noexcept {
     layout_->copy_finite(desired_, observed);
     in_force_ = false;

@@ -95,9 +95,9 @@ class Controller {
     for (std::uint32_t i = 0; i < actuators_.size(); ++i) actuators_[i].trace(of(i, desired));
   }
 
-  /// Checks the records of a complete batch in the pool before it is due, about `budget` blocks,
-  /// and reduces `budget` by them. True when all are checked. The batches of one lane are checked
-  /// one after the other. take() checks the rest.
+  /// Checks about `budget` blocks of a complete batch before it is due, and reduces `budget` by
+  /// them. True when all are checked. A lane has its batches checked in turn; take() checks the
+  /// rest.
   bool check(std::uint32_t lane, BlockIndex batch, std::uint32_t& budget) noexcept {
     return planner_.check(lane, batch, budget);
   }
@@ -197,6 +197,11 @@ class Controller {
   /// True if a command is running or queued; O(actuators).
   bool active() const noexcept {
     return any([](const ActuatorQueue& queue) { return !queue.empty(); });
+  }
+  /// True if nothing acts, and a restart() with the desired block would change nothing later.
+  bool shows_all() noexcept {
+    return !pending() && std::ranges::all_of(busy_, [](std::uint64_t word) { return word == 0; }) &&
+           std::ranges::all_of(actuators_, &ActuatorQueue::shows_all);
   }
   /// True if a direct value keeps a number away from its rest value; O(actuators).
   bool holds() const noexcept { return any(&ActuatorQueue::holds); }

@@ -171,6 +171,12 @@ class Motion {
   bool at_rest(bool follows) const noexcept {
     return all([&](auto& each) { return (follows && !each.has_rest()) || each.at_rest(); });
   }
+  /// True if no number was rounded when it was written to `state`.
+  bool is_published(const std::byte* state) const noexcept {
+    return std::ranges::all_of(numbers_, [&](const Number& each) {
+      return layout_.number(each.number, state) == each.motion.position();
+    });
+  }
   /// True if nothing moves, as far as limits of acceleration tell.
   bool rests() const noexcept {
     return all([](auto& each) { return each.rests(); });

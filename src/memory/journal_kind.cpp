@@ -29,7 +29,8 @@ std::string_view to_text(JournalKind kind) noexcept {
                                                                          "stopping",
                                                                          "ended",
                                                                          "statuses",
-                                                                         "snapshot"};
+                                                                         "snapshot",
+                                                                         "at_rest"};
   const auto i = static_cast<std::size_t>(kind);
   return i < kTexts.size() ? kTexts[i] : "unknown";
 }

@@ -326,7 +326,7 @@ bool UntypedBackend::Body::publish_first() noexcept {
 
 void UntypedBackend::Body::publish(bool fresh) noexcept {
   if (!begun_) {
-    controller.restart(row() + layout.observed, nullptr, current);
+    controller.restart(row() + layout.observed, begins_with, current);
     if (recorded_ == nullptr) {
       watch_halt();
     } else {
@@ -368,6 +368,7 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
     controller.finish_pending();
     under_way_ = false;
     count_burst();
+    if (journal.has_acted() && is_at_rest()) journal.at_rest();
   }
   journal.flush();
   wake_sleepers(segment.view(),
@@ -423,7 +424,10 @@ bool UntypedBackend::publish() noexcept {
   return true;
 }
 
-void UntypedBackend::begin_at(Iteration first) noexcept { body_->current = first; }
+void UntypedBackend::begin_at(Iteration first, const std::byte* desired) noexcept {
+  body_->current = first;
+  body_->begins_with = desired;
+}
 
 Step UntypedBackend::step() noexcept { return step_within(kForEver); }
 Step UntypedBackend::try_step() noexcept { return step_within(0); }

@@ -212,6 +212,7 @@ void UntypedBackend::Body::take(const StagedBatch& sent) noexcept {
 void UntypedBackend::Body::take_checked(const StagedBatch& sent) noexcept {
   taking_owner_ = sent.had_left ? 0 : sent.incarnation;
   deciding_ = &sent;
+  if (pool.batch(sent.batch).records > 0) journal.acts();
   controller.take(sent.lane, sent.batch, *this);
   deciding_ = nullptr;
 }

@@ -87,6 +87,8 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   void end_request(std::uint32_t request, const Served& how) noexcept;
   Step brake() noexcept;
   void interrupt(std::uint32_t actuator) noexcept;
+  /// True if nothing acts, and the row shows all that later desired states depend on.
+  bool is_at_rest() noexcept { return !halts.acts() && !running.any() && controller.shows_all(); }
   bool acts() const noexcept { return shown_acts_ != 0 || controller.active() || running.moves(); }
   void set_timing(const Timing& now) noexcept;
   std::int64_t time() const noexcept {
@@ -115,6 +117,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   std::array<char, 248> failure{};
   bool unreadable = false;  // a fresh start failed
   Iteration current = 0;    // the current iteration; between two iterations, the next one
+  const std::byte* begins_with = nullptr;  // first desired states; null: the observed ones
 
  private:
   // batches => controller

@@ -10,7 +10,7 @@
 namespace o80 {
 
 DecisionJournal::DecisionJournal(const SegmentView& view)
-    : writer_(view), view_(view), named_(view.shape.lanes) {}
+    : writer_(view), view_(view), named_(view.shape.lanes), acts_(writer_.is_on()) {}
 
 void DecisionJournal::begin_blocks(std::uint32_t lane, std::uint64_t sender,
                                    std::uint32_t most) noexcept {
@@ -94,12 +94,14 @@ void DecisionJournal::write_statuses() noexcept {
 }
 
 void DecisionJournal::halt(JournalKind halt_or_reason, const Halt& halt) noexcept {
+  acts();
   const JournalHalt payload{static_cast<std::uint64_t>(halt.cause), halt.who, halt.text};
   write(head(halt_or_reason, 0, halt.number), &payload, sizeof payload);
 }
 
 void DecisionJournal::resume(std::uint32_t lane, std::uint64_t sender,
                              std::uint64_t halt) noexcept {
+  acts();
   name_again(lane, sender);
   const JournalSender payload{sender};
   write(head(JournalKind::resume, lane, halt), &payload, sizeof payload);
@@ -123,11 +125,13 @@ void DecisionJournal::kept(const KeptState& state) noexcept {
 }
 
 void DecisionJournal::died(std::uint32_t lane, std::uint64_t owner, Stale stale) noexcept {
+  acts();
   name_again(lane, owner);
   note(JournalKind::died, lane, owner, static_cast<std::uint32_t>(stale));
 }
 
 void DecisionJournal::silent(std::uint32_t lane, std::uint64_t owner, Stale stale) noexcept {
+  acts();
   name_again(lane, owner);
   note(JournalKind::silent, lane, owner, static_cast<std::uint32_t>(stale));
 }

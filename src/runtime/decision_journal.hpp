@@ -69,6 +69,17 @@ class DecisionJournal {
  public:
   explicit DecisionJournal(const SegmentView& view);
 
+  // rows in which nothing acts
+  /// Something acts from now on, which another entry tells.
+  void acts() noexcept { acts_ = is_on(); }
+  /// True if something has acted since the last at_rest().
+  bool has_acted() const noexcept { return acts_; }
+  /// Nothing acts any more, and the row of this iteration shows the whole state of the controller.
+  void at_rest() noexcept {
+    acts_ = false;
+    note(JournalKind::at_rest, 0, 0);
+  }
+
   // batches
   /// The blocks of a batch, while they are copied: begin, add each, end. `first`: index of the
   /// first of them. `sender`: incarnation that sends, 0 if it has left.
@@ -91,12 +102,16 @@ class DecisionJournal {
   // halts
   void halt(JournalKind halt_or_reason, const Halt& halt) noexcept;
   void resume(std::uint32_t lane, std::uint64_t sender, std::uint64_t halt) noexcept;
-  void fresh_start(std::uint32_t lane) noexcept { note(JournalKind::fresh_start, lane, 0); }
+  void fresh_start(std::uint32_t lane) noexcept {
+    acts();
+    note(JournalKind::fresh_start, lane, 0);
+  }
   /// A snapshot of the driver; left out if it is larger than an entry may be.
   void kept(const KeptState& state) noexcept;
   bool is_on() const noexcept { return writer_.is_on(); }
   /// `before_step`: before the desired states of this iteration were computed.
   void interrupted(std::uint32_t actuator, bool before_step) noexcept {
+    acts();
     note(JournalKind::interrupted, 0, actuator, before_step ? 1 : 0);
   }
 
@@ -115,7 +130,10 @@ class DecisionJournal {
                    BurstEnd how) noexcept;
 
   // ends
-  void stopping() noexcept { note(JournalKind::stopping, 0, 0); }
+  void stopping() noexcept {
+    acts();
+    note(JournalKind::stopping, 0, 0);
+  }
   void ended(BackendState state, std::string_view text) noexcept;
 
   /// Sets the iteration of the following entries.
@@ -164,6 +182,7 @@ class DecisionJournal {
   std::uint32_t statuses_ = 0;
   std::uint32_t status_lane_ = 0;
   Iteration iteration_ = 0;
+  bool acts_;
 };
 
 }  // namespace o80

@@ -36,6 +36,12 @@ void DriverlessReplay::begin_at(Iteration first) noexcept {
   backend_.begin_at(first - 1);
 }
 
+void DriverlessReplay::begin_at_rest(Iteration row) noexcept {
+  at_rest_ = true;
+  start_ = row;
+  backend_.begin_at(row);
+}
+
 void DriverlessReplay::add(const JournalEntry& entry) {
   check_recorded(entry, backend_.schema(), lanes_);
   recorded_.add(entry);
@@ -58,6 +64,7 @@ bool DriverlessReplay::run(std::span<const std::byte> rows) {
   }
   recorded_.set_times(next(), times);
   const Iteration last = first_ + static_cast<Iteration>(count) - 1;
+  if (!started_ && at_rest_) backend_.begin_at(start_, rows.data() + backend_.layout().desired);
   if (!std::exchange(started_, true) && !publish()) return false;
   while (next() <= last) {
     if (backend_.step() == Step::ended || !publish()) return false;

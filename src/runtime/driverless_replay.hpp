@@ -29,6 +29,9 @@ class DriverlessReplay final : private RequestServer {
   /// it, and obeys the decisions from the entry of the fresh start on. Call it before `add` and
   /// `run`.
   void begin_at(Iteration first) noexcept;
+  /// Begins with this row, in which nothing acts: `run` first publishes it, with its recorded
+  /// desired states.
+  void begin_at_rest(Iteration row) noexcept;
   /// Adds the next entry of the recorded journal. Add all of an iteration before it runs. Throws
   /// InvalidArgument for an entry that no backend writes.
   void add(const JournalEntry& entry);
@@ -60,6 +63,7 @@ class DriverlessReplay final : private RequestServer {
   Iteration first_ = 0;                // iteration of the first of them
   Iteration start_ = 0;                // first iteration of the replay
   bool started_ = false;
+  bool at_rest_ = false;  // in the row start_
 };
 
 }  // namespace o80

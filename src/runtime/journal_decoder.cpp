@@ -76,6 +76,9 @@ void JournalDecoder::take() {
       entries_ = statuses_.size();
       returned_ = number < first_ ? std::min<std::uint64_t>(first_ - number, entries_) : 0;
       break;
+    case JournalKind::at_rest:
+      entries_ = shows_rests_ ? 1 : 0;
+      break;
     default:
       entries_ = 1;
       break;
@@ -224,6 +227,7 @@ void JournalDecoder::fill(JournalEntry& entry) {
       break;
     case JournalKind::order_lost:
     case JournalKind::stopping:
+    case JournalKind::at_rest:
       entry.lane = JournalEntry::kNoLane;
       break;
     default:

@@ -24,6 +24,8 @@ class JournalDecoder {
   explicit JournalDecoder(std::shared_ptr<const Description> description,
                           std::uint64_t most_kept = ~std::uint64_t{0});
 
+  /// Also returns the entries `at_rest`.
+  void show_rests() noexcept { shows_rests_ = true; }
   /// Entries before this number are not returned. Forgets all batches.
   void start_at(std::uint64_t number);
 
@@ -68,6 +70,7 @@ class JournalDecoder {
   std::uint64_t missed_ = 0;  // entries missed since the last one returned
   Batches batches_;
   std::uint64_t kept_bytes_ = 0;
+  bool shows_rests_ = false;
   std::map<BatchKey, std::string> names_;  // by lane and incarnation
 };
 

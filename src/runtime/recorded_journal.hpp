@@ -14,10 +14,12 @@ namespace o80 {
 /// Decodes the entries of a journal in a recording, of any version of its format.
 class RecordedJournal {
  public:
-  /// `first`: number of the first entry to return.
-  explicit RecordedJournal(std::shared_ptr<const Description> description, std::uint64_t first = 0)
+  /// `first`: number of the first entry to return. `rests`: also entries `at_rest`.
+  explicit RecordedJournal(std::shared_ptr<const Description> description, std::uint64_t first = 0,
+                           bool rests = false)
       : decoder_(std::move(description)) {
     decoder_.start_at(first);
+    if (rests) decoder_.show_rests();
   }
 
   /// Appends the entries in `bytes`, which follow those of the last call. `codec`: version of their

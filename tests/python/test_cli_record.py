@@ -77,7 +77,7 @@ def test_a_robot_that_runs_is_recorded_from_row_0_and_replays(
     assert report.identical, report
     assert report.runs[0].rows > 300
     from_now = recorded(process.segment, tmp_path / "now.mcap", "--from-now")
-    assert "(--from-now): a replay begins at the next reset or restored snapshot" in from_now
+    assert "(--from-now): a replay begins at the next reset or restored snapshot, or" in from_now
     first = int(o80.open(tmp_path / "now.mcap")[process.segment].history().iteration[0])
     assert first > 300
     assert f"is recorded from row {first} " in from_now

@@ -162,6 +162,84 @@ def test_an_actuator_that_left_a_command_because_of_its_reading_leaves_it_again(
     assert report.identical, report
 
 
+def send_anything(arm: o80.Frontend, choose: random.Random) -> o80.Batch:
+    """Commands of every kind, some of them without effect."""
+    for _ in range(choose.randrange(1, 3)):
+        pace: dict[str, Any] = choose.choice(
+            [{}, {}, {"iterations": choose.randrange(1, 9)}, {"duration": 0.0035}, {"speed": 200.0}]
+        )
+        if not pace and choose.random() < 0.5:
+            pace = {"profile": "as_sent"}
+        place = choose.choice([-1.0, 0.0, 0.1, choose.uniform(-2.5, 2.5)])
+        names = choose.sample(NAMES, 1) if "speed" in pace else choose.sample(NAMES, 2)
+        mode = choose.choice(["queue", "overwrite"])
+        arm.add_command(names, [{"position": place}] * len(names), mode=mode, **pace)
+    if choose.random() < 0.2:
+        arm.add_purge(choose.choice(NAMES))
+    return arm.pulse()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_it_begins_at_any_row_in_which_nothing_acts(segment: str, seed: int) -> None:
+    choose = random.Random(seed)
+    limit = o80.Limits(minimum=-3.0, maximum=3.0, speed=400.0, acceleration=50000.0, jerk=1e8)
+    with o80.Backend(
+        segment,
+        NAMES,
+        JOINT,
+        limits={"shoulder": {"position": limit}, "elbow": {"position": o80.Limits(speed=300.0)}},
+        rests_at={"elbow": {"velocity": 0.0}},
+        when_idle={"wrist": "follow"},
+    ) as backend:
+        place = np.zeros(3, [("position", float), ("velocity", float)])
+        backend.publish(place)
+        at_rest = []
+        calm = 0  # rows until this one
+        with o80.Frontend(segment) as arm:
+            batches: list[o80.Batch] = []
+            for row in range(1, 400):
+                if choose.random() < 0.04:
+                    batches.append(send_anything(arm, choose))
+                if choose.random() < 0.01:
+                    backend.interrupt(choose.choice(NAMES))
+                place[:] = backend.step()
+                place["position"] += choose.choice([0.0, 0.0, choose.gauss(0, 0.01)])
+                backend.publish(place)
+                batches = [batch for batch in batches if not batch.ended]
+                shown = arm.latest()
+                masks = shown.active.any() or shown.clamped.any() or shown.braking.any()
+                decided = any(entry.iteration == row for entry in arm.journal())
+                calm = 0 if batches or masks or decided else calm + 1
+                if calm > 1:  # in the first one, a motion may still have an acceleration
+                    at_rest.append(row)
+        with o80.Frontend(segment, read_only=True, dead=True) as arm:
+            for row in choose.sample(at_rest, 20):
+                (run,) = o80.replay(arm, since=row)
+                assert run.identical, run
+                assert f"the replay begins at rest in row {row}" in run.notes
+                assert run.rows == 400 - row
+
+
+def test_a_recording_that_begins_late_is_replayed_from_where_nothing_acts(
+    segment: str, tmp_path: Path
+) -> None:
+    """It moved before, and its first rows were overwritten."""
+    path = tmp_path / "run.mcap"
+    with o80.robots.load("two_joints").inline(segment, history=64) as arm:
+        arm.add_command("elbow", 0.5, iterations=20)
+        arm.burst(300)
+        with o80.Recording(path, arm):
+            arm.add_command("elbow", 0.1, iterations=20)
+            arm.burst(30)
+    (recorded,) = runs_in(o80.open(path))
+    assert next(recorded.blocks()).iteration[0] > 200
+    (run,) = o80.replay(path, driver=False)
+    assert run.identical, run
+    assert run.rows > 60
+    done = o80_replay(str(path))
+    assert "--without-driver" in done.stdout, done.stdout
+
+
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of a robot of the world."""
@@ -226,11 +304,18 @@ def test_a_changed_decision_is_found(recorded: Path) -> None:
 
 def test_it_begins_at_a_fresh_start(recorded: Path) -> None:
     (run,) = runs_in(o80.open(recorded))
-    report = o80.replay(recorded, since=run.rows // 2)
-    (found,) = report
-    assert report.identical, report
-    assert 0 < found.rows < run.rows
-    assert any("begins with the fresh start" in note for note in found.notes)
+    fresh = [
+        int(row)
+        for block in run.blocks()
+        for row in block.iteration[(block.rows["fresh"] != 0) & (block.rows["halted"] == 0)]
+    ]
+    for row in fresh:
+        (found,) = report = o80.replay(recorded, since=row)
+        assert report.identical, report
+        assert 0 < found.rows < run.rows
+        if f"the replay begins with the fresh start of row {row}" in found.notes:
+            return
+    raise AssertionError("no replay began with a fresh start")
 
 
 def test_the_command_says_what_was_compared(recorded: Path) -> None:

@@ -32,9 +32,10 @@ enum class JournalKind : std::uint8_t {
   stopping,     // all commands were purged; the robot brakes before it stops
   ended,        // the backend has ended
   statuses,     // many of `status` in one entry; readers get each of them
-  snapshot      // the driver keeps its state in a slot: the state
+  snapshot,     // the driver keeps its state in a slot: the state
+  at_rest       // nothing acts from this row on; for replays, readers do not get it
 };
-inline constexpr std::size_t kJournalKinds = static_cast<std::size_t>(JournalKind::snapshot) + 1;
+inline constexpr std::size_t kJournalKinds = static_cast<std::size_t>(JournalKind::at_rest) + 1;
 
 std::string_view to_text(JournalKind kind) noexcept;
 

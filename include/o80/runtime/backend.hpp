@@ -121,8 +121,9 @@ class UntypedBackend {
   /// backend ends. `failure` names the number.
   bool publish() noexcept;
 
-  /// Replay only: sets the first iteration (default 0). Call it before `publish`.
-  void begin_at(Iteration first) noexcept;
+  /// Replay only: sets the first iteration (default 0), with these desired states instead of the
+  /// observed ones; `desired` is read by the next `publish`. Call it before that.
+  void begin_at(Iteration first, const std::byte* desired = nullptr) noexcept;
   /// Begins an iteration: commands => desired. In bursting mode `step` waits for a burst,
   /// `try_step` does not.
   Step step() noexcept;

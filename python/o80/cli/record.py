@@ -124,8 +124,12 @@ def _replay_text(source: Source, frontend: Frontend, from_now: bool) -> str:
             f"is recorded from row {source.begin}, because earlier ones were overwritten (a longer "
             f"--history keeps more)"
         )
-    beginning = "resume" if alone else "reset or restored snapshot"
-    return f"{why}: a replay{alone} begins at the next {beginning}"
+    if alone:
+        return f"{why}: a replay without its driver begins at the first row in which nothing acts"
+    return (
+        f"{why}: a replay begins at the next reset or restored snapshot, or, with "
+        f"--without-driver, at the first row in which nothing acts"
+    )
 
 
 class _Report:

@@ -285,9 +285,14 @@ class RecordedEpoch:
         decoder = EntryDecoder(self.schema)
         return [decoder.entry(entry) for entry in self.native_journal(since)]
 
-    def native_journal(self, since: int = 0) -> Iterator[_core.JournalEntry]:
-        """The same before their conversion to Python, read as they are needed: for a replay."""
-        native = _core.RecordedJournal(self.description, whole(since, "since", 0))
+    def native_journal(
+        self, since: int = 0, *, rests: bool = False
+    ) -> Iterator[_core.JournalEntry]:
+        """The same before their conversion to Python, read as they are needed.
+
+        rests: with the rows from which on nothing acts, for a replay.
+        """
+        native = _core.RecordedJournal(self.description, whole(since, "since", 0), rests)
         try:
             for entries in self.journal_parts():
                 yield from native.decode(entries.content, entries.codec)

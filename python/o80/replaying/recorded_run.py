@@ -58,7 +58,7 @@ class RecordedRun(Protocol):
         """Rows in their order, a few thousand at a time."""
 
     def entries(self) -> Iterator[_core.JournalEntry]:
-        """The journal in its order."""
+        """The journal in its order, with its entries `at_rest`."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ class LiveRun:
             raise InvalidArgument(
                 f"'{self.segment}' was started without a journal (journal=0): replay needs it"
             )
-        native = _core.RecordedJournal(self.frontend._description, 0)
+        native = _core.RecordedJournal(self.frontend._description, 0, rests=True)
         while content := journal.read(_BYTES_AT_ONCE)[0]:
             yield from native.decode(content, _core.JOURNAL_CODEC)
 
@@ -157,7 +157,7 @@ class FileRun:
                 f"the recording has no journal of '{self.segment}', which a replay needs: its "
                 f"robot was started without one, or an older o80 recorded it"
             )
-        return self.epoch.native_journal()
+        return self.epoch.native_journal(rests=True)
 
 
 def runs_in(recording: RecordingFile, segment: str | None = None) -> list[FileRun]:

@@ -32,7 +32,7 @@ from o80.replaying.recorded_run import ROWS_AT_ONCE, LiveRun, RecordedRun, runs_
 from o80.replaying.report import ReplayReport, RunReport
 from o80.replaying.runner import Runner, with_driver, without_driver
 from o80.replaying.same_bytes import same_bytes
-from o80.replaying.start import Requests, SlotsKept, Start, find_fresh_start, find_start
+from o80.replaying.start import Requests, SlotsKept, Start, find_fresh_start, find_rest, find_start
 
 if TYPE_CHECKING:
     from o80.history import History
@@ -69,7 +69,8 @@ def replay(
         another build of o80, C library or processor recorded the run; a note in the report says so.
         {}: bit for bit.
     since: begin at the first reset or restored snapshot in this iteration or later. None: at row 0,
-        or at the first of these that the recording holds.
+        or at the first of these that the recording holds. Without a driver: at the first row in
+        which nothing acts, or at the first fresh start.
     driver: False starts no robot, as for hardware.
     progress: called with the name of a run, its rows compared, and all its rows.
 
@@ -173,7 +174,8 @@ class _RunReplay:
             return None
         self._start = start
         if start.row > 0:
-            self._notes.append(f"the replay begins with the {start.request} of row {start.row}")
+            begins = "at rest in" if start.is_at_rest else f"with the {start.request} of"
+            self._notes.append(f"the replay begins {begins} row {start.row}")
         # without a driver, a restored snapshot is read as any other row
         known = Start() if self._no_driver else start
         rules = self._motion_rules()
@@ -217,8 +219,7 @@ class _RunReplay:
             entry = next(iter(self._run.entries()), None)
             if entry is None or not entry.missed:
                 return Start()
-        find = find_fresh_start if self._no_driver else find_start
-        found = find(self._run, max(first, self._since or 0))
+        found = self._first_start(max(first, self._since or 0))
         if found is None and first == 0 and self._since is None:
             return Start()  # says what the journal lacks
         if found is None and self._since is not None:
@@ -229,10 +230,25 @@ class _RunReplay:
                 f"{self._beginnings(', or at a ')}, and none is recorded. Record before the "
                 f"robot overwrites its first rows (--history), and without --from-now"
             )
+        if found is None and not self._no_driver:
+            self._gap += (
+                ". Without its driver (--without-driver, in Python driver=False) a replay may "
+                "also begin at a row in which nothing acts"
+            )
         return found
 
+    def _first_start(self, since: int) -> Start | None:
+        if not self._no_driver:
+            return find_start(self._run, since)
+        found = (find(self._run, since) for find in (find_rest, find_fresh_start))
+        return min((each for each in found if each), key=lambda each: each.row, default=None)
+
     def _beginnings(self, between: str) -> str:
-        begins = ["reset", "resume"] if self._no_driver else ["reset", "restored snapshot"]
+        begins = (
+            ["row at rest", "reset", "resume"]
+            if self._no_driver
+            else ["reset", "restored snapshot"]
+        )
         return between.join(begins)
 
     @staticmethod

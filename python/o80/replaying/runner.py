@@ -35,6 +35,10 @@ class Runner:
         """Begins at this row."""
         if start.row == 0:
             return
+        if start.is_at_rest:
+            assert isinstance(self.native, _core.DriverlessReplay)
+            self.native.begin_at_rest(start.row)
+            return
         self.native.begin_at(start.row)
         if isinstance(self.native, _core.Replay):
             for slot, state in start.snapshots.items():

@@ -1,4 +1,7 @@
-"""Where a replay can begin: at row 0, at a reset, or at a restored snapshot that is recorded."""
+"""Where a replay can begin: at row 0, at a reset, or at a restored snapshot that is recorded.
+
+Without a driver: at row 0, at a fresh start, or at a row in which nothing acts.
+"""
 
 from __future__ import annotations
 
@@ -20,8 +23,9 @@ class Start:
 
     row: int = 0
     entry: int = 0  #: number of the first entry of the journal to obey
-    request: str = ""  #: that began it: "reset" or "restore"; empty at row 0
+    request: str = ""  #: that began it: "reset" or "restore"; empty at row 0 and at rest
     snapshots: dict[int, bytes] = field(default_factory=dict)  #: by slot
+    is_at_rest: bool = False  #: nothing acts in this row
 
 
 class Requests:
@@ -109,6 +113,52 @@ def find_fresh_start(run: RecordedRun, since: int) -> Start | None:
             if is_alone and entry.iteration >= since:
                 return Start(entry.iteration, entry.number, "fresh start")
     return None
+
+
+def find_rest(run: RecordedRun, since: int) -> Start | None:
+    """For a replay without a driver: the first row at `since` or later in which nothing acts.
+
+    The journal marks where such rows begin; they end before the next entry by which something acts.
+    The masks of the row must be clear, as those of a backend that begins.
+    """
+    ranges = [each for each in _rests(run.entries()) if each[1] >= since]
+    for block in run.blocks():
+        calm = (block.rows["fresh"] == 0) & (block.rows["halted"] == 0)
+        calm &= block.iteration >= since
+        for mask in ("active", "clamped", "braking"):
+            calm &= ~getattr(block, mask).any(axis=1)
+        rows = block.iteration[calm]
+        ranges = [each for each in ranges if len(block) == 0 or each[1] >= block.iteration[0]]
+        for begin, end, number in ranges:
+            if len(rows) == 0 or begin > rows[-1]:
+                break
+            found = rows[(rows >= begin) & (rows <= end)]
+            if len(found):
+                return Start(int(found[0]), number, is_at_rest=True)
+    return None
+
+
+_ACTS = {"halt", "resume", "died", "silent", "interrupted", "fresh_start", "stopping", "ended"}
+
+
+def _rests(entries: Iterator[_core.JournalEntry]) -> Iterator[tuple[int, int, int]]:
+    """First row, last row, and number of the mark of each stretch in which nothing acts."""
+    began: _core.JournalEntry | None = None
+    newest = -1
+    for entry in entries:
+        acts = entry.kind in _ACTS or (
+            entry.kind == "taken" and (len(entry.records) > 0 or entry.records_lost)
+        )
+        if began is not None and (acts or entry.missed):
+            # something may have acted in the iteration of the last entry before those missed
+            last = max(began.iteration, newest - 1) if entry.missed else entry.iteration - 1
+            yield began.iteration, last, began.number
+            began = None
+        newest = max(newest, entry.iteration)
+        if entry.kind == "at_rest":
+            began = entry
+    if began is not None:
+        yield began.iteration, 2**62, began.number
 
 
 def _restores(snapshots: dict[int, bytes]) -> list[tuple[str, int]]:
