@@ -1,5 +1,5 @@
 # Everything made lies in .venv and build/. Options go through ARGS="...".
-.PHONY: demo learn test check soak wheel scripts torture model fuzz rt systemd bench growth stress format clean distclean
+.PHONY: demo learn test check soak wheel scripts torture model fuzz rt systemd bench format clean distclean
 ARGS ?=
 export PYTHONDONTWRITEBYTECODE := 1
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
@@ -53,16 +53,12 @@ model:
 	@tools/setup.sh check
 	@.venv/bin/python tests/proofs/run.py models $(ARGS)
 
-# bench: the budgets; growth: cost against size, as plots; stress: jitter of the real-time loop on a
-# machine under stress, beside cyclictest
-bench: script := run
-growth: script := growth
-stress: script := stress
-bench growth stress:
+# the budgets
+bench:
 	@tools/setup.sh bench
 	@.venv/bin/cmake --preset release > /dev/null
 	@.venv/bin/cmake --build --preset release
-	@.venv/bin/python benchmarks/$(script).py $(ARGS)
+	@.venv/bin/python benchmarks/run.py $(ARGS)
 
 # some minutes for each fuzzer; finds go to build/fuzz/found: make fuzz ARGS="lane --minutes 60 --merge"
 fuzz:

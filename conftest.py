@@ -1,4 +1,4 @@
-"""What every test session promises: it leaves no process and no shared memory behind."""
+"""Promise of every test session: it leaves no process and no shared memory behind."""
 
 import contextlib
 import os
@@ -104,12 +104,12 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
 
 
 def segment_files() -> set[Path]:
-    """What lies in that directory."""
+    """Files in that directory."""
     return set(DIRECTORY.iterdir())
 
 
 def told_of(path: Path) -> str:
-    """What the kernel says of a process or thread; empty if that has ended."""
+    """Text of the kernel about a process or thread; empty if that has ended."""
     try:
         return path.read_bytes().decode(errors="replace")
     except OSError:
@@ -146,7 +146,7 @@ def relatives() -> set[int]:
 
 
 def left_over(found: Callable[[], set[Found]], before: set[Found]) -> list[Found]:
-    """What was found beyond what was there before, once the dying have died."""
+    """Findings that were not there before, once ending processes have ended."""
     end = time.monotonic() + GRACE
     while (rest := found() - before) and time.monotonic() < end:
         time.sleep(0.05)

@@ -1,4 +1,4 @@
-"""What tracking a ball in four images of 640 x 480 pixels takes of a processor, at 180 Hz.
+"""Processor time of tracking a ball in four images of 640 x 480 pixels, at 180 Hz.
 
 The images and their noise are prepared; those of a flight follow those of an empty room, so that
 following and searching are both measured. The images come as rows of a segment, as in real time.
@@ -57,7 +57,7 @@ def measure(rows: list[NDArray[np.uint8]]) -> None:
 
 
 def rendering() -> float:
-    """Of four synthetic images of a flying ball [s]: what the simulation takes, not the tracker."""
+    """Time to render four synthetic images of a flying ball [s]: no part of the tracker."""
     rig = four_cameras()
     scene, throws = Scene(rig), Throws(rig, 1)
     images = [np.empty((480, 640, 3), np.uint8) for _ in rig.cameras]

@@ -40,7 +40,7 @@ def measure(word: str, robot: str, options: dict[str, Any]) -> None:
 
 
 def instructions(program: Path, side: str, bursts: int, robot: list[str]) -> int:
-    """Of the whole program, in user mode."""
+    """Instructions of the whole program, in user mode."""
     tool = ["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null"]
     command = [*tool, str(program), "count", side, str(bursts), *robot]
     ended = subprocess.run(command, check=True, capture_output=True, text=True)

@@ -1,4 +1,4 @@
-"""What a process pays at first: imports of o80 and NumPy, a first attach, and o80 list."""
+"""Costs of a process at first: imports of o80 and NumPy, a first attach, and o80 list."""
 
 import os
 import subprocess
@@ -25,11 +25,11 @@ o80.Frontend(sys.argv[1]).latest()
 print(time.perf_counter() - begin)
 """
 ON_TOP = 10.0
-"""Of `import numpy` for a first attach [ms]."""
+"""Time on top of `import numpy` for a first attach [ms]."""
 
 
 def timed(program: str, *words: str) -> float:
-    """What a program prints in a fresh interpreter [s], in ms."""
+    """Time that a program prints in a fresh interpreter [s], in ms."""
     command = [sys.executable, "-c", program, *words]
     ended = subprocess.run(command, capture_output=True, text=True, check=True)
     return float(ended.stdout) * 1e3

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import time
+from collections.abc import Callable, Sequence
 
 from sampling import built, rounds, sample
 
@@ -35,24 +36,38 @@ def lateness(segment: str) -> list[int]:
     return [int(line) for line in ended.stdout.split()]
 
 
-def main() -> None:
+Command = Sequence[str | os.PathLike[str]]
+
+
+def measure(name: str, beside: Callable[[str], Sequence[Command]] = lambda segment: []) -> None:
+    """beside: commands of the programs that run meanwhile, by the segment of the loop."""
     processor = max(os.sched_getaffinity(0))
     segment = f"bench-jitter-{os.getpid()}"
-    loop = subprocess.Popen(
-        [PROGRAMS / "o80-run", "two_joints", "--segment", segment, "--frequency", "1000",
-         "--policy", "fifo", "--priority", str(PRIORITY), "--cpus", str(processor),
-         "--lock-memory", "--until-eof"],
-        stdin=subprocess.PIPE, stdout=subprocess.DEVNULL,
-    )  # fmt: skip
+    loop: Command = [
+        PROGRAMS / "o80-run", "two_joints", "--segment", segment, "--frequency", "1000",
+        "--policy", "fifo", "--priority", str(PRIORITY), "--cpus", str(processor),
+        "--lock-memory", "--until-eof",
+    ]  # fmt: skip
+    started = []
     try:
-        time.sleep(0.5)
+        for command in (loop, *beside(segment)):
+            started.append(
+                subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL)
+            )
+            if command is loop:
+                time.sleep(0.5)
         for _ in range(min(rounds(), 12)):
             bare = cyclictest(processor)
-            sample("cyclictest_p99", "us", percentile_99(bare))
-            sample("loop_lateness_p99", "us", percentile_99(lateness(segment)))
+            sample(f"{name}cyclictest_p99", "us", percentile_99(bare))
+            sample(f"{name}loop_lateness_p99", "us", percentile_99(lateness(segment)))
     finally:
-        loop.terminate()
-        loop.wait()
+        for program in reversed(started):
+            program.terminate()
+            program.wait()
+
+
+def main() -> None:
+    measure("")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What a recorder takes of a processor, and what a recording takes of an inline training loop.
+"""Processor time of a recorder, and the cost of a recording for an inline training loop.
 
 A second process publishes rows of 512 bytes in 1, 4 and 16 segments, 1000 times a second each, with
 a command for each of eight actuators in every iteration.

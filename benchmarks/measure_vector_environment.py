@@ -28,7 +28,7 @@ from sampling import built, rounds, sample, seconds, take_priority
 THREADS = 2
 COPIES = (64, 16)
 PRESETS = {"standard": "", "identified": "identified_"}
-"""Of the arm, with what the names of their figures begin."""
+"""Presets of the arm, with the beginnings of the names of their figures."""
 PROCESSES = 16
 COPY_STEPS = 16_000  # of all copies together, in a round
 TASK = TaskSettings(factor=COARSE)

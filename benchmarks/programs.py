@@ -31,7 +31,7 @@ class Samples:
 
 
 def command_of(program: str, rounds: int, built: Path) -> list[str]:
-    """What to run for the program of a row."""
+    """Command that runs the program of a row."""
     python = ROOT / "benchmarks" / f"measure_{program.replace('-', '_')}.py"
     if python.exists():
         return [sys.executable, str(python), str(rounds), str(built)]

@@ -6,7 +6,7 @@ Limit = float | tuple[float, str]
 """A fixed one, or a factor of a baseline that the same program measures."""
 
 USUAL = {"plain_cpp": 12.0, "plain_python": 34.0}
-"""Of a plain loop on the machine of README.md, "One result", for which fixed limits are meant [ns].
+"""Times of a plain loop on the machine for which fixed limits are meant [ns].
 
 Found in proportion: on another machine, where the copies took 22 ns and the calls 63.5 ns, the
 copies of whole histories (baseline of `history`) took 1.9 times as long, and so did `latest`.
@@ -29,6 +29,19 @@ class Row:
 
 CACHE_LINE = "3 x a bare cache-line round trip"
 HALF_MEMCPY = "half of memcpy's bandwidth"
+
+
+def growth(name: str, row: str, times: float, few: str) -> Row:
+    """Row that must cost about the same with many of something as with few."""
+    return Row(
+        name=f"growth-{name}",
+        row=row,
+        budget=f"{times} x with {few}",
+        program="growth",
+        measured=f"growth_{name}",
+        limit=(times, f"growth_{name}_few"),
+    )
+
 
 ROWS = (
     Row(
@@ -224,6 +237,21 @@ ROWS = (
         measured="loop_lateness_p99",
         limit=(1.1, "cyclictest_p99"),
     ),
+    Row(
+        name="jitter-stressed",
+        row="the same on a machine under stress, with 64 readers that wait",
+        budget="1.2 x cyclictest beside it",
+        program="jitter-stressed",
+        measured="stressed_loop_lateness_p99",
+        limit=(1.2, "stressed_cyclictest_p99"),
+    ),
+    growth("actuators", "iteration of 1000 moving actuators, for each of them", 1.6, "100"),
+    growth("queued", "iteration with 100 000 commands queued", 2.5, "1000"),
+    growth("taking", "the same, in which it takes one more", 2.5, "1000"),
+    growth("dropping", "the same, in which all are overwritten", 2.5, "1000"),
+    growth("publish", "iteration with a history of 1 000 000 rows", 2.5, "10 000"),
+    growth("latest", "latest() in C++, with such a history", 2.5, "10 000"),
+    growth("attach", "frontend attached, with such a history", 2.5, "10 000"),
     Row(
         name="readers",
         row="64 readers attached: an iteration of the writer",

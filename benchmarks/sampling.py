@@ -1,4 +1,4 @@
-"""What the measuring programs in Python have in common with those in C++."""
+"""Parts that the measuring programs in Python share with those in C++."""
 
 import os
 import sys

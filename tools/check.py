@@ -27,7 +27,14 @@ from steps import (
 
 PROOF = [sys.executable, "tests/proofs/run.py"]
 PACKAGES = ("o80", "o80_mujoco", "o80_pam", "o80_devices", "o80_table_tennis")
-TYPED = ("tools", "benchmarks", "examples", "tests/proofs", "conftest.py")  # beside the packages
+TYPED = (  # beside the packages
+    "tools",
+    "benchmarks",
+    "examples",
+    "apps/table_tennis/studies",
+    "tests/proofs",
+    "conftest.py",
+)
 TYPED_TESTS = (
     "tests/python",
     "tests/processes",

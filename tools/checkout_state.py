@@ -23,7 +23,7 @@ def files() -> list[Path]:
 
 
 def digest() -> str:
-    """Of the paths and contents of all files."""
+    """Digest of the paths and contents of all files."""
     total = hashlib.sha256()
     for file in files():
         content = hashlib.sha256(file.read_bytes()).hexdigest()

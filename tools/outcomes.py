@@ -1,4 +1,4 @@
-"""What test runners reported: which tests passed, and which were skipped for which reason.
+"""Reports of test runners: which tests passed, and which were skipped for which reason.
 
 ctest names a test `folder.Suite.Test`, and so does the real-time machine: a test that is skipped in
 one build and passes in another one has the same name in both.
@@ -13,7 +13,7 @@ from pathlib import Path
 
 @dataclass
 class Outcomes:
-    """Of one run, or of several together."""
+    """Outcomes of one run, or of several together."""
 
     passed: set[str] = field(default_factory=set)
     skipped: dict[str, str] = field(default_factory=dict)  # by name: the reason
@@ -23,7 +23,7 @@ class Outcomes:
         self.skipped |= other.skipped
 
     def gaps(self) -> dict[str, str]:
-        """What was skipped and passed in no run."""
+        """Tests that were skipped and passed in no run, with the reasons."""
         return {name: why for name, why in self.skipped.items() if name not in self.passed}
 
 
@@ -63,7 +63,7 @@ def of_real_time_machine(passed: Path) -> Outcomes:
 
 
 def of_log(step: str, log: Path) -> Outcomes:
-    """Of a step that says itself in a line `skipped: why` that it could not be run."""
+    """Outcome of a step that says itself in a line `skipped: why` that it could not be run."""
     lines: Iterable[str] = log.read_text(errors="replace").splitlines()
     reasons = [line.removeprefix("skipped: ") for line in lines if line.startswith("skipped: ")]
     return Outcomes(skipped={step: reasons[-1]} if reasons else {})

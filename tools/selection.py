@@ -54,7 +54,7 @@ class Selection:
     python: list[str] = field(default_factory=list)
 
     def cpp_pattern(self) -> str:
-        """Of the names that ctest gives these tests."""
+        """Pattern of the names that ctest gives these tests."""
         each = (
             rf"{folder}\.(\w+/)?({'|'.join(sorted(suites))})[./]" if suites else rf"{folder}\."
             for folder, suites in self.cpp.items()

@@ -158,9 +158,9 @@ need_renderer() { ldconfig -p | grep -q libEGL_mesa || need_packages libosmesa6 
 install_programs() {
   case $purpose in
     demo) need_renderer ;;
-    check) # compilers of the sanitizers and of another machine, model checkers, emulators, stress, browser
+    check) # compilers of the sanitizers and of another machine, model checkers, emulators, browser
       need_packages googletest clang-19 libclang-rt-19-dev llvm-19 g++-aarch64-linux-gnu \
-        qemu-user-static relacy-dev spin strace stress-ng rt-tests qemu-system-x86 busybox-static \
+        qemu-user-static relacy-dev spin strace rt-tests qemu-system-x86 busybox-static \
         cpio chromium
       need_renderer
       ;;

@@ -223,7 +223,7 @@ def available() -> list[str]:
 
 
 def python_files() -> list[str]:
-    """What pytest collects by default, a file each."""
+    """Files that pytest collects by default."""
     listed = subprocess.run(
         [*PYTHON, "pytest", "--collect-only", "-qq", "-m", "not check"],
         cwd=ROOT,

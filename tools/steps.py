@@ -50,7 +50,7 @@ def use_tools() -> None:
 
 
 def processor_time() -> float:
-    """Of all programs that were run so far and have ended [s]."""
+    """Processor time of all programs that were run so far and have ended [s]."""
     times = os.times()
     return times.children_user + times.children_system
 

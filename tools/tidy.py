@@ -29,7 +29,7 @@ ANALYZER = [
 
 
 def compile_options(command: str) -> tuple[str, ...]:
-    """What decides how a file is read: directories, definitions, language."""
+    """Options that decide how a file is read: directories, definitions, language."""
     words = shlex.split(command)
     kept = ("-I", "-D", "-std=", "-isystem")
     options: list[str] = []

@@ -10,13 +10,13 @@ AGAIN = 60.0
 
 
 class Trouble:
-    """What is wrong with one device. A failure that repeats itself is told once a minute."""
+    """Trouble with one device. A failure that repeats itself is reported once a minute."""
 
     def __init__(self, device: str) -> None:
         self._device = device
         self._told: dict[str, float] = {}
         self.text = ""
-        """What is wrong; empty: nothing."""
+        """Text of the trouble; empty: none."""
 
     def tell(self, text: str) -> None:
         text = " ".join(text.split())

@@ -17,7 +17,7 @@ FIELD = "observed.ball"
 
 
 def place(time: float) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    """Of the ball, at a time since row 0 [s]."""
+    """Place of the ball, at a time since row 0 [s]."""
     return np.array([0.4, 2.0 - 4.0 * time, 1.0 + time])
 
 

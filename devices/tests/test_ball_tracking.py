@@ -62,14 +62,14 @@ def followed(noise: float, false: int | None = None) -> list[Row]:
 
 
 def errors(rows: list[Row]) -> FloatArray:
-    """Of the rows in which the ball was found [m]."""
+    """Errors of the rows in which the ball was found [m]."""
     return np.array(
         [np.linalg.norm(r.tracked.position - r.ball.position) for r in rows if r.tracked.seen]
     )
 
 
 def share_found(rows: list[Row]) -> float:
-    """Of the rows in which at least three cameras see the ball."""
+    """Share of found balls among the rows in which at least three cameras see the ball."""
     return float(np.mean([row.tracked.seen for row in rows if row.cameras >= 3]))
 
 

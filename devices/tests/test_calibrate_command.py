@@ -36,7 +36,7 @@ RIG = Rig(
 NAMES = [camera.name for camera in RIG.cameras]
 BOARD = Board((9, 6), 0.03)
 INSIDE = ([-0.6, 0.2, 0.8], [1.4, 2.9, 1.7])
-"""Of what the ball is waved through [m]."""
+"""Bounds of the space that the ball is waved through [m]."""
 
 
 def board_poses(count: int, tilt: float) -> list[tuple[FloatArray, FloatArray]]:
@@ -86,7 +86,7 @@ def run(*arguments: object) -> None:
 
 
 class Files:
-    """What the step `places` reads."""
+    """Files that the step `places` reads."""
 
     def __init__(self, folder: Path) -> None:
         self.lenses = folder / "lenses.json"

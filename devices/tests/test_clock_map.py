@@ -16,7 +16,7 @@ Mapped = list[tuple[Packet, Capture]]
 
 
 def mapped(device: Device, clock: ClockMap | None = None, seed: int = 0) -> Mapped:
-    """What was captured when, of all packets that were not dropped."""
+    """Packets that were not dropped, each with its capture time."""
     clock = clock or ClockMap(latency=device.latency, tick=device.tick)
     found = []
     for packet in device.packets(seed):
@@ -27,7 +27,7 @@ def mapped(device: Device, clock: ClockMap | None = None, seed: int = 0) -> Mapp
 
 
 def between(found: Mapped, begin: float, end: float = 1e9) -> Mapped:
-    """Those captured in a span of time [s]."""
+    """Packets captured in a span of time [s]."""
     return [each for each in found if begin * SECOND <= each[0].captured < end * SECOND]
 
 
@@ -113,7 +113,7 @@ def test_the_rate_of_a_clock_is_found() -> None:
 
 
 def test_packets_of_a_stalled_reader_keep_their_capture_times() -> None:
-    """What waited in a socket while the process was stopped was not captured when it was read."""
+    """A packet that waited in the socket of a stopped process was not captured when it was read."""
     packets = list(Device().packets())
     clock = ClockMap(latency=0.002)
     until = int(10.7 * SECOND)

@@ -1,4 +1,4 @@
-"""What every module of the package keeps."""
+"""Rules that every module of the package keeps."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""What a damaged, a wrong or a hostile device sends: no crash, no pose that is none, no stall."""
+"""Messages of damaged, wrong or hostile devices: no crash, no invalid pose, no stall."""
 
 import math
 import socket

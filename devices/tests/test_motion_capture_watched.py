@@ -56,7 +56,7 @@ def clients() -> list[int]:
 
 
 def told_of(path: Path) -> bytes:
-    """What the kernel says of a process or thread; empty if that has ended."""
+    """Text of the kernel about a process or thread; empty if that has ended."""
     try:
         return path.read_bytes()
     except OSError:

@@ -11,7 +11,7 @@ MOTOR = np.dtype([("position", float), ("velocity", float)])
 
 
 def command() -> None:
-    """What another process would do."""
+    """Commands that another process would send."""
     with o80.Frontend("gripper") as frontend:
         frontend.add_command("left", {"position": 0.02, "velocity": 0.0}, iterations=50)
         frontend.add_command("right", {"position": -0.02}, iterations=50)

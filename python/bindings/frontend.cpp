@@ -177,7 +177,7 @@ Attachment attach(const std::string& segment, nb::handle timeout, bool read_only
   return {std::make_shared<UntypedFrontend>(segment, options), nullptr};
 }
 
-/// What will take the place of a frontend; its closing ends the wait.
+/// Successor that takes the place of a frontend; its closing ends the wait.
 Attachment attach_again(const Frontend& self, nb::handle timeout, bool read_only) {
   const std::shared_ptr<UntypedFrontend> former = self.shared();
   former->link()->check_usable();

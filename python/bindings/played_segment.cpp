@@ -34,7 +34,7 @@ o80::Provenance::Options options_in(nb::handle object, const char* name) {
   return options;
 }
 
-/// That of an o80.provenance.Provenance.
+/// Copy of an o80.provenance.Provenance in C++.
 o80::Provenance provenance_in(nb::handle object) {
   o80::Provenance provenance;
   provenance.robot = text_in(object, "robot");

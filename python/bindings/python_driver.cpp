@@ -222,7 +222,7 @@ int write(void* robot, const o80::DesiredView* desired, FaultText* fault) {
   return failed;
 }
 
-/// What the adapter reports of a reading: see `Adapter.read`.
+/// Report of the adapter about a reading: see `Adapter.read`.
 void take_report(PythonDriver& self, nb::handle told, o80::ReadingView* reading) {
   const nb::tuple report = nb::cast<nb::tuple>(told);
   reading->finished = nb::cast<bool>(report[0]) ? 1 : 0;

@@ -6,7 +6,7 @@
 
 namespace o80 {
 
-/// What a robot describes, as dictionaries and lists; numbers without a limit are None.
+/// Description of a robot as dictionaries and lists; numbers without a limit are None.
 nanobind::dict tables_of(const Schema& schema);
 
 }  // namespace o80

@@ -47,7 +47,7 @@ class ChainedBurst:
 def _feeds(
     rows: np.dtype[Any], second: GroupBurst, numbers: str | Mapping[str, str]
 ) -> Iterator[tuple[int, int, int, int]]:
-    """Of each number of each actuator: offset in the row and in the targets, stride, size."""
+    """Feed of each number of each actuator: offset in the row and in the targets, stride, size."""
     state = second.targets.dtype
     if second.targets.ndim == 1:
         raise InvalidArgument(

@@ -57,7 +57,7 @@ class EventFlag:
 
 
 class Gather:
-    """What `InlineGroup.gather` reads of each copy.
+    """Numbers and flags that `InlineGroup.gather` reads of each copy.
 
     observations: float32 (copies, numbers).
     flags: bool (copies, flags); `gather["name"]` is one flag of all copies.

@@ -72,8 +72,8 @@ class JournalEntry:
     text: str = ""  #: the reason of a halt, or of the end of the backend
     actuator: str = ""  #: that the driver interrupted
     slot: int | None = None  #: in which the driver keeps a snapshot
-    #: What this o80 does not know of the entry or its commands, such as "entry kind 30" (the kind
-    #: is "none" then): a newer one has recorded it.
+    #: Parts of the entry or its commands that this o80 does not know, such as "entry kind 30" (the
+    #: kind is "none" then): a newer one has recorded it.
     unknown: str = ""
 
 

@@ -1,4 +1,4 @@
-"""What of a machine decides the last bits of a computation: its C library and its processor."""
+"""Machine, as far as it decides the last bits of a computation: C library and processor."""
 
 import json
 import os
@@ -30,7 +30,7 @@ class Machine:
         )
 
     def difference(self, other: "Machine") -> str:
-        """What of another machine differs, in words; empty if nothing does."""
+        """Difference to another machine, in words; empty if there is none."""
         if self.libc != other.libc:
             return f"{self.libc} recorded it, this machine has {other.libc}"
         if self.architecture != other.architecture:
@@ -53,7 +53,7 @@ def this_machine() -> Machine:
 
 
 def _features() -> tuple[str, ...]:
-    """Of the first processor, as Linux lists them."""
+    """Features of the first processor, as Linux lists them."""
     try:
         text = Path("/proc/cpuinfo").read_text()
     except OSError:

@@ -124,7 +124,7 @@ def _resolved(path: list[str], namespace: dict[str, Any]) -> Any:
 
 
 def _keys(found: Any) -> Sequence[str] | None:
-    """What completes a subscript: of a record, or of the structured array of a row."""
+    """Completions of a subscript: of a record, or of the structured array of a row."""
     names = getattr(found, "keys", None) if _is_ours(found) else None
     return names() if callable(names) else getattr(getattr(found, "dtype", None), "names", None)
 

@@ -1,4 +1,4 @@
-"""What a command would do."""
+"""Preview of a command."""
 
 from dataclasses import dataclass, field
 
@@ -7,7 +7,7 @@ from o80.states import States
 
 @dataclass(frozen=True, eq=False)
 class Preview:
-    """What a command would do: the answer of Frontend.preview."""
+    """Preview of a command: the answer of Frontend.preview."""
 
     iterations: int  #: number of iterations that it takes
     late: int  #: by how many of them it takes longer than asked, at most 65535

@@ -128,7 +128,7 @@ def _announced_class(name: str) -> type[Any] | None:
 
 
 def _value_of(point: "EntryPoint") -> Any:
-    """What an entry point names: a driver class, a path, or what its function returns."""
+    """Value of an entry point: a driver class, a path, or the result of its function."""
     package = point.dist.name if point.dist is not None else point.module
     try:
         value = point.load()
@@ -196,12 +196,12 @@ class Robot:
 
     @property
     def _program(self) -> builtins.list[str | Path]:
-        """What runs this robot in a process."""
+        """Command that runs this robot in a process."""
         return [prefix() / "bin" / "o80-run", self._library.path]
 
     @property
     def _environment(self) -> dict[str, str] | None:
-        """Of that process; None: that of this one."""
+        """Environment variables of the robot's process; None: those of this one."""
         return None
 
     def start(

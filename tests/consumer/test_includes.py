@@ -1,4 +1,4 @@
-"""What the compilation of a robot library reads of o80."""
+"""Headers of o80 that the compilation of a robot library reads."""
 
 import subprocess
 from pathlib import Path

@@ -260,7 +260,7 @@ def unpack(sdist: Path, folder: Path) -> Path:
 def test_source_distributions_that_lie_as_in_a_checkout_install_together(
     built: Path, tmp_path: Path
 ) -> None:
-    """What the core ships is enough to build it, and the arm finds it beside itself."""
+    """The core ships enough to build it, and the arm finds it beside itself."""
     root = ROOT / "build" / "unpacked"  # the same in each run, for ccache
     shutil.rmtree(root, ignore_errors=True)
     unpacked = []

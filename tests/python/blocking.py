@@ -159,7 +159,7 @@ class Place:
         return self._stack.enter_context(owner)
 
     def open_frontends(self) -> None:
-        """Of its own for whoever calls it."""
+        """Opens frontends of the caller's own."""
         self.silent = self._enter(o80.Frontend(self.silent_backend.segment))
         self.reader = self._enter(o80.Frontend(self.silent_backend.segment, read_only=True))
         self.standing = self._enter(o80.Frontend(self.standing_backend.segment))

@@ -60,7 +60,7 @@ _names = (f"test-mixed-{os.getpid()}-{i}" for i in itertools.count())
 
 
 def recorded(groups: Any, sensors: Any, seed: int, rows: int = 5) -> o80.History:
-    """What a robot of these types published."""
+    """Rows that a robot of these types published."""
     random = np.random.default_rng(seed)
     name = next(_names)
     options: Any = {"extended": sensors, "bursting": True}

@@ -1,4 +1,4 @@
-"""What a robot published, and a check of everything that reads its rows against it.
+"""Rows that a robot published, and a check of everything that reads them.
 
 The expected numbers are made without offsets: from nested values and the names of their fields.
 """
@@ -69,7 +69,7 @@ def numbers(path: str, value: Any) -> Iterator[tuple[str, Any]]:
 
 
 def element(value: Any, index: int) -> Any:
-    """Of values of several actuators those of one."""
+    """Values of one actuator, from those of several."""
     if isinstance(value, Mapping):
         return {name: element(inner, index) for name, inner in value.items()}
     return value[index]
@@ -166,7 +166,7 @@ def check_every_reader(
 
 @dataclass
 class Readers:
-    """What reads one history."""
+    """Readers of one history."""
 
     history: o80.History
     expected: Columns
@@ -297,7 +297,7 @@ def played(path: Path, segment: str, expected: Columns) -> None:
 
 
 def messages(path: Path, segment: str, expected: Columns) -> None:
-    """What the libraries of mcap and rosbags read."""
+    """Messages as the libraries of mcap and rosbags read them."""
     topic = f"/{segment}"
     with AnyReader([path]) as reader:
         found = [(each, raw) for each, _, raw in reader.messages() if each.topic == topic]

@@ -10,14 +10,14 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
-from o80.learning.rollouts import Workers
-from o80.learning.rollouts.ppo import RolloutPPO, WorkersEnv
+from o80.learning.rollouts import Collector
+from o80.learning.rollouts.ppo import CollectorEnv, RolloutPPO
 
 
-def model_of(workers: Workers, *, steps: int, batch: int = 80, **options: Any) -> RolloutPPO:
+def model_of(collector: Collector, *, steps: int, batch: int = 80, **options: Any) -> RolloutPPO:
     return RolloutPPO(
         "MlpPolicy",
-        VecNormalize(WorkersEnv(workers), norm_reward=False),
+        VecNormalize(CollectorEnv(collector), norm_reward=False),
         n_steps=steps,
         batch_size=batch,
         n_epochs=4,
@@ -28,10 +28,10 @@ def model_of(workers: Workers, *, steps: int, batch: int = 80, **options: Any) -
     )
 
 
-def learned(workers: Workers, steps: int, iterations: int) -> bytes:
+def learned(collector: Collector, steps: int, iterations: int) -> bytes:
     """The weights after some updates."""
-    with workers:
-        model = model_of(workers, steps=steps)
+    with collector:
+        model = model_of(collector, steps=steps)
         model.learn(iterations * steps * model.n_envs)
         return copied(model).weights()
 
@@ -53,7 +53,7 @@ class copied:  # noqa: N801 - a verb
         return b"".join(each.numpy().tobytes() for each in self._state.values())
 
     def values(self, observations: Any) -> Any:
-        """Of observations (..., M), as (...)."""
+        """Values of observations (..., M), as (...)."""
         statistics: Any = self.statistics
         seen = (observations - statistics.mean) / np.sqrt(statistics.var + self._epsilon)
         tensor = torch.as_tensor(np.clip(seen, -self._clip, self._clip), dtype=torch.float32)

@@ -1,4 +1,4 @@
-"""What one pulse sent, and what became of it."""
+"""Batches: what one pulse sent, and what became of it."""
 
 import pytest
 

@@ -28,7 +28,7 @@ def folder() -> Iterator[Path]:
 
 
 def o80(folder: Path, *words: str, fails: bool = False) -> str:
-    """What a command prints; its errors if it should fail."""
+    """Output of a command; its errors if it should fail."""
     done = subprocess.run(
         [O80, *words],
         capture_output=True,
@@ -42,7 +42,7 @@ def o80(folder: Path, *words: str, fails: bool = False) -> str:
 
 
 def in_a_line(said: str) -> str:
-    """What stands in a box, without its borders and line breaks."""
+    """Text in a box, without its borders and line breaks."""
     return " ".join(said.replace("│", " ").split())
 
 

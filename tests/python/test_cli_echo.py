@@ -20,7 +20,7 @@ O80 = str(Path(sys.executable).parent / "o80")
 
 
 class Gear(IntEnum):
-    """What an enumeration of a sensor holds."""
+    """Values of an enumeration of a sensor."""
 
     NEUTRAL = 0
     FORWARD = 4
@@ -40,7 +40,7 @@ def backend(segment: str) -> Iterator[o80.Backend]:
 
 
 def echo(segment: str, *words: str, fails: bool = False) -> str:
-    """What it prints; its errors if it should fail."""
+    """Output of `o80 echo`; its errors if it should fail."""
     done = subprocess.run(
         [O80, "echo", segment, *words], capture_output=True, text=True, timeout=WAIT, check=False
     )

@@ -61,7 +61,7 @@ def test_seconds_and_size_end_it(process: o80.robots.Process, tmp_path: Path) ->
 
 
 def recorded(segment: str, path: Path, *words: str) -> str:
-    """What `o80 record` says of one segment at once."""
+    """First line of `o80 record` about one segment."""
     said = run("record", segment, "-o", path, "--seconds", "0.1", *words)
     return next(line for line in said.splitlines() if f"'{segment}' " in line)
 

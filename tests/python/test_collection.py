@@ -1,4 +1,4 @@
-"""What is dropped is given back, whatever state it was in; views keep what they show."""
+"""Dropped objects are given back, whatever state they were in; views keep what they show."""
 
 import gc
 import os
@@ -20,7 +20,7 @@ WAIT = 30.0  # [s] longer than any wait should take
 
 
 def held() -> dict[str, int]:
-    """What this process holds of the system."""
+    """Resources of the system that this process holds."""
     gc.collect()
     return {
         "descriptors": len(os.listdir("/proc/self/fd")),

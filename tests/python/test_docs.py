@@ -1,4 +1,4 @@
-"""What the pages of documentation point to is there: links, sections, sources."""
+"""Links, sections and sources that the pages of documentation point to exist."""
 
 import re
 from pathlib import Path
@@ -11,7 +11,9 @@ PAGES = sorted([*ROOT.glob("*.md"), *(page for f in FOLDERS for page in (ROOT / 
 LINK = re.compile(r"\]\(([^)#\s]*)(?:#([^)\s]+))?\)")
 NAME = re.compile(r"`(?:(\w+)::)?(\w+)`")
 SOURCE = re.compile(r"`([\w/]+\.(?:cpp|hpp|py))`")
-PAGE = re.compile(r"((?:\b(?:docs|tests/proofs/models|benchmarks)/\w+|\b[A-Z]+)\.md)(?:#([\w-]+))?")
+PAGE = re.compile(
+    r"((?:\b(?:docs(?:/\w+)?|tests/proofs/models|benchmarks)/\w+|\b[A-Z]+)\.md)(?:#([\w-]+))?"
+)
 SOURCES = [
     path
     for folder in ("apps", "devices", "include", "python", "robots", "simulators", "src", "tests")

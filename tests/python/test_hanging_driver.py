@@ -1,4 +1,4 @@
-"""What `o80 list` and `o80 info` say of robots whose driver hangs or is late."""
+"""Texts of `o80 list` and `o80 info` about robots whose driver hangs or is late."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""What a frontend reads of the decisions of its backend, also of commands of others."""
+"""Decisions of the backend, as a frontend reads them, also about commands of others."""
 
 import contextlib
 from typing import Any

@@ -1,4 +1,4 @@
-"""What `import o80` loads, and that every name is there all the same."""
+"""Modules that `import o80` loads, and that every name is there all the same."""
 
 import subprocess
 import sys

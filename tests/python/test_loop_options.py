@@ -1,4 +1,4 @@
-"""What can be set about every backend is described once: flags, keywords and docs follow."""
+"""Options of every backend are described once: flags, keywords and docs follow."""
 
 import inspect
 from collections.abc import Callable
@@ -34,7 +34,7 @@ def start(request: pytest.FixtureRequest, segment: str) -> Start:
 
 
 def keywords(function: Callable[..., Any]) -> dict[str, Any]:
-    """Those after the star, with their defaults."""
+    """Keywords after the star, with their defaults."""
     return {
         parameter.name: parameter.default
         for parameter in inspect.signature(function).parameters.values()

@@ -1,4 +1,4 @@
-"""What IPython and Jupyter complete and show, with their own code."""
+"""Completions and displays of IPython and Jupyter, with their own code."""
 
 import subprocess
 import sys
@@ -33,7 +33,7 @@ def shell() -> Iterator[InteractiveShell]:
 
 
 def completed(shell: InteractiveShell, text: str) -> set[str]:
-    """What the completer offers at the end of a text, without quotes and brackets."""
+    """Offers of the completer at the end of a text, without quotes and brackets."""
     lines = text.split("\n")
     found = shell.Completer.completions(text, len(text)) if len(lines) > 1 else ()
     if len(lines) > 1:

@@ -1,4 +1,4 @@
-"""What is data is sent by pickle; what belongs to a process says what to send instead."""
+"""Data are sent by pickle; objects that belong to a process say what to send instead."""
 
 import copy
 import multiprocessing

@@ -1,4 +1,4 @@
-"""What a segment says about how its backend was started."""
+"""Provenance: what a segment says about how its backend was started."""
 
 import hashlib
 import json

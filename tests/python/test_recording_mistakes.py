@@ -20,7 +20,7 @@ O80 = Path(sys.executable).parent / "o80"
 
 
 def refused(*words: str | Path, code: int = 1) -> str:
-    """What a command says that fails with one line, not with a trace."""
+    """Error of a command, which is one line and not a trace."""
     done = subprocess.run(
         [O80, *words],
         capture_output=True,

@@ -19,7 +19,7 @@ from o80.replaying.trust import options_of
 
 @pytest.fixture
 def forged(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
-    """What recordings made in this test say of their robots instead of the truth."""
+    """Provenance that recordings made in this test give instead of the truth."""
     lies: dict[str, Any] = {}
     honest = Provenance.as_json
     monkeypatch.setattr(

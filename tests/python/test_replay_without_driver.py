@@ -98,7 +98,7 @@ class World:
 
 
 def act(arm: o80.Frontend, choose: random.Random) -> None:
-    """What random programs send."""
+    """Sends what random programs send."""
     for _ in range(choose.randrange(3)):
         actuators = choose.choice([["shoulder"], ["elbow"], ["wrist"], ["shoulder", "elbow"]])
         arm.add_command(

@@ -1,4 +1,4 @@
-"""Stable-Baselines3's PPO learns from the rollouts of workers (o80.learning.rollouts.ppo)."""
+"""Stable-Baselines3's PPO learns from the rollouts of a collector (o80.learning.rollouts.ppo)."""
 
 from __future__ import annotations
 
@@ -20,32 +20,32 @@ from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.vec_env import VecNormalize
 
 import o80
-from o80.learning.rollouts import LocalWorkers, Rollout
-from o80.learning.rollouts.ppo import RolloutPPO, WorkersEnv
+from o80.learning.rollouts import Collector, Rollout
+from o80.learning.rollouts.ppo import CollectorEnv, RolloutPPO
 
 pytestmark = pytest.mark.check  # needs torch, which only `make check` installs
 
-STEPS = 16
+STEPS = 32
 
 
 class Told(BaseCallback):
-    """Keeps the rollouts of the workers, the buffer of each update, and the ends of episodes."""
+    """Keeps the rollouts, the buffer of each update, and the ends of episodes."""
 
-    def __init__(self, workers: LocalWorkers) -> None:
+    def __init__(self, collector: Collector) -> None:
         super().__init__()
-        self.rollouts: list[list[Rollout]] = []
+        self.rollouts: list[Rollout] = []
         self.ends: list[Any] = []
         self.buffers: list[Any] = []
         self.before: Any = None
-        collect = workers.collect
+        collect = collector.collect
 
-        def kept(policy: Any, *, steps: int) -> list[Rollout]:
+        def kept(policy: Any, *, steps: int) -> Rollout:
             assert isinstance(self.model, PPO)
             self.before = copied(self.model)
             self.rollouts.append(collect(policy, steps=steps))
             return self.rollouts[-1]
 
-        workers.collect = kept  # type: ignore[method-assign]
+        collector.collect = kept  # type: ignore[method-assign]
 
     def _on_step(self) -> bool:
         for copy in np.flatnonzero(self.locals["dones"]):
@@ -60,8 +60,8 @@ class Told(BaseCallback):
         self.buffers.append(kept | {"starts": buffer.episode_starts.copy()})
 
 
-def workers_of(folder: Path, count: int = 2) -> LocalWorkers:
-    return LocalWorkers(maker(folder), workers=count, seed=5, infos=INFOS)
+def collector_of(folder: Path) -> Collector:
+    return Collector(maker(folder), seed=5, infos=INFOS)
 
 
 @pytest.fixture(autouse=True)
@@ -69,31 +69,26 @@ def one_thread() -> None:
     torch.set_num_threads(1)
 
 
-def test_log_probabilities_are_those_of_the_workers_and_advantages_of_their_rewards(
+def test_log_probabilities_are_those_of_the_rollout_and_advantages_of_its_rewards(
     tmp_path: Path,
 ) -> None:
-    with workers_of(tmp_path) as workers:
-        told = Told(workers)
-        model = model_of(workers, steps=STEPS)
-        model.learn(3 * STEPS * 2 * COPIES, callback=told)
+    with collector_of(tmp_path) as collector:
+        told = Told(collector)
+        model = model_of(collector, steps=STEPS)
+        model.learn(3 * STEPS * COPIES, callback=told)
     assert len(told.buffers) == 3
     cut_off = 0
-    for rollouts, buffer in zip(told.rollouts, told.buffers, strict=True):
-        columns = {
-            name: np.concatenate([getattr(each, name) for each in rollouts], axis=1)
-            for name in ("log_probabilities", "actions", "terminated", "truncated")
-        }
-        assert buffer["log_probs"] == pytest.approx(columns["log_probabilities"], abs=1e-4)
-        assert buffer["actions"].tobytes() == columns["actions"].tobytes()
-        over = columns["terminated"] | columns["truncated"]
+    for rollout, buffer in zip(told.rollouts, told.buffers, strict=True):
+        assert buffer["log_probs"] == pytest.approx(rollout.log_probabilities, abs=1e-4)
+        assert buffer["actions"].tobytes() == rollout.actions.tobytes()
+        over = rollout.terminated | rollout.truncated
         assert buffer["starts"][1:].tolist() == over[:-1].astype(float).tolist()
-        cut_off += int((columns["truncated"] & ~columns["terminated"]).sum())
+        cut_off += int((rollout.truncated & ~rollout.terminated).sum())
     assert cut_off > 10
 
     # the last one by hand, with the model as it was then
-    rollouts, buffer = told.rollouts[-1], told.buffers[-1]
-    expected = [advantages(told.before, each) for each in rollouts]
-    assert buffer["advantages"] == pytest.approx(np.concatenate(expected, axis=1), abs=1e-3)
+    expected = advantages(told.before, told.rollouts[-1])
+    assert told.buffers[-1]["advantages"] == pytest.approx(expected, abs=1e-3)
 
 
 def advantages(model: Any, rollout: Rollout) -> Any:
@@ -123,10 +118,10 @@ def advantages(model: Any, rollout: Rollout) -> Any:
 
 
 def test_the_callback_hears_of_every_end(tmp_path: Path) -> None:
-    with workers_of(tmp_path) as workers:
-        told = Told(workers)
-        model_of(workers, steps=STEPS).learn(2 * STEPS * 2 * COPIES, callback=told)
-    ends = [each.ends for both in told.rollouts for each in both]
+    with collector_of(tmp_path) as collector:
+        told = Told(collector)
+        model_of(collector, steps=STEPS).learn(2 * STEPS * COPIES, callback=told)
+    ends = [each.ends for each in told.rollouts]
     for name in INFOS:
         expected = sorted(str(value) for each in ends for value in each.infos[name])
         assert sorted(str(info[name]) for info in told.ends) == expected
@@ -135,51 +130,50 @@ def test_the_callback_hears_of_every_end(tmp_path: Path) -> None:
 
 
 def test_statistics_are_those_of_the_observations_of_all_rollouts(tmp_path: Path) -> None:
-    with workers_of(tmp_path) as workers:
-        told = Told(workers)
-        model = model_of(workers, steps=STEPS)
-        model.learn(3 * STEPS * 2 * COPIES, callback=told)
+    with collector_of(tmp_path) as collector:
+        told = Told(collector)
+        model = model_of(collector, steps=STEPS)
+        model.learn(3 * STEPS * COPIES, callback=told)
         normalisation = model.get_vec_normalize_env()
     assert normalisation is not None
-    seen = [each.observations[:-1].reshape(-1, 6) for both in told.rollouts for each in both]
+    seen = [each.observations[:-1].reshape(-1, 6) for each in told.rollouts]
     statistics: Any = normalisation.obs_rms
     assert statistics.mean == pytest.approx(np.concatenate(seen).mean(axis=0), abs=1e-4)
     assert statistics.var == pytest.approx(np.concatenate(seen).var(axis=0), abs=1e-3)
 
 
-def test_a_resumed_training_goes_on_where_its_workers_begin_anew(tmp_path: Path) -> None:
-    each = STEPS * 2 * COPIES
-    with workers_of(tmp_path) as workers:
-        model = model_of(workers, steps=STEPS)
+def test_a_resumed_training_goes_on_where_its_collector_begins_anew(tmp_path: Path) -> None:
+    each = STEPS * COPIES
+    with collector_of(tmp_path) as collector:
+        model = model_of(collector, steps=STEPS)
         model.learn(each)
         saved = copied(model)
-        told = Told(workers)
-        workers.restart(1)
+        told = Told(collector)
+        collector.restart(1)
         model.learn(each, callback=told, reset_num_timesteps=False)
-    with workers_of(tmp_path) as workers:
-        resumed = model_of(workers, steps=STEPS)
+    with collector_of(tmp_path) as collector:
+        resumed = model_of(collector, steps=STEPS)
         saved.into(resumed)
-        again = Told(workers)
+        again = Told(collector)
         resumed.learn(each, callback=again, reset_num_timesteps=False)
-        assert {each.iteration for each in workers.replacements} == {1}
-    assert_same_rollouts(again.rollouts[0], told.rollouts[0])
+        assert collector.iteration == 2
+    assert_same_rollouts(again.rollouts, told.rollouts)
     assert copied(resumed).weights() == copied(model).weights()
 
 
 def test_numbers_that_are_not_visible_change_nothing(tmp_path: Path) -> None:
     visible = np.array([1, 1, 1, 1, 0, 0])
-    with workers_of(tmp_path) as workers:
-        told = Told(workers)
-        model_of(workers, steps=STEPS, visible=visible).learn(2 * STEPS * 2 * COPIES, callback=told)
-    for rollouts, buffer in zip(told.rollouts, told.buffers, strict=True):
+    with collector_of(tmp_path) as collector:
+        told = Told(collector)
+        model_of(collector, steps=STEPS, visible=visible).learn(2 * STEPS * COPIES, callback=told)
+    for rollout, buffer in zip(told.rollouts, told.buffers, strict=True):
         assert not buffer["observations"][..., 4:].any()
         assert buffer["observations"][..., :4].any()
-        logarithms = np.concatenate([each.log_probabilities for each in rollouts], axis=1)
-        assert buffer["log_probs"] == pytest.approx(logarithms, abs=1e-4)
+        assert buffer["log_probs"] == pytest.approx(rollout.log_probabilities, abs=1e-4)
 
 
 def test_the_same_seed_gives_the_same_weights(tmp_path: Path) -> None:
-    assert learned(workers_of(tmp_path), STEPS, 3) == learned(workers_of(tmp_path), STEPS, 3)
+    assert learned(collector_of(tmp_path), STEPS, 3) == learned(collector_of(tmp_path), STEPS, 3)
 
 
 class Guess(gymnasium.Env[Any, Any]):
@@ -198,10 +192,10 @@ class Guess(gymnasium.Env[Any, Any]):
 
 def test_it_learns() -> None:
     def make() -> Any:
-        return SyncVectorEnv([Guess] * 4, autoreset_mode=AutoresetMode.SAME_STEP)
+        return SyncVectorEnv([Guess] * 8, autoreset_mode=AutoresetMode.SAME_STEP)
 
-    with LocalWorkers(make, workers=2, seed=1) as workers:
-        model = model_of(workers, steps=32, batch=64, policy_kwargs={"log_std_init": -1.2})
+    with Collector(make, seed=1) as collector:
+        model = model_of(collector, steps=32, batch=64, policy_kwargs={"log_std_init": -1.2})
         model.learn(12 * 32 * 8)
     action, _ = model.predict(np.zeros((1, 3), np.float32), deterministic=True)
     assert action[0] == pytest.approx([0.4, -0.6], abs=0.15)
@@ -213,17 +207,17 @@ def test_it_leaves_no_temporary_files(tmp_path: Path, monkeypatch: pytest.Monkey
 
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     monkeypatch.delenv("SB3_LOGDIR", raising=False)
-    with LocalWorkers(make, workers=1, seed=1) as workers:
-        model_of(workers, steps=8, batch=16).learn(16)
+    with Collector(make, seed=1) as collector:
+        model_of(collector, steps=8, batch=16).learn(16)
     assert not list(tmp_path.iterdir())
 
 
 def test_mistakes_are_named(tmp_path: Path) -> None:
-    with workers_of(tmp_path) as workers:
-        environments = WorkersEnv(workers)
+    with collector_of(tmp_path) as collector:
+        environments = CollectorEnv(collector)
         model = PPO("MlpPolicy", environments, n_steps=2, batch_size=2, device="cpu")
         model.set_logger(Logger(None, []))
-        with pytest.raises(o80.InvalidArgument, match="give WorkersEnv to a RolloutPPO only"):
+        with pytest.raises(o80.InvalidArgument, match="give CollectorEnv to a RolloutPPO only"):
             model.learn(2)
         with pytest.raises(o80.InvalidArgument, match="norm_reward=False"):
             RolloutPPO("MlpPolicy", VecNormalize(environments), device="cpu")

@@ -1,10 +1,8 @@
-"""Rollouts of workers in this process (o80.learning.rollouts)."""
+"""Rollouts of a collector (o80.learning.rollouts)."""
 
 from __future__ import annotations
 
 import math
-import subprocess
-import sys
 from collections.abc import Sequence
 from itertools import combinations
 from pathlib import Path
@@ -19,24 +17,24 @@ from rollout_tasks import COPIES, INFOS, assert_same_rollouts, maker, policies
 
 import o80
 from o80.learning import Environment, VectorEnvironment
-from o80.learning.rollouts import GaussianPolicy, LocalWorkers, Rollout, Worker
+from o80.learning.rollouts import Collector, GaussianPolicy, Rollout
+from o80.learning.rollouts.collector import environment_seeds, policy_generator
 from o80.learning.rollouts.rollout import arrays_of
-from o80.learning.rollouts.worker import environment_seeds, policy_generator
 
 STEPS = 11
 
 
-def workers_of(folder: Path, count: int = 2, **options: Any) -> LocalWorkers:
-    return LocalWorkers(maker(folder), workers=count, seed=5, infos=INFOS, **options)
+def collector_of(folder: Path, number: int = 1, **options: Any) -> Collector:
+    return Collector(maker(folder), number=number, seed=5, infos=INFOS, **options)
 
 
-def collected(workers: LocalWorkers, count: int) -> list[list[Rollout]]:
-    return [workers.collect(policy, steps=STEPS) for policy in policies(count)]
+def collected(folder: Path, count: int, number: int = 1) -> list[Rollout]:
+    with collector_of(folder, number) as collector:
+        return [collector.collect(policy, steps=STEPS) for policy in policies(count)]
 
 
 def test_a_rollout_is_what_its_actions_make_of_the_environments(tmp_path: Path) -> None:
-    with workers_of(tmp_path) as workers:
-        rollouts = [each[1] for each in collected(workers, 3)]
+    rollouts = collected(tmp_path, 3)
     singles: Any = SyncVectorEnv(
         [lambda: Environment(Reach())] * COPIES, autoreset_mode=AutoresetMode.SAME_STEP
     )
@@ -75,16 +73,13 @@ def rows_of(rollout: Rollout) -> Sequence[Any]:
 def test_actions_are_drawn_by_the_policy_from_the_generator_of_the_iteration(
     tmp_path: Path,
 ) -> None:
-    with workers_of(tmp_path) as workers:
-        rollouts = collected(workers, 2)
-    for iteration, policy in enumerate(policies(2)):
-        for worker in range(2):
-            rollout = rollouts[iteration][worker]
-            generator = policy_generator(5, worker, iteration)
-            for step in range(STEPS):
-                actions, logarithms = policy.sample(rollout.observations[step], generator)
-                assert actions.tobytes() == rollout.actions[step].tobytes()
-                assert logarithms.tobytes() == rollout.log_probabilities[step].tobytes()
+    rollouts = collected(tmp_path, 2)
+    for iteration, (policy, rollout) in enumerate(zip(policies(2), rollouts, strict=True)):
+        generator = policy_generator(5, 1, iteration)
+        for step in range(STEPS):
+            actions, logarithms = policy.sample(rollout.observations[step], generator)
+            assert actions.tobytes() == rollout.actions[step].tobytes()
+            assert logarithms.tobytes() == rollout.log_probabilities[step].tobytes()
 
 
 def test_log_probabilities_are_those_of_the_normal_distributions() -> None:
@@ -108,74 +103,56 @@ def test_the_means_are_those_of_the_network() -> None:
     assert policy.means(seen) == pytest.approx(expected, abs=1e-4)
 
 
-def test_workers_iterations_and_seeds_differ(tmp_path: Path) -> None:
-    with workers_of(tmp_path, 3) as workers:
-        rollouts = [workers.collect(policies(1)[0], steps=STEPS) for _ in range(2)]
+def test_collectors_iterations_and_seeds_differ(tmp_path: Path) -> None:
+    rollouts = [collected(tmp_path, 2, number) for number in range(3)]
+    with Collector(maker(tmp_path), seed=6) as collector:
+        other = collector.collect(policies(1)[0], steps=STEPS)
     noise = [each.log_probabilities.tobytes() for both in rollouts for each in both]
-    begins = [each.observations[0].tobytes() for each in rollouts[0]]
-    with LocalWorkers(maker(tmp_path), workers=1, seed=6) as workers:
-        other = workers.collect(policies(1)[0], steps=STEPS)[0]
+    begins = [first.observations[0].tobytes() for first, _ in rollouts]
     assert len({*noise, other.log_probabilities.tobytes()}) == 7
     assert len({*begins, other.observations[0].tobytes()}) == 4
 
 
-def test_a_replaced_worker_begins_anew_and_the_others_go_on(tmp_path: Path) -> None:
-    with workers_of(tmp_path) as workers:
-        expected = collected(workers, 3)
-    with workers_of(tmp_path) as workers:
-        first = workers.collect(policies(3)[0], steps=STEPS)
-        workers.replace(1)
-        workers.replace(1)  # as often as it dies in this iteration
-        rest = [workers.collect(policy, steps=STEPS) for policy in policies(3)[1:]]
-        assert workers.replacements == [(1, 1), (1, 1)]
-    assert_same_rollouts(first, expected[0])
-    for iteration in (1, 2):
-        assert_same_rollouts(rest[iteration - 1][:1], expected[iteration][:1])
-        assert rest[iteration - 1][1].begun == 1
-    with Worker(maker(tmp_path), worker=1, seed=5, iteration=1, infos=INFOS) as alone:
-        for iteration in (1, 2):
-            again = alone.collect(policies(3)[iteration], steps=STEPS, iteration=iteration)
-            assert_same_rollouts([again], rest[iteration - 1][1:])
+def test_the_same_seed_gives_the_same_rollouts(tmp_path: Path) -> None:
+    assert_same_rollouts(collected(tmp_path, 3), collected(tmp_path, 3))
 
 
-def test_workers_that_start_at_a_later_iteration_all_begin_there(tmp_path: Path) -> None:
-    with workers_of(tmp_path) as workers:
-        workers.collect(policies(2)[0], steps=STEPS)
-        for worker in range(2):
-            workers.replace(worker)
-        expected = workers.collect(policies(2)[1], steps=STEPS)
-    with workers_of(tmp_path, iteration=1) as resumed:
-        assert_same_rollouts(resumed.collect(policies(2)[1], steps=STEPS), expected)
+def test_a_restart_begins_anew_in_its_iteration(tmp_path: Path) -> None:
+    first, second = policies(2)
+    with collector_of(tmp_path) as collector:
+        collector.collect(first, steps=STEPS)
+        going_on = collector.collect(second, steps=STEPS)
+        collector.restart(1)
+        again = collector.collect(second, steps=STEPS)
+        assert collector.iteration == 2
+    with collector_of(tmp_path, iteration=1) as resumed:
+        assert_same_rollouts([resumed.collect(second, steps=STEPS)], [again])
+    assert again.observations.tobytes() != going_on.observations.tobytes()
 
 
-def test_after_an_exception_all_workers_begin_anew_and_repeat_the_iteration(
+def test_after_an_exception_a_collector_begins_anew_and_repeats_the_iteration(
     tmp_path: Path,
 ) -> None:
-    with workers_of(tmp_path) as workers:
-        workers.collect(policies(2)[0], steps=STEPS)
+    with collector_of(tmp_path) as collector:
+        collector.collect(policies(2)[0], steps=STEPS)
         (tmp_path / "raise").touch()
-        with pytest.raises(ArithmeticError, match="square") as raised:
-            workers.collect(policies(2)[1], steps=STEPS)
-        assert raised.value.__notes__ == ["raised in rollout worker 0"]
-        again = workers.collect(policies(2)[1], steps=STEPS)
-        assert workers.replacements == [(1, 0), (1, 1)]
-        assert workers.iteration == 2
-    with workers_of(tmp_path, iteration=1) as fresh:
-        assert_same_rollouts(again, fresh.collect(policies(2)[1], steps=STEPS))
+        with pytest.raises(ArithmeticError, match="square"):
+            collector.collect(policies(2)[1], steps=STEPS)
+        again = collector.collect(policies(2)[1], steps=STEPS)
+        assert collector.iteration == 2
+    with collector_of(tmp_path, iteration=1) as fresh:
+        assert_same_rollouts([again], [fresh.collect(policies(2)[1], steps=STEPS)])
 
 
 def test_arrays_are_read_only_and_shared_by_nobody(tmp_path: Path) -> None:
-    with workers_of(tmp_path) as workers:
-        rollouts = [each for both in collected(workers, 2) for each in both]
-    arrays = [array for each in rollouts for _, array in arrays_of(each)]
+    arrays = [array for each in collected(tmp_path, 2) for _, array in arrays_of(each)]
     assert not any(array.flags.writeable for array in arrays)
     assert not any(np.shares_memory(a, b) for a, b in combinations(arrays, 2) if a.size and b.size)
 
 
 def test_a_rollout_without_an_end_has_empty_ends(tmp_path: Path) -> None:
-    with workers_of(tmp_path, 1) as workers:
-        rollout = workers.collect(policies(1)[0], steps=1)[0]
-    ends = rollout.ends
+    with collector_of(tmp_path) as collector:
+        ends = collector.collect(policies(1)[0], steps=1).ends
     assert ends.observations.shape == (0, 6)
     assert {len(array) for _, array in arrays_of(ends)} == {0}
     assert set(ends.infos) == set(INFOS)
@@ -201,8 +178,8 @@ class Plain(Goal):
 
 def test_a_policy_may_be_of_ones_own_with_discrete_actions() -> None:
     make = lambda: VectorEnvironment(Plain(3), autoreset_mode="SameStep")  # noqa: E731
-    with LocalWorkers(make, workers=1, seed=1) as workers:
-        rollout = workers.collect(Chance(), steps=20)[0]
+    with Collector(make, seed=1) as collector:
+        rollout = collector.collect(Chance(), steps=20)
     assert set(rollout.actions.ravel().tolist()) == {0, 1, 2}
     assert rollout.actions.dtype == Discrete(3).dtype
 
@@ -211,38 +188,20 @@ def test_mistakes_are_named(tmp_path: Path) -> None:
     make = maker(tmp_path)
     policy = policies(1)[0]
     with pytest.raises(o80.InvalidArgument, match=r"SameStep, these are in NextStep: make them"):
-        LocalWorkers(lambda: VectorEnvironment(Reach(2)), workers=1)
+        Collector(lambda: VectorEnvironment(Reach(2)))
     with pytest.raises(o80.InvalidArgument, match="observation_space of arrays"):
-        LocalWorkers(
-            lambda: VectorEnvironment(Goal(2), autoreset_mode="SameStep"),
-            workers=1,
-        )
-    with pytest.raises(o80.InvalidArgument, match="workers must be at least 1, got 0"):
-        LocalWorkers(make, workers=0)
-    with LocalWorkers(make, workers=1, infos=("distance",)) as workers:
+        Collector(lambda: VectorEnvironment(Goal(2), autoreset_mode="SameStep"))
+    with pytest.raises(o80.InvalidArgument, match="number must be at least 0, got -1"):
+        Collector(make, number=-1)
+    with Collector(make, infos=("distance",)) as collector:
         with pytest.raises(o80.InvalidArgument, match=r"no array 'distance' .* it has apart, "):
-            workers.collect(policy, steps=20)
+            collector.collect(policy, steps=20)
         with pytest.raises(o80.InvalidArgument, match="steps must be at least 1, got 0"):
-            workers.collect(policy, steps=0)
-        with pytest.raises(IndexError, match="workers 0 to 0, not 3"):
-            workers.replace(3)
-    with pytest.raises(o80.Closed, match="make new ones"):
-        workers.collect(policy, steps=1)
+            collector.collect(policy, steps=0)
+    for use in (lambda: collector.collect(policy, steps=1), lambda: collector.restart(1)):
+        with pytest.raises(o80.Closed, match="make a new one"):
+            use()
     with pytest.raises(o80.InvalidArgument, match=r"log_std must have shape \(4,\), got \(3,\)"):
         GaussianPolicy(policy.mean, policy.scale, policy.weights, policy.biases, policy.log_std[:3])
     with pytest.raises(o80.InvalidArgument, match=r"weights must have the shapes \[\(32, 6\)"):
         GaussianPolicy(policy.mean, policy.scale, policy.weights[1:], policy.biases, policy.log_std)
-
-
-def test_without_ray_everything_but_its_workers_is_there() -> None:
-    program = (
-        "import sys; sys.modules['ray'] = None\n"
-        "import o80\n"
-        "from o80.learning.rollouts import LocalWorkers, RayWorkers\n"
-        "try: RayWorkers(None, workers=1)\n"
-        "except o80.MissingExtra as error: print(error)\n"
-    )
-    ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
-    assert ran.stdout.strip() == (
-        'rollouts on several machines needs ray, which is not installed: pip install "o80[ray]"'
-    )

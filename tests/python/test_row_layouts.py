@@ -119,7 +119,7 @@ def test_rows_without_their_padding_are_no_history(segment: str) -> None:
 
 
 def after_other_values(copied: Callable[[], Any]) -> Any:
-    """What a call makes of memory that held something before."""
+    """Result of a call in memory that held something before."""
     used = [np.full(32 << i % 16, 255, np.uint8) for i in range(320)]
     del used
     return copied()

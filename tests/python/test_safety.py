@@ -1,4 +1,4 @@
-"""What the arm does when something fails: the rows of docs/safety.md that need whole processes."""
+"""Failures and what the arm then does: the rows of docs/safety.md that need whole processes."""
 
 import asyncio
 import os

@@ -104,7 +104,7 @@ class Machine:
         return json.loads(self.process.stdout.readline())
 
     def o80(self, *words: str, fails: bool = False, **environment: str) -> str:
-        """What a command prints; its errors if it should fail."""
+        """Output of a command; its errors if it should fail."""
         code, out, error = self.ask(words, **environment)
         assert (code != 0) == fails, out + error
         return " ".join((error if fails else out).replace("│", " ").split())

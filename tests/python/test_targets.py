@@ -1,4 +1,4 @@
-"""What can be a target: numbers, mappings, records, labels, and arrays of many rows."""
+"""Targets: numbers, mappings, records, labels, and arrays of many rows."""
 
 from collections.abc import Iterator
 from enum import IntEnum

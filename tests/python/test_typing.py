@@ -1,4 +1,4 @@
-"""What a type checker says of users' programs."""
+"""Findings of a type checker in users' programs."""
 
 import fcntl
 import subprocess
@@ -81,7 +81,7 @@ BAD = [
 
 
 def mypy(program: str, folder: Path) -> str:
-    """What mypy, as strict as it gets, says of a program."""
+    """Findings of mypy, as strict as it gets, in a program."""
     file = folder / "program.py"
     file.write_text(program)
     cache = Path(__file__).parents[2] / "build" / "mypy-users"

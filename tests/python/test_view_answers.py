@@ -1,4 +1,4 @@
-"""What `o80 view` answers to a page about robots and recordings."""
+"""Answers of `o80 view` to a page about robots and recordings."""
 
 import base64
 import math

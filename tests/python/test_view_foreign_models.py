@@ -21,7 +21,7 @@ PLAIN = """
 
 
 def introduced(*names: str, model_files: bool = False) -> dict[str, Any]:
-    """What a page learns first."""
+    """Introduction that a page gets first."""
     found: dict[str, Any] = Answers(SourceList(names, model_files=model_files), control=False).look(
         {}
     )["new"]

@@ -1,4 +1,4 @@
-"""What the page of `o80 view` shows, in a real browser."""
+"""Page of `o80 view`, in a real browser."""
 
 import os
 import signal

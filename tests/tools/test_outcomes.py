@@ -1,4 +1,4 @@
-"""What the runners reported is read, and a skip that another run made good is no gap."""
+"""Reports of the runners are read, and a skip that another run made good is no gap."""
 
 from pathlib import Path
 

@@ -33,7 +33,7 @@ FloatArray = NDArray[np.float64]
 Numbers = NDArray[np.intp]
 
 TEXTS = np.array([end.text for end in End], object)
-"""Of the ends, by their numbers."""
+"""Texts of the ends, by their numbers."""
 
 
 def _running(copies: int) -> dict[str, NDArray[Any]]:
@@ -149,7 +149,7 @@ class TableTennisCopies(Task):
             self._look()
 
     def _look(self) -> None:
-        """What of the state is no view of the newest rows."""
+        """Updates the parts of the state that are no views of the newest rows."""
         self._rig.arms.read_pressures(self._state.pressures)
         self._state.record = self._rig.twins.records
 

@@ -39,12 +39,12 @@ from .settings import Pacing, RigSettings, TaskSettings
 
 @dataclass(frozen=True)
 class DemoSettings:
-    """What the demo plays, and where it writes."""
+    """Settings of the demo: what it plays, and where it writes."""
 
     balls: Path | None = None
     """Recordings; None: simulated shots."""
     episodes: int = 20
-    """Of each accelerated mode."""
+    """Episodes of each accelerated mode."""
     real_time_episodes: int = 5
     seed: int = 1
     extra_balls: int = 0
@@ -53,7 +53,7 @@ class DemoSettings:
     output: Path = Path("build/demo")
 
     def task(self) -> TaskSettings:
-        """What every environment of the demo plays."""
+        """Task that every environment of the demo plays."""
         balls = None if self.balls is None else str(self.balls)
         return TaskSettings(balls=balls, factor=DEFAULT_FACTOR)
 
@@ -252,7 +252,7 @@ def main(
 
 
 def _say_where(settings: DemoSettings, console: Console) -> None:
-    """What was written, and how to look at it."""
+    """Prints what was written, and how to look at it."""
     recording = settings.recording
     arm = next(iter(o80.open(recording)))
     lines = (

@@ -263,7 +263,7 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
 
     @property
     def summary(self) -> EpisodeSummary:
-        """Of the episode that has just ended."""
+        """Summary of the episode that has just ended."""
         if self._summary is None:
             raise RuntimeError("there is no summary yet: the episode is not over")
         return self._summary
@@ -275,7 +275,7 @@ class TableTennisEnvironment(gymnasium.Env[Float32Array, Action]):
 
     @property
     def observer(self) -> Observer:
-        """What makes observations of states."""
+        """Observer that makes observations of states."""
         return self._observer
 
     def statistics(self) -> Statistics:

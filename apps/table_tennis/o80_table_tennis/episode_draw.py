@@ -1,4 +1,4 @@
-"""What is drawn for an episode, in a fixed order: the same generator, the same episode."""
+"""Random draws for an episode, in a fixed order: the same generator, the same episode."""
 
 from __future__ import annotations
 

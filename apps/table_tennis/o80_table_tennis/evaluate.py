@@ -27,7 +27,7 @@ from .settings import Pacing
 
 @dataclass(frozen=True)
 class Match:
-    """What every policy plays."""
+    """Balls, arm and number of episodes that all compared policies share."""
 
     balls: str | None
     preset: str | None

@@ -65,7 +65,7 @@ class RigSettings:
     start_noise: float = 0.0
     """On each joint of the simulated arm at a reset, uniform in plus or minus this [rad]."""
     frequency: float = 1.0 / PERIOD
-    """Of the arm and of the twins [1/s]."""
+    """Frequency of the arm and of the twins [1/s]."""
     history: int | None = None
     """Rows that arm and twins keep; None: as many as fit into o80's usual history."""
 
@@ -86,12 +86,12 @@ class RigSettings:
 
     @property
     def period(self) -> float:
-        """Of an iteration [s]."""
+        """Duration of an iteration [s]."""
         return 1.0 / self.frequency
 
     @property
     def step(self) -> float:
-        """Of the environment [s]."""
+        """Duration of a step of the environment [s]."""
         return ITERATIONS * self.period
 
     def paced(self, pacing: Pacing) -> RigSettings:
@@ -119,11 +119,11 @@ class TaskSettings:
     of the ball launcher, needs o80-devices). Or the path of a recording, or of a folder of them.
     None: narrow."""
     ball_seed: int = 0
-    """Of the simulated shots: each seed has its own."""
+    """Seed of the simulated shots: each seed has its own."""
     ball_count: int | None = None
     """How many simulated shots there are; None: no end of them, each episode draws a new one."""
     factor: float = FINE
-    """Of the actions: 0.05 fine, 1 coarse."""
+    """Factor of the actions: 0.05 fine, 1 coarse."""
     repeat: int = 1
     """How often an action is carried out, for 10 ms each time, before the next observation."""
     delay: int = 1
@@ -132,13 +132,13 @@ class TaskSettings:
     """published (22 numbers), or full: with what was asked lately and a filtered ball, see
     `task.full_observation`; the latter of the named tasks with a ball."""
     noise: NoiseSettings = NO_NOISE
-    """Of what is observed; `NoiseSettings.tracker()` is that of a real camera system."""
+    """Noise of the observations; `NoiseSettings.tracker()` is that of a real camera system."""
     bounds: ObservationBounds = field(default_factory=ObservationBounds)
-    """Of the published observation of the named tasks with a ball."""
+    """Bounds of the published observation of the named tasks with a ball."""
     end: EndRule = field(default_factory=EndRule)
-    """Of an episode of the named tasks."""
+    """End of an episode of the named tasks."""
     reward: str | RewardRule = "ordered"
-    """Of the named tasks with a ball: ordered, published, or a rule of `task.rewards`."""
+    """Reward of the named tasks with a ball: ordered, published, or a rule of `task.rewards`."""
     fly_out: bool = False
     """After the first touch nobody is asked any more: in the same step the ball flies to its end,
     and the episode ends. A second touch of the racket then does not happen."""

@@ -48,10 +48,6 @@ def main(
         Path | None, typer.Option(help="Recordings that the finished policy plays too.")
     ] = None,
     evaluated: Annotated[int, typer.Option(min=1, help="Fresh balls for the verdict.")] = 400,
-    actors: Annotated[
-        int,
-        typer.Option(min=0, help="Actors of Ray that collect; --minutes do not count theirs."),
-    ] = 0,
     output: Annotated[Path, typer.Option(help="Folder that is written.")] = OUTPUT,
     resume: Annotated[bool, typer.Option(help="Go on from the checkpoint in the folder.")] = False,
 ) -> None:
@@ -68,7 +64,6 @@ def main(
             balls=balls,
             decisions=decisions,
             minutes=minutes,
-            actors=actors,
         )
         from .learning.session import Session
 

@@ -17,7 +17,7 @@ def model() -> mujoco.MjModel:
 
 
 def test_torques_are_nearly_those_of_the_scene(model: mujoco.MjModel) -> None:
-    """Those that play: joint 1 fast, the others slow. Left out is what the model says it leaves."""
+    """Motions of play: joint 1 fast, the others slow, without the effects that the model omits."""
     data = mujoco.MjData(model)
     rng = np.random.default_rng(5)
     for _ in range(30):

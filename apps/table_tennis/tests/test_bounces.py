@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 from recorded_rows import DATA, ball_gun_shots
 from typer.testing import CliRunner
 
-import o80_table_tennis.fit_bounces
-from o80_table_tennis.balls.bounce_fit import Law, errors, fitted
+from bounce_fit import Law, errors, fitted
+from fit_bounces import SPINLESS, BounceSet, app, bounce_set, rms
 from o80_table_tennis.balls.recordings import load_trajectories
 from o80_table_tennis.balls.trajectories import BallTrajectory
-from o80_table_tennis.fit_bounces import SPINLESS, BounceSet, bounce_set, rms
 from o80_table_tennis.physics.aerodynamics import AERODYNAMICS
 from o80_table_tennis.physics.impact import bounced, leaving
 from o80_table_tennis.world.ball import BALL_GUN_SPIN, BALL_RADIUS
@@ -65,7 +64,6 @@ def test_the_constants_are_those_of_the_fit(sets: list[BounceSet]) -> None:
 def test_the_command_prints_a_row_for_each_set() -> None:
     runner = CliRunner()
     paths = [str(DATA / name) for name in SETS[1:]]
-    app = o80_table_tennis.fit_bounces.app
     result = runner.invoke(app, paths)
     assert result.exit_code == 0, result.output
     assert "mn5008_no_spin          10" in result.output

@@ -25,7 +25,7 @@ def demo(output: Path, *arguments: str) -> list[str]:
 
 
 def live_segments(process: int) -> set[str]:
-    """Of those that a demo has started."""
+    """Names of the running segments that a demo has started."""
     return {
         segment.name
         for segment in o80.segments()

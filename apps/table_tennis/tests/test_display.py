@@ -27,7 +27,7 @@ def no_screen(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def address(told: str) -> str:
-    """Of the page, in what was printed."""
+    """Address of the page, from the printed text."""
     return told.split(" at ")[1].strip()
 
 

@@ -118,7 +118,7 @@ class Rows:
     asked: FloatArray
 
     def state(self, step: int, which: Any) -> State:
-        """Of one copy, or of some."""
+        """State of one copy, or of some."""
         racket = self.motion[which, step][..., :3]
         return State(
             step if np.ndim(which) == 0 else np.full(len(which), step),

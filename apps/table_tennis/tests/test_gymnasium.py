@@ -1,4 +1,4 @@
-"""What Gymnasium asks of an environment."""
+"""Requirements of Gymnasium for an environment."""
 
 import warnings
 from collections.abc import Iterator

@@ -7,11 +7,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from lab_kill_table import KILLS, SUPERVISOR, as_markdown
+from lab_kills import Killer, wait_until
 
 import o80
 from o80_table_tennis.lab.environment_row import Phase
-from o80_table_tennis.lab.kill_table import KILLS, SUPERVISOR, as_markdown
-from o80_table_tennis.lab.kills import Killer, wait_until
 from o80_table_tennis.lab.lacking import not_measured, not_played
 from o80_table_tennis.lab.parts import (
     ARM,
@@ -80,7 +80,7 @@ def test_a_supervisor_that_looks_late_misses_nothing(tmp_path: Path) -> None:
 
 @pytest.mark.check
 def test_balls_are_played_and_reported(tmp_path: Path) -> None:
-    words = ("-m", "o80_table_tennis.lab", "--count=2", "--no-fifo", "--no-cyclictest")
+    words = ("-m", "o80_table_tennis.lab", "--count=2", "--no-fifo")
     prefix = f"lab-test-{os.getpid()}"
     done = subprocess.run(
         [sys.executable, *words, f"--output={tmp_path}", f"--prefix={prefix}"],

@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 from recorded_rows import ball_gun_shots
 
-from o80_table_tennis.balls.launch_fit import (
+from launch_fit import (
     LAUNCH,
     NAMES,
     fitted,
@@ -21,7 +21,7 @@ FloatArray = NDArray[np.float64]
 UNLIKELY = 0.001
 """The drawn sample is fixed: 18 comparisons rarely fall below this by chance."""
 AFTER_BOUNCE = ("crossing time", "crossing vx", "crossing vy")
-"""What the law of the bounce, which is fitted to all spins, does not quite get."""
+"""Numbers that the law of the bounce, which is fitted to all spins, does not quite get."""
 
 
 @pytest.fixture(scope="module")

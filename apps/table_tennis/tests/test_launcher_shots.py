@@ -13,7 +13,7 @@ from o80_table_tennis.balls.trajectories import BallTrajectory
 from o80_table_tennis.physics.prediction import predict
 
 FITTED = 13
-"""Of the 25 shots, in an order drawn once and for all."""
+"""Number of the 25 shots that were fitted, in an order drawn once and for all."""
 
 
 def held_out() -> list[tuple[tuple[float, float, float], BallTrajectory]]:
@@ -29,8 +29,8 @@ def held_out() -> list[tuple[tuple[float, float, float], BallTrajectory]]:
 
 
 def distances(speeds: tuple[float, float, float], shot: BallTrajectory) -> NDArray[np.float64]:
-    """Of each row from the flight of the mean ball [m]. Only the time of the launch, which nobody
-    recorded, is taken from the first rows."""
+    """Distances of each row from the flight of the mean ball [m]. Only the time of the launch,
+    which was not recorded, is taken from the first rows."""
     launch = launcher_launch(speeds)
     flight = predict(launch.position, launch.velocity, 1.2, spin=launch.spin, period=0.001)
 

@@ -20,7 +20,7 @@ def layer(module: Path) -> int:
 
 
 def used(module: Path) -> set[str]:
-    """What a module imports of this package: names of packages, or of modules beside them."""
+    """Imports of a module from this package: names of packages, or of modules beside them."""
     depth = len(module.relative_to(PACKAGE).parts)
     return {
         (node.module or "").split(".")[0]

@@ -141,6 +141,17 @@ def test_a_training_that_has_nothing_left_to_do_tells_no_share_of_the_environmen
         assert math.isnan(training.environment_share)
 
 
+def test_the_same_seed_and_the_same_resumption_learn_the_same(tmp_path: Path) -> None:
+    ended = []
+    for folder in (tmp_path / "one", tmp_path / "two"):
+        with Training(SMALL, folder) as training:
+            training.run()
+        with Training(replace(SMALL, decisions=192), folder, resume=True) as resumed:
+            resumed.run()
+            ended.append(state_of(resumed))
+    assert ended[0] == ended[1]
+
+
 def test_rows_after_the_checkpoint_are_dropped_when_a_training_resumes(tmp_path: Path) -> None:
     with Training(SMALL, tmp_path) as training:
         training.run()

@@ -27,7 +27,7 @@ def model() -> mujoco.MjModel:
 
 
 def reference_row(model: mujoco.MjModel, q: Numbers, dq: Numbers, torque: Numbers) -> Numbers:
-    """What the engine computes for one motion of the arm: inputs, then all outputs."""
+    """Numbers of the engine for one motion of the arm: inputs, then all outputs."""
     data = mujoco.MjData(model)
     arm = slice(0, JOINTS)
     data.qpos[arm], data.qvel[arm], data.qfrc_applied[arm] = q, dq, torque

@@ -1,4 +1,4 @@
-"""What the application reads from the scene is what the simulator and the robot have."""
+"""The numbers that the application reads from the scene are those of simulator and robot."""
 
 import mujoco
 import numpy as np

@@ -59,12 +59,12 @@ ALONE = np.array([0.05, 0.01, 0.01, 10.0, 10.0, 10.0])
 """Typical changes from shot to shot: speed [m/s], azimuth, altitude [rad], spin [rad/s]. The value
 for the spin is also a prior, because a short flight says little about the spin."""
 NOISE = 0.005
-"""Of a recorded position [m]."""
+"""Noise of a recorded position [m]."""
 SCATTERS = ("speed_scatter", "azimuth_scatter", "altitude_scatter", "spin_scatter")
 LOW = 0.05
 """Rows up to the first one so near to the table are surely before the bounce [m]."""
 PERIOD = 0.001
-"""Of the computed flights [s]."""
+"""Period of the computed flights [s]."""
 LEAD = 0.2
 """The first row of a shot is at most so long after the launch [s]."""
 FIRST_ROWS = 10
@@ -114,7 +114,7 @@ def scatter(model: LaunchModel, shots: Sequence[Shot]) -> FloatArray:
 
 
 def _missed_alone(model: LaunchModel, shot: Shot, moves: FloatArray) -> FloatArray:
-    """Of a shot whose launch differs from the mean by `moves`, in standard deviations."""
+    """Errors of a shot whose launch differs from the mean by `moves`, in standard deviations."""
     ball = model.launch(shot.setting.phi, shot.setting.theta, shot.setting.speeds)
     x, y, z = ball.velocity
     speed = float(np.linalg.norm(ball.velocity))

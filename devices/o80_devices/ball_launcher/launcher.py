@@ -23,7 +23,7 @@ CONFIRMATIONS = 2  # of the state, after which no older request can be waiting
 
 
 class Status(IntEnum):
-    """What the launcher does, or why it cannot launch."""
+    """State of the launcher, or the reason why it cannot launch."""
 
     disconnected = 0
     setting = 1

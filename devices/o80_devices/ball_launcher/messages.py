@@ -26,7 +26,7 @@ REFUSED = (b"0", b"\x00")
 
 
 class Kind(IntEnum):
-    """What is requested."""
+    """Kind of a request."""
 
     SET_STATE = 0
     LAUNCH_BALL = 1

@@ -19,12 +19,12 @@ FEWEST_ROWS = 20
 
 @dataclass(frozen=True)
 class Setting:
-    """What the launcher was told before a shot."""
+    """Setting of the launcher before a shot."""
 
     phi: float
     theta: float
     speeds: tuple[float, float, float]
-    """Of the motors top left, top right, bottom [1/min]."""
+    """Speeds of the motors top left, top right, bottom [1/min]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,7 +39,7 @@ STATUS = {
     5: "a packet is larger than the image",
     7: "aborted",
 }
-"""Of buffers, ArvBufferStatus."""
+"""Texts of the states of buffers, ArvBufferStatus."""
 
 
 class _Error(ctypes.Structure):
@@ -99,7 +99,7 @@ def found() -> list[str]:
 
 @dataclass(frozen=True)
 class Settings:
-    """What a camera is set to; 0 and empty: as it is."""
+    """Settings of a camera; 0 and empty: as it is."""
 
     pixel_format: str
     region: tuple[int, int, int, int]
@@ -113,13 +113,13 @@ class Settings:
 
 @dataclass(frozen=True)
 class Buffer:
-    """What came from the camera."""
+    """Buffer that came from the camera."""
 
     status: int
     number: int
-    """Of the frame; GigE Vision counts from 1 to 65535, and again."""
+    """Number of the frame; GigE Vision counts from 1 to 65535, and again."""
     stamp: int
-    """Of the camera [ns]; 0: it gives none."""
+    """Stamp of the camera [ns]; 0: it gives none."""
     content: Image
     """Bytes of the image; empty if it is damaged."""
     size: tuple[int, int]

@@ -15,7 +15,7 @@ RETRY = 50_000_000
 KEPT = 32
 """Pairs of a row and its time."""
 GAP = 3.0
-"""Of periods, between a time and the rows around it, above which the ball is unknown."""
+"""Periods between a time and the rows around it above which the ball is unknown."""
 
 
 class Attached:
@@ -27,7 +27,7 @@ class Attached:
         self._next_try: int | None = None
 
     def frontend(self, now: int) -> tuple[o80.Frontend | None, bool]:
-        """Of the living backend, or None; and whether it is another one than at the last call."""
+        """Frontend of the living backend, or None; and whether it is new since the last call."""
         if self._frontend is not None and not self._frontend.alive:
             self.close()
         if self._frontend is not None:

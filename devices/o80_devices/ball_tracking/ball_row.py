@@ -1,4 +1,4 @@
-"""What a row of a tracked ball holds."""
+"""Row of a tracked ball."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Reason(IntEnum):
     no_agreement = 3
     """Cameras see something, but not at one place in the world."""
     unexpected = 4
-    """What was seen does not continue the flight; once more, and it is a hit or another ball."""
+    """The sighting does not continue the flight; once more, and it is a hit or another ball."""
 
 
 EXTENDED: dict[str, Any] = {

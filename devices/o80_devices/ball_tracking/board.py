@@ -20,7 +20,7 @@ PURPOSE = "the calibration of cameras"
 LEAST_PICTURES = 8
 """Pictures in which the board is found, for one lens."""
 LARGEST_UNCERTAINTY = 0.02
-"""Of a focal length, as a share of it."""
+"""Largest uncertainty of a focal length, as a share of it."""
 LEAST_TILT = 0.1
 """Root mean square of the angles between boards and images [rad]; boards that all face the camera
 do not tell a long lens from a near board."""

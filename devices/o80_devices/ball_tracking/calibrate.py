@@ -192,7 +192,7 @@ def tell_corners(
 
 
 def two_numbers(text: str) -> tuple[int, int]:
-    """Of a text such as 9x6."""
+    """Two numbers from a text such as 9x6."""
     first, _, second = text.partition("x")
     if not (first.isdecimal() and second.isdecimal()):
         raise argparse.ArgumentTypeError(f"two numbers such as 9x6 are needed, got '{text}'")

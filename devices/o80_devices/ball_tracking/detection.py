@@ -19,7 +19,7 @@ FloatArray = NDArray[np.float64]
 Image = NDArray[np.uint8]
 
 STEP = 3
-"""Of a search of a whole image [px]."""
+"""Step of a search of a whole image [px]."""
 AROUND = 24
 """Half the side of a region, besides what the ball's size and uncertainty ask for [px]."""
 LARGEST = 120

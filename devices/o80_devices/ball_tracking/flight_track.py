@@ -88,7 +88,7 @@ class FlightTrack:
         return self._last is not None
 
     def forget(self) -> None:
-        """What is seen next is another ball."""
+        """Forgets the ball: the next sighting is another one."""
         self._last = self._surprise = None
 
     def expected(self, time: int) -> tuple[FloatArray | None, float]:

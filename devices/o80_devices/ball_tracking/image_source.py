@@ -24,7 +24,7 @@ class Images:
 
     images: list[Image | None]
     time: int
-    """Of capture [ns]."""
+    """Time of capture [ns]."""
     error: int = 0
     """Estimated error of this time, the largest of all cameras with an image [ns]; 0 if exact."""
 

@@ -43,7 +43,7 @@ class Lens:
     held_out: float
     """The same in those that it was not fitted to [px]."""
     pictures: int
-    """In which the board was found."""
+    """Number of pictures in which the board was found."""
 
 
 def lens_from_boards(

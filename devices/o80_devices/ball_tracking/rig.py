@@ -68,7 +68,7 @@ class RigCamera:
 
 @dataclass(frozen=True)
 class Flight:
-    """What air and gravity do to the ball; src/vision/flight.hpp has the formulas.
+    """Forces of air and gravity on the ball; src/vision/flight.hpp has the formulas.
 
     The numbers are those of the balls of the table-tennis application.
     """
@@ -79,7 +79,7 @@ class Flight:
     """[1/m]"""
     magnus: float = 0.00626
     saturation: float = 0.06
-    """Of the lift [m]."""
+    """Saturation of the lift [m]."""
     spin_decay: float = 0.5
     """[1/s]"""
     gravity: Vector = (0.0, 0.0, -9.81)
@@ -91,7 +91,7 @@ class Table:
     """A table on which the ball bounces; its edges are parallel to the axes of the world."""
 
     middle: Vector = (0.4, 1.57, 0.775)
-    """Of its surface [m]."""
+    """Middle of its surface [m]."""
     half: tuple[float, float] = (0.7625, 1.37)
     """Half its width along x and half its length along y [m]."""
     kept_normal: float = 0.92

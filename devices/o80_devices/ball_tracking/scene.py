@@ -1,4 +1,4 @@
-"""What a camera of a rig sees: a room with the table, and a ball, through its lens.
+"""Images of the cameras of a rig: a room with the table, and a ball, through the lens.
 
 The ball is drawn as it is during the exposure: a fast one is a streak, a boundary lies between
 pixels, the lens bends it, light comes from above. The background with its noise is prepared.
@@ -63,7 +63,7 @@ class Scene:
         velocity: FloatArray | None = None,
         into: Image | None = None,
     ) -> Image:
-        """What a camera sees; position None: no ball. into: (height, width, 3), to be filled."""
+        """Image of a camera; position None: no ball. into: (height, width, 3), to be filled."""
         backgrounds = self._backgrounds[camera]
         self._images += 1
         prepared = backgrounds[self._images % len(backgrounds)]

@@ -24,7 +24,7 @@ FloatArray = NDArray[np.float64]
 SECOND = 1_000_000_000  # [ns]
 LARGEST_STAMP = 2**62
 LARGEST_MESSAGE = 1 << 16
-"""Of another publisher; it is not parsed [bytes]."""
+"""Size above which a message is of another publisher; it is not parsed [bytes]."""
 FARTHEST = 1e3
 """A ball further away than this is no ball [m]."""
 
@@ -50,7 +50,7 @@ class ServerReason(IntEnum):
 
 @dataclass(frozen=True)
 class Message:
-    """What the server says of one frame."""
+    """Message of the server about one frame."""
 
     stamp: int
     """On its own clock [ns]."""

@@ -51,10 +51,10 @@ class Tracker:
         self._detector = Detector(rig, colour.of_hue() if colours is None else colours)
         self._track = FlightTrack(rig.law(), self.options.forget)
         self.sightings: FloatArray = np.empty((0, 4))
-        """Of the last images: camera, x and y [px], area [px^2]."""
+        """Sightings in the last images: camera, x and y [px], area [px^2]."""
 
     def forget(self) -> None:
-        """What is seen next is another ball."""
+        """Forgets the ball: the next sighting is another one."""
         self._track.forget()
 
     def track(self, images: Sequence[Image | None], time: int) -> Tracked:

@@ -32,7 +32,7 @@ class NewestFrame:
         self._last = 0  # arrival [ns]
         self._trouble = Trouble(f"camera {source}")
         self.wrong = ""
-        """What is wrong with the camera, for the user; empty: nothing."""
+        """Text for the user about a failure of the camera; empty: none."""
         self._ends = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
@@ -68,7 +68,7 @@ class NewestFrame:
         capture.set(self._cv2.CAP_PROP_BUFFERSIZE, 1)
 
     def _time_of(self, capture: Any) -> tuple[int, int]:
-        """Of capture as the kernel says, where it does; of arrival otherwise. Its error [ns]."""
+        """Time of capture where the kernel gives it, of arrival otherwise; and its error [ns]."""
         now = time.monotonic_ns()
         between, self._last = now - self._last, now
         said = int(1e6 * float(capture.get(self._cv2.CAP_PROP_POS_MSEC)))

@@ -34,7 +34,7 @@ class WavedBall:
     """Moments in which at least two cameras see the ball."""
 
     names: tuple[str, ...]
-    """Of the cameras."""
+    """Names of the cameras."""
     pixels: FloatArray
     """(moments, cameras, 2) [px]; NaN: not seen."""
 

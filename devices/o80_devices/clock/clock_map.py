@@ -128,7 +128,7 @@ class ClockMap:
         return Capture(time, round(error), self._epoch)
 
     def _line_error(self, x: float) -> float:
-        """Of the line at x [ns]."""
+        """Error of the line at x [ns]."""
         envelope = self._envelope
         if envelope.buckets <= RECENT:
             count = envelope.count
@@ -165,7 +165,7 @@ class ClockMap:
         return x, (arrival - self._first_arrival) - x
 
     def _step(self, but_last: int = 0) -> float:
-        """What is too much for a delay, by those that were, without the newest buckets [ns]."""
+        """Lateness too large for a delay, judged by earlier ones but the newest buckets [ns]."""
         return max(STEP, STEP_SCATTERS * self._envelope.scatter(but_last))
 
     def _was_set_forward(self, x: float, y: float) -> bool:

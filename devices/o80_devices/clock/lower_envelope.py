@@ -111,7 +111,7 @@ class LowerEnvelope:
 
     @property
     def error(self) -> float:
-        """Of the line where its points are [ns].
+        """Error of the line where its points are [ns].
 
         The median distance of the lowest points of the buckets: not the mean, because a bucket
         whose packets all waited in a queue tells nothing. A few buckets may lie on the line by

@@ -39,9 +39,9 @@ class Behaviour:
     """Times and faults."""
 
     state_time: float = 1.0
-    """Of a change of state [s]."""
+    """Duration of a change of state [s]."""
     launch_time: float = 3.0
-    """Of a launch, with the stirring [s]."""
+    """Duration of a launch, with the stirring [s]."""
     magazine: int = 100
     """Balls in it; a launch without one fails."""
     refuse: float = 0.0
@@ -114,7 +114,7 @@ class FakeLauncher:
 
     @property
     def busy(self) -> Request | None:
-        """What it is doing."""
+        """Request that is being served."""
         return self._busy
 
     # ------------------------------------------------------------------ work

@@ -17,7 +17,7 @@ SECOND = 1_000_000_000  # [ns]
 SEEN_FOR = 3.0
 """A ball that lies somewhere is not tracked any more [s]."""
 STEP = 0.01
-"""In which a flight is computed [s]."""
+"""Time step in which a flight is computed [s]."""
 
 
 class LaunchedBalls:
@@ -44,7 +44,7 @@ class LaunchedBalls:
         self._time = self._launched = now
 
     def message(self, now: int) -> Message:
-        """What the tracker sees at a time [ns]; times do not go back."""
+        """Message of the tracker at a time [ns]; times do not go back."""
         while self._ball is not None and self._time < now:
             step = min(round(STEP * SECOND), now - self._time)
             ball = self._ball

@@ -32,7 +32,7 @@ def port(text: str) -> int:
 
 
 def vector(text: str) -> tuple[float, float, float]:
-    """Of a text such as 0.4,2.9,0"""
+    """Vector from a text such as 0.4,2.9,0"""
     try:
         x, y, z = (float(each) for each in text.split(","))
     except ValueError:

@@ -52,7 +52,7 @@ class Stream:
 
 @dataclass
 class Faults:
-    """What goes wrong; may be changed while the server runs."""
+    """Faults of the server; may be changed while it runs."""
 
     lose: float = 0.0  #: share of the frames that are not sent
     silent: bool = False  #: connected, but nothing comes: a pulled cable

@@ -83,7 +83,7 @@ class QualisysConnection:
 
 
 def body_names(settings: str) -> list[str]:
-    """Of the 6D settings of the server, in the order of the frames. Raises ValueError."""
+    """Names in the 6D settings of the server, in the order of the frames. Raises ValueError."""
     try:
         root = ElementTree.fromstring(settings.strip())
     except ElementTree.ParseError as error:

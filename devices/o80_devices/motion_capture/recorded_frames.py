@@ -24,7 +24,7 @@ class RecordedFrames:
 
     @property
     def names(self) -> list[str]:
-        """Of all subjects, in the order of their appearance."""
+        """Names of all subjects, in the order of their appearance."""
         return list(dict.fromkeys(name for frame in self.frames for name in frame.subjects))
 
 

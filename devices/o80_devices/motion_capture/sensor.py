@@ -1,4 +1,4 @@
-"""What all motion capture drivers share: the rows, the capture times, and the gaps."""
+"""Parts that all motion capture drivers share: the rows, the capture times, and the gaps."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ class Frames(Protocol):
 
     @property
     def names(self) -> Sequence[str]:
-        """Of the subjects that it knows. Asked for before `start`, if the user names none."""
+        """Names of the subjects that it knows. Asked for before `start`, if the user names none."""
 
     @property
     def tick(self) -> float:
-        """What a stamp counts [ns]."""
+        """Unit of a stamp [ns]."""
 
     @property
     def reason(self) -> Reason:
@@ -238,7 +238,7 @@ NO_FRAME = {
     "stamped": False,
     "frame_number": 0,
 }
-"""Of a row without a frame; `epoch` and `lost_frames` stay."""
+"""Values of a row without a frame; `epoch` and `lost_frames` stay."""
 SUBJECT_FIELDS: dict[str, Any] = {
     "visible": bool,
     "position": (float, 3),
@@ -249,7 +249,7 @@ UNSEEN = (False, Subject(False).position, Subject(False).quaternion, float("nan"
 
 
 def hint(name: str, there: Sequence[str]) -> str:
-    """What to tell of a subject that no frame has."""
+    """Hint about a subject that no frame has."""
     near = difflib.get_close_matches(name, there, n=1)
     listed = ", ".join(there[:5]) + (", ..." if len(there) > 5 else "")
     known = f"did you mean '{near[0]}'?" if near else f"there are: {listed or 'none'}"

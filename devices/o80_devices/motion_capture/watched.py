@@ -120,7 +120,7 @@ class WatchedFrames(FrameStream):
 
     @cached_property
     def names(self) -> Sequence[str]:
-        """Of the subjects of the first frame. Raises DriverError."""
+        """Names of the subjects of the first frame. Raises DriverError."""
         connection = ChildConnection(self._system, self._host)
         begin = time.monotonic()
         try:

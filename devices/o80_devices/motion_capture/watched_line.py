@@ -1,4 +1,4 @@
-"""What the process of a watched client prints, a line each."""
+"""Lines that the process of a watched client prints."""
 
 STARTED = b"started"
 """The first line: from now on the client connects. Each line after it is a frame in JSON."""

@@ -72,7 +72,7 @@ namespace o80 {
 template <class T>
 struct Tag {};
 
-/// What O80_DESCRIBE gives for a field: a text, the value at which it rests, and its origin.
+/// Notes of O80_DESCRIBE about a field: a text, the value at which it rests, and its origin.
 struct FieldNote {
   std::string_view text;
   std::optional<RestsAt> rest;

@@ -31,8 +31,8 @@ enum class Kind : std::uint8_t {
   text,         // a string; only in options, never in shared memory
 };
 
-/// What an actuator does without a command: hold its last desired state, or follow the observed
-/// one.
+/// Behaviour of an actuator without a command: hold its last desired state, or follow the
+/// observed one.
 enum class WhenIdle : std::uint8_t { hold, follow };
 
 /// A text of fixed size for shared memory, filled up with zeros.

@@ -36,7 +36,7 @@ struct Limits {
   /// Largest difference of two readings, in addition to the motion that `speed` allows; with a
   /// larger one a reading counts as wrong. 0: a tenth of `error`.
   double noise = 0.0;
-  /// What the number moves, if it is the velocity of another one; no limit of jerk then.
+  /// Field that the number moves, if it is its velocity; no limit of jerk then.
   IntegralBounds integral = {};
 
   LimitRow row(double rest = 0.0, bool resting = false) const {

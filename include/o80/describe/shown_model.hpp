@@ -12,7 +12,7 @@
 
 namespace o80 {
 
-/// What a value of a row moves in the model.
+/// Part of the model that a value of a row moves.
 enum class Shown : std::uint8_t {
   joint,    // one number: position of a hinge or a slide
   position  // three numbers: position of a body with a free joint

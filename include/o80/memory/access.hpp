@@ -4,7 +4,7 @@
 
 namespace o80 {
 
-/// What a frontend may do with a segment.
+/// Rights of a frontend to a segment.
 enum class Access : std::uint8_t {
   read_only,  // observe
   read_write  // command as well

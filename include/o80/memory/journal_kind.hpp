@@ -6,7 +6,7 @@
 
 namespace o80 {
 
-/// What an entry of a journal reports. See ARCHITECTURE.md, The journal.
+/// Kind of an entry of a journal. See ARCHITECTURE.md, The journal.
 enum class JournalKind : std::uint8_t {
   none,
   records,           // blocks of a batch, as they came from its lane

@@ -55,7 +55,7 @@ struct BackendOptions {
   /// Real time only: starts where the robot is read to be, even if it cannot have come
   /// there.
   bool accept_reading = false;
-  /// What the caller knows of the robot: its options, library and files, and further run options.
+  /// Provenance that the caller knows: the robot's options, library, files, further run options.
   /// The backend adds its own options, the versions and the clock, and the robot's name if none is
   /// given.
   Provenance provenance{};
@@ -121,8 +121,8 @@ class UntypedBackend {
   /// backend ends. `failure` names the number.
   bool publish() noexcept;
 
-  /// Of a replay: makes this the first iteration, instead of 0, with these desired states instead
-  /// of the observed ones; `desired` is read by the next `publish`. Call it before that.
+  /// Replay only: sets the first iteration (default 0), with these desired states instead of the
+  /// observed ones; `desired` is read by the next `publish`. Call it before that.
   void begin_at(Iteration first, const std::byte* desired = nullptr) noexcept;
   /// Begins an iteration: commands => desired. In bursting mode `step` waits for a burst,
   /// `try_step` does not.
@@ -130,7 +130,7 @@ class UntypedBackend {
   Step try_step() noexcept;
   /// As `step`, but waits for at most `at_most` [ns]; then returns `standing`.
   Step step_within(std::int64_t at_most) noexcept;
-  /// Of an inline group: grants the next iterations, with targets for them, as a batch would. False
+  /// Inline group only: grants the next iterations, with targets for them, as a batch would. False
   /// if a batch is needed, because others command or a journal is written. Call it between two
   /// iterations; the memory of the targets must outlive those iterations.
   bool begin_direct(const DirectBurst& burst) noexcept;

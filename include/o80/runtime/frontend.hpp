@@ -99,7 +99,7 @@ class UntypedFrontend {
   std::uint32_t add_commands(std::span<const std::uint32_t> actuators,
                              std::span<const std::byte> states, const CommandOptions& options = {},
                              std::span<const std::uint64_t> masks = {});
-  /// What the command of add_commands would do if it began after the newest row: how many
+  /// Computes what the command of add_commands would do if it began after the newest row: how many
   /// iterations it takes, later than asked by how many and why, and the desired states in each of
   /// them, bit for bit, because the loop's own code computes them here. Sends nothing and needs no
   /// lane.

@@ -29,7 +29,7 @@ struct JournalRecord {
     mark,
     unknown
   };
-  /// What a command asks of one actuator.
+  /// Targets of a command for one actuator.
   struct Target {
     std::uint16_t actuator = 0;
     std::vector<std::uint64_t> mask;  // one bit for each number that was given; empty: all
@@ -92,8 +92,8 @@ struct JournalEntry {
   std::uint16_t actuator = 0;                  // interrupted
   bool before_step = false;                    // interrupted before the step of the iteration
   BackendState state = BackendState::running;  // ended
-  /// What this o80 does not know of it, "entry kind 30", or of its records: a newer o80 has
-  /// recorded it. Empty: nothing.
+  /// Parts of it, or of its records, that this o80 does not know ("entry kind 30"): a newer o80
+  /// has recorded it. Empty: none.
   std::string unknown;
   // snapshot: what the driver keeps in a slot
   std::uint32_t slot = 0;

@@ -9,7 +9,7 @@
 
 namespace o80 {
 
-/// What a command would do, computed by UntypedFrontend::preview.
+/// Preview of a command, computed by UntypedFrontend::preview.
 struct Preview {
   /// Number of iterations that the command takes.
   std::int64_t iterations() const { return static_cast<std::int64_t>(rows.count); }

@@ -65,7 +65,7 @@ class Frontend : public UntypedFrontend {
                         std::span<const State>(targets.begin(), targets.size()), options);
   }
   using UntypedFrontend::preview;
-  /// What a command of add_command would do after the newest row; with `initial`, from rest there.
+  /// Preview of add_command after the newest row; with `initial`, from rest there.
   template <Shareable State>
   TypedPreview<R> preview(std::string_view name, const State& target,
                           const CommandOptions& options = {},

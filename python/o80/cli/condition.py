@@ -66,7 +66,7 @@ def age_text(seconds: float) -> str:
 
 
 def watchdog_text(schema: dict[str, Any]) -> str:
-    """What the backend does when a commander hangs or dies."""
+    """Text about what the backend does when a commander hangs or dies."""
     silence, stale = schema["silence"], schema["stale"]
     if silence:
         return f"watchdog: {stale} after {silence} iterations without a sign of life"

@@ -25,7 +25,7 @@ class Named:
 
 
 def histories(source: str, only: str | None, *, seconds: float | None = None) -> Iterator[Named]:
-    """What a file, or a segment in shared memory, holds.
+    """Histories of a file, or of a segment in shared memory.
 
     source: a path that ends in .mcap, or the name of a segment. only: one segment of a file.
     """

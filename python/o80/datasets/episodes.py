@@ -50,7 +50,7 @@ class Episode:
 
     @cached
     def actions(self) -> NDArray[np.float64]:
-        """What was asked in each step, the desired states: (T, numbers)."""
+        """Actions of all steps, the desired states: (T, numbers)."""
         return self._numbers("desired")[1:]
 
     def _numbers(self, part: str) -> NDArray[np.float64]:

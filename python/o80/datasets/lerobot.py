@@ -97,7 +97,7 @@ def _frames(
 
 
 def _row(episode: Episode, number: int, first: int, columns: Columns) -> dict[str, Any]:
-    """What is said about an episode: where its frames are, and their statistics."""
+    """Row about an episode: where its frames are, and their statistics."""
     row: dict[str, Any] = {
         "episode_index": number,
         "tasks": [episode.task],
@@ -115,7 +115,7 @@ def _row(episode: Episode, number: int, first: int, columns: Columns) -> dict[st
 
 
 def _stats(values: NDArray[Any]) -> dict[str, list[float]]:
-    """Of each number of a column, over all frames."""
+    """Statistics of each number of a column, over all frames."""
     numbers = values.reshape(len(values), -1).astype(np.float64)
     stats: dict[str, list[float]] = {
         "min": numbers.min(axis=0).tolist(),

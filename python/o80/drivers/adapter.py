@@ -71,7 +71,7 @@ class Adapter:
         return writer.builder
 
     def give_differences(self, differences: Differences) -> None:
-        """What `Desired.rate` asks for, given after describe()."""
+        """Takes the differences for `Desired.rate`; call it after describe()."""
         self._desired.differences = differences
 
     def _told(self, name: str, otherwise: Any = None) -> Any:

@@ -50,7 +50,7 @@ class Options:
 
     @classmethod
     def of(cls, driver: type[Any]) -> Options:
-        """Those of the class `Config` in a driver class. Raises InvalidArgument."""
+        """Options of the class `Config` in a driver class. Raises InvalidArgument."""
         config = getattr(driver, "Config", None)
         if config is None:
             return cls(None, {}, [])

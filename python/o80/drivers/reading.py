@@ -1,4 +1,4 @@
-"""What the verbs of a driver get: the desired states to write, and a reading to fill."""
+"""Arguments of a driver's verbs: the desired states to write, and a reading to fill."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ class Desired:
 
 
 class Reading:
-    """What came of an iteration: fill `observed` and `extended`; they hold the last reading."""
+    """Reading of an iteration: fill `observed` and `extended`; they hold the last reading."""
 
     def __init__(
         self,
@@ -195,7 +195,7 @@ class Reading:
         self._reports.append((index, answer, text))
 
     def report(self) -> tuple[Any, ...] | None:
-        """What was called, for the compiled loop; None: nothing."""
+        """Calls on this reading, for the compiled loop; None: none."""
         if not (
             self._finished
             or self._missed
@@ -226,7 +226,7 @@ class Answer:
 
     @staticmethod
     def of(answer: Any, what: str) -> tuple[int, str]:
-        """Of what a handler returned. Raises InvalidArgument."""
+        """Answer and text for what a handler returned. Raises InvalidArgument."""
         if answer is None:
             return Answer.DONE, ""
         if isinstance(answer, Running):

@@ -32,7 +32,7 @@ class Previewing(Commanding):
         every: float | int | None = None,
         initial: Any = None,
     ) -> Preview:
-        """What `add_command` with the same arguments would do if it began after the newest row.
+        """Computes what `add_command` with the same arguments would do after the newest row.
 
         The code of the loop computes it here, so the robot does the same bit for bit. Sends
         nothing, adds nothing, works read-only.

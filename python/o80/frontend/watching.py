@@ -15,7 +15,7 @@ class Watching(Describing):
     """The part of o80.Frontend that watches the loop of the backend."""
 
     def journal(self, since: int | None = None) -> list[JournalEntry]:
-        """What the backend decided, oldest first: who sent what, when it was taken, how it ended.
+        """Decisions of the backend, oldest first: who sent what, when it was taken, how it ended.
 
         since: number of the first entry to return (None: the oldest that there is). To follow a
             backend, keep an `o80.Journal`, which reads each entry once.

@@ -37,7 +37,7 @@ class Latency:
     uncertainty: float
     """Standard error, from a jackknife over ten parts of the time [s]."""
     correlation: float
-    """Of the two signals at this delay, at most 1."""
+    """Correlation of the two signals at this delay, at most 1."""
     samples: int
     """Times at which the signals were compared."""
 

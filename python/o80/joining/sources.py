@@ -1,4 +1,4 @@
-"""What can be joined by time: histories, each with the times of its rows on one common clock."""
+"""Sources to join by time: histories, each with the times of its rows on one common clock."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def _opened(name: str, source: Any, seconds: float | None) -> tuple[History, int
 
 
 def shifts_of(found: Mapping[str, tuple[History, int | None]]) -> dict[str, int] | None:
-    """What to add to the row times of each [ns]; None: their clocks have nothing in common."""
+    """Shifts to add to the row times of each [ns]; None: their clocks have nothing in common."""
     clocks = {history.schema["clock"] for history, _ in found.values()}
     if len(clocks) > 1:
         return None

@@ -12,7 +12,7 @@ from o80.learning.task import Index
 
 
 def rows(batch: Any, copies: Any) -> Any:
-    """Those of some copies; a number gives that of one copy. Arrays are fresh."""
+    """Entries of the given copies (of one copy for a single number), as new arrays."""
     if isinstance(batch, dict):
         return {name: rows(each, copies) for name, each in batch.items()}
     if isinstance(batch, tuple):

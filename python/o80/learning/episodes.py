@@ -16,7 +16,7 @@ from o80.learning.task import Index, Outcome, Task
 
 @dataclass(slots=True)
 class Begun:
-    """What n copies see when their episode begins."""
+    """Observations of n copies when their episodes begin."""
 
     observations: Any
     """(n, ...) a fresh batch."""
@@ -26,7 +26,7 @@ class Begun:
 
 @dataclass(slots=True)
 class Stepped(Begun):
-    """What n copies see after a step, and what it was worth, in arrays over all copies."""
+    """Observations of n copies after a step; its rewards and ends in arrays over all copies."""
 
     rewards: NDArray[np.float64]
     terminated: NDArray[np.bool_]
@@ -34,7 +34,7 @@ class Stepped(Begun):
     judged: NDArray[np.intp]
     """Numbers of the copies that were judged."""
     judged_info: Mapping[str, Any]
-    """Of these."""
+    """Info of the judged copies."""
 
 
 def begin(
@@ -75,7 +75,7 @@ def step(task: Task, actions: Any, copies: Index) -> Stepped:
 
 
 def no_step(task: Task) -> Stepped:
-    """What comes of a step of no copy."""
+    """Result of a step of no copy."""
     nothing = np.zeros(task.copies, np.bool_)
     return Stepped(
         None, {}, np.zeros(task.copies), nothing, nothing.copy(), np.zeros(0, np.intp), {}

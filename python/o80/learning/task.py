@@ -22,7 +22,7 @@ EVERY = slice(None)
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a step was worth to the n copies that were judged: an entry for each, or one for all."""
+    """Outcome of a step for the n copies that were judged: an entry for each, or one for all."""
 
     reward: ArrayLike = 0.0
     terminated: ArrayLike = False
@@ -34,7 +34,7 @@ class Outcome:
 
 
 class Task(ABC):
-    """What `copies` copies of a robot do in episodes: for one copy and for many, written once.
+    """Task of `copies` copies of a robot in episodes: for one copy and for many, written once.
 
     `Environment` makes a Gymnasium environment of a task with one copy, `VectorEnvironment` one of
     a task with any number. Both call, in each step: `step`, `flagged`, `judge` for the flagged
@@ -47,7 +47,7 @@ class Task(ABC):
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
-    """Of the environments: modes of rendering, among others."""
+    """Metadata of the environments: modes of rendering, among others."""
 
     def __init__(
         self,
@@ -104,7 +104,7 @@ class Task(ABC):
 
     @abstractmethod
     def judge(self, copies: NDArray[np.intp]) -> Outcome:
-        """What the step was worth to these copies: flagged, or at the end of `most_steps`."""
+        """Judges the step of these copies, which are flagged or at the end of `most_steps`."""
 
     def info(self, copies: Index) -> Mapping[str, Any]:
         """Entries of Gymnasium's info in every step and reset: arrays (n, ...), or mappings."""

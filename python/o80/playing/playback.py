@@ -255,7 +255,7 @@ class Playback(Closeable):
 
 
 def _tracks(path: str | os.PathLike[str], segments: str | Sequence[str] | None) -> list[Track]:
-    """What a recording holds of these segments. Raises InvalidArgument, RecordingError."""
+    """Tracks of these segments in a recording. Raises InvalidArgument, RecordingError."""
     from o80.recording.reader import RecordingFile
 
     file = RecordingFile(path)

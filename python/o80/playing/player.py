@@ -139,7 +139,7 @@ class Player:
             ) from error
 
     def _provenance(self, run: int) -> Provenance:
-        """That of the recorded robot, with the clock of the rows as they are played."""
+        """Provenance of the recorded robot, with the clock of the rows as they are played."""
         epoch = self.track.epochs[run]
         offset = epoch.wall_offset
         if self._has_clock(run):

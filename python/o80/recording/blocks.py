@@ -16,7 +16,7 @@ MESSAGE_HEAD = np.dtype(
         ("publish_time", "<u8"),
     ]
 )
-"""What stands before the data of a message; packed."""
+"""Head before the data of a message; packed."""
 LENGTH_ENDS_AT = 9  # opcode and length are not counted in a record's length
 MESSAGE, MESSAGE_INDEX = 0x05, 0x07
 

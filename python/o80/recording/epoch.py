@@ -33,7 +33,7 @@ _NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,63}")  # as src/memory/segmen
 
 @dataclass(frozen=True)
 class EpochNote:
-    """What the metadata of a channel say about its rows."""
+    """Metadata of a channel about its rows."""
 
     segment: str
     robot: str
@@ -100,7 +100,7 @@ def topic_of(segment: str) -> str:
 
 
 def note_of(frontend: "Frontend", number: int, begin: int) -> EpochNote:
-    """What is to be said about rows from `begin` on."""
+    """Note about the rows from `begin` on."""
     return EpochNote(
         segment=frontend.segment,
         robot=frontend.robot,

@@ -110,7 +110,7 @@ class FileWriter:
 
     @property
     def found(self) -> Scan:
-        """What the file holds by now, except messages."""
+        """Contents of the file by now, except messages."""
         return self._found
 
     def add_schema(self, name: str, definition: str, *, encoding: str = "ros2msg") -> int:
@@ -239,5 +239,5 @@ class FileWriter:
 
 
 def _beginning() -> bytes:
-    """What every file begins with."""
+    """Bytes with which every file begins."""
     return MAGIC + bytes_of(Header(PROFILE, f"o80 {o80.__version__}"))

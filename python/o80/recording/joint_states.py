@@ -41,7 +41,7 @@ int32 sec
 uint32 nanosec
 """
 CONTENT = "joint_states"
-"""What the metadata of the channel call it."""
+"""Name of this content in the metadata of the channel."""
 QUANTITIES = {
     "position": ("position",),
     "velocity": ("velocity",),

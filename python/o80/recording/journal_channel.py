@@ -27,9 +27,9 @@ uint64 next  # number after the last entry
 uint8[] entries  # o80.open decodes them
 """
 CONTENT = "journal"
-"""What the metadata of the channel call it."""
+"""Name of this content in the metadata of the channel."""
 CODEC = "codec"
-"""What the metadata call the version of the format; files without it are of version 0."""
+"""Name of the format's version in the metadata; files without it are of version 0."""
 GAP = "o80.journal_gap"
 """Name of the metadata record of entries that were overwritten before they were read."""
 MOST = 4 << 20  # bytes that are read at once

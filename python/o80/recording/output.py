@@ -23,7 +23,7 @@ FILES = "*.mcap"
 
 @dataclass(frozen=True)
 class Written:
-    """What a recording holds of one epoch already."""
+    """Part of one epoch that a recording holds already."""
 
     note: EpochNote
     last: int = -1  #: iteration; -1: no row
@@ -100,7 +100,7 @@ def next_file(file: FileWriter) -> FileWriter:
 
 
 class Predecessor:
-    """What the files of a recording hold that is continued.
+    """Contents of the files of a recording that is continued.
 
     Looks into them from the newest back, into each once at most, and no further than it must: the
     newest epoch of a segment is the only one that can go on.
@@ -113,7 +113,7 @@ class Predecessor:
         self._unread = list(before)
 
     def written(self, segment: str) -> dict[int, Written]:
-        """What is to be known of a segment, by epoch; empty: no row. Raises RecordingError."""
+        """Written part of each epoch of a segment; empty: no row. Raises RecordingError."""
         epochs: dict[int, Written] = {}
         for path, found in self._files():
             self._add(epochs, path, found, segment)

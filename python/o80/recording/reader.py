@@ -44,7 +44,7 @@ class RecordingFile:
 
     @property
     def size(self) -> int:
-        """Of its files [bytes]."""
+        """Size of its files [bytes]."""
         return sum(path.stat().st_size for path, _ in self._files)
 
     @property

@@ -31,7 +31,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class EpochPart:
-    """What one file holds of a run."""
+    """Part of a run that one file holds."""
 
     path: Path
     found: Scan
@@ -275,7 +275,7 @@ class RecordedEpoch:
     # ------------------------------------------------------------------ journal
 
     def journal(self, since: int = 0) -> list[JournalEntry]:
-        """What the backend decided, oldest first, as `Frontend.journal` gives it.
+        """Decisions of the backend, oldest first, as `Frontend.journal` gives them.
 
         It begins with the oldest entry that the segment held when recording began, which may be
         older than the first row. since: number of the first entry to return.

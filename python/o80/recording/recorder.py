@@ -77,7 +77,7 @@ class Recorder:
 
     @property
     def size(self) -> int:
-        """Of all files so far [bytes]."""
+        """Size of all files so far [bytes]."""
         return self._bytes_before + self.file.size
 
     @property

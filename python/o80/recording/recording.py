@@ -70,7 +70,7 @@ class Recording(Closeable):
 
     @property
     def size(self) -> int:
-        """Of the recording so far [bytes]."""
+        """Size of the recording so far [bytes]."""
         return self._recorder.size
 
     def flush(self) -> None:

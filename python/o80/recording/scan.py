@@ -1,4 +1,4 @@
-"""What an MCAP file holds, also one that was cut off in the middle.
+"""Contents of an MCAP file, also of one that was cut off in the middle.
 
 A file of o80 is a sequence of groups, each written by one call: a schema, a channel, an attachment,
 a metadata record, or a chunk with the message indexes that follow it. A scan ends before the first

@@ -168,7 +168,7 @@ class Source:
             self._journal.add_channel(file, note)
 
     def _first_time(self, frontend: Frontend) -> Written:
-        """Of an epoch that is not in the recording yet."""
+        """Note for an epoch that is not in the recording yet."""
         first = frontend.published
         if not self._from_now or self._written:
             first = min(first, _oldest_safe(frontend))
@@ -214,7 +214,7 @@ class Source:
         return message
 
     def log_time(self, iteration: int) -> int:
-        """Of a row [ns]; of one that is not there any more, that of the newest one read."""
+        """Log time of a row [ns]; if it is not there any more, that of the newest one read."""
         if self._frontend is not None and self._writer is not None:
             rows = self._frontend.history(since=iteration, until=iteration)
             if len(rows):

@@ -19,7 +19,7 @@ class Split:
 
     @classmethod
     def of(cls, text: str) -> "Split":
-        """Of "500M" or "2G" (bytes), or of "600s", "10min" or "1h". Raises InvalidArgument."""
+        """Split by "500M" or "2G" (bytes), "600s", "10min" or "1h". Raises InvalidArgument."""
         number = text.rstrip("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ ")
         unit = text[len(number) :].strip()
         try:

@@ -1,4 +1,4 @@
-"""What differs between a recorded run and its replay."""
+"""Differences between a recorded run and its replay."""
 
 from typing import Any
 
@@ -37,7 +37,7 @@ def _blends(described: dict[str, Any]) -> bool:
 
 
 def changes(recorded: Provenance, now: Provenance) -> list[str]:
-    """What else than the run may be the cause of a difference, in words."""
+    """Changes, in words, that may be the cause of a difference instead of the run."""
     found = []
     if recorded.library_sha256 and recorded.library_sha256 != now.library_sha256:
         ran = "" if recorded.library == now.library else f" (it ran from {recorded.library!r})"

@@ -1,4 +1,4 @@
-"""What other rules of motion than those of this o80 mean for a replay."""
+"""Effect on a replay of other rules of motion than those of this o80."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a replay needs of one run of a backend: its rows, its journal, how it was started."""
+"""Run of a backend, as a replay needs it: its rows, its journal, how it was started."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class RecordedRun(Protocol):
 
     @property
     def number(self) -> int:
-        """Of the run in a file, from 0."""
+        """Number of the run in a file, from 0."""
 
     @property
     def schema(self) -> dict[str, Any]: ...
@@ -44,7 +44,7 @@ class RecordedRun(Protocol):
 
     @property
     def machine(self) -> Machine | None:
-        """That it ran on; None: not known."""
+        """Machine of the run; None: not known."""
 
     @property
     def is_own(self) -> bool:
@@ -63,7 +63,7 @@ class RecordedRun(Protocol):
 
 @dataclass(frozen=True)
 class LiveRun:
-    """What a segment in shared memory holds."""
+    """Run that a segment in shared memory holds."""
 
     frontend: Frontend
     number: int = 0

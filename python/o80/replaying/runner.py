@@ -1,4 +1,4 @@
-"""What runs a replay: the recorded robot, or its backend alone."""
+"""Runners of a replay: the recorded robot, or its backend alone."""
 
 from __future__ import annotations
 

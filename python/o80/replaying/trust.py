@@ -1,4 +1,4 @@
-"""What a replay takes from a recording, which may come from a stranger.
+"""Trust of a replay in a recording, which may come from a stranger.
 
 A recording can name any library and any file of this computer. A replay loads only robots that are
 found here by their names, and reads only files whose content is the recorded one, unless the user
@@ -90,7 +90,7 @@ def _may_be_a_file(path: Path) -> bool:
 
 
 def _sha256(path: Path) -> str:
-    """Of a regular file's content; empty if it cannot be read."""
+    """SHA-256 of a regular file's content; empty if it cannot be read."""
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode) or status.st_size > _LARGEST_HASHED:

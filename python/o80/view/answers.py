@@ -1,4 +1,4 @@
-"""What the server answers to the requests of a page."""
+"""Answers of the server to the requests of a page."""
 
 import math
 import threading
@@ -110,7 +110,7 @@ class Answers:
 
 
 class _Shown:
-    """What is worked out once for a run of a robot."""
+    """Results that are worked out once for a run of a robot."""
 
     def __init__(self, source: Source, schema: dict[str, Any]) -> None:
         self.key = source.key
@@ -125,7 +125,7 @@ class _Shown:
                 self.no_scene = str(error)
 
     def introduction(self, source: Source) -> dict[str, Any]:
-        """What a page needs once."""
+        """Data that a page needs once."""
         schema = source.schema
         return {
             "robot": schema["robot"],

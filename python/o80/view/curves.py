@@ -16,7 +16,7 @@ FIRST_PANELS = 3  # shown before the user chooses
 
 
 class Panels:
-    """What can be drawn of a robot: for each panel its columns, by part of the row."""
+    """Panels that can be drawn of a robot: for each its columns, by part of the row."""
 
     def __init__(self, schema: dict[str, Any]) -> None:
         self.columns: dict[str, dict[str, Column]] = {}

@@ -1,4 +1,4 @@
-"""What a page can show: one run of a robot, live or recorded."""
+"""Source of a page: one run of a robot, live or recorded."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence

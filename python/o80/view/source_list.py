@@ -45,7 +45,7 @@ class SourceList:
 
     @property
     def waiting(self) -> str:
-        """What a page says while there is nothing to show."""
+        """Text of a page while there is nothing to show."""
         if self._patterns == ["*"]:
             return (
                 _core.directory_problem()

@@ -11,7 +11,7 @@ WAIT = 60.0  # [s] longer than any wait should take
 
 
 def act(arm: o80.Frontend, choose: random.Random) -> None:
-    """What a learner does: targets that overwrite each other, late ones, resets, snapshots."""
+    """Acts as a learner: targets that overwrite each other, late ones, resets, snapshots."""
     start = arm.initial_states
     for _ in range(choose.randrange(4)):
         muscle = choose.randrange(8)

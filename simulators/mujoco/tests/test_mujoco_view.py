@@ -1,4 +1,4 @@
-"""What `o80 view` draws of a MuJoCo robot."""
+"""Drawings of a MuJoCo robot by `o80 view`."""
 
 import base64
 from pathlib import Path

@@ -276,7 +276,7 @@ TEST_F(WatchedLoopTest, BurstsTakeNothingFromTheHeapAndHoldNoLock) {
     two.burst(1, kPatience);
   }
   loop.stop();
-  const Calls& all = loop.account().offence;
+  const Calls& all = loop.account().violation;
   EXPECT_EQ(all[Kind::heap] + all[Kind::lock] + all[Kind::exception] + all[Kind::text], 0U)
       << all.text();
 }

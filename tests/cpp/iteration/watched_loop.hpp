@@ -33,9 +33,9 @@ struct Account {
   Calls mark;
   std::int64_t sleeps = 0;
   std::int64_t wakes = 0;
-  std::int64_t offences = 0;
-  Calls offence;  // the first
-  Iteration offended = 0;
+  std::int64_t violations = 0;
+  Calls violation;  // the first
+  Iteration violated_in = 0;
 
   void close(Part part, Iteration iteration) noexcept {
     const Calls& now = calls_so_far();
@@ -44,9 +44,9 @@ struct Account {
     sleeps += found.system[SYS_clock_nanosleep];
     wakes += found.wakes;
     if (allowed(part, iteration, found)) return;
-    if (offences++ > 0) return;
-    offence = found;
-    offended = iteration;
+    if (violations++ > 0) return;
+    violation = found;
+    violated_in = iteration;
   }
 
   bool allowed(Part part, Iteration iteration, const Calls& found) const noexcept {
@@ -182,8 +182,8 @@ class WatchedLoop {
   void expect_a_clean_account() {
     EXPECT_GT(keeper->oldest(), 0) << "the history was full";
     stop();
-    EXPECT_EQ(account_.offences, 0)
-        << "at first in iteration " << account_.offended << ": " << account_.offence.text();
+    EXPECT_EQ(account_.violations, 0)
+        << "at first in iteration " << account_.violated_in << ": " << account_.violation.text();
     if (!bursting_) {
       EXPECT_GT(account_.sleeps, 0);
     }

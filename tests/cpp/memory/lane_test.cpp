@@ -253,30 +253,30 @@ TEST_F(LaneTest, ForgetsGarbageWhenToldTo) {
   EXPECT_THAT(take_all(), ElementsAre(2));
 }
 
-TEST_F(LaneTest, KeepsWhatAnHeirSentBehindTheGarbageOfItsPredecessor) {
-  for (const bool heir_comes_late : {false, true}) {
+TEST_F(LaneTest, KeepsTheBatchOfASuccessorBehindTheGarbageOfItsPredecessor) {
+  for (const bool successor_comes_late : {false, true}) {
     {
       const LaneSender liar(attached_);
       segment_.view().lane(0).committed += 3;
     }
-    std::optional<LaneSender> heir;
-    if (heir_comes_late) {
+    std::optional<LaneSender> successor;
+    if (successor_comes_late) {
       EXPECT_EQ(lanes_[0].available(), 3U);
     }
-    heir.emplace(attached_);
-    send(*heir, 7, 2);
-    if (!heir_comes_late) {
+    successor.emplace(attached_);
+    send(*successor, 7, 2);
+    if (!successor_comes_late) {
       EXPECT_EQ(lanes_[0].available_of_one(), 3U);
     }
     lanes_[0].reset();
     EXPECT_EQ(lanes_[0].available_of_one(), 2U);
     EXPECT_THAT(take_all(), ElementsAre(7));
     give_back(0);
-    EXPECT_EQ(heir->free_blocks(), 16U);
+    EXPECT_EQ(successor->free_blocks(), 16U);
   }
 }
 
-TEST_F(LaneTest, TakesWhatAnHeirSentWherePartOfALaneWasTakenBack) {
+TEST_F(LaneTest, TakesTheBatchOfASuccessorWherePartOfALaneWasTakenBack) {
   for (const std::size_t blocks : {2U, 3U, 4U}) {
     {
       LaneSender liar(attached_);
@@ -285,12 +285,12 @@ TEST_F(LaneTest, TakesWhatAnHeirSentWherePartOfALaneWasTakenBack) {
       give_back(0);
       segment_.view().lane(0).committed -= 3;
     }
-    LaneSender heir(attached_);
+    LaneSender successor(attached_);
     // no room until the backend has seen whose lane it is
     lanes_[0].meet_owner();
     flush();
-    EXPECT_EQ(heir.free_blocks(), 16U);
-    send(heir, 7, blocks);
+    EXPECT_EQ(successor.free_blocks(), 16U);
+    send(successor, 7, blocks);
     EXPECT_THAT(take_all(), ElementsAre(7)) << blocks;
     give_back(0);
   }

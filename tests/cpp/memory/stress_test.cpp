@@ -174,7 +174,7 @@ TEST_F(StressTest, WhoeverWaitsIsToldOfTheEnd) {
 }
 
 TEST_F(StressTest, ANameIsTakenOverWhileOthersFollowIt) {
-  constexpr int kHeirs = 200;
+  constexpr int kSuccessors = 200;
   {
     const OwnedSegment first = std::move(segment_);
   }
@@ -205,7 +205,7 @@ TEST_F(StressTest, ANameIsTakenOverWhileOthersFollowIt) {
   std::atomic<int> reigns{0};
   for (int i = 0; i < 2; ++i)
     starters.emplace_back([&] {
-      while (reigns < kHeirs) {
+      while (reigns < kSuccessors) {
         try {
           OwnedSegment own = running_segment({.name = "arm",
                                               .schema = {},

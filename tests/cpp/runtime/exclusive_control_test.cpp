@@ -76,11 +76,11 @@ TEST_F(ExclusiveControl, ControlDoesNotPassToWhoGetsTheLaneNext) {
   send(other, 1, 1.0);
   station.run(1);
   holder.reset();
-  UntypedFrontend heir("pair");
-  const Batch of_heir = send(heir, 0, 1.0);
+  UntypedFrontend successor("pair");
+  const Batch of_successor = send(successor, 0, 1.0);
   const Batch of_other = send(other, 0, 2.0);
   station.run(2);
-  EXPECT_EQ(of_heir.handle(0).status, Status::completed);
+  EXPECT_EQ(of_successor.handle(0).status, Status::completed);
   EXPECT_EQ(of_other.handle(0).status, Status::completed);
 }
 
@@ -93,20 +93,20 @@ class InheritedControl : public StationTest {
     former_.emplace("pair");
     other_.emplace("pair");
   }
-  /// Sends what was added and leaves the lane to an heir before that is taken.
+  /// Sends what was added and leaves the lane to a successor before that is taken.
   Batch leave_for_later() {
     const Batch late = former_->pulse({.at = 5});
     send(*other_, 1, 0.5);
     station_.run(1);
     former_.reset();
-    heir_.emplace("pair");
-    send(*heir_, 1, 0.25);
+    successor_.emplace("pair");
+    send(*successor_, 1, 0.25);
     station_.run(1);
     return late;
   }
   Batch take_control_at_once() {
-    heir_->add_take_control();
-    const Batch taken = heir_->pulse();
+    successor_->add_take_control();
+    const Batch taken = successor_->pulse();
     station_.run(1);
     EXPECT_EQ(taken.handle(0).status, Status::completed);
     return taken;
@@ -121,7 +121,7 @@ class InheritedControl : public StationTest {
   Station station_{{.segment = "pair", .lanes = 2}};
   std::optional<UntypedFrontend> former_;
   std::optional<UntypedFrontend> other_;
-  std::optional<UntypedFrontend> heir_;
+  std::optional<UntypedFrontend> successor_;
 };
 
 TEST_F(InheritedControl, IsNotLostByARequestOfTheFormerOwnerToLetGo) {
@@ -131,7 +131,7 @@ TEST_F(InheritedControl, IsNotLostByARequestOfTheFormerOwnerToLetGo) {
   EXPECT_EQ(of_another_after(8), Status::rejected);
 }
 
-TEST_F(InheritedControl, IsNotTakenForTheHeirByTheFormerOwner) {
+TEST_F(InheritedControl, IsNotTakenForTheSuccessorByTheFormerOwner) {
   former_->add_take_control();
   leave_for_later();
   EXPECT_EQ(of_another_after(8), Status::completed);

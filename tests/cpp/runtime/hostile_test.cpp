@@ -130,9 +130,9 @@ TEST_F(HostileTest, AnotherFrontendCommandsWhileOneScribblesInItsLaneWithoutEnd)
   // once it is gone, all is as if it had never been; also for who gets its lane
   good.add_purge();
   good.pulse();
-  UntypedFrontend heir("pair");
-  add(heir, 0, 0.25);
-  pulse_as_soon_as_there_is_room(heir, watched.station);
+  UntypedFrontend successor("pair");
+  add(successor, 0, 0.25);
+  pulse_as_soon_as_there_is_room(successor, watched.station);
   const auto settles = [&](UntypedFrontend& frontend, double target) {
     for (int attempt = 0; attempt < 100; ++attempt) {
       const Batch batch = send(frontend, 1, target, {.mode = Mode::overwrite});
@@ -143,7 +143,7 @@ TEST_F(HostileTest, AnotherFrontendCommandsWhileOneScribblesInItsLaneWithoutEnd)
     return false;
   };
   EXPECT_TRUE(settles(good, 0.5));
-  EXPECT_TRUE(settles(heir, -0.5));
+  EXPECT_TRUE(settles(successor, -0.5));
 }
 
 TEST_F(HostileTest, BurstsOfAnotherFrontendAreRunWhileOneScribbles) {
@@ -298,7 +298,7 @@ TEST_F(HostileTest, ControlFallsWithADeadHolderWhateverItWroteAboutItself) {
   });
 }
 
-TEST_F(HostileTest, WhatAnHeirSendsBehindTheGarbageOfItsPredecessorIsDone) {
+TEST_F(HostileTest, TheBatchOfASuccessorBehindTheGarbageOfItsPredecessorIsTaken) {
   Station station({.segment = "pair", .lanes = 1, .lane_blocks = 64});
   station.start();
   for (const std::uint64_t claimed : {0U, 3U, 9U}) {
@@ -317,8 +317,8 @@ TEST_F(HostileTest, WhatAnHeirSendsBehindTheGarbageOfItsPredecessorIsDone) {
       liar.page().committed += 3;
       liar.leave();
     }
-    UntypedFrontend heir("pair");
-    const Batch sent = send(heir, 0, 0.5);
+    UntypedFrontend successor("pair");
+    const Batch sent = send(successor, 0, 0.5);
     station.run(3);
     ASSERT_TRUE(sent.ended()) << claimed;
     EXPECT_EQ(sent.handle(0).status, Status::completed) << claimed;

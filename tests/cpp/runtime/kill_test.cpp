@@ -162,7 +162,7 @@ TEST_F(KillTest, PurgesTheCommandsOfADeadFrontendIfToldSo) {
 }
 
 TEST_F(KillTest, WhatADeadFrontendSentForLaterIsDroppedWhoeverHasItsLaneByNow) {
-  for (const bool heir_stays : {true, false}) {
+  for (const bool successor_stays : {true, false}) {
     Station station({.segment = "pair", .lanes = 1, .stale = Stale::purge});
     station.start();
     UntypedFrontend reader("pair");
@@ -176,13 +176,13 @@ TEST_F(KillTest, WhatADeadFrontendSentForLaterIsDroppedWhoeverHasItsLaneByNow) {
     ASSERT_TRUE(dying.wait_until_ready());
     station.run(3);  // it waits for its iteration
     dying.kill_now();
-    std::optional<UntypedFrontend> heir("pair");
-    const Batch own = send(*heir, 1, 1.0);
-    if (!heir_stays) heir.reset();
+    std::optional<UntypedFrontend> successor("pair");
+    const Batch own = send(*successor, 1, 1.0);
+    if (!successor_stays) successor.reset();
     station.run_until([&] { return own.ended(); });
     while (station.last() < 310) station.iterate();
     EXPECT_EQ(desired(reader.latest(), 0), 0.0);
-    EXPECT_EQ(desired(reader.latest(), 1), 1.0) << "what its heir sent is done";
+    EXPECT_EQ(desired(reader.latest(), 1), 1.0) << "the batch of its successor is carried out";
   }
 }
 

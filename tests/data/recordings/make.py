@@ -247,7 +247,7 @@ def _is_default(found: Any, default: Any) -> bool:
 
 
 def found_in(path: Path) -> dict[str, Any]:
-    """What every later version must find."""
+    """Contents that every later version must find."""
     recording = o80.open(path)
     assert recording.finished
     return {

@@ -162,7 +162,7 @@ def verify(actor: Actor, generation: int, observation: Any, iteration: int | Non
 
 
 class Ledger:
-    """What a commander writes down, laid out as the C++ ones do."""
+    """Ledger of a commander, laid out as the C++ ones do."""
 
     def __init__(self, actor: Actor) -> None:
         self.actor = actor

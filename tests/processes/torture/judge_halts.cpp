@@ -255,7 +255,7 @@ bool starts_halted(const Round& round, const Generation& life) {
 
 /// Calls visit(predecessor, successor) where the second has to start halted.
 template <class Visit>
-void for_each_heir(const Round& round, Visit&& visit) {
+void for_each_successor(const Round& round, Visit&& visit) {
   std::array<const Generation*, 4> halted{};  // of each segment
   for (std::uint32_t i = 0; i < round.generations; ++i) {
     const Generation& life = round.lives[i];
@@ -275,7 +275,7 @@ void for_each_heir(const Round& round, Visit&& visit) {
 void judge_halts(const Round& round, std::vector<Failure>& failures) {
   for (std::uint32_t i = 0; i < round.generations; ++i)
     HaltedLife(round, round.lives[i]).judge(failures);
-  for_each_heir(round, [&](const Generation& former, const Generation& life) {
+  for_each_successor(round, [&](const Generation& former, const Generation& life) {
     if (starts_halted(round, life)) return;
     failures.push_back({Fault::halt_broken,
                         "generation " + std::to_string(&former - round.lives.data()) +
@@ -325,7 +325,7 @@ HaltCount halts_of(const Round& round) {
       if (life.moves(k - 1)) ++count.moving;
     }
   }
-  for_each_heir(round, [&](const Generation&, const Generation&) { ++count.inherited; });
+  for_each_successor(round, [&](const Generation&, const Generation&) { ++count.inherited; });
   return count;
 }
 

@@ -29,7 +29,7 @@ JOBS = len(os.sched_getaffinity(0))
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a checker said: whether the model held, how far it looked, and all it printed."""
+    """Verdict of a checker: whether the model held, how far it looked, and all it printed."""
 
     holds: bool
     looked: str

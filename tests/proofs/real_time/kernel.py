@@ -8,7 +8,7 @@ META_PACKAGE = "linux-image-rt-amd64"  # depends on the image of the day
 
 
 class NoKernelError(Exception):
-    """What went wrong, and what to do about it."""
+    """The kernel is missing: the text says why, and what to do about it."""
 
 
 def image_package() -> str:
@@ -62,7 +62,7 @@ def download(package: str, folder: Path) -> Path:
 
 
 def unpack_kernel(archive: Path, kernel: Path) -> None:
-    """Of 70 MB only the kernel itself: all that the machine needs is built into it."""
+    """Unpacks only the kernel of 70 MB: all that the machine needs is built into it."""
     part = kernel.with_name("kernel.part")
     with (
         part.open("wb") as output,

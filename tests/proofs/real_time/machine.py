@@ -10,13 +10,13 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class Console:
-    """What the machine said, and whether it ended by itself."""
+    """Output of the machine, and whether it ended by itself."""
 
     text: str
     powered_off: bool
 
     def without_findings(self) -> str:
-        """What people read: failed tests, and what the kernel printed."""
+        """Text for people: failed tests, and what the kernel printed."""
         return "\n".join(
             line
             for line in self.text.splitlines()

@@ -13,7 +13,7 @@ LATE = "iterations were late"  # what the loop says of an emulated processor
 
 @dataclass(frozen=True)
 class Program:
-    """What came of the tests of a program."""
+    """Results of the tests of a program."""
 
     name: str
     passed: int
@@ -43,12 +43,12 @@ class Findings:
         return (self.all(word) or [""])[-1]
 
     def account(self, word: str) -> dict[str, int]:
-        """Of a line "word key=number key=number"."""
+        """Numbers of a line "word key=number key=number"."""
         pairs = (pair.partition("=") for pair in self.one(word).split())
         return {key: int(value) for key, _, value in pairs if value.isdigit()}
 
     def programs(self) -> list[Program]:
-        """Those that have run all their tests."""
+        """Programs that have run all their tests."""
         said = (line.split() for line in self.all("test"))
         return [
             Program(name, int(passed), int(skipped), int(tests))
@@ -56,7 +56,7 @@ class Findings:
         ]
 
     def durations(self) -> dict[str, float]:
-        """Of each suite, by the clock of the machine [s]."""
+        """Duration of each suite, by the clock of the machine [s]."""
         said = (line.split() for line in self.all("took"))
         return {suite: float(end) - float(begin) for begin, end, suite in said}
 
@@ -110,7 +110,7 @@ def jitter(findings: Findings) -> Iterator[str]:
 
 
 def report(findings: Findings) -> Iterator[str]:
-    """What to show."""
+    """Lines to show."""
     yield f"kernel {findings.one('kernel')}"
     for program in findings.programs():
         yield f"{program.name}: {program.passed} passed, {program.skipped} skipped"
@@ -123,7 +123,7 @@ def report(findings: Findings) -> Iterator[str]:
 
 
 def faults(console: Console, findings: Findings, programs: list[str]) -> Iterator[str]:
-    """What is wrong. Emulated time is slow: how late the loop was is no fault."""
+    """Faults of the run. Emulated time is slow: how late the loop was is no fault."""
     if not console.powered_off or not findings.all("over"):
         yield "the machine did not power off by itself"
     if "Kernel panic" in console.text:

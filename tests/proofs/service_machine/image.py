@@ -20,7 +20,7 @@ ada:x:1000:1000:ada:/:/bin/sh
 
 
 class NoSystemdError(Exception):
-    """What is missing, and how to get it."""
+    """Systemd is missing: the text says what, and how to get it."""
 
 
 def packed_units() -> list[Path]:

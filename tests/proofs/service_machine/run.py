@@ -45,7 +45,7 @@ def fits(said: str, expected: str) -> bool:
 
 
 def faults(said: dict[str, str]) -> Iterator[str]:
-    """What is not as it should be."""
+    """Differences from what is expected."""
     for key, expected in EXPECTED.items():
         if not fits(said.get(key, "nothing"), expected):
             yield f"{key}: '{said.get(key, 'nothing')}' instead of '{expected}'"

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from o80_devices.ball_launcher import LaunchModel
 
 SETTINGS = ((1200.0, 1200.0, 1200.0), (1800.0, 1800.0, 400.0))
-"""Of the motors [1/min], without and with top spin: those of the recorded shots."""
+"""Motor speeds [1/min] without and with top spin, as in the recorded shots."""
 
 
 def launcher_launch(

@@ -21,7 +21,7 @@ from .trajectories import BallTrajectory
 FloatArray = NDArray[np.float64]
 
 DURATION = 1.28
-"""Of a simulated shot as cameras would see it: the mean of the recorded ones [s]."""
+"""Duration of a simulated shot as cameras would see it: the mean of the recorded ones [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ class Launch:
 
 
 class LaunchDistribution(Protocol):
-    """What launches are drawn from."""
+    """Distribution that launches are drawn from."""
 
     def draw(self, rng: np.random.Generator) -> Launch:
         """Another launch; the same `rng` gives the same one."""
@@ -102,7 +102,7 @@ NARROW = NormalLaunches(
     ),
 )
 """Like the recorded shots of the ball gun: fitted to 40 of them, tested on the other 40, by
-`python -m o80_table_tennis.fit_launches`."""
+studies/fit_launches.py."""
 
 
 @dataclass(frozen=True)

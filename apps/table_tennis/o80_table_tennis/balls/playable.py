@@ -44,7 +44,7 @@ class Verdict(Enum):
 
 
 def verdict(launch: Launch) -> Verdict:
-    """Of a shot, by its predicted flight until it comes within reach."""
+    """Judges a shot by its predicted flight until it comes within reach."""
     usual = flight_nodes(launch.position, launch.velocity, launch.spin, USUAL)
     # but for its last step, which may be shorter, this is how the whole flight begins
     decided = _decided(usual[usual[:, TIME] <= USUAL - STEP])

@@ -41,10 +41,11 @@ class Frame:
 
 
 BALL_GUN_FRAME = Frame(offset=(-0.4, -0.13, 1.23))
-"""Of the JSON files: measured."""
+"""Frame of the JSON files, as measured."""
 LAUNCHER_FRAME = Frame(offset=(0.4, 2.95, 0.033), yaw=-math.pi / 2)
-"""Of the HDF5 files, which begin at the launcher and fly along +x: height fitted to the bounces,
-the rest chosen so that the launcher stands at the far end of the table and shoots at the arm."""
+"""Frame of the HDF5 files, whose shots begin at the launcher and fly along +x. The height is fitted
+to the bounces; the rest is chosen so that the launcher stands at the far end of the table and
+shoots at the arm."""
 
 FORMATS = (".json", ".hdf5", ".h5")
 

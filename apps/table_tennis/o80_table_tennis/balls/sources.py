@@ -15,7 +15,7 @@ from .simulated_shots import DISTRIBUTIONS, NUMBERS, SimulatedShots
 from .trajectories import BallTrajectory
 
 DEFAULT_BALLS = "narrow"
-"""What is played where no balls are named."""
+"""Balls that are played where none are named."""
 
 
 class Flights(Protocol):
@@ -67,7 +67,7 @@ def recorded_balls(path: str | Path, *, period: float = PERIOD) -> KeptFlights:
 
 
 def _of_file(file: Path, period: float) -> SampledFlight:
-    """Of a file of one shot, whose time stamps take most of the time."""
+    """Flight in a file of one shot, cached because the time stamps take most of the time."""
     return cached_flight(
         file.read_bytes(),
         file.stem,

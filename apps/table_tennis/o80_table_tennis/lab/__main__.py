@@ -26,7 +26,6 @@ def main(
     prefix: Annotated[str, typer.Option(help="Of the names of all segments.")] = "lab",
     fifo: Annotated[bool, typer.Option(help="Real time for arm and motion capture.")] = True,
     restart: Annotated[bool, typer.Option(help="Start again a process that has ended.")] = False,
-    cyclictest: Annotated[bool, typer.Option(help="Run cyclictest beside it.")] = True,
     bursting: Annotated[
         bool,
         typer.Option(
@@ -42,7 +41,7 @@ def main(
         if bursting:
             play_in_lock_step(settings, console)
             return
-        play_in_real_time(settings, console, restart=restart, cyclictest=cyclictest)
+        play_in_real_time(settings, console, restart=restart)
     except (o80.Error, PartEndedError) as error:
         console.print(str(error), markup=False, style="red")
         sys.exit(1)

@@ -26,11 +26,11 @@ from .parts import CAMERAS, CAMERAS_ROBOT, RATES, TRACKER, TRACKER_ROBOT
 from .tracked_perception import TrackedPerception
 
 TIMEOUT = 10.0
-"""Of four images on a busy machine [s]."""
+"""Time limit for four images on a busy machine [s]."""
 
 
 class LockStepTracking:
-    """What the tracker sees of the ball of a rig's world, which cameras look at."""
+    """Tracking in lock-step: simulated cameras look at the ball of a rig's world."""
 
     def __init__(self, rig: Rig, pacing: Pacing, seed: int) -> None:
         self._world = rig.twins[0].frontend
@@ -47,7 +47,7 @@ class LockStepTracking:
         self._period = round(1e9 / RATES[CAMERAS])
         self._began, self._sees_it = 0, True
         self.errors: list[float] = []
-        """Of the ball where it was seen, against the true one [m]."""
+        """Distances of the seen ball from the true one [m]."""
         self.observations = 0
         self.first_seen: list[float] = []
         """From the launch to the first observation that the ball was seen in [s]."""
@@ -88,7 +88,7 @@ class LockStepTracking:
         generators: Sequence[np.random.Generator],
         which: NDArray[np.int64],
     ) -> Perceived:
-        """Of a new episode."""
+        """First perception of a new episode."""
         self._began, self._sees_it = self._now(), False
         return self._tracked.begin(state, generators, which)
 
@@ -112,7 +112,7 @@ class TrueBall:
         _generators: Sequence[np.random.Generator],
         _which: NDArray[np.int64],
     ) -> Perceived:
-        """Of a new episode."""
+        """First perception of a new episode."""
         return exactly(state)
 
     def perceive(self, state: State, _which: object = EVERY) -> Perceived:

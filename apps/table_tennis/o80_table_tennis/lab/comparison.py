@@ -20,7 +20,7 @@ from .player import policy_of, task_of
 from .report import BURSTING, REPORT, spread
 
 WANTED = 0.9
-"""Of the returns on the true ball, on the tracked one."""
+"""Returns that the tracked ball should reach, as a share of those on the true ball."""
 
 
 @dataclass(frozen=True)

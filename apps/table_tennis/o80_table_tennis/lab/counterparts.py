@@ -76,7 +76,7 @@ class Launches:
 
 
 class Poses:
-    """What the motion capture would see: the racket as the rows of the arm say, table and base."""
+    """Poses that the motion capture would see: racket (from the rows of the arm), table, base."""
 
     def __init__(self, arm: str) -> None:
         self._arm = Watched(arm)

@@ -32,7 +32,7 @@ from .watched import Watched
 STEP = 1.0 / RATES[ENVIRONMENT]
 """[s]"""
 OPENING = (o80.BackendGone, o80.TimeoutError, o80.SegmentError)
-"""What is raised while arm or world end, or are not there."""
+"""Errors that are raised while arm or world end, or are missing."""
 
 
 class EndRequestedError(Exception):
@@ -79,7 +79,7 @@ class EnvironmentProcess:
         self.publish()
 
     def _tell_observed(self) -> None:
-        """What the policy saw last, while it plays."""
+        """Writes into the row what the policy saw last, while it plays."""
         row, seen = self.row, self._perception
         time, at, ball = 0, 0, np.full(3, np.nan)
         if row["phase"] is Phase.playing and seen is not None:

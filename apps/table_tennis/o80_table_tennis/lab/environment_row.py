@@ -1,4 +1,4 @@
-"""What a row of the environment holds: one for each step of 10 ms, 100 a second."""
+"""Row of the environment's process: one for each step of 10 ms, 100 a second."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ WATCHED = (ARM, WORLD, LAUNCHER, CAMERAS, TRACKER, MOTION_CAPTURE)
 
 
 class Phase(IntEnum):
-    """What the environment does."""
+    """Phase in which the environment is."""
 
     waiting = 0
     """Arm or world is missing."""

@@ -18,11 +18,11 @@ from ..balls.recordings import Frame
 
 _X, _Y, _Z = WIDE.position
 PLACE = Frame(offset=(_X, _Y, _Z - LAUNCH_MODEL.muzzle[2]), yaw=-math.pi / 2)
-"""Of the launcher in the world: it shoots along -y."""
+"""Place of the launcher in the world: it shoots along -y."""
 TOP_SPINS = (0.0, 60.0)
 """Least and most [rad/s]: with the scatter of the launcher, within those of `wide`."""
 SPREAD = 0.2
-"""Of each number of the velocity, either way [m/s]; the launcher adds its scatter."""
+"""Spread of each component of the velocity, either way [m/s]; the launcher adds its scatter."""
 
 
 def drawn_aim(rng: np.random.Generator) -> list[float]:

@@ -22,7 +22,7 @@ class Launching:
         self._batch: o80.Batch | None = None
         self._asked = False
         self.number = 0
-        """Of the last launch that was found."""
+        """Number of the last launch that was found."""
         self.failed = False
         """The launcher has refused the last launch, or has lost it."""
 

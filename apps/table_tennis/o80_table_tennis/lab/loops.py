@@ -32,7 +32,7 @@ class Loop:
         return 100.0 * self.missed / max(1, self.iterations + self.missed)
 
     def since(self, earlier: Loop | None) -> Loop:
-        """What came after an earlier look at the same process; None: all."""
+        """Counts since an earlier look at the same process; None: all."""
         if earlier is None or earlier.iterations > self.iterations:  # it was started again
             return self
         return replace(
@@ -44,7 +44,7 @@ class Loop:
 
 
 def loop_of(observer: Watched, part: Part) -> Loop | None:
-    """Of a part that runs; None: it is not there."""
+    """Figures of the loop of a part; None: it does not run."""
     frontend = observer.frontend()
     if frontend is None:
         return None
@@ -59,7 +59,7 @@ def loop_of(observer: Watched, part: Part) -> Loop | None:
 
 
 def scheduling_of(pid: int) -> str:
-    """Of the main thread of a process, which runs its loop."""
+    """Scheduling of the main thread of a process, which runs its loop."""
     try:
         kind = os.sched_getscheduler(pid)
         priority = os.sched_getparam(pid).sched_priority

@@ -38,17 +38,17 @@ RATES = {ARM: 500.0, LAUNCHER: 50.0, CAMERAS: 180.0, TRACKER: 180.0, MOTION_CAPT
 CAMERAS_ROBOT = "o80_devices.ball_tracking:SyntheticCameras"
 TRACKER_ROBOT = "o80_devices.ball_tracking:BallTracker"
 SUBJECTS = ("racket", "base", "table")
-"""What the motion capture sees."""
+"""Subjects that the motion capture sees."""
 RECORDED = (ARM, WORLD, LAUNCHER, TRACKER, MOTION_CAPTURE, ENVIRONMENT)
 """No images."""
 LOGS = "processes"
 SETS_WITHIN, LAUNCHES_WITHIN = 0.1, 0.4
-"""What the fake launcher takes to set its motors, and for a launch [s]."""
+"""Time that the fake launcher takes to set its motors, and for a launch [s]."""
 
 
 @dataclass(frozen=True)
 class LabSettings:
-    """What is played, and where it is written."""
+    """Settings of the lab: what is played, and where it is written."""
 
     balls: int = 5
     """To play; 0: until Ctrl-C."""
@@ -56,14 +56,14 @@ class LabSettings:
     policy: str = "learned"
     """learned or scripted."""
     prefix: str = "lab"
-    """Of the names of all segments."""
+    """Prefix of the names of all segments."""
     folder: Path = Path("build/lab")
     fifo: bool = True
     """Ask for real-time scheduling of the arm and of the motion capture."""
     most_late: int = 20
     """Rows of the arm by which the environment may lag behind between two balls."""
     parts: tuple[str, ...] = NINE
-    """Those that are started."""
+    """Parts that are started."""
     rig: RigSettings = field(default_factory=lambda: RigSettings(preset="identified"))
 
     def segment(self, part: str) -> str:

@@ -52,7 +52,7 @@ def home_of(settings: LabSettings) -> Home:
 
 
 def task_of(settings: LabSettings, policy: Policy) -> TaskSettings:
-    """What the policy plays: its own actions and observation."""
+    """Task of the policy, with its own actions and observation."""
     if isinstance(policy, LearnedPolicy):
         conditions: Conditions = policy.conditions
         return conditions.task(fly_out=False)  # its noise sets the filter of the observer

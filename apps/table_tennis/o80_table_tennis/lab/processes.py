@@ -27,7 +27,7 @@ LOOK = 0.01
 GRACE = 5.0
 """For a process to end in order; then it is killed [s]."""
 LAST_LINES = 8
-"""Of its output, which say why a process has ended."""
+"""Number of the last lines of its output, which say why a process has ended."""
 PR_SET_PDEATHSIG = 1
 _libc = ctypes.CDLL(None, use_errno=True)
 
@@ -39,15 +39,15 @@ class Part:
     name: str
     command: tuple[str, ...]
     segment: str | None = None
-    """That its backend has; it runs when the segment does."""
+    """Name of its backend's segment; the part counts as running while the segment does."""
     says: str | None = None
-    """Of a process without a segment: it runs when it has printed this."""
+    """Text of a process without a segment: it runs when it has printed this."""
     rate: float | None = None
     """Rows a second that are asked for; None: it has none, or runs only when asked."""
     needs: tuple[str, ...] = ()
     """Parts that it reads or commands; it waits for them itself."""
     output: Path | None = None
-    """That the processes write beside their segments."""
+    """File that the processes write beside their segments."""
 
 
 class PartEndedError(RuntimeError):
@@ -60,7 +60,7 @@ class PartEndedError(RuntimeError):
 
 
 def how_it_ended(code: int) -> str:
-    """Of an exit code, as `subprocess` has it: "was killed by SIGKILL"."""
+    """Text for an exit code of `subprocess`, such as "was killed by SIGKILL"."""
     if code >= 0:
         return f"ended with exit code {code}"
     try:
@@ -184,7 +184,7 @@ class Processes:
         return PartEndedError(name, code, self.last_lines(name))
 
     def pid(self, name: str) -> int:
-        """Of a process that runs. Raises KeyError."""
+        """Process id of a process that runs. Raises KeyError."""
         return self._running[name].pid
 
     @property
@@ -193,14 +193,14 @@ class Processes:
         return list(self._running)
 
     def printed(self, name: str) -> str:
-        """What a process has printed, in all its lives."""
+        """Output of a process, over all its starts."""
         try:
             return self._output_of(name).read_text(errors="replace")
         except FileNotFoundError:
             return ""
 
     def last_lines(self, name: str) -> list[str]:
-        """Of what it has printed."""
+        """Last lines of its output."""
         return self.printed(name).rstrip().splitlines()[-LAST_LINES:]
 
     def _output_of(self, name: str) -> Path:
@@ -255,7 +255,7 @@ class Processes:
             self._ran.clear()
 
     def processor_seconds(self) -> Mapping[str, float]:
-        """Of each process that runs, since its start [s]."""
+        """Processor time of each process that runs, since its start [s]."""
         return {
             name: seconds
             for name, popen in self._running.items()
@@ -264,7 +264,7 @@ class Processes:
 
 
 def processor_seconds(pid: int | str) -> float | None:
-    """Of a process, all threads, in the program and in the kernel [s]; None: it is gone."""
+    """Processor time of a process, all threads, user and system [s]; None: it is gone."""
     try:
         words = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     except OSError:
@@ -273,7 +273,7 @@ def processor_seconds(pid: int | str) -> float | None:
 
 
 def _ends_with(supervisor: int) -> Callable[[], None]:
-    """What a new process does first: it asks the kernel for SIGTERM when the supervisor dies."""
+    """First call of a new process: asks the kernel for SIGTERM when the supervisor dies."""
 
     def ask() -> None:
         _libc.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)

@@ -19,7 +19,6 @@ from rich.table import Table
 
 import o80
 
-from .cyclictest import Cyclictest
 from .ending import ends_in_order
 from .environment_row import Phase
 from .loops import Loop, loop_of
@@ -36,7 +35,7 @@ SHOWN_EVERY = 0.5
 
 @dataclass
 class Events:
-    """What happened to the processes: a file of JSON lines, and the lines themselves."""
+    """Log of the processes: a file of JSON lines, and the lines themselves."""
 
     settings: LabSettings
 
@@ -138,7 +137,7 @@ class Lab:
 
 
 def play_in_real_time(
-    settings: LabSettings, console: Console, *, restart: bool = False, cyclictest: bool = True
+    settings: LabSettings, console: Console, *, restart: bool = False
 ) -> dict[str, Any]:
     """Plays, writes report.json, returns what it holds. Raises PartEndedError, o80.TimeoutError."""
     with ends_in_order():
@@ -150,9 +149,8 @@ def play_in_real_time(
             begin = last = _usage(lab.processes)
             started = time.monotonic()
             at_begin = lab.loops()
-            beside = Cyclictest(enabled=cyclictest)
             loops: dict[str, Loop] = {}
-            with beside, Live(console=console, auto_refresh=False) as live:
+            with Live(console=console, auto_refresh=False) as live:
                 playing = True
                 while playing:
                     playing = lab.look(SHOWN_EVERY)
@@ -164,7 +162,7 @@ def play_in_real_time(
             usage = {
                 name: 100.0 * (used - begin.get(name, 0.0)) / seconds for name, used in last.items()
             }
-        report = write_report(settings, loops, usage, beside.result, seconds)
+        report = write_report(settings, loops, usage, seconds)
         console.print()
         for what, found in report["wanted"].items():
             wanted = found.get("wanted", f"at most {found.get('most')}")
@@ -183,7 +181,7 @@ def _usage(processes: Processes) -> Mapping[str, float]:
 
 
 def table_of(lab: Lab, loops: Mapping[str, Loop]) -> Table:
-    """What each process does now."""
+    """Table of what each process does now."""
     row = lab.row_of_environment()
     table = Table(title=title_of(row))
     for column in ("process", "rate [1/s]", "asked", "missed", "scheduling", "state"):

@@ -46,7 +46,6 @@ def write_report(
     settings: LabSettings,
     loops: Mapping[str, Loop],
     usage: Mapping[str, float],
-    cyclictest: Mapping[str, Any],
     seconds: float,
 ) -> dict[str, Any]:
     """Writes the report, and returns what it holds."""
@@ -62,7 +61,6 @@ def write_report(
         "tracking_error_mm": _tracking_error(rows),
         "motion_capture_error_mm": _motion_capture_error(rows),
         "launcher": _launcher(rows),
-        "cyclictest": dict(cyclictest),
         "seconds": round(seconds, 1),
         "settings": {"policy": settings.policy, "seed": settings.seed, "balls": settings.balls},
         "wanted": _wanted(processes),
@@ -78,7 +76,7 @@ def write_report(
 
 
 def _told_before(path: Path) -> Any:
-    """What the lab in lock-step has written there."""
+    """Reads what the lab in lock-step has written there."""
     try:
         return json.loads(path.read_text()).get(BURSTING)
     except (FileNotFoundError, ValueError, AttributeError):
@@ -93,7 +91,7 @@ class _Rows:
         self._settings = settings
 
     def of(self, part: str) -> o80.History | None:
-        """Of the last run of a part, without its beginning."""
+        """Rows of the last run of a part, without its beginning."""
         name = self._settings.segment(part)
         if name not in self._recording:
             return None
@@ -106,7 +104,7 @@ class _Rows:
         return settled if len(settled) > 2 else history
 
     def whole(self, part: str) -> o80.History | None:
-        """Of the last run, all."""
+        """All rows of the last run of a part."""
         name = self._settings.segment(part)
         if name not in self._recording or not self._recording[name].epochs:
             return None
@@ -135,7 +133,7 @@ def _process(name: str, loop: Loop, rows: _Rows, usage: float | None) -> dict[st
 
 
 def regularity(times: IntArray, skipped: NDArray[np.uint32], period: float) -> dict[str, Any]:
-    """Of rows with times and counts of skipped periods; period [ns]."""
+    """Regularity of rows, from their times and counts of skipped periods; period [ns]."""
     between = np.diff(times)
     missed = int(skipped[-1]) - int(skipped[0])
     return {
@@ -188,13 +186,13 @@ def _latencies(rows: _Rows) -> dict[str, Any]:
 
 
 def _ages(now: IntArray, then: IntArray) -> dict[str, float] | None:
-    """Of what was captured `then`; 0: nothing was [ns] => [ms]."""
+    """Ages at `now` of captures at `then` (0: none), in [ns]; returned in [ms]."""
     return spread((now - then)[then > 0] * 1e-6)
 
 
 def _tracking_error(rows: _Rows) -> dict[str, Any] | None:
-    """Of the tracker against the ball of the world when the images were taken [mm], and of what
-    the policy observed against the world at the same time."""
+    """Errors of the tracker against the ball of the world when the images were taken [mm], and
+    of the ball that the policy observed against the world at the same time."""
     tracker, world, environment = rows.of(TRACKER), rows.whole(WORLD), rows.of(ENVIRONMENT)
     if tracker is None or world is None or environment is None:
         return None
@@ -233,7 +231,7 @@ def _tracking_error(rows: _Rows) -> dict[str, Any] | None:
 
 
 def _motion_capture_error(rows: _Rows) -> dict[str, float] | None:
-    """Of the racket, against the rows of the arm at the same times [mm]."""
+    """Error of the racket against the rows of the arm at the same times [mm]."""
     system, arm = rows.of(MOTION_CAPTURE), rows.of(ARM)
     if system is None or arm is None:
         return None
@@ -256,7 +254,7 @@ def _launcher(rows: _Rows) -> dict[str, int]:
 
 
 def _wanted(processes: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """What a quiet machine should reach, and whether this run has."""
+    """Targets of a quiet machine, and whether this run has reached them."""
     wanted: dict[str, Any] = {}
     for name, most in MOST_MISSED.items():
         if name in processes:

@@ -23,7 +23,7 @@ from ..task.state import State
 
 FloatArray = NDArray[np.float64]
 STEP = 0.005
-"""Of the flight from image to row [s]."""
+"""Time step of the predicted flight from image to row [s]."""
 OLDEST = 0.15
 """Older than this a ball does not count as seen [s]."""
 KNOWN_VELOCITY = 0.25
@@ -32,7 +32,7 @@ once or twice [m/s]."""
 
 
 class TrackedPerception:
-    """Of one episode after the other.
+    """Perception by the tracker, of one episode after the other.
 
     `tracker` is an observer of its segment, or None while there is none; `now` the time of the row
     that is observed, on the clock of the images [ns].
@@ -43,11 +43,11 @@ class TrackedPerception:
         self._began = self._used = 0
         self._seen_yet = False
         self.ball: FloatArray = np.zeros(6)
-        """What was perceived last, also as a guess."""
+        """Ball that was perceived last, also as a guess."""
         self.at = 0
         """Time of the row of the arm at which that was [ns]."""
         self.ball_time = 0
-        """Of the images of the ball that was perceived last [ns]; 0: it was not seen."""
+        """Time of the images of the ball that was perceived last [ns]; 0: it was not seen."""
 
     def begin(
         self,

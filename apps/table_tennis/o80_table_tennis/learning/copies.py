@@ -1,4 +1,4 @@
-"""The copies that a training steps; light, because actors on other machines import it."""
+"""The copies that a training steps."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ class CurvePoint:
     decisions: int
     episodes: int
     motions: int
-    """Of the arm: each episode is one, with a ball of its own."""
+    """Motions of the arm so far: one an episode, with a ball of its own."""
     minutes: float
     """Since the start, on the clock [min]."""
     processor_minutes: float
@@ -32,8 +32,7 @@ class CurvePoint:
     restarts: int
     """Networks that were replaced by new ones, because they had got stuck."""
     environment: float
-    """Share of the processor time that the environments took, without evaluations; NaN if actors
-    stepped them."""
+    """Share of the processor time that the environments took, without evaluations."""
     evaluated_touched: float = NOT_EVALUATED
     """The same without exploration, on balls of their own; not in every row."""
     evaluated_returned: float = NOT_EVALUATED

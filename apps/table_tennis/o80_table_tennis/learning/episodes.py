@@ -1,4 +1,4 @@
-"""What came of the last episodes of a training."""
+"""Outcomes of the last episodes of a training."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ LAST = 1000
 
 
 class EpisodeOutcome(NamedTuple):
-    """Of one episode."""
+    """Outcome of one episode."""
 
     touched: bool
     returned: bool
@@ -29,7 +29,7 @@ class Shares(NamedTuple):
 
 
 def shares(outcomes: Any) -> Shares:
-    """Of outcomes."""
+    """Shares of outcomes."""
     table = np.array(outcomes, np.float64).reshape(-1, len(EpisodeOutcome._fields))
     if not len(table):
         return Shares(np.nan, np.nan, np.nan)
@@ -69,5 +69,5 @@ class EpisodeCounter:
 
     @property
     def shares(self) -> Shares:
-        """Of the last episodes."""
+        """Shares of the last episodes."""
         return shares(self._last)

@@ -19,7 +19,7 @@ from ..report.statistics import Statistics
 from ..settings import Pacing
 
 VERDICT_SEED = 7_000_001
-"""Of the shots and of the noise of a verdict: no training and no search plays them."""
+"""Seed of the shots and of the noise of a verdict, which no training and no search plays."""
 VERDICT_BALLS = 400
 
 
@@ -30,7 +30,7 @@ class Evaluation:
     name: str
     episodes: Sequence[EpisodeSummary]
     statistics: Statistics
-    """Of the environment that played them."""
+    """Statistics of the environment that played them."""
 
     @property
     def touched(self) -> float:

@@ -1,12 +1,13 @@
 """Stable-Baselines3's PPO for this task, and the network of NumPy that its policy becomes.
 
-The decisions are collected by workers that play the policy with NumPy: in this process, or as
-actors of Ray. Values and probabilities are computed for a whole rollout at once.
+The decisions are collected by playing the policy with NumPy. Values and probabilities are computed
+for a whole rollout at once.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,19 +16,30 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.vec_env import VecNormalize
 
-from o80.learning.rollouts.ppo import RolloutPPO, WorkersEnv
+from o80.learning.rollouts import Collector
+from o80.learning.rollouts.ppo import CollectorEnv, RolloutPPO
 
 from ..players.network import CLIP, Network
-from .copies import Stopwatch
+from .copies import Stopwatch, timed_copies
 from .settings import LearningSettings
 from .visible_numbers import Float32Array, visible_numbers
-from .workers import training_workers
+
+INFOS = ("touched", "returned")
+"""Entries of an episode's last info that a training counts."""
 
 
 def training_environments(settings: LearningSettings, watch: Stopwatch) -> VecNormalize:
-    """The environments of a training, normalised; `watch` is told of those of this process."""
+    """The environments of a training, normalised; `watch` measures them."""
+    make = partial(
+        timed_copies,
+        settings.conditions,
+        count=settings.ppo.environments,
+        ball_seed=settings.seed,
+        watch=watch,
+    )
+    collector = Collector(make, seed=settings.seed, infos=INFOS)
     return VecNormalize(
-        WorkersEnv(training_workers(settings, watch)),
+        CollectorEnv(collector),
         norm_obs=True,
         norm_reward=False,
         clip_obs=CLIP,
@@ -77,7 +89,7 @@ def begin_anew(model: PPO) -> None:
 
 
 def set_exploration(model: PPO, settings: LearningSettings) -> None:
-    """That of the decisions made so far, unless it is learned; call it before each rollout."""
+    """Sets the scheduled exploration, unless it is learned; call it before each rollout."""
     value = settings.ppo.log_exploration_at(model.num_timesteps / settings.decisions)
     if value is not None:
         policy: Any = model.policy
@@ -86,7 +98,7 @@ def set_exploration(model: PPO, settings: LearningSettings) -> None:
 
 
 def learning_rate(settings: LearningSettings) -> Callable[[float], float]:
-    """Of the share of the training that is left."""
+    """Learning rate as a function of the share of the training that is left."""
     first, last = settings.ppo.learning_rate, settings.ppo.last_rate
     return lambda left: first * (last + (1.0 - last) * max(float(left), 0.0))
 

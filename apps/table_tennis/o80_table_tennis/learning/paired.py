@@ -25,7 +25,7 @@ class Paired:
 
     @classmethod
     def of(cls, accelerated: Evaluation, real_time: Evaluation) -> Paired:
-        """Of the same balls. Raises ValueError if they differ."""
+        """Pairs two evaluations of the same balls. Raises ValueError if the balls differ."""
         if [each.ball for each in accelerated.episodes] != [
             each.ball for each in real_time.episodes
         ]:

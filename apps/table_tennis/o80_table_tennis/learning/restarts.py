@@ -1,8 +1,8 @@
 """Whether a network has got stuck, so that the training continues with a new one.
 
 Some networks learn early to return the balls that fly to one side, and never learn the others.
-Longer training does not help them, see docs/learning.md. A low share of touched balls shows this
-before half of the training is over.
+Longer training does not help them, see docs/results/learning.md. A low share of touched balls shows
+this before half of the training is over.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What `python -m o80_table_tennis.train` does: a training, its verdict, its files."""
+"""Session of `python -m o80_table_tennis.train`: a training, its verdict, its files."""
 
 from __future__ import annotations
 

@@ -13,10 +13,10 @@ from ..players.conditions import Conditions
 
 @dataclass(frozen=True)
 class PpoSettings:
-    """Of Stable-Baselines3's PPO. `python -m o80_table_tennis.learning.search` tries others."""
+    """Settings of Stable-Baselines3's PPO; studies/search_settings.py tries others."""
 
     environments: int = 32
-    """That are stepped side by side."""
+    """Copies that are stepped side by side."""
     steps: int = 64
     """Decisions of each environment between two updates."""
     batch: int = 512
@@ -90,19 +90,11 @@ class LearningSettings:
     """Decisions between two evaluations of the deterministic policy."""
     evaluated: int = 100
     """Balls of such an evaluation."""
-    actors: int = 0
-    """Of Ray that collect the rollouts, each with its share of the environments; 0: this process
-    does."""
 
     def __post_init__(self) -> None:
         whole(self.seed, "seed", 0)
         for name in ("decisions", "evaluate_every", "evaluated"):
             whole(getattr(self, name), name, 1)
-        whole(self.actors, "actors", 0)
-        if self.actors and self.ppo.environments % self.actors:
-            raise ValueError(
-                f"actors must divide the {self.ppo.environments} environments, got {self.actors}"
-            )
         if not self.minutes > 0:
             raise ValueError(f"minutes must be positive, got {self.minutes}")
 

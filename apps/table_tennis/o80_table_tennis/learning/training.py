@@ -121,7 +121,7 @@ class Training:
     @property
     def environment_share(self) -> float:
         """The environments' share of the processor time since the start or the last resumption,
-        without evaluations; NaN if they were not stepped in this process, or not at all.
+        without evaluations; NaN if they were not stepped.
         """
         if self._watch.seconds <= 0:
             return math.nan
@@ -178,7 +178,7 @@ class Training:
 
 
 class _Updates(BaseCallback):
-    """What happens beside learning: counting, the curve, checkpoints, the end in time."""
+    """Callback for all that is not learning: counting, the curve, checkpoints, the end in time."""
 
     def __init__(self, training: Training, told: Told) -> None:
         super().__init__()

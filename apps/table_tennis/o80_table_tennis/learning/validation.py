@@ -12,7 +12,7 @@ from .episodes import EpisodeCounter, EpisodeOutcome, Shares, shares
 from .settings import LearningSettings
 
 BALL_SEED = 900_001
-"""Of the shots of validation: no training and no verdict plays them."""
+"""Seed of the shots of validation, which no training and no verdict plays."""
 ENVIRONMENTS = 20
 
 
@@ -26,7 +26,7 @@ class Validation:
         self._each = -(-settings.evaluated // count)
 
     def play(self, network: Network) -> Shares:
-        """What the network makes of the balls; each environment plays as many."""
+        """Plays the balls with a network, as many in each environment, and returns the shares."""
         environments = self._environments
         environments.seed(BALL_SEED)
         counter = EpisodeCounter(environments.num_envs)

@@ -23,7 +23,7 @@ from ..world.ball import BALL_MASS, BALL_RADIUS, GRAVITY
 
 @dataclass(frozen=True)
 class Aerodynamics:
-    """What the air and gravity do to the ball. The twins get the same numbers as options."""
+    """Forces of air and gravity on the ball. The twins get the same numbers as options."""
 
     air_density: float = 1.18
     """[kg/m^3]"""

@@ -38,22 +38,22 @@ seen across the table says nothing about the flight along it."""
 
 @dataclass(frozen=True)
 class FilterSettings:
-    """What the filter expects of the measurements and of the ball: standard deviations."""
+    """Standard deviations that the filter expects of the measurements and of the ball."""
 
     step: float = STEP
     """From one measurement to the next [s]."""
     position: float = 0.005
-    """Of a measured position [m]."""
+    """Standard deviation of a measured position [m]."""
     velocity: float = 0.1
-    """Of a measured velocity [m/s]."""
+    """Standard deviation of a measured velocity [m/s]."""
     spin: float = 45.0
-    """Of the spin of a shot before it is seen [rad/s]."""
+    """Standard deviation of the spin of a shot before it is seen [rad/s]."""
     mean_spin: float = 20.0
     """[rad/s]"""
     force: float = 0.3
-    """Of an acceleration that no law explains, in each step [m/s^2]."""
+    """Standard deviation of an acceleration that no law explains, in each step [m/s^2]."""
     bounce_velocity: float = 0.1
-    """Of the law of the bounce [m/s]."""
+    """Standard deviation of the law of the bounce [m/s]."""
     bounce_spin: float = 10.0
     """[rad/s]"""
 

@@ -1,4 +1,4 @@
-"""What an impact does to a ball: at rest on the table, or by a moving racket.
+"""Impact of a ball on the table, which is at rest, or on a moving racket.
 
 Along the normal the ball keeps a share of its velocity. Friction acts on the slip, the velocity of
 the ball's surface relative to the other one: it takes a share of the slip from the velocity while

@@ -26,7 +26,7 @@ INTEGRATION_STEP = 0.0025
 
 @dataclass(frozen=True)
 class ArmState:
-    """Of each joint at a time of its own."""
+    """State of the arm, each joint at a time of its own."""
 
     q: FloatArray
     """(4,) [rad]"""

@@ -1,4 +1,4 @@
-"""What a policy must be better than: an arm that does nothing, and one that does anything."""
+"""Baselines that a policy must beat: an arm that does nothing, and one that does anything."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a policy plays with: arm, actions and observation. A learned policy holds its own."""
+"""Conditions of a policy: arm, actions and observation. A learned policy holds its own."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ class Conditions:
     """Arm, actions, observation and reward; the defaults are those of the training."""
 
     preset: str = "identified"
-    """Of the simulated arm."""
+    """Preset of the simulated arm."""
     observation: str = "full"
     """published (22 numbers) or full, see `task.full_observation`."""
     ball_position_noise: float = 0.005
-    """Of the observed ball, along each axis [m]: as a camera system leaves it."""
+    """Noise of the observed ball, along each axis [m]: as a camera system leaves it."""
     ball_velocity_noise: float = 0.1
     """[m/s]"""
     start_noise: float = 0.02
     """On each joint at the start of an episode, uniform in plus or minus this [rad]."""
     factor: float = 0.6
-    """Of the actions."""
+    """Factor of the actions."""
     repeat: int = 2
     """Steps of 10 ms that an action lasts."""
     reward: str = "ordered"
@@ -66,7 +66,7 @@ class Conditions:
 
     @classmethod
     def of_json(cls, values: Mapping[str, Any]) -> Conditions:
-        """Of the values of a file. Raises ValueError for names that this version does not know."""
+        """Conditions from the values of a file. Raises ValueError for names that are unknown."""
         known = [each.name for each in fields(cls)]
         unknown = [name for name in values if name not in known]
         if unknown:

@@ -15,7 +15,7 @@ FILE = Path(__file__).with_name("found_parameters.json")
 
 @dataclass(frozen=True)
 class FoundParameters:
-    """What a search ended with, and how to search again."""
+    """Result of a search, and how to search again."""
 
     command: str
     parameters: Mapping[str, float]

@@ -49,9 +49,9 @@ class ControlSettings:
     """How the arm is driven along its swing."""
 
     stiffness: float = 400.0
-    """Of the feedback [1/s^2]."""
+    """Stiffness of the feedback [1/s^2]."""
     damping: float = 30.0
-    """Of the feedback [1/s]."""
+    """Damping of the feedback [1/s]."""
     mean_pressure: float = 0.45
     """Mean normalised pressure of two antagonists."""
     begin: float = 0.003
@@ -84,9 +84,9 @@ class HittingSettings:
     muscles: MusclePair = field(default_factory=MusclePair)
     lag: PressureLag = field(default_factory=PressureLag)
     dead_time: tuple[float, ...] = (0.0,) * JOINTS
-    """Of the muscles of each joint [s]."""
+    """Dead time of the muscles of each joint [s]."""
     factor: float = COARSE
-    """Of the environment's actions."""
+    """Factor of the environment's actions."""
 
     def for_arm(self, arm: ArmNumbers) -> HittingSettings:
         """The same for another arm than the standard one."""
@@ -134,7 +134,7 @@ class HittingPolicy:
         self._spin: Vector = self._settings.interception.spin
         self._over = False
         self.strike: Strike | None = None
-        """What is planned now."""
+        """Strike that is planned now."""
 
     def act(self, observation: Float32Array) -> NDArray[np.float32]:
         """The action (8,) in [-1, 1] after `observation` (22,)."""

@@ -27,7 +27,7 @@ from .inverse_kinematics import posture_towards
 FloatArray = NDArray[np.float64]
 
 PATH_PERIOD = 0.01
-"""Of the rows of a predicted path [s]."""
+"""Period of the rows of a predicted path [s]."""
 TOUCH = BALL_RADIUS + BLADE_THICKNESS / 2
 """From the middle of the blade to the centre of a ball that touches it [m]."""
 LATEST = 1.6
@@ -81,7 +81,7 @@ class InterceptionSettings:
     off_middle: float = 8.0
     """Weight of a touch off the middle of the blade, relative to the same error [1/s]."""
     spin: Vector = BALL_GUN_SPIN
-    """Of a ball that comes, before its bounce [rad/s]."""
+    """Spin of an approaching ball, before its bounce [rad/s]."""
     racket: Restitution = RACKET_RESTITUTION
     aerodynamics: Aerodynamics = AERODYNAMICS
     table: Table = TABLE

@@ -50,7 +50,7 @@ class LearnedPolicy:
 
     @classmethod
     def load(cls, path: Path) -> LearnedPolicy:
-        """Of `path`.npz and `path`.json; `path` may name either of them.
+        """Loads `path`.npz and `path`.json; `path` may name either of them.
 
         Raises FileNotFoundError or ValueError.
         """

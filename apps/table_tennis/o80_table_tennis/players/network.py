@@ -30,9 +30,9 @@ class Network:
     scale: Float32Array
     """(M,) then multiplied with it."""
     weights: tuple[Float32Array, ...]
-    """Of each layer (out, in)."""
+    """Weights of each layer (out, in)."""
     biases: tuple[Float32Array, ...]
-    """Of each layer (out,)."""
+    """Biases of each layer (out,)."""
 
     def __post_init__(self) -> None:
         size = self.inputs
@@ -76,7 +76,7 @@ class Network:
 
     @classmethod
     def of_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> Network:
-        """Of the arrays of a file. Raises KeyError or ValueError."""
+        """Network from the arrays of a file. Raises KeyError or ValueError."""
         layers = sum(name.startswith("weight_") for name in arrays)
         taken = {name: np.asarray(values, np.float32) for name, values in arrays.items()}
         return cls(

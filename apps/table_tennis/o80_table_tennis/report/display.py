@@ -19,7 +19,7 @@ class Display(Protocol):
     """Shows the newest rows of a rig."""
 
     def render(self) -> Image | None:
-        """What `render` of the environment returns."""
+        """Result of the environment's `render`."""
         ...
 
     def after_step(self) -> None:

@@ -120,7 +120,7 @@ def packed(rows: Sequence[Float32Array]) -> dict[str, Any]:
 
 
 def unpacked(value: Mapping[str, Any]) -> Float32Array:
-    """What `packed` packed."""
+    """Array that `packed` has packed."""
     numbers = np.frombuffer(base64.b64decode(value["float32"]), "<f4")
     return numbers.reshape(value["shape"])
 

@@ -16,7 +16,7 @@ class EpisodeSummary:
     """How an episode ended."""
 
     number: int
-    """Of the episode in its environment, from 0."""
+    """Number of the episode in its environment, from 0."""
     ball: int
     """Number of the ball in its source; -1 for one given by the user."""
     steps: int
@@ -41,7 +41,7 @@ class EpisodeSummary:
 
     @classmethod
     def of(cls, record: BallRecord, **others: Any) -> EpisodeSummary:
-        """Of what happened to the ball of one episode, and the `others` as they are."""
+        """Summary of what happened to the ball of one episode, and the `others` as they are."""
         return cls(
             touched=bool(record.touched),
             returned=bool(returned(record)),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 NORMAL_95 = 1.959963984540054
-"""Of the normal distribution: 95 % lie within so many standard deviations."""
+"""Standard deviations within which 95 % of a normal distribution lie."""
 
 
 def wilson(successes: int, count: int) -> tuple[float, float]:

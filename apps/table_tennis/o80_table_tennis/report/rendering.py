@@ -28,9 +28,9 @@ CAMERAS = ("side", "behind", "close")
 SIZE = (640, 480)
 """Width and height of pictures [pixels]."""
 HALF_SIZE = (480, 360)
-"""Of each picture in a film of several."""
+"""Size of each picture in a film of several."""
 TITLE_HEIGHT = 28
-"""Of the line above each of them."""
+"""Height of the line above each of them."""
 SHADOWS = 1024
 """Size of the map of shadows [pixels]: finer ones take software renderers much longer."""
 OTHER_BALL = (0.95, 0.95, 0.92, 0.8)

@@ -59,7 +59,7 @@ class Statistics:
     """Actions that came after the iteration for which they were meant, and acted at once."""
     stalled_episodes: int
     mean_lateness: float
-    """Of the end of a step: newest row of the arm less the one used [rows]; real time only."""
+    """Lateness of a step's end: newest row of the arm less the one used [rows]; real time only."""
     largest_lateness: int
     """[rows]"""
     arm_iterations: int

@@ -23,7 +23,7 @@ FloatArray = NDArray[np.float64]
 TIMEOUT = 5.0
 """Longest wait for a row [s]."""
 RETURN_SECONDS = 0.6
-"""In which the pressures go back to those of the start [s]."""
+"""Duration of the return to the start pressures [s]."""
 SETTLED_SPEED = 0.02
 """Below this speed of every joint the arm stands [rad/s]."""
 SETTLED_ANGLE = 0.05
@@ -42,7 +42,7 @@ class Arm:
     def __init__(self, frontend: o80.Frontend) -> None:
         self.frontend = frontend
         self.range = PressureRange.of(frontend)
-        """Of the raw pressures."""
+        """Range of the raw pressures."""
         self.late = False
         """The last step's pressures were taken later than at their iteration, or not yet."""
         self._sent: o80.Batch | None = None
@@ -84,7 +84,7 @@ class Arm:
 
     @property
     def last_time(self) -> int:
-        """Of the last row [ns]."""
+        """Time of the last row [ns]."""
         return int(self._rows["time"][-1])
 
     @property

@@ -23,14 +23,14 @@ Pairs = tuple[tuple[float, float], ...]
 
 @dataclass(frozen=True)
 class ArmNumbers:
-    """Of each joint (4,), or of the agonist and antagonist of each (4, 2)."""
+    """Numbers of each joint (4,), or of the agonist and antagonist of each (4, 2)."""
 
     maximum_force: Numbers
     """[N], of each of its muscles"""
     stroke: Numbers
     """Contraction without force [m]."""
     contraction: float
-    """Of two muscles that are equally long [m]."""
+    """Contraction of two muscles that are equally long [m]."""
     pulley: float
     """Radius [m]."""
     neutral: Numbers
@@ -50,7 +50,7 @@ class ArmNumbers:
 
     @classmethod
     def of_rig(cls, settings: RigSettings) -> ArmNumbers:
-        """Of the arm that a rig with these settings will have: one is made and asked."""
+        """Numbers of the arm that a rig with these settings will have: one is made and asked."""
         if settings.attach:
             with o80.Frontend(str(settings.arm_segment)) as arm:
                 return cls.of(arm)
@@ -59,7 +59,7 @@ class ArmNumbers:
 
     @classmethod
     def of(cls, arm: o80.Frontend) -> ArmNumbers:
-        """Of the arm that a frontend is attached to. Raises ValueError if it does not tell them."""
+        """Numbers of the arm of a frontend. Raises ValueError if its description lacks them."""
         custom = ElementTree.fromstring(arm.model).find("custom") if arm.model else None
         if custom is None:
             raise ValueError(

@@ -26,9 +26,9 @@ class Arms:
     def __init__(self, group: o80.InlineGroup, *, delay: int) -> None:
         self.group = group
         self.range = PressureRange.of(group[0])
-        """Of the raw pressures."""
+        """Range of the raw pressures."""
         self.burst = group.prepared_burst(ITERATIONS, mode="overwrite", delay=delay)
-        """Of a step."""
+        """Burst of a step."""
         self._reset = group.prepared_request("reset", seed=0)
         self._reset_words = words_of(self._reset.rows)
         self._raw: FloatArray = self.burst.targets[:, 0]

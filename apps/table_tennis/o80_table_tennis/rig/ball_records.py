@@ -48,7 +48,7 @@ READ = {
 FAR = 1e9
 """[m]"""
 CODES = {"i8": "q", "f8": "d"}
-"""Of numbers, for `struct`."""
+"""Codes of numbers for `struct`."""
 
 
 SURFACES = {
@@ -57,7 +57,7 @@ SURFACES = {
     "net": NET_RESTITUTION,
     "floor": FLOOR_RESTITUTION,
 }
-"""What balls bounce on, by the names of its geoms; to the simulator they are all alike."""
+"""Surfaces that balls bounce on, by the names of geoms; to the simulator they are all alike."""
 
 
 def ball_options(balls: int) -> dict[str, Any]:
@@ -113,7 +113,7 @@ class BallReader:
         self._speed, self._distance = places[LARGEST_SPEED], places[SMALLEST_DISTANCE]
 
     def read(self, row: Any) -> BallRecord:
-        """What has happened to the ball; `row` is any buffer."""
+        """Reads what has happened to the ball; `row` is any buffer."""
         seen = self._struct.unpack_from(row, self._offset)
         landed, net_at = seen[self._landed], seen[self._net_at]
         return BallRecord(
@@ -136,7 +136,7 @@ FLAGS = {
     "met_net": (NET_TOUCHES, ">", 0),
     "touched_floor": (FLOOR_TOUCHES, ">", 0),
 }
-"""What a group gathers of the first ball of each row."""
+"""Flags that a group gathers of the first ball of each row."""
 
 
 def event_flags() -> dict[str, Any]:
@@ -174,7 +174,7 @@ class BallRecords:
         )
 
     def read(self) -> BallRecord:
-        """What has happened to the balls; all arrays but `touched_net` are views."""
+        """Reads what has happened to the balls; all arrays but `touched_net` are views."""
         record = self._record
         if np.count_nonzero(self._met_net):
             late = self._landed & (self._landed_at < self._net_at)
@@ -185,7 +185,7 @@ class BallRecords:
 
 
 def ball_records(records: NDArray[Any]) -> BallRecord:
-    """What has happened to N balls, of their records (N,)."""
+    """Events of N balls, from their records (N,)."""
     compare = {">": np.greater, ">=": np.greater_equal}
     flags = {
         name: compare[how](_values(records, path), value)

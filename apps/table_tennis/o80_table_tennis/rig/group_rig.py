@@ -21,9 +21,9 @@ from .twins import Twins
 FloatArray = NDArray[np.float64]
 
 LANE_BLOCKS = 2048
-"""Of 64 bytes in a lane of a twin: the states of a recorded flight are one batch."""
+"""Blocks of 64 bytes in a lane of a twin: the states of a recorded flight are one batch."""
 MIRRORED = {"position": "extended.joint_positions", "velocity": "extended.joint_velocities"}
-"""Of the joints of a twin, by the rows of its arm."""
+"""Fields of the joints of a twin, each with its path in the rows of the arm."""
 
 
 class GroupRig:

@@ -28,7 +28,7 @@ NUMBERS = count(1)
 
 
 def unused_name(robot: str) -> str:
-    """Of a segment that no rig of any process has."""
+    """Name of a segment that no rig of any process has."""
     return f"{robot}-{os.getpid()}-{next(NUMBERS)}"
 
 

@@ -11,7 +11,7 @@ from .ball_records import ball_options
 
 
 def arm_options(settings: RigSettings) -> dict[str, Any]:
-    """Of the pneumatic arm."""
+    """Options of the pneumatic arm."""
     return {
         "preset": settings.preset,
         "muscle": settings.muscle,
@@ -23,7 +23,7 @@ def arm_options(settings: RigSettings) -> dict[str, Any]:
 
 
 def twin_options(settings: RigSettings, twin: int = 0) -> dict[str, Any]:
-    """Of the simulation number `twin`."""
+    """Options of the simulation number `twin`."""
     return {
         "model": str(MODEL),
         "timestep": settings.period,

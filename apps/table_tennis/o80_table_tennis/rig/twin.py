@@ -52,7 +52,7 @@ class Twin:
         self.row: FloatArray = self._last
         """The words of the newest row; the next step overwrites them."""
         self.iteration = -1
-        """Of that row."""
+        """Iteration of that row."""
 
     def reset(self, seed: int) -> None:
         """All balls and contacts forgotten."""
@@ -107,7 +107,7 @@ class Twin:
 
     @property
     def record(self) -> BallRecord:
-        """What has happened to the first ball until the newest row."""
+        """Record of what has happened to the first ball until the newest row."""
         return self._reader.read(self.row)
 
     @property

@@ -35,7 +35,7 @@ class Twins:
         self._joint_names, self._ball_name = names[:JOINTS], names[JOINTS]
         assert tuple(self._joint_names) == JOINT_NAMES, "the twin moves the joints of the scene"
         self.burst = group.prepared_burst(ITERATIONS, self._joint_names, steps=ITERATIONS)
-        """Of a step: it mirrors the rows of the arms."""
+        """Burst of a step: it mirrors the rows of the arms."""
         states = self.burst.targets.swapaxes(1, 2).view(np.float64)
         self._motion = states.reshape(group.copies, JOINTS, ITERATIONS, 2)
         assert np.shares_memory(self._motion, states)
@@ -69,7 +69,7 @@ class Twins:
 
     @property
     def records(self) -> BallRecord:
-        """What has happened to each ball (N,) until the last rows."""
+        """Records of what has happened to each ball (N,) until the last rows."""
         return self._records.read()
 
     def fly_out(self, copies: NDArray[np.intp], every: int, passed_y: float) -> None:

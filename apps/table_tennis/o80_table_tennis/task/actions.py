@@ -26,7 +26,7 @@ _MINUS_ONES = -_ONES
 
 
 def largest_change(factor: float) -> float:
-    """Of a normalised pressure, by one action."""
+    """Largest change of a normalised pressure by one action."""
     return 0.5 * math.tanh(0.5 * factor)
 
 

@@ -1,4 +1,4 @@
-"""What has happened to a ball in an episode, or to many balls in theirs."""
+"""Record of what has happened to a ball in an episode, or to many balls in theirs."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ class BallRecord:
     """Since the episode began. Of one ball: Python numbers; of many: arrays, shapes (...)."""
 
     smallest_distance: Numbers
-    """Of the surfaces of ball and racket so far [m]."""
+    """Smallest distance of the surfaces of ball and racket so far [m]."""
     touched: Flags = False
     """The racket has touched the ball."""
     velocity_after: Vectors = NOWHERE
     """(..., 3) of the ball after that touch [m/s]."""
     largest_speed: Numbers = 0.0
-    """Of the ball since that touch [m/s]."""
+    """Largest speed of the ball since that touch [m/s]."""
     landed: Flags = False
     """The ball has touched the table after the touch; bounces before it do not count."""
     landing: Vectors = NOWHERE

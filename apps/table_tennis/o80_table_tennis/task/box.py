@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 
 class Bounded(Protocol):
-    """What has bounds: a task, or another observation."""
+    """Anything with bounds: a task, or another observation."""
 
     @property
     def low(self) -> NDArray[np.float32]:

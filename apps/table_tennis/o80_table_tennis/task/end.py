@@ -55,7 +55,7 @@ class End(IntEnum):
 
 
 BY_EVENT = np.array([end.terminated for end in End])
-"""Of the ends, by their numbers: whether an event ended the episode."""
+"""Whether an event ended the episode, for each end by its number."""
 # plain numbers: NumPy takes ten times as long to read a member of an IntEnum
 _RUNNING, _RETURNED, _NET, _FLOOR, _PASSED, _OUT_OF_STEPS = map(int, list(End)[:6])
 _OWN_HALF, _TABLE_SIDE = int(End.OWN_HALF), int(End.TABLE_SIDE)

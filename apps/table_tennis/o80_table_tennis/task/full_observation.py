@@ -31,7 +31,7 @@ class Part(NamedTuple):
 
 @dataclass(frozen=True)
 class FullObservation:
-    """What `full` holds, and how it is scaled: `parts` names everything in its order."""
+    """Content and scaling of `full`: `parts` names everything in its order."""
 
     changes: int = 4
     """How many of the last changes of the asked pressures it holds: in steps of 10 ms they cover

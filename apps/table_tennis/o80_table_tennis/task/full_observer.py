@@ -24,7 +24,7 @@ LEAST_VELOCITY_NOISE = 0.02
 
 
 def filter_settings(noise: NoiseSettings, interval: float) -> FilterSettings:
-    """What the filter expects of a ball that is seen with this noise, every `interval` [s]."""
+    """Filter settings for a ball that is seen with this noise, every `interval` [s]."""
     return FilterSettings(
         step=interval,
         position=max(noise.ball_position, LEAST_POSITION_NOISE),
@@ -33,7 +33,7 @@ def filter_settings(noise: NoiseSettings, interval: float) -> FilterSettings:
 
 
 class FullObserver:
-    """What an observation holds beyond the state: what was asked lately, and the filtered ball.
+    """Parts of an observation beyond the state: the latest requests, and the filtered ball.
 
     `interval` is the time from one observation to the next [s], `largest_change` that of an asked
     pressure in that time, normalised.
@@ -68,7 +68,7 @@ class FullObserver:
 
 
 class OneFullObserver(FullObserver):
-    """Of one episode."""
+    """Observer of one episode."""
 
     def __init__(
         self, full: FullObservation, noise: NoiseSettings, interval: float, largest_change: float
@@ -107,7 +107,7 @@ class OneFullObserver(FullObserver):
 
 
 class ManyFullObserver(FullObserver):
-    """Of N episodes."""
+    """Observer of N episodes."""
 
     def __init__(
         self,

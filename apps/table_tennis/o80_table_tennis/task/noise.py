@@ -17,15 +17,15 @@ class NoiseSettings:
     """
 
     ball_position: float = 0.0
-    """Of the ball's position, along each axis [m]."""
+    """Noise of the ball's position, along each axis [m]."""
     ball_velocity: float = 0.0
-    """Of the ball's velocity, along each axis [m/s]."""
+    """Noise of the ball's velocity, along each axis [m/s]."""
     missed_frames: float = 0.0
     """Share of the observations in which the ball was not seen: they hold the last one."""
     latency: float = 0.0
     """How old the observed ball is [s]."""
     pressure: float = 0.0
-    """Of the observed pressures, normalised."""
+    """Noise of the observed pressures, normalised."""
     start_posture: float = 0.0
     """On each joint of the simulated arm at a reset, uniform in plus or minus this [rad]."""
 
@@ -41,7 +41,7 @@ class NoiseSettings:
 
     @classmethod
     def tracker(cls) -> Self:
-        """What a real camera system leaves of a ball in flight."""
+        """Noise that a real camera system leaves on a ball in flight."""
         return cls(ball_position=0.005, ball_velocity=0.1)
 
     @property

@@ -40,7 +40,7 @@ class Observing:
     interval: float = 0.01
     """From one observation to the next [s]."""
     largest_change: float = 1.0
-    """Of an asked pressure in that time, normalised."""
+    """Largest change of an asked pressure in that time, normalised."""
 
 
 class Observer:
@@ -55,7 +55,7 @@ class Observer:
         observed: Bounded = task if full is None else _Bounds(full)
         self._box = ObservationBox(observed)
         self.space: spaces.Space[Float32Array] = self._box.space
-        """Of the observation of one episode."""
+        """Space of the observation of one episode."""
         self.size = int(observed.high.size)
         """M, the numbers of an observation."""
         self.is_ball_play = (
@@ -138,6 +138,6 @@ class _Bounds:
 
 
 def exactly(state: State) -> Perceived:
-    """What is observed without noise."""
+    """Perception without noise."""
     missed = False if state.ball.ndim == 1 else np.zeros(len(state.ball), np.bool_)
     return Perceived(state.ball, missed, state.pressures)

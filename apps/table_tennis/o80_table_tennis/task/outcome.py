@@ -1,4 +1,4 @@
-"""What came of a touched ball: whether it was returned, and where its flight ended.
+"""Outcome of a touched ball: whether it was returned, and where its flight ended.
 
 A ball is **returned** if, after the racket touched it, it met nothing before it landed on top of
 the table beyond the net. A ball that touched the net on the way, landed first on the player's own

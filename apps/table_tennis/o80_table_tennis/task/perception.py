@@ -31,7 +31,7 @@ EVERY = slice(None)
 
 @dataclass(slots=True)
 class Perceived:
-    """What is observed of one episode, or of N."""
+    """Perception of one episode, or of N."""
 
     ball: FloatArray
     """(..., 6) position [m] and velocity [m/s]; where the ball was not seen, the last ones"""
@@ -44,12 +44,12 @@ class Perceived:
 
 
 class Perceiving(Protocol):
-    """What gives observations their ball and pressures: noise, or a device."""
+    """Source of the ball and the pressures in observations: noise, or a device."""
 
     def begin(
         self, state: State, generators: Sequence[np.random.Generator], which: IntArray
     ) -> Perceived:
-        """Of new episodes."""
+        """First perception of new episodes."""
         ...
 
     def perceive(self, state: State, which: IntArray | slice = EVERY) -> Perceived:
@@ -139,7 +139,7 @@ class Delay:
         self._late, self._share = int(latency / interval), latency / interval % 1.0
         self._used, self._interval = latency > 0, interval
         self._past = np.zeros((copies, self._late + 2, BALL))
-        """Of the last observations, the newest first."""
+        """Balls of the last observations, the newest first."""
 
     def __bool__(self) -> bool:
         return self._used

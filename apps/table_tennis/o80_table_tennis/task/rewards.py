@@ -29,7 +29,7 @@ _power = np.frompyfunc(math.pow, 2, 1)
 
 
 class RewardRule(Protocol):
-    """What an episode is worth that has ended in a state, or N in theirs."""
+    """Reward of an episode that has ended in a state, or of N in theirs."""
 
     @property
     def target(self) -> Vector:

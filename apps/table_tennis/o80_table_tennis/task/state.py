@@ -32,7 +32,7 @@ class State:
     ball: FloatArray
     """(..., 6) position [m], then velocity [m/s] of the ball, world frame."""
     record: BallRecord
-    """What has happened to the ball."""
+    """Record of what has happened to the ball."""
     goal: FloatArray
     """(..., G) of the episode, as the task chose it."""
 

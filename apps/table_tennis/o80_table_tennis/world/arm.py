@@ -23,7 +23,7 @@ JOINTS = len(JOINT_NAMES)
 MUSCLES = 2 * JOINTS
 """An agonist and an antagonist for each joint."""
 JOINT_LIMIT = math.radians(numbers(element("default/joint"), "range")[1])
-"""Of every joint, either way [rad]."""
+"""Limit of every joint, either way [rad]."""
 JOINT_DAMPING = tuple(numbers(joint, "damping")[0] for joint in _JOINTS)
 """[Nm s/rad]"""
 
@@ -37,7 +37,7 @@ UPPER_ARM = vector(body("elbow"), "pos")[2]
 FOREARM = vector(body("racket"), "pos")[2]
 """Joint 3 to the centre of the racket [m]."""
 BLADE_THICKNESS = full_size(geom("racket"))[1]
-"""Of the racket [m]."""
+"""Thickness of the racket's blade [m]."""
 
 
 @dataclass(frozen=True)
@@ -61,9 +61,9 @@ class RacketPose:
     """Where the racket is, and where it looks."""
 
     position: Vector
-    """Of its centre, in the world [m]."""
+    """Position of its centre, in the world [m]."""
     normal: Vector
-    """Of its face, a unit vector."""
+    """Normal of its face, a unit vector."""
 
 
 def racket_pose(q: FloatArray) -> RacketPose:

@@ -15,4 +15,4 @@ BALL_INERTIA = 2.0 / 3.0
 NO_SPIN: Vector = (0.0, 0.0, 0.0)
 BALL_GUN_SPIN: Vector = (64.0, 0.0, 0.0)
 """Top spin of the recorded shots of the ball gun before their bounce [rad/s]: the median of what
-their fitted flights show, by `python -m o80_table_tennis.fit_bounces`."""
+their fitted flights show, by studies/fit_bounces.py."""

@@ -36,9 +36,9 @@ RACKET_RESTITUTION = Restitution(tangential=0.78, normal=0.78)
 """As published."""
 TABLE_RESTITUTION = Restitution(tangential=0.505, normal=0.92, friction=0.25)
 """Normal: median of the bounces of the recorded shots of the ball gun. Tangential: fitted to the
-recorded bounces of three sets by `python -m o80_table_tennis.fit_bounces`; a hollow ball that
-rolls at the end of the bounce keeps 0.60. Friction: chosen as usual for a celluloid ball on a
-table; no recorded shot slides."""
+recorded bounces of three sets by studies/fit_bounces.py; a hollow ball that rolls at the end of
+the bounce keeps 0.60. Friction: chosen as usual for a celluloid ball on a table; no recorded shot
+slides."""
 NET_RESTITUTION = Restitution(tangential=0.50, normal=0.15)
 """Chosen; no value is published."""
 FLOOR_RESTITUTION = Restitution(tangential=0.70, normal=0.75)

@@ -15,7 +15,7 @@ TABLE_SIZE = full_size(geom("table"))
 TARGET: Vector = (0.0, 2.5, 0.78)
 """Where on the opponent's half a ball should land, as published [m]."""
 NET_Y = vector(geom("net"), "pos")[1]
-"""Of the plane of the net: greater is the opponent's half [m]."""
+"""Plane of the net: greater is the opponent's half [m]."""
 NET_HEIGHT = full_size(geom("net"))[2]
 """Above the table [m]."""
 

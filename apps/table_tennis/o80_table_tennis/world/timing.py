@@ -5,8 +5,8 @@ from __future__ import annotations
 from .scene import element, numbers
 
 PERIOD = numbers(element("option"), "timestep")[0]
-"""Of an iteration of the arm and of a twin: the time step of the scene [s]."""
+"""Duration of an iteration of the arm and of a twin: the time step of the scene [s]."""
 ITERATIONS = 5
-"""Of the arm and of each twin, in a step of the environment."""
+"""Iterations of the arm and of each twin in a step of the environment."""
 STEP = ITERATIONS * PERIOD
-"""Of the environment [s]."""
+"""Duration of a step of the environment [s]."""

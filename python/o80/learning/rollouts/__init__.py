@@ -1,27 +1,20 @@
-"""Rollouts of vector environments, collected by workers: in this process, or by Ray on machines.
+"""Rollouts of a vector environment, collected with NumPy alone.
 
-with LocalWorkers(make, workers=4, seed=1) as workers:      # or RayWorkers: the same, bit for bit
-    rollouts = workers.collect(policy, steps=64)
+with Collector(make, seed=1) as collector:
+    rollout = collector.collect(policy, steps=64)
 
-See docs/learning.md. RayWorkers needs the extra `ray`.
+See docs/learning.md.
 """
 
+from o80.learning.rollouts.collector import Collector, Make, Policy
 from o80.learning.rollouts.gaussian_policy import GaussianPolicy
-from o80.learning.rollouts.local_workers import LocalWorkers
-from o80.learning.rollouts.ray_workers import RayWorkers
 from o80.learning.rollouts.rollout import Ends, Rollout
-from o80.learning.rollouts.worker import Make, Policy, Worker
-from o80.learning.rollouts.workers import Replacement, Workers
 
 __all__ = [
+    "Collector",
     "Ends",
     "GaussianPolicy",
-    "LocalWorkers",
     "Make",
     "Policy",
-    "RayWorkers",
-    "Replacement",
     "Rollout",
-    "Worker",
-    "Workers",
 ]

@@ -27,9 +27,9 @@ class GaussianPolicy:
     scale: Float32Array
     """(M,) then multiplied with them."""
     weights: tuple[Float32Array, ...]
-    """Of each layer (out, in)."""
+    """Weights of each layer (out, in)."""
     biases: tuple[Float32Array, ...]
-    """Of each layer (out,)."""
+    """Biases of each layer (out,)."""
     log_std: Float32Array
     """(A,) logarithm of the standard deviation of each action."""
     clip: float = 10.0

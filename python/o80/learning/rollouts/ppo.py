@@ -1,7 +1,7 @@
-"""Stable-Baselines3's PPO, which learns from the rollouts of workers.
+"""Stable-Baselines3's PPO, which learns from the rollouts of a Collector.
 
-with RayWorkers(make, workers=4, seed=1) as workers:
-    model = RolloutPPO("MlpPolicy", VecNormalize(WorkersEnv(workers), norm_reward=False))
+with Collector(make, seed=1) as collector:
+    model = RolloutPPO("MlpPolicy", VecNormalize(CollectorEnv(collector), norm_reward=False))
     model.learn(1_000_000)
 
 Needs the extra `stable-baselines3`. See docs/learning.md.
@@ -9,7 +9,7 @@ Needs the extra `stable-baselines3`. See docs/learning.md.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from o80.errors import InvalidArgument
 from o80.extras import needed
+from o80.learning.rollouts.collector import Collector
 from o80.learning.rollouts.rollout import Rollout
 from o80.learning.rollouts.sb3_policy import gaussian_policy
-from o80.learning.rollouts.workers import Workers
 
 needed("stable_baselines3", "stable-baselines3", "o80.learning.rollouts.ppo")
 
@@ -32,32 +32,33 @@ from stable_baselines3.common.vec_env import VecEnv  # noqa: E402
 
 Info = dict[str, Any]
 
+ALONE = "a collector steps its copies itself: give CollectorEnv to a RolloutPPO only"
 
-class WorkersEnv(VecEnv):
-    """Stands for the copies of all workers in a RolloutPPO, which alone can step them."""
 
-    def __init__(self, workers: Workers) -> None:
-        self.workers = workers
+class CollectorEnv(VecEnv):
+    """Stands for the copies of a collector in a RolloutPPO, which alone can step them."""
+
+    def __init__(self, collector: Collector) -> None:
+        self.collector = collector
         self.render_mode = None
-        copies, observation_space, action_space = workers.spaces
-        super().__init__(copies * workers.count, observation_space, action_space)
+        super().__init__(collector.copies, collector.observation_space, collector.action_space)
 
     def reset(self) -> Any:
-        """Zeros: a rollout begins with the observations of its workers."""
+        """Zeros: a rollout begins with the observations of the collector."""
         space = self.observation_space
         return np.zeros((self.num_envs, *(space.shape or ())), space.dtype)
 
     def step_async(self, actions: Any) -> None:
         """Refused."""
-        raise InvalidArgument("workers step by themselves: give WorkersEnv to a RolloutPPO only")
+        raise InvalidArgument(ALONE)
 
     def step_wait(self) -> Any:
         """Refused."""
-        raise InvalidArgument("workers step by themselves: give WorkersEnv to a RolloutPPO only")
+        raise InvalidArgument(ALONE)
 
     def close(self) -> None:
-        """Ends the workers."""
-        self.workers.close()
+        """Closes the collector."""
+        self.collector.close()
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """An attribute of this object, for each copy."""
@@ -65,11 +66,11 @@ class WorkersEnv(VecEnv):
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
         """Refused."""
-        raise InvalidArgument(f"give '{attr_name}' to what makes the environments of the workers")
+        raise InvalidArgument(f"give '{attr_name}' to what makes the collector's environments")
 
     def env_method(self, method_name: str, *_: Any, indices: Any = None, **__: Any) -> list[Any]:
         """Refused."""
-        raise InvalidArgument(f"'{method_name}' cannot be called in workers")
+        raise InvalidArgument(f"'{method_name}' cannot be called in a collector's environments")
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
         """Whether ends have the info `episode`, as those of a Monitor."""
@@ -79,11 +80,11 @@ class WorkersEnv(VecEnv):
 
 
 class RolloutPPO(PPO):
-    """PPO whose rollouts are collected by workers, with the weights of the last update.
+    """PPO whose rollouts a collector collects, with the weights of the last update.
 
-    Its environment is a WorkersEnv, or a VecNormalize of one without `norm_reward`. Statistics of
-    observations are updated after each rollout, not in each step. The iteration is the number of
-    updates; a model that was loaded makes the workers begin anew there.
+    Its environment is a CollectorEnv, or a VecNormalize of one without `norm_reward`. Statistics
+    of observations are updated after each rollout, not in each step. The iteration is the number
+    of updates; a model that was loaded makes the collector begin anew there.
     """
 
     def __init__(
@@ -99,19 +100,19 @@ class RolloutPPO(PPO):
             self.set_logger(Logger(None, []))  # the default one leaves a folder in /tmp
         normalisation = self._vec_normalize_env
         inner = normalisation.unwrapped if normalisation is not None else self.env
-        if not isinstance(inner, WorkersEnv) or (normalisation and normalisation.norm_reward):
+        if not isinstance(inner, CollectorEnv) or (normalisation and normalisation.norm_reward):
             raise InvalidArgument(
-                "RolloutPPO needs a WorkersEnv, or VecNormalize(WorkersEnv(workers), "
+                "RolloutPPO needs a CollectorEnv, or VecNormalize(CollectorEnv(collector), "
                 f"norm_reward=False), got {self.env!r}"
             )
-        self._workers = inner.workers
+        self._collector = inner.collector
         gaussian_policy(self.policy, self._vec_normalize_env, self._visible)  # may refuse
 
     def _excluded_save_params(self) -> list[str]:
-        return [*super()._excluded_save_params(), "_workers"]
+        return [*super()._excluded_save_params(), "_collector"]
 
     def _setup_learn(self, *arguments: Any, **options: Any) -> Any:
-        """Without the zeros of WorkersEnv.reset in the statistics."""
+        """Without the zeros of CollectorEnv.reset in the statistics."""
         normalisation = self._vec_normalize_env
         if normalisation is None:
             return super()._setup_learn(*arguments, **options)
@@ -128,25 +129,25 @@ class RolloutPPO(PPO):
         rollout_buffer: RolloutBuffer,
         n_rollout_steps: int,
     ) -> bool:
-        """Fills the buffer with a rollout of each worker."""
+        """Fills the buffer with a rollout."""
         self.policy.set_training_mode(False)
         rollout_buffer.reset()
         callback.on_rollout_start()
-        together = _Together(self._collected(n_rollout_steps), self._visible)
-        rewards, values, log_probabilities = self._valued(together)
+        rollout = _Visible(self._collected(n_rollout_steps), self._visible)
+        rewards, values, log_probabilities = self._valued(rollout)
         starts = self._last_episode_starts
-        normalised = self._normalised(together.observations)
+        normalised = self._normalised(rollout.observations)
         for step in range(n_rollout_steps):
             self.num_timesteps += self.n_envs
-            dones, infos = together.over[step], together.infos(step)
-            told = {"rewards": together.rewards[step], "dones": dones, "infos": infos}
+            dones, infos = rollout.over[step], rollout.infos(step)
+            told = {"rewards": rollout.rewards[step], "dones": dones, "infos": infos}
             callback.update_locals(told)
             if not callback.on_step():
                 return False
             self._update_info_buffer(infos, dones)
             rollout_buffer.add(
                 normalised[step],
-                together.actions[step],
+                rollout.actions[step],
                 rewards[step],
                 starts,  # type: ignore[arg-type]
                 values[step],
@@ -158,17 +159,17 @@ class RolloutPPO(PPO):
         rollout_buffer.compute_returns_and_advantage(last_values=values[-1], dones=starts)  # type: ignore[arg-type]
         if self._vec_normalize_env is not None and self._vec_normalize_env.training:
             statistics: Any = self._vec_normalize_env.obs_rms
-            statistics.update(together.observations[:-1].reshape(-1, *env.observation_space.shape))  # type: ignore[misc]
+            statistics.update(rollout.observations[:-1].reshape(-1, *env.observation_space.shape))  # type: ignore[misc]
         callback.on_rollout_end()
         return True
 
-    def _collected(self, steps: int) -> list[Rollout]:
-        """The rollouts of the iteration that this model has come to."""
+    def _collected(self, steps: int) -> Rollout:
+        """The rollout of the iteration that this model has come to."""
         iteration = self.num_timesteps // (steps * self.n_envs)
-        if self._workers.iteration != iteration:
-            self._workers.restart(iteration)
+        if self._collector.iteration != iteration:
+            self._collector.restart(iteration)
         policy = gaussian_policy(self.policy, self._vec_normalize_env, self._visible)
-        return self._workers.collect(policy, steps=steps)
+        return self._collector.collect(policy, steps=steps)
 
     def _normalised(self, observations: NDArray[Any]) -> NDArray[Any]:
         if self._vec_normalize_env is None:
@@ -176,24 +177,24 @@ class RolloutPPO(PPO):
         normalised: Any = self._vec_normalize_env.normalize_obs(observations)
         return normalised  # type: ignore[no-any-return]
 
-    def _valued(self, together: _Together) -> tuple[NDArray[Any], Any, Any]:
+    def _valued(self, rollout: _Visible) -> tuple[NDArray[Any], Any, Any]:
         """Rewards (T, N) with the values that truncated episodes still had, values (T + 1, N), and
         log-probabilities (T, N): of torch, with which the update compares its own.
         """
-        steps, count = together.rewards.shape
-        rewards = together.rewards.copy()
+        steps, count = rollout.rewards.shape
+        rewards = rollout.rewards.copy()
         with torch.no_grad():
-            values = self._values(together.observations).reshape(steps + 1, count)
-            seen = self._tensor(self._normalised(together.observations[:-1])).flatten(0, 1)
-            acted = self._tensor(together.actions).flatten(0, 1)
+            values = self._values(rollout.observations).reshape(steps + 1, count)
+            seen = self._tensor(self._normalised(rollout.observations[:-1])).flatten(0, 1)
+            acted = self._tensor(rollout.actions).flatten(0, 1)
             _, log_probabilities, _ = self.policy.evaluate_actions(seen, acted)
-            cut, last = together.cut_off()
+            cut, last = rollout.cut_off()
             if len(last):
                 rewards[cut] += self.gamma * self._values(last).numpy()
         return rewards, values, log_probabilities.reshape(steps, count)
 
     def _values(self, observations: NDArray[Any]) -> torch.Tensor:
-        """Of the states (..., M), as (n,)."""
+        """Values of the states (..., M), as (n,)."""
         seen = self._tensor(self._normalised(observations))
         values: torch.Tensor = self.policy.predict_values(seen.flatten(0, -2)).flatten().cpu()
         return values
@@ -202,21 +203,20 @@ class RolloutPPO(PPO):
         return torch.as_tensor(np.array(array), dtype=torch.float32, device=self.device)
 
 
-class _Together:
-    """The rollouts of all workers side by side: copies of worker 0, then those of worker 1, ..."""
+class _Visible:
+    """A rollout as the learner sees it: without the numbers that must not be seen."""
 
-    def __init__(self, rollouts: Sequence[Rollout], visible: NDArray[Any] | None) -> None:
-        self._rollouts, self._visible = rollouts, visible
-        self.observations = self._seen(_beside([each.observations for each in rollouts]))
-        self.actions = _beside([each.actions for each in rollouts])
-        self.rewards = _beside([each.rewards for each in rollouts])
-        self.over = _beside([each.terminated | each.truncated for each in rollouts])
+    def __init__(self, rollout: Rollout, visible: NDArray[Any] | None) -> None:
+        self._rollout, self._visible = rollout, visible
+        self.observations = self._seen(rollout.observations)
+        self.actions, self.rewards = rollout.actions, rollout.rewards
+        self.over = rollout.terminated | rollout.truncated
         self._infos: dict[int, dict[int, Info]] = {}
         for step, copy, info in self._ends():
             self._infos.setdefault(step, {})[copy] = info
 
     def infos(self, step: int) -> list[Info]:
-        """Of all copies, as Stable-Baselines3 wants them: with entries where an episode ended."""
+        """Infos of all copies, for Stable-Baselines3: with entries where an episode ended."""
         ended = self._infos.get(step, {})
         return [ended.get(copy, {}) for copy in range(self.rewards.shape[1])]
 
@@ -231,22 +231,15 @@ class _Together:
         return (steps, copies), np.array([each[2] for each in found])
 
     def _ends(self) -> Iterator[tuple[int, int, Info]]:
-        first = 0
-        for rollout in self._rollouts:
-            ends = rollout.ends
-            for number in range(len(ends.steps)):
-                step, copy = int(ends.steps[number]), int(ends.copies[number])
-                info = {name: values[number] for name, values in ends.infos.items()}
-                info["terminal_observation"] = self._seen(ends.observations[number])
-                info["TimeLimit.truncated"] = not rollout.terminated[step, copy]
-                reward, length = float(ends.rewards[number]), int(ends.lengths[number])
-                info["episode"] = {"r": reward, "l": length}
-                yield step, first + copy, info
-            first += rollout.rewards.shape[1]
+        ends, terminated = self._rollout.ends, self._rollout.terminated
+        for number in range(len(ends.steps)):
+            step, copy = int(ends.steps[number]), int(ends.copies[number])
+            info = {name: values[number] for name, values in ends.infos.items()}
+            info["terminal_observation"] = self._seen(ends.observations[number])
+            info["TimeLimit.truncated"] = not terminated[step, copy]
+            reward, length = float(ends.rewards[number]), int(ends.lengths[number])
+            info["episode"] = {"r": reward, "l": length}
+            yield step, copy, info
 
     def _seen(self, observations: NDArray[Any]) -> NDArray[Any]:
         return observations if self._visible is None else observations * self._visible
-
-
-def _beside(arrays: Sequence[NDArray[Any]]) -> NDArray[Any]:
-    return np.concatenate(arrays, axis=1)

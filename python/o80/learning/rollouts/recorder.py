@@ -28,7 +28,7 @@ class EpisodeSums:
 
 
 class Recorder:
-    """Of one rollout."""
+    """Recorder of one rollout."""
 
     def __init__(
         self, environments: VectorEnv[Any, Any, Any], steps: int, infos: Sequence[str]
@@ -56,7 +56,7 @@ class Recorder:
         actions: NDArray[Any],
         log_probabilities: NDArray[Any],
     ) -> None:
-        """What was seen before a step, and what the policy drew."""
+        """Takes what was seen before a step, and what the policy drew."""
         self._observations[step] = observations
         self._actions[step] = actions
         self._log_probabilities[step] = log_probabilities
@@ -67,7 +67,7 @@ class Recorder:
         result: tuple[Any, Any, Any, Any, Mapping[str, Any]],
         sums: EpisodeSums,
     ) -> None:
-        """What the environments returned; adds it to the sums."""
+        """Takes what the environments returned; adds it to the sums."""
         _, self._rewards[step], self._terminated[step], self._truncated[step], infos = result
         sums.rewards += self._rewards[step]
         sums.lengths += 1
@@ -81,9 +81,7 @@ class Recorder:
         self._infos.append({name: _entry(infos["final_info"], name)[over] for name in self._names})
         sums.restart(over)
 
-    def rollout(
-        self, observations: NDArray[Any], *, worker: int, iteration: int, begun: int
-    ) -> Rollout:
+    def rollout(self, observations: NDArray[Any]) -> Rollout:
         """The rollout; `observations` are those after its last step."""
         self._observations[-1] = observations
         steps, copies, rewards, lengths, last = (
@@ -96,9 +94,6 @@ class Recorder:
             for name in self._names
         }
         rollout = Rollout(
-            worker,
-            iteration,
-            begun,
             self._observations,
             self._actions,
             self._log_probabilities,
@@ -108,7 +103,7 @@ class Recorder:
             Ends(steps, copies, rewards, lengths, last, infos),
         )
         for _, array in arrays_of(rollout):
-            array.flags.writeable = False  # as Ray's are, so that both behave alike
+            array.flags.writeable = False  # as arrays that come from Ray are
         return rollout
 
 

@@ -33,12 +33,6 @@ class Ends:
 class Rollout:
     """T steps of N copies. All arrays are read-only."""
 
-    worker: int
-    """The number of the worker that collected it."""
-    iteration: int
-    """The iteration for which it was collected."""
-    begun: int
-    """The iteration in which this worker began, with a reset of all its copies."""
     observations: NDArray[Any]
     """(T + 1, N, ...) before each step; the next rollout begins with the last ones."""
     actions: NDArray[Any]

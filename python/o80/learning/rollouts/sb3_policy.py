@@ -30,7 +30,7 @@ def gaussian_policy(
         or not all(isinstance(each, torch.nn.Linear | torch.nn.Tanh) for each in hidden)
     ):
         raise InvalidArgument(
-            "workers play an MlpPolicy with layers of tanh and normally distributed actions, and "
+            "rollouts need an MlpPolicy with layers of tanh and normally distributed actions, and "
             f"this one is {type(policy).__name__}({policy.action_dist}, {policy.mlp_extractor})"
         )
     layers = [each for each in hidden if isinstance(each, torch.nn.Linear)]
@@ -54,5 +54,5 @@ def gaussian_policy(
 
 
 def _array(parameter: Any) -> NDArray[np.float32]:
-    # a copy: Ray's workers must not see the next update
+    # a copy: the next update changes the parameter in place
     return np.array(parameter.detach().cpu().numpy(), np.float32)

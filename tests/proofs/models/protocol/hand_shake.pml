@@ -1,16 +1,16 @@
 // The burst hand-shake with deaths: a frontend asks, the backend grants, runs, answers; either may
 // be killed anywhere.
 //
-// Transcribed from src/runtime/backend.cpp (step, publish, end_burst), backend_lives.cpp (mourn),
-// batch.cpp (Burst::wait_done) and src/memory/lane_sender.cpp (wait_until, sleep), signal.cpp
-// (BellWaiter, ring_bell), lane_receiver.cpp (flush). Sleeps are cut into slices, which end
-// at any time, but do end.
+// Transcribed from src/runtime/backend.cpp (step, publish), backend_burst.cpp (end_burst),
+// backend_lives.cpp (look_at_lives, on_owner_death), batch.cpp (Burst::wait_done) and
+// src/memory/lane_sender.cpp (wait_until, sleep), signal.cpp (BellWaiter, ring_bell),
+// lane_receiver.cpp (flush). Sleeps are cut into slices, which end at any time, but do end.
 //
 // safety: two bursts never mix; an answer is of the frontend's own burst and comes after its rows
 // ltl:    while the backend lives, each living frontend gets its answer, whoever else is killed, and
 //         the backend stands still again; if the backend is killed, each is told (weak fairness)
 //
-// mutant NO_MOURNING       a burst without end of a dead frontend is not cut
+// mutant DEATH_IGNORED     a burst without end of a dead frontend is not cut
 // mutant NO_SLICES         a sleep lasts until somebody wakes
 // mutant ANSWERS_FIRST     the answer is there before the rows
 // mutant GRANTS_TWICE      a burst is granted while another runs
@@ -116,7 +116,7 @@ proctype Backend() {
   :: else ->
      // look_at_lives: the helper thread has said who is dead
      if
-#ifndef NO_MOURNING
+#ifndef DEATH_IGNORED
      :: runs != STILL && dead[runs] && left > 1 -> left = 1
 #endif
      :: else

@@ -45,14 +45,14 @@ bool acts[SEGMENTS];
 byte answered[SEGMENTS];          // the last halt that was
 byte resumed[SEGMENTS];           // the last halt that a resume has granted
 bool moved[SEGMENTS];             // what was written last is a motion
-byte heir[SEGMENTS] = NONE;
+byte successor[SEGMENTS] = NONE;
 
 #define MAY_DIE if :: true :: goto dying fi
 
 #define HAS_TO_BE_HALTED(s) (answered[s] > resumed[s] || (moved[s] && !ended[s]))
 
-inline judge_heir(s) {
-  assert(heir[s] == NONE || !HAS_TO_BE_HALTED(s) || answered[heir[s]] > 0)
+inline judge_successor(s) {
+  assert(successor[s] == NONE || !HAS_TO_BE_HALTED(s) || answered[successor[s]] > 0)
 }
 
 // a backend that runs
@@ -162,16 +162,16 @@ proctype Starter(byte mine) {
         MAY_DIE;
 #endif
         atomic {                                                            // rename
-          name = mine; alive[mine] = true; heir[old] = mine; locked[old] = false; holds = false
+          name = mine; alive[mine] = true; successor[old] = mine; locked[old] = false; holds = false
 #ifndef INHERITS_AFTER_RENAME
           ;
-          judge_heir(old)
+          judge_successor(old)
 #endif
         }
 #ifdef INHERITS_AFTER_RENAME
         MAY_DIE;
         if :: inherits -> halts[mine] = 1; answered[mine] = 1 :: else fi;
-        judge_heir(old);
+        judge_successor(old);
 #endif
         break
      fi
@@ -201,7 +201,7 @@ proctype Asker() {
   // halt() returns the number
   atomic {
     if :: number > answered[to] -> answered[to] = number :: else fi;
-    judge_heir(to)
+    judge_successor(to)
   }
 gone:
   skip

@@ -3,7 +3,8 @@
 //
 // Transcribed from src/memory/lane_sender.cpp (LaneSender, count_in, send, give_back),
 // lane_receiver.cpp (dead_predecessor, next_is_of_dead), liveness.cpp (ask_lane) and
-// src/runtime/backend_lives.cpp, backend_batches.cpp (look_at_lives, mourn, begin_staging, admit).
+// src/runtime/backend_lives.cpp (look_at_lives, on_owner_death), backend_batches.cpp (stage, admit)
+// and staging.cpp (begin).
 //
 // safety: each batch is dealt with once and in order; a living owner's is never refused as a dead
 //         one's; what a successor sends acts on queues without commands of the dead; ids are not
@@ -15,7 +16,7 @@
 // mutant COUNTED_EARLY        a successor counts itself before it has left its mark
 // mutant WITHOUT_THE_MARK     a successor does not say where it began
 // mutant DEATH_IGNORED        the dead is not dealt with before its successor's first batch
-// mutant DEAD_MAN_TALKS       who was mourned is listened to until a successor comes
+// mutant DEAD_MAN_TALKS       batches of an owner that is known to be dead are taken
 // mutant NOBODY_ASKS          no helper thread asks who lives
 // mutant ASKS_ONCE            who was seen alive is not asked about again
 // mutant IDS_BEGIN_ANEW       a successor counts its ids from 1
@@ -51,7 +52,7 @@ byte died = 0;                  // the owner that it found dead, 0: none
 
 // the backend
 byte cursor = 0;
-byte mourned = 0;
+byte handled_death = 0;
 byte acting = 0;                // whose command is in the queue
 byte refused = 0;
 bool settled = false;           // all owners are gone, and it knows how
@@ -145,10 +146,10 @@ proctype Helper() {
   od
 }
 
-inline mourn(who) {
+inline on_owner_death(who) {
   if
-  :: who > mourned ->
-     mourned = who;
+  :: who > handled_death ->
+     handled_death = who;
      acting = 0                   // purge_lane
   :: else
   fi
@@ -159,13 +160,13 @@ proctype Backend() {
   bool of_dead;
   do
   :: cursor < committed ->
-     // begin_staging
+     // stage, Staging::begin
      if
      :: dead_incarnation < incarnation -> predecessor = dead_incarnation
      :: else -> predecessor = 0
      fi;
 #ifndef DEATH_IGNORED
-     mourn(predecessor);
+     on_owner_death(predecessor);
 #endif
      present = incarnation;
      if
@@ -174,7 +175,7 @@ proctype Backend() {
      fi;
      of_dead = predecessor != 0 && cursor < successor_begin;
 #ifndef DEAD_MAN_TALKS
-     of_dead = of_dead || present <= mourned;
+     of_dead = of_dead || present <= handled_death;
 #endif
      // take, admit
      d_step {
@@ -193,8 +194,8 @@ proctype Backend() {
           acting = owner
        fi
      }
-  :: atomic { died > mourned -> mourn(died) }
-  :: over == OWNERS && cursor == committed && (died <= mourned) &&
+  :: atomic { died > handled_death -> on_owner_death(died) }
+  :: over == OWNERS && cursor == committed && (died <= handled_death) &&
      (died == incarnation || closed == incarnation || incarnation == 0) -> break
   od;
   assert(acting == 0 || !killed[acting]);

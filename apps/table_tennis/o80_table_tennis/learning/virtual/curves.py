@@ -16,7 +16,7 @@ class Point:
     """How a training stood after so many motions."""
 
     motions: int
-    """Of the arm."""
+    """Motions of the arm."""
     touched: float
     """Share of the fresh shots, with the deterministic policy."""
     returned: float

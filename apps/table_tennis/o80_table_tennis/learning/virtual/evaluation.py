@@ -14,7 +14,7 @@ from ..episodes import EpisodeOutcome, Shares, shares
 from .motions import Float32Array
 
 BALL_SEED = 800_001
-"""Of the shots of evaluations: no training plays them."""
+"""Seed of the shots of evaluations, which no training plays."""
 COPIES = 20
 
 

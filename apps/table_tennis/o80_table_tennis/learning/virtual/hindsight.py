@@ -37,7 +37,7 @@ class Transitions:
 
 
 def transitions(motion: Motion, balls: Balls) -> Transitions:
-    """Those of the episodes of some balls of a motion."""
+    """Transitions of the episodes of some balls of a motion."""
     steps = np.concatenate([np.arange(motion.lengths[ball]) for ball in balls])
     which = np.repeat(balls, motion.lengths[balls])
     last = steps == motion.lengths[which] - 1

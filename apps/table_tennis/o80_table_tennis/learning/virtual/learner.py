@@ -20,7 +20,7 @@ from .settings import SacSettings
 CLIP = 10.0
 """Scaled observations lie within plus or minus this."""
 LEAST_SPREAD = 1e-3
-"""Of a number of an observation that hardly changes."""
+"""Smallest spread by which a number of an observation is divided: some hardly change."""
 
 
 class Learner:

@@ -165,7 +165,7 @@ class Motions:
         return np.broadcast_to(array, (self._count, *array.shape))
 
     def _judge(self, state: State, episodes: _Episodes) -> None:
-        """What the step that led to this state was for the balls in play."""
+        """Judges the step that led to this state, for the balls in play."""
         playing = episodes.running.copy()
         touched = playing & state.record.touched
         judged = playing & self._task.eventful(state)

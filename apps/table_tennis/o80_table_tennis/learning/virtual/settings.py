@@ -19,11 +19,11 @@ CONDITIONS = Conditions(
 
 @dataclass(frozen=True)
 class Way:
-    """What a learner makes of one motion of the arm."""
+    """Way to learn from one motion of the arm."""
 
     text: str
     virtual_balls: int = 0
-    """That meet each motion beside the played one."""
+    """Balls that meet each motion beside the played one."""
     select: Selection = every_ball
     gradient_steps: int = 20
     """After each motion."""
@@ -40,7 +40,7 @@ WAYS: Mapping[str, Way] = {
 
 @dataclass(frozen=True)
 class SacSettings:
-    """Of Stable-Baselines3's SAC."""
+    """Settings of Stable-Baselines3's SAC."""
 
     buffer: int = 500_000
     """Transitions that are kept."""
@@ -48,7 +48,7 @@ class SacSettings:
     learning_rate: float = 1e-3
     discount: float = 0.97
     target_rate: float = 0.01
-    """Of the target networks towards the learned ones, each gradient step."""
+    """Rate at which the target networks follow the learned ones, in each gradient step."""
     entropy: str = "auto_0.02"
     """Weight of the entropy: learned, from this on."""
     hidden: int = 64
@@ -62,7 +62,7 @@ class VirtualSettings:
     way: str = "none"
     seed: int = 1
     motions: int = 1000
-    """Of the arm, with random actions at first."""
+    """Motions of the arm; the first ones have random actions."""
     random_motions: int = 20
     """Nothing is learned before; the observations are scaled by what is seen in them."""
     evaluate_every: int = 50

@@ -1,4 +1,4 @@
-"""The search for the settings of the training: `python -m o80_table_tennis.learning.search`.
+"""The search for the settings of the training: `python search_settings.py`.
 
 Each trial changes some settings of the default ones, and trains as long as the others, with seeds
 that no published training has. Writes a table, the best trial first.
@@ -15,15 +15,15 @@ import numpy as np
 import typer
 from rich.console import Console
 
-from ..players.conditions import Conditions
-from . import curve
-from .curve import CURVE
-from .settings import LearningSettings, PpoSettings
-from .training import Training
-from .verdict import write_report
+from o80_table_tennis.learning import curve
+from o80_table_tennis.learning.curve import CURVE
+from o80_table_tennis.learning.settings import LearningSettings, PpoSettings
+from o80_table_tennis.learning.training import Training
+from o80_table_tennis.learning.verdict import write_report
+from o80_table_tennis.players.conditions import Conditions
 
 FIRST_SEED = 101
-"""Of the trials; published trainings have seeds below."""
+"""First seed of the trials; published trainings have seeds below."""
 
 TRIALS: Mapping[str, Mapping[str, Any]] = {
     "default": {},

@@ -1,4 +1,4 @@
-"""What the others do when one process of the lab is killed: the table of page and test."""
+"""Reactions of the others when one process of the lab is killed: the table of page and test."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 import o80
 from o80_devices.ball_tracking.ball_row import Reason as TrackerReason
 from o80_devices.motion_capture.sensor import Reason as CaptureReason
-
-from .parts import (
+from o80_table_tennis.lab.parts import (
     ARM,
     CAMERAS,
     ENVIRONMENT,
@@ -38,7 +37,7 @@ class Mark:
     says: str
     """For people."""
     holds: Callable[[o80.History], Bools] | None = None
-    """In which of its rows; None: an entry of its journal, or of the supervisor."""
+    """Selects the rows that say so; None: an entry of its journal, or of the supervisor, does."""
     journal: str = ""
     """Kind of that entry."""
 
@@ -50,7 +49,7 @@ class Kill:
     killed: str
     marks: tuple[Mark, ...]
     halts: tuple[str, ...] = ()
-    """Those that stand still until it is back."""
+    """Processes that stand still until it is back."""
     remark: str = ""
     """For people: what else happens."""
 

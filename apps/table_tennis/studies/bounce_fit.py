@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..physics.aerodynamics import AERODYNAMICS, Aerodynamics
-from ..physics.impact import bounced
-from ..world.table import TABLE, Table
-from .flight_fit import FlightFit
+from o80_table_tennis.balls.flight_fit import FlightFit
+from o80_table_tennis.physics.aerodynamics import AERODYNAMICS, Aerodynamics
+from o80_table_tennis.physics.impact import bounced
+from o80_table_tennis.world.table import TABLE, Table
 
 FloatArray = NDArray[np.float64]
 
@@ -31,8 +31,8 @@ ROLLING = 0.4
 GRIP_ERROR = 0.03
 """Expected difference of the grip from that."""
 BOUNDS = np.array([[0.2, 0.0, 0.2], [3.0, 3.0, 0.6]])
-"""Of lift coefficient, lift saturation and grip. With more saturation a turn would say little about
-the spin."""
+"""Bounds of lift coefficient, lift saturation and grip. With more saturation a turn would say
+little about the spin."""
 STARTS = [(lift, saturation, 0.43) for lift in (0.5, 1.0, 1.5) for saturation in (0.5, 2.7)]
 MOST_ROUNDS = 60
 
@@ -88,7 +88,7 @@ class Law:
         )
 
     def spin(self, bounce: RecordedBounce) -> FloatArray:
-        """Of the ball before the bounce (3,) [rad/s]."""
+        """Spin of the ball before the bounce (3,) [rad/s]."""
         speed = np.array([np.linalg.norm(bounce.before)])
         spin: FloatArray = self.air.spins(bounce.turn_before, speed)[0]
         return spin

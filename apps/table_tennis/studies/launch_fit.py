@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..physics.prediction import predict, predict_crossing
-from .flight_fit import FlightFit
-from .launches import Launch
-from .trajectories import BallTrajectory
+from o80_table_tennis.balls.flight_fit import FlightFit
+from o80_table_tennis.balls.launches import Launch
+from o80_table_tennis.balls.trajectories import BallTrajectory
+from o80_table_tennis.physics.prediction import predict, predict_crossing
 
 FloatArray = NDArray[np.float64]
 
@@ -98,7 +98,7 @@ def _predicted(launch: Launch) -> list[float]:
 
 
 def probability_of_same(one: FloatArray, other: FloatArray) -> float:
-    """Of Kolmogorov and Smirnov's test that two samples (N,), (M,) come from one distribution."""
+    """p-value of the two-sample Kolmogorov-Smirnov test for samples (N,) and (M,)."""
     one, other = np.sort(one), np.sort(other)
     places = np.concatenate([one, other])
     below = [np.searchsorted(each, places, side="right") / len(each) for each in (one, other)]

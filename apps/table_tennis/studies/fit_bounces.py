@@ -1,4 +1,4 @@
-"""Fits lift and grip to recorded bounces: `python -m o80_table_tennis.fit_bounces SET...`.
+"""Fits lift and grip to recorded bounces: `python fit_bounces.py SET...`.
 
 Each set is a recording or a folder of them. The table shows how well the velocity along the table
 after each bounce is predicted: without spin, by the constants of the application, and by constants
@@ -16,11 +16,11 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from .balls.bounce_fit import Law, RecordedBounce, errors, fitted
-from .balls.recordings import load_trajectories
-from .balls.trajectories import BallTrajectory
-from .physics.aerodynamics import AERODYNAMICS
-from .world.table import TABLE
+from bounce_fit import Law, RecordedBounce, errors, fitted
+from o80_table_tennis.balls.recordings import load_trajectories
+from o80_table_tennis.balls.trajectories import BallTrajectory
+from o80_table_tennis.physics.aerodynamics import AERODYNAMICS
+from o80_table_tennis.world.table import TABLE
 
 FloatArray = NDArray[np.float64]
 

@@ -1,6 +1,6 @@
-"""Kills each process of a running lab, and looks what the others say: see `kill_table`.
+"""Kills each process of a running lab, and looks what the others say: see `lab_kill_table`.
 
-python -m o80_table_tennis.lab.kills: prints the times, and writes kills.json.
+As a program it prints the times, and writes kills.json.
 """
 
 from __future__ import annotations
@@ -13,20 +13,19 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import numpy as np
+from lab_kill_table import KILLS, SUPERVISOR, Kill, Mark
 
 import o80
-
-from .kill_table import KILLS, SUPERVISOR, Kill, Mark
-from .parts import ENVIRONMENT, NINE, RATES, RECORDER, VIEW, LabSettings
-from .processes import PartEndedError
-from .real_time import Lab
+from o80_table_tennis.lab.parts import ENVIRONMENT, NINE, RATES, RECORDER, VIEW, LabSettings
+from o80_table_tennis.lab.processes import PartEndedError
+from o80_table_tennis.lab.real_time import Lab
 
 WITHIN = 60.0
 """For what takes a fraction of a second on a quiet machine [s]."""
 SAYS_WITHIN = 0.2
 """From the last row of the killed process to the first one that says that it is missing [s]."""
 ROWS_ON = 20
-"""That each process which goes on must still publish."""
+"""Rows that every surviving process must still publish."""
 LOOK = 0.005
 """[s]"""
 
@@ -49,7 +48,7 @@ class Said:
 
 @dataclass
 class Outcome:
-    """What was seen after a kill."""
+    """Observations after a kill."""
 
     killed: str
     ended_at: int = 0
@@ -202,7 +201,7 @@ def wait_until(holds: object, what: str) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    parser = argparse.ArgumentParser(prog="python -m o80_table_tennis.lab.kills")
+    parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--output", type=Path, default=LabSettings().folder)
     parser.add_argument("--prefix", default=LabSettings().prefix)
     given = parser.parse_args(arguments)

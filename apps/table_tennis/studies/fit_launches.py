@@ -1,4 +1,4 @@
-"""Fits the launches of recorded shots: `python -m o80_table_tennis.fit_launches SET [OTHER...]`.
+"""Fits the launches of recorded shots: `python fit_launches.py SET [OTHER...]`.
 
 The distribution is fitted to one half of the first set. Shots drawn from it are compared with the
 other half, and with the other sets, number by number.
@@ -12,7 +12,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from .balls.launch_fit import (
+from launch_fit import (
     LAUNCH,
     NAMES,
     fitted,
@@ -21,9 +21,9 @@ from .balls.launch_fit import (
     recorded_numbers,
     simulated_numbers,
 )
-from .balls.launches import NormalLaunches
-from .balls.recordings import load_trajectories
-from .balls.simulated_shots import drawn_launch
+from o80_table_tennis.balls.launches import NormalLaunches
+from o80_table_tennis.balls.recordings import load_trajectories
+from o80_table_tennis.balls.simulated_shots import drawn_launch
 
 DRAWN = 300
 """Simulated shots that are compared."""

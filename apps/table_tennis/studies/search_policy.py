@@ -1,4 +1,4 @@
-"""The search for the numbers of the hitting policy: `python -m o80_table_tennis.search`.
+"""The search for the numbers of the hitting policy: `python search_policy.py`.
 
 An evolution strategy with one parent and one child: the child is the parent with every number
 changed at random; it becomes the parent if its mean reward is larger. Steps grow after a success
@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
-from .players.found_parameters import FILE, FoundParameters, with_parameters
-from .players.hitting_policy import HittingPolicy, HittingSettings
+from o80_table_tennis.players.found_parameters import FILE, FoundParameters, with_parameters
+from o80_table_tennis.players.hitting_policy import HittingPolicy, HittingSettings
 
 if TYPE_CHECKING:
-    from .environment import TableTennisEnvironment
+    from o80_table_tennis.environment import TableTennisEnvironment
 
 SCALES = {
     "interception.target_x": 0.08,
@@ -37,7 +37,7 @@ SCALES = {
 MOST_BALLS = 80
 """The played shots are spread evenly over so many numbers: there is no end of simulated ones."""
 GROWTH = 1.3
-"""Of the steps after a success; four failures undo it."""
+"""Growth of the steps after a success; four failures undo it."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ def search(
 
 def scoring(environment: TableTennisEnvironment, balls: Sequence[int], seed: int) -> Scoring:
     """Scores parameters by an episode with each of `balls`, always the same ones."""
-    from .playing import play
+    from o80_table_tennis.playing import play
 
     def score(parameters: Parameters) -> Score:
         policy = HittingPolicy(with_parameters(HittingSettings(), parameters))
@@ -111,9 +111,9 @@ def main(
     output: Annotated[Path, typer.Option(help="Where the numbers are written.")] = FILE,
 ) -> None:
     """Searches for numbers with which the hitting policy earns more."""
-    from .balls.sources import balls_from
-    from .environment import TableTennisEnvironment
-    from .settings import TaskSettings
+    from o80_table_tennis.balls.sources import balls_from
+    from o80_table_tennis.environment import TableTennisEnvironment
+    from o80_table_tennis.settings import TaskSettings
 
     def tell(number: int, child: Score, best: Score) -> None:
         print(
@@ -130,7 +130,7 @@ def main(
     with TableTennisEnvironment(task=task) as environment:
         score = scoring(environment, numbers, seed)
         parameters, best = search(score, candidates=candidates, seed=seed, after_each=tell)
-    command = f"python -m o80_table_tennis.search --candidates {candidates} --episodes {episodes}"
+    command = f"python search_policy.py --candidates {candidates} --episodes {episodes}"
     command += f" --seed {seed}" + ("" if balls is None else f" --balls {balls.name}")
     FoundParameters(
         command=command,

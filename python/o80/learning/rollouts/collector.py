@@ -1,0 +1,185 @@
+"""Collects rollouts: plays policies in a vector environment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from types import TracebackType
+from typing import Any, Protocol, Self
+
+import numpy as np
+from gymnasium import Space
+from gymnasium.spaces import Box
+from gymnasium.vector import AutoresetMode, VectorEnv
+from numpy.typing import NDArray
+
+from o80.checked import whole
+from o80.errors import Closed, InvalidArgument
+from o80.learning.rollouts.recorder import EpisodeSums, Recorder
+from o80.learning.rollouts.rollout import Rollout
+
+Make = Callable[[], "VectorEnv[Any, Any, Any]"]
+"""Makes a vector environment in autoreset mode SameStep."""
+
+
+class Policy(Protocol):
+    """Weights, and how to act with them."""
+
+    def sample(
+        self, observations: NDArray[Any], generator: np.random.Generator
+    ) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Actions (N, ...) after observations (N, ...), and their log-probabilities (N,).
+
+        All random numbers must come from `generator`.
+        """
+        ...
+
+
+class Collector:
+    """Collects the rollouts of one vector environment.
+
+    All random numbers follow from (seed, number, iteration): those of the environments from the
+    iteration in which they began, those of the policy from the iteration of the rollout. So the
+    same seed and policies give the same rollouts, bit for bit, in any process.
+
+    After an exception in `collect` the next one begins anew, and repeats the iteration.
+    """
+
+    def __init__(
+        self,
+        make: Make,
+        *,
+        seed: int = 0,
+        number: int = 0,
+        iteration: int = 0,
+        infos: Sequence[str] = (),
+    ) -> None:
+        """make: the vector environment, in autoreset mode SameStep.
+
+        seed: of all random numbers. number: tells collectors of the same seed apart.
+        iteration: the first one; a training that resumes gives the one it has come to.
+        infos: entries of Gymnasium's info that `Rollout.ends` keeps of each episode.
+        """
+        self.seed = whole(seed, "seed", 0)
+        self.number = whole(number, "number", 0)
+        self.iteration = whole(iteration, "iteration", 0)
+        """Iteration of the next `collect`."""
+        self._make, self._infos = make, tuple(infos)
+        self._interrupted = False  # a rollout was begun and not finished
+        self._closed = False
+        self._begin()
+
+    def collect(self, policy: Policy, *, steps: int) -> Rollout:
+        """So many steps of all copies, from where they are; then the next iteration begins."""
+        steps = whole(steps, "steps", 1)
+        self._refuse_if_closed()
+        if self._interrupted:
+            self.restart(self.iteration)
+        self._interrupted = True
+        rollout = self._collected(policy, steps)
+        self._interrupted = False
+        self.iteration += 1
+        return rollout
+
+    def restart(self, iteration: int) -> None:
+        """Begins anew, in `iteration`, with new environments."""
+        self._refuse_if_closed()
+        self.iteration = whole(iteration, "iteration", 0)
+        self._interrupted = True
+        self._environments.close()
+        self._begin()
+        self._interrupted = False
+
+    @property
+    def copies(self) -> int:
+        """How many the environment steps together."""
+        return self._environments.num_envs
+
+    @property
+    def observation_space(self) -> Space[Any]:
+        """Observation space of one copy."""
+        return self._environments.single_observation_space
+
+    @property
+    def action_space(self) -> Space[Any]:
+        """Action space of one copy."""
+        return self._environments.single_action_space
+
+    def close(self) -> None:
+        """Closes the environments; may be called twice."""
+        if not self._closed:
+            self._closed = True
+            self._environments.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _refuse_if_closed(self) -> None:
+        if self._closed:
+            raise Closed("this collector was closed: make a new one")
+
+    def _begin(self) -> None:
+        """Makes the environments and resets them."""
+        self._environments = self._make()
+        try:
+            _refuse_unless_collectable(self._environments)
+            count = self._environments.num_envs
+            self._sums = EpisodeSums(count)
+            # one for each copy, which VectorEnv's own annotation leaves out
+            seeds: Any = environment_seeds(self.seed, self.number, self.iteration, count)
+            self._observations, _ = self._environments.reset(seed=seeds)
+        except BaseException:
+            self._environments.close()
+            raise
+
+    def _collected(self, policy: Policy, steps: int) -> Rollout:
+        environments = self._environments
+        generator = policy_generator(self.seed, self.number, self.iteration)
+        recorder = Recorder(environments, steps, self._infos)
+        for step in range(steps):
+            actions, log_probabilities = policy.sample(self._observations, generator)
+            recorder.acted(step, self._observations, actions, log_probabilities)
+            result = environments.step(_inside(environments.single_action_space, actions))
+            recorder.stepped(step, result, self._sums)
+            self._observations = result[0]
+        return recorder.rollout(self._observations)
+
+
+def environment_seeds(seed: int, number: int, iteration: int, copies: int) -> list[int]:
+    """Seeds of the copies of a collector that begins in `iteration`."""
+    sequence = np.random.SeedSequence((seed, number, iteration, 0))
+    words: list[int] = sequence.generate_state(copies, np.uint64).tolist()
+    return [word >> 1 for word in words]
+
+
+def policy_generator(seed: int, number: int, iteration: int) -> np.random.Generator:
+    """Random generator of the policy in the rollout of `iteration`."""
+    return np.random.default_rng((seed, number, iteration, 1))
+
+
+def _inside(space: Any, actions: NDArray[Any]) -> NDArray[Any]:
+    if isinstance(space, Box):
+        actions = np.clip(actions, space.low, space.high).astype(space.dtype, copy=False)
+    return actions
+
+
+def _refuse_unless_collectable(environments: VectorEnv[Any, Any, Any]) -> None:
+    """Raises InvalidArgument."""
+    mode = environments.metadata.get("autoreset_mode")
+    if mode != AutoresetMode.SAME_STEP:
+        raise InvalidArgument(
+            "rollouts need environments in autoreset mode SameStep, these are in "
+            f"{getattr(mode, 'value', mode)}: make them with autoreset_mode='SameStep' "
+            "(SyncVectorEnv and AsyncVectorEnv: AutoresetMode.SAME_STEP)"
+        )
+    for name in ("single_observation_space", "single_action_space"):
+        space = getattr(environments, name)
+        if space.shape is None or space.dtype is None:
+            raise InvalidArgument(f"rollouts need a {name} of arrays, such as a Box, got {space}")
