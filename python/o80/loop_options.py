@@ -3,7 +3,6 @@
 The one description is in src/robot/loop_options.cpp.
 """
 
-import difflib
 import numbers
 import operator
 import os
@@ -96,5 +95,5 @@ def text_of(value: Any) -> str:
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """Ends an error about an unknown name, if another one is near."""
-    near = difflib.get_close_matches(name, known, n=1)
-    return f". Did you mean '{near[0]}'?" if near else ""
+    near = _core.nearest_name(name, list(known))
+    return f". Did you mean '{near}'?" if near else ""
