@@ -15,7 +15,7 @@ from o80.description import Described, Limit, SchemaWriter
 from o80.enumerations import numbers_of
 from o80.errors import Closed, InvalidArgument, RequestRejected, exception_text
 from o80.layout import Layout, record_of
-from o80.loop_options import loop_texts
+from o80.loop_options import loop_texts, names_of
 from o80.record import Record
 from o80.words import IdleWord, StaleWord
 
@@ -136,22 +136,7 @@ class Backend:
         model: str | os.PathLike[str] | None = None,
         joints: Mapping[str, int | str | tuple[str, int]] | None = None,
     ) -> None:
-        loop = loop_texts(
-            {
-                "frequency": frequency,
-                "bursting": bursting,
-                "history": history,
-                "lanes": lanes,
-                "lane_blocks": lane_blocks,
-                "journal": journal,
-                "permission": permission,
-                "stale": stale,
-                "silence": silence,
-                "max_overruns": max_overruns,
-                "resume": resume,
-                "accept_reading": accept_reading,
-            }
-        )
+        loop = loop_texts(locals(), names_of("backend"))
         requests = mapping(requests, "requests", "names to dtypes or None")
         limits = mapping(limits, "limits", "actuators to limits")
         rests_at = mapping(rests_at, "rests_at", "actuators to fields and values")

@@ -1,10 +1,11 @@
 """Signatures of compiled methods, and error texts for calls with wrong arguments."""
 
-import difflib
 import inspect
 from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
+
+from o80 import _core
 
 
 @cache
@@ -50,14 +51,9 @@ def refuse(
         return
     except TypeError as error:
         text = str(error)
-    near = [
-        close
-        for word in keywords
-        if word not in names
-        for close in difflib.get_close_matches(word, names, 1)
-    ]
-    if near:
-        text += f" (did you mean '{near[0]}'?)"
+    unknown = next((word for word in keywords if word not in names), "")
+    if near := _core.nearest_name(unknown, names):
+        text += f" (did you mean '{near}'?)"
     by_place = sum(p.kind is not p.KEYWORD_ONLY for p in takes.parameters.values()) - 1
     if names and len(arguments) > by_place:
         text += " (give the rest by name)"

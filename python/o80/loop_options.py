@@ -3,14 +3,13 @@
 The one description is in src/robot/loop_options.cpp.
 """
 
-import difflib
 import numbers
 import operator
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, Literal
 
 from o80 import _core
 from o80.errors import InvalidArgument
@@ -37,14 +36,20 @@ def loop_options() -> dict[str, LoopOption]:
     return {fields[0]: LoopOption(*fields) for fields in _core.loop_options()}
 
 
-def loop_texts(given: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Names and texts of the options that are not None.
+def names_of(place: Literal["start", "inline", "backend"]) -> list[str]:
+    """Names of the options that can be given there."""
+    return [option.name for option in loop_options().values() if getattr(option, f"of_{place}")]
 
-    Raises InvalidArgument, which names the option and what is allowed.
+
+def loop_texts(given: Mapping[str, Any], names: Iterable[str]) -> list[tuple[str, str]]:
+    """Names and texts of those of the named options that are not None.
+
+    given: the arguments of a function. Raises InvalidArgument, which names the option and what is
+    allowed.
     """
     texts = []
-    for name, value in given.items():
-        option = loop_options()[name]
+    for name in names:
+        option, value = loop_options()[name], given[name]
         is_empty = option.kind == "list" and hasattr(value, "__len__") and len(value) == 0
         is_off = option.kind == "boolean" and value is False
         if value is None or is_off or is_empty:
@@ -96,5 +101,5 @@ def text_of(value: Any) -> str:
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """Ends an error about an unknown name, if another one is near."""
-    near = difflib.get_close_matches(name, known, n=1)
-    return f". Did you mean '{near[0]}'?" if near else ""
+    near = _core.nearest_name(name, list(known))
+    return f". Did you mean '{near}'?" if near else ""

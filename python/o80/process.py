@@ -1,8 +1,6 @@
 """Starts a robot in a process of its own, and stops it."""
 
-import contextlib
 import os
-import select
 import signal
 import subprocess
 import sys
@@ -12,9 +10,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, Self
-from weakref import WeakSet
 
 from o80 import _core, at_exit
+from o80.child import end_child, ends_within, start_child
 from o80.errors import (
     DriverError,
     Error,
@@ -26,7 +24,6 @@ from o80.errors import (
 from o80.frontend import Frontend
 
 GRACE = 5.0  # [s] for a robot to stop
-COLLECT = 1.0  # [s] for the exit code of a robot that has ended
 LOOK = 0.002  # [s] between checks of a robot that starts
 BAD_OPTIONS = 2  # exit code
 
@@ -44,7 +41,6 @@ class Process:
         self._output = output
         self._owner = os.getpid()
         self.segment = segment  #: name of its segment
-        _started.add(self)
         at_exit.close_later(self)
 
     @property
@@ -77,7 +73,7 @@ class Process:
 
         Raises TimeoutError after `timeout` [s].
         """
-        if not self._ends_within(timeout):
+        if not ends_within(self._own, timeout):
             raise TimeoutError(
                 f"the robot of '{self.segment}' did not end within {timeout} s: stop() ends it"
             )
@@ -88,17 +84,7 @@ class Process:
 
         A `wait` in another thread returns.
         """
-        popen = self._own
-        if popen.stdin is not None:
-            with contextlib.suppress(OSError):
-                popen.stdin.close()
-        if self.alive:
-            popen.send_signal(signal.SIGTERM)
-        if not self._ends_within(timeout):
-            popen.kill()
-        # an interrupt inside Popen may have left its lock taken
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            popen.wait(COLLECT)
+        end_child(self._own, timeout, signal.SIGTERM)
 
     def _check_process(self) -> None:
         if self._owner != os.getpid():
@@ -111,27 +97,6 @@ class Process:
     def _own(self) -> subprocess.Popen[bytes]:
         self._check_process()
         return self._popen
-
-    def _ends_within(self, timeout: float | None) -> bool:
-        """True if it ends within `timeout`. Ctrl-C ends this wait at once, unlike Popen.wait."""
-        if self._own.poll() is not None:
-            return True
-        try:
-            life = os.pidfd_open(self._popen.pid)
-        except ProcessLookupError:  # another thread has collected its exit code meanwhile
-            return True
-        try:
-            end = select.poll()
-            end.register(life, select.POLLIN)
-            return bool(end.poll(None if timeout is None else min(max(timeout, 0.0), 1e6) * 1e3))
-        finally:
-            os.close(life)
-
-    def _let_go(self) -> None:
-        """In a forked child: forgets the process, which ends with the parent."""
-        if self._popen.stdin is not None:
-            self._popen.stdin.close()
-        self._popen.returncode = 0
 
     def _close_at_exit(self) -> None:
         self.stop()
@@ -172,19 +137,6 @@ class Process:
         return f"<o80.robots.Process of '{self.segment}', {state}>"
 
 
-_started: WeakSet[Process] = WeakSet()
-
-
-def _let_go_of_all() -> None:
-    """Closes the inherited pipes: else robots of a killed parent would run as long as the child."""
-    for process in list(_started):
-        process._let_go()
-    _started.clear()
-
-
-os.register_at_fork(after_in_child=_let_go_of_all)
-
-
 def start_process(
     program: Sequence[str | Path],
     segment: str,
@@ -198,16 +150,11 @@ def start_process(
     _refuse_in_import()
     output = tempfile.TemporaryFile()  # noqa: SIM115, it lives as long as the process
     try:
-        popen = subprocess.Popen(
+        popen = start_child(
             [*program, f"--segment={segment}", "--until-eof", *flags],
             env=environment,
-            stdin=subprocess.PIPE,
             stdout=output,
             stderr=subprocess.STDOUT,
-            # A process group of its own: Ctrl-C reaches only this program, which stops the robot in
-            # order. Not a session of its own: the kernel divides processor time between sessions
-            # first, so the robot alone would get as much as all programs that read it.
-            process_group=0,
         )
     except BaseException:
         output.close()

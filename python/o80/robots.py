@@ -24,8 +24,9 @@ from o80.checked import whole
 from o80.errors import DriverError, InvalidArgument
 from o80.frontend import Frontend
 from o80.installation import prefix
-from o80.loop_options import did_you_mean, loop_options, loop_texts, text_of
+from o80.loop_options import did_you_mean, loop_options, loop_texts, names_of, text_of
 from o80.process import Process, start_process
+from o80.words import StaleWord
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -215,7 +216,7 @@ class Robot:
         lane_blocks: int | None = None,
         journal: float | None = None,
         permission: int | None = None,
-        stale: Literal["hold", "purge", "halt", "stop"] | None = None,
+        stale: StaleWord | None = None,
         silence: int | None = None,
         max_overruns: int | None = None,
         gap: float | None = None,
@@ -259,33 +260,13 @@ class Robot:
         docs/options.md lists allowed values and defaults. Returns when the robot runs. Raises
         DriverError with the driver's fault, SegmentTaken, InvalidArgument, TimeoutError.
         """
-        texts = loop_texts(
-            {
-                "frequency": frequency,
-                "bursting": bursting,
-                "history": history,
-                "lanes": lanes,
-                "lane_blocks": lane_blocks,
-                "journal": journal,
-                "permission": permission,
-                "stale": stale,
-                "silence": silence,
-                "max_overruns": max_overruns,
-                "gap": gap,
-                "accept_reading": accept_reading,
-                "resume": resume,
-                "policy": policy,
-                "priority": priority,
-                "cpus": cpus,
-                "lock_memory": lock_memory,
-            }
-        )
+        known = names_of("start")
+        texts = loop_texts(locals(), known)
         switches = {option.name for option in loop_options().values() if option.kind == "boolean"}
         words = [
             f"--{name.replace('_', '-')}" + ("" if name in switches else f"={text}")
             for name, text in texts
         ]
-        known = [option.name for option in loop_options().values() if option.of_start]
         words += [f"--{name}={text}" for name, text in self._config(config, known)]
         return start_process(self._program, segment or self.name, words, timeout, self._environment)
 
@@ -300,7 +281,7 @@ class Robot:
         lane_blocks: int | None = None,
         journal: float | None = None,
         permission: int | None = None,
-        stale: Literal["hold", "purge", "halt", "stop"] | None = None,
+        stale: StaleWord | None = None,
         silence: int | None = None,
         copies: None = None,
         threads: None = None,
@@ -319,7 +300,7 @@ class Robot:
         lane_blocks: int | None = None,
         journal: float | None = None,
         permission: int | None = None,
-        stale: Literal["hold", "purge", "halt", "stop"] | None = None,
+        stale: StaleWord | None = None,
         silence: int | None = None,
         **config: Any,
     ) -> "InlineGroup": ...
@@ -333,7 +314,7 @@ class Robot:
         lane_blocks: int | None = None,
         journal: float | None = None,
         permission: int | None = None,
-        stale: Literal["hold", "purge", "halt", "stop"] | None = None,
+        stale: StaleWord | None = None,
         silence: int | None = None,
         copies: int | None = None,
         threads: "int | InlineGroup | None" = None,
@@ -353,19 +334,8 @@ class Robot:
         Closing the frontend or the group stops the robot. Raises DriverError, SegmentTaken,
         InvalidArgument.
         """
-        texts = loop_texts(
-            {
-                "frequency": frequency,
-                "history": history,
-                "lanes": lanes,
-                "lane_blocks": lane_blocks,
-                "journal": journal,
-                "permission": permission,
-                "stale": stale,
-                "silence": silence,
-            }
-        )
-        known = [option.name for option in loop_options().values() if option.of_inline]
+        known = names_of("inline")
+        texts = loop_texts(locals(), known)
         own = self._config(config, known)
         if copies is not None:
             return self._group(copies, threads, segment, texts, own)

@@ -1,7 +1,9 @@
 """The command line, as a person and as a script would use it."""
 
+import contextlib
 import json
 import os
+import pty
 import pwd
 import signal
 import subprocess
@@ -98,6 +100,54 @@ def test_a_running_robot_is_listed(folder: Path, robot: "subprocess.Popen[str]")
     assert row["frequency"] == 200.0
     assert row["hangs"] is False
     assert row["halted"] == ""
+
+
+def test_a_watched_list_is_printed_again_and_again(
+    folder: Path, robot: "subprocess.Popen[str]"
+) -> None:
+    watching = subprocess.Popen(
+        [O80, "list", "--watch"],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "O80_DIRECTORY": str(folder)},
+    )
+    assert watching.stdout is not None
+    seen = ""
+    while seen.count("two_joints  two_joints") < 2:
+        line = watching.stdout.readline()
+        assert line, seen
+        seen += line
+    watching.send_signal(signal.SIGINT)
+    assert watching.wait(timeout=60) == 130
+    watching.stdout.close()
+    assert "\033[" not in seen
+    said = o80(folder, "list", "--watch", "--json", fails=True)
+    assert "--json prints one list; leave out --watch" in in_a_line(said)
+
+
+def test_a_watched_list_leaves_the_terminal_as_it_was(
+    folder: Path, robot: "subprocess.Popen[str]"
+) -> None:
+    ours, theirs = pty.openpty()
+    watching = subprocess.Popen(
+        [O80, "list", "--watch"],
+        stdout=theirs,
+        stderr=theirs,
+        env={**os.environ, "O80_DIRECTORY": str(folder)},
+    )
+    os.close(theirs)
+    seen = ""
+    while seen.count("last row") < 2:
+        seen += os.read(ours, 4096).decode()
+    watching.send_signal(signal.SIGINT)
+    with contextlib.suppress(OSError):  # the end of a terminal is an error
+        while part := os.read(ours, 4096):
+            seen += part.decode()
+    assert watching.wait(timeout=60) == 130
+    os.close(ours)
+    assert seen.startswith("\033[?1049h")
+    assert seen.rstrip().endswith("\033[?1049l\033[?25h")
+    assert "two_joints" in seen
 
 
 def test_info_describes_a_robot(folder: Path, robot: "subprocess.Popen[str]") -> None:

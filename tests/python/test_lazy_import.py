@@ -1,10 +1,12 @@
 """Modules that `import o80` loads, and that every name is there all the same."""
 
+import ast
+import importlib
 import subprocess
 import sys
+from pathlib import Path
 
 import o80
-from o80 import _LAZY
 
 
 def in_a_fresh_interpreter(program: str) -> str:
@@ -34,8 +36,18 @@ def test_every_public_name_is_there_and_listed() -> None:
     for name in o80.__all__:
         assert getattr(o80, name) is not None
         assert name in dir(o80)
-    # `from o80 import *` must not replace the builtin
-    assert set(_LAZY) - set(o80.__all__) == {"open"}
+    assert "open" not in o80.__all__  # `from o80 import *` must not replace the builtin
+
+
+def test_type_checkers_are_told_the_same_names_from_the_same_modules() -> None:
+    told = {"__version__"}
+    for node in ast.walk(ast.parse(Path(o80.__file__).read_text())):
+        if isinstance(node, ast.ImportFrom):
+            module = importlib.import_module(str(node.module))
+            for name in [alias.name for alias in node.names if alias.asname == alias.name]:
+                assert getattr(o80, name) is getattr(module, name)
+                told.add(name)
+    assert told == set(dir(o80))
 
 
 def test_a_name_that_is_not_there_is_an_attribute_error() -> None:

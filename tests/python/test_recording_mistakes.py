@@ -351,7 +351,3 @@ def test_empty_recordings_are_not_called_equal(tmp_path: Path) -> None:
     Recorder(path, ["nobody"]).finish()
 
     assert "hold no segment" in refused("diff", path, path)
-
-
-def test_an_interval_that_no_clock_holds_is_refused() -> None:
-    assert "interval must be positive" in refused("top", "--interval", "1e300", code=2)

@@ -24,7 +24,6 @@ from o80.cli.run import run
 from o80.cli.save import repair, save
 from o80.cli.stop import stop
 from o80.cli.stub import stub
-from o80.cli.top import top
 from o80.cli.view import view
 
 app = typer.Typer(
@@ -44,7 +43,6 @@ app.command(
     add_help_option=False,
 )(run)
 app.command("list")(list_segments)
-app.command("top")(top)
 app.command("info")(info)
 app.command("stub")(stub)
 app.command("echo")(echo)

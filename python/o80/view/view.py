@@ -9,9 +9,9 @@ import time
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
-from weakref import WeakSet
 
 from o80 import at_exit
+from o80.child import end_child, start_child
 from o80.closeable import Closeable
 from o80.errors import Error, InvalidArgument, TimeoutError
 from o80.frontend import Frontend
@@ -57,13 +57,8 @@ class View(Closeable):
             "control": control,
             "model_files": model_files,
         }
-        self._popen = subprocess.Popen(
-            [sys.executable, "-m", "o80.view", json.dumps(options)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            process_group=0,  # Ctrl-C reaches only this program, which then ends it
-        )
-        _open.add(self)
+        command = [sys.executable, "-m", "o80.view", json.dumps(options)]
+        self._popen = start_child(command, stdout=subprocess.PIPE)
         at_exit.close_later(self)
         try:
             said = self._first_line()
@@ -87,15 +82,9 @@ class View(Closeable):
         """Ends the server; pages say so. May be called twice; does nothing in a forked child."""
         if self._owner != os.getpid():
             return
-        assert self._popen.stdin is not None
-        assert self._popen.stdout is not None
-        self._popen.stdin.close()  # ends it
-        try:
-            self._popen.wait(GRACE)
-        except subprocess.TimeoutExpired:
-            self._popen.kill()
-            self._popen.wait()
-        self._popen.stdout.close()
+        end_child(self._popen, GRACE)
+        if self._popen.stdout is not None:
+            self._popen.stdout.close()
 
     def _first_line(self) -> dict[str, Any]:
         assert self._popen.stdout is not None
@@ -109,27 +98,8 @@ class View(Closeable):
         said: dict[str, Any] = json.loads(line)
         return said
 
-    def _let_go(self) -> None:
-        for pipe in (self._popen.stdin, self._popen.stdout):
-            if pipe is not None:
-                pipe.close()
-        self._popen.returncode = 0
-
     def __repr__(self) -> str:
         return f"<o80.View on port {self.port}, {'open' if self.alive else 'closed'}>"
-
-
-_open: WeakSet[View] = WeakSet()
-
-
-def _let_go_of_all() -> None:
-    """In a forked child: closes the pipes, so that the views end with the parent."""
-    for view in list(_open):
-        view._let_go()
-    _open.clear()
-
-
-os.register_at_fork(after_in_child=_let_go_of_all)
 
 
 def _several(what: What | Iterable[What]) -> Iterable[What]:

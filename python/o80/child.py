@@ -1,0 +1,73 @@
+"""Child processes that end when their standard input does, so with this process."""
+
+import contextlib
+import os
+import select
+import signal
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+from weakref import WeakSet
+
+COLLECT = 1.0  # [s] for the exit code of a process that has ended
+
+_children: WeakSet["subprocess.Popen[bytes]"] = WeakSet()
+
+
+def start_child(command: Sequence[str | Path], **options: Any) -> "subprocess.Popen[bytes]":
+    """Starts a program that ends at the end of its standard input. options: of Popen.
+
+    In a forked child its pipes are closed, so that it ends with the parent.
+    """
+    # A process group of its own: Ctrl-C reaches only this program, which ends the child in order.
+    # Not a session of its own: the kernel divides processor time between sessions first, so a robot
+    # alone would get as much as all programs that read it.
+    child = subprocess.Popen(command, stdin=subprocess.PIPE, process_group=0, **options)
+    _children.add(child)
+    return child
+
+
+def ends_within(child: "subprocess.Popen[bytes]", timeout: float | None) -> bool:
+    """True if it ends within `timeout`. Ctrl-C ends this wait at once, unlike Popen.wait."""
+    if child.poll() is not None:
+        return True
+    try:
+        life = os.pidfd_open(child.pid)
+    except ProcessLookupError:  # another thread has collected its exit code meanwhile
+        return True
+    try:
+        end = select.poll()
+        end.register(life, select.POLLIN)
+        return bool(end.poll(None if timeout is None else min(max(timeout, 0.0), 1e6) * 1e3))
+    finally:
+        os.close(life)
+
+
+def end_child(
+    child: "subprocess.Popen[bytes]", grace: float, also: signal.Signals | None = None
+) -> None:
+    """Ends its standard input, sends a signal `also`, and kills it after `grace` [s]."""
+    if child.stdin is not None:
+        with contextlib.suppress(OSError):
+            child.stdin.close()
+    if also is not None:
+        child.send_signal(also)
+    if not ends_within(child, grace):
+        child.kill()
+    # an interrupt inside Popen may have left its lock taken
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        child.wait(COLLECT)
+
+
+def _leave_to_parent() -> None:
+    """Closes the inherited pipes: else children of a killed parent would run as long as this."""
+    for child in list(_children):
+        for pipe in (child.stdin, child.stdout):
+            if pipe is not None:
+                pipe.close()
+        child.returncode = 0
+    _children.clear()
+
+
+os.register_at_fork(after_in_child=_leave_to_parent)
